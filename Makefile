@@ -1,0 +1,99 @@
+# The one door: `make help` lists what there is. Needs make and a Python 3.11 or newer, no compiler.
+
+MODEL ?= fourbar3
+
+# What `make run` draws: the swing of the follower for the four-bars, the energy for all else.
+QUANTITY_fourbar3 := follower.r.y
+QUANTITY ?= $(or $(QUANTITY_$(notdir $(MODEL))),energy.total)
+
+# Runs are named after the model, also where MODEL is a path. Recipes quote what may hold a space.
+RUN := runs/$(basename $(notdir $(MODEL)))
+
+# Paths are relative, so that the folder of the project may have any name.
+override VENV := .venv
+PYTHON := $(VENV)/bin/python
+PIP := $(PYTHON) -m pip --disable-pip-version-check
+INSTALL := $(PIP) install --quiet --only-binary=:all:
+PYTHON3 ?= python3 python3.13 python3.12 python3.11 python3.14 python
+
+CHECK_PYTHON := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
+
+.DELETE_ON_ERROR:
+.PHONY: help run install test test-all verify unit-nojit lint format bench clean
+
+help:  ## show this list
+	@echo "make TARGET, where TARGET is one of"
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-12s %s\n", $$1, $$2}' Makefile
+	@echo "make run MODEL=NAME takes another model (folders of models/), QUANTITY=NAME draws another curve."
+
+run: $(VENV)/.installed  ## simulate MODEL (fourbar3), write runs/MODEL.nc and a picture of it
+	@mkdir -p runs
+	@$(VENV)/bin/dap3d run "$(MODEL)" -o "$(RUN).nc" --force
+	@$(VENV)/bin/dap3d plot "$(RUN).nc" "$(QUANTITY)" -o "$(RUN).png" --force
+
+install: $(VENV)/.installed  ## put dap3d into .venv, editable (what run, test and lint do themselves)
+
+test: $(VENV)/.installed-test  ## the quick tests
+	@$(PYTHON) -m pytest -m "not slow"
+
+test-all: $(VENV)/.installed-test  ## all tests, the slow verification as well
+	@$(PYTHON) -m pytest
+
+verify: $(VENV)/.installed-test  ## the slow verification alone
+	@$(PYTHON) -m pytest -m slow
+
+unit-nojit: $(VENV)/.installed-test  ## unit tests with kernels as plain Python, and their coverage
+	@NUMBA_DISABLE_JIT=1 $(PYTHON) -m coverage run -m pytest tests/unit
+	@$(PYTHON) -m coverage report
+
+# All checks run, also after one has failed; the last line says which.
+lint: $(VENV)/.installed-dev  ## format, lint, types, floors, sizes
+	@failed=""; \
+	check() { name="$$1"; shift; echo "-- $$name"; "$$@" || failed="$$failed $$name"; }; \
+	check format $(PYTHON) -m ruff format --check .; \
+	check ruff $(PYTHON) -m ruff check .; \
+	check mypy $(PYTHON) -m mypy; \
+	check floors $(VENV)/bin/lint-imports; \
+	check sizes $(PYTHON) tools/check_sizes.py; \
+	if [ -n "$$failed" ]; then echo "lint failed:$$failed" >&2; exit 1; fi; \
+	echo "lint: all clean"
+
+format: $(VENV)/.installed-dev  ## let ruff format and repair what it can
+	@$(PYTHON) -m ruff format .
+	@$(PYTHON) -m ruff check --fix .
+
+bench: $(VENV)/.installed  ## measure speed against error (benchmarks/run.py)
+	@$(PYTHON) benchmarks/run.py
+
+clean:  ## remove caches, builds and coverage (.venv and runs stay)
+	@rm -rf build dist htmlcov .coverage .coverage.*
+	@rm -rf .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	@find src plugins tests models benchmarks tools -name __pycache__ -type d -prune \
+	    -exec rm -rf {} + 2>/dev/null || true
+
+# Each stamp is redone when pyproject.toml changes. They hang on one another, so that `make -j`
+# never runs two installs at once.
+$(VENV)/.installed: pyproject.toml $(PYTHON)
+	@echo "Installing dap3d into .venv; the first time takes a minute ..."
+	@$(PYTHON) -m pip --version >/dev/null 2>&1 || $(PYTHON) -m ensurepip >/dev/null
+	@$(INSTALL) -e .
+	@touch $@
+
+$(VENV)/.installed-test: $(VENV)/.installed
+	@echo "Installing what the tests need ..."
+	@$(INSTALL) -e ".[test]"
+	@touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.installed-test
+	@echo "Installing what the checks need ..."
+	@$(INSTALL) -e ".[dev]"
+	@touch $@
+
+$(PYTHON):
+	@for python in $(PYTHON3); do \
+	    if "$$python" -c '$(CHECK_PYTHON)' >/dev/null 2>&1; then \
+	        "$$python" -m venv --clear $(VENV) && exit 0; \
+	    fi; \
+	done; \
+	echo "dap3d needs Python 3.11 or newer with its venv module; none of these is one: $(PYTHON3)." \
+	    "Install one, or name it: make run PYTHON3=/path/to/python3" >&2; exit 1

@@ -1,0 +1,17 @@
+"""How things are timed here: medians of interleaved runs."""
+
+import statistics
+import time
+
+
+def median_seconds(functions, repeats=7):
+    """Median seconds of each function, called in turn (A B A B ...), so that drift of the machine hits all alike."""
+    found = [[] for _ in functions]
+    for function in functions:
+        function()
+    for _ in range(repeats):
+        for times, function in zip(found, functions, strict=True):
+            start = time.perf_counter()
+            function()
+            times.append(time.perf_counter() - start)
+    return [statistics.median(times) for times in found]

@@ -1,0 +1,1 @@
+"""The standard joints, one file each. They use only what any third party may use."""

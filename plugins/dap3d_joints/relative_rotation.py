@@ -1,0 +1,42 @@
+"""Relative rotation driver: prescribes how fast one body turns against another about an axis."""
+
+from dap3d_core.interface import Body, Joint, Vector, body, function, hookimpl, vector
+from dap3d_core.kernels import cross, dot, neg, row
+
+interface_version = 1
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+class RelativeRotation(Joint):
+    """The angular velocity of body j relative to body i along a_j is f_dot(t) (manual: ``rel-rot``; spec 4.7).
+
+    One row, of the velocity level alone; without a function it locks the relative rotation:
+
+        J v   = a_j . (w_j - w_i) = f_dot = nu
+        J_i   = [0, -a_j^T],  J_j = [0, a_j^T]
+        gamma = f_ddot - a_j . (w_j x w_i)
+
+    With ground as body j a positive f_dot turns body i by -f_dot about a_j.
+    """
+
+    keyword, rows, holonomic = "rel-rot", 1, False
+    body_i: Body = body(doc="body whose rotation the driver is measured from")
+    body_j: Body = body(default="ground", doc="body that is turned")
+    a_j: Vector = vector(doc="axis, on body j")
+    function: str = function(doc="angle as a function of time; only its rates are used")
+
+    def J(a_j):
+        return row(ZERO, neg(a_j)), row(ZERO, a_j)
+
+    def nu(f_dot):
+        return f_dot
+
+    def gamma(a_j, w_i, w_j, f_ddot):
+        return f_ddot - dot(a_j, cross(w_j, w_i))
+
+
+@hookimpl
+def dap3d_joints():
+    """The joint types of this module."""
+    return [RelativeRotation]

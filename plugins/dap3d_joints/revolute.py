@@ -1,0 +1,55 @@
+"""Revolute joint: two bodies share a point and an axis through it."""
+
+from dap3d_core.interface import Joint, Point, Vector, hookimpl, point, vector
+from dap3d_core.kernels import add, cross, dot, eye, hstack, neg, normals, row, skew, sub
+
+interface_version = 1
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+class Revolute(Joint):
+    """Point P_i stays on P_j and axis a_i along a_j; one rotation is left free (manual: ``rev``; spec 3.1, 3.2, 4.2).
+
+    n_j and m_j complete a_j to a triad on body j. Rows 1 to 3 are those of the spherical joint; rows 4 and 5, for
+    b = n_j and b = m_j, keep the axes parallel:
+
+        C     = a_i . b
+        J_i   = [0, (a_i x b)^T],  J_j = [0, -(a_i x b)^T]
+        gamma = (a_i_dot x b + a_i x b_dot) . (w_j - w_i)
+
+    The manual writes a_j for a_i in rows 4 and 5, the same on the constraint manifold only; these are exact.
+    """
+
+    keyword, rows = "rev", 5
+    P_i: Point = point(doc="point on the axis, on body i")
+    P_j: Point = point(doc="point on the axis, on body j")
+    a_i: Vector = vector(doc="axis on body i")
+    a_j: Vector = vector(doc="axis on body j")
+
+    def prepare(self, bodies):
+        n, m = normals(self.a_j)
+        return {"n_j": n, "m_j": m}
+
+    def C(r_P_i, r_P_j, a_i, n_j, m_j):
+        return (*sub(r_P_j, r_P_i), dot(a_i, n_j), dot(a_i, m_j))
+
+    def J(s_P_i, s_P_j, a_i, n_j, m_j):
+        n, m = cross(a_i, n_j), cross(a_i, m_j)
+        return (
+            (*hstack(eye(-1.0), skew(s_P_i)), row(ZERO, n), row(ZERO, m)),
+            (*hstack(eye(1.0), skew(neg(s_P_j))), row(ZERO, neg(n)), row(ZERO, neg(m))),
+        )
+
+    def gamma(s_P_i, s_P_j, a_i, n_j, m_j, a_i_dot, n_j_dot, m_j_dot, w_i, w_j):
+        w = sub(w_j, w_i)
+        n_dot = add(cross(a_i_dot, n_j), cross(a_i, n_j_dot))
+        m_dot = add(cross(a_i_dot, m_j), cross(a_i, m_j_dot))
+        point_rows = sub(cross(w_i, cross(w_i, s_P_i)), cross(w_j, cross(w_j, s_P_j)))
+        return (*point_rows, dot(n_dot, w), dot(m_dot, w))
+
+
+@hookimpl
+def dap3d_joints():
+    """The joint types of this module."""
+    return [Revolute]

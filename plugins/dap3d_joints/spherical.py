@@ -1,0 +1,36 @@
+"""Spherical joint: point P_i of body i and point P_j of body j stay together."""
+
+from dap3d_core.interface import Joint, Point, hookimpl, point
+from dap3d_core.kernels import cross, eye, hstack, neg, skew, sub
+
+interface_version = 1
+
+
+class Spherical(Joint):
+    """Point P_i stays on point P_j; the three rotations are left free (manual: ``sph``; spec 3.1).
+
+    Rows 1 to 3, with s the arms from the mass centres to the points:
+
+        C     = r_Pj - r_Pi
+        J_i   = [-I, s_i~],  J_j = [I, -s_j~]
+        gamma = w_i x (w_i x s_i) - w_j x (w_j x s_j)
+    """
+
+    keyword, rows = "sph", 3
+    P_i: Point = point(doc="point on body i")
+    P_j: Point = point(doc="point on body j")
+
+    def C(r_P_i, r_P_j):
+        return sub(r_P_j, r_P_i)
+
+    def J(s_P_i, s_P_j):
+        return hstack(eye(-1.0), skew(s_P_i)), hstack(eye(1.0), skew(neg(s_P_j)))
+
+    def gamma(s_P_i, s_P_j, w_i, w_j):
+        return sub(cross(w_i, cross(w_i, s_P_i)), cross(w_j, cross(w_j, s_P_j)))
+
+
+@hookimpl
+def dap3d_joints():
+    """The joint types of this module."""
+    return [Spherical]

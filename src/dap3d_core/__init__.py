@@ -1,0 +1,69 @@
+"""dap3d: the motion of rigid bodies joined by joints, springs and drivers in three dimensions.
+
+    import dap3d_core as dap
+    result = dap.simulate(dap.load("pen1"), t_end=2.0)
+    result.r, result.reaction("J1")["i"].force, result.ledger["energy"]
+
+Every public name is here; each is imported when it is first used, so that importing the package costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dap3d_core.interface import PluginError
+    from dap3d_core.plot import plot
+    from dap3d_core.registry import load_registry
+    from dap3d_core.result import Result
+    from dap3d_core.scene import Scene, SceneError, load, shipped_models
+    from dap3d_core.simulation import AssemblyError, RedundantError, SimulationError, simulate
+    from dap3d_core.simulation import compile_scene as compile
+    from dap3d_core.simulation import open_result as open
+
+_HOMES = {
+    "AssemblyError": ("simulation", "AssemblyError"),
+    "PluginError": ("interface", "PluginError"),
+    "RedundantError": ("simulation", "RedundantError"),
+    "Result": ("result", "Result"),
+    "Scene": ("scene", "Scene"),
+    "SceneError": ("scene", "SceneError"),
+    "SimulationError": ("simulation", "SimulationError"),
+    "compile": ("simulation", "compile_scene"),
+    "load": ("scene", "load"),
+    "load_registry": ("registry", "load_registry"),
+    "open": ("simulation", "open_result"),
+    "plot": ("plot", "plot"),
+    "shipped_models": ("scene", "shipped_models"),
+    "simulate": ("simulation", "simulate"),
+}
+
+__all__ = [
+    "AssemblyError",
+    "PluginError",
+    "RedundantError",
+    "Result",
+    "Scene",
+    "SceneError",
+    "SimulationError",
+    "compile",
+    "load",
+    "load_registry",
+    "open",
+    "plot",
+    "shipped_models",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    floor, attribute = _HOMES[name]
+    value = getattr(import_module(f"dap3d_core.{floor}"), attribute)
+    if name != "plot":  # a module of that name stands beside it
+        globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,1 @@
+"""The assembly floor: positions -> C, J; velocities -> nu, gamma; forces."""

@@ -1,0 +1,132 @@
+"""From a state to bodies, functions, forces, rows: what every formulation evaluates.
+
+The integrated state y has the order of u, with the angular velocity in body axes, and one number more: the work done
+on the system (docs/decisions/0002). It reads r, p of all bodies; v, w' of all bodies; work.
+"""
+
+from dap3d_core.kernels.cache import compiled
+
+
+@compiled
+def place_bodies(y, body, metric):
+    """Poses and velocities of the bodies of a state: fills body (r, A, v, w, p) and B = A U of metric."""
+    n = body.shape[0] - 1
+    for b in range(1, n + 1):
+        c, f = 7 * (b - 1), 7 * n + 6 * (b - 1)
+        s, k = body[b], metric[b]
+        e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
+        h = 1.0 / (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3) ** 0.5
+        e0, e1, e2, e3 = e0 * h, e1 * h, e2 * h, e3 * h
+        a00, a01, a02 = 1.0 - 2.0 * (e2 * e2 + e3 * e3), 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)
+        a10, a11, a12 = 2.0 * (e1 * e2 + e0 * e3), 1.0 - 2.0 * (e1 * e1 + e3 * e3), 2.0 * (e2 * e3 - e0 * e1)
+        a20, a21, a22 = 2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)
+        w0, w1, w2 = y[f + 3], y[f + 4], y[f + 5]
+        s[0], s[1], s[2] = y[c], y[c + 1], y[c + 2]
+        s[3], s[4], s[5] = a00, a01, a02
+        s[6], s[7], s[8] = a10, a11, a12
+        s[9], s[10], s[11] = a20, a21, a22
+        s[12], s[13], s[14] = y[f], y[f + 1], y[f + 2]
+        s[15] = a00 * w0 + a01 * w1 + a02 * w2
+        s[16] = a10 * w0 + a11 * w1 + a12 * w2
+        s[17] = a20 * w0 + a21 * w1 + a22 * w2
+        s[18], s[19], s[20], s[21] = e0, e1, e2, e3
+        u00, u01, u02, u11, u12, u22 = k[1], k[2], k[3], k[4], k[5], k[6]
+        k[7], k[8], k[9] = a00 * u00, a00 * u01 + a01 * u11, a00 * u02 + a01 * u12 + a02 * u22
+        k[10], k[11], k[12] = a10 * u00, a10 * u01 + a11 * u11, a10 * u02 + a11 * u12 + a12 * u22
+        k[13], k[14], k[15] = a20 * u00, a20 * u01 + a21 * u11, a20 * u02 + a21 * u12 + a22 * u22
+
+
+@compiled
+def call_loops(first, last, t, body, F, idx, par, groups, loops, out1, out2, out3):
+    """Call the group loops from first to last - 1."""
+    for q in range(first, last):
+        loop = loops[q]
+        loop(t, body, F, idx, par, groups[q, 0], groups[q, 1], groups[q, 2], out1, out2, out3)
+
+
+@compiled
+def zero(values):
+    """Fill with zeros (a slice assignment would compile numpy's error messages)."""
+    for k in range(values.shape[0]):
+        values[k] = 0.0
+
+
+@compiled
+def scale_forces(body, metric, force):
+    """Power of the applied forces; then ``force`` becomes the right-hand side of the bodies in scaled coordinates.
+
+    Per body (f, n) becomes (f / sqrt(m), B^T n - U^T (w' x J' w')), the gyroscopic moment included.
+    """
+    power = 0.0
+    for b in range(1, body.shape[0]):
+        s, k, o = body[b], metric[b], 6 * b
+        f0, f1, f2, n0, n1, n2 = force[o], force[o + 1], force[o + 2], force[o + 3], force[o + 4], force[o + 5]
+        power += f0 * s[12] + f1 * s[13] + f2 * s[14] + n0 * s[15] + n1 * s[16] + n2 * s[17]
+        w0 = s[3] * s[15] + s[6] * s[16] + s[9] * s[17]
+        w1 = s[4] * s[15] + s[7] * s[16] + s[10] * s[17]
+        w2 = s[5] * s[15] + s[8] * s[16] + s[11] * s[17]
+        h0 = s[23] * w0 + s[24] * w1 + s[25] * w2
+        h1 = s[26] * w0 + s[27] * w1 + s[28] * w2
+        h2 = s[29] * w0 + s[30] * w1 + s[31] * w2
+        g0, g1, g2 = w1 * h2 - w2 * h1, w2 * h0 - w0 * h2, w0 * h1 - w1 * h0
+        force[o], force[o + 1], force[o + 2] = f0 * k[0], f1 * k[0], f2 * k[0]
+        force[o + 3] = k[7] * n0 + k[10] * n1 + k[13] * n2 - k[1] * g0
+        force[o + 4] = k[8] * n0 + k[11] * n1 + k[14] * n2 - (k[2] * g0 + k[4] * g1)
+        force[o + 5] = k[9] * n0 + k[12] * n1 + k[15] * n2 - (k[3] * g0 + k[5] * g1 + k[6] * g2)
+    return power
+
+
+@compiled
+def scale_velocities(body, metric, force):
+    """The velocities of the bodies in scaled coordinates, into ``force``: (sqrt(m) v, L^T w')."""
+    for b in range(1, body.shape[0]):
+        s, k, o = body[b], metric[b], 6 * b
+        w0 = s[3] * s[15] + s[6] * s[16] + s[9] * s[17]
+        w1 = s[4] * s[15] + s[7] * s[16] + s[10] * s[17]
+        w2 = s[5] * s[15] + s[8] * s[16] + s[11] * s[17]
+        force[o], force[o + 1], force[o + 2] = s[12] / k[0], s[13] / k[0], s[14] / k[0]
+        z2 = w2 / k[6]
+        z1 = (w1 - k[5] * z2) / k[4]
+        force[o + 3], force[o + 4], force[o + 5] = (w0 - k[2] * z1 - k[3] * z2) / k[1], z1, z2
+
+
+@compiled
+def rates(y, metric, force, out):
+    """dy/dt of coordinates from y and of velocities from the scaled accelerations in ``force``."""
+    n = metric.shape[0] - 1
+    for b in range(1, n + 1):
+        c, f, o, k = 7 * (b - 1), 7 * n + 6 * (b - 1), 6 * b, metric[b]
+        e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
+        w0, w1, w2 = 0.5 * y[f + 3], 0.5 * y[f + 4], 0.5 * y[f + 5]
+        out[c], out[c + 1], out[c + 2] = y[f], y[f + 1], y[f + 2]
+        out[c + 3] = -e1 * w0 - e2 * w1 - e3 * w2
+        out[c + 4] = e0 * w0 - e3 * w1 + e2 * w2
+        out[c + 5] = e3 * w0 + e0 * w1 - e1 * w2
+        out[c + 6] = -e2 * w0 + e1 * w1 + e0 * w2
+        out[f], out[f + 1], out[f + 2] = k[0] * force[o], k[0] * force[o + 1], k[0] * force[o + 2]
+        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
+        out[f + 3] = k[1] * a0 + k[2] * a1 + k[3] * a2
+        out[f + 4] = k[4] * a1 + k[5] * a2
+        out[f + 5] = k[6] * a2
+
+
+@compiled
+def global_accelerations(metric, force, out):
+    """v_dot (6 n: r_ddot, omega_dot in global axes) from the scaled accelerations: omega_dot = B a."""
+    for b in range(1, metric.shape[0]):
+        o, k = 6 * b, metric[b]
+        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
+        for c in range(3):
+            out[o - 6 + c] = k[0] * force[o + c]
+            out[o - 3 + c] = k[7 + 3 * c] * a0 + k[8 + 3 * c] * a1 + k[9 + 3 * c] * a2
+
+
+@compiled
+def largest(values):
+    """Largest magnitude; NaN where one is NaN."""
+    found = 0.0
+    for k in range(values.shape[0]):
+        size = abs(values[k])
+        if not size <= found:
+            found = size
+    return found

@@ -1,0 +1,188 @@
+"""``dap3d describe``: a type of joint, force or function, its fields and its equations."""
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dap3d_core.cli.exits import DONE, Refused
+from dap3d_core.cli.group import Command
+
+if TYPE_CHECKING:
+    from dap3d_core.registry import Registry
+
+
+@click.command(cls=Command, short_help="Explain a type: equations, fields, an example.")
+@click.argument("keyword")
+@click.option("--names", is_flag=True, help="Also list the names that its kernels may use.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+def describe(keyword: str, *, names: bool, as_json: bool) -> int:
+    """Explain the type with a KEYWORD: equations, fields, units, defaults, an example.
+
+    A keyword may belong to a joint, a force and a function; all of them are shown.
+    """
+    import dap3d_core as dap
+    from dap3d_core.cli.rendering import output, print_json
+
+    registry = dap.load_registry()
+    found = [type_facts(registry, kind, keyword) for kind in _kinds(registry, keyword)]
+    if as_json:
+        print_json({"types": found})
+        return DONE
+    console = output()
+    for k, facts in enumerate(found):
+        if k:
+            console.print()
+        _show(console, facts, names=names)
+    return DONE
+
+
+def _kinds(registry: "Registry", keyword: str) -> list[str]:
+    """The kinds that have this keyword."""
+    from dap3d_core.interface.hooks import GROUPS
+    from dap3d_core.registry.spelling import nearest
+
+    known = {kind: registry.keywords(kind) for kind in GROUPS}
+    found = [kind for kind, words in known.items() if keyword in words]
+    if not found:
+        near = nearest(keyword, sorted({w for words in known.values() for w in words}))
+        lists = "; ".join(f"{kind}s: {', '.join(words) or 'none'}" for kind, words in known.items())
+        hint = f"; did you mean {near!r}?" if near else ""
+        raise Refused(f"there is no type {keyword!r}{hint} ({lists})")
+    return found
+
+
+def type_facts(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
+    """What there is to say of a type.
+
+    Raises:
+        PluginError: it cannot be loaded; says why.
+    """
+    import inspect
+
+    from dap3d_core.cli.example import example_of
+    from dap3d_core.interface.checks import where_is
+    from dap3d_core.interface.fields import specs_of
+
+    examined = registry.get(kind, keyword)
+    type_: Any = examined.type
+    slots = examined.layout.slots
+    source = registry.sources[kind, keyword][0]
+    facts: dict[str, Any] = {
+        "kind": kind,
+        "keyword": keyword,
+        "class": type_.__name__,
+        "distribution": source.distribution,
+        "version": source.version,
+        "module": source.module,
+        "file": where_is(type_).removesuffix(f": {type_.__name__}"),
+        "doc": inspect.cleandoc(type_.__doc__ or ""),
+        "bodies": list(slots),
+        "kernels": list(type_.kernels()),
+        "fields": [_field(name, spec) for name, spec in specs_of(type_).items()],
+        "names": [
+            {
+                "name": q.name,
+                "shape": list(q.shape),
+                "level": "velocity" if q.velocity else "position",
+                "doc": q.doc,
+            }
+            for q in examined.names.values()
+        ],
+        "example": example_of(type_),
+    }
+    if kind == "joint":
+        facts["rows"] = type_.rows
+        facts["position_rows"] = len(type_.position_rows())
+        facts["freedoms"] = 6 * max(len(slots) - 1, 1) - type_.rows
+    if kind == "force":
+        facts["each_body"] = bool(type_.each_body)
+    return facts
+
+
+def _field(name: str, spec: Any) -> dict[str, Any]:
+    return {
+        "name": name,
+        "kind": spec.kind,
+        "required": spec.required,
+        "default": None if spec.required else spec.default,
+        "unit": spec.unit,
+        "doc": spec.doc,
+        "allowed": _allowed(spec),
+    }
+
+
+def _allowed(spec: Any) -> str:
+    """What a value must satisfy beyond its kind."""
+    words = []
+    if spec.choices:
+        words.append(", ".join(spec.choices))
+    if spec.positive:
+        words.append("> 0")
+    if spec.minimum is not None:
+        words.append(f">= {spec.minimum:g}")
+    if spec.maximum is not None:
+        words.append(f"<= {spec.maximum:g}")
+    return ", ".join(words)
+
+
+def _show(console: Any, found: dict[str, Any], *, names: bool) -> None:
+    from dap3d_core.cli.rendering import facts, prose, say, show, table, title
+
+    title(console, f"{found['keyword']}, a {found['kind']}")
+    prose(console, found["doc"].replace("``", ""))
+    if not console.wraps:
+        console.print()
+    origin = f"{found['distribution']} {found['version']}".strip() or "the model's own file"
+    pairs = [("acts on", _acts_on(found)), ("from", f"{origin}, {found['module']}")]
+    if found["kind"] == "joint":
+        pairs[:1] = [("rows", _rows(found)), ("bodies", _acts_on(found))]
+    facts(console, pairs)
+    title(console, "fields")
+    if found["fields"]:
+        rows = [(f["name"], f["kind"], _default(f), f["unit"] or "-", _about(f))
+                for f in found["fields"]]  # fmt: skip
+        columns = ("field", "kind", "default", "unit", "meaning")
+        show(console, table(columns, rows, fixed=(0, 1, 3)))
+    else:
+        say(console, "none", indent=2)
+    if names:
+        title(console, f"names for its kernels ({', '.join(found['kernels'])})")
+        offered = [(n["name"], _shape(n["shape"]), n["level"], n["doc"]) for n in found["names"]]
+        show(console, table(("name", "shape", "level", "meaning"), offered, fixed=(0, 1, 2)))
+    title(console, "example")
+    say(console, found["example"].rstrip(), indent=2)
+
+
+def _acts_on(found: dict[str, Any]) -> str:
+    if found["kind"] == "function":
+        return "its argument x, time where a force or joint does not say otherwise"
+    if found.get("each_body"):
+        return "every body of the scene"
+    return f"{', '.join(found['bodies'])}; a field's last letter says whose it is"
+
+
+def _rows(found: dict[str, Any]) -> str:
+    rows, freedoms, bodies = found["rows"], found["freedoms"], len(found["bodies"])
+    words = f"{rows} constraint equation{'s' if rows > 1 else ''}"
+    if found["position_rows"] < rows:
+        words += f", {found['position_rows']} of them at position level"
+    if bodies == 2:
+        words += f"; leaves {freedoms} of 6 freedoms between two bodies"
+    return words
+
+
+def _default(field: dict[str, Any]) -> str:
+    if field["required"]:
+        return "required"
+    default = field["default"]
+    return (
+        "-" if default is None else f"{default:g}" if isinstance(default, float) else str(default)
+    )
+
+
+def _about(field: dict[str, Any]) -> str:
+    return "; ".join(w for w in (field["doc"], field["allowed"]) if w)
+
+
+def _shape(shape: list[int]) -> str:
+    return " x ".join(map(str, shape)) if shape else "number"

@@ -1,0 +1,93 @@
+"""What goes wrong, in words and as an exit code; a traceback only with ``--debug``."""
+
+import contextlib
+import sys
+import traceback
+from typing import Any
+
+from dap3d_core.cli import exits
+from dap3d_core.cli.rendering import Terminal, messages, plain, print_json, say
+
+
+def report(error: BaseException, *, debug: bool, as_json: bool) -> int:
+    """Tell what went wrong, on stderr and with ``as_json`` as one JSON object on stdout.
+
+    Returns:
+        The exit code.
+    """
+    if debug:
+        traceback.print_exception(error, file=sys.stderr)
+    code, words = _judge(error)
+    mistakes = mistakes_of(error)
+    if as_json:
+        found: dict[str, Any] = {"error": words, "exit_code": code}
+        print_json({"mistakes": mistakes, **found} if mistakes else found)
+    with contextlib.suppress(OSError):  # stderr is closed or full: the exit code remains
+        console = messages()
+        if mistakes:
+            _tell_mistakes(console, error)
+        else:
+            say(console, words, "bold red")
+        if code == exits.FAILED and not debug and _is_unexpected(error):
+            say(console, "run the command again with --debug to see where it happened")
+    return code
+
+
+def mistakes_of(error: BaseException) -> list[dict[str, Any]]:
+    """The mistakes of a scene as JSON has them; none for other errors."""
+    from dap3d_core.scene import MISSING, SceneError
+
+    if not isinstance(error, SceneError):
+        return []
+    return [
+        {
+            "file": m.file,
+            "line": m.line,
+            "key": m.key,
+            "value": None if m.value is MISSING else plain(m.value),
+            "what": m.what,
+            "nearest": m.nearest,
+            "remedy": m.remedy,
+        }
+        for m in error.mistakes
+    ]
+
+
+def _tell_mistakes(console: Terminal, error: Any) -> None:
+    number = len(error.mistakes)
+    if number > 1:
+        say(console, f"{number} mistakes:", "bold red")
+    for line in str(error).splitlines():
+        indented = line.startswith("    ")
+        say(console, line.strip(), "" if indented else "red", indent=4 if indented else 0)
+
+
+def _judge(error: BaseException) -> tuple[int, str]:
+    """Exit code and words for an error."""
+    from dap3d_core.interface import PluginError
+    from dap3d_core.scene import SceneError
+
+    if isinstance(error, KeyboardInterrupt):
+        return exits.INTERRUPTED, "interrupted; nothing was computed yet"
+    if isinstance(error, exits.Terminated):
+        return exits.FAILED, f"{error}; nothing was computed yet"
+    if isinstance(error, (SceneError, PluginError, exits.Refused)):
+        return exits.REFUSED, str(error)
+    if isinstance(error, MemoryError):
+        return exits.FAILED, "there is not enough memory for this"
+    if _is_unexpected(error):
+        words = " ".join(str(error).split())
+        return exits.FAILED, f"unexpected {type(error).__name__}" + (f": {words}" if words else "")
+    return exits.FAILED, str(error)
+
+
+def _is_unexpected(error: BaseException) -> bool:
+    """Whether an error is none of those that the library raises on purpose."""
+    if isinstance(error, (OSError, MemoryError, exits.Terminated)):
+        return False
+    # Asked without importing it: what is broken may be the library itself.
+    module = sys.modules.get("dap3d_core.simulation.errors")
+    return module is None or not isinstance(error, module.SimulationError)
+
+
+__all__ = ["mistakes_of", "report"]

@@ -1,0 +1,53 @@
+"""Files that commands read and write, refused before any work is done."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dap3d_core.cli.exits import Refused
+
+if TYPE_CHECKING:
+    from dap3d_core.result import Result
+
+
+def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) -> Path:
+    """A path that can be written to.
+
+    Args:
+        path: what is to be written.
+        force: whether an existing file is overwritten.
+        sources: files that are read, which are never overwritten.
+
+    Raises:
+        Refused: says why, and what to do.
+    """
+    from dap3d_core.result import ResultError
+    from dap3d_core.result.files import check_target
+
+    if not force and path.is_file():
+        raise Refused(f"{path} exists; --force overwrites it, -o writes another file")
+    try:
+        check_target(path, force)
+    except ResultError as error:
+        raise Refused(str(error)) from error
+    for source in sources:
+        if source is not None and path.exists() and source.exists() and path.samefile(source):
+            raise Refused(f"{path} is what is read; name another file with -o")
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise Refused(f"cannot write {path}: no permission to write in its folder; use -o")
+    return path
+
+
+def open_result(path: str) -> "Result":
+    """The result in a file.
+
+    Raises:
+        Refused: it cannot be read; says why.
+    """
+    import dap3d_core as dap
+    from dap3d_core.result import ResultError
+
+    try:
+        return dap.open(path)
+    except ResultError as error:
+        raise Refused(str(error)) from error

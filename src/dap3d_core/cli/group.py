@@ -1,0 +1,144 @@
+"""The group ``dap3d``: its commands, and what all of them have in common.
+
+Nothing here imports numpy, scipy, numba, matplotlib, netCDF4 or rich: commands do, when they run.
+"""
+
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+from dap3d_core.cli import exits
+from dap3d_core.cli.streams import leave_stdout, print_anything
+
+
+class Command(click.Command):
+    """A command with ``--debug``; its failures become messages and exit codes.
+
+    An option that is given twice is refused: taking the last one would be a quiet choice.
+    """
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.params.append(
+            click.Option(["--debug"], is_flag=True, help="Show the traceback of a failure.")
+        )
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse, and refuse options that are given twice."""
+        if not ctx.resilient_parsing:
+            _, _, order = self.make_parser(ctx).parse_args(args=list(args))
+            for option in order:
+                if isinstance(option, click.Option) and order.count(option) > 1:
+                    words = f"the option {' / '.join(option.opts)} is given more than once"
+                    raise click.UsageError(words, ctx)
+        return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; whatever it raises is reported and becomes an exit code."""
+        debug = ctx.params.pop("debug") or bool(ctx.find_root().params.get("debug"))
+        ctx.meta["dap3d.debug"] = debug
+        try:
+            return super().invoke(ctx)
+        except (click.ClickException, click.exceptions.Exit):
+            raise
+        except (Exception, KeyboardInterrupt) as error:
+            from dap3d_core.cli.failures import report
+
+            ctx.exit(report(error, debug=debug, as_json=bool(ctx.params.get("as_json"))))
+
+
+class Group(click.Group):
+    """The group, which knows the right spelling of a command."""
+
+    command_class = Command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command; suggest the nearest where there is none."""
+        name = args[0]
+        if self.get_command(ctx, name) is None and not name.startswith("-"):
+            from dap3d_core.registry.spelling import nearest
+
+            commands = self.list_commands(ctx)
+            near = nearest(name, commands)
+            hint = f"did you mean {near!r}?" if near else f"commands: {', '.join(commands)}"
+            raise click.UsageError(f"there is no command {name!r}; {hint}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """In the order in which one meets them."""
+        return list(self.commands)
+
+
+@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="dap3d", prog_name="dap3d")
+@click.option("--debug", is_flag=True, help="Show the traceback of a failure.")
+def dap3d(debug: bool) -> None:
+    """Simulate the motion of rigid bodies joined by joints, springs and drivers.
+
+    \b
+    dap3d models                  what there is to try
+    dap3d run pen1                simulate, write pen1.nc
+    dap3d plot pen1.nc cone.r.z   draw a curve of it
+
+    MODEL is the name of a shipped model, a folder with a scene.toml, or a TOML file. RESULT is a
+    file that run wrote.
+
+    Exit codes: 0 done; 1 failed, nothing to keep; 2 wrong usage or mistakes in the scene; 3 stopped
+    early, what was computed is saved; 130 interrupted, what was computed is saved.
+    """
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Args:
+        argv: the words after ``dap3d``; by default those of the process.
+    """
+    print_anything()
+    try:
+        code = dap3d.main(
+            args=None if argv is None else list(argv), prog_name="dap3d", standalone_mode=False
+        )
+        sys.stdout.flush()
+    except click.ClickException as error:
+        _tell_usage(error)
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        print("interrupted", file=sys.stderr)
+        return exits.INTERRUPTED
+    except BrokenPipeError:  # the reader has seen enough
+        leave_stdout()
+        return exits.DONE
+    return code if isinstance(code, int) else exits.DONE
+
+
+def _tell_usage(error: click.ClickException) -> None:
+    from dap3d_core.cli.rendering import messages, say
+
+    console = messages()
+    ctx = getattr(error, "ctx", None)
+    if ctx is not None:
+        click.echo(ctx.get_usage(), err=True)
+        say(console, f"Try '{ctx.command_path} --help' for help.\n")
+    say(console, f"Error: {error.format_message()}", "red")
+
+
+def _add_commands() -> None:
+    from dap3d_core.cli.check import check
+    from dap3d_core.cli.describe import describe
+    from dap3d_core.cli.info import info
+    from dap3d_core.cli.models import models
+    from dap3d_core.cli.plot import plot
+    from dap3d_core.cli.plugins import plugins
+    from dap3d_core.cli.post import post
+    from dap3d_core.cli.run import run
+
+    for command in (run, check, models, plugins, describe, info, post, plot):
+        dap3d.add_command(command)
+
+
+_add_commands()

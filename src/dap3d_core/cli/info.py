@@ -1,0 +1,61 @@
+"""``dap3d info``: what a result file holds."""
+
+from pathlib import Path
+
+import click
+
+from dap3d_core.cli.exits import DONE
+from dap3d_core.cli.group import Command
+
+
+@click.command(cls=Command, short_help="Say what a result file holds.")
+@click.argument("result")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+def info(result: str, *, as_json: bool) -> int:
+    """Say what a RESULT file holds and how its run went."""
+    from dap3d_core.cli.facts import facts_of
+    from dap3d_core.cli.files import open_result
+    from dap3d_core.cli.rendering import facts, output, print_json, size, title
+    from dap3d_core.cli.summary import run_pairs, show_ledger, show_remarks
+
+    opened = open_result(result)
+    found = {"file": result, "size_bytes": Path(result).stat().st_size, **facts_of(opened)}
+    subject = opened.subject
+    names = {
+        "body_names": subject.body_names,
+        "joint_names": subject.joint_names,
+        "point_names": subject.point_names,
+    }
+    if as_json:
+        print_json({**found, **names, "scene_text": opened.scene_text})
+        return DONE
+    console = output()
+    versions = ", ".join(f"{name} {number}" for name, number in opened.versions.items())
+    settings = ", ".join(f"{k} {_short(v)}" for k, v in opened.settings.items() if v is not None)
+    title(console, f"{found['scene'] or 'scene without a name'}: {found['status']}")
+    facts(
+        console,
+        [
+            ("file", f"{result}, {size(found['size_bytes'])}"),
+            ("bodies", _some(subject.body_names)),
+            ("joints", _some(subject.joint_names)),
+            ("points", _some(subject.point_names)),
+            *run_pairs(found),
+            ("settings", settings),
+            ("made with", versions),
+        ],
+    )
+    show_ledger(console, found)
+    show_remarks(console, found)
+    return DONE
+
+
+def _some(names: tuple[str, ...], most: int = 12) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def _short(value: object) -> str:
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return f"{value:g}" if isinstance(value, float) else str(value)

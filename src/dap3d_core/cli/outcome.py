@@ -1,0 +1,135 @@
+"""How a run ended, and what is said of it."""
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+
+from dap3d_core.cli import exits
+from dap3d_core.cli.facts import facts_of, remarks_of, violations_of
+from dap3d_core.cli.rendering import (
+    Terminal,
+    facts,
+    items,
+    messages,
+    output,
+    plain,
+    print_json,
+    say,
+    size,
+    title,
+)
+from dap3d_core.cli.summary import run_pairs, show_ledger, show_remarks, show_state
+
+if TYPE_CHECKING:
+    from dap3d_core.result import Result
+    from dap3d_core.simulation import CompiledModel
+
+#: Bodies whose corrected initial conditions are printed; the result has all of them.
+MOST_BODIES = 10
+
+
+@attrs.frozen(eq=False)
+class Outcome:
+    """A run that left a result.
+
+    Attributes:
+        compiled: the model.
+        result: what was computed.
+        code: the exit code, but for ``--strict``.
+        reason: why it ended early; "" where it did not.
+    """
+
+    compiled: "CompiledModel"
+    result: "Result"
+    code: int
+    reason: str
+
+
+def tell(
+    outcome: Outcome, model: str, target: Path, *, strict: bool, as_json: bool, quiet: bool
+) -> int:
+    """Tell how a run ended that was saved; returns the exit code."""
+    found = facts_of(outcome.result)
+    if found["dof"] is None:
+        found["dof"] = outcome.compiled.redundancy(outcome.result.u[0]).rank.dof
+    faults = violations_of(found)
+    code = outcome.code
+    if strict and code == exits.DONE and (faults or remarks_of(found)):
+        code = exits.FAILED
+    if as_json:
+        print_json(
+            {
+                "model": model,
+                "file": str(target),
+                **found,
+                "initial": _initial(outcome),
+                "reason": outcome.reason,
+                "exit_code": code,
+            }
+        )
+    elif not quiet:
+        _show_all(output(), outcome, found, target)
+    if outcome.reason or (quiet and not as_json):
+        _show_faults(messages(), outcome, faults if quiet else [], target)
+    if code != outcome.code:
+        say(messages(), "--strict: there are notes, or the ledger does not close; exit code 1")
+    return code
+
+
+def _show_all(console: Terminal, outcome: Outcome, found: dict[str, Any], target: Path) -> None:
+    words = found["scene"] or "scene without a name"
+    title(console, words if found["status"] == "done" else f"{words}: {found['status']}")
+    if outcome.compiled.scene.description:
+        say(console, str(outcome.compiled.scene.description))
+    facts(console, run_pairs(found))
+    _show_corrected(console, outcome)
+    show_ledger(console, found)
+    show_remarks(console, found)
+    say(console, f"{target} written ({size(target.stat().st_size)}). Next:", whole=True)
+    name = shlex.quote(str(target))
+    body = outcome.result.subject.body_names[0]
+    quantity = shlex.quote(f"{body}.r")
+    for line in (f"dap3d plot {name} {quantity}", f"dap3d info {name}"):
+        say(console, line, "green", indent=2, whole=True)
+
+
+def _show_faults(console: Terminal, outcome: Outcome, faults: list[str], target: Path) -> None:
+    items(console, faults, "red")
+    if outcome.reason:
+        result = outcome.result
+        say(console, outcome.reason, "bold red")
+        last = f"t = {result.t[-1]:.6g} s"
+        say(console, f"what was computed until then, up to {last}, is in {target}")
+
+
+def _show_corrected(console: Terminal, outcome: Outcome) -> None:
+    """The corrected initial conditions, as the manual reports them."""
+    initial = _initial(outcome)
+    if initial is None:
+        return
+    if not initial["changed"]:
+        say(console, "initial conditions: they fulfil the constraints, nothing was changed")
+        return
+    bodies = dict(list(initial["bodies"].items())[:MOST_BODIES])
+    more = len(initial["bodies"]) - len(bodies)
+    show_state(console, "corrected initial conditions (SI, global axes)", bodies, more)
+
+
+def _initial(outcome: Outcome) -> dict[str, Any] | None:
+    """The initial conditions after their correction; None where none was asked for or needed."""
+    import numpy as np
+
+    result = outcome.result
+    if not (result.settings.get("correct") and result.subject.row_count and len(result.t)):
+        return None
+    arrays = {"r": result.r[0], "p": result.p[0], "r_dot": result.rd[0], "w": result.w[0]}
+    given = outcome.compiled.model.u0
+    return {
+        "changed": bool(np.any(np.abs(result.u[0] - given) > 1e-12 * (1.0 + np.abs(given)))),
+        "bodies": {
+            name: {q: plain(values[k]) for q, values in arrays.items()}
+            for k, name in enumerate(result.subject.body_names)
+        },
+    }

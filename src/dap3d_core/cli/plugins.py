@@ -1,0 +1,43 @@
+"""``dap3d plugins``: every type that is installed, and what is wrong with one that is broken."""
+
+import click
+
+from dap3d_core.cli.exits import DONE
+from dap3d_core.cli.group import Command
+
+
+@click.command(cls=Command, short_help="List the installed types.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+def plugins(*, as_json: bool) -> int:
+    """List the types of joints, forces and functions that are installed.
+
+    A type that cannot be loaded is listed with the reason. DAP3D_BLOCK=NAME leaves out the types of
+    a distribution.
+    """
+    import attrs
+
+    import dap3d_core as dap
+    from dap3d_core.cli.rendering import items, output, print_json, show, table, title
+
+    registry = dap.load_registry()
+    found = registry.listing()
+    if as_json:
+        print_json({"types": [attrs.asdict(t) for t in found], "notes": registry.notes})
+        return DONE
+    console = output()
+    rows = [(t.kind or "?", t.keyword or "?", _origin(t), t.module, t.state) for t in found]
+    columns = ("kind", "keyword", "distribution", "module", "state")
+    show(console, table(columns, rows, fixed=(0, 1, 4)))
+    faults = [f"{t.keyword or t.distribution}: {t.reason}" for t in found if t.reason]
+    if faults:
+        title(console, "not usable")
+        items(console, faults, "red")
+    if registry.notes:
+        title(console, "notes")
+        items(console, registry.notes)
+    return DONE
+
+
+def _origin(info: object) -> str:
+    name, version = getattr(info, "distribution", ""), getattr(info, "version", "")
+    return f"{name} {version}".strip() or "-"

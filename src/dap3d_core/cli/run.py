@@ -1,0 +1,203 @@
+"""``dap3d run``: simulate a model and write its result."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dap3d_core.cli import exits
+from dap3d_core.cli.exits import Refused, Terminated
+from dap3d_core.cli.group import Command
+
+if TYPE_CHECKING:
+    from dap3d_core.cli.outcome import Outcome
+    from dap3d_core.scene import Scene
+
+#: Settings of a run that the command line overrides, with the options that do.
+SETTINGS = {
+    "t_end": "--t-end",
+    "dt": "--dt",
+    "method": "--method",
+    "integrator": "--integrator",
+    "rtol": "--rtol",
+    "atol": "--atol",
+    "step": "--step",
+    "correct": "--correct",
+    "project": "--project",
+}
+
+_OPTIONS = (
+    click.option("-o", "--output", type=click.Path(), metavar="FILE",
+                 help="Result file; MODEL.nc in the current folder by default."),
+    click.option("--t-end", type=float, metavar="S",
+                 help="Final time in s; 0 solves once at t = 0."),
+    click.option("--dt", type=float, metavar="S", help="Reporting step in s."),
+    click.option("--method", metavar="NAME",
+                 help="Formulation: auto, unconstrained, standard, penalty, lsq."),
+    click.option("--integrator", metavar="NAME",
+                 help="dop853, dopri5, or rk4 with --step."),
+    click.option("--rtol", type=float, metavar="X", help="Relative tolerance."),
+    click.option("--atol", type=float, metavar="X", help="Absolute tolerance."),
+    click.option("--step", type=float, metavar="S",
+                 help="Fixed step in s, without error control."),
+    click.option("--correct/--no-correct", default=None,
+                 help="Correct the initial conditions so that they fulfil the constraints."),
+    click.option("--project/--no-project", default=None,
+                 help="Bring every step onto the constraints."),
+    click.option("--strict", is_flag=True,
+                 help="Exit with 1 if there are notes or the ledger does not close; the result is "
+                      "saved all the same."),
+    click.option("--force", is_flag=True, help="Overwrite an existing result."),
+    click.option("--allow-code", is_flag=True,
+                 help="Allow the model's own types (plugin.py in its folder) to run."),
+    click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else."),
+    click.option("-q", "--quiet", is_flag=True, help="Print what went wrong alone."),
+)  # fmt: skip
+
+
+def _with_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    for option in reversed(_OPTIONS):
+        function = option(function)
+    return function
+
+
+@click.command(cls=Command, short_help="Simulate a model, write its result.")
+@click.argument("model", required=False)
+@_with_options
+@click.pass_context
+def run(
+    ctx: click.Context,
+    /,
+    model: str | None,
+    *,
+    output: str | None,
+    strict: bool,
+    force: bool,
+    allow_code: bool,
+    as_json: bool,
+    quiet: bool,
+    **given: Any,
+) -> int:
+    """Simulate a MODEL and write its result.
+
+    MODEL is the name of a shipped model (dap3d models), a folder with a scene.toml, or a TOML file.
+    Without it, in a terminal, dap3d asks. What no option says is taken from the scene.
+
+    Ctrl-C ends a run; what was computed until then is saved.
+    """
+    import dap3d_core as dap
+    from dap3d_core.cli.files import writable
+    from dap3d_core.cli.outcome import tell
+
+    if model is None:
+        model, scene, force = _ask(ctx, given, output, force=force)
+    else:
+        scene = dap.load(model)
+    target = writable(_target(model, output), force=force, sources=(scene.path,))
+    _check_settings(scene, given)
+    outcome = _simulate(
+        scene, given, allow_code=allow_code, quiet=quiet, debug=ctx.meta["dap3d.debug"]
+    )
+    try:
+        outcome.result.save(target, force=force)
+    except OSError as error:
+        if outcome.reason:
+            raise OSError(f"{outcome.reason}; and then: {error}") from error
+        raise
+    return tell(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
+
+
+def _ask(
+    ctx: click.Context, given: dict[str, Any], output: str | None, *, force: bool
+) -> tuple[str, "Scene", bool]:
+    """Model, scene and settings by questions, where somebody can answer; whether to overwrite."""
+    import sys
+
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        raise click.UsageError("name a MODEL; dap3d models lists the shipped ones", ctx)
+    from dap3d_core.cli.questions import ask
+
+    model, scene = ask(given)
+    target = _target(model, output)
+    if not force and target.is_file():
+        force = click.confirm(f"{target} exists. Overwrite it?", default=False, err=True)
+    return model, scene, force
+
+
+def _target(model: str, output: str | None) -> Path:
+    """Where the result goes: MODEL.nc in the current folder if nothing else is said."""
+    if output is not None:
+        return Path(output)
+    path = Path(model)
+    if path.is_file():
+        return Path(f"{path.stem}.nc")
+    return Path(f"{path.resolve().name if path.exists() else path.name}.nc")
+
+
+def _check_settings(scene: "Scene", given: dict[str, Any]) -> None:
+    """Refuse what the options say before the model is compiled; names the options."""
+    import attrs
+
+    from dap3d_core.scene import SceneError, check_simulation
+
+    said = {name: value for name, value in given.items() if value is not None}
+    try:
+        check_simulation(attrs.evolve(scene.simulation, **said), scene.bodies)
+    except SceneError as error:
+        about = said.keys() | ({"dt"} if "t_end" in said else set())
+        mistakes = [m for m in error.mistakes if m.key in about]
+        if mistakes:  # others are found again with the whole scene, with their lines
+            raise SceneError(
+                attrs.evolve(m, key=SETTINGS[m.key]) if m.key in said else m for m in mistakes
+            ) from error
+
+
+def _simulate(
+    scene: "Scene", given: dict[str, Any], *, allow_code: bool, quiet: bool, debug: bool
+) -> "Outcome":
+    """Compile and simulate; a run that ends early gives what it computed."""
+    import dap3d_core as dap
+    from dap3d_core.cli.outcome import Outcome
+    from dap3d_core.cli.progress import RunProgress
+    from dap3d_core.cli.signals import Stopping
+
+    with Stopping() as stopping, RunProgress(quiet=quiet) as progress:
+
+        def on_progress(t: float, t_end: float) -> None:
+            progress.advance(t, t_end)
+            stopping.between_chunks()
+
+        try:
+            compiled = dap.compile(
+                scene,
+                method=given["method"],
+                allow_code=allow_code,
+                announce=progress.announce,
+            )
+        except dap.SimulationError as error:  # a method that does not fit the scene
+            raise Refused(str(error)) from error
+        progress.start()
+        try:
+            result = dap.simulate(compiled, progress=on_progress, **given)
+        except (Exception, KeyboardInterrupt) as error:
+            kept = getattr(error, "result", None)
+            if kept is None:
+                raise
+            if debug:
+                import traceback
+
+                traceback.print_exception(error)
+            return Outcome(compiled, kept, *_ending(error))
+        return Outcome(compiled, result, exits.DONE, "")
+
+
+def _ending(error: BaseException) -> tuple[int, str]:
+    """Exit code and reason of a run that ended early and left something to keep."""
+    from dap3d_core.simulation import SimulationError
+
+    if isinstance(error, KeyboardInterrupt):
+        return exits.INTERRUPTED, "interrupted"
+    if isinstance(error, (SimulationError, Terminated)):
+        return exits.PARTIAL, str(error)
+    return exits.PARTIAL, f"{type(error).__name__}: {error} (--debug shows where)"

@@ -1,0 +1,62 @@
+"""Ctrl-C and SIGTERM between two chunks of a run, so that what was computed can be kept."""
+
+import signal
+from types import FrameType, TracebackType
+from typing import Any
+
+from dap3d_core.cli.exits import Terminated
+
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+
+
+class Stopping:
+    """While it lasts, signals end a run in an orderly way.
+
+    Before the run has begun a signal raises at once. After the first ``between_chunks`` it waits
+    for the next one, so that no chunk is lost; a second signal no longer waits. Raises
+    KeyboardInterrupt for Ctrl-C, ``Terminated`` for others.
+    """
+
+    def __init__(self) -> None:
+        self._asked: int | None = None
+        self._patient = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> "Stopping":
+        for name in _NAMES:
+            number = getattr(signal, name, None)
+            if number is None or signal.getsignal(number) is signal.SIG_IGN:  # nohup asked for it
+                continue
+            try:
+                self._before[number] = signal.signal(number, self._handle)
+            except ValueError:  # not the main thread: signals are someone else's affair
+                break
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for number, before in self._before.items():
+            signal.signal(number, before)
+
+    def between_chunks(self) -> None:
+        """Raise what a signal asked for meanwhile; from now on signals wait for this call."""
+        self._patient = True
+        asked, self._asked = self._asked, None
+        if asked is not None:
+            raise _exception(asked)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        if self._patient and self._asked is None:
+            self._asked = number
+        else:
+            raise _exception(number)
+
+
+def _exception(number: int) -> BaseException:
+    if number == signal.SIGINT:
+        return KeyboardInterrupt()
+    return Terminated(f"ended by {signal.Signals(number).name}")

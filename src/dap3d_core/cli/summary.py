@@ -1,0 +1,143 @@
+"""The facts of a run, rendered: 60 columns hold them."""
+
+from typing import Any
+
+from rich.text import Text
+
+from dap3d_core.cli.facts import reason_of, remarks_of, violations_of
+from dap3d_core.cli.rendering import (
+    Terminal,
+    count,
+    items,
+    say,
+    seconds,
+    show,
+    table,
+    title,
+)
+
+
+def run_pairs(found: dict[str, Any]) -> list[tuple[str, str]]:
+    """What was modelled, how it was solved, what it cost: names and words."""
+    return [
+        ("modelled", modelled(found)),
+        ("method", method(found)),
+        ("integrator", integrator(found)),
+        ("simulated", simulated(found)),
+        ("steps", f"{found['steps']:,} taken, {found['rejected']:,} rejected"),
+        ("evaluations", evaluations(found)),
+        ("duration", duration(found)),
+    ]
+
+
+def show_ledger(console: Terminal, found: dict[str, Any]) -> None:
+    """The ledger as a table; what is beyond its limit is explained."""
+    if not found["ledger"]:
+        return
+    title(console, "ledger")
+    rows = []
+    for name, entry in found["ledger"].items():
+        limit = "-" if entry["limit"] is None else f"{entry['limit']:.1e}"
+        rows.append((name, f"{entry['value']:.1e}", limit, _verdict(entry["ok"])))
+    columns = ("quantity", "value", "limit", "ok")
+    show(console, table(columns, rows, right=(1, 2), fixed=(0, 1, 2, 3)))
+    items(console, violations_of(found), "red")
+
+
+def show_notes(console: Terminal, notes: list[str]) -> None:
+    """Notes as a list, under a heading."""
+    if notes:
+        title(console, "notes")
+        items(console, notes)
+
+
+def show_remarks(console: Terminal, found: dict[str, Any]) -> None:
+    """The notes of a run besides the choice of its method."""
+    show_notes(console, remarks_of(found))
+
+
+def modelled(found: dict[str, Any]) -> str:
+    """Bodies, joints, rows, freedoms."""
+    words = count(found["bodies"], "body", "bodies")
+    if found["joints"]:
+        rows = count(found["rows"], "row")
+        words += f", {count(found['joints'], 'joint')} ({rows})"
+    if found["dof"] is not None:
+        words += f"; {count(found['dof'], 'degree')} of freedom".replace("no degrees", "0 degrees")
+    return words
+
+
+def method(found: dict[str, Any]) -> str:
+    """The formulation and why."""
+    reason = reason_of(found)
+    return f"{found['method']}: {reason}" if reason else str(found["method"])
+
+
+def integrator(found: dict[str, Any]) -> str:
+    """The integrator and what controls it."""
+    settings = found["settings"]
+    if settings.get("step"):
+        control = f"steps of {settings['step']:g} s"
+    elif settings.get("rtol") is not None:
+        control = f"rtol {settings['rtol']:g}, atol {settings['atol']:g}"
+    else:
+        control = ""
+    words = ", ".join(w for w in (str(found["integrator"]), control) if w)
+    if found["rows"]:
+        words += ", projected" if settings.get("project") else ", not projected"
+    return words
+
+
+def simulated(found: dict[str, Any]) -> str:
+    """The time span and the number of instants."""
+    if not found["instants"]:
+        return "nothing"
+    span = f"t = {found['t_start']:g} to {found['t_end']:.6g} s"
+    if found["t_start"] == found["t_end"]:
+        span = f"t = {found['t_start']:g} s"
+    return f"{span}, {count(found['instants'], 'instant')} reported"
+
+
+def evaluations(found: dict[str, Any]) -> str:
+    """Right-hand sides and projections."""
+    words = f"{found['rhs']:,} of the right-hand side"
+    return words + (f", {count(found['projections'], 'projection')}" if found["rows"] else "")
+
+
+def duration(found: dict[str, Any]) -> str:
+    """Wall time of the run and of what came before."""
+    return f"{seconds(found['wall_time_s'])}; to prepare {seconds(found['compile_time_s'])}"
+
+
+def _verdict(ok: bool | None) -> Text:
+    if ok is None:
+        return Text("-")
+    return Text("yes", style="green") if ok else Text("NO", style="bold red")
+
+
+def show_state(console: Terminal, title_words: str, bodies: dict[str, Any], more: int) -> None:
+    """Coordinates and velocities of bodies, as the manual reports them.
+
+    Args:
+        console: where.
+        title_words: the heading.
+        bodies: name -> {"r": 3, "p": 4, "r_dot": 3, "w": 3 numbers}.
+        more: how many further bodies there are.
+    """
+    title(console, title_words)
+    rows: list[tuple[str, ...]] = []
+    for name, state in bodies.items():
+        rows.append((name, "", "", "", ""))
+        for symbol, values in state.items():
+            rows.append((f"  {symbol}", *([_short(x) for x in values] + [""])[:4]))
+    show(console, table(("", "x, e0", "y, e1", "z, e2", "e3"), rows, right=(1, 2, 3, 4),
+                        fixed=(1, 2, 3, 4)))  # fmt: skip
+    if more:
+        say(console, f"and {count(more, 'body', 'bodies')} more", indent=2)
+
+
+def _short(x: float) -> str:
+    """A number in at most 10 characters; what is far below any tolerance is zero."""
+    if abs(x) < 1e-12:
+        return "0"
+    return f"{x:.5f}" if 1e-3 <= abs(x) < 1e3 else f"{x:.3e}"

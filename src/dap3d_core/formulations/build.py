@@ -1,0 +1,131 @@
+"""From a model and its elimination plan to the driver's arrays and group loops."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.assembly.system import KINDS, System
+from dap3d_core.interface.writer import stride, write
+from dap3d_core.kernels.gather import BODY_WIDTH, JP, MASS, A, P
+from dap3d_core.kernels.lists import loop_list
+from dap3d_core.kernels.loops import build
+from dap3d_core.linear.plan import Plan
+from dap3d_core.model import Group, Model
+
+
+def build_loops(model: Model, kinds: tuple[str, ...], announce: Callable[[str], None] | None = None) -> Any:
+    """The compiled group loops of a model, only of the kinds asked for, and what they run over.
+
+    Returns:
+        (typed list of loops, [(kind, group)] in the order of the list).
+    """
+    loops, what = [], []
+    for kind in KINDS:
+        if kind not in kinds:
+            continue
+        for group in (*model.functions, *model.forces, *model.joints):
+            loop = write(group.examined, kind)
+            if loop is not None:
+                loops.append(build(loop, announce))
+                what.append((kind, group))
+    return loop_list(loops), what
+
+
+def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> System:
+    """Allocate and fill the driver's arrays.
+
+    Args:
+        model: the model.
+        plan: its elimination program.
+        what: the loops as ``build_loops`` returns them.
+    """
+    n = model.body_count
+    body = np.zeros((n + 1, BODY_WIDTH))
+    body[0, A : A + 9 : 4] = body[0, P] = 1.0
+    body[1:, MASS] = model.mass
+    body[1:, JP : JP + 9] = model.Jp.reshape(n, 9)
+    metric = np.zeros((n + 1, 16))
+    set_metric(metric, model.mass, model.Jp)
+    idx, par, groups, starts = _tables(model, plan, what)
+    return System(
+        body=body,
+        metric=metric,
+        F=np.zeros((model.function_count + 1, 4)),
+        par=par,
+        force=np.zeros(6 * (n + 1)),
+        gamma=np.zeros(plan.row_size),
+        nu=np.zeros(plan.row_size),
+        C=np.zeros(plan.row_size),
+        x=np.zeros(plan.row_size),
+        D=np.zeros(plan.block_size),
+        K=np.zeros(plan.matrix_size),
+        smallest=np.zeros(plan.row_size),
+        settings=np.array([1e-15, 1e-15, 0.0]),
+        idx=idx,
+        groups=groups,
+        kinds=starts,
+        row=rows_of(model, plan),
+        blocks=plan.blocks,
+        targets=plan.targets,
+        contributions=plan.contributions,
+        nodes=plan.nodes,
+        columns=plan.columns,
+        updates=plan.updates,
+        hubs=plan.hubs,
+    )
+
+
+def set_metric(metric: NDArray[np.float64], mass: NDArray[np.float64], Jp: NDArray[np.float64]) -> None:
+    """Fill the constant columns of the metric: 1/sqrt(m) and U = L^-T with J' = L L^T (ground: zero)."""
+    if not len(mass):
+        return
+    metric[1:, 0] = 1.0 / np.sqrt(mass)
+    U = np.linalg.inv(np.linalg.cholesky(Jp)).transpose(0, 2, 1)
+    metric[1:, 1:7] = U[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+
+
+def rows_of(model: Model, plan: Plan) -> NDArray[np.int64]:
+    """(rows,) place of each constraint row of the model in the row vectors."""
+    first = np.repeat(plan.joint_row, model.joint_rows)
+    return first + np.arange(model.row_count) - np.repeat(model.joint_start[:-1], model.joint_rows)
+
+
+def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[Any, Any, Any, Any]:
+    """Integers and numbers of all instances; a group that serves two loops stands there once."""
+    idx: list[NDArray[np.int64]] = []
+    par: list[NDArray[np.float64]] = []
+    at: dict[int, tuple[int, int]] = {}
+    i0 = p0 = 0
+    rows = []
+    for _, group in what:
+        if id(group) not in at:
+            table = _integers_of(group, plan)
+            at[id(group)] = (i0, p0)
+            idx.append(table.ravel())
+            par.append(group.numbers.ravel())
+            i0, p0 = i0 + table.size, p0 + group.numbers.size
+        rows.append((*at[id(group)], group.count))
+    kinds = [kind for kind, _ in what]
+    starts = np.array([sum(KINDS.index(k) < n for k in kinds) for n in range(len(KINDS) + 1)], dtype=np.int64)
+    return (
+        np.concatenate([np.zeros(0, dtype=np.int64), *idx]),
+        np.concatenate([np.zeros(0), *par]),
+        np.array(rows, dtype=np.int64).reshape(-1, 3),
+        starts,
+    )
+
+
+def _integers_of(group: Group, plan: Plan) -> NDArray[np.int64]:
+    """The rows of ``idx`` of a group, as interface/writer.py lays them out."""
+    kind = group.examined.type.kind
+    parts = [group.bodies, group.functions]
+    if kind == "joint":
+        parts.append(plan.joint_row[group.members][:, None])
+        parts.append(np.array([plan.joint_block[m] for m in group.members], dtype=np.int64))
+    elif kind == "function":
+        parts.append(1 + group.members[:, None])
+    table = np.ascontiguousarray(np.hstack(parts), dtype=np.int64)
+    assert table.shape[1] == stride(group.examined)
+    return table

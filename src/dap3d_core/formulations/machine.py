@@ -1,0 +1,161 @@
+"""A model made ready to be evaluated: plan, arrays, group loops and a formulation, and the Python door to them."""
+
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dap3d_core.assembly.evaluate import call_loops, place_bodies
+from dap3d_core.assembly.system import ACCELERATION, POSITION, VALUE, System
+from dap3d_core.formulations import LOOPS, REPORT, RHS, functions_of
+from dap3d_core.formulations.build import build_loops, build_system
+from dap3d_core.linear.plan import Plan, make_plan
+from dap3d_core.model import Model
+from dap3d_core.model.kinematics import split, to_global, to_integrated
+
+Floats = NDArray[np.float64]
+
+
+@attrs.frozen
+class Rows:
+    """The constraint rows of a model at one state, in the order of the model.
+
+    Attributes:
+        C: (rows,) position-level residuals, zero where a row has none.
+        nu, gamma: (rows,) right-hand sides of the velocity and acceleration level.
+        row, column, value: the Jacobian's entries, (rows, 6 n), in no particular order.
+    """
+
+    C: Floats
+    nu: Floats
+    gamma: Floats
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    value: Floats
+    shape: tuple[int, int]
+
+    def dense(self) -> Floats:
+        """The Jacobian D (rows, 6 n)."""
+        D = np.zeros(self.shape)
+        D[self.row, self.column] = self.value
+        return D
+
+    def sparse(self) -> Any:
+        """The Jacobian D (rows, 6 n) as a scipy CSR array."""
+        from scipy.sparse import csr_array
+
+        return csr_array((self.value, (self.row, self.column)), shape=self.shape)
+
+
+#: Pivots are squares of lengths: a hundredth in length of what it was at the start.
+POOR = 1e-4
+
+
+class Machine:
+    """Evaluates one model by one formulation. Not for two threads at once: its arrays are its own.
+
+    Attributes:
+        model, plan, system, loops: what it evaluates.
+        method: name of the formulation.
+        report_size: numbers that ``report`` writes (formulations/standard.py).
+    """
+
+    def __init__(self, model: Model, method: str, announce: Callable[[str], None] | None = None) -> None:
+        """Args:
+        model: what to evaluate.
+        method: "unconstrained" or "standard".
+        announce: called with the name of each group loop that has to be compiled.
+        """
+        self.model = model
+        self.method = method
+        self.plan: Plan = make_plan(model.body_count, model.joint_slots, model.joint_rows.tolist())
+        self.loops, self.what = build_loops(model, LOOPS[method], announce)
+        self.system: System = build_system(model, self.plan, self.what)
+        self.report_size = 6 * model.body_count + model.row_count + 4
+
+    @property
+    def functions(self) -> Any:
+        """The compiled functions (rhs, project, report) as the list that an integrator takes."""
+        return functions_of(self.method)
+
+    def integrated(self, u: ArrayLike) -> Floats:
+        """The integrated state y (13 n + 1,) of a state u (13 n,)."""
+        return to_integrated(np.asarray(u, dtype=float), self.model.body_count)
+
+    def rhs(self, t: float, u: ArrayLike) -> Floats:
+        """du/dt (13 n,) at time t in s and state u (13 n,): r_dot, p_dot of each body, then r_ddot, omega_dot."""
+        n = self.model.body_count
+        y = self.integrated(u)
+        out = np.zeros_like(y)
+        self.functions[RHS](float(t), y, out, self.system, self.loops)
+        w_dot = split(out, n)[3]
+        w_dot[:] = to_global(split(y, n)[1], w_dot)  # omega_dot = A omega'_dot, no extra term
+        return out[: 13 * n]
+
+    def report(self, t: float, u: ArrayLike) -> Floats:
+        """(report_size,) v_dot, lambda, potential energy and the largest residuals of the three levels at a state."""
+        out = np.zeros(self.report_size)
+        self.functions[REPORT](float(t), self.integrated(u), out, self.system, self.loops)
+        return out
+
+    def watch_pivots(self, t: float, u: ArrayLike) -> None:
+        """Remember the pivots at a state u (13 n,): where one falls below POOR of it, the pose is near a singular one.
+
+        The measure is relative to the start because masses of very different size make small pivots, too.
+        """
+        if self.method != "standard" or not self.model.row_count:
+            return
+        from dap3d_core.formulations.standard import linearise
+
+        s = self.system
+        self._place(t, u)
+        s.smallest[:] = 0.0
+        linearise(float(t), s, self.loops, True)
+        for size, first, diagonal, *_ in self.plan.nodes[:-1]:
+            inverse = s.K[diagonal : diagonal + size * size : size + 1]
+            s.smallest[first : first + size] = POOR / inverse**2
+
+    def rows(self, t: float, u: ArrayLike) -> Rows:
+        """All constraint rows at time t and state u (13 n,)."""
+        s = self.system
+        self._place(t, u)
+        s.C[:] = 0.0
+        self._call(POSITION, t, s.C, s.C, s.C)
+        self._call(ACCELERATION, t, s.D, s.gamma, s.nu)
+        row, column, place = self._pattern
+        shape = (self.model.row_count, 6 * self.model.body_count)
+        return Rows(s.C[s.row], s.nu[s.row], s.gamma[s.row], row, column, s.D[place], shape)
+
+    def _place(self, t: float, u: ArrayLike) -> None:
+        s = self.system
+        place_bodies(self.integrated(u), s.body, s.metric)
+        self._call(VALUE, t, s.force, s.force, s.force)
+
+    def _call(self, kind: int, t: float, out1: Floats, out2: Floats, out3: Floats) -> None:
+        s = self.system
+        call_loops(
+            s.kinds[kind], s.kinds[kind + 1], float(t), s.body, s.F, s.idx, s.par, s.groups, self.loops,
+            out1, out2, out3,
+        )  # fmt: skip
+
+    @property
+    def _pattern(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """Row, column and place in D of the Jacobian's entries."""
+        s = self.system
+        blocks = self.plan.blocks
+        heights = blocks[:, 2]
+        count = int(heights.sum())
+        block = np.repeat(np.arange(len(blocks)), heights)
+        within = np.arange(count) - np.repeat(np.cumsum(heights) - heights, heights)
+        model_row = np.zeros(self.plan.row_size, dtype=np.int64)
+        model_row[s.row] = np.arange(self.model.row_count)
+        six = np.arange(6)
+        row = np.repeat(model_row[blocks[block, 3] + within], 6)
+        column = (6 * (blocks[block, 1] - 1)[:, None] + six).ravel()
+        place = ((blocks[block, 0] + 6 * within)[:, None] + six).ravel()
+        return row, column, place
+
+
+__all__ = ["Machine", "Rows"]

@@ -1,0 +1,56 @@
+"""Changes of a state: displacements and changes of velocity given in the bodies' scaled coordinates."""
+
+from dap3d_core.kernels.cache import compiled
+
+
+@compiled
+def normalise(y, n):
+    """Bring the Euler parameters of n bodies to unit length."""
+    for b in range(n):
+        c = 7 * b + 3
+        h = 1.0 / (y[c] * y[c] + y[c + 1] * y[c + 1] + y[c + 2] * y[c + 2] + y[c + 3] * y[c + 3]) ** 0.5
+        for d in range(c, c + 4):
+            y[d] *= h
+
+
+@compiled
+def move(y, metric, force):
+    """Add a scaled displacement to the coordinates: r += dr, p += 1/2 L^T dtheta', of unit length again."""
+    for b in range(1, metric.shape[0]):
+        c, o, k = 7 * (b - 1), 6 * b, metric[b]
+        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
+        w0 = 0.5 * (k[1] * a0 + k[2] * a1 + k[3] * a2)
+        w1 = 0.5 * (k[4] * a1 + k[5] * a2)
+        w2 = 0.5 * k[6] * a2
+        e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
+        for d in range(3):
+            y[c + d] += k[0] * force[o + d]
+        y[c + 3] += -e1 * w0 - e2 * w1 - e3 * w2
+        y[c + 4] += e0 * w0 - e3 * w1 + e2 * w2
+        y[c + 5] += e3 * w0 + e0 * w1 - e1 * w2
+        y[c + 6] += -e2 * w0 + e1 * w1 + e0 * w2
+    normalise(y, metric.shape[0] - 1)
+
+
+@compiled
+def change_velocity(y, metric, force):
+    """Add a scaled change of velocity to the velocities."""
+    n = metric.shape[0] - 1
+    for b in range(1, n + 1):
+        f, o, k = 7 * n + 6 * (b - 1), 6 * b, metric[b]
+        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
+        for d in range(3):
+            y[f + d] += k[0] * force[o + d]
+        y[f + 3] += k[1] * a0 + k[2] * a1 + k[3] * a2
+        y[f + 4] += k[4] * a1 + k[5] * a2
+        y[f + 5] += k[6] * a2
+
+
+@compiled
+def size_of(y, first, count, period, part):
+    """1 + the largest magnitude among the first ``part`` numbers of each ``period``: the scale of a tolerance."""
+    found = 0.0
+    for b in range(count):
+        for c in range(part):
+            found = max(found, abs(y[first + period * b + c]))
+    return 1.0 + found

@@ -1,0 +1,66 @@
+"""The arithmetic of a step: sums over stages, the norm of the error, interpolation.
+
+Loops run over the components innermost, four stages at a time, so that a sum of many stages reads
+and writes its result a few times only; the terms come from ``method.combinations``.
+"""
+
+from dap3d_core.integrators.method import GROUP, GROUPS, TERMS, Floats
+from dap3d_core.kernels.cache import compiled
+
+_LARGEST = 1.7976931348623157e308
+
+
+@compiled
+def combine(
+    out: Floats, share: float, y: Floats, h: float, table: Floats, row: int, k: Floats
+) -> None:
+    """``out = share y + h sum_j weight_j k[j]``; y is added last, which rounds least."""
+    terms = table[row]
+    for group in range(int(terms[GROUPS])):
+        j = TERMS + 2 * GROUP * group
+        w0, w1, w2, w3 = terms[j], terms[j + 1], terms[j + 2], terms[j + 3]
+        j0, j1, j2, j3 = int(terms[j + 4]), int(terms[j + 5]), int(terms[j + 6]), int(terms[j + 7])
+        if group == 0:
+            for i in range(out.size):
+                out[i] = w0 * k[j0, i] + w1 * k[j1, i] + w2 * k[j2, i] + w3 * k[j3, i]
+        else:
+            for i in range(out.size):
+                out[i] += w0 * k[j0, i] + w1 * k[j1, i] + w2 * k[j2, i] + w3 * k[j3, i]
+    for i in range(out.size):
+        out[i] = share * y[i] + h * out[i]
+
+
+@compiled
+def all_finite(x: Floats) -> bool:
+    """Whether no component is infinite or not a number."""
+    bad = 0
+    for i in range(x.size):
+        bad |= not (abs(x[i]) <= _LARGEST)
+    return bad == 0
+
+
+@compiled
+def scaled_largest(x: Floats, y0: Floats, y1: Floats, size: int, rtol: float, atol: float) -> float:
+    """``max_i |x_i| / (atol + rtol max(|y0_i|, |y1_i|))`` over the first ``size`` components; NaN where one is NaN."""
+    largest = 0.0
+    for i in range(size):
+        a, b = abs(y0[i]), abs(y1[i])
+        ratio = abs(x[i]) / (atol + rtol * (a if a > b else b))
+        if not ratio <= largest:
+            largest = ratio
+    return largest
+
+
+@compiled
+def interpolate(out: Floats, terms: Floats, theta: float) -> None:
+    """Dense output at ``t + theta h`` out of its terms r (rows):
+
+    ``r0 + theta (r1 + (1 - theta) (r2 + theta (r3 + (1 - theta) (r4 + ...))))``, HNW I (II.6.12).
+    """
+    last = terms.shape[0] - 1
+    for i in range(out.size):
+        out[i] = terms[last, i]
+    for row in range(last - 1, -1, -1):
+        factor = theta if row % 2 == 0 else 1.0 - theta
+        for i in range(out.size):
+            out[i] = terms[row, i] + factor * out[i]

@@ -1,0 +1,214 @@
+"""One integration, seen from Python: set up, advanced in chunks, drained of its rows."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dap3d_core.integrators import work as at
+from dap3d_core.integrators.control import FLOOR
+from dap3d_core.integrators.method import Floats, Method, combinations
+from dap3d_core.integrators.runge_kutta import advance
+from dap3d_core.integrators.work import Function, Status, Work
+from dap3d_core.kernels.cache import jit_is_on
+
+#: Least scale of an error: at atol = 0 a component that is exactly zero is not divided by zero.
+_SMALLEST_ATOL = 1e-290
+
+
+class Statistics(NamedTuple):
+    """What an integration has done so far."""
+
+    steps: int  # accepted
+    rejected: int  # tried and thrown away
+    rhs: int  # calls of rhs alone
+    projections: int  # calls of project
+    reports: int  # calls of report
+
+
+class Integration:
+    """An initial value problem on its way: ``advance`` it until its status is no longer RUNNING.
+
+    Parameters
+    ----------
+    method
+        One of ``METHODS``.
+    functions
+        ``[rhs, project, report]``: a typed list of first-class functions of the signature
+        ``void(t, y, out, system, loops)`` (runge_kutta.py says what each does); a plain list where
+        compilation is off. ``project`` is called only with ``project_on``.
+    system, loops
+        Handed on to the functions: a tuple of arrays, and a typed list of first-class functions.
+    y0
+        (n,) state at ``times[0]``, used as it is: it is not projected.
+    times
+        (nt,) increasing reporting times; the first is t0, the last t_end.
+    rtol, atol
+        Tolerances: the error of a step is measured by ``atol + rtol max(|y0|, |y1|)``.
+    step
+        Fixed step, without error control: equal steps, none longer. A method with dense output
+        takes them from t0 to t_end, one without (rk4, which needs ``step``) from reporting time to
+        reporting time.
+    first_step
+        First step that error control tries; by default it is chosen as in HNW I, II.4.
+    project_on
+        Whether accepted steps and interpolated states are projected.
+    error_size
+        Number of leading components that steer the step; all by default.
+    report_size
+        Number of values that ``report`` gives.
+    buffer_rows
+        Number of rows that wait at most to be taken by ``rows``.
+
+    Raises
+    ------
+    ValueError
+        For times, sizes, tolerances or steps that make no sense.
+    """
+
+    def __init__(
+        self,
+        method: Method,
+        functions: Sequence[Function],
+        system: Any,
+        loops: Any,
+        y0: ArrayLike,
+        times: ArrayLike,
+        *,
+        rtol: float = 1e-8,
+        atol: float = 1e-10,
+        step: float | None = None,
+        first_step: float | None = None,
+        project_on: bool = False,
+        error_size: int | None = None,
+        report_size: int = 0,
+        buffer_rows: int = 256,
+    ) -> None:
+        self.method = method
+        self._arguments = (functions, system, loops)
+        y = np.array(y0, dtype=np.float64)
+        instants = np.array(times, dtype=np.float64)
+        _check_state_and_times(y, instants)
+        _check_control(method, rtol, atol, instants, step=step, first_step=first_step)
+        error_size = y.size if error_size is None else error_size
+        if not 0 <= error_size <= y.size:
+            raise ValueError(f"error_size is {error_size}, but y has {y.size} components")
+        if buffer_rows < 1:
+            raise ValueError(f"buffer_rows is {buffer_rows}; at least one row must fit")
+
+        real = np.zeros(at.REALS)
+        real[at.RTOL], real[at.ATOL] = rtol, max(atol, _SMALLEST_ATOL)
+        real[at.STEP], real[at.H] = step or 0.0, first_step or 0.0
+        real[at.EXPONENT], real[at.BETA] = method.exponent, method.beta
+        real[at.FACTOR_MIN], real[at.FACTOR_MAX] = method.factor_min, method.factor_max
+        real[at.T], real[at.ERROR_OLD] = instants[0], 1e-4
+        integer = np.zeros(at.INTEGERS, dtype=np.int64)
+        integer[at.STAGES], integer[at.ORDER] = method.stages, method.order
+        integer[at.ERROR_SIZE], integer[at.ERRORS] = error_size, len(method.e)
+        integer[at.ERROR_USES_RESULT] = method.error_uses_result
+        integer[at.DENSE], integer[at.PROJECT_ON] = method.dense, project_on
+        state = np.zeros((at.STATES, y.size))
+        state[at.Y] = y
+        #: All the state there is, as arrays: copied and put back, the run goes on from there.
+        self.work = Work(
+            real=real,
+            integer=integer,
+            times=instants,
+            state=state,
+            k=np.zeros((len(method.a), y.size)),
+            terms=np.zeros((4 + len(method.d), y.size)),
+            rows=np.empty((buffer_rows, 1 + y.size + report_size)),
+            table=combinations(method),
+        )
+
+    def advance(self, budget: int) -> Status:
+        """Go on until more than ``budget`` calls of rhs are spent, the buffer is full, or the end.
+
+        How a run is cut into chunks changes no bit of its result. Take the ``rows`` after each.
+
+        Raises
+        ------
+        RuntimeError
+            If the buffer is full on entry, so that nothing can be done.
+        """
+        work = self.work
+        if int(work.integer[at.ROW]) == len(work.rows) and self.status is Status.RUNNING:
+            raise RuntimeError("the row buffer is full: take rows() before advancing")
+        if jit_is_on():
+            advance(work, *self._arguments, budget)
+        else:
+            with np.errstate(all="ignore"):  # as in compiled code, which tests what matters
+                advance(work, *self._arguments, budget)
+        return self.status
+
+    def rows(self) -> Floats:
+        """Take the waiting rows out of the buffer: (k, 1 + n + report_size), each t, y, report."""
+        integer = self.work.integer
+        taken: Floats = self.work.rows[: integer[at.ROW]].copy()
+        integer[at.ROW] = 0
+        return taken
+
+    @property
+    def status(self) -> Status:
+        """Where the integration stands."""
+        return Status(int(self.work.integer[at.STATUS]))
+
+    @property
+    def t(self) -> float:
+        """Time reached by accepted steps."""
+        return float(self.work.real[at.T])
+
+    @property
+    def y(self) -> Floats:
+        """(n,) state at ``t``, a copy."""
+        y: Floats = self.work.state[at.Y].copy()
+        return y
+
+    @property
+    def t_stop(self) -> float | None:
+        """Time of what stopped the run short: end of the step that failed, or a reporting time."""
+        if self.status in (Status.RUNNING, Status.FINISHED):
+            return None
+        return float(self.work.real[at.T_STOP])
+
+    @property
+    def statistics(self) -> Statistics:
+        """What has been done so far."""
+        integer = self.work.integer
+        names = (at.STEPS, at.REJECTED, at.RHS, at.PROJECTIONS, at.REPORTS)
+        return Statistics(*(int(integer[i]) for i in names))
+
+
+def _check_state_and_times(y: Floats, times: Floats) -> None:
+    if y.ndim != 1 or not np.all(np.isfinite(y)):
+        raise ValueError("y0 must be one vector of finite numbers")
+    if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
+        raise ValueError("times must be one vector of finite numbers, t0 first")
+    if not np.all(np.diff(times) > 0.0):
+        raise ValueError("reporting times must increase")
+
+
+def _check_control(
+    method: Method,
+    rtol: float,
+    atol: float,
+    times: Floats,
+    *,
+    step: float | None,
+    first_step: float | None,
+) -> None:
+    least = FLOOR * max(abs(times[0]), abs(times[-1]), times[-1] - times[0])
+    for name, value in (("step", step), ("first_step", first_step)):
+        if value is not None and not least < value < np.inf:
+            raise ValueError(
+                f"{name} is {value}; it must be finite and above {least:.1e}, the rounding of time"
+            )
+    if step is None and not method.adaptive:
+        raise ValueError(
+            f"{method.name} does not choose its step: give step, or take an adaptive method"
+        )
+    if step is None and not (0.0 <= rtol < np.inf and 0.0 <= atol < np.inf and rtol + atol > 0.0):
+        raise ValueError(
+            f"rtol is {rtol} and atol {atol}; they must be finite, not negative, not both zero"
+        )

@@ -1,0 +1,271 @@
+"""The one algorithm of all explicit Runge-Kutta methods: a compiled loop that can stop and go on.
+
+It knows a vector y and three first-class functions ``f(t, y, out, system, loops)``:
+
+    rhs      out = dy/dt
+    project  moves y onto its constraints in place; out[0] = 1 where y changed by more than the
+             rounding of a normalisation (so that a stored dy/dt is stale), out[1] = 1 where that
+             failed, 2 where the state is too close to a singular one to go on from
+    report   out = what else is reported at (t, y): accelerations, multipliers, ...
+
+Everything that decides what comes next lies in the arrays of ``Work``: however a run is cut into
+calls of ``advance``, its numbers are the same bit for bit. Source: Hairer, Norsett, Wanner, Solving
+Ordinary Differential Equations I (HNW), II.4 to II.6.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from collections.abc import Sequence
+from typing import Any
+
+from dap3d_core.integrators.combination import all_finite, combine, interpolate
+from dap3d_core.integrators.control import (
+    LARGEST,
+    SAFETY,
+    accept,
+    end_of_step,
+    error_norm,
+    first_step,
+    reject,
+)
+from dap3d_core.integrators.method import ABSCISSA, Floats, Integers
+from dap3d_core.integrators.work import (
+    DENSE,
+    ERROR_USES_RESULT,
+    ERRORS,
+    EXPONENT,
+    FACTOR_MIN,
+    FINISHED,
+    FRESH,
+    H_DENSE,
+    NEXT,
+    NOT_FINITE,
+    OUTCOME,
+    POOR,
+    PROJECT_ON,
+    PROJECTION_FAILED,
+    PROJECTIONS,
+    REPORTS,
+    RHS,
+    ROW,
+    RUNNING,
+    SCRATCH,
+    STAGES,
+    STATUS,
+    STEP,
+    STEP_FLOOR,
+    T_DENSE,
+    T_STOP,
+    TRIAL,
+    Function,
+    H,
+    T,
+    Work,
+    Y,
+)
+from dap3d_core.kernels.borrow import borrow
+from dap3d_core.kernels.cache import compiled
+
+#: Factor on a step that met a number that is not finite, or whose end could not be projected.
+RETREAT = 0.1
+#: What project says in out[1]: it failed; the state is good, but too close to a singular one to go on from.
+FAILED, POOR_PLACE = 1.0, 2.0
+#: Factor on a step that should end elsewhere, and how often in a row that is tried.
+ELSEWHERE, ATTEMPTS = 0.6, 4
+
+
+@compiled
+def advance(
+    work: Work, functions: Sequence[Function], system: Any, loops: Any, budget: int
+) -> None:
+    """Go on until more than ``budget`` calls of rhs are spent, the rows are full, or the run ends.
+
+    At least one step is tried in each call, whatever the budget.
+    """
+    rhs, project, report = functions[0], functions[1], functions[2]
+    system = borrow(system)
+    real, integer, times = work.real, work.integer, work.times
+    limit = integer[RHS] + budget
+    while integer[STATUS] == RUNNING:
+        if times[integer[NEXT]] <= real[T]:
+            if not report_reached(work, project, report, system, loops):
+                return
+        elif integer[RHS] > limit:
+            return
+        else:
+            step(work, rhs, project, system, loops)
+
+
+@compiled
+def report_reached(
+    work: Work, project: Function, report: Function, system: Any, loops: Any
+) -> bool:
+    """Write a row for each reporting time up to t; False where the rows are full.
+
+    Sets the status where the last time is reported, or where a row is not finite.
+    """
+    real, integer, times = work.real, work.integer, work.times
+    n = work.state.shape[1]
+    while integer[NEXT] < times.size and times[integer[NEXT]] <= real[T]:
+        if integer[ROW] == work.rows.shape[0]:
+            return False
+        t, y = times[integer[NEXT]], work.state[Y]
+        if t < real[T]:
+            y = work.state[TRIAL]
+            interpolate(y, work.terms, (t - real[T_DENSE]) / real[H_DENSE])
+            failure = project_state(real, integer, t, y, project, system, loops)
+            if failure != RUNNING:
+                real[T_STOP], integer[STATUS] = t, failure
+                return True
+        row = work.rows[integer[ROW]]
+        row[0] = t
+        for i in range(n):
+            row[1 + i] = y[i]
+        integer[REPORTS] += 1
+        report(t, y, row[1 + n :], system, loops)
+        if not all_finite(row):
+            real[T_STOP], integer[STATUS] = t, NOT_FINITE
+            return True
+        integer[ROW] += 1
+        integer[NEXT] += 1
+    if integer[NEXT] == times.size:
+        integer[STATUS] = FINISHED
+    return True
+
+
+@compiled
+def project_state(
+    real: Floats,
+    integer: Integers,
+    t: float,
+    y: Floats,
+    project: Function,
+    system: Any,
+    loops: Any,
+) -> int:
+    """Project y where that is on; why that failed, or RUNNING."""
+    real[OUTCOME] = 0.0
+    if not all_finite(y):
+        return NOT_FINITE
+    if integer[PROJECT_ON] == 0:
+        return RUNNING
+    outcome = real[OUTCOME:]
+    outcome[1] = 0.0
+    integer[PROJECTIONS] += 1
+    project(t, y, outcome, system, loops)
+    if outcome[1] == FAILED or not all_finite(y):
+        return PROJECTION_FAILED
+    return RUNNING
+
+
+@compiled
+def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) -> None:
+    """Try one step: accept it, reject it, or stop the run."""
+    real, integer, times, k = work.real, work.integer, work.times, work.k
+    t, y, trial, argument = real[T], work.state[Y], work.state[TRIAL], work.state[SCRATCH]
+    stages, table = integer[STAGES], work.table
+    if integer[FRESH] == 0:
+        integer[RHS] += 1
+        rhs(t, y, k[0], system, loops)
+        integer[FRESH] = 1
+        if not all_finite(k[0]):
+            real[T_STOP], integer[STATUS] = t, NOT_FINITE
+            return
+    adaptive = real[STEP] == 0.0
+    if adaptive and real[H] == 0.0:
+        real[H] = first_step(real, integer, times, y, k, argument, rhs, system, loops)
+    t1 = end_of_step(real, integer, times)
+    h = t1 - t
+    last = stages if integer[ERROR_USES_RESULT] != 0 else stages - 1
+    for i in range(1, stages + 1):
+        x = trial if i == stages else argument
+        combine(x, 1.0, y, h, table, i, k)
+        if i <= last:
+            c = table[i, ABSCISSA]
+            rhs(t1 if c == 1.0 else t + c * h, x, k[i], system, loops)
+    integer[RHS] += last
+    error = error_norm(real, integer, work.state, k, table, h) if adaptive else 0.0
+    if error <= 1.0:
+        failure = land(work, t1, rhs, project, system, loops)
+        if failure == RUNNING and adaptive and is_poor(real, integer, times, t1):
+            integer[POOR] += 1
+            reject(real, integer, times, t1, h * ELSEWHERE, STEP_FLOOR)
+        elif failure == RUNNING:
+            integer[POOR] = 0
+            accept(real, integer, times, work.state, k, t1, error)
+        else:
+            reject(real, integer, times, t1, h * RETREAT, failure)
+    elif error <= LARGEST:
+        factor = max(real[FACTOR_MIN], SAFETY / error ** real[EXPONENT])
+        reject(real, integer, times, t1, h * factor, STEP_FLOOR)
+    else:
+        reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)
+
+
+@compiled
+def is_poor(real: Floats, integer: Integers, times: Floats, t1: float) -> bool:
+    """Whether a step should end elsewhere: project found the state close to a singular one.
+
+    From there every next step would be inaccurate, while from some way before it one can step across. A run
+    that stays close to a singular state is not held up: after a few attempts the landing is taken.
+    """
+    return real[OUTCOME + 1] == POOR_PLACE and integer[POOR] < ATTEMPTS and t1 < times[-1]
+
+
+@compiled
+def land(work: Work, t1: float, rhs: Function, project: Function, system: Any, loops: Any) -> int:
+    """Prepare dense output, project the trial state, evaluate f; why that failed, or RUNNING.
+
+    Dense output belongs to the step as the method took it; what it gives is projected by itself.
+    """
+    real, integer, times, k = work.real, work.integer, work.times, work.k
+    y, trial, result = work.state[Y], work.state[TRIAL], integer[STAGES]
+    known = integer[ERROR_USES_RESULT] != 0
+    if integer[DENSE] != 0 and times[integer[NEXT]] < t1:
+        t, argument, table = real[T], work.state[SCRATCH], work.table
+        if not known:
+            integer[RHS] += 1
+            rhs(t1, trial, k[result], system, loops)
+            known = True
+        for i in range(result + 1, k.shape[0]):
+            combine(argument, 1.0, y, t1 - t, table, i, k)
+            rhs(t + table[i, ABSCISSA] * (t1 - t), argument, k[i], system, loops)
+        integer[RHS] += k.shape[0] - 1 - result
+        prepare_dense(real, integer, work.state, k, work.terms, table, t1)
+    failure = project_state(real, integer, t1, trial, project, system, loops)
+    if failure != RUNNING:
+        return failure
+    known = known and real[OUTCOME] == 0.0
+    if not known and t1 < times[-1]:
+        integer[RHS] += 1
+        rhs(t1, trial, k[result], system, loops)
+        known = True
+    if known and not all_finite(k[result]):
+        return NOT_FINITE
+    integer[FRESH] = 1 if known else 0
+    return RUNNING
+
+
+@compiled
+def prepare_dense(
+    real: Floats,
+    integer: Integers,
+    state: Floats,
+    k: Floats,
+    terms: Floats,
+    table: Floats,
+    t1: float,
+) -> None:
+    """Terms of the dense output from t to t1, HNW II.6, from all stages."""
+    h, result = t1 - real[T], integer[STAGES]
+    for i in range(state.shape[1]):
+        rise = state[TRIAL, i] - state[Y, i]
+        terms[0, i] = state[Y, i]
+        terms[1, i] = rise
+        terms[2, i] = h * k[0, i] - rise
+        terms[3, i] = rise - h * k[result, i] - terms[2, i]
+    first = k.shape[0] + integer[ERRORS]
+    for row in range(4, terms.shape[0]):
+        combine(terms[row], 0.0, state[Y], h, table, first + row - 4, k)
+    real[T_DENSE], real[H_DENSE] = real[T], h

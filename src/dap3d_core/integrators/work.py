@@ -1,0 +1,54 @@
+"""The state of an integration: arrays that the compiled core reads and writes, and their places."""
+
+from collections.abc import Callable
+from enum import IntEnum
+from typing import NamedTuple
+
+from dap3d_core.integrators.method import Floats, Integers
+
+#: ``f(t, y, out, system, loops)``: rhs, project or report (runge_kutta.py).
+Function = Callable[..., None]
+
+
+class Status(IntEnum):
+    """Where an integration stands."""
+
+    RUNNING = 0
+    FINISHED = 1
+    STEP_FLOOR = 2  # the error asks for a step that time cannot resolve
+    NOT_FINITE = 3  # dy/dt, y or a reported quantity became infinite or not a number
+    PROJECTION_FAILED = 4
+
+
+# The same as plain integers, for compiled code.
+RUNNING, FINISHED = int(Status.RUNNING), int(Status.FINISHED)
+STEP_FLOOR, NOT_FINITE = int(Status.STEP_FLOOR), int(Status.NOT_FINITE)
+PROJECTION_FAILED = int(Status.PROJECTION_FAILED)
+
+# Places in ``real``. Settings; a STEP of 0 lets the error choose it.
+RTOL, ATOL, STEP, EXPONENT, BETA, FACTOR_MIN, FACTOR_MAX = range(7)
+# What changes: time, next step, error of the last accepted step, start and length of the step that
+# the dense output belongs to, start of the present run of equal steps, time of what stopped
+# the run, and the four numbers that project gives.
+T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, OUTCOME = range(7, 15)
+REALS = OUTCOME + 4
+# Places in ``integer``. Settings.
+STAGES, ORDER, ERROR_SIZE, ERRORS, ERROR_USES_RESULT, DENSE, PROJECT_ON = range(7)
+# What changes. POOR: landings in a row that project called poor. FRESH: k[0] is f(t, y). GAP_STEP of GAP_STEPS: in the present run of equal steps.
+STATUS, NEXT, ROW, FRESH, LAST_REJECTED, GAP_STEP, GAP_STEPS = range(7, 14)
+STEPS, REJECTED, RHS, PROJECTIONS, REPORTS, POOR, INTEGERS = range(14, 21)
+# Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch.
+Y, TRIAL, SCRATCH, STATES = range(4)
+
+
+class Work(NamedTuple):
+    """All that ``advance`` reads and writes; n components, S stages (method.Method)."""
+
+    real: Floats  # (REALS,)
+    integer: Integers  # (INTEGERS,)
+    times: Floats  # (nt,) reporting times, increasing, t0 first and t_end last
+    state: Floats  # (STATES, n)
+    k: Floats  # (S, n) stages; k[0] is f(t, y)
+    terms: Floats  # (4 + rows of d, n) of the dense output over the last step
+    rows: Floats  # (capacity, 1 + n + report_size) rows t, y, report that wait to be taken
+    table: Floats  # method.combinations

@@ -1,0 +1,43 @@
+"""The interface of a joint, a force and a function type: all that the author of a plugin imports, besides the kernels' words."""
+
+from dap3d_core.interface.checks import PluginError, examine
+from dap3d_core.interface.fields import (
+    Body,
+    Point,
+    Vector,
+    Vector2,
+    body,
+    choice,
+    function,
+    matrix,
+    number,
+    point,
+    vec3,
+    vector,
+    vector2,
+)
+from dap3d_core.interface.hooks import hookimpl
+from dap3d_core.interface.types import INTERFACE_VERSION, Force, Function, Joint
+
+__all__ = [
+    "INTERFACE_VERSION",
+    "Body",
+    "Force",
+    "Function",
+    "Joint",
+    "PluginError",
+    "Point",
+    "Vector",
+    "Vector2",
+    "body",
+    "choice",
+    "examine",
+    "function",
+    "hookimpl",
+    "matrix",
+    "number",
+    "point",
+    "vec3",
+    "vector",
+    "vector2",
+]

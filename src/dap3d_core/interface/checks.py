@@ -1,0 +1,263 @@
+"""What is asked of a type before it is used: its kernels are called once, in plain Python, with random numbers.
+
+A wrong shape, an unknown name, a velocity in a position-level kernel or an exception is a ``PluginError`` that names
+file, type, function and remedy.
+"""
+
+import inspect
+import math
+import random
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any
+
+import attrs
+
+from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
+from dap3d_core.interface.namespace import (
+    VELOCITY_KERNELS,
+    Layout,
+    Quantity,
+    body_slots,
+    layout_of,
+    namespace,
+    parameters,
+)
+from dap3d_core.interface.outputs import ShapeError, entries, value_at
+from dap3d_core.interface.types import Function, Joint, TypeBase
+
+
+class PluginError(Exception):
+    """A type or a plugin cannot be used; the message names file, type, function and remedy."""
+
+
+@attrs.frozen
+class BodyPose:
+    """A body as ``prepare`` sees it: position r (3), Euler parameters p (4), rotation matrix A (three rows)."""
+
+    r: tuple[float, ...]
+    p: tuple[float, ...]
+    A: tuple[tuple[float, ...], ...]
+
+    def to_local(self, s: Any) -> tuple[float, ...]:
+        """Components on the body of a global 3-vector."""
+        return tuple(sum(self.A[r][c] * s[r] for r in range(3)) for c in range(3))
+
+    def to_global(self, s: Any) -> tuple[float, ...]:
+        """Global components of a 3-vector given on the body."""
+        return tuple(sum(self.A[r][c] * s[c] for c in range(3)) for r in range(3))
+
+    def place(self, s: Any) -> tuple[float, ...]:
+        """Global position of a point given by its coordinates on the body."""
+        return tuple(a + b for a, b in zip(self.r, self.to_global(s), strict=True))
+
+
+@attrs.frozen
+class Examined:
+    """A type that passed, with what the loops are written from.
+
+    Attributes:
+        type: the class.
+        layout: how instances are stored.
+        names: every name its kernels may use.
+        outputs: kernel -> expressions of its numbers in the order of their shape.
+    """
+
+    type: type[TypeBase]
+    layout: Layout
+    names: dict[str, Quantity]
+    outputs: dict[str, tuple[str, ...]]
+
+
+def pose(r: Any, p: Any) -> BodyPose:
+    """A body's pose from its position and (unit) Euler parameters."""
+    e0, e1, e2, e3 = (float(x) for x in p)
+    matrix = (
+        (1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)),
+        (2 * (e1 * e2 + e0 * e3), 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 - e0 * e1)),
+        (2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), 1 - 2 * (e1 * e1 + e2 * e2)),
+    )
+    return BodyPose(tuple(float(x) for x in r), (e0, e1, e2, e3), matrix)
+
+
+def where_is(type_: type) -> str:
+    """File and class of a type, for messages."""
+    try:
+        file = inspect.getsourcefile(type_) or type_.__module__
+    except (TypeError, OSError):
+        file = type_.__module__
+    return f"{file}: {type_.__name__}"
+
+
+def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
+    """Check a type and return what its loops are written from.
+
+    Raises:
+        PluginError: with file, type, function and remedy.
+    """
+    _check_class(type_)
+    rng = random.Random(seed)
+    bodies = {s: _random_pose(rng) for s in body_slots(type_)}
+    instance = type_(**{n: _random_field(spec, rng) for n, spec in specs_of(type_).items()})
+    set_ends(instance, lambda: _numbers(rng, 3))
+    try:
+        constants = prepared(instance, bodies)
+    except ValueError as error:
+        raise PluginError(f"{where_is(type_)}.prepare refuses random values: {error}") from error
+    names = namespace(type_, constants)
+    values = {n: _random(q.shape, rng) for n, q in names.items()}
+    outputs = {}
+    for kernel_name, kernel in type_.kernels().items():
+        asked = parameters(kernel)
+        _check_names(type_, kernel_name, asked, names)
+        try:
+            value = kernel(*(values[n] for n in asked))
+            found = entries(value, *_expected(type_, kernel_name))
+        except ShapeError as error:
+            raise PluginError(f"{where_is(type_)}.{kernel_name}: {error}") from None
+        except Exception as error:
+            raise PluginError(
+                f"{where_is(type_)}.{kernel_name} failed on a random input: {type(error).__name__}: {error}"
+            ) from error
+        for path in found:
+            _check_number(type_, kernel_name, value_at(value, path))
+        outputs[kernel_name] = tuple(found)
+    return Examined(type_, layout_of(type_, constants), names, outputs)
+
+
+def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
+    """What ``prepare`` returns for an instance, checked and as plain tuples of floats.
+
+    Raises:
+        ValueError: the type refuses these values of its fields, in its own words.
+        PluginError: it failed otherwise, or returned something else than a dict of numbers and tuples of numbers.
+    """
+    type_ = type(instance)
+    try:
+        constants = instance.prepare(bodies)
+    except ValueError:  # a mistake in the scene, said in the type's own words
+        raise
+    except Exception as error:
+        raise PluginError(f"{where_is(type_)}.prepare failed: {type(error).__name__}: {error}") from error
+    if not isinstance(constants, Mapping):
+        raise PluginError(f"{where_is(type_)}.prepare should return a dict; it returned {constants!r}")
+    try:
+        return {str(n): _as_floats(v) for n, v in constants.items()}
+    except (TypeError, ValueError):
+        raise PluginError(f"{where_is(type_)}.prepare should return numbers and tuples of numbers") from None
+
+
+def set_ends(instance: Any, make: Any) -> None:
+    """Give an instance with a vector2 field the two ends of that vector as attributes P_i and P_j."""
+    if any(spec.kind == "vector2" for spec in specs_of(type(instance)).values()):
+        instance.P_i, instance.P_j = make(), make()
+
+
+def _as_floats(value: Any) -> Any:
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, (tuple, list)):
+        return tuple(_as_floats(v) for v in value)
+    return float(value)
+
+
+def _check_class(type_: type[TypeBase]) -> None:
+    if not type_.keyword:
+        raise PluginError(f"{where_is(type_)} has no keyword; add e.g. keyword = \"{type_.__name__.lower()}\"")
+    needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[type_.kind]
+    if issubclass(type_, Joint):
+        if type_.rows < 1:
+            raise PluginError(f"{where_is(type_)} declares rows = {type_.rows}; a joint has at least one row")
+        if not isinstance(type_.holonomic, bool) and len(type_.holonomic) != type_.rows:
+            raise PluginError(f"{where_is(type_)}.holonomic needs one truth value for each of its {type_.rows} rows")
+        needed += ["C"] if type_.position_rows() else []
+    if type_.kind != "function" and not body_slots(type_):
+        raise PluginError(f"{where_is(type_)} acts on no body; declare a field such as P_i: Point = point()")
+    allowed = [*type_.kernel_names, "prepare"]
+    for name, value in vars(type_).items():
+        if isinstance(value, (staticmethod, type(_check_class))) and not name.startswith("_") and name not in allowed:
+            near = get_close_matches(name, allowed, 1)
+            hint = f"; did you mean {near[0]}?" if near else f"; a {type_.kind} may define {', '.join(allowed)}"
+            raise PluginError(f"{where_is(type_)} defines {name}, which nothing calls{hint}")
+    for name in needed:
+        if name not in type_.kernels():
+            raise PluginError(f"{where_is(type_)} does not define {name}, which every {type_.kind} of its rows needs")
+
+
+def _check_names(type_: type[TypeBase], kernel: str, asked: tuple[str, ...], names: Mapping[str, Quantity]) -> None:
+    for name in asked:
+        if name not in names:
+            near = get_close_matches(name, names, 1)
+            hint = f"did you mean {near[0]}? " if near else ""
+            raise PluginError(
+                f"{where_is(type_)}.{kernel} asks for {name}, which its fields do not offer; {hint}"
+                f"they offer {', '.join(names)}"
+            )
+        if names[name].velocity and kernel not in VELOCITY_KERNELS:
+            raise PluginError(
+                f"{where_is(type_)}.{kernel} asks for {name}, a quantity of the velocity level; at position level "
+                "only positions and time may be used (move the term to gamma or wrench)"
+            )
+
+
+def _expected(type_: type[TypeBase], kernel: str) -> tuple[tuple[int, ...], str]:
+    slots = len(body_slots(type_))
+    if issubclass(type_, Joint):
+        if kernel == "C":
+            n = len(type_.position_rows())
+            return (n,), f"{n} numbers, one for each row of the position level"
+        if kernel == "J":
+            return (slots, type_.rows, 6), f"a block of {type_.rows} x 6 for each of {slots} bodies"
+        return (type_.rows,), f"{type_.rows} numbers, one for each row"
+    if issubclass(type_, Function):
+        return (4,), "(f, f', f'', f''')"
+    if kernel == "wrench":
+        return (slots, 2, 3), f"(force, moment) for each of {slots} bodies"
+    return (), "one number"
+
+
+def _check_number(type_: type[TypeBase], kernel: str, value: Any) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise PluginError(f"{where_is(type_)}.{kernel} returned {value!r} where a finite number is expected")
+
+
+def _numbers(rng: random.Random, n: int) -> tuple[float, ...]:
+    return tuple(rng.uniform(0.5, 1.5) * rng.choice((-1.0, 1.0)) for _ in range(n))
+
+
+def _unit(values: tuple[float, ...]) -> tuple[float, ...]:
+    length = math.sqrt(sum(x * x for x in values))
+    return tuple(x / length for x in values)
+
+
+def _random_pose(rng: random.Random) -> BodyPose:
+    return pose(_numbers(rng, 3), _unit(_numbers(rng, 4)))
+
+
+def _random(shape: tuple[int, ...], rng: random.Random) -> Any:
+    if shape == ():
+        return rng.uniform(0.5, 1.5)
+    if shape == (3, 3):
+        return _random_pose(rng).A
+    if shape == (4,):
+        return _unit(_numbers(rng, 4))
+    return tuple(_random(shape[1:], rng) for _ in range(shape[0])) if len(shape) > 1 else _numbers(rng, shape[0])
+
+
+def _random_field(spec: FieldSpec, rng: random.Random) -> Any:
+    if spec.kind in ("point", "vec3", "vector2"):
+        return _numbers(rng, 3)
+    if spec.kind == "vector":
+        return _unit(_numbers(rng, 3))
+    if spec.kind == "matrix":
+        return _random_pose(rng).A
+    if spec.kind == "number":
+        low = 0.5 if spec.minimum is None else spec.minimum + 0.5
+        value = rng.uniform(low, low + 1.0)
+        return value if spec.maximum is None else min(value, spec.maximum)
+    if spec.kind == "choice":
+        return spec.choices[0]
+    return None if spec.kind == "function" else "body"
+
+
+__all__ = ["BodyPose", "Examined", "PluginError", "examine", "pose", "prepared", "set_ends", "slot_of", "where_is"]

@@ -1,0 +1,31 @@
+"""The pluggy side: three hooks without arguments, each returning a list of classes. All substance is in the classes."""
+
+import pluggy
+
+PROJECT = "dap3d"
+
+hookspec = pluggy.HookspecMarker(PROJECT)
+hookimpl = pluggy.HookimplMarker(PROJECT)
+
+
+@hookspec
+def dap3d_joints():
+    """The joint types of a module: a list of subclasses of ``Joint``."""
+
+
+@hookspec
+def dap3d_forces():
+    """The force types of a module: a list of subclasses of ``Force``."""
+
+
+@hookspec
+def dap3d_functions():
+    """The function types of a module: a list of subclasses of ``Function``."""
+
+
+#: Entry-point group and hook of each kind.
+GROUPS = {
+    "joint": ("dap3d.joints", "dap3d_joints"),
+    "force": ("dap3d.forces", "dap3d_forces"),
+    "function": ("dap3d.functions", "dap3d_functions"),
+}

@@ -1,0 +1,106 @@
+"""What a joint, a force and a function type is: an attrs class with fields, and pure functions of named quantities.
+
+The functions stand in the class without ``self``: they are static, and their parameter names say what they need, as
+a pytest test names its fixtures. ``namespace.py`` lists the names.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+import attrs
+
+#: Raised by one when a type written for the old interface would no longer work.
+INTERFACE_VERSION = 1
+
+
+class TypeBase:
+    """Common ground of the three kinds: gathers the kernels and declares the class an attrs class."""
+
+    kind: ClassVar[str] = ""
+    kernel_names: ClassVar[tuple[str, ...]] = ()
+    keyword: ClassVar[str] = ""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "kernel_names" in vars(cls):  # Joint, Force, Function themselves
+            return
+        for name in cls.kernel_names:
+            function = vars(cls).get(name)
+            if callable(function):
+                setattr(cls, name, staticmethod(function))
+        attrs.define(cls, slots=False, kw_only=True)  # slots would make a second class, and hooks see the first
+
+    @classmethod
+    def kernels(cls) -> dict[str, Callable[..., Any]]:
+        """The pure functions this type defines, by name."""
+        return {n: getattr(cls, n) for n in cls.kernel_names if getattr(cls, n, None) is not None}
+
+
+class Joint(TypeBase):
+    """A kinematic constraint or driver: ``rows`` equations between one, two or more bodies.
+
+    Subclasses define, each a pure function of named quantities (spec 2):
+
+    * ``C``      position level, one number a row that ``holonomic`` keeps;
+    * ``J``      dC/dq, one block of rows x 6 (tuples of rows) for each body slot, in the order i, j, k;
+    * ``gamma``  right-hand side of the acceleration level, J v_dot = gamma;
+    * ``nu``     right-hand side of the velocity level, J v = nu; zero where not defined.
+
+    ``prepare(self, bodies)`` may return constants found once on the poses as given.
+
+    Attributes:
+        keyword: the word that names the type in a scene.
+        rows: number of constraint equations.
+        holonomic: True, False, or one truth value a row: which rows exist at position level.
+    """
+
+    kind = "joint"
+    kernel_names = ("C", "J", "gamma", "nu")
+    rows: ClassVar[int] = 0
+    holonomic: ClassVar[bool | tuple[bool, ...]] = True
+
+    @classmethod
+    def position_rows(cls) -> tuple[int, ...]:
+        """Indices of the rows that have a position-level equation."""
+        mask = cls.holonomic
+        if isinstance(mask, bool):
+            mask = (mask,) * cls.rows
+        return tuple(k for k, there in enumerate(mask) if there)
+
+    def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
+        """Constants of this instance; a 3-tuple whose name ends in _i, _j or _k is a vector in that body's axes."""
+        return {}
+
+
+class Force(TypeBase):
+    """A force element: what acts on one, two or more bodies.
+
+    Subclasses define ``wrench``, which returns for each body slot a pair (force, moment about the mass centre) in
+    global axes, and where there is one ``energy``, the potential in J.
+
+    Attributes:
+        keyword: the word that names the type in a scene.
+        each_body: True when the element acts on every body of the scene (slot i in turn).
+    """
+
+    kind = "force"
+    kernel_names = ("wrench", "energy")
+    each_body: ClassVar[bool] = False
+
+    def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
+        """Constants of this instance; a 3-tuple whose name ends in _i, _j or _k is a vector in that body's axes."""
+        return {}
+
+
+class Function(TypeBase):
+    """A function of one variable: ``value(x, ...)`` returns (f, f', f'', f''')."""
+
+    kind = "function"
+    kernel_names = ("value",)
+
+    def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
+        """Constants of this instance, found once (coefficients of a polynomial)."""
+        return {}
+
+
+KINDS: dict[str, type[TypeBase]] = {"joint": Joint, "force": Force, "function": Function}

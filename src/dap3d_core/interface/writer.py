@@ -1,0 +1,78 @@
+"""From a type to its group loops: the lines that gather the named quantities, call the kernels and store the numbers.
+
+An instance's integers stand in ``idx`` from ``b0``: the bodies of its slots, the rows of F of its functions, then for
+a joint the place of its first row in the row vectors and for each slot the place of its block in D; its numbers stand
+in ``par`` from ``p1``.
+"""
+
+from collections.abc import Iterable
+
+from dap3d_core.interface.checks import Examined
+from dap3d_core.interface.namespace import in_order, parameters
+from dap3d_core.interface.types import Joint
+from dap3d_core.kernels.loops import Loop
+
+#: What can be computed, and from which kernels; each is one loop.
+LOOP_KINDS = {
+    "acceleration": ("J", "gamma", "nu"),
+    "position": ("C",),
+    "wrench": ("wrench",),
+    "energy": ("energy",),
+    "value": ("value",),
+}
+
+
+def stride(examined: Examined) -> int:
+    """Integers that an instance takes in ``idx``."""
+    n = len(examined.layout.slots) + len(examined.layout.functions)
+    if examined.type.kind == "joint":
+        return n + 1 + len(examined.layout.slots)
+    return n + 1 if examined.type.kind == "function" else n
+
+
+def write(examined: Examined, what: str) -> Loop | None:
+    """The loop that computes ``what`` (a key of LOOP_KINDS), or None where the type has no such kernel."""
+    kernels = {n: k for n, k in examined.type.kernels().items() if n in LOOP_KINDS[what]}
+    if not kernels:
+        return None
+    layout = examined.layout
+    lines = [f"b0 = i0 + q * {stride(examined)}", f"p1 = p0 + q * {layout.par_width}"]
+    lines += [f"b_{s} = idx[b0 + {n}]" for n, s in enumerate(layout.slots)]
+    wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
+    lines += [f"x_{quantity.name} = {quantity.code}" for quantity in in_order(examined.names, wanted)]
+    if examined.type.kind == "joint":
+        lines.append(f"row = idx[b0 + {len(layout.slots) + len(layout.functions)}]")
+    for name, kernel in kernels.items():
+        arguments = ", ".join(f"x_{n}" for n in parameters(kernel))
+        lines.append(f"out = kernel_{name}({arguments})")
+        lines += _store(examined, name)
+    title = f"{examined.type.keyword}: {', '.join(kernels)}"
+    return Loop(title, {f"kernel_{n}": k for n, k in kernels.items()}, lines)
+
+
+def _store(examined: Examined, kernel: str) -> Iterable[str]:
+    paths, layout, type_ = examined.outputs[kernel], examined.layout, examined.type
+    first_block = len(layout.slots) + len(layout.functions) + 1
+    if kernel == "J":
+        assert issubclass(type_, Joint)
+        for n in range(len(layout.slots)):
+            yield f"d = idx[b0 + {first_block + n}]"
+            for k in range(6 * type_.rows):
+                yield f"out1[d + {k}] = {paths[6 * type_.rows * n + k]}"
+    elif kernel == "C":
+        assert issubclass(type_, Joint)
+        for path, k in zip(paths, type_.position_rows(), strict=True):
+            yield f"out1[row + {k}] = {path}"
+    elif kernel in ("gamma", "nu"):
+        for k, path in enumerate(paths):
+            yield f"{'out2' if kernel == 'gamma' else 'out3'}[row + {k}] = {path}"
+    elif kernel == "wrench":
+        for n, s in enumerate(layout.slots):
+            for k in range(6):
+                yield f"out1[6 * b_{s} + {k}] += {paths[6 * n + k]}"
+    elif kernel == "energy":
+        yield f"out1[0] += {paths[0]}"
+    else:
+        yield "row = idx[b0]"
+        for k, path in enumerate(paths):
+            yield f"F[row, {k}] = {path}"

@@ -1,0 +1,43 @@
+"""The lowest floor: what kernels are written with, and how they become fast.
+
+A plugin imports from here only the words of its formulas; ``compiled``, the loops and their cache serve the core.
+"""
+
+from dap3d_core.kernels.mathematics import atan2, cos, sin, sqrt, tanh, where
+from dap3d_core.kernels.vectors import (
+    add,
+    cross,
+    dot,
+    eye,
+    hstack,
+    neg,
+    norm2,
+    normals,
+    rotate,
+    row,
+    scale,
+    skew,
+    sub,
+)
+
+__all__ = [
+    "add",
+    "atan2",
+    "cos",
+    "cross",
+    "dot",
+    "eye",
+    "hstack",
+    "neg",
+    "norm2",
+    "normals",
+    "rotate",
+    "row",
+    "scale",
+    "sin",
+    "skew",
+    "sqrt",
+    "sub",
+    "tanh",
+    "where",
+]

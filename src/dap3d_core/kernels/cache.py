@@ -1,0 +1,157 @@
+"""Where compiled code is kept, and under which digest.
+
+numba's own cache looks at one source file only: a function that calls a helper of another file would go on giving
+the old number after the helper changed. So compiled code lives in folders named by a digest of *all* the sources
+that went into it; a change anywhere leads to another folder (docs/decisions/0001).
+"""
+
+import hashlib
+import os
+import sys
+import tempfile
+import types
+from functools import cache
+from pathlib import Path
+
+import numba
+from numba import config, njit
+
+#: One compiled function of the core or of a group loop: no bounds checks, IEEE division, no reassociation.
+OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
+
+#: Floors of the core that hold compiled code, low to high: a function depends on its own floor and those below.
+COMPILED_FLOORS = ("kernels", "assembly", "linear", "formulations", "integrators")
+
+
+def jit_is_on() -> bool:
+    """Whether kernels are compiled; ``NUMBA_DISABLE_JIT=1`` runs the same sources as plain Python."""
+    return not config.DISABLE_JIT
+
+
+@cache
+def cache_folder() -> Path | None:
+    """The folder that keeps compiled code between processes, or None where nothing can be written.
+
+    The first of these that can be written: ``$DAP3D_CACHE_DIR``, the user's cache folder, a private folder beside the
+    temporary files.
+    """
+    for folder in _candidates():
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    return None
+
+
+def _candidates():
+    if chosen := os.environ.get("DAP3D_CACHE_DIR"):
+        yield Path(chosen)
+    home = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
+    try:
+        yield (Path(home) if home else Path.home() / ".cache") / "dap3d"
+    except RuntimeError:  # no home folder
+        pass
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    private = Path(tempfile.gettempdir()) / f"dap3d-{user}"
+    if not private.exists() or not hasattr(os, "getuid") or private.stat().st_uid == os.getuid():
+        yield private
+
+
+def digest(*parts: str | bytes) -> str:
+    """Digest of sources and of what else decides the code made from them (Python, numba)."""
+    seal = hashlib.sha256()
+    for part in (*parts, numba.__version__, f"{sys.version_info[:2]}"):
+        seal.update(part.encode() if isinstance(part, str) else part)
+        seal.update(b"\0")
+    return seal.hexdigest()[:20]
+
+
+@cache
+def _driver_digest(floor: str) -> str:
+    root = Path(__file__).parents[1]
+    below = COMPILED_FLOORS[: COMPILED_FLOORS.index(floor) + 1]
+    files = sorted(f for name in below for f in (root / name).glob("*.py"))
+    return digest(*(part for f in files for part in (f.name, f.read_bytes())))
+
+
+def compiled(function):
+    """Compile a function of the core when it is first called, and keep the code for the next process."""
+    floor = function.__module__.split(".")[1]
+    return compiled_in(cache_folder(), f"{floor}-{_driver_digest(floor)}", function)
+
+
+def compiled_in(folder: Path | None, name: str, function, signature=None):
+    """Compile with the cache in ``folder/name``; without a folder the code lives as long as the process."""
+    if not jit_is_on():
+        return function
+    arguments = () if signature is None else (signature,)
+    if folder is None:
+        return njit(*arguments, **OPTIONS)(function)
+    before, config.CACHE_DIR = config.CACHE_DIR, str(folder / name)
+    try:
+        return njit(*arguments, cache=True, **OPTIONS)(function)
+    finally:
+        config.CACHE_DIR = before
+
+
+def sources(*functions) -> list[str | bytes]:
+    """Everything that decides what these functions compute: files, and values of the constants they read.
+
+    Follows names from function to function through their modules' globals; numpy, numba and the standard library are
+    told by name alone (their versions are part of the digest or fixed by it).
+    """
+    seen: dict[object, None] = {}
+    files: dict[str, bytes] = {}
+    constants: list[str] = []
+    todo = list(functions)
+    while todo:
+        function = todo.pop()
+        function = getattr(function, "py_func", function)
+        if function in seen:
+            continue
+        seen[function] = None
+        _add_file(files, function.__code__.co_filename)
+        for name, value in _named_values(function):
+            if isinstance(value, types.FunctionType) or hasattr(value, "py_func"):
+                if _is_ours(getattr(value, "py_func", value).__code__.co_filename):
+                    todo.append(value)
+            elif isinstance(value, (bool, int, float, complex, str, tuple)):
+                constants.append(f"{function.__qualname__}.{name}={value!r}")
+    return [*constants, *(part for path in sorted(files) for part in (Path(path).name, files[path]))]
+
+
+def _named_values(function):
+    """Names that a function reads from outside itself, with their values; one step through modules."""
+    code_objects = [function.__code__]
+    for code in code_objects:
+        code_objects += [c for c in code.co_consts if isinstance(c, types.CodeType)]
+    names = {name for code in code_objects for name in code.co_names}
+    outside = dict(zip(function.__code__.co_freevars, (c.cell_contents for c in function.__closure__ or ()), strict=True))
+    for name in sorted(names):
+        if name in function.__globals__:
+            outside[name] = function.__globals__[name]
+    for name, value in list(outside.items()):
+        if isinstance(value, types.ModuleType) and _is_ours(getattr(value, "__file__", None) or ""):
+            outside |= {f"{name}.{n}": getattr(value, n) for n in names if hasattr(value, n)}
+    return sorted(outside.items())
+
+
+@cache
+def _is_ours(filename: str) -> bool:
+    standard = Path(os.__file__).parent
+    path = Path(filename)
+    if not filename.endswith(".py"):
+        return False
+    if path.is_relative_to(Path(numba.__file__).parent) or "numpy" in path.parts:
+        return False
+    return not (path.is_relative_to(standard) and "site-packages" not in path.parts)
+
+
+def _add_file(files, filename):
+    if filename not in files:
+        try:
+            files[filename] = Path(filename).read_bytes()
+        except OSError:  # typed at a prompt: no file, so nothing of it is kept between processes
+            files[filename] = os.urandom(16)

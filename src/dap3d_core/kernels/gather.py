@@ -1,0 +1,35 @@
+"""What a group loop uses to read an instance's quantities: vectors and matrices out of rows of arrays."""
+
+from dap3d_core.kernels.inline import inlined
+from dap3d_core.kernels.vectors import add, cross, rotate, sub
+
+#: Columns of the body array: position, rotation matrix by rows, velocity, angular velocity (global), Euler
+#: parameters, mass, inertia matrix in body axes by rows.
+R, A, V, W, P, MASS, JP, BODY_WIDTH = 0, 3, 12, 15, 18, 22, 23, 32
+
+__all__ = ["JP", "MASS", "A", "P", "R", "V", "W", "add", "cross", "matrix_at", "matrix_in", "rotate", "sub",
+           "vector_at", "vector_in"]
+
+
+@inlined
+def vector_at(array, i, k):
+    """The 3-vector in columns k, k+1, k+2 of row i."""
+    return (array[i, k], array[i, k + 1], array[i, k + 2])
+
+
+@inlined
+def matrix_at(array, i, k):
+    """The 3x3 matrix in nine columns of row i, by rows."""
+    return (vector_at(array, i, k), vector_at(array, i, k + 3), vector_at(array, i, k + 6))
+
+
+@inlined
+def vector_in(array, k):
+    """The 3-vector at k of a flat array."""
+    return (array[k], array[k + 1], array[k + 2])
+
+
+@inlined
+def matrix_in(array, k):
+    """The 3x3 matrix at k of a flat array, by rows."""
+    return (vector_in(array, k), vector_in(array, k + 3), vector_in(array, k + 6))

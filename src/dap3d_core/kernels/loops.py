@@ -1,0 +1,116 @@
+"""Group loops: one compiled function that runs a type's kernel over all its instances.
+
+A loop is written as the source of a small module: gather the named quantities of instance q, call the kernel, store
+what it returns. All loops have one signature, so that the driver holds them in one list and is never recompiled for a
+new type:
+
+    loop(t, body, F, idx, par, i0, p0, count, out1, out2, out3)
+
+    body (n+1, BODY_WIDTH)  state and constants of each body, ground first (columns: gather.py)
+    F    (functions+1, 4)   f, f', f'', f''' of each function of time at t; row 0 is the absent function
+    idx, par                integers and numbers of all instances; this group's begin at i0 and p0
+    out1, out2, out3        what the kernels return
+"""
+
+import importlib.util
+import os
+import sys
+import uuid
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from dap3d_core.kernels import gather
+from dap3d_core.kernels.cache import (
+    cache_folder,
+    compiled_in,
+    digest,
+    jit_is_on,
+    sources,
+)
+from dap3d_core.kernels.inline import inlined
+from dap3d_core.kernels.lists import LOOP
+
+class Loop(NamedTuple):
+    """What a loop module is written from."""
+
+    name: str  # of the type and what it computes: shown while compiling
+    kernels: dict[str, Callable]  # the pure functions, by the name under which ``lines`` call them
+    lines: Sequence[str]  # body of the loop for instance q
+
+
+def source_of(loop: Loop) -> str:
+    """The source text of a loop's module, without its kernels (they are put into its namespace)."""
+    head = (
+        f'"""Group loop of {loop.name}; written by dap3d, do not edit."""\n\n'
+        "from dap3d_core.kernels.gather import *\n\n\n"
+        "def loop(t, body, F, idx, par, i0, p0, count, out1, out2, out3):\n"
+        "    for q in range(count):\n"
+    )
+    return head + "".join(f"        {line}\n" for line in loop.lines)
+
+
+_built: dict[str, Callable] = {}
+#: Names of the loops that this process had to compile (not those it found in the cache).
+compiled_here: list[str] = []
+
+
+def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable:
+    """The compiled loop, from this process, from the cache folder, or compiled now.
+
+    Args:
+        loop: what to build.
+        announce: called with the loop's name before it is compiled anew.
+    """
+    text = source_of(loop)
+    key = digest(text, *sources(*loop.kernels.values(), gather.vector_at, gather.matrix_at))
+    if key in _built:
+        return _built[key]
+    folder = cache_folder()
+    name = f"loop-{key}"
+    path = _write(folder, name, text) if folder is not None and jit_is_on() else None
+    namespace = _namespace(path, name, text)
+    namespace.update({n: inlined(k) for n, k in loop.kernels.items()})
+    if path is None:
+        function = compiled_in(None, name, namespace["loop"])
+    else:
+        function = compiled_in(folder, name, namespace["loop"])
+    if jit_is_on():
+        if announce is not None and not _is_cached(folder, name):
+            announce(loop.name)
+        function.compile(LOOP)
+        if not function.stats.cache_hits:
+            compiled_here.append(loop.name)
+    _built[key] = function
+    return function
+
+
+def _is_cached(folder: Path | None, name: str) -> bool:
+    return folder is not None and any((folder / name).glob("*/*.nbc"))
+
+
+def _write(folder: Path, name: str, text: str) -> Path | None:
+    """Put the module where every process finds it; written aside and renamed, for two may race."""
+    path = folder / name / f"{name.replace('-', '_')}.py"
+    if path.exists():
+        return path
+    try:
+        path.parent.mkdir(exist_ok=True)
+        aside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+        aside.write_text(text)
+        os.replace(aside, path)
+    except OSError:
+        return None
+    return path
+
+
+def _namespace(path: Path | None, name: str, text: str) -> dict:
+    if path is None:
+        namespace = {"__name__": f"dap3d_{name.replace('-', '_')}"}
+        exec(compile(text, f"<{name}>", "exec"), namespace)  # our own text, as importing the file would do
+        return namespace
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module
+    spec.loader.exec_module(module)
+    return vars(module)

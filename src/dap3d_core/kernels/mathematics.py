@@ -1,0 +1,79 @@
+"""Scalar mathematics for kernels: one name that works on floats, complex numbers, sympy symbols and in compiled code.
+
+Outside their domain the functions give NaN, as compiled code does; a run stops at the first NaN and names its source.
+"""
+
+import cmath
+import math
+
+from numba.extending import overload
+
+from dap3d_core.kernels.inline import INLINE_OPTIONS
+
+
+def _symbolic(x):
+    return hasattr(x, "free_symbols")
+
+
+def _sympy():
+    import sympy  # only reached with a sympy argument, so it is there
+
+    return sympy
+
+
+def _generic(name):
+    real, other = getattr(math, name), getattr(cmath, name)
+
+    def function(x):
+        if isinstance(x, complex):
+            return other(x)
+        if _symbolic(x):
+            return getattr(_sympy(), name)(x)
+        try:
+            return real(x)
+        except ValueError:
+            return math.nan
+
+    function.__name__ = function.__qualname__ = name
+    function.__doc__ = f"{name}(x) of a number (float, complex or sympy)."
+
+    @overload(function, jit_options=INLINE_OPTIONS)
+    def compiled(x):
+        return lambda x: real(x)
+
+    return function
+
+
+sqrt = _generic("sqrt")
+sin = _generic("sin")
+cos = _generic("cos")
+tanh = _generic("tanh")
+
+
+def atan2(y, x):
+    """Angle of the point (x, y) in (-pi, pi]; for complex arguments its first-order continuation (complex step)."""
+    if isinstance(y, complex) or isinstance(x, complex):
+        y, x = complex(y), complex(x)
+        slope = (x.real * y.imag - y.real * x.imag) / (x.real**2 + y.real**2)
+        return complex(math.atan2(y.real, x.real), slope)
+    if _symbolic(y) or _symbolic(x):
+        return _sympy().atan2(y, x)
+    return math.atan2(y, x)
+
+
+@overload(atan2, jit_options=INLINE_OPTIONS)
+def _compiled_atan2(y, x):
+    return lambda y, x: math.atan2(y, x)
+
+
+def where(condition, a, b):
+    """``a`` where the condition holds, else ``b``: the branch of a kernel. Both numbers are evaluated."""
+    if _symbolic(condition):
+        sympy = _sympy()
+        return sympy.Piecewise((a, condition), (b, True))
+    return a if condition else b
+
+
+@overload(where, jit_options=INLINE_OPTIONS)
+def _compiled_where(condition, a, b):
+    return lambda condition, a, b: a if condition else b

@@ -1,0 +1,94 @@
+"""How many constraint rows are independent, and which are not (spec 8)."""
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.linear.blocks import assemble, factor, scale_blocks
+from dap3d_core.linear.plan import Plan
+
+Floats = NDArray[np.float64]
+
+#: Up to this many rows the rank comes from singular values.
+DENSE_ROWS = 1000
+
+#: Beyond, a pivot of the block factorisation counts as zero below this part of its row's squared length.
+PIVOT_TOLERANCE = 1e-10
+
+
+@attrs.frozen(eq=False)
+class Rank:
+    """Independence of the rows of a Jacobian.
+
+    Attributes:
+        rows, columns: size of the Jacobian.
+        rank: number of independent rows.
+        tolerance: below this (relative to the largest) a singular value or pivot counts as zero.
+        method: "svd" or "pivots".
+        shared: rows that take part in a dependency (svd), or that were found dependent on earlier ones (pivots).
+        dependencies: (redundant, rows) an orthonormal basis of the combinations of rows that vanish; empty for pivots.
+    """
+
+    rows: int
+    columns: int
+    rank: int
+    tolerance: float
+    method: str
+    shared: tuple[int, ...]
+    dependencies: Floats
+
+    @property
+    def redundant(self) -> int:
+        """Number of redundant rows."""
+        return self.rows - self.rank
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom: columns less rank."""
+        return self.columns - self.rank
+
+
+def dense_rank(D: Floats) -> Rank:
+    """Rank of D (rows, columns) by singular values; zero is below max(rows, columns) eps 100 of the largest."""
+    rows, columns = D.shape
+    tolerance = max(rows, columns) * np.finfo(float).eps * 100
+    if not rows:
+        return Rank(0, columns, 0, tolerance, "svd", (), np.zeros((0, 0)))
+    left, values, _ = np.linalg.svd(D)
+    rank = int(np.sum(values > tolerance * values[0]))
+    null = left[:, rank:].T
+    shared = np.flatnonzero(np.max(np.abs(null), axis=0) > 1e-8) if len(null) else ()
+    return Rank(rows, columns, rank, tolerance, "svd", tuple(int(k) for k in shared), null)
+
+
+def sparse_rank(plan: Plan, D: Floats, metric: Floats, row_places: NDArray[np.int64], columns: int) -> Rank:
+    """Rank by the pivots of the block factorisation, for many rows.
+
+    The order of elimination is static, so this is weaker than singular values: a row counts as dependent when what is
+    left of it, after the rows before it, is below sqrt(PIVOT_TOLERANCE) of its length.
+
+    Args:
+        plan: the elimination program.
+        D: (block_size,) blocks as the joints gave them; not changed.
+        metric: (n+1, 16) of bodies as placed.
+        row_places: (rows,) place of each row in the row vectors.
+        columns: 6 n.
+    """
+    D = D.copy()
+    scale_blocks(plan.blocks, D, metric)
+    K = np.zeros(plan.matrix_size)
+    assemble(plan.targets, plan.contributions, D, K)
+    smallest = np.zeros(plan.row_size)
+    for place, _, height, first, _ in plan.blocks:
+        block = D[place : place + 6 * height].reshape(height, 6)
+        smallest[first : first + height] += np.sum(block**2, axis=1)
+    smallest *= PIVOT_TOLERANCE
+    factor(plan.nodes, plan.columns, plan.updates, K, smallest, True)
+    inverse_pivot = np.ones(plan.row_size)
+    for size, first, diagonal, *_ in plan.nodes[:-1]:
+        inverse_pivot[first : first + size] = K[diagonal : diagonal + size * size : size + 1]
+    dependent = np.flatnonzero(inverse_pivot[row_places] == 0.0)
+    rows = len(row_places)
+    return Rank(
+        rows, columns, rows - len(dependent), PIVOT_TOLERANCE, "pivots", tuple(int(k) for k in dependent), np.zeros((0, rows))
+    )

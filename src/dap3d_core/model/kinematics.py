@@ -1,0 +1,61 @@
+"""Euler parameters and frames for whole arrays at once (spec 1)."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+
+def rotation(p: ArrayLike) -> Floats:
+    """Rotation matrices (..., 3, 3), body to global, of Euler parameters (..., 4) of any length but zero."""
+    p = np.asarray(p, dtype=float)
+    e0, e1, e2, e3 = np.moveaxis(p / np.linalg.norm(p, axis=-1, keepdims=True), -1, 0)
+    return np.moveaxis(
+        np.array(
+            [
+                [1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)],
+                [2 * (e1 * e2 + e0 * e3), 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 - e0 * e1)],
+                [2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), 1 - 2 * (e1 * e1 + e2 * e2)],
+            ]
+        ),
+        (0, 1),
+        (-2, -1),
+    )
+
+
+def to_body(p: ArrayLike, vector: ArrayLike) -> Floats:
+    """Body components (..., 3) of global vectors (..., 3): A^T a."""
+    return np.einsum("...rc,...r->...c", rotation(p), vector)
+
+
+def to_global(p: ArrayLike, vector: ArrayLike) -> Floats:
+    """Global components (..., 3) of vectors given on the body (..., 3): A a."""
+    return np.einsum("...rc,...c->...r", rotation(p), vector)
+
+
+def split(u: ArrayLike, n: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Views r (..., n, 3), p (..., n, 4), r_dot (..., n, 3), w (..., n, 3) of states u (..., 13 n)."""
+    u = np.asarray(u, dtype=float)
+    q = u[..., : 7 * n].reshape(*u.shape[:-1], n, 7)
+    v = u[..., 7 * n : 13 * n].reshape(*u.shape[:-1], n, 6)
+    return q[..., :3], q[..., 3:], v[..., :3], v[..., 3:]
+
+
+def join(r: ArrayLike, p: ArrayLike, v: ArrayLike, w: ArrayLike) -> Floats:
+    """States u (..., 13 n) from r, p, r_dot, w of n bodies: the inverse of ``split``."""
+    q = np.concatenate([r, p], axis=-1)
+    s = np.concatenate([v, w], axis=-1)
+    return np.concatenate([q.reshape(*q.shape[:-2], -1), s.reshape(*s.shape[:-2], -1)], axis=-1)
+
+
+def to_integrated(u: ArrayLike, n: int, work: ArrayLike = 0.0) -> Floats:
+    """The integrated state y (..., 13 n + 1): angular velocities in body axes, and the work last."""
+    r, p, v, w = split(u, n)
+    work = np.broadcast_to(np.asarray(work, dtype=float), r.shape[:-2])[..., None]
+    return np.concatenate([join(r, p, v, to_body(p, w)), work], axis=-1)
+
+
+def from_integrated(y: ArrayLike, n: int) -> Floats:
+    """The state u (..., 13 n) of integrated states y (..., 13 n + 1)."""
+    r, p, v, w = split(y, n)
+    return join(r, p, v, to_global(p, w))

@@ -1,0 +1,160 @@
+"""The model: a checked scene as integers and arrays. No names are looked up after this floor.
+
+Coordinates stand in the state u in the order of the manual: r, p of every body, then r_dot, omega of every body.
+"""
+
+from functools import cached_property
+
+import attrs
+import numpy as np
+
+from dap3d_core.interface.checks import BodyPose, pose
+from dap3d_core.model.groups import Floats, Group, Integers, PrepareError, make_groups
+from dap3d_core.scene import Checked, Instance
+
+
+@attrs.frozen(eq=False)
+class Model:
+    """What a scene is to the solvers.
+
+    Attributes:
+        body_names: (n,) without ground, for reports only.
+        mass: (n,) kg.            Jp: (n, 3, 3) inertia matrix in body axes, kg m^2.
+        r, p: (n, 3), (n, 4) position and unit Euler parameters as given.
+        v, w: (n, 3) velocity and global angular velocity as given.
+        joint_names, force_names, function_names: in file order, for reports.
+        joint_rows: (joints,) rows of each joint.
+        joint_start: (joints + 1,) first row of each joint in C, nu, gamma and lambda.
+        joint_slots: bodies of each joint by slot, ground 0, in file order.
+        position_row: (rows,) True where a row has an equation at position level.
+        joints, forces, functions: groups of instances of one type.
+        function_count: number of functions; F has one row more, for the absent one.
+        point_names, point_body (points,), point_local (points, 3): for rP; animation points last.
+    """
+
+    body_names: tuple[str, ...]
+    mass: Floats
+    Jp: Floats
+    r: Floats
+    p: Floats
+    v: Floats
+    w: Floats
+    joint_names: tuple[str, ...]
+    force_names: tuple[str, ...]
+    function_names: tuple[str, ...]
+    joint_rows: Integers
+    joint_start: Integers
+    joint_slots: tuple[tuple[int, ...], ...]
+    position_row: np.ndarray
+    joints: tuple[Group, ...]
+    forces: tuple[Group, ...]
+    functions: tuple[Group, ...]
+    function_count: int
+    point_names: tuple[str, ...]
+    point_body: Integers
+    point_local: Floats
+
+    @property
+    def body_count(self) -> int:
+        """Number of bodies, ground not counted."""
+        return len(self.body_names)
+
+    @property
+    def row_count(self) -> int:
+        """Number of constraint rows."""
+        return int(self.joint_start[-1])
+
+    @cached_property
+    def irc(self) -> Integers:
+        """(n,) index in u of the first coordinate of each body (r, then p)."""
+        return 7 * np.arange(self.body_count, dtype=np.int64)
+
+    @cached_property
+    def iru(self) -> Integers:
+        """(n,) index in u of the first velocity of each body (r_dot, then omega)."""
+        return 7 * self.body_count + self.irv
+
+    @cached_property
+    def irv(self) -> Integers:
+        """(n,) index in v_dot, and column in the Jacobian, of the first acceleration of each body."""
+        return 6 * np.arange(self.body_count, dtype=np.int64)
+
+    @cached_property
+    def u0(self) -> Floats:
+        """(13 n,) the state as given, p of unit length."""
+        coordinates = np.hstack([self.r, self.p]).ravel()
+        return np.concatenate([coordinates, np.hstack([self.v, self.w]).ravel()])
+
+    def row_owner(self, row: int) -> str:
+        """Name of the joint that a constraint row belongs to."""
+        return self.joint_names[int(np.searchsorted(self.joint_start, row, side="right")) - 1]
+
+
+class ModelError(ValueError):
+    """A type refuses an element of the scene: (kind, name of the element, the type's own words)."""
+
+
+def build_model(checked: Checked) -> Model:
+    """Turn a checked scene into a model.
+
+    Raises:
+        ModelError: the ``prepare`` of a type refuses an element.
+        PluginError: the ``prepare`` of a type failed.
+    """
+    n = len(checked.body_names)
+    poses = _Poses(checked)
+    rows = np.array([_rows(j) for j in checked.joints], dtype=np.int64)
+    mask = [_position_mask(j) for j in checked.joints]
+    return Model(
+        body_names=tuple(checked.body_names),
+        mass=checked.mass,
+        Jp=checked.Jp,
+        r=checked.r,
+        p=checked.p,
+        v=checked.r_dot,
+        w=checked.w,
+        joint_names=tuple(j.name for j in checked.joints),
+        force_names=tuple(f.name for f in checked.forces),
+        function_names=tuple(f.name for f in checked.functions),
+        joint_rows=rows,
+        joint_start=np.concatenate([[0], np.cumsum(rows)]).astype(np.int64),
+        joint_slots=tuple(j.bodies for j in checked.joints),
+        position_row=np.array([there for m in mask for there in m], dtype=bool),
+        joints=_groups("joint", checked.joints, poses, n),
+        forces=_groups("force", checked.forces, poses, n),
+        functions=_groups("function", checked.functions, poses, n),
+        function_count=len(checked.functions),
+        point_names=tuple(checked.point_names),
+        point_body=checked.point_body,
+        point_local=checked.point_local,
+    )
+
+
+def _groups(kind: str, instances: list[Instance], poses: "_Poses", n: int) -> tuple[Group, ...]:
+    try:
+        return make_groups(instances, poses, n)
+    except PrepareError as error:
+        member, words = error.args
+        raise ModelError(kind, instances[member].name, words) from error
+
+
+def _rows(joint: Instance) -> int:
+    return int(joint.examined.type.rows)  # type: ignore[attr-defined]
+
+
+def _position_mask(joint: Instance) -> tuple[bool, ...]:
+    mask = joint.examined.type.holonomic  # type: ignore[attr-defined]
+    return (mask,) * _rows(joint) if isinstance(mask, bool) else tuple(mask)
+
+
+class _Poses(dict[int, BodyPose]):
+    """Poses as given, made when a type's ``prepare`` asks for them."""
+
+    def __init__(self, checked: Checked) -> None:
+        super().__init__({0: pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))})
+        self._checked = checked
+
+    def __missing__(self, body: int) -> BodyPose:
+        made = pose(self._checked.r[body - 1], self._checked.p[body - 1])
+        self[body] = made
+        return made

@@ -1,0 +1,20 @@
+"""The plot floor: quantities of a result as curves, in a window or in a file."""
+
+import sys
+from types import ModuleType
+from typing import Any
+
+from dap3d_core.plot.drawing import plot
+from dap3d_core.plot.saving import FORMATS, save_plot
+
+__all__ = ["FORMATS", "plot", "save_plot"]
+
+
+class _CallableModule(ModuleType):
+    """Lets ``dap3d_core.plot(...)`` plot whether or not this module of the same name is loaded."""
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        return plot(*arguments, **options)
+
+
+sys.modules[__name__].__class__ = _CallableModule

@@ -1,0 +1,74 @@
+"""Figures as files, without a window."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from dap3d_core.plot.drawing import WIDTH, draw, gather, height_of
+from dap3d_core.result import Result, ResultError
+from dap3d_core.result.files import cannot, whole_file
+
+#: Suffix -> what keeps the time of day out of the file: equal figures give equal files.
+FORMATS: dict[str, dict[str, Any]] = {
+    ".png": {},
+    ".svg": {"Date": None},
+    ".pdf": {"CreationDate": None},
+}
+
+
+def save_plot(
+    result: Result,
+    quantities: str | Sequence[str],
+    path: str | os.PathLike[str],
+    *,
+    x: str | None = None,
+    width: float = WIDTH,
+    height: float | None = None,
+    dpi: float = 150.0,
+    force: bool = False,
+) -> Path:
+    """Draw quantities of a result as ``plot`` does, into a file; needs no display.
+
+    Args:
+        result: what to draw from.
+        quantities: one name or several.
+        path: the file; its suffix says what it is, .png, .svg or .pdf.
+        x: the quantity they are drawn over; time when left out.
+        width, height: size in inches; the height fits the number of panels when left out.
+        dpi: dots an inch of a PNG.
+        force: whether an existing file is overwritten.
+
+    Returns:
+        The path.
+
+    Raises:
+        UnknownNameError, ValueError: as ``plot``; also for a suffix or a size that cannot be.
+        ResultError: the file cannot be written, or exists and ``force`` is off.
+    """
+    target = Path(path)
+    suffix = target.suffix.lower()
+    if suffix not in FORMATS:
+        raise ValueError(f"cannot write {target}: a figure is one of {', '.join(FORMATS)}")
+    names = [quantities] if isinstance(quantities, str) else list(quantities)
+    drawing = gather(result, names, x)
+    size = (width, height_of(drawing) if height is None else height)
+    if not all(0.5 <= s <= 100.0 for s in size) or not 10.0 <= dpi <= 1200.0:
+        raise ValueError(f"a figure of {size[0]:g} x {size[1]:g} inches at {dpi:g} dpi cannot be")
+    # Text in an SVG stays text; its identifiers do not change from run to run.
+    with matplotlib.rc_context({"svg.hashsalt": "dap3d", "svg.fonttype": "none"}):
+        figure = Figure(figsize=size, layout="constrained")
+        FigureCanvasAgg(figure)
+        draw(figure, drawing, result)
+        with whole_file(target, force) as part:
+            try:
+                figure.savefig(part, format=suffix[1:], dpi=dpi, metadata=FORMATS[suffix])
+            except ResultError:
+                raise
+            except OSError as error:
+                raise cannot("write", target, error) from error
+    return target

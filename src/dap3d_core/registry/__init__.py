@@ -1,0 +1,14 @@
+"""Finds types by keyword: entry points are read at once, a plugin is imported when asked for."""
+
+from dap3d_core.interface import PluginError
+from dap3d_core.registry.discovery import BLOCK_VARIABLE
+from dap3d_core.registry.registry import PluginInfo, Registry, UnknownTypeError, load_registry
+
+__all__ = [
+    "BLOCK_VARIABLE",
+    "PluginError",
+    "PluginInfo",
+    "Registry",
+    "UnknownTypeError",
+    "load_registry",
+]

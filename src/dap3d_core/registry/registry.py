@@ -1,0 +1,195 @@
+"""The registry: which types there are, and each of them examined when it is first asked for."""
+
+from collections.abc import Collection
+from pathlib import Path
+
+import attrs
+
+from dap3d_core.interface import PluginError
+from dap3d_core.interface.checks import Examined
+from dap3d_core.interface.hooks import GROUPS
+from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover
+from dap3d_core.registry.loading import load, load_file
+from dap3d_core.registry.spelling import nearest
+
+
+class UnknownTypeError(PluginError, LookupError):
+    """No installed type has this keyword.
+
+    Attributes:
+        nearest: the most similar keyword of this kind, or None.
+    """
+
+    nearest: str | None = None
+
+
+@attrs.frozen
+class PluginInfo:
+    """One line of ``dap3d plugins``.
+
+    Attributes:
+        kind: joint, force or function; "" where a distribution's entry points cannot be read.
+        keyword: the type's word in a scene.
+        distribution, version: the installed package; "" for a model's own file.
+        module: the module, or the path of a model's own file.
+        state: ok, broken, blocked or duplicate.
+        reason: why it is not ok, with the remedy; "" where it is.
+    """
+
+    kind: str
+    keyword: str
+    distribution: str
+    version: str
+    module: str
+    state: str
+    reason: str = ""
+
+
+@attrs.frozen(eq=False)
+class Registry:
+    """The types that scenes may name. A value: make one with ``load_registry`` and pass it on.
+
+    Attributes:
+        sources: where each type comes from, by kind and keyword; several where packages collide.
+        notes: what plugins changed in the process while they were loaded, and was put back.
+    """
+
+    sources: dict[tuple[str, str], list[Source]]
+    notes: list[str] = attrs.field(factory=list)
+    _loaded: dict[Source, Examined | str] = attrs.field(factory=dict, repr=False)
+
+    def get(self, kind: str, keyword: str) -> Examined:
+        """The type of this keyword, loaded and examined when first asked for.
+
+        Args:
+            kind: joint, force or function.
+            keyword: the type's word in a scene.
+
+        Raises:
+            UnknownTypeError: there is none; it names the nearest and all others.
+            PluginError: the type cannot be used: two packages bring it, or its plugin is broken.
+                Names distribution, module or file, reason and remedy.
+        """
+        _check_kind(kind)
+        sources = [s for s in self.sources.get((kind, keyword), []) if not s.blocked]
+        if not sources:
+            raise self._unknown(kind, keyword)
+        if len(sources) > 1:
+            raise PluginError(_collision(sources))
+        return self._load(sources[0])
+
+    def keywords(self, kind: str) -> tuple[str, ...]:
+        """All keywords of a kind, sorted, without those of blocked packages. Loads nothing."""
+        _check_kind(kind)
+        return tuple(
+            sorted(
+                w for (k, w), found in self.sources.items() if k == kind and not _all_blocked(found)
+            )
+        )
+
+    def listing(self) -> list[PluginInfo]:
+        """Every type with its state; loads each in its own guard and raises nothing."""
+        return [self._info(s, found) for found in self.sources.values() for s in found]
+
+    def with_file(self, path: str | Path) -> "Registry":
+        """A registry that has the types of a model's own Python file as well. Runs that file.
+
+        Args:
+            path: the file, ``plugin.py`` of a model's folder.
+
+        Raises:
+            PluginError: the file cannot be used; names file, reason and remedy.
+        """
+        sources = {key: list(found) for key, found in self.sources.items()}
+        notes = list(self.notes)
+        for source in load_file(Path(path), notes):
+            sources.setdefault((source.kind, source.keyword), []).append(source)
+        return Registry(sources, notes, dict(self._loaded))
+
+    def _load(self, source: Source) -> Examined:
+        found = self._loaded.get(source)
+        if found is None:
+            try:
+                found = load(source, self.notes)
+            except PluginError as error:
+                self._loaded[source] = str(error)
+                raise
+            self._loaded[source] = found
+        if isinstance(found, str):
+            raise PluginError(found)
+        return found
+
+    def _info(self, source: Source, rivals: list[Source]) -> PluginInfo:
+        state, reason = "ok", ""
+        active = [s for s in rivals if not s.blocked]
+        if source.blocked:
+            state, reason = "blocked", f"{BLOCK_VARIABLE} names {source.distribution}"
+        elif not source.kind:
+            state, reason = "broken", source.fault
+        elif len(active) > 1:
+            state, reason = "duplicate", _collision(active)
+        else:
+            try:
+                self._load(source)
+            except PluginError as error:
+                state, reason = "broken", str(error)
+        return PluginInfo(
+            source.kind,
+            source.keyword,
+            source.distribution,
+            source.version,
+            source.module,
+            state,
+            reason,
+        )
+
+    def _unknown(self, kind: str, keyword: str) -> UnknownTypeError:
+        known = self.keywords(kind)
+        near = nearest(keyword, known)
+        words = f"there is no {kind} type {keyword!r}"
+        blocked = self.sources.get((kind, keyword), [])
+        others = [k for k in GROUPS if k != kind and (k, keyword) in self.sources]
+        if blocked:
+            words += f": {BLOCK_VARIABLE} leaves {blocked[0].distribution} out"
+        elif others:
+            words += f"; {keyword!r} is a {others[0]} type and belongs under {others[0]}s"
+        elif near:
+            words += f"; did you mean {near!r}?"
+        words += f" (installed {kind} types: {', '.join(known) or 'none'})"
+        error = UnknownTypeError(words)
+        error.nearest = near if near and not blocked and not others else None
+        return error
+
+
+def load_registry(*, groups: Collection[str] | None = None) -> Registry:
+    """Find the installed types by their entry points; imports no plugin.
+
+    Args:
+        groups: entry-point groups to read, by default ``dap3d.joints``, ``dap3d.forces`` and
+            ``dap3d.functions``; an empty collection gives an empty registry.
+    """
+    sources: dict[tuple[str, str], list[Source]] = {}
+    for source in discover(groups):
+        sources.setdefault((source.kind, source.keyword), []).append(source)
+    return Registry(sources)
+
+
+def _check_kind(kind: str) -> None:
+    if kind not in GROUPS:
+        raise ValueError(f"a kind is one of {', '.join(GROUPS)}, not {kind!r}")
+
+
+def _all_blocked(sources: list[Source]) -> bool:
+    return all(s.blocked for s in sources)
+
+
+def _collision(sources: list[Source]) -> str:
+    title = f"{sources[0].kind} type {sources[0].keyword!r}"
+    both = " and ".join(str(s) for s in sources)
+    names = sorted({s.distribution for s in sources})
+    if "" in names:
+        return f"{title} is brought by {both}; rename the one in the model's own file"
+    if len(names) == 1:
+        return f"{title} is declared twice, by {both}; update or uninstall {names[0]}"
+    blocks = " or ".join(f"{BLOCK_VARIABLE}={n}" for n in names)
+    return f"{title} is brought by {both}; uninstall one of them, or leave one out with {blocks}"

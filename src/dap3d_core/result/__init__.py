@@ -1,0 +1,27 @@
+"""The result floor: what a run left behind, on disk and in memory; the post-processor's arrays."""
+
+from dap3d_core.result.errors import ResultError, UnknownNameError
+from dap3d_core.result.ledger import Entry
+from dap3d_core.result.motion import Energy
+from dap3d_core.result.quantities import Quantity, find
+from dap3d_core.result.reactions import Reaction
+from dap3d_core.result.reading import open_result
+from dap3d_core.result.record import Record, Statistics, current_versions
+from dap3d_core.result.result import Result
+from dap3d_core.result.writing import ResultWriter
+
+__all__ = [
+    "Energy",
+    "Entry",
+    "Quantity",
+    "Reaction",
+    "Record",
+    "Result",
+    "ResultError",
+    "ResultWriter",
+    "Statistics",
+    "UnknownNameError",
+    "current_versions",
+    "find",
+    "open_result",
+]

@@ -1,0 +1,120 @@
+"""The arrays that a result stores; all others are computed from them."""
+
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from dap3d_core.model.groups import Floats
+from dap3d_core.model.kinematics import from_integrated
+from dap3d_core.result.subject import Subject
+
+
+class Column(NamedTuple):
+    """One stored array: its name, its dimension besides time ("" for none), unit and meaning."""
+
+    name: str
+    dimension: str
+    unit: str
+    meaning: str
+
+
+#: "SI" stands where the unit differs from entry to entry; the meaning says how.
+COLUMNS = (
+    Column("t", "", "s", "time"),
+    Column(
+        "u",
+        "state",
+        "SI",
+        "state: r (m), p of each body, then r_dot (m/s), omega (rad/s, global axes) of each body",
+    ),
+    Column(
+        "v_dot",
+        "velocity",
+        "SI",
+        "accelerations: r_ddot (m/s^2), omega_dot (rad/s^2, global axes) of each body",
+    ),
+    Column("Lam", "row", "SI", "Lagrange multipliers by joint and row (N, N m or as the row says)"),
+    Column("work", "", "J", "work done on the system by forces and drivers since the start"),
+    Column("potential_energy", "", "J", "potential energy of the forces that have one"),
+    Column("position_residual", "", "SI", "largest |C| of the constraint rows"),
+    Column("velocity_residual", "", "SI", "largest |D v - nu| of the constraint rows"),
+    Column("acceleration_residual", "", "SI", "largest |D v_dot - gamma| of the constraint rows"),
+)
+
+
+@attrs.frozen(eq=False)
+class Arrays:
+    """What was reported, for n bodies and m constraint rows at nt instants; read-only.
+
+    Attributes:
+        t: (nt,) s.
+        u: (nt, 13 n) states, angular velocities in global axes (spec 1).
+        v_dot: (nt, 6 n) accelerations r_ddot, omega_dot of each body, global axes.
+        Lam: (nt, m) Lagrange multipliers.
+        work: (nt,) J, done on the system by forces and drivers.
+        potential_energy: (nt,) J.
+        position_residual, velocity_residual, acceleration_residual: (nt,) largest magnitude.
+    """
+
+    t: Floats
+    u: Floats
+    v_dot: Floats
+    Lam: Floats
+    work: Floats
+    potential_energy: Floats
+    position_residual: Floats
+    velocity_residual: Floats
+    acceleration_residual: Floats
+
+    def __attrs_post_init__(self) -> None:
+        for column in COLUMNS:
+            getattr(self, column.name).flags.writeable = False
+
+
+def column_sizes(subject: Subject) -> dict[str, int]:
+    """Length of each dimension that a column may have besides time."""
+    n = subject.body_count
+    return {"state": 13 * n, "velocity": 6 * n, "row": subject.row_count}
+
+
+def row_width(subject: Subject) -> int:
+    """Numbers in a row as the integrator delivers it."""
+    return 1 + (13 * subject.body_count + 1) + 6 * subject.body_count + subject.row_count + 4
+
+
+def _states(y: Floats, n: int) -> Floats:
+    """States of integrated states, bit for bit the same however the rows are cut into pieces.
+
+    Of one vector alone numpy adds the products in another order than of several.
+    """
+    if len(y) > 1:
+        return from_integrated(y, n)
+    return from_integrated(np.repeat(y, 2, axis=0), n)[:1] if len(y) else np.zeros((0, 13 * n))
+
+
+def arrays_of(rows: Floats, subject: Subject) -> Arrays:
+    """Take apart rows as the integrator delivers them.
+
+    Args:
+        rows: (nt, row_width): t; the integrated state (angular velocity in body axes, work last);
+            v_dot; lambda; potential energy; largest residuals of the three levels.
+        subject: whose rows they are.
+
+    Raises:
+        ValueError: the rows have another width.
+    """
+    rows = np.asarray(rows, dtype=float)
+    width = row_width(subject)
+    if rows.ndim != 2 or rows.shape[1] != width:
+        raise ValueError(f"rows should have the shape (nt, {width}), not {rows.shape}")
+    n, m = subject.body_count, subject.row_count
+    t, y, v_dot, Lam, last = np.split(rows, np.cumsum([1, 13 * n + 1, 6 * n, m]), axis=1)
+    return Arrays(
+        t[:, 0].copy(),
+        _states(y, n),
+        v_dot.copy(),
+        Lam.copy(),
+        y[:, -1].copy(),
+        *(last[:, k].copy() for k in range(4)),
+    )

@@ -1,0 +1,108 @@
+"""Files that are written whole or not at all, and never over another without being asked to."""
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from dap3d_core.result.errors import ResultError
+
+#: So many unfinished files may lie beside one another.
+_MOST_PARTS = 1000
+
+
+def cannot(verb: str, path: Path, error: BaseException) -> ResultError:
+    """The error for a file that the system or a library refuses, in a sentence."""
+    reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    if getattr(error, "errno", None) in (errno.EACCES, errno.EPERM):
+        reason = "no permission"
+    elif "HDF error" in reason:
+        reason = f"the library says {reason!r}; is the disk full?"
+    return ResultError(f"cannot {verb} {path}: {reason}")
+
+
+def check_target(path: str | os.PathLike[str], force: bool = False) -> Path:
+    """The path of a file that may be written.
+
+    Raises:
+        ResultError: its folder does not exist, it is no file, or it exists and ``force`` is off.
+    """
+    target = Path(path)
+    try:
+        if target.is_file():
+            fault = "" if force else "the file exists; force overwrites it"
+        elif target.is_dir():
+            fault = "it is a folder; name a file in it"
+        elif target.exists():
+            fault = "it is no regular file"
+        elif not target.parent.is_dir():
+            fault = f"there is no folder {target.parent}"
+        else:
+            fault = ""
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise cannot("write", target, error) from error
+    if fault:
+        raise ResultError(f"cannot write {target}: {fault}")
+    return target
+
+
+def reserve(target: Path) -> Path:
+    """Make an empty file beside the target, ``NAME.part`` or the first of its kind that is free.
+
+    An unfinished file of an earlier run that was killed is left as it is.
+
+    Raises:
+        ResultError: the folder cannot be written to.
+    """
+    for k in range(1, _MOST_PARTS):
+        part = target.with_name(f"{target.name}.part{k if k > 1 else ''}")
+        try:
+            os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        except FileExistsError:
+            continue
+        except (OSError, ValueError) as error:
+            raise cannot("write", target, error) from error
+        return part
+    raise ResultError(f"cannot write {target}: {_MOST_PARTS} unfinished files lie beside it")
+
+
+def put_in_place(part: Path, target: Path) -> None:
+    """Give a finished file its name, once its content is on the disk.
+
+    Raises:
+        ResultError: the system refuses.
+    """
+    try:
+        with part.open("rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(part, target)
+        with suppress(OSError):  # not every system lets a folder be synchronised
+            folder = os.open(target.parent, os.O_RDONLY)
+            try:
+                os.fsync(folder)
+            finally:
+                os.close(folder)
+    except OSError as error:
+        raise cannot("write", target, error) from error
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike[str], force: bool = False) -> Iterator[Path]:
+    """A file to write into, which gets its name at the end; left with an error, it vanishes.
+
+    Args:
+        path: what it is called in the end.
+        force: whether an existing file is overwritten.
+
+    Raises:
+        ResultError: the path cannot be written to.
+    """
+    target = check_target(path, force)
+    part = reserve(target)
+    try:
+        yield part
+        check_target(path, force)
+        put_in_place(part, target)
+    finally:
+        part.unlink(missing_ok=True)

@@ -1,0 +1,205 @@
+"""The ledger of a run: what should be conserved or zero, how far it is, and how far it may be.
+
+Error control keeps the error of each step below ``atol + rtol |y|``. The errors of many steps add
+up; a run is called good while they come to no more than LOOSE times that. A run of fixed steps has
+no tolerance: its entries have no limit, they inform. Drift is not accuracy: a small entry does not
+prove a right result, a large one proves a wrong one.
+"""
+
+import attrs
+import numpy as np
+
+from dap3d_core.model.groups import Floats
+from dap3d_core.model.kinematics import split
+from dap3d_core.result.arrays import Arrays
+from dap3d_core.result.motion import kinetic_energy, momentum
+from dap3d_core.result.record import Record
+from dap3d_core.result.subject import Subject
+
+#: How many steps' worth of error a run may gather.
+LOOSE = 1e3
+#: Relative rounding error of sums over a run.
+ROUNDING = 1e-12
+#: Residual, relative to 1 + largest magnitude, up to which a projection counts as converged
+#: (formulations/standard.py: 1e3 times its tolerance 1e-13).
+PROJECTED = 1e-10
+#: Relative residual of solved equations of motion. Rounding and the condition of the system.
+SOLVED = 1e-9
+#: Deviation of normalised Euler parameters from unit length.
+UNIT_LENGTH = 1e-12
+
+
+@attrs.frozen
+class Entry:
+    """One line of the ledger.
+
+    Attributes:
+        value: how far it is off, largest over the reported instants.
+        limit: how far it may be; None where nothing says so.
+        ok: whether it is within the limit (NaN is not); None without a limit.
+        unit: of value and limit; "1" for relative ones.
+        text: what was compared with what, in a sentence.
+    """
+
+    value: float
+    limit: float | None
+    ok: bool | None
+    unit: str
+    text: str
+
+
+def _entry(value: float, limit: float | None, unit: str, text: str) -> Entry:
+    value = float(value)
+    limit = None if limit is None else float(limit)
+    return Entry(value, limit, None if limit is None else bool(value <= limit), unit, text)
+
+
+def ledger_of(subject: Subject, arrays: Arrays, record: Record) -> dict[str, Entry]:
+    """All entries of a run, by name; none for a run without reported instants.
+
+    Names: energy; total energy (where every force has a potential); momentum (where nothing
+    outside acts on the bodies); position, velocity, acceleration; quaternion.
+    """
+    if not len(arrays.t):
+        return {}
+    entries = {"energy": _energy(subject, arrays, record)}
+    if subject.has_potential:
+        entries["total energy"] = _total_energy(subject, arrays, record)
+    if subject.is_isolated:
+        entries["momentum"] = _momentum(subject, arrays, record)
+    entries |= _constraints(subject, arrays, record)
+    entries["quaternion"] = _quaternion(subject, arrays, record)
+    return entries
+
+
+def _relative_limit(record: Record) -> float | None:
+    """LOOSE rtol, and rounding."""
+    control = record.tolerances
+    return None if control is None else LOOSE * control[0] + ROUNDING
+
+
+def _floor(record: Record) -> float:
+    """Magnitude below which error control is absolute, not relative: atol / rtol; 0 without it."""
+    control = record.tolerances
+    return 0.0 if control is None else control[1] / control[0]
+
+
+def _energy_scale(subject: Subject, arrays: Arrays, record: Record) -> float:
+    """What an imbalance of energy is compared with, J: the largest kinetic energy or work.
+
+    Below a speed of atol / rtol error control is absolute: an error atol of the speed v is one of
+    m v atol in the energy, to which m v (atol / rtol) is the scale. A system that hangs at rest
+    has rounding errors of its potential for energy; they are given the share that ROUNDING is of
+    the limit.
+    """
+    floor, limit = _floor(record), _relative_limit(record)
+    speed, spin = _momenta(subject, arrays)
+    kinetic = np.max(kinetic_energy(subject, arrays.u) + floor * (speed + spin))
+    rounding = 0.0 if limit is None else ROUNDING / limit * _largest(arrays.potential_energy)
+    work = _largest(arrays.work - arrays.work[0])
+    return max(float(kinetic), work, rounding, float(np.finfo(float).tiny))
+
+
+def _momenta(subject: Subject, arrays: Arrays) -> tuple[Floats, Floats]:
+    """(nt,) sums of m |r_dot|, kg m/s, and of |J| |omega|, kg m^2/s, over the bodies."""
+    _, _, rd, w = split(arrays.u, subject.body_count)
+    inertia = np.linalg.norm(subject.Jp, ord=2, axis=(1, 2))
+    return np.linalg.norm(rd, axis=2) @ subject.mass, np.linalg.norm(w, axis=2) @ inertia
+
+
+def _energy(subject: Subject, arrays: Arrays, record: Record) -> Entry:
+    """Kinetic energy against the work done by forces and drivers, dampers included."""
+    kinetic = kinetic_energy(subject, arrays.u)
+    imbalance = (kinetic - kinetic[0]) - (arrays.work - arrays.work[0])
+    worst, when = _worst(imbalance, arrays.t)
+    scale = _energy_scale(subject, arrays, record)
+    text = (
+        f"change of kinetic energy less work of forces and drivers: {worst:.2g} J "
+        f"at t = {when:g} s, relative to {scale:.3g} J"
+    )
+    return _entry(worst / scale, _relative_limit(record), "1", text)
+
+
+def _total_energy(subject: Subject, arrays: Arrays, record: Record) -> Entry:
+    """Change of kinetic and potential energy together: zero without dampers and drivers."""
+    total = kinetic_energy(subject, arrays.u) + arrays.potential_energy
+    worst, when = _worst(total - total[0], arrays.t)
+    scale = _energy_scale(subject, arrays, record)
+    text = (
+        f"change of kinetic and potential energy: {worst:.2g} J at t = {when:g} s, relative to "
+        f"{scale:.3g} J; dampers and drivers change it too"
+    )
+    return _entry(worst / scale, None, "1", text)
+
+
+def _momentum(subject: Subject, arrays: Arrays, record: Record) -> Entry:
+    """Drift of linear and angular momentum, relative to the momenta of the bodies added up."""
+    r, _, rd, _ = split(arrays.u, subject.body_count)
+    far, fast = np.linalg.norm(r, axis=2), np.linalg.norm(rd, axis=2)
+    floor = _floor(record)  # of coordinates and velocities alike, to first order
+    inertia = float(np.linalg.norm(subject.Jp, ord=2, axis=(1, 2)).sum())
+    speed, spin = _momenta(subject, arrays)
+    orbit = (far * fast + floor * (far + fast)) @ subject.mass
+    scales = (
+        np.max(speed) + floor * subject.mass.sum(),
+        np.max(orbit + spin) + floor * inertia,
+    )
+    drifts = []
+    for values, scale in zip(momentum(subject, arrays.u), scales, strict=True):
+        worst, _ = _worst(np.linalg.norm(values - values[0], axis=1), arrays.t)
+        drifts.append(worst / max(float(scale), float(np.finfo(float).tiny)))
+    text = (
+        f"relative drift of linear momentum {drifts[0]:.2g}, of angular momentum about the origin "
+        f"{drifts[1]:.2g}"
+    )
+    return _entry(float(np.max(drifts)), _relative_limit(record), "1", text)
+
+
+def _constraints(subject: Subject, arrays: Arrays, record: Record) -> dict[str, Entry]:
+    """Largest residuals of the constraints at the three levels.
+
+    Position and velocity: with projection as far as a projection may leave them, else what errors
+    of steps come to. Acceleration: the equations solved for it, at any tolerance.
+    """
+    r, _, _, _ = split(arrays.u, subject.body_count)
+    speeds = arrays.u[:, 7 * subject.body_count :]
+    sizes = [1.0 + _largest(a) for a in (r, speeds, arrays.v_dot)]
+    limits = [*(_state_limit(record, size) for size in sizes[:2]), SOLVED * sizes[2]]
+    found = {}
+    for name, residual, limit in zip(
+        ("position", "velocity", "acceleration"), ("C", "D v - nu", "D v_dot - gamma"), limits,
+        strict=True,
+    ):  # fmt: skip
+        worst, when = _worst(getattr(arrays, f"{name}_residual"), arrays.t)
+        text = f"largest |{residual}| of {subject.row_count} constraint rows, at t = {when:g} s"
+        if not subject.row_count:
+            text = "no constraints"
+        found[name] = _entry(worst, limit, "SI", text)
+    return found
+
+
+def _state_limit(record: Record, size: float) -> float | None:
+    if record.projected:
+        return PROJECTED * size
+    control = record.tolerances
+    return None if control is None else LOOSE * (control[0] * size + control[1])
+
+
+def _quaternion(subject: Subject, arrays: Arrays, record: Record) -> Entry:
+    """Euler parameters are normalised by projection; without it their length drifts."""
+    _, p, _, _ = split(arrays.u, subject.body_count)
+    off = np.abs(np.linalg.norm(p, axis=2) - 1.0)
+    worst, when = _worst(off.max(axis=1, initial=0.0), arrays.t)
+    limit = UNIT_LENGTH if record.projected else _state_limit(record, 1.0)
+    text = f"largest deviation of Euler parameters from unit length, at t = {when:g} s"
+    return _entry(worst, limit, "1", text)
+
+
+def _worst(values: Floats, t: Floats) -> tuple[float, float]:
+    """Largest magnitude, NaN where one is NaN, and when it occurs."""
+    k = int(np.argmax(np.abs(values)))  # argmax stops at a NaN
+    return float(abs(values[k])), float(t[k])
+
+
+def _largest(values: Floats) -> float:
+    return float(np.max(np.abs(values), initial=0.0))

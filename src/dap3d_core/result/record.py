@@ -1,0 +1,118 @@
+"""What a run says of itself: where it came from, how it went, what it cost."""
+
+import json
+import platform
+import tomllib
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import attrs
+
+#: How a run can have ended.
+STATUSES = ("done", "interrupted", "stopped")
+#: Stands in a file that is still being written, or whose writer was killed.
+RUNNING = "running"
+
+
+@attrs.frozen(kw_only=True)
+class Statistics:
+    """What a run cost.
+
+    Attributes:
+        steps, rejected: integration steps taken, and tried but thrown away.
+        rhs: evaluations of the right-hand side.
+        projections: projections on the constraints.
+        wall_time_s, compile_time_s: time of the run without compilation, and of compilation, s.
+    """
+
+    steps: int = 0
+    rejected: int = 0
+    rhs: int = 0
+    projections: int = 0
+    wall_time_s: float = 0.0
+    compile_time_s: float = 0.0
+
+
+@cache
+def _installed() -> dict[str, str]:
+    found = {}
+    for package in ("dap3d", "numpy", "numba"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "unknown"
+    return {**found, "python": platform.python_version()}
+
+
+def current_versions() -> dict[str, str]:
+    """Versions of what the numbers depend on: dap3d, numpy, numba, python."""
+    return dict(_installed())
+
+
+def _words(words: Iterable[str]) -> tuple[str, ...]:
+    return tuple(words)
+
+
+def _plain(value: Any) -> Any:
+    """Settings as a file gives them back: lists for tuples, Python's numbers for numpy's."""
+    return json.loads(to_json(value))
+
+
+def to_json(value: Any) -> str:
+    """Text of settings, notes or statistics; numpy's numbers and arrays become Python's."""
+    return json.dumps(value, default=lambda v: v.tolist() if hasattr(v, "tolist") else str(v))
+
+
+@attrs.frozen(kw_only=True)
+class Record:
+    """Everything about a run that is not an array.
+
+    Attributes:
+        scene_text: the scene that was run, as the text of a scene file.
+        status: "done"; "interrupted" by the user; "stopped" early, by an event or a failure.
+        method, integrator: formulation and method of integration that were used.
+        notes: what the run chose, changed or noticed, in order.
+        settings: rtol, atol, step, project, correct and the like, as they were used.
+        stats: what it cost.
+        known_versions: of dap3d, numpy, numba, python; None for those that are installed.
+    """
+
+    scene_text: str
+    status: str = attrs.field(default="done", validator=attrs.validators.in_((*STATUSES, RUNNING)))
+    method: str = ""
+    integrator: str = ""
+    notes: tuple[str, ...] = attrs.field(default=(), converter=_words)
+    settings: dict[str, Any] = attrs.field(factory=dict, converter=_plain)
+    stats: Statistics = attrs.Factory(Statistics)
+    known_versions: Mapping[str, str] | None = attrs.field(
+        default=None, eq=lambda known: _installed() if known is None else dict(known)
+    )
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Versions of dap3d, numpy, numba and python that made the numbers."""
+        known = self.known_versions
+        return current_versions() if known is None else dict(known)
+
+    @property
+    def title(self) -> str:
+        """Name of the scene, "" where it has none."""
+        head = self.scene_text.partition("\n[")[0]  # the header is the first table
+        try:
+            return str(tomllib.loads(head)["scene"]["name"])
+        except (tomllib.TOMLDecodeError, KeyError, TypeError):
+            return ""
+
+    @property
+    def tolerances(self) -> tuple[float, float] | None:
+        """(rtol, atol) that controlled the steps; None for steps of fixed size."""
+        rtol, atol = self.settings.get("rtol"), self.settings.get("atol")
+        fixed = self.integrator == "rk4" or self.settings.get("step") is not None
+        return None if fixed or not rtol else (float(rtol), float(atol or 0.0))
+
+    @property
+    def projected(self) -> bool:
+        """Whether states were projected on the constraints."""
+        return bool(self.settings.get("project", False))

@@ -1,0 +1,85 @@
+"""What the numbers of a result belong to: bodies, joints and points, and their constants."""
+
+from functools import cached_property
+
+import attrs
+import numpy as np
+
+from dap3d_core.model import Model
+from dap3d_core.model.groups import Floats, Integers
+
+
+@attrs.frozen(eq=False)
+class Subject:
+    """The part of a model that a result needs and a file keeps.
+
+    Attributes:
+        body_names, joint_names, point_names: in file order; ground is not among the bodies,
+            animation points come last.
+        mass: (n,) kg.
+        Jp: (n, 3, 3) inertia matrices in body axes, kg m^2.
+        joint_rows: (joints,) constraint rows of each joint.
+        point_body: (points,) body of each point: 1 to n, 0 for ground.
+        point_local: (points, 3) coordinates on that body, m.
+        has_potential: whether every force has a potential (which a damper part still may not).
+        is_isolated: whether nothing outside acts on the bodies, so that momentum is conserved:
+            no force, and no joint with ground or with a single body.
+    """
+
+    body_names: tuple[str, ...]
+    mass: Floats
+    Jp: Floats
+    joint_names: tuple[str, ...]
+    joint_rows: Integers
+    point_names: tuple[str, ...]
+    point_body: Integers
+    point_local: Floats
+    has_potential: bool
+    is_isolated: bool
+
+    @property
+    def body_count(self) -> int:
+        """Number of bodies n, ground not counted."""
+        return len(self.body_names)
+
+    @property
+    def row_count(self) -> int:
+        """Number of constraint rows m."""
+        return int(self.joint_rows.sum())
+
+    @cached_property
+    def joint_start(self) -> Integers:
+        """(joints + 1,) first row of each joint."""
+        return np.concatenate([[0], np.cumsum(self.joint_rows)]).astype(np.int64)
+
+    @cached_property
+    def body_index(self) -> dict[str, int]:
+        """Name of a body -> its place, from 0."""
+        return {name: k for k, name in enumerate(self.body_names)}
+
+    @cached_property
+    def point_index(self) -> dict[str, int]:
+        """Name of a point -> its place, from 0."""
+        return {name: k for k, name in enumerate(self.point_names)}
+
+    @cached_property
+    def joint_index(self) -> dict[str, int]:
+        """Name of a joint -> its place, from 0."""
+        return {name: k for k, name in enumerate(self.joint_names)}
+
+
+def subject_of(model: Model) -> Subject:
+    """The subject of a model."""
+    return Subject(
+        body_names=model.body_names,
+        mass=model.mass,
+        Jp=model.Jp,
+        joint_names=model.joint_names,
+        joint_rows=model.joint_rows,
+        point_names=model.point_names,
+        point_body=model.point_body,
+        point_local=model.point_local,
+        has_potential=all("energy" in g.examined.type.kernels() for g in model.forces),
+        is_isolated=not model.forces
+        and all(len(slots) > 1 and 0 not in slots for slots in model.joint_slots),
+    )

@@ -1,0 +1,132 @@
+"""The settings of a run: [simulation] of a scene file, or what a script or command line gives."""
+
+from collections.abc import Callable, Collection
+from typing import Any
+
+from dap3d_core.registry.spelling import nearest
+from dap3d_core.scene.description import HEADER_KEYS, SCHEMA, Scene, Simulation
+from dap3d_core.scene.mistakes import Key, Mistake, SceneError, dotted
+from dap3d_core.scene.values import Fault, bounded, number_of, text_of, truth_of, word_of
+
+#: What ``method`` and ``integrator`` may say.
+METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq")
+INTEGRATORS = ("dopri5", "dop853", "rk4")
+#: Relative tolerances below are beyond double precision.
+SMALLEST_RTOL = 1e-14
+#: More reported times are refused before anything is computed.
+MOST_ROWS = 5e7
+
+_READ: dict[str, Callable[[Any], Any]] = {
+    "t_end": lambda v: bounded(number_of(v), minimum=0.0),
+    "dt": lambda v: bounded(number_of(v), positive=True),
+    "method": lambda v: word_of(v, METHODS),
+    "integrator": lambda v: word_of(v, INTEGRATORS),
+    "rtol": lambda v: bounded(number_of(v), minimum=SMALLEST_RTOL, maximum=1.0),
+    "atol": lambda v: bounded(number_of(v), minimum=0.0),
+    "step": lambda v: bounded(number_of(v), positive=True),
+    "correct": truth_of,
+    "project": truth_of,
+    "alpha": lambda v: bounded(number_of(v), positive=True),
+    "Omega": lambda v: bounded(number_of(v), positive=True),
+    "mu": lambda v: bounded(number_of(v), positive=True),
+}
+#: Settings that may be left open.
+OPEN = ("t_end", "dt", "step")
+
+
+def check_simulation(simulation: Simulation, body_names: Collection[str]) -> None:
+    """Refuse settings that make no sense, such as those a script or a command line gives.
+
+    Args:
+        simulation: the settings.
+        body_names: bodies that ``hold`` may name.
+
+    Raises:
+        SceneError: all mistakes; their keys are the names of the settings.
+    """
+    found = simulation_mistakes(simulation, body_names)
+    if found:
+        raise SceneError(m for _, m in found)
+
+
+def simulation_mistakes(
+    simulation: Simulation, body_names: Collection[str], key: Key = ()
+) -> list[tuple[Key, Mistake]]:
+    """Everything that is wrong in settings, under a key such as ``("simulation",)``."""
+    found: list[tuple[Key, Mistake]] = []
+    good: dict[str, Any] = {}
+    for name, read in _READ.items():
+        value = getattr(simulation, name)
+        result = None if value is None and name in OPEN else read(value)
+        if isinstance(result, Fault):
+            found.append(_mistake((*key, name), value, result))
+        else:
+            good[name] = result
+    found += _span_mistakes(simulation, good, len(body_names), key)
+    found += _hold_mistakes(simulation.hold, body_names, (*key, "hold"))
+    return found
+
+
+def _span_mistakes(
+    simulation: Simulation, good: dict[str, Any], body_count: int, key: Key
+) -> list[tuple[Key, Mistake]]:
+    """A reporting step that fits the final time, and not too many reports."""
+    t_end, dt = good.get("t_end"), good.get("dt")
+    if not t_end or not dt:
+        return []
+    if dt > t_end:
+        fault = Fault(f"the reporting step is longer than the run (t_end = {t_end:g})")
+    elif t_end / dt > MOST_ROWS:
+        rows, numbers = t_end / dt, 13 * max(body_count, 1)
+        memory = rows * numbers * 8 / 2**30
+        fault = Fault(
+            f"t_end / dt asks for {rows:.3g} reported times of {numbers} numbers, "
+            f"{memory:.3g} GiB; at most {MOST_ROWS:g} times are reported",
+            f"give dt of at least {t_end / MOST_ROWS:.3g}",
+        )
+    else:
+        return []
+    return [_mistake((*key, "dt"), simulation.dt, fault)]
+
+
+def _hold_mistakes(hold: Any, body_names: Collection[str], key: Key) -> list[tuple[Key, Mistake]]:
+    if type(hold) is not tuple:
+        return [_mistake(key, hold, Fault('should be a list of names of bodies, ["crank"]'))]
+    known = frozenset(body_names)
+    wrong = [(k, n) for k, n in enumerate(hold) if not (isinstance(n, str) and n in known)]
+    near = {name: nearest(name, known) for _, name in wrong[:100] if isinstance(name, str)}
+    return [
+        _mistake((*key, k), name, Fault(f"there is no body {name!r}", "", near.get(name, "")))
+        for k, name in wrong
+    ]
+
+
+def header_mistakes(scene: Scene) -> list[tuple[Key, Mistake]]:
+    """Everything that is wrong in [scene]."""
+    found: list[tuple[Key, Mistake]] = []
+    for name in sorted(HEADER_KEYS - {"schema"}):
+        text = text_of(getattr(scene, name))
+        if isinstance(text, Fault):
+            found.append(_mistake(("scene", name), getattr(scene, name), text))
+    schema = scene.schema
+    if type(schema) is not int or schema < 1:
+        fault = Fault(f"the version of the file format is a whole number; the newest is {SCHEMA}")
+    elif schema > SCHEMA:
+        fault = Fault(
+            f"the file format is newer than this program, which reads up to {SCHEMA}",
+            "install a newer dap3d",
+        )
+    else:
+        return found
+    return [*found, _mistake(("scene", "schema"), schema, fault)]
+
+
+def notes_of(simulation: Simulation) -> list[str]:
+    """What looks odd in settings that are allowed."""
+    if simulation.atol == 0.0 and type(simulation.atol) in (int, float):
+        return ["simulation.atol = 0: a quantity that is zero is then asked for without any error"]
+    return []
+
+
+def _mistake(key: Key, value: Any, fault: Fault) -> tuple[Key, Mistake]:
+    return key, Mistake(dotted(key), value, fault.what, fault.nearest, fault.remedy)

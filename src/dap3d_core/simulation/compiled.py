@@ -1,0 +1,138 @@
+"""A scene made ready to run: checked, modelled, with its method chosen and its kernels compiled."""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.linear.rank import Rank
+from dap3d_core.model import Model, ModelError, build_model
+from dap3d_core.registry import Registry, load_registry
+from dap3d_core.scene import Checked, Scene, SceneError, check, load, mistake_at
+from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.explanation import explain
+from dap3d_core.simulation.redundancy import Redundancy, redundancy_of
+
+Floats = NDArray[np.float64]
+Announce = Callable[[str], None]
+
+
+class CompiledModel:
+    """What ``compile`` returns: a frozen model that can be evaluated and explained.
+
+    Attributes:
+        scene: the scene, as it was when it was compiled.
+        checked: the scene after its check.
+        model: arrays, groups, row and column pointers (irc, iru, irv).
+        method: the formulation, "unconstrained" or "standard".
+        reason: why this formulation.
+        notes: what was changed or assumed.
+        compile_time: seconds that checking, modelling and compiling took.
+    """
+
+    def __init__(
+        self,
+        scene: Scene | str | os.PathLike[str],
+        *,
+        method: str | None = None,
+        allow_code: bool = False,
+        registry: Registry | None = None,
+        announce: Announce | None = None,
+    ) -> None:
+        """Check a scene, build its model and compile what it needs; arguments as ``compile`` has them."""
+        started = time.perf_counter()
+        self.scene: Scene = scene if isinstance(scene, Scene) else load(Path(scene) if isinstance(scene, os.PathLike) else scene)
+        self.checked: Checked = check(self.scene, registry or load_registry(), allow_code=allow_code)
+        self.model: Model = _modelled(self.checked)
+        self.method, self.reason = choose_method(self.model, method or str(self.scene.simulation.method))
+        self.machine = Machine(self.model, self.method, announce)
+        self.notes: list[str] = list(self.checked.notes)
+        self._redundancy: Redundancy | None = None
+        self.compile_time = time.perf_counter() - started
+
+    def rhs(self, t: float, u: ArrayLike) -> Floats:
+        """du/dt (13 n,) at time t in s and state u (13 n,): r_dot, p_dot of each body, then r_ddot, omega_dot.
+
+        Raises:
+            ValueError: u has not 13 n finite numbers.
+        """
+        state = np.array(u, dtype=float)
+        if state.shape != (13 * self.model.body_count,) or not np.all(np.isfinite(state)):
+            raise ValueError(f"u must be {13 * self.model.body_count} finite numbers, 13 a body; its shape is {state.shape}")
+        return self.machine.rhs(t, state)
+
+    def redundancy(self, u: ArrayLike | None = None) -> Redundancy:
+        """Rank of the constraints at a state u (13 n,), or as given; see ``Redundancy``."""
+        if u is not None:
+            return redundancy_of(self.machine, np.asarray(u, dtype=float))
+        if self._redundancy is None:
+            if self.model.row_count:
+                self._redundancy = redundancy_of(self.machine, self.model.u0)
+            else:
+                nothing = Rank(0, 6 * self.model.body_count, 0, 0.0, "svd", (), np.zeros((0, 0)))
+                self._redundancy = Redundancy(nothing, (), 0.0)
+        return self._redundancy
+
+    def explain(self) -> str:
+        """What was modelled, what was left out and why, and which method was chosen and why."""
+        return explain(self.checked, self.model, self.machine, self.method, self.reason, self.redundancy())
+
+
+def choose_method(model: Model, asked: str) -> tuple[str, str]:
+    """The formulation for a model, and the reason in words.
+
+    Raises:
+        SimulationError: the method asked for does not fit the scene, or is not there yet.
+    """
+    constrained = model.row_count > 0
+    if asked == "auto":
+        if constrained:
+            return "standard", "the scene has joints"
+        return "unconstrained", "the scene has no joints"
+    if asked == "unconstrained" and constrained:
+        raise SimulationError(
+            f"method unconstrained does not fit: the scene has {len(model.joint_names)} joints with "
+            f"{model.row_count} rows; use standard or auto"
+        )
+    if asked == "standard" and not constrained:
+        return "unconstrained", "asked for standard, but the scene has no joints"
+    if asked not in ("standard", "unconstrained"):
+        raise SimulationError(f"method {asked} is not there yet; use auto, standard or unconstrained")
+    return asked, "asked for"
+
+
+def _modelled(checked: Checked) -> Model:
+    try:
+        return build_model(checked)
+    except ModelError as error:
+        kind, name, words = error.args
+        raise SceneError([mistake_at(checked.scene, (f"{kind}s", name), words)]) from error
+
+
+def compile_scene(
+    scene: Scene | str | os.PathLike[str],
+    *,
+    method: str | None = None,
+    allow_code: bool = False,
+    registry: Registry | None = None,
+    announce: Announce | None = None,
+) -> CompiledModel:
+    """Check a scene, build its model and compile the kernels it needs.
+
+    Args:
+        scene: a Scene, or what ``load`` takes: the name of a shipped model, a folder, a TOML file.
+        method: formulation; the scene's own choice when left out.
+        allow_code: whether the model's own types (plugin.py in its folder) may be loaded.
+        registry: where types come from; by default the installed plugins.
+        announce: called with the name of each kernel that has to be compiled anew.
+
+    Raises:
+        SceneError: the scene has mistakes; all of them are in the message.
+        PluginError: a type that the scene uses cannot be loaded.
+        SimulationError: the method does not fit the scene.
+    """
+    return CompiledModel(scene, method=method, allow_code=allow_code, registry=registry, announce=announce)

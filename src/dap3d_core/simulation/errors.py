@@ -1,0 +1,19 @@
+"""What can go wrong with a run."""
+
+from typing import Any
+
+
+class SimulationError(Exception):
+    """A run could not start or could not go on; ``result`` is what was computed until then, or None."""
+
+    def __init__(self, message: str, result: Any = None) -> None:
+        super().__init__(message)
+        self.result = result
+
+
+class RedundantError(SimulationError):
+    """The scene has redundant constraints, which the chosen formulation cannot solve."""
+
+
+class AssemblyError(SimulationError):
+    """The initial conditions could not be brought onto the constraints."""

@@ -1,0 +1,73 @@
+"""What was modelled, what was left out and why."""
+
+from collections import Counter
+from typing import Any
+
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.model import Group, Model
+from dap3d_core.scene import Checked, Scene
+from dap3d_core.simulation.redundancy import Redundancy
+
+
+def explain(checked: Checked, model: Model, machine: Machine, method: str, reason: str, redundancy: Redundancy) -> str:
+    """A text for people, one fact a line."""
+    n, ordering = model.body_count, machine.plan.ordering
+    lines = [f"scene {checked.scene.name or '(no name)'}"]
+    lines.append(f"  bodies     {n}: {_some(model.body_names)}; {13 * n} states, {6 * n} accelerations")
+    for title, groups in (("joints", model.joints), ("forces", model.forces), ("functions", model.functions)):
+        lines.append(f"  {title:10s} {_counts(groups)}")
+    if model.row_count:
+        lines.append(f"  rows       {redundancy.describe()}")
+        lines.append(
+            f"  matrix     {len(ordering.early)} bodies eliminated first, then {len(ordering.nodes)} joint nodes and "
+            f"{len(ordering.hubs)} hubs; {machine.plan.fill} blocks of fill"
+        )
+    lines.append(f"  method     {method}, because {reason}")
+    compiled = sorted({f"{group.keyword} ({kind})" for kind, group in machine.what})
+    lines.append(f"  kernels    {', '.join(compiled) or 'none'}")
+    left_out = _left_out(checked, model)
+    lines.append("left out")
+    lines += [f"  {line}" for line in left_out] or ["  nothing"]
+    for note in checked.notes:
+        lines.append(f"note: {note}")
+    return "\n".join(lines)
+
+
+def _some(names: tuple[str, ...], most: int = 8) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def _counts(groups: tuple[Group, ...]) -> str:
+    return ", ".join(f"{len(set(g.members.tolist()))} {g.keyword}" for g in groups) or "none"
+
+
+def _left_out(checked: Checked, model: Model) -> list[str]:
+    scene = checked.scene
+    result = []
+    for title, kind in (("constraints", model.joints), ("forces", model.forces), ("functions", model.functions)):
+        if not kind:
+            result.append(f"{title}: the scene has none, so no code for them was loaded")
+    if model.forces and not any(g.examined.type.keyword == "weight" for g in model.forces):
+        result.append("weight: no force of this type, so there is no gravity")
+    for word, declared in _declared(scene).items():
+        unused = [name for name in declared if name not in _used(scene)]
+        if unused:
+            result.append(f"{word} that nothing uses: {_some(tuple(unused))}")
+    if checked.animation_count:
+        result.append(f"animation points: {checked.animation_count}, not part of the analysis")
+    return result
+
+
+def _declared(scene: Scene) -> dict[str, Any]:
+    return {"points": scene.points, "vectors": scene.vectors, "vectors2": scene.vectors2, "functions": scene.functions}
+
+
+def _used(scene: Scene) -> Counter[str]:
+    """Names that joints, forces and vectors2 mention."""
+    found: Counter[str] = Counter()
+    for elements in (scene.joints, scene.forces):
+        for element in elements.values():
+            found.update(v for v in element.fields.values() if isinstance(v, str))
+    for d in scene.vectors2.values():
+        found.update((d.P_i, d.P_j))
+    return found

@@ -1,0 +1,167 @@
+"""Initial conditions brought onto the constraints, at position and at velocity level (spec 8)."""
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.assembly.system import System
+from dap3d_core.formulations.build import set_metric
+from dap3d_core.formulations.machine import Machine, Rows
+from dap3d_core.formulations.standard import correct, linearise
+from dap3d_core.linear.rank import DENSE_ROWS
+from dap3d_core.model.kinematics import join, split
+from dap3d_core.simulation.errors import AssemblyError
+
+Floats = NDArray[np.float64]
+
+#: Position residuals above this are corrected; Newton stops below it.
+TOLERANCE = 1e-10
+MOST_PASSES = 25
+#: A pass turns no body by more than this (rad), and moves none by more than this part of the model's size.
+MOST_TURN, MOST_SHIFT = 0.5, 0.5
+#: Singular values below this part of the largest are left out of the least-norm solution.
+RCOND = 1e-10
+
+
+@attrs.frozen(eq=False)
+class Initial:
+    """A corrected start.
+
+    Attributes:
+        u: (13 n,) the state.
+        violation: (position, velocity) largest residuals as given.
+        residual: the same after the correction.
+        passes: Newton passes at position level.
+        moved, turned: largest displacement in m and rotation in rad of a body.
+    """
+
+    u: Floats
+    violation: tuple[float, float]
+    residual: tuple[float, float]
+    passes: int
+    moved: float
+    turned: float
+
+
+def violation(machine: Machine, u: Floats, t: float = 0.0) -> tuple[float, float]:
+    """Largest residuals |C| and |D v - nu| of a state u (13 n,)."""
+    if not machine.model.row_count:
+        return 0.0, 0.0
+    rows = machine.rows(t, u)
+    return _largest(rows.C), _largest(_velocity_residual(rows, u))
+
+
+def correct_initial(machine: Machine, u: Floats, t: float = 0.0) -> Initial:
+    """Correct positions by Newton's method and velocities by one linear step, each by the least change.
+
+    The least change is that of the sum of squares of displacements, rotations and velocities, as in the manual.
+    Rows without a position level do not take part in the position stage.
+
+    Raises:
+        AssemblyError: the position residual does not vanish; the message has the residual of each joint.
+    """
+    before = violation(machine, u, t)
+    if not machine.model.row_count:
+        return Initial(u, before, before, 0, 0.0, 0.0)
+    start = u
+    u, passes = _correct_positions(machine, u, t)
+    rows = machine.rows(t, u)
+    residual = _velocity_residual(rows, u)
+    if _largest(residual) > 0.0:
+        u = u.copy()
+        u[7 * machine.model.body_count :] -= _least_change(machine, rows, residual, t, u, positions=False)
+    moved, turned = _distance(start, u, machine.model.body_count)
+    return Initial(u, before, violation(machine, u, t), passes, moved, turned)
+
+
+def _correct_positions(machine: Machine, u: Floats, t: float) -> tuple[Floats, int]:
+    size = _model_size(machine)
+    for passes in range(MOST_PASSES + 1):
+        rows = machine.rows(t, u)
+        if _largest(rows.C) <= TOLERANCE:
+            return u, passes
+        if passes == MOST_PASSES or not np.all(np.isfinite(rows.C)):
+            break
+        change = _least_change(machine, rows, rows.C, t, u, positions=True).reshape(-1, 6)
+        shift = float(np.max(np.linalg.norm(change[:, :3], axis=1)))
+        turn = float(np.max(np.linalg.norm(change[:, 3:], axis=1)))
+        limit = min(1.0, MOST_SHIFT * size / shift if shift else 1.0, MOST_TURN / turn if turn else 1.0)
+        u = _displaced(u, -limit * change, machine.model.body_count)
+    raise AssemblyError(_failure(machine, rows.C))
+
+
+def _least_change(machine: Machine, rows: Rows, residual: Floats, t: float, u: Floats, *, positions: bool) -> Floats:
+    """The shortest x (6 n,) with D x = residual, on the position rows or on all."""
+    if machine.model.row_count <= DENSE_ROWS:
+        D = rows.dense()
+        keep = machine.model.position_row if positions else np.ones(len(residual), dtype=bool)
+        solution: Floats = np.linalg.lstsq(D[keep], residual[keep], rcond=RCOND)[0]
+        return solution
+    return _sparse_least_change(machine, residual, t)
+
+
+def _sparse_least_change(machine: Machine, residual: Floats, t: float) -> Floats:
+    """The same by the block factorisation, every mass and inertia set to one; for many rows.
+
+    Rows without a position level are kept as they are here: the correction does not move along them.
+    """
+    system: System = machine.system
+    metric = system.metric.copy()
+    n = machine.model.body_count
+    try:
+        set_metric(system.metric, np.ones(n), np.tile(np.eye(3), (n, 1, 1)))
+        system.metric[1:, 7:16] = system.body[1:, 3:12]
+        linearise(t, system, machine.loops, True)
+        system.C[:] = 0.0
+        system.C[system.row] = -residual
+        correct(system)
+        change = system.force[6:].reshape(n, 6).copy()
+    finally:
+        system.metric[:] = metric
+    A = system.body[1:, 3:12].reshape(n, 3, 3)
+    change[:, 3:] = np.einsum("brc,bc->br", A, change[:, 3:])  # body axes there, global ones here
+    return change.ravel()
+
+
+def _displaced(u: Floats, change: Floats, n: int) -> Floats:
+    """r + dr, and p turned by the small global rotation dtheta (p + 1/2 G^T dtheta, of unit length)."""
+    r, p, v, w = split(u, n)
+    e0, e, turn = p[:, :1], p[:, 1:], 0.5 * change[:, 3:]
+    dp = np.hstack([-np.sum(e * turn, axis=1, keepdims=True), e0 * turn + np.cross(turn, e)])
+    p = p + dp
+    return join(r + change[:, :3], p / np.linalg.norm(p, axis=1, keepdims=True), v, w)
+
+
+def _distance(u: Floats, other: Floats, n: int) -> tuple[float, float]:
+    r, p, _, _ = split(u, n)
+    s, q, _, _ = split(other, n)
+    cosine = np.clip(np.abs(np.sum(p * q, axis=1)), 0.0, 1.0)
+    sine = np.linalg.norm(p - np.sign(np.sum(p * q, axis=1))[:, None] * q, axis=1)
+    angle = np.where(cosine > 0.9, 4.0 * np.arcsin(np.clip(sine / 2.0, 0, 1)), 2.0 * np.arccos(cosine))
+    return float(np.max(np.linalg.norm(r - s, axis=1), initial=0.0)), float(np.max(angle, initial=0.0))
+
+
+def _velocity_residual(rows: Rows, u: Floats) -> Floats:
+    v = u[-rows.shape[1] :]
+    return np.bincount(rows.row, rows.value * v[rows.column], minlength=rows.shape[0]) - rows.nu
+
+
+def _model_size(machine: Machine) -> float:
+    """A length of the model: its extent, or one metre where it has none."""
+    points = np.vstack([machine.model.r, machine.model.point_local])
+    return float(np.max(np.abs(points), initial=0.0)) or 1.0
+
+
+def _largest(values: Floats) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
+
+
+def _failure(machine: Machine, C: Floats) -> str:
+    model = machine.model
+    lines = [f"the initial positions cannot be assembled: after {MOST_PASSES} passes these joints are still open"]
+    worst = np.array([_largest(C[a:b]) for a, b in zip(model.joint_start[:-1], model.joint_start[1:], strict=True)])
+    for k in np.argsort(-worst)[:10]:
+        if not worst[k] <= TOLERANCE:
+            lines.append(f"  {model.joint_names[k]}: residual {worst[k]:.3g}")
+    lines.append("check the points, axes and lengths of these joints; contradictory joints cannot be assembled")
+    return "\n".join(lines)

@@ -1,0 +1,240 @@
+"""The loop of a run: initial conditions, method, integration in chunks, and what is left behind."""
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.integrators import METHODS
+
+from dap3d_core.integrators.integration import Integration, Status
+from dap3d_core.result import Result, Statistics
+from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, check_simulation
+from dap3d_core.simulation.compiled import CompiledModel
+from dap3d_core.simulation.errors import RedundantError, SimulationError
+from dap3d_core.simulation.initial import TOLERANCE, Initial, correct_initial, violation
+from dap3d_core.simulation.offender import find_offender
+
+Floats = NDArray[np.float64]
+Progress = Callable[[float, float], None]
+
+#: Seconds that a compiled chunk should take: Ctrl-C and the progress bar wait for its end.
+CHUNK_SECONDS = 0.1
+#: Numbers that wait in the row buffer at most.
+BUFFER_NUMBERS = 4_000_000
+#: A start this far off the constraints, left uncorrected, gets a note.
+OFF_CONSTRAINTS = 1e-6
+
+
+def simulate(
+    scene: Scene | str | os.PathLike[str] | CompiledModel,
+    *,
+    t_end: float | None = None,
+    dt: float | None = None,
+    method: str | None = None,
+    integrator: str | None = None,
+    rtol: float | None = None,
+    atol: float | None = None,
+    step: float | None = None,
+    correct: bool | None = None,
+    project: bool | None = None,
+    progress: Progress | None = None,
+    allow_code: bool = False,
+    announce: Callable[[str], None] | None = None,
+) -> Result:
+    """Simulate a scene from t = 0 to t_end.
+
+    What is left out is taken from the scene's [simulation], and there by default method "auto", integrator "dop853",
+    rtol 1e-8, atol 1e-10, correct and project on.
+
+    Args:
+        scene: a Scene, what ``load`` takes, or a model that was compiled before.
+        t_end: final time, s; 0 solves once at t = 0.
+        dt: reporting step, s; t_end / 100 when nobody gives one. When it does not divide t_end, t_end is reported too.
+        method: "auto", "unconstrained" or "standard".
+        integrator: "dopri5", "dop853" or "rk4" (which needs ``step``).
+        rtol, atol: tolerances of the step's error.
+        step: fixed step, s, without error control.
+        correct: bring the initial conditions onto the constraints first.
+        project: bring every accepted step and reported state onto the constraints.
+        progress: called as progress(t, t_end) between chunks of some 0.1 s.
+        allow_code: whether the model's own types (plugin.py in its folder) may be loaded.
+        announce: called with the name of each kernel that has to be compiled anew.
+
+    Returns:
+        the result. Any exception that ends the integration carries what was computed until then as ``.result``;
+        KeyboardInterrupt and exceptions of ``progress`` come out as they are.
+
+    Raises:
+        SceneError, PluginError: as ``compile``; also for settings that make no sense.
+        RedundantError: the constraints depend on each other.
+        AssemblyError: the initial positions cannot be assembled.
+        SimulationError: the run stopped; ``.result`` is what was computed.
+    """
+    compiled = scene if isinstance(scene, CompiledModel) else CompiledModel(
+        scene, method=method, allow_code=allow_code, announce=announce
+    )  # fmt: skip
+    given = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol, step=step,
+                 correct=correct, project=project)  # fmt: skip
+    settings = attrs.evolve(compiled.scene.simulation, **{k: v for k, v in given.items() if v is not None})
+    check_simulation(settings, compiled.model.body_names)
+    return _Run(compiled, settings).go(progress)
+
+
+def report_times(t_end: float | None, dt: float | None) -> Floats:
+    """Reporting times (nt,): multiples of dt, and t_end where it is none of them.
+
+    Raises:
+        SceneError: no final time.
+    """
+    if t_end is None:
+        remedy = "give t_end in the scene's [simulation], or --t-end"
+        raise SceneError([Mistake("t_end", MISSING, "a run needs a final time", remedy=remedy)])
+    if t_end == 0.0:
+        return np.zeros(1)
+    dt = t_end / 100.0 if dt is None else dt
+    count = int(np.floor(t_end / dt * (1.0 + 1e-12) + 1e-9))
+    times = dt * np.arange(count + 1)
+    if t_end - times[-1] > 1e-9 * dt:
+        return np.append(times, t_end)
+    times[-1] = t_end
+    return times
+
+
+class _Run:
+    """One run of a compiled model."""
+
+    def __init__(self, compiled: CompiledModel, settings: Any) -> None:
+        self.compiled = compiled
+        self.machine = compiled.machine
+        self.settings = settings
+        self.times = report_times(settings.t_end, settings.dt)
+        self.notes = [*compiled.notes, f"method {compiled.method}: {compiled.reason}"]
+        self.rows: list[Floats] = []
+        self.started = time.perf_counter()
+
+    def go(self, progress: Progress | None) -> Result:
+        u0 = self._start()
+        integration = self._integration(u0)
+        try:
+            self._advance(integration, progress)
+        except BaseException as error:
+            self.rows.append(integration.rows())
+            if self.rows and len(np.concatenate(self.rows)):
+                status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
+                error.result = self._result(integration, status)  # type: ignore[attr-defined]
+            raise
+        if integration.status is not Status.FINISHED:
+            raise self._stopped(integration)
+        return self._result(integration, "done")
+
+    def _start(self) -> Floats:
+        """The initial state, corrected if asked for; constraints must be independent there."""
+        machine, settings = self.machine, self.settings
+        u0 = machine.model.u0
+        if settings.correct:
+            initial = correct_initial(machine, u0)
+            u0 = initial.u
+            self._note_correction(initial)
+        elif max(violation(machine, u0)) > OFF_CONSTRAINTS:
+            position, velocity = violation(machine, u0)
+            self.notes.append(
+                f"the initial conditions violate the constraints (position {position:.2g}, velocity {velocity:.2g}) "
+                "and were not corrected; switch correct on"
+            )
+        if machine.model.row_count:
+            redundancy = self.compiled.redundancy(u0)
+            if redundancy.rank.redundant:
+                raise RedundantError(f"{redundancy.describe()}. The standard method needs independent rows")
+        return u0
+
+    def _note_correction(self, initial: Initial) -> None:
+        position, velocity = initial.violation
+        if position > TOLERANCE:
+            self.notes.append(
+                f"initial positions corrected in {initial.passes} passes: |C| {position:.2g} -> "
+                f"{initial.residual[0]:.2g}; bodies moved by up to {initial.moved:.2g} m and {initial.turned:.2g} rad"
+            )
+        if velocity > TOLERANCE:
+            self.notes.append(
+                f"initial velocities corrected: |D v - nu| {velocity:.2g} -> {initial.residual[1]:.2g}"
+            )
+
+    def _integration(self, u0: Floats) -> Integration:
+        machine, settings = self.machine, self.settings
+        machine.watch_pivots(0.0, u0)
+        y0 = machine.integrated(u0)
+        width = 1 + len(y0) + machine.report_size
+        try:
+            return Integration(
+                METHODS[settings.integrator],
+                machine.functions,
+                machine.system,
+                machine.loops,
+                y0,
+                self.times,
+                rtol=settings.rtol,
+                atol=settings.atol,
+                step=settings.step,
+                project_on=settings.project,
+                error_size=len(y0) - 1,  # the work does not steer the step
+                report_size=machine.report_size,
+                buffer_rows=max(1, min(len(self.times), BUFFER_NUMBERS // width)),
+            )
+        except ValueError as error:
+            raise SceneError([Mistake("step", settings.step, str(error))]) from error
+
+    def _advance(self, integration: Integration, progress: Progress | None) -> None:
+        """Advance in chunks whose length in right-hand sides follows the clock."""
+        budget, t_end = 100, float(self.times[-1])
+        while integration.status is Status.RUNNING:
+            before, clock = integration.statistics.rhs, time.perf_counter()
+            integration.advance(budget)
+            self.rows.append(integration.rows())
+            done, seconds = integration.statistics.rhs - before, time.perf_counter() - clock
+            if progress is not None:
+                progress(integration.t, t_end)
+            if done and seconds > 0.0:
+                budget = int(min(max(1.0, done * CHUNK_SECONDS / seconds), 4.0 * budget, 1e9))
+
+    def _stopped(self, integration: Integration) -> SimulationError:
+        """Why the integration ended early, with what was computed."""
+        t = integration.t
+        t_stop = integration.t_stop if integration.t_stop is not None else t
+        culprit = find_offender(self.machine, t, integration.y, t_stop)
+        reason = {
+            Status.STEP_FLOOR: "the step size fell to the resolution of time",
+            Status.NOT_FINITE: "a number became infinite or not a number",
+            Status.PROJECTION_FAILED: "the state could not be projected onto the constraints",
+        }[integration.status]
+        message = f"the run stopped at t = {t:.9g} s: {reason}" + (f": {culprit}" if culprit else "")
+        self.notes.append(message)
+        result = self._result(integration, "stopped") if any(len(r) for r in self.rows) else None
+        return SimulationError(message, result)
+
+    def _result(self, integration: Integration, status: str) -> Result:
+        counts = integration.statistics
+        wall = time.perf_counter() - self.started
+        return Result(
+            model=self.machine.model,
+            machine_of=lambda: self.machine,
+            scene_text=self.compiled.scene.to_toml(),
+            rows=np.concatenate(self.rows),
+            stats=Statistics(
+                steps=counts.steps, rejected=counts.rejected, rhs=counts.rhs, projections=counts.projections,
+                wall_time_s=wall, compile_time_s=self.compiled.compile_time,
+            ),
+            status=status,
+            method=self.compiled.method,
+            integrator=self.settings.integrator,
+            notes=self.notes,
+            settings={
+                "t_end": float(self.times[-1]), "dt": self.settings.dt, "rtol": self.settings.rtol,
+                "atol": self.settings.atol, "step": self.settings.step, "project": bool(self.settings.project),
+                "correct": bool(self.settings.correct),
+            },
+        )  # fmt: skip

@@ -1,0 +1,166 @@
+"""The contract of every registered type (spec 2), along random motions off the constraint manifold.
+
+The tests run over the registry: a new type is covered without a new test. Tolerances: sixth-order differences with
+h = 1e-2 of functions whose seventh derivatives are of order 1e3 leave about 1e3 h^6 / 140 = 1e-11 of truncation and
+eps / h = 1e-13 of rounding; 1e-8 of the largest term is asked for.
+"""
+
+import numpy as np
+import pytest
+from support.motions import Motion, derivative
+from support.scenes import scene_for
+
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.model import build_model
+from dap3d_core.model.kinematics import join, rotation, split
+from dap3d_core.registry import load_registry
+from dap3d_core.scene import check
+from dap3d_core.simulation.initial import correct_initial
+
+REGISTRY = load_registry()
+H, TOLERANCE = 1e-2, 1e-8
+
+
+def standard(kind):
+    return [i.keyword for i in REGISTRY.listing() if i.kind == kind and i.state == "ok"]
+
+
+def machine_for(kind, keyword, seed, ground=None):
+    examined = REGISTRY.get(kind, keyword)
+    scene = scene_for(examined, np.random.default_rng(seed), ground=ground)
+    model = build_model(check(scene, REGISTRY))
+    return Machine(model, "standard")
+
+
+def close(a, b, tolerance=TOLERANCE):
+    scale = 1.0 + np.max(np.abs(b), initial=0.0)
+    return np.max(np.abs(a - b), initial=0.0) <= tolerance * scale
+
+
+joints = pytest.mark.parametrize("keyword", standard("joint"))
+forces = pytest.mark.parametrize("keyword", standard("force"))
+grounded = pytest.mark.parametrize("ground", [None, "j"], ids=["body-body", "body-ground"])
+seeds = pytest.mark.parametrize("seed", range(3))
+
+
+@joints
+@grounded
+@seeds
+def test_position_rows_have_the_velocity_form_as_their_rate(keyword, ground, seed):
+    """d/dt C = D v - nu on the rows of the position level."""
+    machine = machine_for("joint", keyword, seed, ground)
+    motion = Motion(3, np.random.default_rng(seed + 100))
+    rate = derivative(lambda t: machine.rows(t, motion.u(t)).C, 0.1, H)
+    rows = machine.rows(0.1, motion.u(0.1))
+    velocity = rows.dense() @ motion.u(0.1)[-18:] - rows.nu
+    mask = machine.model.position_row
+    assert close(rate[mask], velocity[mask])
+
+
+@joints
+@grounded
+@seeds
+def test_velocity_rows_have_the_acceleration_form_as_their_rate(keyword, ground, seed):
+    """d/dt (D v - nu) = D v_dot - gamma on all rows."""
+    machine = machine_for("joint", keyword, seed, ground)
+    motion = Motion(3, np.random.default_rng(seed + 200))
+
+    def velocity_form(t):
+        rows = machine.rows(t, motion.u(t))
+        return rows.dense() @ motion.u(t)[-18:] - rows.nu
+
+    rows = machine.rows(0.1, motion.u(0.1))
+    acceleration = rows.dense() @ motion.v_dot(0.1) - rows.gamma
+    assert close(derivative(velocity_form, 0.1, H), acceleration)
+
+
+@joints
+@seeds
+def test_rank_is_the_number_of_rows(keyword, seed):
+    """At a pose taken at random the rows of a joint are independent."""
+    machine = machine_for("joint", keyword, seed)
+    rows = machine.rows(0.0, Motion(3, np.random.default_rng(seed + 300)).u(0.1))
+    assert np.linalg.matrix_rank(rows.dense()) == machine.model.row_count
+
+
+@joints
+@seeds
+def test_an_assembled_joint_allows_a_common_rigid_motion(keyword, seed):
+    """D v = 0 for bodies that move together as one (frame indifference), at a pose on the constraints."""
+    machine = machine_for("joint", keyword, seed)
+    u = correct_initial(machine, Motion(3, np.random.default_rng(seed + 400)).u(0.0)).u
+    r, p, _, w = split(u, 3)
+    spin, speed = np.array([0.3, -0.7, 0.4]), np.array([1.0, 2.0, -0.5])
+    u = join(r, p, speed + np.cross(spin, r), np.broadcast_to(spin, w.shape))
+    rows = machine.rows(0.0, u)
+    assert close(rows.dense() @ u[-18:], np.zeros(machine.model.row_count), 1e-9)  # |C| <= 1e-10 times the spin
+
+
+@forces
+@grounded
+@seeds
+def test_energy_is_the_potential_of_the_wrench(keyword, ground, seed):
+    """At rest the power of the wrench along any motion is -dV/dt (types with an energy alone)."""
+    if "energy" not in REGISTRY.get("force", keyword).type.kernels():
+        pytest.skip("the type has no potential")
+    machine = machine_for("force", keyword, seed, ground)
+    motion = Motion(3, np.random.default_rng(seed + 500))
+    last = 18  # the potential energy stands behind v_dot and no multipliers
+    rate = derivative(lambda t: machine.report(0.0, motion.u(t))[last : last + 1], 0.1, H)
+    assert close(np.array([applied(machine, at_rest(motion.u(0.1))) @ motion.u(0.1)[-18:]]), -rate)
+
+
+@forces
+@seeds
+def test_forces_between_bodies_balance(keyword, seed):
+    """Force and moment of an element between bodies sum to zero about the origin (action and reaction)."""
+    if getattr(REGISTRY.get("force", keyword).type, "each_body", False):
+        pytest.skip("acts on each body from outside")
+    machine = machine_for("force", keyword, seed)
+    u = Motion(3, np.random.default_rng(seed + 600)).u(0.1)
+    wrench = applied(machine, u) - applied(without_forces(seed, keyword), u)
+    wrench = wrench.reshape(3, 6)
+    r = split(u, 3)[0]
+    assert close(wrench[:, :3].sum(axis=0), np.zeros(3), 1e-12)
+    assert close((wrench[:, 3:] + np.cross(r, wrench[:, :3])).sum(axis=0), np.zeros(3), 1e-12)
+
+
+@pytest.mark.parametrize("keyword", standard("function"))
+@seeds
+def test_function_derivatives(keyword, seed):
+    """Each of f', f'', f''' is the derivative of the one before."""
+    examined = REGISTRY.get("function", keyword)
+    scene = scene_for(examined, np.random.default_rng(seed))
+    checked = check(scene, REGISTRY)
+    values = [checked.functions[0].values[n] for n in examined.layout.numbers]
+
+    def at(x):
+        return np.array(examined.type.value(x, *values))
+
+    for x in np.random.default_rng(seed).uniform(0.1, 0.9, 5):
+        assert close(derivative(at, x, 1e-3)[:3], at(x)[1:], 1e-7)
+
+
+def at_rest(u):
+    u = u.copy()
+    u[-18:] = 0.0
+    return u
+
+
+def applied(machine, u):
+    """Generalised forces (18,) at a state, M v_dot of free bodies."""
+    v_dot = machine.report(0.0, u)[:18].reshape(3, 6)
+    model = machine.model
+    r, p, _, _ = split(u, 3)
+    A = rotation(p)
+    J = A @ model.Jp @ A.transpose(0, 2, 1)
+    force = model.mass[:, None] * v_dot[:, :3]
+    moment = np.einsum("brc,bc->br", J, v_dot[:, 3:])
+    return np.hstack([force, moment]).ravel()
+
+
+def without_forces(seed, keyword):
+    """The machine of the same bodies without the element."""
+    scene = scene_for(REGISTRY.get("force", keyword), np.random.default_rng(seed))
+    scene.forces.clear()
+    return Machine(build_model(check(scene, REGISTRY)), "standard")

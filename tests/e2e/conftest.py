@@ -1,0 +1,86 @@
+"""The command line as a user has it: processes of their own, in a folder of their own.
+
+The user's cache of compiled code is used, but where a test is about it.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+COMMAND = [str(Path(sys.executable).with_name("dap3d"))]
+
+
+def environment(**variables):
+    """What a user's shell has: no width, no settings of test tools."""
+    dropped = ("NUMBA_", "COVERAGE_", "COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR", "DAP3D_BLOCK")
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(dropped)}
+    return kept | {k: str(v) for k, v in variables.items()}
+
+
+class CommandLine:
+    """Runs ``dap3d`` in a folder."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def start(self, *arguments, **variables):
+        """Start a command and return its process."""
+        return subprocess.Popen(
+            [*COMMAND, *map(str, arguments)],
+            cwd=self.folder,
+            env=environment(**variables),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def __call__(self, *arguments, **variables):
+        """Run a command to its end; never with a traceback."""
+        process = self.start(*arguments, **variables)
+        out, err = process.communicate(timeout=300)
+        assert "Traceback" not in err, err
+        return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+
+
+@pytest.fixture
+def dap3d(tmp_path):
+    """The command line in a folder of its own, ``dap3d.folder``."""
+    return CommandLine(tmp_path)
+
+
+SCENE = """\
+[scene]
+name = "fall"
+
+[bodies.stone]
+mass = 2.0
+Jp = [0.1, 0.1, 0.1]
+
+[forces.gravity]
+type = "weight"
+
+[simulation]
+t_end = 0.1
+dt = 0.01
+"""
+
+
+@pytest.fixture
+def scene_file(tmp_path):
+    """Writes a scene, a falling stone with some words replaced, and returns its file."""
+
+    def write(*replaced, name="fall.toml"):
+        text = SCENE
+        for old, new in replaced:
+            assert old in text
+            text = text.replace(old, new)
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write

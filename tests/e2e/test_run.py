@@ -1,0 +1,194 @@
+"""``dap3d run`` as a user meets it: what it writes, what it says, its exit codes."""
+
+import json
+import os
+import re
+
+import pytest
+
+import dap3d_core as dap
+
+
+def test_run_writes_a_result_and_says_what_was_done(dap3d):
+    done = dap3d("run", "pen1", "--t-end", "0.1")
+    assert done.returncode == 0, done.stderr
+    assert dap.open(dap3d.folder / "pen1.nc").t[-1] == 0.1
+    for words in ("1 body", "1 joint (3 rows)", "3 degrees of freedom", "standard", "dop853",
+                  "right-hand side", "energy", "pen1.nc written", "dap3d plot pen1.nc"):  # fmt: skip
+        assert words in done.stdout
+    assert "\x1b" not in done.stdout + done.stderr  # nobody looks at a terminal
+
+
+def test_json_is_one_object_with_the_same_facts(dap3d):
+    done = dap3d("run", "fourbar3", "--t-end", "0.1", "--json", "-o", "a.nc")
+    assert done.returncode == 0
+    found = json.loads(done.stdout)
+    expected = {"status": "done", "exit_code": 0, "file": "a.nc", "bodies": 3, "rows": 17, "dof": 1}
+    assert {k: found[k] for k in expected} == expected
+    assert found["method"] == "standard"
+    assert found["ledger"]["position"]["ok"] is True
+    result = dap.open(dap3d.folder / "a.nc")
+    assert found["steps"] == result.stats.steps
+    assert found["notes"] == result.notes
+    # the corrected start is that of the result
+    assert found["initial"]["changed"]
+    assert found["initial"]["bodies"]["crank"]["w"] == result.w[0, 0].tolist()
+
+
+def test_the_corrected_initial_conditions_are_reported(dap3d):
+    done = dap3d("run", "fourbar3", "--t-end", "0.05", "--dt", "0.05")
+    assert "corrected initial conditions" in done.stdout
+    # the motor turns the crank once a second, backwards about x: -2 pi
+    assert re.search(r"crank\n.*\n.*\n.*\n +w +-6\.28319", done.stdout), done.stdout
+    again = dap3d("run", "fourbar3", "--t-end", "0.05", "--dt", "0.05", "--no-correct", "--force")
+    assert "corrected initial" not in again.stdout
+
+
+def test_the_end_may_be_zero(dap3d):
+    done = dap3d("run", "pen1", "--t-end", "0", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["instants"] == 1
+
+
+def test_quiet_prints_nothing(dap3d):
+    done = dap3d("run", "pen1", "--t-end", "0.1", "--quiet")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_strict_makes_notes_a_failure_and_saves_all_the_same(dap3d):
+    calm = dap3d("run", "pen1", "--t-end", "0.1", "--strict")
+    assert calm.returncode == 0, calm.stdout + calm.stderr
+    noted = dap3d("run", "fourbar3", "--t-end", "0.1", "--strict")
+    assert noted.returncode == 1
+    assert "--strict" in noted.stderr
+    assert dap.open(dap3d.folder / "fourbar3.nc").status == "done"
+
+
+def test_output_that_exists_is_refused_before_running(dap3d):
+    (dap3d.folder / "pen1.nc").write_text("mine")
+    refused = dap3d("run", "pen1", "--t-end", "0.1")
+    assert refused.returncode == 2
+    assert "--force" in refused.stderr
+    assert (dap3d.folder / "pen1.nc").read_text() == "mine"
+    assert dap3d("run", "pen1", "--t-end", "0.1", "--force").returncode == 0
+    assert dap.open(dap3d.folder / "pen1.nc").status == "done"
+
+
+def test_output_that_cannot_be_written_is_refused_before_running(dap3d, scene_file):
+    scene = scene_file()
+    text = scene.read_text()
+    for target in ("nowhere/a.nc", "fall.toml/a.nc", ".", "fall.toml", "/dev/full", "x" * 300):
+        refused = dap3d("run", "fall.toml", "-o", target, "--force")
+        assert refused.returncode == 2, (target, refused)
+        assert len(refused.stderr.splitlines()) == 1
+    assert scene.read_text() == text
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_without_permission_is_refused(dap3d):
+    folder = dap3d.folder / "locked"
+    folder.mkdir(mode=0o500)
+    refused = dap3d("run", "pen1", "-o", "locked/a.nc")
+    assert refused.returncode == 2
+    assert "permission" in refused.stderr
+
+
+def test_without_a_model_and_without_a_terminal_it_is_a_usage_error(dap3d):
+    refused = dap3d("run")
+    assert refused.returncode == 2
+    assert "MODEL" in refused.stderr
+
+
+def test_settings_are_refused_before_compiling_and_by_their_option(dap3d):
+    for option, value in (("--t-end", "inf"), ("--t-end", "-1"), ("--rtol", "0"), ("--dt", "nan"),
+                          ("--atol", "-1"), ("--step", "0"), ("--dt", "100")):  # fmt: skip
+        refused = dap3d("run", "pen1", option, value)
+        assert refused.returncode == 2, (option, value, refused)
+        assert refused.stderr.startswith(option)
+    misspelt = dap3d("run", "pen1", "--integrator", "dop85")
+    assert misspelt.returncode == 2
+    assert "did you mean 'dop853'" in misspelt.stderr
+    unfit = dap3d("run", "pen1", "--method", "unconstrained")
+    assert unfit.returncode == 2
+    assert "1 joints" in unfit.stderr or "joint" in unfit.stderr
+
+
+def test_usage_errors(dap3d):
+    for arguments, words in (
+        (("run", "pen1", "--t_end", "1"), "--t-end"),
+        (("run", "pen1", "--dt", "0.1", "--dt", "0.2"), "--dt is given more than once"),
+        (("run", "pen1", "--correct", "--no-correct"), "more than once"),
+        (("run", "pen1", "pen2"), "pen2"),
+        (("run", "pen1", "--dt", "1,5"), "1,5"),
+        (("rnu", "pen1"), "did you mean 'run'"),
+        (("check",), "MODEL"),
+    ):
+        refused = dap3d(*arguments)
+        assert refused.returncode == 2, arguments
+        assert words in refused.stderr, arguments
+        assert refused.stdout == ""
+
+
+def test_mistakes_of_a_scene_are_all_told_with_place_and_remedy(dap3d, scene_file):
+    scene_file(("mass = 2.0", "mas = 2.0"), ('type = "weight"', 'type = "wieght"'))
+    refused = dap3d("run", "fall.toml")
+    assert refused.returncode == 2
+    assert "fall.toml:5: bodies.stone.mas = 2.0" in refused.stderr
+    assert "did you mean 'mass'" in refused.stderr
+    assert "fall.toml:9: forces.gravity.type" in refused.stderr
+    assert "did you mean 'weight'" in refused.stderr
+    assert not (dap3d.folder / "fall.nc").exists()
+    as_json = dap3d("run", "fall.toml", "--json")
+    assert as_json.returncode == 2
+    found = json.loads(as_json.stdout)
+    assert found["exit_code"] == 2
+    assert [(m["line"], m["nearest"]) for m in found["mistakes"]][0] == (5, "mass")
+
+
+def test_a_missing_point_and_a_missing_file(dap3d, scene_file):
+    scene_file(("[simulation]", '[joints.J]\ntype = "sph"\nP_i = "tip"\nP_j = "ground.O"\n'
+                                "[simulation]"))  # fmt: skip
+    refused = dap3d("run", "fall.toml")
+    assert refused.returncode == 2
+    assert "joints.J.P_i" in refused.stderr
+    missing = dap3d("run", "no/such.toml")
+    assert missing.returncode == 2
+    assert "no/such.toml" in missing.stderr
+
+
+def test_file_names_of_any_kind(dap3d, scene_file):
+    for name in ("it's a \"stone\".toml", "-dash.toml", "päper\nclip.toml"):
+        scene_file(name=name)
+        done = dap3d("run", "--", name)
+        assert done.returncode == 0, done.stderr
+        assert (dap3d.folder / f"{name.removesuffix('.toml')}.nc").is_file()
+
+
+def test_a_run_that_cannot_be_assembled_leaves_nothing(dap3d, scene_file):
+    scene_file(("[simulation]", '[points.P]\nbody = "ground"\nsPp = [0.0, 0.0, 1.0]\n'
+                '[joints.J]\ntype = "sph"\nP_i = "stone.O"\nP_j = "ground.O"\n'
+                '[joints.K]\ntype = "sph"\nP_i = "stone.O"\nP_j = "P"\n[simulation]'))  # fmt: skip
+    failed = dap3d("run", "fall.toml", "--json")
+    assert failed.returncode == 1
+    assert "J" in failed.stderr
+    assert json.loads(failed.stdout)["exit_code"] == 1
+    assert not (dap3d.folder / "fall.nc").exists()
+
+
+def test_a_reader_that_leaves_early_is_no_failure(dap3d):
+    process = dap3d.start("run", "pen1", "--t-end", "0.1")
+    process.stdout.close()
+    assert process.stderr.read() == ""
+    assert process.wait() == 0
+    process.stderr.close()
+    assert dap.open(dap3d.folder / "pen1.nc").status == "done"
+
+
+@pytest.mark.slow
+def test_the_first_run_says_that_it_compiles(dap3d):
+    cold = {"DAP3D_CACHE_DIR": dap3d.folder / "cache"}
+    first = dap3d("run", "pen1", "--t-end", "0.1", **cold)
+    assert first.stderr.count("compiling for the first time; this happens once") == 1
+    assert "sph" in first.stderr
+    second = dap3d("run", "pen1", "--t-end", "0.1", "--force", **cold)
+    assert second.stderr == ""

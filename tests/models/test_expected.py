@@ -1,0 +1,89 @@
+"""Every shipped model gives the numbers of its expected.toml, each within the tolerance stated there (models/README.md)."""
+
+import tomllib
+from functools import cache
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+
+EXPECTED = {name: tomllib.loads((folder / "expected.toml").read_text()) for name, folder in dap.shipped_models().items()
+            if (folder / "expected.toml").exists()}  # fmt: skip
+CHECKS = [(name, check) for name, content in EXPECTED.items() for check in content["check"]]
+COUNTS = ("rows", "rank", "dof")
+
+
+def title(name, check):
+    where = f"t={check['t']:.5g}" if "t" in check else f"crossing{check['crossing']['number']}"
+    return f"{name}-{check['quantity']}-{where}-{check['source']}"
+
+
+@cache
+def compiled(name):
+    return dap.compile(dap.load(name), allow_code=True)
+
+
+@cache
+def run_to(name, t):
+    """The result whose last instant is t, reached by a step and not by dense output."""
+    settings = EXPECTED[name]["run"]
+    return dap.simulate(compiled(name), t_end=t, dt=max(t, 1.0) if t == 0.0 else t, **settings)
+
+
+@pytest.mark.parametrize(("name", "check"), CHECKS, ids=[title(*c) for c in CHECKS])
+def test_expected(name, check):
+    """The quantity agrees with the independent value."""
+    value = np.array(check["value"], dtype=float)
+    if "crossing" in check:
+        found = np.array([time_of(name, check["crossing"])])
+    elif check["quantity"] in COUNTS:
+        found = np.array([count(name, check["quantity"])])
+    else:
+        found = at_end(run_to(name, check["t"]), check["quantity"])
+    if check["quantity"].startswith("p."):
+        found = found * np.sign(found @ value)  # p and -p are one pose
+    assert np.max(np.abs(found - value)) <= check["tolerance"]
+
+
+def count(name, what):
+    result = run_to(name, 0.0)
+    rank = compiled(name).redundancy(result.u[0]).rank
+    return {"rows": rank.rows, "rank": rank.rank, "dof": rank.dof}[what]
+
+
+def at_end(result, quantity):
+    """A quantity of models/README.md at the last instant."""
+    head, *rest = quantity.split(".")
+    if head == "v_dot":
+        return result.v_dot[-1]
+    if head == "v":
+        return result.u[-1, 7 * len(result.model.body_names) :]
+    if head == "energy":
+        return np.atleast_1d(getattr(result.energy, rest[0])[-1])
+    if head == "lambda":
+        joint = result.model.joint_names.index(rest[0])
+        return result.Lam[-1, result.model.joint_start[joint] : result.model.joint_start[joint + 1]]
+    if head == "reaction":
+        joint, side, what = rest
+        return getattr(result.reaction(joint)[side], what)[-1]
+    return getattr(result, head)[-1, result.model.body_names.index(rest[0])]
+
+
+def time_of(name, crossing):
+    """The instant of a crossing, by bisection on runs that end there."""
+    horizon = max(c["t"] for n, c in CHECKS if n == name and "t" in c)
+    dt = 1e-3
+    result = dap.simulate(compiled(name), t_end=horizon, dt=dt, **EXPECTED[name]["run"])
+    body = result.model.body_names.index(crossing["of"].split(".")[1])
+    kind = crossing["of"].split(".")[0]
+    sign = 1.0 if crossing["direction"] == "up" else -1.0
+    series = sign * (getattr(result, kind)[:, body, crossing["component"]] - crossing["level"])
+    at = np.flatnonzero((series[:-1] < 0.0) & (series[1:] >= 0.0))[crossing["number"] - 1]
+    low, high = result.t[at], result.t[at + 1]
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        end = dap.simulate(compiled(name), t_end=middle, dt=middle, **EXPECTED[name]["run"])
+        value = sign * (getattr(end, kind)[-1, body, crossing["component"]] - crossing["level"])
+        low, high = (middle, high) if value < 0.0 else (low, middle)
+    return 0.5 * (low + high)

@@ -1,0 +1,70 @@
+"""Reference problems with closed forms or published digits, as scenes made through the public API."""
+
+import dap3d_core as dap
+
+ROD = (1e-3, 1 / 12, 1 / 12)  # uniform rod of 1 m and 1 kg along x, made thin but not infinitely so
+
+
+def pendulum():
+    """IFToMM A01: point mass of 1 kg on a massless rod of 1 m, released at rest at (-1, 0), gravity along -y."""
+    scene = dap.Scene(name="A01")
+    scene.add_body("bob", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(-1.0, 0.0, 0.0))
+    scene.add_joint("sph-sph", "rod", P_i="bob.O", P_j="ground.O", length=1.0)
+    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
+    return scene
+
+
+def four_bar():
+    """IFToMM A02 with N = 1, made free of redundancy: cranks on revolutes, the coupler on two spherical joints."""
+    scene = dap.Scene(name="A02")
+    for k in range(2):
+        scene.add_body(f"crank{k}", Jp=(1 / 12, 1e-3, 1 / 12), mass=1.0, r=(k, 0.5, 0.0), r_dot=(0.5, 0.0, 0.0),
+                       w=(0.0, 0.0, -1.0))  # fmt: skip
+        scene.add_point(f"low{k}", f"crank{k}", (0.0, -0.5, 0.0))
+        scene.add_point(f"high{k}", f"crank{k}", (0.0, 0.5, 0.0))
+        scene.add_point(f"pivot{k}", "ground", (float(k), 0.0, 0.0))
+        scene.add_joint("rev", f"A{k}", P_i=f"low{k}", P_j=f"pivot{k}", a_i=f"crank{k}.z", a_j="ground.z")
+    scene.add_body("coupler", mass=1.0, Jp=ROD, r=(0.5, 1.0, 0.0), r_dot=(1.0, 0.0, 0.0))
+    for k in range(2):
+        scene.add_point(f"end{k}", "coupler", (k - 0.5, 0.0, 0.0))
+        scene.add_joint("sph", f"B{k}", P_i=f"end{k}", P_j=f"high{k}")
+    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
+    return scene
+
+
+def free_body(Jp, w, **more):
+    """One body with principal inertias Jp, turning with body components w at the identity pose, no forces."""
+    scene = dap.Scene(name="free body")
+    scene.add_body("top", mass=1.0, Jp=Jp, w=w, **more)
+    return scene
+
+
+def heavy_top(theta, spin, precession):
+    """G4: symmetric heavy top in steady precession; mass centre 0.1 m from the pivot, A = 0.02 about it, C = 0.005."""
+    import numpy as np
+
+    c, s = np.cos(theta), np.sin(theta)
+    axis = np.array([0.0, s, c])
+    scene = dap.Scene(name="heavy top")
+    # axial omega is the whole component along the axis; the rest comes from the precession about z
+    w = spin * axis + precession * (np.array([0.0, 0.0, 1.0]) - c * axis)
+    r = 0.1 * axis
+    scene.add_body("top", mass=1.0, Jp=(0.02 - 0.01, 0.02 - 0.01, 0.005), r=r, r_dot=np.cross(w, r), w=w,
+                   p=(np.cos(theta / 2), -np.sin(theta / 2), 0.0, 0.0))  # fmt: skip
+    scene.add_point("tip", "top", (0.0, 0.0, -0.1))
+    scene.add_joint("sph", "pivot", P_i="tip", P_j="ground.O")
+    scene.add_force("weight", "gravity")
+    return scene
+
+
+def chain(n):
+    """n uniform rods of 1 m and 1 kg, planar, from rest along +x, first end on ground, gravity along -y."""
+    scene = dap.Scene(name=f"chain of {n}")
+    outer = "ground.O"
+    for k in range(n):
+        scene.add_body(f"b{k}", mass=1.0, Jp=ROD, r=(k + 0.5, 0.0, 0.0))
+        scene.add_point(f"in{k}", f"b{k}", (-0.5, 0.0, 0.0))
+        scene.add_joint("sph", f"J{k}", P_i=f"in{k}", P_j=outer)
+        outer = scene.add_point(f"out{k}", f"b{k}", (0.5, 0.0, 0.0))
+    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
+    return scene

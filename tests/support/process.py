@@ -1,0 +1,37 @@
+"""Python scripts run in fresh processes, with a cache folder of their own."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+
+def environment(cache=None, **variables):
+    """The environment of a child process, with its own cache of compiled code."""
+    env = {k: v for k, v in os.environ.items() if not k.startswith(("DAP3D_", "NUMBA_", "COVERAGE_"))}
+    if cache is not None:
+        env["DAP3D_CACHE_DIR"] = str(cache)
+    return env | {k: str(v) for k, v in variables.items()}
+
+
+def start(script, cache=None, *, cwd=None, **variables):
+    """Start a script and return the process."""
+    return subprocess.Popen(
+        [sys.executable, "-c", script],
+        env=environment(cache, **variables),
+        cwd=cwd,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def run(script, cache=None, *, cwd=None, **variables):
+    """Run a script to its end and return what it printed; its failure is the test's."""
+    process = start(script, cache, cwd=cwd, **variables)
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 0, err
+    return out.strip()
+
+
+REPOSITORY = Path(__file__).parents[2]

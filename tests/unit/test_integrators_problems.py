@@ -1,0 +1,154 @@
+"""Problems with known answers for the tests of the integrators; the answers are checked here."""
+
+import numpy as np
+import pytest
+from numba import njit, types
+from numba.typed import List
+
+from dap3d_core.integrators import METHODS, Integration, Status
+from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.lists import VECTOR, function_type, loop_list, step_signature
+
+# The system is a plain tuple of one array, which counts the calls of rhs, project and report: a
+# class of this file, written into the core's cache index, would be looked for by every process.
+
+STEP = step_signature(types.UniTuple(VECTOR, 1))
+
+
+def oscillator(t, y, out, system, loops):
+    """y'' = -y in pairs; further components are the integral of the first."""
+    system[0][0] += 1
+    out[0], out[1] = y[1], -y[0]
+    for i in range(2, y.size):
+        out[i] = 1e6 * y[0]
+
+
+def kepler(t, y, out, system, loops):
+    system[0][0] += 1
+    r3 = (y[0] * y[0] + y[1] * y[1]) ** 1.5
+    out[0], out[1], out[2], out[3] = y[2], y[3], -y[0] / r3, -y[1] / r3
+
+
+def time_dependent(t, y, out, system, loops):
+    """y = exp(sin t) by two roads."""
+    system[0][0] += 1
+    out[0] = y[0] * np.cos(t)
+    out[1] = np.exp(np.sin(t)) * np.cos(t)
+
+
+def nan_after_one(t, y, out, system, loops):
+    system[0][0] += 1
+    out[0] = np.cos(t) if t <= 1.0 else np.nan
+
+
+def blow_up(t, y, out, system, loops):
+    """y = 1 / (1 - t)."""
+    system[0][0] += 1
+    out[0] = y[0] * y[0]
+
+
+def spiral(t, y, out, system, loops):
+    """Turns at unit rate and grows; on the unit circle it is (cos t, sin t)."""
+    system[0][0] += 1
+    out[0], out[1] = -y[1] + 0.1 * y[0], y[0] + 0.1 * y[1]
+
+
+def no_constraint(t, y, out, system, loops):
+    system[0][1] += 1
+    out[0] = 0.0
+
+
+def circle(t, y, out, system, loops):
+    system[0][1] += 1
+    r = np.sqrt(y[0] * y[0] + y[1] * y[1])
+    y[0], y[1] = y[0] / r, y[1] / r
+    out[0] = 1.0 if abs(r - 1.0) > 1e-14 else 0.0
+
+
+def circle_until_one(t, y, out, system, loops):
+    system[0][1] += 1
+    out[1] = 1.0 if t > 1.0 else 0.0
+
+
+def plain_report(t, y, out, system, loops):
+    system[0][2] += 1
+    for i in range(out.size):
+        out[i] = (i + 1) * t * y[0]
+
+
+def report_until_one(t, y, out, system, loops):
+    system[0][2] += 1
+    out[0] = 1.0 if t < 1.0 else np.inf
+
+
+_compiled = {}
+
+
+def first_class(function):
+    if function not in _compiled:
+        _compiled[function] = njit(STEP, error_model="numpy")(function)
+    return _compiled[function]
+
+
+def start(name, rhs, y0, times, project=no_constraint, report=plain_report, **options):
+    """An integration of a toy; its calls are counted in ``.calls``."""
+    functions = [rhs, project, report]
+    if jit_is_on():
+        functions = List.empty_list(function_type(STEP))
+        for function in (rhs, project, report):
+            functions.append(first_class(function))
+    calls = np.zeros(3)
+    run = Integration(METHODS[name], functions, (calls,), loop_list([]), y0, times, **options)
+    run.calls = calls
+    return run
+
+
+def finish(run, budget=10**9):
+    """Rows of a whole run, in chunks."""
+    parts = []
+    while run.status is Status.RUNNING:
+        run.advance(budget)
+        parts.append(run.rows())
+    return np.concatenate(parts)
+
+
+def kepler_orbit(t, e=0.3):
+    """Position and velocity (k, 4) from pericentre, unit semi-major axis, by Kepler's equation."""
+    t = np.asarray(t, dtype=float)
+    E = t.copy()
+    for _ in range(60):
+        E -= (E - e * np.sin(E) - t) / (1.0 - e * np.cos(E))
+    s, rate = np.sqrt(1.0 - e * e), 1.0 / (1.0 - e * np.cos(E))
+    return np.stack(
+        [np.cos(E) - e, s * np.sin(E), -np.sin(E) * rate, s * np.cos(E) * rate], axis=-1
+    )
+
+
+def kepler_f(t, y):
+    """The Kepler problem as scipy wants it."""
+    return np.concatenate([y[2:], -y[:2] / np.hypot(*y[:2]) ** 3])
+
+
+def slope(x, y):
+    return np.polyfit(np.log(x), np.log(y), 1)[0]
+
+
+ALL, ADAPTIVE = ("rk4", "dopri5", "dop853"), ("dopri5", "dop853")
+TIGHT = {"rtol": 1e-11, "atol": 1e-11}
+
+
+@pytest.mark.parametrize(
+    ("rhs", "solution"),
+    [
+        (oscillator, lambda t: np.array([np.sin(t), np.cos(t)])),
+        (kepler, lambda t: kepler_orbit(t)),
+        (time_dependent, lambda t: np.exp(np.sin(t)) * np.ones(2)),
+        (blow_up, lambda t: np.array([1.0 / (1.0 - t)])),
+    ],
+)
+def test_answers_solve_their_problems(rhs, solution):
+    """The central difference of each solution is what its right-hand side says."""
+    t, h = 0.37, 1e-5
+    out = np.zeros(len(solution(t)))
+    rhs(t, solution(t), out, (np.zeros(3),), None)
+    assert np.allclose((solution(t + h) - solution(t - h)) / (2 * h), out, rtol=0, atol=1e-8)

@@ -1,0 +1,114 @@
+"""Compiled code is kept under a digest of everything it was made from: never stale, never compiled twice."""
+
+import pytest
+from support.process import run, start
+
+from dap3d_core.kernels.cache import jit_is_on
+
+pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled with NUMBA_DISABLE_JIT=1")
+
+#: A force type whose kernel calls a helper in another module, and that calls one in a third.
+PLUGIN = """
+from dap3d_core.interface import Body, Force, body
+from helper import push
+
+class Push(Force):
+    keyword = "push"
+    body_i: Body = body()
+    def wrench(mass_i):
+        return (push(mass_i), (0.0, 0.0, 0.0))
+"""
+HELPER = """
+from dap3d_core.kernels import scale
+from dap3d_core.kernels.inline import inlined
+import constants
+STRENGTH = {strength}
+@inlined
+def push(mass):
+    return scale(mass * STRENGTH + constants.offset(), (1.0, 0.0, 0.0))
+"""
+CONSTANTS = """
+from dap3d_core.kernels.inline import inlined
+@inlined
+def offset():
+    return {offset}
+"""
+EVALUATE = """
+import sys; sys.path.insert(0, ".")
+import numpy as np
+from dap3d_core.interface import examine
+from dap3d_core.interface.writer import write
+from dap3d_core.kernels.gather import BODY_WIDTH, MASS
+from dap3d_core.kernels.loops import build, compiled_here
+from plugin import Push
+loop = build(write(examine(Push), "wrench"))
+body = np.zeros((2, BODY_WIDTH)); body[1, MASS] = 2.0
+force = np.zeros(12)
+loop(0.0, body, np.zeros((1, 4)), np.ones(1, dtype=np.int64), np.zeros(1), 0, 0, 1, force, force, force)
+print(force[6], len(compiled_here))
+"""
+#: Runs a pendulum and prints its last state, and how many functions were compiled on the way.
+PENDULUM = """
+from numba.core import event
+compiled = []
+class Listener(event.Listener):
+    def on_start(self, e): compiled.append(e.data["dispatcher"].__name__)
+    def on_end(self, e): pass
+with event.install_listener("numba:compile", Listener()):
+    import dap3d_core as dap
+    result = dap.simulate(dap.load("pen1"), t_end=0.05, dt=0.05, integrator="dopri5")
+print(" ".join(x.hex() for x in result.u[-1].tolist()), len(compiled))
+"""
+
+
+def write_plugin(folder, strength=3.0, offset=0.5):
+    (folder / "plugin.py").write_text(PLUGIN)
+    (folder / "helper.py").write_text(HELPER.format(strength=strength))
+    (folder / "constants.py").write_text(CONSTANTS.format(offset=offset))
+
+
+def test_an_edited_helper_gives_the_new_number(tmp_path):
+    """A change in a module that the kernel's helper calls is seen by the next process, and only then compiled anew."""
+    cache = tmp_path / "cache"
+    write_plugin(tmp_path)
+    assert run(EVALUATE, cache, cwd=tmp_path) == "6.5 1"
+    assert run(EVALUATE, cache, cwd=tmp_path) == "6.5 0"
+    write_plugin(tmp_path, strength=4.0)
+    assert run(EVALUATE, cache, cwd=tmp_path) == "8.5 1"
+    write_plugin(tmp_path, strength=4.0, offset=1.0)
+    assert run(EVALUATE, cache, cwd=tmp_path) == "9.0 1"
+    write_plugin(tmp_path)
+    assert run(EVALUATE, cache, cwd=tmp_path) == "6.5 0"
+
+
+@pytest.mark.slow
+def test_a_second_process_compiles_nothing(tmp_path):
+    """The second run of a model finds every function in the cache, and gives the same bits."""
+    first = run(PENDULUM, tmp_path).split()
+    second = run(PENDULUM, tmp_path).split()
+    assert int(first.pop()) > 0
+    assert second.pop() == "0"
+    assert first == second
+
+
+def test_two_processes_race_on_an_empty_cache(tmp_path):
+    """Both succeed with the same number; what they leave serves a third."""
+    cache = tmp_path / "cache"
+    write_plugin(tmp_path)
+    racers = [start(EVALUATE, cache, cwd=tmp_path) for _ in range(2)]
+    printed = [p.communicate(timeout=300) for p in racers]
+    assert [p.returncode for p in racers] == [0, 0], printed
+    assert [out.split()[0] for out, _ in printed] == ["6.5", "6.5"]
+    assert run(EVALUATE, cache, cwd=tmp_path) == "6.5 0"
+
+
+@pytest.mark.parametrize("where", ["through a file", "nowhere"])
+def test_a_cache_that_cannot_be_written_does_no_harm(tmp_path, where):
+    """Without a folder to write to the code is compiled for this process alone."""
+    write_plugin(tmp_path)
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    script = EVALUATE
+    if where == "nowhere":
+        script = "import dap3d_core.kernels.cache as c; c._candidates = lambda: iter(())\n" + script
+    assert run(script, blocked / "cache", cwd=tmp_path, XDG_CACHE_HOME=blocked).split()[0] == "6.5"

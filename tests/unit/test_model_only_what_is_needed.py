@@ -1,0 +1,48 @@
+"""A scene pays for nothing that it does not use: what is imported and compiled is counted in fresh processes."""
+
+import pytest
+from support.process import run
+
+MODULES = "import sys; print(' '.join(m for m in sys.modules))"
+HEAVY = {"numpy", "scipy", "numba", "matplotlib", "netCDF4", "xarray"}
+
+
+def imported(script):
+    return set(run(f"{script}\n{MODULES}").splitlines()[-1].split())
+
+
+def test_importing_the_package_imports_nothing_heavy():
+    """``import dap3d_core`` brings in neither numerics nor plugins nor drawing."""
+    found = imported("import dap3d_core")
+    assert not found & (HEAVY | {"rich", "click", "pluggy"})
+    assert not any(m.startswith(("dap3d_joints", "dap3d_forces", "dap3d_functions")) for m in found)
+
+
+def test_the_command_help_imports_nothing_heavy():
+    """``dap3d --help`` answers without numpy, scipy, numba and matplotlib."""
+    script = "from dap3d_core.cli import main\ntry:\n    main(['--help'])\nexcept SystemExit:\n    pass"
+    assert not imported(script) & HEAVY
+
+
+@pytest.mark.parametrize(
+    ("model", "present", "absent"),
+    [
+        ("bodies2", {"dap3d_forces.point_to_point"}, {"dap3d_joints", "dap3d_functions"}),
+        ("pen1", {"dap3d_joints.spherical"}, {"dap3d_joints.revolute", "dap3d_forces.point_to_point", "dap3d_functions"}),
+    ],
+)
+def test_a_model_loads_only_its_own_types(model, present, absent):
+    """Types that the scene does not name are not imported; without joints no joint kernel is written."""
+    script = (
+        "import dap3d_core as dap\n"
+        f"compiled = dap.compile(dap.load({model!r}))\n"
+        "print('loops', ' '.join(kind for kind, group in compiled.machine.what))\n"
+    )
+    lines = run(f"{script}\n{MODULES}").splitlines()
+    found = set(lines[-1].split())
+    assert present <= found
+    assert not {m for m in found if m.startswith(tuple(absent))}
+    assert not found & {"matplotlib", "netCDF4", "xarray", "rich"}
+    if model == "bodies2":
+        assert not {"acceleration", "position"} & set(lines[-2].split())
+        assert "dap3d_core.formulations.standard" not in found

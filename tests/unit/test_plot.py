@@ -1,0 +1,215 @@
+"""Plots show the named quantities, in files of each kind, and refuse what they cannot show."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib
+import matplotlib.image
+import numpy as np
+import pytest
+from unit.test_result import circling, drifting, model_of, result_of
+
+from dap3d_core.plot import FORMATS, plot, save_plot
+from dap3d_core.result import ResultError, UnknownNameError
+from dap3d_core.scene import Scene
+
+matplotlib.use("Agg")
+
+
+@pytest.fixture(scope="module")
+def result():
+    return circling()[0]
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    yield
+    from matplotlib import pyplot
+
+    pyplot.close("all")
+
+
+def lines(ax):
+    return {line.get_label(): line.get_xydata() for line in ax.get_lines()}
+
+
+def test_a_curve_over_time_with_units(result):
+    ax = plot(result, "bob.r.x")
+    ((name, data),) = lines(ax).items()
+    assert name == "bob.r.x"
+    np.testing.assert_array_equal(data, np.stack([result.t, result.r[:, 0, 0]], axis=1))
+    assert ax.get_xlabel() == "time [s]"
+    assert ax.get_ylabel() == "position of bob, x [m]"
+    assert ax.get_legend() is None
+    assert ax.figure.get_suptitle() == "circling"
+
+
+def test_all_components_of_a_vector_with_a_legend(result):
+    ax = plot(result, "bob.rdd")
+    assert list(lines(ax)) == ["bob.rdd.x", "bob.rdd.y", "bob.rdd.z"]
+    assert ax.get_ylabel() == "acceleration of bob [m/s²]"
+    assert [t.get_text() for t in ax.get_legend().get_texts()] == list(lines(ax))
+
+
+def test_units_share_a_figure_in_panels_below_one_another(result):
+    first = plot(result, "bob.r", "energy.total", "P.r.z", "work", "bob.p.e0")
+    axes = first.figure.axes
+    assert [sorted(lines(ax)) for ax in axes] == [
+        ["P.r.z", "bob.r.x", "bob.r.y", "bob.r.z"],
+        ["energy.total", "work"],
+        ["bob.p.e0"],
+    ]
+    assert [ax.get_ylabel().replace("\n", " ") for ax in axes] == [
+        "position [m]",
+        "total energy, work of forces and drivers [J]",
+        "Euler parameters of bob, e0",
+    ]
+    assert axes[-1].get_xlabel() == "time [s]"
+
+
+def test_one_quantity_over_another(result):
+    ax = plot(result, "bob.r.y", x="bob.r.x")
+    np.testing.assert_array_equal(lines(ax)["bob.r.y"], result.r[:, 0, :2])
+    assert ax.get_xlabel() == "position of bob, x [m]"
+
+
+def test_on_axes_that_are_given(result):
+    from matplotlib import pyplot
+
+    _, given = pyplot.subplots()
+    assert plot(result, "bob.r.x", "bob.r.y", ax=given) is given
+    assert len(given.get_lines()) == 2
+    with pytest.raises(ValueError, match=r"one unit.*m, J"):
+        plot(result, "bob.r.x", "work", ax=given)
+
+
+def test_one_instant_is_drawn_as_markers():
+    single = circling(nt=1)[0]
+    for line in plot(single, "bob.rdd").get_lines():
+        assert line.get_marker() not in ("", "None")
+        assert len(line.get_xydata()) == 1
+
+
+def test_many_curves_differ_in_colour_or_dash():
+    ax = plot(drifting(), "a.r", "b.r", "a.r.norm", "b.r.norm")
+    looks = [(line.get_color(), line.get_linestyle()) for line in ax.get_lines()]
+    assert len(set(looks)) == len(looks) == 8
+
+
+@pytest.mark.parametrize("suffix", [*FORMATS, ".PNG"])
+def test_files_of_each_kind(result, tmp_path, suffix):
+    path = save_plot(result, ["bob.r", "energy.total", "J1.force.norm"], tmp_path / f"a{suffix}")
+    data = path.read_bytes()
+    begin = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}[suffix.lower()]
+    assert data.startswith(begin)
+    assert len(data) > 5000
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    again = save_plot(result, ["bob.r", "energy.total", "J1.force.norm"], tmp_path / f"b{suffix}")
+    assert again.read_bytes() == data  # equal figures, equal files
+
+
+def test_a_picture_is_not_blank_and_has_the_size_asked_for(result, tmp_path):
+    path = save_plot(result, "bob.r", tmp_path / "a.png", width=3, height=2, dpi=100)
+    pixels = matplotlib.image.imread(path)
+    assert pixels.shape[:2] == (200, 300)
+    colours = np.unique((pixels[..., :3] * 255).round().reshape(-1, 3), axis=0)
+    assert len(colours) > 50
+
+
+def test_nothing_is_cut_off_at_a_small_width(tmp_path):
+    """The margin of the picture is white all around, legends of two panels included."""
+    result = drifting()
+    names = ["a.w", "b.wp", "a.rd", "b.rd"]
+    path = save_plot(result, names, tmp_path / "a.png", width=3.5)
+    pixels = matplotlib.image.imread(path)[..., :3]
+    for edge in (pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]):
+        assert (edge == 1.0).all()
+
+
+def test_a_file_is_overwritten_only_when_forced(result, tmp_path):
+    path = tmp_path / "a.png"
+    path.write_text("precious")
+    with pytest.raises(ResultError, match="the file exists"):
+        save_plot(result, "work", path)
+    assert path.read_text() == "precious"
+    save_plot(result, "work", path, force=True)
+    assert path.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (dict(path="a.bmp"), r"a figure is one of \.png, \.svg, \.pdf"),
+        (dict(path="a"), "a figure is one of"),
+        (dict(quantities=[]), "at least one quantity"),
+        (dict(x="bob.r"), r"x = bob\.r has components; name one of bob\.r\.x, bob\.r\.y"),
+        (dict(width=0), "cannot be"),
+        (dict(dpi=1e9), "cannot be"),
+        (dict(width=float("nan")), "cannot be"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(result, tmp_path, options, words):
+    given = dict(quantities=["work"], path="a.png") | options
+    given["path"] = tmp_path / given["path"]
+    with pytest.raises(ValueError, match=words):
+        save_plot(result, **given)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_quantity_is_answered_before_anything_is_written(result, tmp_path):
+    with pytest.raises(UnknownNameError, match=r"did you mean 'bob\.r\.z'"):
+        save_plot(result, "bbo.r.z", tmp_path / "a.png")
+    with pytest.raises(ResultError, match="there is no folder"):
+        save_plot(result, "work", tmp_path / "no" / "a.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_result_without_instants_cannot_be_drawn():
+    model = model_of(scene_with())
+    empty = result_of(scene_with(), np.zeros((0, 25)), model, "unconstrained")
+    with pytest.raises(ValueError, match="no instants"):
+        plot(empty, "work")
+
+
+def scene_with(name="b"):
+    scene = Scene(name="$x_2$ and _")
+    scene.add_body(name, mass=1.0, Jp=[1, 1, 1])
+    return scene
+
+
+@pytest.mark.parametrize("name", ["_hidden", "a$b", "$x^2$", "two words", "50%", "back\\slash"])
+def test_names_are_shown_as_they_are(tmp_path, name):
+    """matplotlib takes $ for a formula and hides what begins with _; neither happens here."""
+    scene = scene_with(name)
+    rows = np.zeros((2, 25))
+    rows[:, 4] = 1.0
+    rows[1, 0] = 1.0
+    result = result_of(scene, rows, model_of(scene), "unconstrained")
+    legend = plot(result, f"{name}.r").get_legend().get_texts()
+    assert [t.get_text().strip().replace(r"\$", "$") for t in legend] == [
+        f"{name}.r.{axis}" for axis in "xyz"
+    ]
+    save_plot(result, f"{name}.r", tmp_path / "a.png")
+
+
+def test_saving_needs_no_window_and_the_module_can_be_called(tmp_path):
+    """pyplot, which opens windows, stays out; dap3d_core.plot(...) works with the module loaded."""
+    code = """if True:
+        import sys
+        sys.path.insert(0, sys.argv[1])
+        from unit.test_result import circling
+        import dap3d_core
+        import dap3d_core.plot
+        dap3d_core.plot.save_plot(circling()[0], "work", "a.png")
+        assert "matplotlib.pyplot" not in sys.modules
+        import matplotlib
+        matplotlib.use("Agg")
+        print(dap3d_core.plot(circling()[0], "work").get_ylabel())
+    """
+    tests = Path(__file__).parents[1]
+    out = subprocess.run(
+        [sys.executable, "-c", code, str(tests)], cwd=tmp_path, capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    assert out.stdout.strip() == "work of forces and drivers [J]"

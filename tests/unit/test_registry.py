@@ -1,0 +1,371 @@
+"""The registry: installed types are found by keyword, and a broken plugin only breaks itself.
+
+Plugins here are real distributions on sys.path: a module, and a dist-info with entry points.
+"""
+
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from dap3d_core.interface import PluginError
+from dap3d_core.registry import UnknownTypeError, load_registry
+
+GOOD = """
+    from dap3d_core.interface import Body, Force, body, hookimpl, number
+    from dap3d_core.kernels import scale
+
+    interface_version = 1
+
+    class Push(Force):
+        \"\"\"A constant push along x.\"\"\"
+
+        keyword = "push"
+        body_i: Body = body()
+        k: float = number(default=1.0)
+
+        def wrench(k):
+            return (((k, 0.0, 0.0), (0.0, 0.0, 0.0)),)
+
+    @hookimpl
+    def dap3d_forces():
+        return [Push]
+"""
+
+
+@pytest.fixture
+def install(tmp_path, monkeypatch):
+    """Put a distribution on sys.path: its module's text, and its entry points."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delenv("DAP3D_BLOCK", raising=False)
+    modules = []
+
+    def put(name, text, keyword="push", group="dap3d.forces", *, entry_points=None):
+        module = name.replace("-", "_") + "_module"
+        modules.append(module)
+        (tmp_path / f"{module}.py").write_text(textwrap.dedent(text))
+        info = tmp_path / f"{name.replace('-', '_')}-1.2.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.2\n")
+        if entry_points is None:
+            entry_points = f"[{group}]\n{keyword} = {module}\n"
+        (info / "entry_points.txt").write_text(entry_points)
+        return module
+
+    yield put
+    for module in modules:
+        sys.modules.pop(module, None)
+
+
+def message(kind="force", keyword="push", registry=None):
+    """What ``get`` says against a type."""
+    registry = registry or load_registry()
+    with pytest.raises(PluginError) as caught:
+        registry.get(kind, keyword)
+    with pytest.raises(PluginError) as again:
+        registry.get(kind, keyword)
+    assert str(again.value) == str(caught.value), "the second answer is the same"
+    return str(caught.value)
+
+
+def test_a_type_is_imported_when_asked_for_and_not_before(install):
+    module = install("dap3d-push", GOOD)
+    registry = load_registry()
+    assert "push" in registry.keywords("force")
+    assert "push" not in registry.keywords("joint")
+    assert module not in sys.modules
+    examined = registry.get("force", "push")
+    assert module in sys.modules
+    assert examined.type.__name__ == "Push"
+    assert examined.type.__doc__ == "A constant push along x."
+    assert examined.layout.slots == ("i",)
+    assert registry.get("force", "push") is examined, "examined once"
+
+
+def test_listing_says_ok_with_distribution_and_version(install):
+    module = install("dap3d-push", GOOD)
+    (info,) = [i for i in load_registry().listing() if i.keyword == "push"]
+    assert (info.kind, info.distribution, info.version) == ("force", "dap3d-push", "1.2")
+    assert (info.module, info.state, info.reason) == (module, "ok", "")
+
+
+def test_two_registries_share_nothing(install):
+    before = load_registry()
+    install("dap3d-push", GOOD)
+    assert "push" not in before.keywords("force")
+    assert "push" in load_registry().keywords("force")
+    assert load_registry(groups=()).listing() == []
+    assert "push" not in load_registry(groups=["dap3d.joints"]).keywords("force")
+
+
+BROKEN = {
+    "import error": (
+        "import no_such_package_here\n",
+        ["ModuleNotFoundError", "no_such_package_here", "_module.py:1"],
+    ),
+    "syntax error": ("def f(:\n", ["SyntaxError", "_module.py:1"]),
+    "exit": ("import sys\nsys.exit(3)\n", ["SystemExit", "_module.py:2"]),
+    "generator exit": ("raise GeneratorExit\n", ["GeneratorExit"]),
+    "stop iteration": ("raise StopIteration('x')\n", ["StopIteration"]),
+    "no version": (
+        GOOD.replace("interface_version = 1", ""),
+        ["no interface_version", "interface_version = 1"],
+    ),
+    "newer version": (
+        GOOD.replace("interface_version = 1", "interface_version = 99"),
+        ["interface version 99", "newer dap3d"],
+    ),
+    "older version": (
+        GOOD.replace("interface_version = 1", "interface_version = 0"),
+        ["interface version 0", "newer version of the plugin"],
+    ),
+    "version is true": (
+        GOOD.replace("interface_version = 1", "interface_version = True"),
+        ["says True", "an integer"],
+    ),
+    "version is text": (
+        GOOD.replace("interface_version = 1", "interface_version = '1'"),
+        ["says '1'", "an integer"],
+    ),
+    "hook takes an argument": (
+        GOOD.replace("def dap3d_forces():", "def dap3d_forces(scene):"),
+        ["wrong hook", "scene"],
+    ),
+    "hook of an unknown name": (
+        GOOD.replace("def dap3d_forces():", "def dap3d_force():"),
+        ["wrong hook", "dap3d_force"],
+    ),
+    "no hookimpl": (GOOD.replace("@hookimpl\n", "\n"), ["no hook for a force", "@hookimpl"]),
+    "hook of another kind": (
+        GOOD.replace("def dap3d_forces():", "def dap3d_joints():"),
+        ["no hook for a force", "dap3d_forces"],
+    ),
+    "hook returns None": (GOOD.replace("return [Push]", "return None"), ["list of classes"]),
+    "hook returns a class": (GOOD.replace("return [Push]", "return Push"), ["list of classes"]),
+    "hook returns an instance": (
+        GOOD.replace("return [Push]", "return [Push(body_i='a')]"),
+        ["subclasses of Force"],
+    ),
+    "hook raises": (
+        GOOD.replace("return [Push]", "raise RuntimeError('nothing here')"),
+        ["RuntimeError", "nothing here"],
+    ),
+    "other keyword": (
+        GOOD.replace('keyword = "push"', 'keyword = "pusher"'),
+        ["no class with the keyword 'push'", "did you mean 'pusher'"],
+    ),
+    "no keyword": (GOOD.replace('keyword = "push"', ""), ["no keyword"]),
+    "keyword twice": (
+        GOOD.replace("return [Push]", "return [Push, Push]"),
+        ["the same keyword 'push'"],
+    ),
+    "kernel asks for an unknown name": (
+        GOOD.replace("def wrench(k):", "def wrench(k, w_1):"),
+        ["Push.wrench asks for w_1", "did you mean w_i"],
+    ),
+    "kernel of wrong shape": (
+        GOOD.replace("(0.0, 0.0, 0.0)),)", "(0.0, 0.0)),)"),
+        ["Push.wrench", "differ in length"],
+    ),
+    "kernel raises": (
+        GOOD.replace("return (((k,", "return ((({}['k'],"),
+        ["Push.wrench", "KeyError"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "words"), BROKEN.values(), ids=BROKEN)
+def test_a_broken_plugin_is_named_with_reason_and_remedy(install, text, words):
+    module = install("dap3d-push", text)
+    said = message()
+    for word in [*words, "'push'", "dap3d-push 1.2", module, "DAP3D_BLOCK=dap3d-push"]:
+        assert word in said
+    assert "\n" not in said
+
+
+@pytest.mark.parametrize(("text", "words"), BROKEN.values(), ids=BROKEN)
+def test_a_broken_plugin_breaks_no_other_and_is_listed(install, text, words):
+    install("dap3d-push", text)
+    install("dap3d-pull", GOOD.replace('"push"', '"pull"'), "pull")
+    registry = load_registry()
+    listing = {i.keyword: i for i in registry.listing()}
+    assert listing["push"].state == "broken"
+    assert words[0] in listing["push"].reason
+    assert listing["pull"].state == "ok"
+    assert registry.get("force", "pull").type.keyword == "pull"
+
+
+def test_ctrl_c_at_import_is_not_swallowed(install):
+    install("dap3d-push", "raise KeyboardInterrupt\n")
+    with pytest.raises(KeyboardInterrupt):
+        load_registry().get("force", "push")
+
+
+def test_two_distributions_with_one_keyword_are_both_named(install, monkeypatch):
+    install("dap3d-push", GOOD)
+    install("Other.Push", GOOD)
+    said = message()
+    for word in ["dap3d-push 1.2", "Other.Push 1.2", "uninstall one", "DAP3D_BLOCK=Other.Push"]:
+        assert word in said
+    states = [i for i in load_registry().listing() if i.keyword == "push"]
+    assert [i.state for i in states] == ["duplicate", "duplicate"]
+    assert all("Other.Push" in i.reason and "dap3d-push" in i.reason for i in states)
+
+    monkeypatch.setenv("DAP3D_BLOCK", "something, other_push")
+    registry = load_registry()
+    assert registry.get("force", "push").type.__module__ == "dap3d_push_module"
+    states = {i.distribution: i.state for i in registry.listing() if i.keyword == "push"}
+    assert states == {"dap3d-push": "ok", "Other.Push": "blocked"}
+
+
+def test_a_name_that_shadows_a_standard_type_is_a_collision(install):
+    install("dap3d-mine", GOOD.replace('"push"', '"weight"'), "weight")
+    said = message(keyword="weight")
+    assert "dap3d-mine" in said
+    assert "DAP3D_BLOCK=dap3d " in said or "DAP3D_BLOCK=dap3d or" in said
+
+
+def test_a_blocked_type_says_who_blocked_it(install, monkeypatch):
+    install("dap3d-push", GOOD)
+    monkeypatch.setenv("DAP3D_BLOCK", "dap3d-push")
+    registry = load_registry()
+    assert "push" not in registry.keywords("force")
+    with pytest.raises(UnknownTypeError, match="DAP3D_BLOCK leaves dap3d-push out"):
+        registry.get("force", "push")
+
+
+def test_an_unknown_keyword_names_the_nearest_and_all(install):
+    install("dap3d-push", GOOD)
+    registry = load_registry()
+    with pytest.raises(LookupError) as caught:
+        registry.get("force", "pusch")
+    assert isinstance(caught.value, PluginError)
+    assert caught.value.nearest == "push"
+    assert "did you mean 'push'" in str(caught.value)
+    for word in registry.keywords("force"):
+        assert word in str(caught.value)
+    with pytest.raises(LookupError, match="did you mean 'push'"):
+        registry.get("force", "PUSH")
+
+
+def test_a_keyword_of_another_kind_says_where_it_belongs(install):
+    install("dap3d-push", GOOD)
+    with pytest.raises(LookupError, match="'push' is a force type and belongs under forces"):
+        load_registry().get("joint", "push")
+
+
+def test_an_unknown_kind_is_an_error_of_the_caller():
+    with pytest.raises(ValueError, match="joint, force, function"):
+        load_registry().get("joints", "sph")
+
+
+def test_an_entry_point_that_names_no_module_is_broken(install):
+    install("dap3d-push", GOOD, entry_points="[dap3d.forces]\npush = dap3d_push_module:Push\n")
+    assert "should name a module" in message()
+
+
+def test_a_damaged_entry_point_file_stops_nobody_else(install):
+    install("dap3d-broken", "", entry_points="[dap3d.forces]\nthis is not an entry point\n")
+    install("dap3d-push", GOOD)
+    registry = load_registry()
+    assert registry.get("force", "push").type.keyword == "push"
+    broken = [i for i in registry.listing() if i.distribution == "dap3d-broken"]
+    assert [i.state for i in broken] == ["broken"]
+    assert "entry_points.txt" in broken[0].reason
+
+
+def test_what_a_plugin_changes_in_the_process_is_put_back(install, tmp_path, capsys):
+    import numpy as np
+
+    changes = """
+    import os
+    import numpy
+    print("hello from the plugin")
+    os.chdir("/")
+    numpy.seterr(all="raise")
+    """
+    install("dap3d-push", textwrap.dedent(changes) + textwrap.dedent(GOOD))
+    before, state = os.getcwd(), np.geterr()
+    registry = load_registry()
+    registry.get("force", "push")
+    assert os.getcwd() == before
+    assert np.geterr() == state
+    assert any("working folder" in note for note in registry.notes)
+    assert any("numpy" in note for note in registry.notes)
+    assert capsys.readouterr().out == "", "what it prints does not mix with results"
+
+
+def test_finding_types_imports_nothing_heavy_and_no_plugin():
+    code = """
+    import sys
+    from dap3d_core.registry import load_registry
+    assert "sph" in load_registry().keywords("joint")
+    heavy = ["numpy", "scipy", "numba", "matplotlib", "rich", "click", "dap3d_joints"]
+    print([m for m in heavy if m in sys.modules])
+    """
+    answer = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True
+    )
+    assert answer.stdout.strip() == "[]"
+
+
+# ---------------------------------------------------------------------------- a model's own file
+
+
+def write(folder: Path, text: str = GOOD) -> Path:
+    file = folder / "plugin.py"
+    file.write_text(textwrap.dedent(text))
+    return file
+
+
+def test_a_model_file_adds_its_types_to_a_new_registry(tmp_path):
+    import inspect
+
+    registry = load_registry()
+    more = registry.with_file(write(tmp_path))
+    examined = more.get("force", "push")
+    assert examined.type.__doc__ == "A constant push along x."
+    assert "def wrench(k)" in inspect.getsource(examined.type), "its source can be found"
+    assert inspect.getsourcefile(examined.type) == str(tmp_path / "plugin.py")
+    assert "push" not in registry.keywords("force"), "the first registry is as before"
+    assert not (tmp_path / "__pycache__").exists()
+    (info,) = [i for i in more.listing() if i.keyword == "push"]
+    assert (info.state, info.distribution) == ("ok", "")
+    assert info.module == str(tmp_path / "plugin.py")
+
+
+def test_a_model_file_that_changed_is_another_module(tmp_path):
+    first = load_registry().with_file(write(tmp_path)).get("force", "push").type
+    again = load_registry().with_file(write(tmp_path)).get("force", "push").type
+    assert again is first
+    changed = GOOD.replace("default=1.0", "default=2.0")
+    other = load_registry().with_file(write(tmp_path, changed)).get("force", "push").type
+    assert other.__module__ != first.__module__
+    assert other(body_i="a").k == 2.0
+
+
+@pytest.mark.parametrize("case", ["import error", "exit", "no version", "hook takes an argument"])
+def test_a_broken_model_file_is_named(tmp_path, case):
+    text, words = BROKEN[case]
+    file = write(tmp_path, text)
+    with pytest.raises(PluginError) as caught:
+        load_registry().with_file(file)
+    for word in [str(file), "Repair the file", *words]:
+        assert word.replace("_module.py", "plugin.py") in str(caught.value)
+
+
+def test_a_model_file_without_types_or_missing_is_refused(tmp_path):
+    with pytest.raises(PluginError, match="brings no type"):
+        load_registry().with_file(write(tmp_path, "interface_version = 1\n"))
+    with pytest.raises(PluginError, match="cannot be read"):
+        load_registry().with_file(tmp_path / "nothing.py")
+
+
+def test_a_model_file_does_not_replace_an_installed_type_quietly(tmp_path):
+    file = write(tmp_path, GOOD.replace('"push"', '"weight"'))
+    said = message(keyword="weight", registry=load_registry().with_file(file))
+    assert str(file) in said
+    assert "rename" in said

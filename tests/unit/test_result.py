@@ -1,0 +1,361 @@
+"""A result gives back the motion that was put into it: closed-form motions, laws of mechanics."""
+
+import json
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.model import build_model
+from dap3d_core.model.kinematics import join, to_global, to_integrated
+from dap3d_core.registry import load_registry
+from dap3d_core.result import Result, ResultError, Statistics, UnknownNameError
+from dap3d_core.scene import Scene, check, load
+
+CONTROLLED = dict(rtol=1e-8, atol=1e-10, step=None, project=True, correct=True)
+
+
+def model_of(scene):
+    return build_model(check(scene, load_registry()))
+
+
+def about_z(angle):
+    """Euler parameters (nt, 1, 4) of a rotation about z."""
+    half = np.asarray(angle, dtype=float)[:, None] / 2
+    zero = np.zeros_like(half)
+    return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
+
+
+def rows_of(model, t, u, v_dot, Lam, work=0.0, potential=0.0, residuals=(0.0, 0.0, 0.0)):
+    """Rows as the integrator delivers them."""
+    last = np.tile([0.0, *residuals], (len(t), 1))
+    last[:, 0] = potential
+    y = to_integrated(u, model.body_count, work)
+    return np.hstack([t[:, None], y, v_dot, Lam, last])
+
+
+def result_of(scene, rows, model=None, method="standard", **more):
+    """A result whose machine is made when something asks for it."""
+    model = model or model_of(scene)
+    given = dict(settings=CONTROLLED, integrator="dop853", method=method) | more
+    return Result(
+        model=model,
+        machine_of=lambda: Machine(model, method),
+        scene_text=scene.to_toml(),
+        rows=rows,
+        **given,
+    )
+
+
+MASS, ARM, RATE, PIVOT = 3.0, 0.4, 2.5, np.array([0.3, -0.2, 0.5])
+X = np.array([1.0, 0.0, 0.0])
+
+
+def circling_scene():
+    """A bob on a ball joint away from the origin, without gravity; P is beyond its mass centre."""
+    scene = Scene(name="circling")
+    scene.add_body("bob", mass=MASS, Jp=[0.2, 0.3, 0.4], r=PIVOT + ARM * X, w=[0, 0, RATE],
+                   r_dot=[0, RATE * ARM, 0])  # fmt: skip
+    scene.add_point("Q", body="ground", sPp=PIVOT)
+    scene.add_point("H", body="bob", sPp=[-ARM, 0, 0])
+    scene.add_point("P", body="bob", sPp=[0.1, 0, 0])
+    scene.add_joint("sph", "J1", P_i="H", P_j="Q")
+    return scene
+
+
+def circling(nt=21, **more):
+    """Its motion: uniform rotation about z through the pivot. The joint holds m RATE^2 ARM."""
+    scene = circling_scene()
+    model = model_of(scene)
+    t = np.linspace(0.0, 1.7, nt)
+    out = np.stack([np.cos(RATE * t), np.sin(RATE * t), 0 * t], axis=1)  # from the pivot outwards
+    ahead = np.stack([-out[:, 1], out[:, 0], 0 * t], axis=1)
+    w = np.broadcast_to([0.0, 0.0, RATE], (nt, 1, 3))
+    u = join((PIVOT + ARM * out)[:, None], about_z(RATE * t), (RATE * ARM * ahead)[:, None], w)
+    v_dot = np.hstack([-(RATE**2) * ARM * out, np.zeros((nt, 3))])
+    Lam = MASS * RATE**2 * ARM * out  # 'sph' exerts -lambda on body i (spec 2)
+    rows = rows_of(model, t, u, v_dot, Lam)
+    return result_of(scene, rows, model, **more), out, ahead
+
+
+def drifting(nt=11, joint=False, **more):
+    """Two free bodies, each with constant velocity and a spin about a principal axis."""
+    scene = Scene(name="drifting")
+    scene.add_body("a", mass=2.0, Jp=[1.0, 2.0, 3.0], r=[1, 0, 0])
+    scene.add_body("b", mass=5.0, Jp=[0.1, 0.2, 0.3], r=[0, -2, 1])
+    if joint:
+        scene.add_joint("sph", "J", P_i="a.O", P_j="b.O")
+    model = model_of(scene)
+    t = np.linspace(0.0, 3.0, nt)
+    velocity = np.array([[0.5, -0.2, 0.1], [-1.0, 0.3, 0.7]])
+    rates = np.array([0.8, -1.3])
+    r = np.array([[1.0, 0, 0], [0, -2, 1]]) + t[:, None, None] * velocity
+    p = np.concatenate([about_z(rate * t) for rate in rates], axis=1)
+    w = np.zeros((nt, 2, 3))
+    w[..., 2] = rates
+    u = join(r, p, np.broadcast_to(velocity, r.shape), w)
+    rows = rows_of(model, t, u, np.zeros((nt, 12)), np.zeros((nt, model.row_count)))
+    return result_of(scene, rows, model, "standard" if joint else "unconstrained", **more)
+
+
+# ---------------------------------------------------------------------------- motion
+
+
+def test_stored_arrays_are_those_of_the_rows():
+    result, out, ahead = circling()
+    assert result.t.shape == (21,)
+    assert result.u.shape == (21, 13)
+    assert (result.r.shape, result.p.shape) == ((21, 1, 3), (21, 1, 4))
+    np.testing.assert_allclose(result.r[:, 0], PIVOT + ARM * out, atol=1e-15)
+    np.testing.assert_allclose(result.rd[:, 0], RATE * ARM * ahead, atol=1e-15)
+    np.testing.assert_allclose(result.rdd[:, 0], -(RATE**2) * ARM * out, atol=1e-15)
+    np.testing.assert_array_equal(result.v_dot[:, 3:], result.wd[:, 0])
+    assert result.Lam.shape == (21, 3)
+
+
+def test_angular_velocity_of_the_rows_is_in_body_axes_and_of_the_result_in_global_ones():
+    scene = Scene(name="tumbling")
+    scene.add_body("top", mass=1.0, Jp=[1.0, 2.0, 3.0])
+    model = model_of(scene)
+    rng = np.random.default_rng(5)
+    p = rng.normal(size=(7, 1, 4))
+    p /= np.linalg.norm(p, axis=-1, keepdims=True)
+    wp, wpd, r = rng.normal(size=(3, 7, 1, 3))
+    y = np.hstack([join(r, p, r, wp), np.zeros((7, 1))])
+    v_dot = np.concatenate([r, to_global(p, wpd)], axis=-1).reshape(7, 6)
+    rows = np.hstack([np.arange(7.0)[:, None], y, v_dot, np.zeros((7, 4))])
+    result = result_of(scene, rows, model, "unconstrained")
+    np.testing.assert_allclose(result.w, to_global(p, wp), atol=1e-15)
+    np.testing.assert_allclose(result.wp, wp, atol=1e-14)
+    np.testing.assert_allclose(result.wpd, wpd, atol=1e-14)
+    assert not np.allclose(result.w, wp)
+
+
+def test_points_move_as_on_a_circle_and_those_of_the_ground_stand():
+    result, out, ahead = circling()
+    P = result.subject.point_index
+    assert result.rP.shape == result.rPd.shape == result.rPdd.shape == (21, 3, 3)
+    far = ARM + 0.1
+    np.testing.assert_allclose(result.rP[:, P["P"]], PIVOT + far * out, atol=1e-14)
+    np.testing.assert_allclose(result.rPd[:, P["P"]], RATE * far * ahead, atol=1e-14)
+    np.testing.assert_allclose(result.rPdd[:, P["P"]], -(RATE**2) * far * out, atol=1e-14)
+    for name in ("Q", "H"):
+        np.testing.assert_allclose(result.rP[:, P[name]] - PIVOT, 0, atol=1e-15)
+        np.testing.assert_allclose(result.rPd[:, P[name]], 0, atol=1e-14)
+        np.testing.assert_allclose(result.rPdd[:, P[name]], 0, atol=1e-14)
+
+
+def test_velocity_and_acceleration_of_a_point_are_derivatives_of_its_position():
+    nt, h = 3, 1e-4
+    scene = Scene(name="derivatives")
+    scene.add_body("top", mass=1.0, Jp=[1.0, 1.0, 1.0])
+    scene.add_point("P", body="top", sPp=[0.3, -0.5, 0.7])
+    model = model_of(scene)
+    t = h * np.arange(-1, nt - 1)
+    # A rotation about z by 2 t + t^2 while the mass centre runs along a parabola.
+    angle, rate = 2 * t + t**2, 2 + 2 * t
+    r = np.stack([t, t**2, 3 * t], axis=1)[:, None]
+    v = np.stack([1 + 0 * t, 2 * t, 3 + 0 * t], axis=1)[:, None]
+    w = np.stack([0 * t, 0 * t, rate], axis=1)[:, None]
+    v_dot = np.tile([0.0, 2.0, 0.0, 0.0, 0.0, 2.0], (nt, 1))
+    rows = rows_of(model, t, join(r, about_z(angle), v, w), v_dot, np.zeros((nt, 0)))
+    result = result_of(scene, rows, model, "unconstrained")
+    rP = result.rP[:, 0]
+    # Central differences: truncation h^2 |r'''| / 6 about 1e-8; rounding of the second 1e-16 / h^2.
+    np.testing.assert_allclose((rP[2] - rP[0]) / (2 * h), result.rPd[1, 0], atol=1e-7)
+    second = (rP[2] - 2 * rP[1] + rP[0]) / h**2
+    np.testing.assert_allclose(second, result.rPdd[1, 0], atol=1e-6)
+
+
+def test_stored_arrays_cannot_be_changed_by_accident():
+    result, _, _ = circling()
+    for array in (result.t, result.u, result.r, result.Lam, result.v_dot, result.work):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+
+
+def test_rows_of_another_width_are_refused():
+    with pytest.raises(ValueError, match=r"\(nt, 28\), not \(5, 4\)"):
+        result_of(circling_scene(), np.zeros((5, 4)))
+
+
+# ---------------------------------------------------------------------------- joints
+
+
+def test_reaction_is_the_centripetal_force_and_its_opposite_on_the_ground():
+    result, out, _ = circling()
+    reaction = result.reaction("J1")
+    assert list(reaction) == ["i", "j"]
+    assert (reaction["i"].body, reaction["j"].body) == ("bob", "ground")
+    force = -MASS * RATE**2 * ARM * out
+    np.testing.assert_allclose(reaction["i"].force, force, atol=1e-13)
+    np.testing.assert_allclose(reaction["i"].moment, 0, atol=1e-13)  # it passes the mass centre
+    np.testing.assert_allclose(reaction["j"].force, -force, atol=1e-13)
+    np.testing.assert_allclose(reaction["j"].moment, np.cross(PIVOT, -force), atol=1e-13)
+
+
+def test_the_reported_multipliers_give_that_reaction():
+    """The solver finds the multipliers of the closed form."""
+    result, _, _ = circling()
+    machine = Machine(result.model, "standard")
+    for k in (0, 7, 20):
+        found = machine.report(result.t[k], result.u[k])
+        np.testing.assert_allclose(found[:6], result.v_dot[k], atol=1e-12)
+        np.testing.assert_allclose(found[6:9], result.Lam[k], atol=1e-12)
+
+
+def test_jacobian_has_a_row_for_each_constraint_and_vanishes_on_the_motion():
+    result, _, _ = circling()
+    assert result.Jac.shape == (21, 3, 6)
+    assert result.Jac is result.Jac
+    v = result.u[:, 7:]
+    np.testing.assert_allclose(np.einsum("trc,tc->tr", result.Jac, v), 0, atol=1e-14)
+    np.testing.assert_allclose(result.Jac[0, :, :3], -np.eye(3), atol=0)
+
+
+def test_jacobian_of_many_rows_is_sparse(monkeypatch):
+    monkeypatch.setattr("dap3d_core.result.reactions.DENSE_ROWS", 2)
+    result, _, _ = circling(nt=4)
+    dense, _, _ = circling(nt=4)
+    monkeypatch.setattr("dap3d_core.result.reactions.DENSE_ROWS", 3)
+    expected = dense.Jac
+    monkeypatch.setattr("dap3d_core.result.reactions.DENSE_ROWS", 2)
+    assert len(result.Jac) == 4
+    for found, D in zip(result.Jac, expected, strict=True):
+        assert found.shape == (3, 6)
+        np.testing.assert_array_equal(found.toarray(), D)
+
+
+@pytest.fixture(scope="module", params=["pen2", "fourbar2", "fourbar3"])
+def thrown(request):
+    """A shipped model at its start, its velocities thrown at random: no constraint level holds."""
+    scene = load(request.param)
+    model = model_of(scene)
+    machine = Machine(model, "standard")
+    rng = np.random.default_rng(11)
+    u = np.tile(model.u0, (3, 1))
+    u[:, 7 * model.body_count :] += rng.normal(size=(3, 6 * model.body_count))
+    t = np.array([0.0, 0.3, 0.7])
+    report = np.array([machine.report(*each) for each in zip(t, u, strict=True)])
+    y = to_integrated(u, model.body_count)
+    result = result_of(scene, np.hstack([t[:, None], y, report]), model)
+    return result, machine
+
+
+def test_every_joint_acts_on_its_bodies_as_they_act_on_it(thrown):
+    """Forces of a joint cancel, and their moments about the origin, ground taken into account."""
+    result, _ = thrown
+    place = result.subject.body_index
+    for name in result.subject.joint_names:
+        total, moment, size = 0.0, 0.0, 0.0
+        for one in result.reaction(name).values():
+            r = result.r[:, place[one.body]] if one.body in place else np.zeros((3, 3))
+            total = total + one.force
+            moment = moment + one.moment + np.cross(r, one.force)
+            size = max(size, np.abs(one.force).max(), np.abs(one.moment).max())
+        assert size > 0
+        np.testing.assert_allclose(total, 0, atol=1e-12 * size, err_msg=name)
+        np.testing.assert_allclose(moment, 0, atol=1e-11 * size, err_msg=name)
+
+
+def test_reactions_are_what_the_jacobian_transposed_gives(thrown):
+    """Two ways to D^T lambda: block by block, and through the assembled Jacobian."""
+    result, _ = thrown
+    n = result.subject.body_count
+    total = np.zeros((3, n, 6))
+    for name in result.subject.joint_names:
+        for one in result.reaction(name).values():
+            if one.body != "ground":
+                k = result.subject.body_index[one.body]
+                total[:, k] += np.concatenate([one.force, one.moment], axis=1)
+    expected = np.einsum("trc,tr->tc", result.Jac, result.Lam).reshape(3, n, 6)
+    np.testing.assert_allclose(total, expected, atol=1e-12 * np.abs(expected).max())
+
+
+def test_reactions_leave_the_machine_as_it_was(thrown):
+    result, machine = thrown
+    before = machine.report(result.t[0], result.u[0])
+    result.reaction(result.subject.joint_names[-1])
+    np.testing.assert_array_equal(machine.report(result.t[0], result.u[0]), before)
+
+
+def test_an_unknown_joint_is_answered_with_the_nearest():
+    result, _, _ = circling()
+    with pytest.raises(UnknownNameError, match=r"no joint 'j1'.*did you mean 'J1'") as caught:
+        result.reaction("j1")
+    assert caught.value.nearest == "J1"
+    assert isinstance(caught.value, KeyError)
+    with pytest.raises(UnknownNameError, match="the scene has no joint"):
+        drifting().reaction("J1")
+
+
+def test_the_machine_is_made_once_and_only_when_needed():
+    result, _, _ = circling()
+    made = []
+    origin = result._make_origin
+
+    def counted():
+        made.append(1)
+        return origin()
+
+    result._make_origin = counted
+    _ = result.rP, result.energy, result.ledger, result.quantity("bob.r.z")
+    assert made == []
+    _ = result.Jac, result.reaction("J1"), result.model
+    assert made == [1]
+
+
+# ---------------------------------------------------------------------------- what the run says
+
+
+def test_what_the_run_says_of_itself():
+    stats = Statistics(steps=7, rejected=1, rhs=90, projections=8, wall_time_s=0.5)
+    result, _, _ = circling(
+        status="interrupted", notes=["one", "two"], stats=stats, versions={"dap3d": "9"}
+    )
+    assert result.status == "interrupted"
+    assert result.notes == ["one", "two"]
+    assert result.stats.rhs == 90
+    assert result.stats.compile_time_s == 0.0
+    assert result.method == "standard"
+    assert result.integrator == "dop853"
+    assert result.settings["rtol"] == 1e-8
+    assert result.versions == {"dap3d": "9"}
+    assert result.record.title == "circling"
+    assert result.scene_text == circling_scene().to_toml()
+    assert repr(result) == (
+        "<Result 'circling': interrupted, 1 bodies, 3 rows, 21 instants, t = 0 ... 1.7 s>"
+    )
+    with pytest.raises(ValueError, match="status"):
+        circling(status="ready")
+
+
+def test_a_result_travels_between_processes_without_its_model():
+    result, _, _ = circling()
+    _ = result.reaction("J1"), result.subject.body_index
+    found = pickle.loads(pickle.dumps(result))
+    np.testing.assert_array_equal(found.u, result.u)
+    np.testing.assert_array_equal(found.rP, result.rP)
+    assert found.record == result.record
+    assert found.ledger == result.ledger
+    assert not found.u.flags.writeable
+    with pytest.raises(ResultError, match="save the result and open the file"):
+        found.reaction("J1")
+
+
+def test_versions_name_what_the_numbers_depend_on():
+    versions = circling()[0].versions
+    assert set(versions) == {"dap3d", "numpy", "numba", "python"}
+    assert versions["numpy"] == np.__version__
+
+
+def test_importing_results_brings_in_no_compiler_and_no_plots():
+    code = (
+        "import dap3d_core.result, sys, json; print(json.dumps([m for m in"
+        " ('numba', 'scipy', 'matplotlib', 'netCDF4', 'xarray', 'pandas') if m in sys.modules]))"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert json.loads(out.stdout) == []

@@ -1,0 +1,147 @@
+"""Quantities by name: each is the array it names, and a wrong name is answered with a right one."""
+
+import numpy as np
+import pytest
+from unit.test_result import ARM, MASS, RATE, circling, model_of, result_of
+
+from dap3d_core.result import UnknownNameError, find
+from dap3d_core.scene import Scene
+
+
+@pytest.fixture(scope="module")
+def result():
+    return circling()[0]
+
+
+def test_vectors_of_a_body_with_label_and_unit(result):
+    for name, unit in {
+        "r": "m", "rd": "m/s", "rdd": "m/s^2", "w": "rad/s", "wp": "rad/s", "wd": "rad/s^2",
+        "wpd": "rad/s^2", "p": "1",
+    }.items():  # fmt: skip
+        values, label, found = result.quantity(f"bob.{name}")
+        np.testing.assert_array_equal(values, getattr(result, name)[:, 0])
+        assert found == unit
+        assert "of bob" in label
+
+
+def test_components_and_length(result):
+    r = result.r[:, 0]
+    for k, axis in enumerate("xyz"):
+        np.testing.assert_array_equal(result.quantity(f"bob.r.{axis}").values, r[:, k])
+    np.testing.assert_allclose(result.quantity("bob.rd.norm").values, RATE * ARM, rtol=1e-14)
+    assert result.quantity("bob.r.z").label == "position of bob, z"
+    for k in range(4):
+        np.testing.assert_array_equal(result.quantity(f"bob.p.e{k}").values, result.p[:, 0, k])
+
+
+def test_points(result):
+    P = result.subject.point_index["P"]
+    for name, array in {"r": result.rP, "v": result.rPd, "a": result.rPdd}.items():
+        np.testing.assert_array_equal(result.quantity(f"P.{name}").values, array[:, P])
+    assert result.quantity("P.a.norm").unit == "m/s^2"
+
+
+def test_animation_points_have_a_dot_in_their_names():
+    scene = Scene(name="drawn")
+    scene.add_body("b", mass=1.0, Jp=[1, 1, 1])
+    scene.animation.points.append(type_of_point(scene)(body="b", sPp=[1.0, 2.0, 3.0]))
+    model = model_of(scene)
+    rows = np.zeros((1, 1 + 14 + 6 + 4))
+    rows[0, 4] = 1.0  # e0
+    result = result_of(scene, rows, model, "unconstrained")
+    np.testing.assert_array_equal(result.quantity("animation.1.r").values, [[1, 2, 3]])
+    np.testing.assert_array_equal(result.quantity("animation.1.r.y").values, [2])
+    with pytest.raises(UnknownNameError, match=r"did you mean 'animation\.1\.r'"):
+        result.quantity("animation.2.r")
+
+
+def type_of_point(scene):
+    from dap3d_core.scene import AnimationPoint
+
+    return AnimationPoint
+
+
+def test_reactions_are_those_on_the_first_body(result):
+    values, label, unit = result.quantity("J1.force")
+    np.testing.assert_array_equal(values, result.reaction("J1")["i"].force)
+    assert (label, unit) == ("reaction force of J1", "N")
+    norm = result.quantity("J1.force.norm").values
+    np.testing.assert_allclose(norm, MASS * RATE**2 * ARM, rtol=1e-13)
+    assert result.quantity("J1.moment.x").unit == "N m"
+
+
+def test_multipliers_by_row_from_one(result):
+    np.testing.assert_array_equal(result.quantity("J1.lambda").values, result.Lam)
+    np.testing.assert_array_equal(result.quantity("J1.lambda.2").values, result.Lam[:, 1])
+    assert find(result, "J1.lambda").components == ("1", "2", "3")
+
+
+def test_quantities_of_the_whole(result):
+    for name, array in {
+        "t": result.t,
+        "work": result.work,
+        "energy.kinetic": result.energy.kinetic,
+        "energy.potential": result.energy.potential,
+        "energy.total": result.energy.total,
+        "constraint.position": result.arrays.position_residual,
+        "constraint.velocity": result.arrays.velocity_residual,
+        "constraint.acceleration": result.arrays.acceleration_residual,
+    }.items():
+        np.testing.assert_array_equal(result.quantity(name).values, array)
+    assert result.quantity("work").unit == "J"
+
+
+def test_a_name_that_a_body_and_a_point_share_means_the_body_where_it_can():
+    scene = Scene(name="twins")
+    scene.add_body("b", mass=1.0, Jp=[1, 1, 1])
+    scene.add_point("b", body="b", sPp=[1.0, 0.0, 0.0])
+    rows = np.zeros((1, 25))
+    rows[0, 4] = 1.0
+    result = result_of(scene, rows, model_of(scene), "unconstrained")
+    np.testing.assert_array_equal(result.quantity("b.r").values, [[0, 0, 0]])
+    assert result.quantity("b.v").label == "velocity of b"  # only the point has v
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ("bbo.r.z", "bob.r.z"),
+        ("Bob.w", "bob.w"),
+        ("bob.R", "bob.r"),
+        ("bob.rdx.z", "bob.rd.z"),
+        ("bob.r.Z", "bob.r.z"),
+        ("bob.p.e", "bob.p.e0"),
+        ("J1.forces.norm", "J1.force.norm"),
+        ("j1.force.x", "J1.force.x"),
+        ("J1.lambda.4", "J1.lambda"),
+        ("energy.kinetik", "energy.kinetic"),
+        ("constraint.positions", "constraint.position"),
+        ("wrok", "work"),
+    ],
+)
+def test_the_nearest_right_name(result, wrong, right):
+    with pytest.raises(UnknownNameError) as caught:
+        result.quantity(wrong)
+    near = caught.value.nearest
+    assert near.startswith(right[: -1 if right.endswith("e0") else None])
+    result.quantity(near)  # what is proposed exists
+    assert repr(near) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ("bob", "which quantity of the body 'bob': r, p, rd, w, wp, rdd, wd, wpd"),
+        ("bob.q", "the body 'bob' has r, p, rd, w, wp, rdd, wd, wpd, not 'q'"),
+        ("bob.r.x.y", "bob.r has x, y, z, norm, not 'x.y'"),
+        ("bob.p.norm", "bob.p has e0, e1, e2, e3, not 'norm'"),
+        ("P.w", "the point 'P' has r, v, a, not 'w'"),
+        ("zzz.r", "no body, point or joint 'zzz'; body: bob; point: Q, H, P; joint: J1"),
+        ("", "no quantity ''; there are BODY.r"),
+        (".", "no body, point or joint ''"),
+    ],
+)
+def test_what_is_wrong_with_a_name(result, wrong, words):
+    with pytest.raises(UnknownNameError) as caught:
+        result.quantity(wrong)
+    assert words in str(caught.value)

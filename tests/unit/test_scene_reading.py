@@ -1,0 +1,186 @@
+"""Reading a scene: what is found under a name, and one clear error for every file that is none."""
+
+import os
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+import dap3d_core.scene.reading as reading
+from dap3d_core.scene import SceneError, load, shipped_models
+
+TEXT = '[scene]\nname = "small"\n\n[bodies.a]\nmass = 1.0\nJp = [1.0, 1.0, 1.0]\n'
+
+
+def refused(source):
+    with pytest.raises(SceneError) as caught:
+        load(source)
+    assert len(caught.value.mistakes) == 1
+    return str(caught.value)
+
+
+def test_a_folder_and_a_file_are_read(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(TEXT)
+    for source in (tmp_path, str(tmp_path), file, str(file), os.fsencode(file)):
+        scene = load(source)
+        assert scene.name == "small"
+        assert (scene.path, scene.folder) == (file, tmp_path)
+
+
+@pytest.mark.parametrize("name", ["a b.toml", 'it\'s "q".toml', "-o.toml", "a\nb.toml", "ü.txt"])
+def test_odd_file_names_are_read(tmp_path, monkeypatch, name):
+    (tmp_path / name).write_text(TEXT)
+    monkeypatch.chdir(tmp_path)
+    assert load(name).name == "small"
+
+
+def test_shipped_models_are_read_by_name(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    models = shipped_models()
+    assert models, "there are some"
+    for name, folder in models.items():
+        assert load(name).path == folder / "scene.toml"
+
+
+def test_a_folder_of_the_users_own_goes_before_a_shipped_model_and_says_so(monkeypatch, tmp_path):
+    name = next(iter(shipped_models()))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).mkdir()
+    assert load(name).name != "small", "a folder without a scene is not meant"
+    (tmp_path / name / "scene.toml").write_text(TEXT)
+    scene = load(name)
+    assert scene.name == "small"
+    assert "also the name of a shipped model" in scene.notes[0]
+
+
+def test_a_missing_model_names_the_nearest():
+    name = max(shipped_models(), key=len)
+    said = refused(name[:-1])
+    assert "there is no file or folder" in said
+    assert f"did you mean {name!r}" in said or any(
+        f"did you mean {n!r}" in said for n in shipped_models()
+    )
+    assert ", ".join(shipped_models()) in said
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("", "empty"),
+        ("https://example.com/scene.toml", "a URL cannot be loaded"),
+        ("x" * 300, "too long"),
+        ("a\0b", "there is no file"),
+        ("no/such/file.toml", "there is no file"),
+        (3, "by name or path"),
+        (None, "by name or path"),
+        ("/dev/null", "not a regular file"),
+        ("/dev/zero", "not a regular file"),
+    ],
+)
+def test_what_is_no_scene_is_refused(source, words):
+    assert words in refused(source)
+
+
+def test_a_folder_without_a_scene_names_what_it_holds(tmp_path):
+    assert "no scene.toml" in refused(tmp_path)
+    (tmp_path / "four.toml").write_text(TEXT)
+    assert "it holds four.toml" in refused(tmp_path)
+    (tmp_path / "scene.toml").mkdir()
+    assert "not a regular file" in refused(tmp_path)
+
+
+def test_a_path_through_a_file_is_refused(tmp_path):
+    (tmp_path / "file").write_text(TEXT)
+    assert "there is no file" in refused(tmp_path / "file" / "scene.toml")
+
+
+def test_a_pipe_is_refused_and_does_not_hang(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    assert "not a regular file" in refused(tmp_path / "pipe")
+
+
+def test_a_file_that_may_not_be_read_is_refused(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(TEXT)
+    file.chmod(0)
+    if os.access(file, os.R_OK):
+        pytest.skip("this user may read everything")
+    assert "Permission denied" in refused(file)
+
+
+def test_a_loop_of_links_is_refused(tmp_path):
+    (tmp_path / "a.toml").symlink_to(tmp_path / "a.toml")
+    assert "cannot be read" in refused(tmp_path / "a.toml")
+
+
+def test_a_huge_file_is_refused_before_it_is_read(tmp_path):
+    file = tmp_path / "scene.toml"
+    with file.open("wb") as f:
+        f.truncate(2**30)
+    assert "1024 MiB; at most 64 MiB" in refused(file)
+
+
+BAD_CONTENT = {
+    "image": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", ["NUL bytes"]),
+    "NUL": (TEXT.encode() + b"x = '\0'", ["NUL bytes"]),
+    "UTF-16": (TEXT.encode("utf-16"), ["NUL bytes"]),
+    "latin-1": (TEXT.encode() + "# ü".encode("latin-1"), [":7:", "0xfc", "UTF-8"]),
+    "truncated list": (TEXT.encode()[:-6], [":6:", "not valid TOML"]),
+    "truncated text": (b'[scene]\nname = "sm', ["not valid TOML", "end of the file"]),
+    "key twice": (TEXT.encode() + b"mass = 2.0\n", [":7:", "line 7, column 11"]),
+    "table twice": (TEXT.encode() + b"[bodies.a]\n", [":7:", "line 7, column"]),
+    "no value": (b"[scene]\nname =\n", [":2:", "line 2, column 7"]),
+    "word": (b"[scene]\nname = small\n", [":2:", "column 8"]),
+    "deep": (b"x = " + b"[" * 100_000, ["nested too deeply"]),
+    "long integer": (b"x = " + b"9" * 10_000, ["not valid TOML"]),
+    "old line ends": (TEXT.replace("\n", "\r").encode(), ["not valid TOML"]),
+    "program": (b"function inBodies\nsystem('rm -rf /tmp/x')\n", [":1:", "not valid TOML"]),
+}
+
+
+@pytest.mark.parametrize(("content", "words"), BAD_CONTENT.values(), ids=BAD_CONTENT)
+def test_a_file_that_is_not_toml_is_refused_with_its_place(tmp_path, content, words):
+    file = tmp_path / "scene.toml"
+    file.write_bytes(content)
+    said = refused(file)
+    for word in [str(file), *words]:
+        assert word in said
+
+
+def test_a_matlab_file_names_the_importer(tmp_path):
+    file = tmp_path / "inBodies.m"
+    file.write_text("B1 = Body_struct;\nsystem('true');\n")
+    assert "import-matlab" in refused(file)
+
+
+def test_a_byte_order_mark_and_mixed_line_ends_are_read(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n", 3).encode())
+    assert load(file).bodies["a"].mass == 1.0
+
+
+def test_loading_runs_no_code(tmp_path):
+    (tmp_path / "scene.toml").write_text(TEXT)
+    (tmp_path / "plugin.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w')\n")
+    load(tmp_path)
+    assert not (tmp_path / "run").exists()
+
+
+def test_loading_imports_nothing_heavy():
+    code = """
+    import sys
+    from dap3d_core.scene import Scene, check, load, shipped_models
+    for name in shipped_models():
+        load(name).to_toml()
+    print([m for m in ["numpy", "scipy", "numba", "matplotlib", "tomlkit"] if m in sys.modules])
+    """
+    answer = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True
+    )
+    assert answer.stdout.strip() == "[]"
+
+
+def test_the_size_limit_is_64_mib():
+    assert reading.LARGEST_FILE == 64 * 1024 * 1024

@@ -1,0 +1,28 @@
+"""Settings that a script or a command line gives are held to the same rules as those of a file."""
+
+import attrs
+import pytest
+
+from dap3d_core.scene import Scene, SceneError, Simulation, check_simulation, mistake_at
+
+
+def test_the_defaults_are_good():
+    check_simulation(Simulation(), ())
+    check_simulation(Simulation(t_end=0.0, dt=0.1), ("a",))
+
+
+def test_mistakes_carry_the_names_of_the_settings():
+    settings = attrs.evolve(Simulation(), t_end=-1.0, rtol=0, method="fast", hold=("b",))
+    with pytest.raises(SceneError) as caught:
+        check_simulation(settings, ("a",))
+    assert [m.key for m in caught.value.mistakes] == ["t_end", "method", "rtol", "hold.1"]
+
+
+def test_a_mistake_of_a_higher_floor_finds_its_line(tmp_path):
+    from dap3d_core.scene import load
+
+    file = tmp_path / "scene.toml"
+    file.write_text('[bodies.a]\n\n[joints.J1]\ntype = "sph"\n')
+    mistake = mistake_at(load(file), ("joints", "J1"), "cannot be assembled", "move it")
+    assert str(mistake) == f"{file}:3: joints.J1: cannot be assembled\n    move it"
+    assert mistake_at(Scene(), ("joints", "J1"), "bad").line is None
