@@ -35,16 +35,15 @@ def dop853_on_a_chain():
 
     reference = run(1e-14).r[-1]
     rows = []
-    for rtol in (1e-5, 1e-7, 1e-9, 1e-10, 1e-11):
+    for rtol in (1e-5, 1e-7, 5e-8, 1e-9, 1e-11):
         times = []
         for _ in range(7):
             start = time.perf_counter()
             result = run(rtol)
             times.append(time.perf_counter() - start)
         error = float(np.max(np.linalg.norm(result.r[-1] - reference, axis=1)))
-        integration = result.stats.integration_time_s if hasattr(result.stats, "integration_time_s") else None
         rows.append({"rtol": rtol, "error_m": error, "ms": 1e3 * statistics.median(times), "steps": result.stats.steps,
-                     "rhs": result.stats.rhs, "integration_ms": integration and 1e3 * integration})  # fmt: skip
+                     "rhs": result.stats.rhs})  # fmt: skip
     return rows
 
 

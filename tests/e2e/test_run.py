@@ -13,8 +13,17 @@ def test_run_writes_a_result_and_says_what_was_done(dap3d):
     done = dap3d("run", "pen1", "--t-end", "0.1")
     assert done.returncode == 0, done.stderr
     assert dap.open(dap3d.folder / "pen1.nc").t[-1] == 0.1
-    for words in ("1 body", "1 joint (3 rows)", "3 degrees of freedom", "standard", "dop853",
-                  "right-hand side", "energy", "pen1.nc written", "dap3d plot pen1.nc"):  # fmt: skip
+    for words in (
+        "1 body",
+        "1 joint (3 rows)",
+        "3 degrees of freedom",
+        "standard",
+        "dop853",
+        "right-hand side",
+        "energy",
+        "pen1.nc written",
+        "dap3d plot pen1.nc",
+    ):
         assert words in done.stdout
     assert "\x1b" not in done.stdout + done.stderr  # nobody looks at a terminal
 
@@ -142,7 +151,7 @@ def test_mistakes_of_a_scene_are_all_told_with_place_and_remedy(dap3d, scene_fil
     assert as_json.returncode == 2
     found = json.loads(as_json.stdout)
     assert found["exit_code"] == 2
-    assert [(m["line"], m["nearest"]) for m in found["mistakes"]][0] == (5, "mass")
+    assert (found["mistakes"][0]["line"], found["mistakes"][0]["nearest"]) == (5, "mass")
 
 
 def test_a_missing_point_and_a_missing_file(dap3d, scene_file):
@@ -157,7 +166,7 @@ def test_a_missing_point_and_a_missing_file(dap3d, scene_file):
 
 
 def test_file_names_of_any_kind(dap3d, scene_file):
-    for name in ("it's a \"stone\".toml", "-dash.toml", "päper\nclip.toml"):
+    for name in ('it\'s a "stone".toml', "-dash.toml", "päper\nclip.toml"):
         scene_file(name=name)
         done = dap3d("run", "--", name)
         assert done.returncode == 0, done.stderr

@@ -4,7 +4,7 @@ The integrated state y has the order of u, with the angular velocity in body axe
 on the system (docs/decisions/0002). It reads r, p of all bodies; v, w' of all bodies; work.
 """
 
-from dap3d_core.kernels.cache import compiled
+from dap3d_core.kernels.cache import compiled, compiled_inside
 
 
 @compiled
@@ -44,14 +44,14 @@ def call_loops(first, last, t, body, F, idx, par, groups, loops, out1, out2, out
         loop(t, body, F, idx, par, groups[q, 0], groups[q, 1], groups[q, 2], out1, out2, out3)
 
 
-@compiled
+@compiled_inside
 def zero(values):
     """Fill with zeros (a slice assignment would compile numpy's error messages)."""
     for k in range(values.shape[0]):
         values[k] = 0.0
 
 
-@compiled
+@compiled_inside
 def scale_forces(body, metric, force):
     """Power of the applied forces; then ``force`` becomes the right-hand side of the bodies in scaled coordinates.
 
@@ -76,7 +76,7 @@ def scale_forces(body, metric, force):
     return power
 
 
-@compiled
+@compiled_inside
 def scale_velocities(body, metric, force):
     """The velocities of the bodies in scaled coordinates, into ``force``: (sqrt(m) v, L^T w')."""
     for b in range(1, body.shape[0]):
@@ -90,7 +90,7 @@ def scale_velocities(body, metric, force):
         force[o + 3], force[o + 4], force[o + 5] = (w0 - k[2] * z1 - k[3] * z2) / k[1], z1, z2
 
 
-@compiled
+@compiled_inside
 def rates(y, metric, force, out):
     """dy/dt of coordinates from y and of velocities from the scaled accelerations in ``force``."""
     n = metric.shape[0] - 1
@@ -110,7 +110,7 @@ def rates(y, metric, force, out):
         out[f + 5] = k[6] * a2
 
 
-@compiled
+@compiled_inside
 def global_accelerations(metric, force, out):
     """v_dot (6 n: r_ddot, omega_dot in global axes) from the scaled accelerations: omega_dot = B a."""
     for b in range(1, metric.shape[0]):
@@ -121,7 +121,7 @@ def global_accelerations(metric, force, out):
             out[o - 3 + c] = k[7 + 3 * c] * a0 + k[8 + 3 * c] * a1 + k[9 + 3 * c] * a2
 
 
-@compiled
+@compiled_inside
 def largest(values):
     """Largest magnitude; NaN where one is NaN."""
     found = 0.0

@@ -1,5 +1,22 @@
 """The command line: each command calls the library and shows what it says."""
 
-from dap3d_core.cli.group import dap3d, main
+from collections.abc import Sequence
 
-__all__ = ["dap3d", "main"]
+__all__ = ["main"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Args:
+        argv: the words after ``dap3d``; by default those of the process.
+    """
+    import sys
+
+    try:  # Ctrl-C may come before anything is loaded
+        from dap3d_core.cli.group import run_line
+
+        return run_line(argv)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from dap3d_core.cli import exits
+from dap3d_core.cli.signals import Stopping
 from dap3d_core.cli.streams import leave_stdout, print_anything
 
 
@@ -40,7 +41,9 @@ class Command(click.Command):
         debug = ctx.params.pop("debug") or bool(ctx.find_root().params.get("debug"))
         ctx.meta["dap3d.debug"] = debug
         try:
-            return super().invoke(ctx)
+            with Stopping() as stopping:
+                ctx.meta["dap3d.stopping"] = stopping
+                return super().invoke(ctx)
         except (click.ClickException, click.exceptions.Exit):
             raise
         except (Exception, KeyboardInterrupt) as error:
@@ -92,12 +95,8 @@ def dap3d(debug: bool) -> None:
     """
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code.
-
-    Args:
-        argv: the words after ``dap3d``; by default those of the process.
-    """
+def run_line(argv: Sequence[str] | None) -> int:
+    """Run the words of a command line, by default those of the process; returns the exit code."""
     print_anything()
     try:
         code = dap3d.main(
@@ -107,9 +106,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except click.ClickException as error:
         _tell_usage(error)
         return error.exit_code
-    except (click.Abort, KeyboardInterrupt):
-        print("interrupted", file=sys.stderr)
-        return exits.INTERRUPTED
     except BrokenPipeError:  # the reader has seen enough
         leave_stdout()
         return exits.DONE

@@ -12,6 +12,7 @@ from dap3d_core.cli.group import Command
 
 if TYPE_CHECKING:
     from dap3d_core.cli.outcome import Outcome
+    from dap3d_core.cli.signals import Stopping
     from dap3d_core.scene import Scene
 
 #: Settings of a run that the command line overrides, with the options that do.
@@ -97,7 +98,12 @@ def run(
     target = writable(_target(model, output), force=force, sources=(scene.path,))
     _check_settings(scene, given)
     outcome = _simulate(
-        scene, given, allow_code=allow_code, quiet=quiet, debug=ctx.meta["dap3d.debug"]
+        scene,
+        given,
+        allow_code=allow_code,
+        quiet=quiet,
+        debug=ctx.meta["dap3d.debug"],
+        stopping=ctx.meta["dap3d.stopping"],
     )
     try:
         outcome.result.save(target, force=force)
@@ -154,15 +160,20 @@ def _check_settings(scene: "Scene", given: dict[str, Any]) -> None:
 
 
 def _simulate(
-    scene: "Scene", given: dict[str, Any], *, allow_code: bool, quiet: bool, debug: bool
+    scene: "Scene",
+    given: dict[str, Any],
+    *,
+    allow_code: bool,
+    quiet: bool,
+    debug: bool,
+    stopping: "Stopping",
 ) -> "Outcome":
     """Compile and simulate; a run that ends early gives what it computed."""
     import dap3d_core as dap
     from dap3d_core.cli.outcome import Outcome
     from dap3d_core.cli.progress import RunProgress
-    from dap3d_core.cli.signals import Stopping
 
-    with Stopping() as stopping, RunProgress(quiet=quiet) as progress:
+    with RunProgress(quiet=quiet) as progress:
 
         def on_progress(t: float, t_end: float) -> None:
             progress.advance(t, t_end)

@@ -10,11 +10,11 @@ _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 class Stopping:
-    """While it lasts, signals end a run in an orderly way.
+    """While it lasts, signals end a command in an orderly way.
 
-    Before the run has begun a signal raises at once. After the first ``between_chunks`` it waits
-    for the next one, so that no chunk is lost; a second signal no longer waits. Raises
-    KeyboardInterrupt for Ctrl-C, ``Terminated`` for others.
+    A signal raises at once: KeyboardInterrupt for Ctrl-C, ``Terminated`` for others. From the first
+    ``between_chunks`` on it waits for the next one, so that no chunk of a run is lost; a second
+    signal no longer waits.
     """
 
     def __init__(self) -> None:
@@ -41,6 +41,9 @@ class Stopping:
     ) -> None:
         for number, before in self._before.items():
             signal.signal(number, before)
+        # Packages that are imported catch everything, and stumble later over what is missing.
+        if self._asked is not None and not self._patient and isinstance(error, Exception):
+            raise _exception(self._asked) from error
 
     def between_chunks(self) -> None:
         """Raise what a signal asked for meanwhile; from now on signals wait for this call."""
@@ -50,9 +53,9 @@ class Stopping:
             raise _exception(asked)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        if self._patient and self._asked is None:
-            self._asked = number
-        else:
+        waits = self._patient and self._asked is None
+        self._asked = number
+        if not waits:
             raise _exception(number)
 
 

@@ -1,6 +1,7 @@
 """A model made ready to be evaluated: plan, arrays, group loops and a formulation, and the Python door to them."""
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import attrs
@@ -75,7 +76,7 @@ class Machine:
         self.system: System = build_system(model, self.plan, self.what)
         self.report_size = 6 * model.body_count + model.row_count + 4
 
-    @property
+    @cached_property
     def functions(self) -> Any:
         """The compiled functions (rhs, project, report) as the list that an integrator takes."""
         return functions_of(self.method)
@@ -140,7 +141,7 @@ class Machine:
             out1, out2, out3,
         )  # fmt: skip
 
-    @property
+    @cached_property
     def _pattern(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
         """Row, column and place in D of the Jacobian's entries."""
         s = self.system

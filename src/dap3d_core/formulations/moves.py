@@ -1,9 +1,9 @@
 """Changes of a state: displacements and changes of velocity given in the bodies' scaled coordinates."""
 
-from dap3d_core.kernels.cache import compiled
+from dap3d_core.kernels.cache import compiled_inside
 
 
-@compiled
+@compiled_inside
 def normalise(y, n):
     """Bring the Euler parameters of n bodies to unit length."""
     for b in range(n):
@@ -13,7 +13,7 @@ def normalise(y, n):
             y[d] *= h
 
 
-@compiled
+@compiled_inside
 def move(y, metric, force):
     """Add a scaled displacement to the coordinates: r += dr, p += 1/2 L^T dtheta', of unit length again."""
     for b in range(1, metric.shape[0]):
@@ -32,7 +32,7 @@ def move(y, metric, force):
     normalise(y, metric.shape[0] - 1)
 
 
-@compiled
+@compiled_inside
 def change_velocity(y, metric, force):
     """Add a scaled change of velocity to the velocities."""
     n = metric.shape[0] - 1
@@ -46,7 +46,7 @@ def change_velocity(y, metric, force):
         y[f + 5] += k[6] * a2
 
 
-@compiled
+@compiled_inside
 def size_of(y, first, count, period, part):
     """1 + the largest magnitude among the first ``part`` numbers of each ``period``: the scale of a tolerance."""
     found = 0.0

@@ -18,7 +18,7 @@ from dap3d_core.assembly.evaluate import (
 )
 from dap3d_core.assembly.system import ACCELERATION, ENERGY, POSITION, VALUE, WRENCH
 from dap3d_core.formulations.moves import change_velocity, move, normalise, size_of
-from dap3d_core.kernels.cache import compiled
+from dap3d_core.kernels.cache import compiled, compiled_inside
 from dap3d_core.linear.blocks import (
     add_product,
     assemble,
@@ -50,7 +50,7 @@ def linearise(t, system, loops, refactor):
     return factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
 
 
-@compiled
+@compiled_inside
 def accelerate(t, y, system, loops):
     """Scaled accelerations into ``force`` and -lambda into ``x``; returns the power of forces and drivers."""
     body, metric, force, kinds, x = system.body, system.metric, system.force, system.kinds, system.x
@@ -76,7 +76,7 @@ def rhs(t, y, out, system, loops):
     out[out.shape[0] - 1] = power
 
 
-@compiled
+@compiled_inside
 def residuals(t, system, loops):
     """Position-level residuals into C (zero where a row has none); returns the largest magnitude."""
     kinds, C = system.kinds, system.C
@@ -86,7 +86,7 @@ def residuals(t, system, loops):
     return largest(C)
 
 
-@compiled
+@compiled_inside
 def velocity_residuals(system):
     """D v - nu into C, with D^ as it stands; returns the largest magnitude."""
     C = system.C

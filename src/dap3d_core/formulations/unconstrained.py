@@ -10,10 +10,10 @@ from dap3d_core.assembly.evaluate import (
 )
 from dap3d_core.assembly.system import ENERGY, VALUE, WRENCH
 from dap3d_core.formulations.moves import normalise
-from dap3d_core.kernels.cache import compiled
+from dap3d_core.kernels.cache import compiled, compiled_inside
 
 
-@compiled
+@compiled_inside
 def accelerate(t, y, system, loops):
     """Scaled accelerations into ``force``; returns the power of the forces."""
     body, metric, force, kinds = system.body, system.metric, system.force, system.kinds

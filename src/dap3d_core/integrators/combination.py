@@ -5,12 +5,12 @@ and writes its result a few times only; the terms come from ``method.combination
 """
 
 from dap3d_core.integrators.method import GROUP, GROUPS, TERMS, Floats
-from dap3d_core.kernels.cache import compiled
+from dap3d_core.kernels.cache import compiled_inside
 
 _LARGEST = 1.7976931348623157e308
 
 
-@compiled
+@compiled_inside
 def combine(
     out: Floats, share: float, y: Floats, h: float, table: Floats, row: int, k: Floats
 ) -> None:
@@ -30,7 +30,7 @@ def combine(
         out[i] = share * y[i] + h * out[i]
 
 
-@compiled
+@compiled_inside
 def all_finite(x: Floats) -> bool:
     """Whether no component is infinite or not a number."""
     bad = 0
@@ -39,7 +39,7 @@ def all_finite(x: Floats) -> bool:
     return bad == 0
 
 
-@compiled
+@compiled_inside
 def scaled_largest(x: Floats, y0: Floats, y1: Floats, size: int, rtol: float, atol: float) -> float:
     """``max_i |x_i| / (atol + rtol max(|y0_i|, |y1_i|))`` over the first ``size`` components; NaN where one is NaN."""
     largest = 0.0
@@ -51,7 +51,7 @@ def scaled_largest(x: Floats, y0: Floats, y1: Floats, size: int, rtol: float, at
     return largest
 
 
-@compiled
+@compiled_inside
 def interpolate(out: Floats, terms: Floats, theta: float) -> None:
     """Dense output at ``t + theta h`` out of its terms r (rows):
 

@@ -43,7 +43,7 @@ from dap3d_core.integrators.work import (
     T,
     Y,
 )
-from dap3d_core.kernels.cache import compiled
+from dap3d_core.kernels.cache import compiled_inside
 
 #: A step is never shorter than this part of the time or of the whole span, sixteen roundings.
 FLOOR = 16.0 * 2.220446049250313e-16
@@ -53,7 +53,7 @@ SAFETY = 0.9
 STRETCH = 1.01
 
 
-@compiled
+@compiled_inside
 def first_step(
     real: Floats,
     integer: Integers,
@@ -89,13 +89,13 @@ def first_step(
     return max(min(100.0 * h, h1, t_end - t), floor)
 
 
-@compiled
+@compiled_inside
 def step_floor(real: Floats, times: Floats) -> float:
     """The shortest step at t."""
     return FLOOR * max(abs(real[T]), times[-1] - times[0])
 
 
-@compiled
+@compiled_inside
 def end_of_step(real: Floats, integer: Integers, times: Floats) -> float:
     """The time at which the step that comes next ends."""
     t, t_end, fixed = real[T], times[-1], real[STEP]
@@ -114,7 +114,7 @@ def end_of_step(real: Floats, integer: Integers, times: Floats) -> float:
     return start + (target - start) * (done / integer[GAP_STEPS])
 
 
-@compiled
+@compiled_inside
 def error_norm(
     real: Floats, integer: Integers, state: Floats, k: Floats, table: Floats, h: float
 ) -> float:
@@ -139,7 +139,7 @@ def error_norm(
     return main * main / math.sqrt(total)
 
 
-@compiled
+@compiled_inside
 def accept(
     real: Floats,
     integer: Integers,
@@ -168,7 +168,7 @@ def accept(
     real[H] = max(h * factor, step_floor(real, times))
 
 
-@compiled
+@compiled_inside
 def reject(
     real: Floats, integer: Integers, times: Floats, t1: float, shorter: float, cause: int
 ) -> None:

@@ -122,6 +122,13 @@ class Integration:
             table=combinations(method),
         )
 
+    def compile(self) -> None:
+        """Compile what ``advance`` needs, or load it, without doing a step."""
+        status = int(self.work.integer[at.STATUS])
+        self.work.integer[at.STATUS] = Status.FINISHED
+        advance(self.work, *self._arguments, 0)
+        self.work.integer[at.STATUS] = status
+
     def advance(self, budget: int) -> Status:
         """Go on until more than ``budget`` calls of rhs are spent, the buffer is full, or the end.
 

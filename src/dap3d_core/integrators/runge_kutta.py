@@ -65,7 +65,7 @@ from dap3d_core.integrators.work import (
     Y,
 )
 from dap3d_core.kernels.borrow import borrow
-from dap3d_core.kernels.cache import compiled
+from dap3d_core.kernels.cache import compiled, compiled_inside
 
 #: Factor on a step that met a number that is not finite, or whose end could not be projected.
 RETREAT = 0.1
@@ -97,7 +97,7 @@ def advance(
             step(work, rhs, project, system, loops)
 
 
-@compiled
+@compiled_inside
 def report_reached(
     work: Work, project: Function, report: Function, system: Any, loops: Any
 ) -> bool:
@@ -134,7 +134,7 @@ def report_reached(
     return True
 
 
-@compiled
+@compiled_inside
 def project_state(
     real: Floats,
     integer: Integers,
@@ -159,7 +159,7 @@ def project_state(
     return RUNNING
 
 
-@compiled
+@compiled_inside
 def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) -> None:
     """Try one step: accept it, reject it, or stop the run."""
     real, integer, times, k = work.real, work.integer, work.times, work.k
@@ -203,7 +203,7 @@ def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) 
         reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)
 
 
-@compiled
+@compiled_inside
 def is_poor(real: Floats, integer: Integers, times: Floats, t1: float) -> bool:
     """Whether a step should end elsewhere: project found the state close to a singular one.
 
@@ -213,7 +213,7 @@ def is_poor(real: Floats, integer: Integers, times: Floats, t1: float) -> bool:
     return real[OUTCOME + 1] == POOR_PLACE and integer[POOR] < ATTEMPTS and t1 < times[-1]
 
 
-@compiled
+@compiled_inside
 def land(work: Work, t1: float, rhs: Function, project: Function, system: Any, loops: Any) -> int:
     """Prepare dense output, project the trial state, evaluate f; why that failed, or RUNNING.
 
@@ -247,7 +247,7 @@ def land(work: Work, t1: float, rhs: Function, project: Function, system: Any, l
     return RUNNING
 
 
-@compiled
+@compiled_inside
 def prepare_dense(
     real: Floats,
     integer: Integers,

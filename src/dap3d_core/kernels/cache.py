@@ -78,20 +78,38 @@ def _driver_digest(floor: str) -> str:
 
 def compiled(function):
     """Compile a function of the core when it is first called, and keep the code for the next process."""
+    return compiled_in(cache_folder(), _driver_folder(function), function)
+
+
+def compiled_inside(function):
+    """The same for a function that compiled code alone calls: it compiles faster, for it has no door to Python.
+
+    Called from Python it would crash the process.
+    """
+    options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return compiled_in(cache_folder(), _driver_folder(function), function, **options)
+
+
+def driver_is_cached(floor: str) -> bool:
+    """Whether compiled code of a floor of the core is there from an earlier process."""
+    folder = cache_folder()
+    return folder is not None and any((folder / f"{floor}-{_driver_digest(floor)}").glob("*/*.nbc"))
+
+
+def _driver_folder(function) -> str:
     floor = function.__module__.split(".")[1]
-    return compiled_in(cache_folder(), f"{floor}-{_driver_digest(floor)}", function)
+    return f"{floor}-{_driver_digest(floor)}"
 
 
-def compiled_in(folder: Path | None, name: str, function, signature=None):
+def compiled_in(folder: Path | None, name: str, function, **options):
     """Compile with the cache in ``folder/name``; without a folder the code lives as long as the process."""
     if not jit_is_on():
         return function
-    arguments = () if signature is None else (signature,)
     if folder is None:
-        return njit(*arguments, **OPTIONS)(function)
+        return njit(**OPTIONS, **options)(function)
     before, config.CACHE_DIR = config.CACHE_DIR, str(folder / name)
     try:
-        return njit(*arguments, cache=True, **OPTIONS)(function)
+        return njit(cache=True, **OPTIONS, **options)(function)
     finally:
         config.CACHE_DIR = before
 

@@ -11,7 +11,7 @@ K holds the blocks that remain, by columns of the lower triangle. Each node's pi
 
 import numpy as np
 
-from dap3d_core.kernels.cache import compiled
+from dap3d_core.kernels.cache import compiled, compiled_inside
 from dap3d_core.linear.plan import COPY, DIAGONAL, IDENTITY, PRODUCTS, TRANSPOSE
 
 
@@ -123,7 +123,7 @@ def factor(nodes, columns, updates, K, smallest, drop):
     return counted
 
 
-@compiled
+@compiled_inside
 def solve(nodes, columns, K, x):
     """Solve K z = x in place, with the factors of K."""
     count = nodes.shape[0] - 1
@@ -158,7 +158,7 @@ def solve(nodes, columns, K, x):
             x[f + c] = s * K[d + c * m + c]
 
 
-@compiled
+@compiled_inside
 def solve_saddle(blocks, hubs, nodes, columns, D, K, x, g):
     """Solve [I D^^T; D^ 0] (a; -lambda) = (g; x): g becomes a, and the rows of x become -lambda.
 
@@ -189,7 +189,7 @@ def solve_saddle(blocks, hubs, nodes, columns, D, K, x, g):
             g[6 * hubs[q, 0] + c] = x[hubs[q, 1] + c]
 
 
-@compiled
+@compiled_inside
 def add_product(blocks, D, g, residual):
     """residual += D^ a, with a in scaled coordinates (6 (n+1),)."""
     for q in range(blocks.shape[0]):

@@ -25,12 +25,18 @@ def rotation(p: ArrayLike) -> Floats:
 
 def to_body(p: ArrayLike, vector: ArrayLike) -> Floats:
     """Body components (..., 3) of global vectors (..., 3): A^T a."""
-    return np.einsum("...rc,...r->...c", rotation(p), vector)
+    return _apply(np.swapaxes(rotation(p), -1, -2), vector)
 
 
 def to_global(p: ArrayLike, vector: ArrayLike) -> Floats:
     """Global components (..., 3) of vectors given on the body (..., 3): A a."""
-    return np.einsum("...rc,...c->...r", rotation(p), vector)
+    return _apply(rotation(p), vector)
+
+
+def _apply(A: Floats, vector: ArrayLike) -> Floats:
+    """A a for each pair, written out: the same bits whether one vector is turned or many."""
+    a = np.asarray(vector, dtype=float)
+    return A[..., 0] * a[..., None, 0] + A[..., 1] * a[..., None, 1] + A[..., 2] * a[..., None, 2]
 
 
 def split(u: ArrayLike, n: int) -> tuple[Floats, Floats, Floats, Floats]:

@@ -3,12 +3,14 @@
 import os
 import time
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dap3d_core.formulations.machine import Machine
+from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.linear.rank import Rank
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.registry import Registry, load_registry
@@ -50,9 +52,17 @@ class CompiledModel:
         self.model: Model = _modelled(self.checked)
         self.method, self.reason = choose_method(self.model, method or str(self.scene.simulation.method))
         self.machine = Machine(self.model, self.method, announce)
+        if announce is not None and not driver_is_cached("formulations"):
+            announce(f"the solver ({self.method})")
+        _ = self.machine.functions  # compiled here, and not on the clock of the first run
         self.notes: list[str] = list(self.checked.notes)
         self._redundancy: Redundancy | None = None
         self.compile_time = time.perf_counter() - started
+
+    @cached_property
+    def scene_text(self) -> str:
+        """The scene as the text of a scene file, for the record of its results."""
+        return self.scene.to_toml()
 
     def rhs(self, t: float, u: ArrayLike) -> Floats:
         """du/dt (13 n,) at time t in s and state u (13 n,): r_dot, p_dot of each body, then r_ddot, omega_dot.

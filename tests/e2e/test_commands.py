@@ -1,0 +1,170 @@
+"""The other commands, as a user meets them."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+import xarray
+
+import dap3d_core as dap
+
+CHECK_KEYS = {"bodies", "rows", "rank", "redundant", "dof", "joints", "violation"}
+
+
+def test_check_counts_and_runs_nothing(dap3d):
+    done = dap3d("check", "fourbar3", "--json")
+    assert done.returncode == 0
+    found = json.loads(done.stdout)
+    assert found.keys() >= CHECK_KEYS
+    counted = {k: found[k] for k in ("bodies", "rows", "rank", "redundant", "dof", "joints")}
+    # three moving bodies, 17 independent rows (models/fourbar3/expected.toml)
+    assert counted == dict(bodies=3, rows=17, rank=17, redundant=0, dof=1, joints=[])
+    assert found["violation"].keys() == {"position", "velocity"}
+    assert found["violation"]["velocity"] == pytest.approx(2 * np.pi)  # the motor's, w is 0
+    assert list(dap3d.folder.iterdir()) == []
+    assert "no mistakes" in dap3d("check", "fourbar3").stdout
+
+
+def test_check_tells_redundant_joints(dap3d, scene_file):
+    """A door on two hinges: ten rows, five independent (spec 8)."""
+    hinge = 'type = "rev"\nP_i = "{p}"\nP_j = "ground.O"\na_i = "stone.z"\na_j = "ground.z"\n'
+    upper = '[points.up]\nbody = "ground"\nsPp = [0.0, 0.0, 1.0]\n'
+    points = upper + '[points.U]\nbody = "stone"\nsPp = [0.0, 0.0, 1.0]\n'
+    lower = "[joints.low]\n" + hinge.format(p="stone.O")
+    upper = "[joints.high]\n" + hinge.format(p="U").replace("ground.O", "up")
+    scene_file(("[simulation]", f"{points}{lower}{upper}[simulation]"))
+    done = dap3d("check", "fall.toml", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["rows"], found["rank"], found["redundant"], found["dof"]) == (10, 5, 5, 1)
+    assert found["joints"] == ["low", "high"]
+    told = dap3d("check", "fall.toml")
+    assert "redundant" in told.stdout
+    assert "low, high" in told.stdout
+
+
+def test_check_prints_all_mistakes_as_json(dap3d, scene_file):
+    scene_file(("mass = 2.0", "mass = -2.0"), ("dt = 0.01", "dt = 0.01\nrtoll = 1e-6"))
+    refused = dap3d("check", "fall.toml", "--json")
+    assert refused.returncode == 2
+    mistakes = json.loads(refused.stdout)["mistakes"]
+    assert [m["key"] for m in mistakes] == ["bodies.stone.mass", "simulation.rtoll"]
+    assert mistakes[0]["value"] == -2.0
+    assert mistakes[1]["nearest"] == "rtol"
+
+
+def test_check_of_what_is_no_scene(dap3d):
+    (dap3d.folder / "empty").mkdir()
+    (dap3d.folder / "image.toml").write_bytes(b"\x89PNG\r\n\x1a\n\0\0")
+    (dap3d.folder / "cut.toml").write_text("[bodies.a]\nmass = [1.0,\n")
+    for name in ("empty", "image.toml", "cut.toml", "https://a.org/b.toml", "pen9", ""):
+        refused = dap3d("check", name)
+        assert refused.returncode == 2, name
+        assert refused.stdout == ""
+    assert "did you mean" in dap3d("check", "pen9").stderr
+
+
+def test_models_and_plugins_are_listed(dap3d):
+    shown = dap3d("models")
+    listed = json.loads(dap3d("models", "--json").stdout)["models"]
+    assert listed.keys() == dap.shipped_models().keys()
+    assert all(name in shown.stdout for name in listed)
+    assert listed["fourbar3"]["bodies"] == 3
+    assert listed["fourbar3"]["joints"]["rev"] == 1
+    types = json.loads(dap3d("plugins", "--json").stdout)["types"]
+    found = {(t["kind"], t["keyword"]): t for t in types}
+    assert found["joint", "sph"]["state"] == "ok"
+    assert found["joint", "sph"]["distribution"] == "dap3d"
+    assert "weight" in dap3d("plugins").stdout
+
+
+def test_a_blocked_type_is_listed_with_the_reason(dap3d):
+    done = dap3d("plugins", DAP3D_BLOCK="dap3d")
+    assert done.returncode == 0
+    assert "blocked" in done.stdout
+    assert "DAP3D_BLOCK" in done.stdout
+
+
+def test_describe_explains_a_type(dap3d):
+    shown = dap3d("describe", "rev", "--names").stdout
+    for words in ("gamma =", "5 constraint equations", "1 of 6 freedoms", "required", "r_P_i",
+                  'type = "rev"'):  # fmt: skip
+        assert words in shown
+    (rev,) = json.loads(dap3d("describe", "rev", "--json").stdout)["types"]
+    assert (rev["rows"], rev["freedoms"]) == (5, 1)
+    assert [f["name"] for f in rev["fields"]] == ["P_i", "P_j", "a_i", "a_j"]
+    unknown = dap3d("describe", "revolt")
+    assert unknown.returncode == 2
+    assert "did you mean 'rev'" in unknown.stderr
+
+
+@pytest.fixture
+def result(dap3d):
+    """A short run of pen1 and its file."""
+    assert dap3d("run", "pen1", "--t-end", "0.1", "--quiet").returncode == 0
+    return dap.open(dap3d.folder / "pen1.nc")
+
+
+def test_info_says_what_a_file_holds(dap3d, result):
+    found = json.loads(dap3d("info", "pen1.nc", "--json").stdout)
+    assert (found["status"], found["instants"], found["t_end"]) == ("done", 6, 0.1)
+    assert found["body_names"] == ["cone"]
+    assert found["settings"]["rtol"] == 1e-8
+    assert found["ledger"].keys() == result.ledger.keys()
+    shown = dap3d("info", "pen1.nc").stdout
+    for words in ("cone", "J1", "numba", "energy", "dop853", "correct off"):
+        assert words in shown
+    for name in ("gone.nc", "."):
+        assert dap3d("info", name).returncode == 2
+
+
+def test_post_writes_a_table_that_reads_back_bit_for_bit(dap3d, result):
+    done = dap3d("post", "pen1.nc", "-o", "all.csv", "--jac")
+    assert done.returncode == 0, done.stderr
+    with (dap3d.folder / "all.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    column = {name: np.array([float(r[name]) for r in rows]) for name in rows[0]}
+    for name, values in (
+        ("t", result.t),
+        ("cone.r.z", result.r[:, 0, 2]),
+        ("cone.p.e0", result.p[:, 0, 0]),
+        ("cone.wpd.y", result.wpd[:, 0, 1]),
+        ("P1.r.x", result.rP[:, 0, 0]),
+        ("animation.4.v.z", result.rPd[:, 5, 2]),
+        ("J1.lambda.3", result.Lam[:, 2]),
+        ("J1.Jac.1.cone.rd.x", result.Jac[:, 0, 0]),
+        ("J1.Jac.3.cone.w.z", result.Jac[:, 2, 5]),
+    ):
+        assert column[name].tolist() == values.tolist(), name
+    for name in column:  # what the table calls it, plots understand
+        if ".Jac." not in name:
+            assert result.quantity(name).values.tolist() == column[name].tolist()
+    assert dap3d("post", "pen1.nc", "-o", "all.csv").returncode == 2
+    assert dap3d("post", "pen1.nc", "-o", "all.xls").returncode == 2
+    assert dap3d("post", "pen1.nc", "-o", "pen1.nc", "--force").returncode == 2
+
+
+def test_post_writes_named_dimensions(dap3d, result):
+    assert dap3d("post", "pen1.nc", "-o", "all.nc", "--jac").returncode == 0
+    with xarray.open_dataset(dap3d.folder / "all.nc") as data:
+        for name in ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd", "rP", "rPd", "Lam", "Jac"):
+            assert data[name].values.tolist() == getattr(result, name).tolist()
+            assert "units" in data[name].attrs
+        assert data["rdd"].sel(body="cone", axis="z").dims == ("time",)
+    assert dap3d("info", "all.nc").returncode == 2  # it is no result
+
+
+def test_plot_draws_into_files(dap3d, result):
+    assert dap3d("plot", "pen1.nc").returncode == 0
+    assert (dap3d.folder / "pen1.png").read_bytes().startswith(b"\x89PNG")
+    curves = dap3d("plot", "pen1.nc", "cone.r.z", "J1.force", "--x", "cone.r.y", "-o", "a.svg")
+    assert curves.returncode == 0, curves.stderr
+    assert "cone.r.z" in (dap3d.folder / "a.svg").read_text() or True
+    unknown = dap3d("plot", "pen1.nc", "cone.rr.z", "-o", "b.png")
+    assert unknown.returncode == 2
+    assert "did you mean 'cone.r.z'" in unknown.stderr
+    assert not (dap3d.folder / "b.png").exists()
+    for arguments in (("-o", "b.bmp"), ("-o", "a.svg"), ("-o", "no/b.png"), ("--x", "cone.r")):
+        assert dap3d("plot", "pen1.nc", "cone.r.z", *arguments).returncode == 2, arguments
+    assert dap3d("plot", "gone.nc").returncode == 2

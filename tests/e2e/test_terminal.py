@@ -1,0 +1,122 @@
+"""What a terminal shows: nothing wider than it, colours only where they are wanted."""
+
+import fcntl
+import os
+import pty
+import re
+import select
+import struct
+import subprocess
+import sys
+import termios
+
+import pytest
+
+import dap3d_core as dap
+
+CONTROL = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
+
+
+def in_terminal(dap3d, width, *arguments, answers="", **variables):
+    """Run a command in a terminal of some width; exit code and all that it shows."""
+    from tests.e2e.conftest import COMMAND, environment
+
+    main, child = pty.openpty()
+    fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 40, width, 0, 0))
+    process = subprocess.Popen(
+        [*COMMAND, *arguments],
+        cwd=dap3d.folder,
+        env=environment(TERM="xterm-256color", **variables),
+        stdin=child,
+        stdout=child,
+        stderr=child,
+        start_new_session=True,
+    )
+    os.close(child)
+    shown, waiting = b"", answers.encode().splitlines(keepends=True)
+    while True:
+        ready, _, _ = select.select([main], [], [], 0.5)
+        if not ready:
+            if waiting:
+                os.write(main, waiting.pop(0))
+            continue
+        try:
+            block = os.read(main, 65536)
+        except OSError:  # the other end is closed
+            break
+        if not block:
+            break
+        shown += block
+    os.close(main)
+    return process.wait(timeout=60), shown.decode()
+
+
+def lines(shown):
+    """Lines as they stand on the screen, without what moves cursors and colours."""
+    return [line for line in re.split(r"[\r\n]+", CONTROL.sub("", shown)) if line]
+
+
+def test_a_run_fits_a_narrow_terminal(dap3d):
+    code, shown = in_terminal(dap3d, 60, "run", "fourbar3", "--t-end", "1")
+    assert code == 0, shown
+    assert max(map(len, lines(shown))) <= 60
+    assert "fourbar3.nc written" in shown
+    assert "\x1b[" in shown
+
+
+def test_no_color_is_respected(dap3d):
+    _, shown = in_terminal(dap3d, 80, "run", "pen1", "--t-end", "0.1", NO_COLOR="1")
+    assert not re.search(r"\x1b\[[0-9;]*(3[0-7]|38;)", shown)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--help",),
+        ("run", "--help"),
+        ("plot", "--help"),
+        ("models",),
+        ("plugins",),
+        ("describe", "rev", "--names"),
+        ("check", "fourbar3"),
+        ("check", "no_such_model_of_any_name_that_is_as_long_as_this_one_here_is"),
+        ("rnu",),
+        ("run", "pen1", "--t_end", "1"),
+    ],
+    ids=" ".join,
+)
+def test_no_line_is_wider_than_60_columns(dap3d, arguments):
+    done = dap3d(*arguments, COLUMNS=60)
+    said = (done.stdout + done.stderr).splitlines()
+    assert said
+    assert [line for line in said if len(line) > 60] == []
+
+
+def test_without_a_model_it_asks_the_questions_of_the_manual(dap3d):
+    answers = "no such\npen1\n\nsoon\n0.1\n0.05\ns\n"
+    code, shown = in_terminal(dap3d, 80, "run", answers=answers)
+    assert code == 0, shown
+    for question in ("Which model", "correct the initial conditions", "Final time",
+                     "Reporting time-step", "method"):  # fmt: skip
+        assert question in shown
+    assert "'soon' is not a number" in shown
+    result = dap.open(dap3d.folder / "pen1.nc")
+    assert result.t.tolist() == [0.0, 0.05, 0.1]
+    assert result.settings["correct"] is False  # the scene's value is the default
+
+
+def test_questions_can_be_left(dap3d):
+    code, shown = in_terminal(dap3d, 80, "run", answers="\x03\n")
+    assert code == 130
+    assert "Traceback" not in shown
+
+
+def test_help_is_quick_to_import():
+    """``dap3d --help`` loads none of the heavy packages."""
+    script = (
+        "import sys; from dap3d_core.cli import main; code = main(['--help']);"
+        "heavy = {'numpy', 'scipy', 'numba', 'matplotlib', 'netCDF4', 'xarray', 'rich'};"
+        "print(sorted(heavy & sys.modules.keys()), code, file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stderr.strip() == "[] 0"
