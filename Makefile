@@ -6,6 +6,9 @@ MODEL ?= fourbar3
 QUANTITY_fourbar3 := follower.r.y
 QUANTITY ?= $(or $(QUANTITY_$(notdir $(MODEL))),energy.total)
 
+# More for `dap3d run`, such as FLAGS=--allow-code for a model with types of its own.
+FLAGS ?=
+
 # Runs are named after the model, also where MODEL is a path. Recipes quote what may hold a space.
 RUN := runs/$(basename $(notdir $(MODEL)))
 
@@ -28,7 +31,7 @@ help:  ## show this list
 
 run: $(VENV)/.installed  ## simulate MODEL (fourbar3), write runs/MODEL.nc and a picture of it
 	@mkdir -p runs
-	@$(VENV)/bin/dap3d run "$(MODEL)" -o "$(RUN).nc" --force
+	@$(VENV)/bin/dap3d run "$(MODEL)" -o "$(RUN).nc" --force $(FLAGS)
 	@$(VENV)/bin/dap3d plot "$(RUN).nc" "$(QUANTITY)" -o "$(RUN).png" --force
 
 install: $(VENV)/.installed  ## put dap3d into .venv, editable (what run, test and lint do themselves)

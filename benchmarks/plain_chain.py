@@ -1,7 +1,8 @@
-"""A chain of n bodies with spherical joints, written out by hand for this one mechanism: the mark for the framework.
+"""A chain of n bodies with spherical joints, written out by hand for this mechanism alone.
 
-No plugins, no gather, no lists of functions: body update, rows, D M^-1 D^T (block tridiagonal), its Cholesky factors and
-the solution, with loops over constant extents. It knows that the chain is a chain; the framework has to find out.
+The mark for the framework. No plugins, no gather, no lists of functions: body update, rows,
+D M^-1 D^T (block tridiagonal), its Cholesky factors and the solution, with loops over constant
+extents. It knows that the chain is a chain; the framework has to find out.
 """
 
 import numpy as np
@@ -30,7 +31,7 @@ def rhs(u, du, n, mass, J, A, w, f, s, D, S, x, gravity):
         for c in range(3):
             f[b, c] = mass[b] * gravity[c]
             f[b, 3 + c] = a[c, 0] * g0 + a[c, 1] * g1 + a[c, 2] * g2
-            # columns of A scaled by 1/sqrt(J): their products are the inverse inertia in global axes
+            # columns of A by 1/sqrt(J): their products are the inverse inertia in global axes
             for d in range(3):
                 du[7 * b + d] = 0.0
     for j in range(n):  # joint j: body j (its inner end) to body j - 1 (its outer end)
@@ -165,7 +166,7 @@ def repeat(count, u, du, n, mass, J, A, w, f, s, D, S, x, gravity):
 
 
 def chain(n):
-    """State and arguments of a horizontal chain of n rods, 1 m and 1 kg each, from ground along +x."""
+    """State and arguments of a horizontal chain of n rods, 1 m and 1 kg, from ground along +x."""
     u = np.zeros(13 * n)
     for b in range(n):
         u[7 * b], u[7 * b + 3], u[7 * n + 6 * b + 3] = b + 0.5, 1.0, 0.1

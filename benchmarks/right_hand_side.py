@@ -1,4 +1,7 @@
-"""What one right-hand side costs: chains of spherical and revolute joints, a star, against a chain written by hand."""
+"""What one right-hand side costs, on chains of spherical and revolute joints and on a star.
+
+The mark is a chain written by hand.
+"""
 
 import importlib.util
 
@@ -44,7 +47,10 @@ def plain(n):
 
 
 def prototype(path, n):
-    """The same for another program with ``build(n)`` and ``rk4(u, h, steps, args)``, four right-hand sides a step."""
+    """The same for another program with ``build(n)`` and ``rk4(u, h, steps, args)``.
+
+    It takes four right-hand sides a step.
+    """
     spec = importlib.util.spec_from_file_location("prototype", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -1,4 +1,7 @@
-"""All benchmarks, as tables and as JSON: ``make bench``, or ``python benchmarks/run.py [--only NAME] [-o FILE]``."""
+"""All benchmarks, as tables and as JSON.
+
+``make bench``, or ``python benchmarks/run.py [--only NAME] [-o FILE]``.
+"""
 
 import argparse
 import json

@@ -40,7 +40,10 @@ def star(arms):
 
 
 def planar_chain(n):
-    """n uniform rods, 1 m and 1 kg, planar, from rest along +x, gravity along -y: the chains with known digits."""
+    """n uniform rods, 1 m and 1 kg, planar, from rest along +x, gravity along -y.
+
+    These are the chains with known digits.
+    """
     scene = dap.Scene(name=f"planar chain of {n}")
     outer = "ground.O"
     for k in range(n):

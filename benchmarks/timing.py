@@ -5,7 +5,10 @@ import time
 
 
 def median_seconds(functions, repeats=7):
-    """Median seconds of each function, called in turn (A B A B ...), so that drift of the machine hits all alike."""
+    """Median seconds of each function.
+
+    They are called in turn (A B A B ...), so that drift of the machine hits all alike.
+    """
     found = [[] for _ in functions]
     for function in functions:
         function()

@@ -14,7 +14,8 @@ import scenes
 import dap3d_core as dap
 from dap3d_core.simulation import CompiledModel
 
-#: Measured in a fresh process: seconds to build the scene, to compile it, for one right-hand side; peak memory.
+#: Measured in a fresh process: seconds to build the scene, to compile it, for one right-hand side;
+#: peak memory.
 LARGE = """
 import sys, time, resource; sys.path.insert(0, {folder!r})
 import scenes
@@ -27,7 +28,7 @@ print(built - start, done - built, resource.getrusage(resource.RUSAGE_SELF).ru_m
 
 
 def dop853_on_a_chain():
-    """Chain of 8 spherical joints for 1 s: error of the end's position, and seconds, for a ladder of tolerances."""
+    """Chain of 8 spherical joints for 1 s: error of the end and time, by tolerance."""
     compiled = CompiledModel(scenes.chain(8))
 
     def run(rtol):

@@ -7,9 +7,9 @@ interface_version = 1
 
 
 class PointToPoint(Force):
-    """A spring, a damper and an actuator in parallel on the line from P_i to P_j (manual: ``ptp``; spec 6).
+    """Spring, damper and actuator, in parallel, on the line from P_i to P_j (manual: ``ptp``).
 
-    With l = |d|, u = d / l and l_dot = u . d_dot, tension positive:
+    Spec 6. With l = |d|, u = d / l and l_dot = u . d_dot, tension positive:
 
         F = k (l - l0) + c l_dot + f_a,  force F u at P_i on body i and -F u at P_j on body j
         energy = k (l - l0)^2 / 2 + f_a l

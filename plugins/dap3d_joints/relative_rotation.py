@@ -9,9 +9,9 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 class RelativeRotation(Joint):
-    """The angular velocity of body j relative to body i along a_j is f_dot(t) (manual: ``rel-rot``; spec 4.7).
+    """The rate of rotation of body j against body i along a_j is f_dot(t) (manual: ``rel-rot``).
 
-    One row, of the velocity level alone; without a function it locks the relative rotation:
+    Spec 4.7. One row, of the velocity level alone; without a function it locks the rotation:
 
         J v   = a_j . (w_j - w_i) = f_dot = nu
         J_i   = [0, -a_j^T],  J_j = [0, a_j^T]

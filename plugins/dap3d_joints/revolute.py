@@ -9,16 +9,17 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 class Revolute(Joint):
-    """Point P_i stays on P_j and axis a_i along a_j; one rotation is left free (manual: ``rev``; spec 3.1, 3.2, 4.2).
+    """Point P_i stays on P_j and axis a_i along a_j; one rotation is left free (manual: ``rev``).
 
-    n_j and m_j complete a_j to a triad on body j. Rows 1 to 3 are those of the spherical joint; rows 4 and 5, for
-    b = n_j and b = m_j, keep the axes parallel:
+    Spec 3.1, 3.2, 4.2. n_j and m_j complete a_j to a triad on body j. Rows 1 to 3 are those of the
+    spherical joint; rows 4 and 5, for b = n_j and b = m_j, keep the axes parallel:
 
         C     = a_i . b
         J_i   = [0, (a_i x b)^T],  J_j = [0, -(a_i x b)^T]
         gamma = (a_i_dot x b + a_i x b_dot) . (w_j - w_i)
 
-    The manual writes a_j for a_i in rows 4 and 5, the same on the constraint manifold only; these are exact.
+    The manual writes a_j for a_i in rows 4 and 5, the same on the constraint manifold only; these
+    are exact everywhere.
     """
 
     keyword, rows = "rev", 5

@@ -4,7 +4,8 @@
     result = dap.simulate(dap.load("pen1"), t_end=2.0)
     result.r, result.reaction("J1")["i"].force, result.ledger["energy"]
 
-Every public name is here; each is imported when it is first used, so that importing the package costs nothing.
+Every public name is here; each is imported when it is first used, so that importing the package
+costs nothing.
 """
 
 from importlib import import_module

@@ -1,8 +1,9 @@
 """The contract of every registered type (spec 2), along random motions off the constraint manifold.
 
-The tests run over the registry: a new type is covered without a new test. Tolerances: sixth-order differences with
-h = 1e-2 of functions whose seventh derivatives are of order 1e3 leave about 1e3 h^6 / 140 = 1e-11 of truncation and
-eps / h = 1e-13 of rounding; 1e-8 of the largest term is asked for.
+The tests run over the registry: a new type is covered without a new test. Tolerances: sixth-order
+differences with h = 1e-2 of functions whose seventh derivatives are of order 1e3 leave about
+1e3 h^6 / 140 = 1e-11 of truncation and eps / h = 1e-13 of rounding; 1e-8 of the largest term is
+asked for.
 """
 
 import numpy as np
@@ -86,14 +87,24 @@ def test_rank_is_the_number_of_rows(keyword, seed):
 @joints
 @seeds
 def test_an_assembled_joint_allows_a_common_rigid_motion(keyword, seed):
-    """D v = 0 for bodies that move together as one (frame indifference), at a pose on the constraints."""
+    """D v = 0 for bodies that move together as one, at a pose on the constraints (frame indifference).
+
+    Rows of the velocity level alone are asked for a common translation only: ``rel-tran`` is the
+    manual's literal equation, which sees a common rotation (spec 4.8).
+    """
+    if len(REGISTRY.get("joint", keyword).layout.slots) == 1:
+        pytest.skip("ties its one body to ground")
     machine = machine_for("joint", keyword, seed)
     u = correct_initial(machine, Motion(3, np.random.default_rng(seed + 400)).u(0.0)).u
     r, p, _, w = split(u, 3)
-    spin, speed = np.array([0.3, -0.7, 0.4]), np.array([1.0, 2.0, -0.5])
-    u = join(r, p, speed + np.cross(spin, r), np.broadcast_to(spin, w.shape))
-    rows = machine.rows(0.0, u)
-    assert close(rows.dense() @ u[-18:], np.zeros(machine.model.row_count), 1e-9)  # |C| <= 1e-10 times the spin
+    speed, nothing = np.array([1.0, 2.0, -0.5]), np.zeros(machine.model.row_count)
+    together = join(r, p, np.broadcast_to(speed, r.shape), np.zeros_like(w))
+    assert close(machine.rows(0.0, together).dense() @ together[-18:], nothing, 1e-12)
+    spin = np.array([0.3, -0.7, 0.4])
+    together = join(r, p, speed + np.cross(spin, r), np.broadcast_to(spin, w.shape))
+    velocity = machine.rows(0.0, together).dense() @ together[-18:]
+    mask = machine.model.position_row
+    assert close(velocity[mask], nothing[mask], 1e-9)  # |C| <= 1e-10 times the spin
 
 
 @forces
@@ -113,7 +124,7 @@ def test_energy_is_the_potential_of_the_wrench(keyword, ground, seed):
 @forces
 @seeds
 def test_forces_between_bodies_balance(keyword, seed):
-    """Force and moment of an element between bodies sum to zero about the origin (action and reaction)."""
+    """Force and moment of an element between bodies sum to zero about the origin."""
     if getattr(REGISTRY.get("force", keyword).type, "each_body", False):
         pytest.skip("acts on each body from outside")
     machine = machine_for("force", keyword, seed)

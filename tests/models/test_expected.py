@@ -1,4 +1,7 @@
-"""Every shipped model gives the numbers of its expected.toml, each within the tolerance stated there (models/README.md)."""
+"""Every shipped model gives the numbers of its expected.toml, each within the tolerance there.
+
+The form of these files: models/README.md.
+"""
 
 import tomllib
 from functools import cache

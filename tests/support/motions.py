@@ -1,4 +1,4 @@
-"""Random smooth motions of bodies, with exact rates: what the contract of a type is tested along."""
+"""Random smooth motions of bodies, with exact rates: the contract of a type is tested along them."""
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -11,7 +11,7 @@ WEIGHTS = np.array([-1, 9, -45, 45, -9, 1]) / 60.0
 
 
 class Motion:
-    """n bodies whose coordinates and Euler parameters are polynomials of time (the latter normalised)."""
+    """n bodies whose coordinates and Euler parameters (normalised) are polynomials of time."""
 
     def __init__(self, n, rng, level=1.0):
         self.n = n

@@ -1,4 +1,4 @@
-"""Reference problems with closed forms or published digits, as scenes made through the public API."""
+"""Reference problems with closed forms or published digits, made through the public API."""
 
 import dap3d_core as dap
 
@@ -6,7 +6,7 @@ ROD = (1e-3, 1 / 12, 1 / 12)  # uniform rod of 1 m and 1 kg along x, made thin b
 
 
 def pendulum():
-    """IFToMM A01: point mass of 1 kg on a massless rod of 1 m, released at rest at (-1, 0), gravity along -y."""
+    """IFToMM A01: 1 kg on a massless rod of 1 m, released at rest at (-1, 0), gravity along -y."""
     scene = dap.Scene(name="A01")
     scene.add_body("bob", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(-1.0, 0.0, 0.0))
     scene.add_joint("sph-sph", "rod", P_i="bob.O", P_j="ground.O", length=1.0)
@@ -15,7 +15,10 @@ def pendulum():
 
 
 def four_bar():
-    """IFToMM A02 with N = 1, made free of redundancy: cranks on revolutes, the coupler on two spherical joints."""
+    """IFToMM A02 with N = 1, made free of redundancy.
+
+    The cranks turn on revolutes, the coupler hangs on two spherical joints.
+    """
     scene = dap.Scene(name="A02")
     for k in range(2):
         scene.add_body(f"crank{k}", Jp=(1 / 12, 1e-3, 1 / 12), mass=1.0, r=(k, 0.5, 0.0), r_dot=(0.5, 0.0, 0.0),
@@ -33,14 +36,17 @@ def four_bar():
 
 
 def free_body(Jp, w, **more):
-    """One body with principal inertias Jp, turning with body components w at the identity pose, no forces."""
+    """One body with principal inertias Jp, body components w of omega, p = identity, no forces."""
     scene = dap.Scene(name="free body")
     scene.add_body("top", mass=1.0, Jp=Jp, w=w, **more)
     return scene
 
 
 def heavy_top(theta, spin, precession):
-    """G4: symmetric heavy top in steady precession; mass centre 0.1 m from the pivot, A = 0.02 about it, C = 0.005."""
+    """G4: symmetric heavy top in steady precession.
+
+    The mass centre is 0.1 m from the pivot; A = 0.02 about the pivot, C = 0.005.
+    """
     import numpy as np
 
     c, s = np.cos(theta), np.sin(theta)
@@ -58,7 +64,7 @@ def heavy_top(theta, spin, precession):
 
 
 def chain(n):
-    """n uniform rods of 1 m and 1 kg, planar, from rest along +x, first end on ground, gravity along -y."""
+    """n uniform rods of 1 m and 1 kg, planar, from rest along +x, on ground, gravity along -y."""
     scene = dap.Scene(name=f"chain of {n}")
     outer = "ground.O"
     for k in range(n):

@@ -1,4 +1,4 @@
-"""Compiled code is kept under a digest of everything it was made from: never stale, never compiled twice."""
+"""Compiled code is kept under a digest of all it was made from: never stale, never made twice."""
 
 import pytest
 from support.process import run, start
@@ -68,7 +68,7 @@ def write_plugin(folder, strength=3.0, offset=0.5):
 
 
 def test_an_edited_helper_gives_the_new_number(tmp_path):
-    """A change in a module that the kernel's helper calls is seen by the next process, and only then compiled anew."""
+    """A change in a helper of the kernel's helper is seen, and only then compiled anew."""
     cache = tmp_path / "cache"
     write_plugin(tmp_path)
     assert run(EVALUATE, cache, cwd=tmp_path) == "6.5 1"

@@ -1,7 +1,7 @@
 """Runs against closed forms and published digits (IFToMM library; benchmark collections).
 
-Each reference is good to about 1e-11. A tolerance is stated with its reason: at rtol 1e-11 the global error of these
-runs is some 10 to 100 times the tolerance over their length.
+Each reference is good to about 1e-11. A tolerance is stated with its reason: at rtol 1e-11 the
+global error of these runs is some 10 to 100 times the tolerance over their length.
 """
 
 import numpy as np
@@ -27,7 +27,7 @@ A01 = {
 @pytest.mark.parametrize("t", A01)
 @pytest.mark.parametrize("integrator", ["dop853", "dopri5"])
 def test_pendulum(t, integrator):
-    """A01: position, velocity and tension against elliptic functions; 4 periods amplify 1e-11 by some 100."""
+    """A01: position, velocity, tension by elliptic functions; 4 periods amplify 1e-11 by some 100."""
     result = last(problems.pendulum(), t, integrator=integrator)
     x, y, vx, vy, tension = A01[t]
     assert result.r[-1, 0, :2] == pytest.approx([x, y], abs=2e-9)
@@ -44,8 +44,9 @@ def test_pendulum_tension_throughout():
 def test_four_bar_through_its_singular_pose():
     """A02, N = 1: e < 1e-6 after 10 s and four crossings of the pose with all links in line.
 
-    rtol 1e-8: close to that pose a rounding of the position changes the acceleration by eps / distance^3, so that a
-    step across cannot be had at 1e-9 and below with the standard formulation.
+    rtol 1e-8: close to that pose a rounding of the position changes the acceleration by
+    eps / distance^3, so that a step across cannot be had at 1e-9 and below with the standard
+    formulation.
     """
     result = last(problems.four_bar(), 10.0, rtol=1e-8, atol=1e-9)
     B, v = 2 * result.r[-1, 0, :2], 2 * result.rd[-1, 0, :2]
@@ -73,7 +74,7 @@ def test_asymmetric_body(t, integrator):
 
 
 def test_flip_of_the_asymmetric_body():
-    """J = 1, 2, 3 turning about the middle axis flips; at rtol 1e-8 the error after 10 s is below 1e-6."""
+    """J = 1, 2, 3 turning about the middle axis flips; at rtol 1e-8 it errs below 1e-6 after 10 s."""
     scene = problems.free_body((1.0, 2.0, 3.0), (0.001, 5.0, 0.001))
     coarse = last(scene, 10.0, rtol=1e-8, atol=1e-10)
     fine = last(scene, 10.0, rtol=1e-13, atol=1e-15)
@@ -84,7 +85,10 @@ def test_flip_of_the_asymmetric_body():
 
 @pytest.mark.parametrize("precession", [0.998260295360957858, 56.7367666236016186], ids=["slow", "fast"])
 def test_heavy_top_precesses_steadily(precession):
-    """G4: lean, spin and precession rate stay those of the closed form for a turn of slow, nine of fast precession."""
+    """G4: lean, spin and precession stay those of the closed form.
+
+    Slow precession makes a turn, fast precession nine.
+    """
     theta, t = np.radians(30.0), 1.0
     result = dap.simulate(problems.heavy_top(theta, 200.0, precession), t_end=t, dt=0.1, **TIGHT)
     heading = precession * result.t
@@ -104,7 +108,7 @@ CHAINS = {
 
 @pytest.mark.parametrize(("n", "t"), CHAINS)
 def test_chain(n, t):
-    """The free end of a falling chain; the digits hold to 1e-11, the run to some 1e-9 of its length."""
+    """The free end of a falling chain; digits good to 1e-11, the run to some 1e-9 of its length."""
     result = last(problems.chain(n), t)
     tip = result.rP[-1, list(result.model.point_names).index(f"out{n - 1}"), :2]
     assert tip == pytest.approx(CHAINS[n, t], abs=1e-9 * n)
@@ -119,7 +123,7 @@ ORDERS = {
 
 @pytest.mark.parametrize(("problem", "integrator"), ORDERS)
 def test_observed_order(problem, integrator):
-    """Fixed steps: the error falls with the step to the power of the method's order, within 0.2 (closed forms).
+    """Fixed steps: the error falls with the step to the method's order, within 0.2 (closed forms).
 
     The steps are those where the leading term rules: errors from 1e-7 to 1e-13.
     """
@@ -139,7 +143,7 @@ def test_observed_order(problem, integrator):
 
 @pytest.mark.slow
 def test_long_run_keeps_energy_and_constraints():
-    """pen1 over 100 s at rtol 1e-10, atol 1e-12, projected: energy drift below 1e-8, |C| below 1e-11 throughout."""
+    """pen1 over 100 s at rtol 1e-10, projected: energy drift below 1e-8, |C| below 1e-11."""
     result = dap.simulate("pen1", t_end=100.0, dt=0.02, rtol=1e-10, atol=1e-12, project=True)
     assert np.max(np.abs(result.energy.total - result.energy.total[0])) < 1e-8
     assert result.ledger["position"].value < 1e-11

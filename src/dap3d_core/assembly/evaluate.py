@@ -1,7 +1,8 @@
 """From a state to bodies, functions, forces, rows: what every formulation evaluates.
 
-The integrated state y has the order of u, with the angular velocity in body axes, and one number more: the work done
-on the system (docs/decisions/0002). It reads r, p of all bodies; v, w' of all bodies; work.
+The integrated state y has the order of u, with the angular velocity in body axes, and one number
+more: the work done on the system (docs/decisions/0002). It reads r, p of all bodies; v, w' of all
+bodies; work.
 """
 
 from dap3d_core.kernels.cache import compiled, compiled_inside
@@ -9,7 +10,7 @@ from dap3d_core.kernels.cache import compiled, compiled_inside
 
 @compiled
 def place_bodies(y, body, metric):
-    """Poses and velocities of the bodies of a state: fills body (r, A, v, w, p) and B = A U of metric."""
+    """Poses and velocities of the bodies of a state: fills body (r, A, v, w, p) and B of metric."""
     n = body.shape[0] - 1
     for b in range(1, n + 1):
         c, f = 7 * (b - 1), 7 * n + 6 * (b - 1)
@@ -53,7 +54,7 @@ def zero(values):
 
 @compiled_inside
 def scale_forces(body, metric, force):
-    """Power of the applied forces; then ``force`` becomes the right-hand side of the bodies in scaled coordinates.
+    """Power of the applied forces; then ``force`` becomes the scaled right-hand side of the bodies.
 
     Per body (f, n) becomes (f / sqrt(m), B^T n - U^T (w' x J' w')), the gyroscopic moment included.
     """
@@ -112,7 +113,7 @@ def rates(y, metric, force, out):
 
 @compiled_inside
 def global_accelerations(metric, force, out):
-    """v_dot (6 n: r_ddot, omega_dot in global axes) from the scaled accelerations: omega_dot = B a."""
+    """v_dot (6 n: r_ddot, omega_dot, global) from the scaled accelerations: omega_dot = B a."""
     for b in range(1, metric.shape[0]):
         o, k = 6 * b, metric[b]
         a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]

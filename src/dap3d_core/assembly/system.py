@@ -1,7 +1,7 @@
 """The system: every array that the compiled driver works on.
 
-Made from a model and its elimination plan (formulations/build.py). The arrays are one named tuple, which costs little to pass; the loops are
-an argument of their own (docs/decisions/0001).
+Made from a model and its elimination plan (formulations/build.py). The arrays are one named tuple,
+which costs little to pass; the loops are an argument of their own (docs/decisions/0001).
 """
 
 from collections.abc import Callable
@@ -86,7 +86,7 @@ def _append(functions, function):
 
 
 def step_functions(*functions: Callable[..., None]) -> Any:
-    """A formulation's functions (t, y, out, system, loops) as the one list that an integrator takes."""
+    """A formulation's functions (t, y, out, system, loops) as the list that an integrator takes."""
     if jit_is_on():
         for function in functions:
             function.compile(STEP)

@@ -45,7 +45,7 @@ def plot(
 
 
 def _draw(result: object, names: tuple[str, ...], target: Path, x: str | None, force: bool) -> None:
-    from dap3d_core.plotting import save_plot
+    from dap3d_core.plot import save_plot
     from dap3d_core.result import UnknownNameError
 
     try:

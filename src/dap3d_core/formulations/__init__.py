@@ -16,6 +16,6 @@ RHS, PROJECT, REPORT = range(3)
 
 
 def functions_of(method: str) -> Any:
-    """The compiled functions (rhs, project, report) of a formulation as the list that an integrator takes."""
+    """A formulation's compiled (rhs, project, report) as the list that an integrator takes."""
     module: Any = import_module(f"dap3d_core.formulations.{method}")
     return step_functions(module.rhs, module.project, module.report)

@@ -10,7 +10,8 @@ from dap3d_core.assembly.system import KINDS, System
 from dap3d_core.interface.writer import stride, write
 from dap3d_core.kernels.gather import BODY_WIDTH, JP, MASS, A, P
 from dap3d_core.kernels.lists import loop_list
-from dap3d_core.kernels.loops import build
+from dap3d_core.interface.checks import PluginError, where_is
+from dap3d_core.kernels.loops import Loop, build
 from dap3d_core.linear.plan import Plan
 from dap3d_core.model import Group, Model
 
@@ -28,9 +29,20 @@ def build_loops(model: Model, kinds: tuple[str, ...], announce: Callable[[str], 
         for group in (*model.functions, *model.forces, *model.joints):
             loop = write(group.examined, kind)
             if loop is not None:
-                loops.append(build(loop, announce))
+                loops.append(_compiled(loop, group, announce))
                 what.append((kind, group))
     return loop_list(loops), what
+
+
+def _compiled(loop: Loop, group: Group, announce: Callable[[str], None] | None) -> Any:
+    try:
+        return build(loop, announce)
+    except Exception as error:
+        reason = next((line for line in str(error).splitlines() if line.strip()), type(error).__name__)
+        raise PluginError(
+            f"{where_is(group.examined.type)}: numba cannot compile its kernels ({loop.name}): {reason}. "
+            "A kernel is plain: tuples of numbers, the words of dap3d_core.kernels, where() for branches"
+        ) from error
 
 
 def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> System:
@@ -78,7 +90,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
 
 
 def set_metric(metric: NDArray[np.float64], mass: NDArray[np.float64], Jp: NDArray[np.float64]) -> None:
-    """Fill the constant columns of the metric: 1/sqrt(m) and U = L^-T with J' = L L^T (ground: zero)."""
+    """Fill the metric's constants: 1/sqrt(m), and U = L^-T with J' = L L^T (ground: zero)."""
     if not len(mass):
         return
     metric[1:, 0] = 1.0 / np.sqrt(mass)

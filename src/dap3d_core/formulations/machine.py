@@ -1,4 +1,4 @@
-"""A model made ready to be evaluated: plan, arrays, group loops and a formulation, and the Python door to them."""
+"""A model made ready to be evaluated: plan, arrays, group loops, a formulation; for Python."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -86,7 +86,10 @@ class Machine:
         return to_integrated(np.asarray(u, dtype=float), self.model.body_count)
 
     def rhs(self, t: float, u: ArrayLike) -> Floats:
-        """du/dt (13 n,) at time t in s and state u (13 n,): r_dot, p_dot of each body, then r_ddot, omega_dot."""
+        """du/dt (13 n,) at time t in s and state u (13 n,).
+
+        In the order of u: r_dot, p_dot of each body, then r_ddot, omega_dot of each.
+        """
         n = self.model.body_count
         y = self.integrated(u)
         out = np.zeros_like(y)
@@ -96,15 +99,18 @@ class Machine:
         return out[: 13 * n]
 
     def report(self, t: float, u: ArrayLike) -> Floats:
-        """(report_size,) v_dot, lambda, potential energy and the largest residuals of the three levels at a state."""
+        """What a run reports at a state, (report_size,).
+
+        v_dot, lambda, potential energy and the largest residuals of the three levels.
+        """
         out = np.zeros(self.report_size)
         self.functions[REPORT](float(t), self.integrated(u), out, self.system, self.loops)
         return out
 
     def watch_pivots(self, t: float, u: ArrayLike) -> None:
-        """Remember the pivots at a state u (13 n,): where one falls below POOR of it, the pose is near a singular one.
+        """Remember the pivots at a state u (13 n,): below POOR of it a pose is near a singular one.
 
-        The measure is relative to the start because masses of very different size make small pivots, too.
+        Relative to the start, because masses of very different size make small pivots, too.
         """
         if self.method != "standard" or not self.model.row_count:
             return

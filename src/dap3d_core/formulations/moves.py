@@ -1,4 +1,4 @@
-"""Changes of a state: displacements and changes of velocity given in the bodies' scaled coordinates."""
+"""Changes of a state: displacements, changes of velocity, in the bodies' scaled coordinates."""
 
 from dap3d_core.kernels.cache import compiled_inside
 
@@ -15,7 +15,7 @@ def normalise(y, n):
 
 @compiled_inside
 def move(y, metric, force):
-    """Add a scaled displacement to the coordinates: r += dr, p += 1/2 L^T dtheta', of unit length again."""
+    """Add a scaled displacement: r += dr, p += 1/2 L^T dtheta', of unit length again."""
     for b in range(1, metric.shape[0]):
         c, o, k = 7 * (b - 1), 6 * b, metric[b]
         a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
@@ -48,7 +48,7 @@ def change_velocity(y, metric, force):
 
 @compiled_inside
 def size_of(y, first, count, period, part):
-    """1 + the largest magnitude among the first ``part`` numbers of each ``period``: the scale of a tolerance."""
+    """1 + the largest magnitude in the first ``part`` of each ``period``: scale of a tolerance."""
     found = 0.0
     for b in range(count):
         for c in range(part):

@@ -1,4 +1,6 @@
-"""Standard formulation: accelerations and multipliers from the saddle-point equations (manual: analysis_s; spec 9).
+"""Standard formulation: accelerations and multipliers from the saddle-point equations.
+
+Manual: analysis_s; spec 9.
 
     [M  D^T] (v_dot  )   (g    )
     [D   0 ] (-lambda) = (gamma)
@@ -30,15 +32,17 @@ from dap3d_core.linear.blocks import (
 #: Newton passes of one projection; the second already stands at rounding.
 PASSES = 5
 
-#: A residual that stays above this many times the tolerance means that the projection did not find the constraints.
+#: A residual that stays above this many times the tolerance means that the projection did not find
+#: the constraints.
 LOST = 1e6
 
 
 @compiled
 def linearise(t, system, loops, refactor):
-    """D^, gamma and nu of all joints at the bodies as placed; with ``refactor`` also the factors in K.
+    """D^, gamma and nu of all joints at the bodies as placed; if ``refactor``, factors in K, too.
 
-    Returns the number of pivots that have become small (``system.smallest``): the pose is near a singular one.
+    Returns the number of pivots that have become small (``system.smallest``): the pose is near a
+    singular one.
     """
     kinds, D = system.kinds, system.D
     call_loops(kinds[ACCELERATION], kinds[ACCELERATION + 1], t, system.body, system.F, system.idx, system.par,
@@ -52,7 +56,7 @@ def linearise(t, system, loops, refactor):
 
 @compiled_inside
 def accelerate(t, y, system, loops):
-    """Scaled accelerations into ``force`` and -lambda into ``x``; returns the power of forces and drivers."""
+    """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers."""
     body, metric, force, kinds, x = system.body, system.metric, system.force, system.kinds, system.x
     place_bodies(y, body, metric)
     zero(force)
@@ -78,7 +82,7 @@ def rhs(t, y, out, system, loops):
 
 @compiled_inside
 def residuals(t, system, loops):
-    """Position-level residuals into C (zero where a row has none); returns the largest magnitude."""
+    """Position-level residuals (zero where a row has none) into C; returns the largest size."""
     kinds, C = system.kinds, system.C
     zero(C)
     call_loops(kinds[POSITION], kinds[POSITION + 1], t, system.body, system.F, system.idx, system.par,
@@ -109,10 +113,10 @@ def correct(system):
 
 @compiled
 def project(t, y, out, system, loops):
-    """Move a state onto the position and velocity constraints, by the least change in the metric of the masses.
+    """Move a state onto its constraints, by the least change in the metric of the masses.
 
-    out: 1.0 if y changed beyond rounding; 1.0 if it did not converge, 2.0 if the pose is close to a singular one;
-    largest residuals of position and velocity.
+    out: 1.0 if y changed beyond rounding; 1.0 if it did not converge, 2.0 if the pose is close to a
+    singular one; largest residuals of position and velocity.
     """
     body, metric, kinds = system.body, system.metric, system.kinds
     n = body.shape[0] - 1
@@ -161,8 +165,10 @@ def project(t, y, out, system, loops):
 
 @compiled
 def report(t, y, out, system, loops):
-    """v_dot (6 n, global axes), lambda (rows, in the order of the model), then potential energy and the largest
-    residuals of position, velocity and acceleration."""
+    """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals.
+
+    That is the potential energy and the largest residuals of position, velocity and acceleration.
+    """
     kinds, value, C = system.kinds, system.settings[2:3], system.C
     accelerations = 6 * (system.body.shape[0] - 1)
     count = system.row.shape[0]

@@ -1,4 +1,4 @@
-"""Unconstrained formulation: M v_dot = g, for scenes without joints (manual: analysis_uc; spec 9)."""
+"""Unconstrained formulation: M v_dot = g, for scenes without joints (manual: analysis_uc)."""
 
 from dap3d_core.assembly.evaluate import (
     call_loops,
@@ -41,7 +41,7 @@ def project(t, y, out, system, loops):
 
 @compiled
 def report(t, y, out, system, loops):
-    """v_dot (6 n, global axes), then potential energy and three zeros for the constraints that are not there."""
+    """v_dot (6 n, global axes), potential energy, and zeros for the three levels of constraints."""
     kinds, value = system.kinds, system.settings[2:3]
     last = 6 * (system.body.shape[0] - 1)
     accelerate(t, y, system, loops)

@@ -41,7 +41,7 @@ def all_finite(x: Floats) -> bool:
 
 @compiled_inside
 def scaled_largest(x: Floats, y0: Floats, y1: Floats, size: int, rtol: float, atol: float) -> float:
-    """``max_i |x_i| / (atol + rtol max(|y0_i|, |y1_i|))`` over the first ``size`` components; NaN where one is NaN."""
+    """``max |x_i| / (atol + rtol max(|y0_i|, |y1_i|))`` over i < ``size``; NaN if one is NaN."""
     largest = 0.0
     for i in range(size):
         a, b = abs(y0[i]), abs(y1[i])

@@ -120,8 +120,8 @@ def error_norm(
 ) -> float:
     """Largest scaled error of the first components; 1 is just good enough.
 
-    The largest, as in the manual's ode45, and not HNW's root mean square: in a scene of many bodies the mean
-    would hide the error of the one that moves. Two estimates are combined as in HNW II.5:
+    The largest, as in the manual's ode45, and not HNW's root mean square: in a scene of many bodies
+    the mean would hide the error of the one that moves. Two estimates are combined as in HNW II.5:
     |e5|^2 / sqrt(|e5|^2 + 0.01 |e3|^2).
     """
     size, rtol, atol = integer[ERROR_SIZE], real[RTOL], real[ATOL]

@@ -69,7 +69,7 @@ from dap3d_core.kernels.cache import compiled, compiled_inside
 
 #: Factor on a step that met a number that is not finite, or whose end could not be projected.
 RETREAT = 0.1
-#: What project says in out[1]: it failed; the state is good, but too close to a singular one to go on from.
+#: What project says in out[1]: it failed; the state is good, but too close to a singular one.
 FAILED, POOR_PLACE = 1.0, 2.0
 #: Factor on a step that should end elsewhere, and how often in a row that is tried.
 ELSEWHERE, ATTEMPTS = 0.6, 4
@@ -207,8 +207,9 @@ def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) 
 def is_poor(real: Floats, integer: Integers, times: Floats, t1: float) -> bool:
     """Whether a step should end elsewhere: project found the state close to a singular one.
 
-    From there every next step would be inaccurate, while from some way before it one can step across. A run
-    that stays close to a singular state is not held up: after a few attempts the landing is taken.
+    From there every next step would be inaccurate, while from some way before it one can step
+    across. A run that stays close to a singular state is not held up: after a few attempts the
+    landing is taken.
     """
     return real[OUTCOME + 1] == POOR_PLACE and integer[POOR] < ATTEMPTS and t1 < times[-1]
 

@@ -34,7 +34,8 @@ T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, OUTCOME = range(7, 15)
 REALS = OUTCOME + 4
 # Places in ``integer``. Settings.
 STAGES, ORDER, ERROR_SIZE, ERRORS, ERROR_USES_RESULT, DENSE, PROJECT_ON = range(7)
-# What changes. POOR: landings in a row that project called poor. FRESH: k[0] is f(t, y). GAP_STEP of GAP_STEPS: in the present run of equal steps.
+# What changes. POOR: landings in a row that project called poor. FRESH: k[0] is f(t, y).
+# GAP_STEP of GAP_STEPS: in the present run of equal steps.
 STATUS, NEXT, ROW, FRESH, LAST_REJECTED, GAP_STEP, GAP_STEPS = range(7, 14)
 STEPS, REJECTED, RHS, PROJECTIONS, REPORTS, POOR, INTEGERS = range(14, 21)
 # Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch.

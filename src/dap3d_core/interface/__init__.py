@@ -1,4 +1,4 @@
-"""The interface of a joint, a force and a function type: all that the author of a plugin imports, besides the kernels' words."""
+"""What the author of a plugin imports, besides the kernels' words: joints, forces, functions."""
 
 from dap3d_core.interface.checks import PluginError, examine
 from dap3d_core.interface.fields import (

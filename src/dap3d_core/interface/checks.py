@@ -1,7 +1,7 @@
-"""What is asked of a type before it is used: its kernels are called once, in plain Python, with random numbers.
+"""What is asked of a type before it is used: its kernels are called once, with random numbers.
 
-A wrong shape, an unknown name, a velocity in a position-level kernel or an exception is a ``PluginError`` that names
-file, type, function and remedy.
+They run in plain Python. A wrong shape, an unknown name, a velocity in a position-level kernel or
+an exception is a ``PluginError`` that names file, type, function and remedy.
 """
 
 import inspect
@@ -33,7 +33,7 @@ class PluginError(Exception):
 
 @attrs.frozen
 class BodyPose:
-    """A body as ``prepare`` sees it: position r (3), Euler parameters p (4), rotation matrix A (three rows)."""
+    """A body as ``prepare`` sees it: position r, Euler parameters p, rotation matrix A (rows)."""
 
     r: tuple[float, ...]
     p: tuple[float, ...]
@@ -130,7 +130,8 @@ def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
 
     Raises:
         ValueError: the type refuses these values of its fields, in its own words.
-        PluginError: it failed otherwise, or returned something else than a dict of numbers and tuples of numbers.
+        PluginError: it failed otherwise, or returned something else than a dict of numbers and
+            tuples of numbers.
     """
     type_ = type(instance)
     try:
@@ -148,7 +149,7 @@ def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
 
 
 def set_ends(instance: Any, make: Any) -> None:
-    """Give an instance with a vector2 field the two ends of that vector as attributes P_i and P_j."""
+    """Give an instance with a vector2 field the ends of that vector as attributes P_i and P_j."""
     if any(spec.kind == "vector2" for spec in specs_of(type(instance)).values()):
         instance.P_i, instance.P_j = make(), make()
 

@@ -1,7 +1,8 @@
 """The fields a type may declare, and what each offers to its kernels.
 
-A field is one line in a type's class: ``P_i: Point = point()``. Its last letter after ``_`` (i, j, k) names the body
-slot it belongs to. The maker says what the scene may write there; ``namespace.py`` says which names it offers.
+A field is one line in a type's class: ``P_i: Point = point()``. Its last letter after ``_``, one of
+i, j and k, names the body slot it belongs to. The maker says what the scene may write there;
+``namespace.py`` says which names it offers.
 """
 
 from collections.abc import Sequence
@@ -63,12 +64,15 @@ def point(default: Any = REQUIRED, *, doc: str = "") -> Any:
 
 
 def vector(default: Any = REQUIRED, *, doc: str = "") -> Any:
-    """A vector fixed in a body (type 1), by name, normalised to unit length; ``a_i`` is fixed in the body of slot i."""
+    """A unit vector fixed in a body (type 1), by name; ``a_i`` is fixed in the body of slot i.
+
+    It is normalised, with a warning where its length was not 1.
+    """
     return _field(FieldSpec("vector", default, doc=doc, unit_length=True))
 
 
 def vector2(default: Any = REQUIRED, *, doc: str = "") -> Any:
-    """A vector between two points (type 2), by name; the scene may write ``P_i`` and ``P_j`` instead."""
+    """A vector between two points (type 2), by name; ``P_i`` and ``P_j`` may be given instead."""
     return _field(FieldSpec("vector2", default, unit="m", doc=doc))
 
 

@@ -1,4 +1,4 @@
-"""The pluggy side: three hooks without arguments, each returning a list of classes. All substance is in the classes."""
+"""The pluggy side: three hooks without arguments that return classes; the classes do the work."""
 
 import pluggy
 

@@ -2,7 +2,7 @@
 
 | field | names it offers |
 | --- | --- |
-| body slot i (from ``body_i``, or from the body of a point or vector on it) | ``r_i A_i p_i mass_i Jp_i``; ``v_i w_i`` |
+| body slot i (``body_i``, point or vector on it) | ``r_i A_i p_i mass_i Jp_i``; ``v_i w_i`` |
 | point ``P_i`` | ``s_P_i`` (arm, global) ``r_P_i``; ``s_P_i_dot v_P_i`` |
 | vector ``a_i`` | ``a_i``; ``a_i_dot`` |
 | vector2 ``d`` | ``d`` and its ends as points ``P_i``, ``P_j``; ``d_dot`` |
@@ -36,7 +36,7 @@ class Quantity:
         name: as kernels write it.
         shape: () number, (3,) vector, (4,) Euler parameters, (3, 3) matrix, (n,) other tuples.
         velocity: whether it belongs to the velocity level.
-        code: Python expression over the loop's variables and the names in ``needs`` (prefixed by ``x_``).
+        code: Python expression over the loop's variables and ``needs`` (prefixed by ``x_``).
         needs: names that must be computed before.
         doc: what it is, for ``describe``.
     """

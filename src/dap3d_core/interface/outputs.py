@@ -1,7 +1,8 @@
 """What a kernel returns, and where its numbers stand in it.
 
-Kernels may leave out brackets that hold one thing: a joint of one row may return a number for its row, an element of
-one body its pair or block bare. ``entries`` finds for each number the expression that reaches it.
+Kernels may leave out brackets that hold one thing: a joint of one row may return a number for its
+row, an element of one body its pair or block bare. ``entries`` finds for each number the expression
+that reaches it.
 """
 
 from typing import Any
@@ -14,10 +15,10 @@ class ShapeError(ValueError):
 
 
 def entries(value: Any, shape: tuple[int, ...], what: str, name: str = "out") -> list[str]:
-    """Expressions for the numbers of ``shape``, by rows, in a kernel's output of which ``value`` is a sample.
+    """Expressions for the numbers of ``shape``, by rows, in a kernel's output.
 
     Args:
-        value: what the kernel returned for some input.
+        value: a sample of the output: what the kernel returned for some input.
         shape: what is expected; dimensions of extent 1 may be missing in the value.
         what: the expectation in words, for the error.
         name: variable that holds the output in the loop.

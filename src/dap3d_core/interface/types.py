@@ -1,7 +1,8 @@
-"""What a joint, a force and a function type is: an attrs class with fields, and pure functions of named quantities.
+"""What a joint, a force and a function type is: fields, and pure functions of named quantities.
 
-The functions stand in the class without ``self``: they are static, and their parameter names say what they need, as
-a pytest test names its fixtures. ``namespace.py`` lists the names.
+A type is an attrs class. Its functions stand there without ``self``: they are static, and their
+parameter names say what they need, as a pytest test names its fixtures. ``namespace.py`` lists
+these names.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,7 +15,7 @@ INTERFACE_VERSION = 1
 
 
 class TypeBase:
-    """Common ground of the three kinds: gathers the kernels and declares the class an attrs class."""
+    """Common ground of the three kinds: gathers the kernels, makes the class an attrs class."""
 
     kind: ClassVar[str] = ""
     kernel_names: ClassVar[tuple[str, ...]] = ()
@@ -28,7 +29,8 @@ class TypeBase:
             function = vars(cls).get(name)
             if callable(function):
                 setattr(cls, name, staticmethod(function))
-        attrs.define(cls, slots=False, kw_only=True)  # slots would make a second class, and hooks see the first
+        # slots would make a second class, and hooks see the first
+        attrs.define(cls, slots=False, kw_only=True)
 
     @classmethod
     def kernels(cls) -> dict[str, Callable[..., Any]]:
@@ -42,7 +44,7 @@ class Joint(TypeBase):
     Subclasses define, each a pure function of named quantities (spec 2):
 
     * ``C``      position level, one number a row that ``holonomic`` keeps;
-    * ``J``      dC/dq, one block of rows x 6 (tuples of rows) for each body slot, in the order i, j, k;
+    * ``J``      dC/dq, one block of rows x 6 (tuples of rows) a body slot, in the order i, j, k;
     * ``gamma``  right-hand side of the acceleration level, J v_dot = gamma;
     * ``nu``     right-hand side of the velocity level, J v = nu; zero where not defined.
 
@@ -68,15 +70,18 @@ class Joint(TypeBase):
         return tuple(k for k, there in enumerate(mask) if there)
 
     def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
-        """Constants of this instance; a 3-tuple whose name ends in _i, _j or _k is a vector in that body's axes."""
+        """Constants of this instance.
+
+        A 3-tuple whose name ends in _i, _j or _k is a vector in that body's axes.
+        """
         return {}
 
 
 class Force(TypeBase):
     """A force element: what acts on one, two or more bodies.
 
-    Subclasses define ``wrench``, which returns for each body slot a pair (force, moment about the mass centre) in
-    global axes, and where there is one ``energy``, the potential in J.
+    Subclasses define ``wrench``, which returns for each body slot a pair (force, moment about the
+    mass centre) in global axes, and where there is one ``energy``, the potential in J.
 
     Attributes:
         keyword: the word that names the type in a scene.
@@ -88,7 +93,10 @@ class Force(TypeBase):
     each_body: ClassVar[bool] = False
 
     def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
-        """Constants of this instance; a 3-tuple whose name ends in _i, _j or _k is a vector in that body's axes."""
+        """Constants of this instance.
+
+        A 3-tuple whose name ends in _i, _j or _k is a vector in that body's axes.
+        """
         return {}
 
 

@@ -1,8 +1,8 @@
-"""From a type to its group loops: the lines that gather the named quantities, call the kernels and store the numbers.
+"""From a type to its group loops: gather the named quantities, call the kernels, store numbers.
 
-An instance's integers stand in ``idx`` from ``b0``: the bodies of its slots, the rows of F of its functions, then for
-a joint the place of its first row in the row vectors and for each slot the place of its block in D; its numbers stand
-in ``par`` from ``p1``.
+An instance's integers stand in ``idx`` from ``b0``: the bodies of its slots, the rows of F of its
+functions, then for a joint the place of its first row in the row vectors and for each slot the
+place of its block in D; its numbers stand in ``par`` from ``p1``.
 """
 
 from collections.abc import Iterable
@@ -31,7 +31,7 @@ def stride(examined: Examined) -> int:
 
 
 def write(examined: Examined, what: str) -> Loop | None:
-    """The loop that computes ``what`` (a key of LOOP_KINDS), or None where the type has no such kernel."""
+    """The loop that computes ``what`` (a key of LOOP_KINDS); None where there is no such kernel."""
     kernels = {n: k for n, k in examined.type.kernels().items() if n in LOOP_KINDS[what]}
     if not kernels:
         return None

@@ -1,6 +1,7 @@
 """The lowest floor: what kernels are written with, and how they become fast.
 
-A plugin imports from here only the words of its formulas; ``compiled``, the loops and their cache serve the core.
+A plugin imports from here only the words of its formulas; ``compiled``, the loops and their cache
+serve the core.
 """
 
 from dap3d_core.kernels.mathematics import atan2, cos, sin, sqrt, tanh, where

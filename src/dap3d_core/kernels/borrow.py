@@ -1,8 +1,9 @@
 """Arrays without an owner, for the inside of a compiled call.
 
-Compiled code counts references to each array it touches, atomically, in every function that calls a first-class
-function: 100 ns for a tuple of 24 arrays, more than a small scene's physics. The outermost compiled function keeps
-the arrays alive; what it calls may as well borrow them (measured: docs/decisions/0001).
+Compiled code counts references to each array it touches, atomically, in every function that calls a
+first-class function: 100 ns for a tuple of 24 arrays, more than a small scene's physics. The
+outermost compiled function keeps the arrays alive; what it calls may as well borrow them.
+Measurements: docs/decisions/0001.
 """
 
 from numba.core import cgutils
@@ -24,7 +25,7 @@ def _without_owners(_typing, arrays):
 
 
 def borrow(arrays):
-    """The same tuple of arrays without their owners; valid only while the caller holds the tuple itself."""
+    """The same tuple of arrays without their owners; valid while the caller holds the tuple."""
     return arrays
 
 

@@ -1,8 +1,9 @@
 """Where compiled code is kept, and under which digest.
 
-numba's own cache looks at one source file only: a function that calls a helper of another file would go on giving
-the old number after the helper changed. So compiled code lives in folders named by a digest of *all* the sources
-that went into it; a change anywhere leads to another folder (docs/decisions/0001).
+numba's own cache looks at one source file only: a function that calls a helper of another file
+would go on giving the old number after the helper changed. So compiled code lives in folders named
+by a digest of *all* the sources that went into it; a change anywhere leads to another folder
+(docs/decisions/0001).
 """
 
 import hashlib
@@ -10,21 +11,24 @@ import os
 import sys
 import tempfile
 import types
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 import numba
 from numba import config, njit
 
-#: One compiled function of the core or of a group loop: no bounds checks, IEEE division, no reassociation.
+#: How the core and the group loops are compiled: no bounds checks, IEEE division, nothing
+#: reassociated.
 OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 
-#: Floors of the core that hold compiled code, low to high: a function depends on its own floor and those below.
+#: Floors of the core that hold compiled code, low to high: a function depends on its own floor and
+#: those below.
 COMPILED_FLOORS = ("kernels", "assembly", "linear", "formulations", "integrators")
 
 
 def jit_is_on() -> bool:
-    """Whether kernels are compiled; ``NUMBA_DISABLE_JIT=1`` runs the same sources as plain Python."""
+    """Whether kernels are compiled; ``NUMBA_DISABLE_JIT=1`` runs them as plain Python."""
     return not config.DISABLE_JIT
 
 
@@ -32,8 +36,8 @@ def jit_is_on() -> bool:
 def cache_folder() -> Path | None:
     """The folder that keeps compiled code between processes, or None where nothing can be written.
 
-    The first of these that can be written: ``$DAP3D_CACHE_DIR``, the user's cache folder, a private folder beside the
-    temporary files.
+    The first of these that can be written: ``$DAP3D_CACHE_DIR``, the user's cache folder, a private
+    folder beside the temporary files.
     """
     for folder in _candidates():
         try:
@@ -49,10 +53,8 @@ def _candidates():
     if chosen := os.environ.get("DAP3D_CACHE_DIR"):
         yield Path(chosen)
     home = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
-    try:
+    with suppress(RuntimeError):  # no home folder
         yield (Path(home) if home else Path.home() / ".cache") / "dap3d"
-    except RuntimeError:  # no home folder
-        pass
     user = os.getuid() if hasattr(os, "getuid") else "user"
     private = Path(tempfile.gettempdir()) / f"dap3d-{user}"
     if not private.exists() or not hasattr(os, "getuid") or private.stat().st_uid == os.getuid():
@@ -77,14 +79,14 @@ def _driver_digest(floor: str) -> str:
 
 
 def compiled(function):
-    """Compile a function of the core when it is first called, and keep the code for the next process."""
+    """Compile a function of the core at its first call, and keep the code for the next process."""
     return compiled_in(cache_folder(), _driver_folder(function), function)
 
 
 def compiled_inside(function):
-    """The same for a function that compiled code alone calls: it compiles faster, for it has no door to Python.
+    """The same for a function that compiled code alone calls.
 
-    Called from Python it would crash the process.
+    It compiles faster, for it has no door to Python; called from there it would crash the process.
     """
     options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return compiled_in(cache_folder(), _driver_folder(function), function, **options)
@@ -102,7 +104,7 @@ def _driver_folder(function) -> str:
 
 
 def compiled_in(folder: Path | None, name: str, function, **options):
-    """Compile with the cache in ``folder/name``; without a folder the code lives as long as the process."""
+    """Compile with the cache in ``folder/name``; without a folder for this process alone."""
     if not jit_is_on():
         return function
     if folder is None:
@@ -114,39 +116,48 @@ def compiled_in(folder: Path | None, name: str, function, **options):
         config.CACHE_DIR = before
 
 
-def sources(*functions) -> list[str | bytes]:
-    """Everything that decides what these functions compute: files, and values of the constants they read.
+def reached(*functions) -> tuple[list, list[str]]:
+    """The functions that these call, themselves included, and values of the constants they read.
 
-    Follows names from function to function through their modules' globals; numpy, numba and the standard library are
-    told by name alone (their versions are part of the digest or fixed by it).
+    Follows names from function to function through their modules' globals; numpy, numba and the
+    standard library are left out.
     """
-    seen: dict[object, None] = {}
-    files: dict[str, bytes] = {}
+    found: dict[object, None] = {}
     constants: list[str] = []
     todo = list(functions)
     while todo:
         function = todo.pop()
         function = getattr(function, "py_func", function)
-        if function in seen:
+        if function in found:
             continue
-        seen[function] = None
-        _add_file(files, function.__code__.co_filename)
+        found[function] = None
         for name, value in _named_values(function):
             if isinstance(value, types.FunctionType) or hasattr(value, "py_func"):
                 if _is_ours(getattr(value, "py_func", value).__code__.co_filename):
                     todo.append(value)
             elif isinstance(value, (bool, int, float, complex, str, tuple)):
                 constants.append(f"{function.__qualname__}.{name}={value!r}")
-    return [*constants, *(part for path in sorted(files) for part in (Path(path).name, files[path]))]
+    return list(found), constants
+
+
+def sources(*functions) -> list[str | bytes]:
+    """Everything that decides what these functions compute: files, values of constants they read."""
+    found, constants = reached(*functions)
+    files: dict[str, bytes] = {}
+    for function in found:
+        _add_file(files, function.__code__.co_filename)
+    contents = (part for path in sorted(files) for part in (Path(path).name, files[path]))
+    return [*constants, *contents]
 
 
 def _named_values(function):
-    """Names that a function reads from outside itself, with their values; one step through modules."""
+    """Names that a function reads from outside itself, with values; one step through modules."""
     code_objects = [function.__code__]
     for code in code_objects:
         code_objects += [c for c in code.co_consts if isinstance(c, types.CodeType)]
     names = {name for code in code_objects for name in code.co_names}
-    outside = dict(zip(function.__code__.co_freevars, (c.cell_contents for c in function.__closure__ or ()), strict=True))
+    cells = (cell.cell_contents for cell in function.__closure__ or ())
+    outside = dict(zip(function.__code__.co_freevars, cells, strict=True))
     for name in sorted(names):
         if name in function.__globals__:
             outside[name] = function.__globals__[name]

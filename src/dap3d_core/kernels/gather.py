@@ -1,10 +1,10 @@
-"""What a group loop uses to read an instance's quantities: vectors and matrices out of rows of arrays."""
+"""What a group loop reads an instance's quantities with: vectors, matrices out of rows of arrays."""
 
 from dap3d_core.kernels.inline import inlined
 from dap3d_core.kernels.vectors import add, cross, rotate, sub
 
-#: Columns of the body array: position, rotation matrix by rows, velocity, angular velocity (global), Euler
-#: parameters, mass, inertia matrix in body axes by rows.
+#: Columns of the body array: position, rotation matrix by rows, velocity, angular velocity
+#: (global), Euler parameters, mass, inertia matrix in body axes by rows.
 R, A, V, W, P, MASS, JP, BODY_WIDTH = 0, 3, 12, 15, 18, 22, 23, 32
 
 __all__ = ["JP", "MASS", "A", "P", "R", "V", "W", "add", "cross", "matrix_at", "matrix_in", "rotate", "sub",

@@ -2,7 +2,8 @@
 
 from numba.extending import register_jitable
 
-#: As compiled code that calls them: IEEE division (no exception on 1/0), fused multiply-add, nothing reassociated.
+#: As compiled code that calls them: IEEE division (no exception on 1/0), fused multiply-add,
+#: nothing reassociated.
 INLINE_OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}}
 
 _known: set = set()

@@ -1,7 +1,7 @@
-"""Typed lists of first-class functions: how the driver holds what it did not know when it was compiled.
+"""Typed lists of first-class functions: what the driver did not know when it was compiled.
 
-A typed list filled from Python would be compiled anew in each process (0.3 s); these are made by two cached functions
-of known signature. Where kernels run as plain Python the list is a plain list.
+A typed list filled from Python would be compiled anew in each process (0.3 s); these are made by
+two cached functions of known signature. Where kernels run as plain Python the list is a plain list.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,7 +22,7 @@ LOOP_LIST = types.ListType(LOOP_TYPE)
 
 
 def named_tuple_type(class_: type, members: Sequence[Any]) -> Any:
-    """The compiled code's type of a NamedTuple of arrays; the class must stand in an importable module."""
+    """The compiled code's type of a NamedTuple of arrays; the class must be importable."""
     return types.NamedTuple(list(members), class_)
 
 
@@ -42,7 +42,7 @@ def list_type(item: Any) -> Any:
 
 
 def fill(empty: Callable[[], Any], append: Callable[..., None], item: Any, functions: Sequence[Callable]) -> Any:
-    """A typed list of functions, by a compiled ``empty`` and ``append`` that are compiled for this item type only."""
+    """A typed list of functions, by ``empty`` and ``append`` compiled for this item type alone."""
     if not jit_is_on():
         return list(functions)
     if not empty.signatures:

@@ -1,13 +1,13 @@
 """Group loops: one compiled function that runs a type's kernel over all its instances.
 
-A loop is written as the source of a small module: gather the named quantities of instance q, call the kernel, store
-what it returns. All loops have one signature, so that the driver holds them in one list and is never recompiled for a
-new type:
+A loop is written as the source of a small module: gather the named quantities of instance q, call
+the kernel, store what it returns. All loops have one signature, so that the driver holds them in
+one list and is never recompiled for a new type:
 
     loop(t, body, F, idx, par, i0, p0, count, out1, out2, out3)
 
     body (n+1, BODY_WIDTH)  state and constants of each body, ground first (columns: gather.py)
-    F    (functions+1, 4)   f, f', f'', f''' of each function of time at t; row 0 is the absent function
+    F    (functions+1, 4)   f, f', f'', f''' of each function at t; row 0 is the absent function
     idx, par                integers and numbers of all instances; this group's begin at i0 and p0
     out1, out2, out3        what the kernels return
 """
@@ -26,6 +26,7 @@ from dap3d_core.kernels.cache import (
     compiled_in,
     digest,
     jit_is_on,
+    reached,
     sources,
 )
 from dap3d_core.kernels.inline import inlined
@@ -70,7 +71,9 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
     name = f"loop-{key}"
     path = _write(folder, name, text) if folder is not None and jit_is_on() else None
     namespace = _namespace(path, name, text)
-    namespace.update({n: inlined(k) for n, k in loop.kernels.items()})
+    namespace.update(loop.kernels)
+    for plain in reached(*loop.kernels.values())[0]:  # kernels and the author's own helpers
+        inlined(plain)
     if path is None:
         function = compiled_in(None, name, namespace["loop"])
     else:
@@ -107,7 +110,8 @@ def _write(folder: Path, name: str, text: str) -> Path | None:
 def _namespace(path: Path | None, name: str, text: str) -> dict:
     if path is None:
         namespace = {"__name__": f"dap3d_{name.replace('-', '_')}"}
-        exec(compile(text, f"<{name}>", "exec"), namespace)  # our own text, as importing the file would do
+        # our own text, as importing the file would do
+        exec(compile(text, f"<{name}>", "exec"), namespace)
         return namespace
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)

@@ -1,6 +1,7 @@
-"""Scalar mathematics for kernels: one name that works on floats, complex numbers, sympy symbols and in compiled code.
+"""Scalar mathematics for kernels: one name for floats, complex numbers, sympy and compiled code.
 
-Outside their domain the functions give NaN, as compiled code does; a run stops at the first NaN and names its source.
+Outside their domain the functions give NaN, as compiled code does; a run stops at the first NaN and
+names its source.
 """
 
 import cmath
@@ -51,7 +52,7 @@ tanh = _generic("tanh")
 
 
 def atan2(y, x):
-    """Angle of the point (x, y) in (-pi, pi]; for complex arguments its first-order continuation (complex step)."""
+    """Angle of the point (x, y) in (-pi, pi]; complex: its first-order continuation."""
     if isinstance(y, complex) or isinstance(x, complex):
         y, x = complex(y), complex(x)
         slope = (x.real * y.imag - y.real * x.imag) / (x.real**2 + y.real**2)
@@ -67,7 +68,7 @@ def _compiled_atan2(y, x):
 
 
 def where(condition, a, b):
-    """``a`` where the condition holds, else ``b``: the branch of a kernel. Both numbers are evaluated."""
+    """``a`` where the condition holds, else ``b``: a kernel's branch. Both numbers are evaluated."""
     if _symbolic(condition):
         sympy = _sympy()
         return sympy.Piecewise((a, condition), (b, True))

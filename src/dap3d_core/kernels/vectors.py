@@ -1,7 +1,7 @@
 """3-vectors and 3x3 matrices as plain tuples: the words in which a kernel is written.
 
-Every function here is pure and generic: in compiled code the tuples vanish into registers; in plain Python the
-same source runs with floats, with complex numbers (derivatives by complex step) and with sympy symbols.
+Every function here is pure and generic: in compiled code the tuples vanish into registers; in plain
+Python the same source runs with floats, complex numbers (derivatives by complex step) and sympy.
 """
 
 from dap3d_core.kernels.inline import inlined
@@ -80,9 +80,10 @@ def norm2(a):
 
 
 def normals(a):
-    """Two unit vectors n, m that complete the axis a to a right-handed triad: a x n = m, n x m = a (spec 3).
+    """Two unit vectors n, m that complete an axis a to a triad: a x n = m, n x m = a (spec 3).
 
-    n is the coordinate axis least aligned with a, made normal to it. For use in ``prepare``, not in a kernel.
+    n is the coordinate axis least aligned with a, made normal to it. For ``prepare``, not for a
+    kernel.
 
     Args:
         a: axis, 3 components, any length but zero.

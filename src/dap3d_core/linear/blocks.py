@@ -1,12 +1,12 @@
 """The compiled side of the elimination program: scale, assemble, factor, solve.
 
-Bodies are described in coordinates in which their mass matrix is the identity (docs/decisions/0006): with
-M = diag(m I, J), J' = L L^T and B = A L^-T, a Jacobian block D becomes D^ = [D_r / sqrt(m), D_w B] and a force
-(f, n) becomes (f / sqrt(m), B^T n). The saddle-point matrix is then [I D^^T; D^ 0], and eliminating a body leaves
--D^ D^^T between its joints.
+Bodies are described in coordinates in which their mass matrix is the identity
+(docs/decisions/0006): with M = diag(m I, J), J' = L L^T and B = A L^-T, a Jacobian block D becomes
+D^ = [D_r / sqrt(m), D_w B] and a force (f, n) becomes (f / sqrt(m), B^T n). The saddle-point matrix
+is then [I D^^T; D^ 0], and eliminating a body leaves -D^ D^^T between its joints.
 
-K holds the blocks that remain, by columns of the lower triangle. Each node's pivot is sign * L L^T: + for a hub,
-- for a joint. The diagonal of L is stored inverted.
+K holds the blocks that remain, by columns of the lower triangle. The pivot of a node is L L^T for a
+hub and -L L^T for a joint (its ``sign``). The diagonal of L is stored inverted.
 """
 
 import numpy as np
@@ -17,7 +17,10 @@ from dap3d_core.linear.plan import COPY, DIAGONAL, IDENTITY, PRODUCTS, TRANSPOSE
 
 @compiled
 def scale_blocks(blocks, D, metric):
-    """Turn D into D^, in place. metric: (n+1, 16) with 1/sqrt(m) in column 0 and B by rows from column 7."""
+    """Turn D into D^, in place.
+
+    metric: (n+1, 16), with 1/sqrt(m) in column 0 and B by rows from column 7.
+    """
     for q in range(blocks.shape[0]):
         o, b = blocks[q, 0], blocks[q, 1]
         s = metric[b, 0]
@@ -79,8 +82,8 @@ def factor(nodes, columns, updates, K, smallest, drop):
         nodes, columns, updates: of the plan.
         K: filled by ``assemble``.
         smallest: (rows,) a pivot not above this is counted.
-        drop: True to leave a counted row out (its unknown becomes zero). False to use it all the same; where it is
-            not positive at all its unknowns become NaN.
+        drop: True to leave a counted row out (its unknown becomes zero). False to use it all the
+            same; where it is not positive at all its unknowns become NaN.
 
     Returns:
         number of counted pivots.
@@ -191,7 +194,7 @@ def solve_saddle(blocks, hubs, nodes, columns, D, K, x, g):
 
 @compiled_inside
 def add_product(blocks, D, g, residual):
-    """residual += D^ a, with a in scaled coordinates (6 (n+1),)."""
+    """Add D^ g to the residual, with g in scaled coordinates (6 (n+1),)."""
     for q in range(blocks.shape[0]):
         o, b, f = blocks[q, 0], 6 * blocks[q, 1], blocks[q, 3]
         for r in range(blocks[q, 2]):

@@ -1,15 +1,15 @@
 """In which order bodies and joints are eliminated from the saddle-point matrix [M D^T; D 0].
 
-Nodes are bodies and joints; joints between the same bodies are one node. Bodies with few joints come first: each costs
-little and leaves a block between its joints (on a chain, D M^-1 D^T). A body with many joints (a hub) would make all
-of them one dense block, so it waits. A joint's pivot exists only when the rows eliminated so far are independent on
-the bodies eliminated so far; that holds when
+Nodes are bodies and joints; joints between the same bodies are one node. Bodies with few joints
+come first: each costs little and leaves a block between its joints (on a chain, D M^-1 D^T). A body
+with many joints (a hub) would make all of them one dense block, so it waits. A joint's pivot exists
+only when the rows eliminated so far are independent on the bodies eliminated so far. It does when
 
 * a joint of the spanning tree comes after its outboard body, and
 * a joint that closes a loop comes after all bodies of its loop.
 
-Under these rules the cheapest node comes next (minimum degree, weighted by rows). Trees have no fill at all.
-Docs: docs/decisions/0006.
+Under these rules the cheapest node comes next (minimum degree, weighted by rows). Trees have no
+fill at all. More: docs/decisions/0006.
 """
 
 import heapq
@@ -18,7 +18,7 @@ from collections.abc import Iterable, Sequence
 
 import attrs
 
-#: A body with this many joint nodes or more waits; from here on eliminating it late costs less (see the decision).
+#: A body with this many joint nodes or more waits: eliminating it late costs less from here on.
 HUB_DEGREE = 5
 
 #: Joints between the same bodies share a node as long as their rows fit in one body's six.
@@ -27,7 +27,13 @@ NODE_ROWS = 6
 
 @attrs.frozen
 class JointNode:
-    """Joints between the same bodies: ``bodies`` without ground, ``joints`` by index, ``rows`` together."""
+    """Joints between the same bodies.
+
+    Attributes:
+        bodies: without ground.
+        joints: by index.
+        rows: of all its joints.
+    """
 
     bodies: tuple[int, ...]
     joints: tuple[int, ...]
@@ -42,8 +48,9 @@ class Ordering:
         nodes: joint nodes.
         early: bodies eliminated first, in any order.
         hubs: bodies that wait, ascending.
-        order: what comes after the early bodies: k < len(nodes) is a joint node, else hub k - len(nodes).
-        below: for each entry of ``order`` the entries of ``order`` (by place) that it updates, ascending.
+        order: what comes after the early bodies: k is a joint node where k < len(nodes), else hub
+            k - len(nodes).
+        below: for each entry of ``order`` the places in ``order`` that it updates, ascending.
     """
 
     nodes: tuple[JointNode, ...]
@@ -114,7 +121,7 @@ def _neighbours(
 
 
 def _eliminate(neighbours: list[set[int]], size: Sequence[int], waits: dict[int, set[int]]) -> tuple[list[int], dict[int, set[int]]]:
-    """Minimum degree, weighted by rows; a node with waits is not taken before the hubs it waits for."""
+    """Minimum degree, weighted by rows; no node is taken before the hubs that it waits for."""
     weight = [sum(size[m] for m in others) for others in neighbours]
     heap = [(w, k) for k, w in enumerate(weight) if not waits.get(k)]
     heapq.heapify(heap)
@@ -166,7 +173,7 @@ def _waits(nodes: Sequence[JointNode], of_body: Sequence[list[int]], hubs: Seque
 def _spanning_tree(
     nodes: Sequence[JointNode], of_body: Sequence[list[int]], number: dict[int, int]
 ) -> tuple[dict[int, int], dict[int, int]]:
-    """Tree joint -> its outboard body, and body -> nearest hub above it (0 for none), from ground outwards."""
+    """Tree joint -> its outboard body; body -> nearest hub above it (0 for none); from ground."""
     tree: dict[int, int] = {}
     above: dict[int, int] = {}
     queue: deque[int] = deque()
@@ -198,7 +205,7 @@ def _spanning_tree(
 
 
 def _loop_hubs(node: JointNode, above: dict[int, int], number: dict[int, int]) -> set[int]:
-    """Hubs on the tree paths between the bodies of a node that closes a loop, and the one where they meet."""
+    """Hubs on the tree paths between the bodies of a closing node, and the one where they meet."""
 
     def chain(b: int) -> list[int]:
         found = []

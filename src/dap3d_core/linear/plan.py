@@ -1,4 +1,4 @@
-"""The static elimination program: where every block stands and which products are made, found once for a model."""
+"""The static elimination program of a model: where each block stands, which products are made."""
 
 from collections.abc import Sequence
 
@@ -18,15 +18,17 @@ class Plan:
     Attributes:
         ordering: what was found, for reports.
         joint_row: (joints,) place of each joint's first row in the row vectors (gamma, nu, C, x).
-        joint_block: per joint the places in D of its blocks, one for each slot (ground's in a spare place).
+        joint_block: per joint the places in D of its blocks, one a slot (ground's a spare place).
         row_size: length of the row vectors: all rows, and six for each hub.
         block_size, matrix_size: lengths of D and K.
         blocks: (b, 5) of D: place, body, rows, first row, 1 if its body is a hub.
-        targets: (t, 6) of K: place, rows, columns, first and last+1 contribution, kind (see the constants).
+        targets: (t, 6) of K: place, rows, columns, first and last+1 contribution, kind (see below).
         contributions: (c, 2) places in D of the two factors.
-        nodes: (n + 1, 6) rows, first row, place of the diagonal block, sign, first column entry, first update.
+        nodes: (n + 1, 6) rows, first row, place of the diagonal block, sign, first column entry,
+            first update.
         columns: (k, 3) blocks below the diagonal: place in K, first row, rows.
-        updates: (u, 6) place of left and right factor and of the target in K, rows, columns, 1 on the diagonal.
+        updates: (u, 6) place of left and right factor and of the target in K, rows, columns, 1 on
+            the diagonal.
         hubs: (h, 2) body and first row of each body that waits.
     """
 
@@ -50,8 +52,8 @@ class Plan:
         return int(np.sum((self.targets[:, 5] == PRODUCTS) & (self.targets[:, 3] == self.targets[:, 4])))
 
 
-#: Kinds of a target: off-diagonal sum of products, diagonal sum of products, copy of a block of D by rows or
-#: transposed, identity.
+#: Kinds of a target: off-diagonal sum of products, diagonal sum of products, copy of a block of D
+#: by rows or transposed, identity.
 PRODUCTS, DIAGONAL, COPY, TRANSPOSE, IDENTITY = range(5)
 
 

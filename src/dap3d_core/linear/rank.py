@@ -12,7 +12,8 @@ Floats = NDArray[np.float64]
 #: Up to this many rows the rank comes from singular values.
 DENSE_ROWS = 1000
 
-#: Beyond, a pivot of the block factorisation counts as zero below this part of its row's squared length.
+#: Beyond, a pivot of the block factorisation counts as zero below this part of its row's squared
+#: length.
 PIVOT_TOLERANCE = 1e-10
 
 
@@ -25,8 +26,10 @@ class Rank:
         rank: number of independent rows.
         tolerance: below this (relative to the largest) a singular value or pivot counts as zero.
         method: "svd" or "pivots".
-        shared: rows that take part in a dependency (svd), or that were found dependent on earlier ones (pivots).
-        dependencies: (redundant, rows) an orthonormal basis of the combinations of rows that vanish; empty for pivots.
+        shared: rows that take part in a dependency (svd), or that were found dependent on earlier
+            ones (pivots).
+        dependencies: (redundant, rows) an orthonormal basis of the combinations of rows that
+            vanish; empty for pivots.
     """
 
     rows: int
@@ -49,7 +52,10 @@ class Rank:
 
 
 def dense_rank(D: Floats) -> Rank:
-    """Rank of D (rows, columns) by singular values; zero is below max(rows, columns) eps 100 of the largest."""
+    """Rank of D (rows, columns) by singular values.
+
+    Zero is what is below max(rows, columns) eps 100 of the largest.
+    """
     rows, columns = D.shape
     tolerance = max(rows, columns) * np.finfo(float).eps * 100
     if not rows:
@@ -64,8 +70,9 @@ def dense_rank(D: Floats) -> Rank:
 def sparse_rank(plan: Plan, D: Floats, metric: Floats, row_places: NDArray[np.int64], columns: int) -> Rank:
     """Rank by the pivots of the block factorisation, for many rows.
 
-    The order of elimination is static, so this is weaker than singular values: a row counts as dependent when what is
-    left of it, after the rows before it, is below sqrt(PIVOT_TOLERANCE) of its length.
+    The order of elimination is static, so this is weaker than singular values: a row counts as
+    dependent when what is left of it, after the rows before it, is below sqrt(PIVOT_TOLERANCE) of
+    its length.
 
     Args:
         plan: the elimination program.

@@ -7,7 +7,7 @@ Floats = NDArray[np.float64]
 
 
 def rotation(p: ArrayLike) -> Floats:
-    """Rotation matrices (..., 3, 3), body to global, of Euler parameters (..., 4) of any length but zero."""
+    """Rotation matrices (..., 3, 3), body to global, of Euler parameters (..., 4) of any length."""
     p = np.asarray(p, dtype=float)
     e0, e1, e2, e3 = np.moveaxis(p / np.linalg.norm(p, axis=-1, keepdims=True), -1, 0)
     return np.moveaxis(
@@ -40,7 +40,7 @@ def _apply(A: Floats, vector: ArrayLike) -> Floats:
 
 
 def split(u: ArrayLike, n: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Views r (..., n, 3), p (..., n, 4), r_dot (..., n, 3), w (..., n, 3) of states u (..., 13 n)."""
+    """Views r (..., n, 3), p (..., n, 4), r_dot (..., n, 3), w (..., n, 3) of u (..., 13 n)."""
     u = np.asarray(u, dtype=float)
     q = u[..., : 7 * n].reshape(*u.shape[:-1], n, 7)
     v = u[..., 7 * n : 13 * n].reshape(*u.shape[:-1], n, 6)
@@ -55,7 +55,7 @@ def join(r: ArrayLike, p: ArrayLike, v: ArrayLike, w: ArrayLike) -> Floats:
 
 
 def to_integrated(u: ArrayLike, n: int, work: ArrayLike = 0.0) -> Floats:
-    """The integrated state y (..., 13 n + 1): angular velocities in body axes, and the work last."""
+    """The integrated state y (..., 13 n + 1): angular velocities in body axes, the work last."""
     r, p, v, w = split(u, n)
     work = np.broadcast_to(np.asarray(work, dtype=float), r.shape[:-2])[..., None]
     return np.concatenate([join(r, p, v, to_body(p, w)), work], axis=-1)

@@ -1,6 +1,7 @@
 """The model: a checked scene as integers and arrays. No names are looked up after this floor.
 
-Coordinates stand in the state u in the order of the manual: r, p of every body, then r_dot, omega of every body.
+Coordinates stand in the state u in the order of the manual: r, p of every body, then r_dot, omega
+of every body.
 """
 
 from functools import cached_property
@@ -76,7 +77,7 @@ class Model:
 
     @cached_property
     def irv(self) -> Integers:
-        """(n,) index in v_dot, and column in the Jacobian, of the first acceleration of each body."""
+        """(n,) index in v_dot, column in the Jacobian, of the first acceleration of each body."""
         return 6 * np.arange(self.body_count, dtype=np.int64)
 
     @cached_property

@@ -45,7 +45,7 @@ class CompiledModel:
         registry: Registry | None = None,
         announce: Announce | None = None,
     ) -> None:
-        """Check a scene, build its model and compile what it needs; arguments as ``compile`` has them."""
+        """Check a scene, build its model, compile what it needs; arguments as for ``compile``."""
         started = time.perf_counter()
         self.scene: Scene = scene if isinstance(scene, Scene) else load(Path(scene) if isinstance(scene, os.PathLike) else scene)
         self.checked: Checked = check(self.scene, registry or load_registry(), allow_code=allow_code)
@@ -65,7 +65,9 @@ class CompiledModel:
         return self.scene.to_toml()
 
     def rhs(self, t: float, u: ArrayLike) -> Floats:
-        """du/dt (13 n,) at time t in s and state u (13 n,): r_dot, p_dot of each body, then r_ddot, omega_dot.
+        """du/dt (13 n,) at time t in s and state u (13 n,).
+
+        In the order of u: r_dot, p_dot of each body, then r_ddot, omega_dot of each.
 
         Raises:
             ValueError: u has not 13 n finite numbers.

@@ -4,7 +4,7 @@ from typing import Any
 
 
 class SimulationError(Exception):
-    """A run could not start or could not go on; ``result`` is what was computed until then, or None."""
+    """A run could not start or go on; ``result`` is what was computed until then, or None."""
 
     def __init__(self, message: str, result: Any = None) -> None:
         super().__init__(message)

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 from dap3d_core.assembly.system import System
 from dap3d_core.formulations.build import set_metric
 from dap3d_core.formulations.machine import Machine, Rows
-from dap3d_core.formulations.standard import correct, linearise
 from dap3d_core.linear.rank import DENSE_ROWS
 from dap3d_core.model.kinematics import join, split
 from dap3d_core.simulation.errors import AssemblyError
@@ -17,7 +16,7 @@ Floats = NDArray[np.float64]
 #: Position residuals above this are corrected; Newton stops below it.
 TOLERANCE = 1e-10
 MOST_PASSES = 25
-#: A pass turns no body by more than this (rad), and moves none by more than this part of the model's size.
+#: A pass turns no body by more than this (rad), moves none by more than this part of the model.
 MOST_TURN, MOST_SHIFT = 0.5, 0.5
 #: Singular values below this part of the largest are left out of the least-norm solution.
 RCOND = 1e-10
@@ -52,13 +51,13 @@ def violation(machine: Machine, u: Floats, t: float = 0.0) -> tuple[float, float
 
 
 def correct_initial(machine: Machine, u: Floats, t: float = 0.0) -> Initial:
-    """Correct positions by Newton's method and velocities by one linear step, each by the least change.
+    """Correct positions by Newton's method, velocities by one linear step, each by the least change.
 
-    The least change is that of the sum of squares of displacements, rotations and velocities, as in the manual.
-    Rows without a position level do not take part in the position stage.
+    The least change is that of the sum of squares of displacements, rotations and velocities, as in
+    the manual. Rows without a position level do not take part in the position stage.
 
     Raises:
-        AssemblyError: the position residual does not vanish; the message has the residual of each joint.
+        AssemblyError: the position residual does not vanish; the message has that of each joint.
     """
     before = violation(machine, u, t)
     if not machine.model.row_count:
@@ -103,8 +102,10 @@ def _least_change(machine: Machine, rows: Rows, residual: Floats, t: float, u: F
 def _sparse_least_change(machine: Machine, residual: Floats, t: float) -> Floats:
     """The same by the block factorisation, every mass and inertia set to one; for many rows.
 
-    Rows without a position level are kept as they are here: the correction does not move along them.
+    Rows without a position level are kept here: the correction does not move along them.
     """
+    from dap3d_core.formulations.standard import correct, linearise
+
     system: System = machine.system
     metric = system.metric.copy()
     n = machine.model.body_count
@@ -124,7 +125,7 @@ def _sparse_least_change(machine: Machine, residual: Floats, t: float) -> Floats
 
 
 def _displaced(u: Floats, change: Floats, n: int) -> Floats:
-    """r + dr, and p turned by the small global rotation dtheta (p + 1/2 G^T dtheta, of unit length)."""
+    """The state with r + dr, and with p + 1/2 G^T dtheta of unit length (dtheta global, small)."""
     r, p, v, w = split(u, n)
     e0, e, turn = p[:, :1], p[:, 1:], 0.5 * change[:, 3:]
     dp = np.hstack([-np.sum(e * turn, axis=1, keepdims=True), e0 * turn + np.cross(turn, e)])

@@ -16,7 +16,7 @@ AHEAD = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
 
 
 def find_offender(machine: Machine, t: float, y: Floats, t_stop: float) -> str:
-    """Name what is not finite at or just after time t with the integrated state y; "" where nothing is found."""
+    """Name what is not finite at or just after time t with the integrated state y; "" for nothing."""
     for later in (t, t_stop, *(t + part * (1.0 + abs(t)) for part in AHEAD)):
         found = _at(machine, later, y)
         if found:
@@ -63,7 +63,7 @@ def _name(machine: Machine, kind: str, group: Group, k: int) -> str:
 
 
 def _singular(machine: Machine, t: float) -> str:
-    """The joint whose rows (nearly) depend on those before, where the constraint matrix is (nearly) singular."""
+    """The joint whose rows (nearly) depend on those before, where the pose is (nearly) singular."""
     if machine.method != "standard" or not machine.model.row_count:
         return ""
     from dap3d_core.formulations.standard import linearise

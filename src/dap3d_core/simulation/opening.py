@@ -14,8 +14,9 @@ from dap3d_core.simulation.compiled import CompiledModel
 def open_result(path: str | os.PathLike[str]) -> Result:
     """Open a result file.
 
-    Positions, velocities, accelerations, multipliers and energies come from the file; the Jacobian and reactions are
-    computed when asked for, which loads the types that the stored scene names (never types of a model's own file).
+    Positions, velocities, accelerations, multipliers and energies come from the file; the Jacobian
+    and reactions are computed when asked for, which loads the types that the stored scene names
+    (never types of a model's own file).
 
     Args:
         path: a NetCDF file that ``Result.save`` or ``dap3d run`` wrote.

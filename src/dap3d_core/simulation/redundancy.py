@@ -10,7 +10,7 @@ from dap3d_core.linear.rank import DENSE_ROWS, Rank, dense_rank, sparse_rank
 
 Floats = NDArray[np.float64]
 
-#: A combination of redundant rows that should vanish, and misses zero by more than this, is a contradiction.
+#: Redundant rows whose combination misses zero by more than this contradict each other.
 CONSISTENT = 1e-8
 
 
@@ -21,7 +21,7 @@ class Redundancy:
     Attributes:
         rank: rows, rank, degrees of freedom.
         joints: names of the joints whose rows depend on each other, in file order.
-        contradiction: how much prescribed velocities of dependent rows disagree; zero where they agree.
+        contradiction: how much prescribed velocities of dependent rows disagree.
     """
 
     rank: Rank

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 
 from dap3d_core.integrators import METHODS, Integration, Status
+from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import Result, Statistics
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, check_simulation
 from dap3d_core.simulation.compiled import CompiledModel
@@ -47,13 +48,14 @@ def simulate(
 ) -> Result:
     """Simulate a scene from t = 0 to t_end.
 
-    What is left out is taken from the scene's [simulation], and there by default method "auto", integrator "dop853",
-    rtol 1e-8, atol 1e-10, correct and project on.
+    What is left out is taken from the scene's [simulation], and there by default method "auto",
+    integrator "dop853", rtol 1e-8, atol 1e-10, correct and project on.
 
     Args:
         scene: a Scene, what ``load`` takes, or a model that was compiled before.
         t_end: final time, s; 0 solves once at t = 0.
-        dt: reporting step, s; t_end / 100 when nobody gives one. When it does not divide t_end, t_end is reported too.
+        dt: reporting step, s; t_end / 100 when nobody gives one. When it does not divide t_end,
+            t_end is reported too.
         method: "auto", "unconstrained" or "standard".
         integrator: "dopri5", "dop853" or "rk4" (which needs ``step``).
         rtol, atol: tolerances of the step's error.
@@ -65,8 +67,8 @@ def simulate(
         announce: called with the name of each kernel that has to be compiled anew.
 
     Returns:
-        the result. Any exception that ends the integration carries what was computed until then as ``.result``;
-        KeyboardInterrupt and exceptions of ``progress`` come out as they are.
+        the result. Any exception that ends the integration carries what was computed until then as
+        ``.result``; KeyboardInterrupt and exceptions of ``progress`` come out as they are.
 
     Raises:
         SceneError, PluginError: as ``compile``; also for settings that make no sense.
@@ -81,7 +83,7 @@ def simulate(
                  correct=correct, project=project)  # fmt: skip
     settings = attrs.evolve(compiled.scene.simulation, **{k: v for k, v in given.items() if v is not None})
     check_simulation(settings, compiled.model.body_names)
-    return _Run(compiled, settings).go(progress)
+    return _Run(compiled, settings, announce).go(progress)
 
 
 def report_times(t_end: float | None, dt: float | None) -> Floats:
@@ -107,7 +109,8 @@ def report_times(t_end: float | None, dt: float | None) -> Floats:
 class _Run:
     """One run of a compiled model."""
 
-    def __init__(self, compiled: CompiledModel, settings: Any) -> None:
+    def __init__(self, compiled: CompiledModel, settings: Any, announce: Callable[[str], None] | None) -> None:
+        self.announce = announce
         self.compiled = compiled
         self.machine = compiled.machine
         self.settings = settings
@@ -191,6 +194,8 @@ class _Run:
 
     def _compile(self, integration: Integration) -> None:
         """Compile the integrator before the clock of the run goes on."""
+        if self.announce is not None and not driver_is_cached("integrators"):
+            self.announce("the integrator")
         before = time.perf_counter()
         integration.compile()
         self.compile_time = time.perf_counter() - before

@@ -1,0 +1,72 @@
+"""Cylindrical joint: a body turns about an axis and slides along it."""
+
+from dap3d_core.interface import Joint, Vector, Vector2, hookimpl, vector, vector2
+from dap3d_core.kernels import add, cross, dot, neg, normals, row, scale, sub
+
+interface_version = 1
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+class Cylindrical(Joint):
+    """Axis a_i stays on the line of a_j; one rotation and one translation are left free.
+
+    Manual: ``cyl``, formulation II; spec 3.2, 3.3, 4.4. d runs from a point of the axis on body i
+    to one on body j; n_j and m_j complete a_j to a triad on body j. Rows 1 and 2, for b = n_j, m_j,
+    keep the axes parallel; rows 3 and 4 keep d along the axis:
+
+        C     = a_i . b                                C     = d . b
+        J_i   = [0, (a_i x b)^T]                       J_i   = [-b^T, -(s_i x b)^T]
+        J_j   = [0, -(a_i x b)^T]                      J_j   = [b^T, ((s_j - d) x b)^T]
+        gamma = (a_i_dot x b + a_i x b_dot).(w_j - w_i)
+        gamma = (w_i x s_i_dot).b + (w_j x d + s_j_dot - 2 d_dot).b_dot
+    """
+
+    keyword, rows = "cyl", 4
+    a_i: Vector = vector(doc="axis on body i")
+    a_j: Vector = vector(doc="axis on body j")
+    d: Vector2 = vector2(doc="from a point of the axis on body i to one on body j")
+
+    def prepare(self, bodies):
+        n, m = normals(self.a_j)
+        return {"n_j": n, "m_j": m}
+
+    def C(a_i, n_j, m_j, d):
+        return dot(a_i, n_j), dot(a_i, m_j), dot(d, n_j), dot(d, m_j)
+
+    def J(a_i, n_j, m_j, d, s_P_i, s_P_j):
+        p, q = cross(a_i, n_j), cross(a_i, m_j)
+        arm = sub(s_P_j, d)
+        return (
+            (
+                row(ZERO, p),
+                row(ZERO, q),
+                row(neg(n_j), neg(cross(s_P_i, n_j))),
+                row(neg(m_j), neg(cross(s_P_i, m_j))),
+            ),
+            (
+                row(ZERO, neg(p)),
+                row(ZERO, neg(q)),
+                row(n_j, cross(arm, n_j)),
+                row(m_j, cross(arm, m_j)),
+            ),
+        )
+
+    def gamma(a_i, n_j, m_j, d, a_i_dot, n_j_dot, m_j_dot, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j):
+        w = sub(w_j, w_i)
+        p_dot = add(cross(a_i_dot, n_j), cross(a_i, n_j_dot))
+        q_dot = add(cross(a_i_dot, m_j), cross(a_i, m_j_dot))
+        centripetal = cross(w_i, s_P_i_dot)
+        slide = sub(add(cross(w_j, d), s_P_j_dot), scale(2.0, d_dot))
+        return (
+            dot(p_dot, w),
+            dot(q_dot, w),
+            dot(centripetal, n_j) + dot(slide, n_j_dot),
+            dot(centripetal, m_j) + dot(slide, m_j_dot),
+        )
+
+
+@hookimpl
+def dap3d_joints():
+    """The joint types of this module."""
+    return [Cylindrical]

@@ -1,0 +1,92 @@
+"""Translational joint: a body slides along an axis without turning against the other."""
+
+from dap3d_core.interface import Joint, Vector, Vector2, hookimpl, matrix, vector, vector2
+from dap3d_core.kernels import add, cross, dot, neg, normals, row, scale, skew, sub
+from dap3d_joints.orientation import error, error_rate, quaternion
+
+interface_version = 1
+
+ZERO = (0.0, 0.0, 0.0)
+NO_TURN = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+class Translational(Joint):
+    """A_i^T A_j stays A_c, and d along a_j; one translation is left free.
+
+    Manual: ``tran``, formulation II; spec 3.3, 3.4, 4.5. With the error quaternion
+    q = p_j o conj(p_c) o conj(p_i) = (q0, e), rows 1 to 3:
+
+        C     = 2 e
+        J_i   = [0, -(q0 I + e~)],  J_j = [0, q0 I - e~]
+        gamma = -q0_dot (w_j - w_i) + e_dot x (w_i + w_j)
+
+    Rows 4 and 5, for b = n_j and m_j, which complete a_j to a triad on body j:
+
+        C     = d . b
+        J_i   = [-b^T, -(s_i x b)^T],  J_j = [b^T, ((s_j - d) x b)^T]
+        gamma = (w_i x s_i_dot) . b + (w_j x d + s_j_dot - 2 d_dot) . b_dot
+
+    On the constraints these are the manual's; it prints J = [0, -I], [0, I] and gamma = 0 for rows 1 to 3.
+    """
+
+    keyword, rows = "tran", 5
+    a_j: Vector = vector(doc="direction of sliding, on body j")
+    d: Vector2 = vector2(doc="from a point of the axis on body i to one on body j")
+    A_c: tuple = matrix(default=NO_TURN, doc="constant orientation A_i^T A_j, a rotation")
+
+    def prepare(self, bodies):
+        n, m = normals(self.a_j)
+        check_rotation(self.A_c)
+        return {"n_j": n, "m_j": m, "p_c": quaternion(self.A_c)}
+
+    def C(p_i, p_j, p_c, d, n_j, m_j):
+        _, e = error(p_j, p_c, p_i)
+        return (*scale(2.0, e), dot(d, n_j), dot(d, m_j))
+
+    def J(p_i, p_j, p_c, d, n_j, m_j, s_P_i, s_P_j):
+        q0, e = error(p_j, p_c, p_i)
+        x, y, z = skew(e)
+        X, Y, Z = (q0, 0.0, 0.0), (0.0, q0, 0.0), (0.0, 0.0, q0)
+        arm = sub(s_P_j, d)
+        return (
+            (
+                row(ZERO, neg(add(X, x))),
+                row(ZERO, neg(add(Y, y))),
+                row(ZERO, neg(add(Z, z))),
+                row(neg(n_j), neg(cross(s_P_i, n_j))),
+                row(neg(m_j), neg(cross(s_P_i, m_j))),
+            ),
+            (
+                row(ZERO, sub(X, x)),
+                row(ZERO, sub(Y, y)),
+                row(ZERO, sub(Z, z)),
+                row(n_j, cross(arm, n_j)),
+                row(m_j, cross(arm, m_j)),
+            ),
+        )
+
+    def gamma(p_i, p_j, p_c, d, d_dot, n_j, m_j, n_j_dot, m_j_dot, s_P_i_dot, s_P_j_dot, w_i, w_j):
+        q0, e = error(p_j, p_c, p_i)
+        q0_dot, e_dot = error_rate(q0, e, w_i, w_j)
+        turn = add(scale(-q0_dot, sub(w_j, w_i)), cross(e_dot, add(w_i, w_j)))
+        centripetal = cross(w_i, s_P_i_dot)
+        slide = sub(add(cross(w_j, d), s_P_j_dot), scale(2.0, d_dot))
+        return (
+            *turn,
+            dot(centripetal, n_j) + dot(slide, n_j_dot),
+            dot(centripetal, m_j) + dot(slide, m_j_dot),
+        )
+
+
+def check_rotation(A):
+    """Refuse a matrix that is no rotation: A^T A = I and det A = 1, to 1e-6."""
+    x, y, z = A
+    worst = max(abs(dot(a, b) - (a is b)) for a in A for b in A)
+    if worst > 1e-6 or abs(dot(x, cross(y, z)) - 1.0) > 1e-6:
+        raise ValueError("A_c is not a rotation matrix; give A_i^T A_j, with orthonormal rows")
+
+
+@hookimpl
+def dap3d_joints():
+    """The joint types of this module."""
+    return [Translational]

@@ -1,0 +1,70 @@
+"""What the documents show works as it stands there: every block of code is run."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+from support.process import REPOSITORY, environment
+
+
+def blocks(text, language):
+    """Fenced blocks of code in a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def commands(text, program):
+    """Indented lines of a document that call a program, as the words behind it."""
+    lines = re.findall(rf"^    {re.escape(program)} (.*)$", text, flags=re.MULTILINE)
+    return [shlex.split(line, comments=True) for line in lines]
+
+
+def dap3d(words, folder):
+    program = [sys.executable, "-m", "dap3d_core.cli", *words]
+    return subprocess.run(
+        program, cwd=folder, env=environment(), capture_output=True, text=True, timeout=300
+    )
+
+
+def test_the_readme(tmp_path):
+    """The scene, the commands and the script of the README, in this order, in an empty folder."""
+    text = (REPOSITORY / "README.md").read_text()
+    (scene,) = blocks(text, "toml")
+    (tmp_path / "cone.toml").write_text(scene)
+    found = commands(text, ".venv/bin/dap3d")
+    assert [words[0] for words in found] == ["check", "run", "plot"]
+    for words in found:
+        done = dap3d(words, tmp_path)
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "cone.png").stat().st_size > 1000
+    (tmp_path / "cone.nc").unlink()
+    (script,) = blocks(text, "python")
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "cone.nc").exists()
+
+
+def test_the_first_commands_of_the_readme_are_targets():
+    """The two commands at the top exist in the Makefile."""
+    text = (REPOSITORY / "README.md").read_text()
+    targets = [words[0] for words in commands(text, "make")]
+    assert targets[:2] == ["run", "test"]
+    makefile = (REPOSITORY / "Makefile").read_text()
+    for target in targets:
+        assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
+
+
+def test_every_decision_and_document_that_is_named_exists():
+    """Relative links and paths of documents lead somewhere."""
+    for document in [
+        REPOSITORY / "README.md",
+        REPOSITORY / "CONTRIBUTING.md",
+        *(REPOSITORY / "docs").rglob("*.md"),
+    ]:
+        for link in re.findall(r"\]\((?!https?:|#)([^)#]+)", document.read_text()):
+            assert (document.parent / link).exists() or Path(link).is_absolute(), (
+                f"{document.name}: {link}"
+            )
