@@ -1,4 +1,4 @@
-"""Random smooth motions of bodies, with exact rates: the contract of a type is tested along them."""
+"""Random smooth motions of bodies, with exact rates: the contract is tested along them."""
 
 import numpy as np
 from numpy.polynomial import Polynomial

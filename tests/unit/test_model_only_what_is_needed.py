@@ -32,7 +32,7 @@ def test_the_command_help_imports_nothing_heavy():
     ],
 )
 def test_a_model_loads_only_its_own_types(model, present, absent):
-    """Types that the scene does not name are not imported; without joints no joint loop is written."""
+    """Types that the scene does not name are not imported; without joints no joint loop is made."""
     script = (
         "import dap3d_core as dap\n"
         f"compiled = dap.compile(dap.load({model!r}))\n"

@@ -27,7 +27,7 @@ A01 = {
 @pytest.mark.parametrize("t", A01)
 @pytest.mark.parametrize("integrator", ["dop853", "dopri5"])
 def test_pendulum(t, integrator):
-    """A01: position, velocity, tension by elliptic functions; 4 periods amplify 1e-11 by some 100."""
+    """A01: position, velocity, tension by elliptic functions; 4 periods amplify 1e-11 by 100."""
     result = last(problems.pendulum(), t, integrator=integrator)
     x, y, vx, vy, tension = A01[t]
     assert result.r[-1, 0, :2] == pytest.approx([x, y], abs=2e-9)
@@ -74,7 +74,7 @@ def test_asymmetric_body(t, integrator):
 
 
 def test_flip_of_the_asymmetric_body():
-    """J = 1, 2, 3 turning about the middle axis flips; at rtol 1e-8 it errs below 1e-6 after 10 s."""
+    """J = 1, 2, 3 turning about the middle axis flips; at rtol 1e-8 it errs < 1e-6 after 10 s."""
     scene = problems.free_body((1.0, 2.0, 3.0), (0.001, 5.0, 0.001))
     coarse = last(scene, 10.0, rtol=1e-8, atol=1e-10)
     fine = last(scene, 10.0, rtol=1e-13, atol=1e-15)

@@ -5,11 +5,14 @@ more: the work done on the system (docs/decisions/0002). It reads r, p of all bo
 bodies; work.
 """
 
+from typing import Any
+
+from dap3d_core.assembly.system import Floats, Integers
 from dap3d_core.kernels.cache import compiled, compiled_inside
 
 
 @compiled
-def place_bodies(y, body, metric):
+def place_bodies(y: Floats, body: Floats, metric: Floats) -> None:
     """Poses and velocities of the bodies of a state: fills body (r, A, v, w, p) and B of metric."""
     n = body.shape[0] - 1
     for b in range(1, n + 1):
@@ -18,9 +21,15 @@ def place_bodies(y, body, metric):
         e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
         h = 1.0 / (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3) ** 0.5
         e0, e1, e2, e3 = e0 * h, e1 * h, e2 * h, e3 * h
-        a00, a01, a02 = 1.0 - 2.0 * (e2 * e2 + e3 * e3), 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)
-        a10, a11, a12 = 2.0 * (e1 * e2 + e0 * e3), 1.0 - 2.0 * (e1 * e1 + e3 * e3), 2.0 * (e2 * e3 - e0 * e1)
-        a20, a21, a22 = 2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)
+        a00 = 1.0 - 2.0 * (e2 * e2 + e3 * e3)
+        a01 = 2.0 * (e1 * e2 - e0 * e3)
+        a02 = 2.0 * (e1 * e3 + e0 * e2)
+        a10 = 2.0 * (e1 * e2 + e0 * e3)
+        a11 = 1.0 - 2.0 * (e1 * e1 + e3 * e3)
+        a12 = 2.0 * (e2 * e3 - e0 * e1)
+        a20 = 2.0 * (e1 * e3 - e0 * e2)
+        a21 = 2.0 * (e2 * e3 + e0 * e1)
+        a22 = 1.0 - 2.0 * (e1 * e1 + e2 * e2)
         w0, w1, w2 = y[f + 3], y[f + 4], y[f + 5]
         s[0], s[1], s[2] = y[c], y[c + 1], y[c + 2]
         s[3], s[4], s[5] = a00, a01, a02
@@ -38,7 +47,20 @@ def place_bodies(y, body, metric):
 
 
 @compiled
-def call_loops(first, last, t, body, F, idx, par, groups, loops, out1, out2, out3):
+def call_loops(
+    first: int,
+    last: int,
+    t: float,
+    body: Floats,
+    F: Floats,
+    idx: Integers,
+    par: Floats,
+    groups: Integers,
+    loops: Any,
+    out1: Floats,
+    out2: Floats,
+    out3: Floats,
+) -> None:
     """Call the group loops from first to last - 1."""
     for q in range(first, last):
         loop = loops[q]
@@ -46,14 +68,14 @@ def call_loops(first, last, t, body, F, idx, par, groups, loops, out1, out2, out
 
 
 @compiled_inside
-def zero(values):
+def zero(values: Floats) -> None:
     """Fill with zeros (a slice assignment would compile numpy's error messages)."""
     for k in range(values.shape[0]):
         values[k] = 0.0
 
 
 @compiled_inside
-def scale_forces(body, metric, force):
+def scale_forces(body: Floats, metric: Floats, force: Floats) -> float:
     """Power of the applied forces; then ``force`` becomes the scaled right-hand side of the bodies.
 
     Per body (f, n) becomes (f / sqrt(m), B^T n - U^T (w' x J' w')), the gyroscopic moment included.
@@ -61,7 +83,8 @@ def scale_forces(body, metric, force):
     power = 0.0
     for b in range(1, body.shape[0]):
         s, k, o = body[b], metric[b], 6 * b
-        f0, f1, f2, n0, n1, n2 = force[o], force[o + 1], force[o + 2], force[o + 3], force[o + 4], force[o + 5]
+        f0, f1, f2 = force[o], force[o + 1], force[o + 2]
+        n0, n1, n2 = force[o + 3], force[o + 4], force[o + 5]
         power += f0 * s[12] + f1 * s[13] + f2 * s[14] + n0 * s[15] + n1 * s[16] + n2 * s[17]
         w0 = s[3] * s[15] + s[6] * s[16] + s[9] * s[17]
         w1 = s[4] * s[15] + s[7] * s[16] + s[10] * s[17]
@@ -78,7 +101,7 @@ def scale_forces(body, metric, force):
 
 
 @compiled_inside
-def scale_velocities(body, metric, force):
+def scale_velocities(body: Floats, metric: Floats, force: Floats) -> None:
     """The velocities of the bodies in scaled coordinates, into ``force``: (sqrt(m) v, L^T w')."""
     for b in range(1, body.shape[0]):
         s, k, o = body[b], metric[b], 6 * b
@@ -92,7 +115,7 @@ def scale_velocities(body, metric, force):
 
 
 @compiled_inside
-def rates(y, metric, force, out):
+def rates(y: Floats, metric: Floats, force: Floats, out: Floats) -> None:
     """dy/dt of coordinates from y and of velocities from the scaled accelerations in ``force``."""
     n = metric.shape[0] - 1
     for b in range(1, n + 1):
@@ -112,7 +135,7 @@ def rates(y, metric, force, out):
 
 
 @compiled_inside
-def global_accelerations(metric, force, out):
+def global_accelerations(metric: Floats, force: Floats, out: Floats) -> None:
     """v_dot (6 n: r_ddot, omega_dot, global) from the scaled accelerations: omega_dot = B a."""
     for b in range(1, metric.shape[0]):
         o, k = 6 * b, metric[b]
@@ -123,7 +146,7 @@ def global_accelerations(metric, force, out):
 
 
 @compiled_inside
-def largest(values):
+def largest(values: Floats) -> float:
     """Largest magnitude; NaN where one is NaN."""
     found = 0.0
     for k in range(values.shape[0]):

@@ -4,19 +4,20 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dap3d_core.assembly.system import KINDS, System
+from dap3d_core.assembly.system import KINDS, Floats, Integers, System
+from dap3d_core.interface.checks import PluginError, where_is
 from dap3d_core.interface.writer import stride, write
 from dap3d_core.kernels.gather import BODY_WIDTH, JP, MASS, A, P
 from dap3d_core.kernels.lists import loop_list
-from dap3d_core.interface.checks import PluginError, where_is
 from dap3d_core.kernels.loops import Loop, build
 from dap3d_core.linear.plan import Plan
 from dap3d_core.model import Group, Model
 
 
-def build_loops(model: Model, kinds: tuple[str, ...], announce: Callable[[str], None] | None = None) -> Any:
+def build_loops(
+    model: Model, kinds: tuple[str, ...], announce: Callable[[str], None] | None = None
+) -> Any:
     """The compiled group loops of a model, only of the kinds asked for, and what they run over.
 
     Returns:
@@ -38,10 +39,12 @@ def _compiled(loop: Loop, group: Group, announce: Callable[[str], None] | None) 
     try:
         return build(loop, announce)
     except Exception as error:
-        reason = next((line for line in str(error).splitlines() if line.strip()), type(error).__name__)
+        said = [line for line in str(error).splitlines() if line.strip()]
+        reason = said[0] if said else type(error).__name__
         raise PluginError(
-            f"{where_is(group.examined.type)}: numba cannot compile its kernels ({loop.name}): {reason}. "
-            "A kernel is plain: tuples of numbers, the words of dap3d_core.kernels, where() for branches"
+            f"{where_is(group.examined.type)}: numba cannot compile its kernels ({loop.name}): "
+            f"{reason}. A kernel is plain: tuples of numbers, the words of dap3d_core.kernels, "
+            "where() for branches"
         ) from error
 
 
@@ -89,7 +92,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
     )
 
 
-def set_metric(metric: NDArray[np.float64], mass: NDArray[np.float64], Jp: NDArray[np.float64]) -> None:
+def set_metric(metric: Floats, mass: Floats, Jp: Floats) -> None:
     """Fill the metric's constants: 1/sqrt(m), and U = L^-T with J' = L L^T (ground: zero)."""
     if not len(mass):
         return
@@ -98,7 +101,7 @@ def set_metric(metric: NDArray[np.float64], mass: NDArray[np.float64], Jp: NDArr
     metric[1:, 1:7] = U[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
 
 
-def rows_of(model: Model, plan: Plan) -> NDArray[np.int64]:
+def rows_of(model: Model, plan: Plan) -> Integers:
     """(rows,) place of each constraint row of the model in the row vectors."""
     first = np.repeat(plan.joint_row, model.joint_rows)
     return first + np.arange(model.row_count) - np.repeat(model.joint_start[:-1], model.joint_rows)
@@ -106,8 +109,8 @@ def rows_of(model: Model, plan: Plan) -> NDArray[np.int64]:
 
 def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[Any, Any, Any, Any]:
     """Integers and numbers of all instances; a group that serves two loops stands there once."""
-    idx: list[NDArray[np.int64]] = []
-    par: list[NDArray[np.float64]] = []
+    idx: list[Integers] = []
+    par: list[Floats] = []
     at: dict[int, tuple[int, int]] = {}
     i0 = p0 = 0
     rows = []
@@ -120,16 +123,16 @@ def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[An
             i0, p0 = i0 + table.size, p0 + group.numbers.size
         rows.append((*at[id(group)], group.count))
     kinds = [kind for kind, _ in what]
-    starts = np.array([sum(KINDS.index(k) < n for k in kinds) for n in range(len(KINDS) + 1)], dtype=np.int64)
+    starts = [sum(KINDS.index(k) < n for k in kinds) for n in range(len(KINDS) + 1)]
     return (
         np.concatenate([np.zeros(0, dtype=np.int64), *idx]),
         np.concatenate([np.zeros(0), *par]),
         np.array(rows, dtype=np.int64).reshape(-1, 3),
-        starts,
+        np.array(starts, dtype=np.int64),
     )
 
 
-def _integers_of(group: Group, plan: Plan) -> NDArray[np.int64]:
+def _integers_of(group: Group, plan: Plan) -> Integers:
     """The rows of ``idx`` of a group, as interface/writer.py lays them out."""
     kind = group.examined.type.kind
     parts = [group.bodies, group.functions]

@@ -6,17 +6,15 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dap3d_core.assembly.evaluate import call_loops, place_bodies
-from dap3d_core.assembly.system import ACCELERATION, POSITION, VALUE, System
+from dap3d_core.assembly.system import ACCELERATION, POSITION, VALUE, Floats, Integers, System
 from dap3d_core.formulations import LOOPS, REPORT, RHS, functions_of
 from dap3d_core.formulations.build import build_loops, build_system
 from dap3d_core.linear.plan import Plan, make_plan
 from dap3d_core.model import Model
 from dap3d_core.model.kinematics import split, to_global, to_integrated
-
-Floats = NDArray[np.float64]
 
 
 @attrs.frozen
@@ -32,8 +30,8 @@ class Rows:
     C: Floats
     nu: Floats
     gamma: Floats
-    row: NDArray[np.int64]
-    column: NDArray[np.int64]
+    row: Integers
+    column: Integers
     value: Floats
     shape: tuple[int, int]
 
@@ -63,7 +61,9 @@ class Machine:
         report_size: numbers that ``report`` writes (formulations/standard.py).
     """
 
-    def __init__(self, model: Model, method: str, announce: Callable[[str], None] | None = None) -> None:
+    def __init__(
+        self, model: Model, method: str, announce: Callable[[str], None] | None = None
+    ) -> None:
         """Args:
         model: what to evaluate.
         method: "unconstrained" or "standard".
@@ -142,13 +142,11 @@ class Machine:
 
     def _call(self, kind: int, t: float, out1: Floats, out2: Floats, out3: Floats) -> None:
         s = self.system
-        call_loops(
-            s.kinds[kind], s.kinds[kind + 1], float(t), s.body, s.F, s.idx, s.par, s.groups, self.loops,
-            out1, out2, out3,
-        )  # fmt: skip
+        call_loops(s.kinds[kind], s.kinds[kind + 1], float(t), s.body, s.F, s.idx,
+                   s.par, s.groups, self.loops, out1, out2, out3)  # fmt: skip
 
     @cached_property
-    def _pattern(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    def _pattern(self) -> tuple[Integers, Integers, Integers]:
         """Row, column and place in D of the Jacobian's entries."""
         s = self.system
         blocks = self.plan.blocks

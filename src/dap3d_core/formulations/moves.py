@@ -1,20 +1,22 @@
 """Changes of a state: displacements, changes of velocity, in the bodies' scaled coordinates."""
 
+from dap3d_core.assembly.system import Floats
 from dap3d_core.kernels.cache import compiled_inside
 
 
 @compiled_inside
-def normalise(y, n):
+def normalise(y: Floats, n: int) -> None:
     """Bring the Euler parameters of n bodies to unit length."""
     for b in range(n):
         c = 7 * b + 3
-        h = 1.0 / (y[c] * y[c] + y[c + 1] * y[c + 1] + y[c + 2] * y[c + 2] + y[c + 3] * y[c + 3]) ** 0.5
+        e0, e1, e2, e3 = y[c], y[c + 1], y[c + 2], y[c + 3]
+        h = 1.0 / (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3) ** 0.5
         for d in range(c, c + 4):
             y[d] *= h
 
 
 @compiled_inside
-def move(y, metric, force):
+def move(y: Floats, metric: Floats, force: Floats) -> None:
     """Add a scaled displacement: r += dr, p += 1/2 L^T dtheta', of unit length again."""
     for b in range(1, metric.shape[0]):
         c, o, k = 7 * (b - 1), 6 * b, metric[b]
@@ -33,7 +35,7 @@ def move(y, metric, force):
 
 
 @compiled_inside
-def change_velocity(y, metric, force):
+def change_velocity(y: Floats, metric: Floats, force: Floats) -> None:
     """Add a scaled change of velocity to the velocities."""
     n = metric.shape[0] - 1
     for b in range(1, n + 1):
@@ -47,7 +49,7 @@ def change_velocity(y, metric, force):
 
 
 @compiled_inside
-def size_of(y, first, count, period, part):
+def size_of(y: Floats, first: int, count: int, period: int, part: int) -> float:
     """1 + the largest magnitude in the first ``part`` of each ``period``: scale of a tolerance."""
     found = 0.0
     for b in range(count):

@@ -1,5 +1,10 @@
 """Unconstrained formulation: M v_dot = g, for scenes without joints (manual: analysis_uc)."""
 
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
 from dap3d_core.assembly.evaluate import (
     call_loops,
     global_accelerations,
@@ -8,24 +13,24 @@ from dap3d_core.assembly.evaluate import (
     scale_forces,
     zero,
 )
-from dap3d_core.assembly.system import ENERGY, VALUE, WRENCH
+from dap3d_core.assembly.system import ENERGY, VALUE, WRENCH, Floats, System
 from dap3d_core.formulations.moves import normalise
 from dap3d_core.kernels.cache import compiled, compiled_inside
 
 
 @compiled_inside
-def accelerate(t, y, system, loops):
+def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled accelerations into ``force``; returns the power of the forces."""
     body, metric, force, kinds = system.body, system.metric, system.force, system.kinds
     place_bodies(y, body, metric)
     zero(force)
-    call_loops(kinds[VALUE], kinds[WRENCH + 1], t, body, system.F, system.idx, system.par, system.groups, loops,
-               force, force, force)  # fmt: skip
+    call_loops(kinds[VALUE], kinds[WRENCH + 1], t, body, system.F, system.idx,
+               system.par, system.groups, loops, force, force, force)  # fmt: skip
     return scale_forces(body, metric, force)
 
 
 @compiled
-def rhs(t, y, out, system, loops):
+def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of the forces last."""
     power = accelerate(t, y, system, loops)
     rates(y, system.metric, system.force, out)
@@ -33,21 +38,21 @@ def rhs(t, y, out, system, loops):
 
 
 @compiled
-def project(t, y, out, system, loops):
+def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Nothing but unit Euler parameters."""
     out[0] = out[1] = out[2] = out[3] = 0.0
     normalise(y, system.body.shape[0] - 1)
 
 
 @compiled
-def report(t, y, out, system, loops):
+def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """v_dot (6 n, global axes), potential energy, and zeros for the three levels of constraints."""
     kinds, value = system.kinds, system.settings[2:3]
     last = 6 * (system.body.shape[0] - 1)
     accelerate(t, y, system, loops)
     global_accelerations(system.metric, system.force, out)
     value[0] = 0.0
-    call_loops(kinds[ENERGY], kinds[ENERGY + 1], t, system.body, system.F, system.idx, system.par,
-               system.groups, loops, value, value, value)  # fmt: skip
+    call_loops(kinds[ENERGY], kinds[ENERGY + 1], t, system.body, system.F, system.idx,
+               system.par, system.groups, loops, value, value, value)  # fmt: skip
     out[last] = value[0]
     out[last + 1] = out[last + 2] = out[last + 3] = 0.0

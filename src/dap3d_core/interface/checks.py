@@ -27,6 +27,10 @@ from dap3d_core.interface.outputs import ShapeError, entries, value_at
 from dap3d_core.interface.types import Function, Joint, TypeBase
 
 
+#: How often a type may refuse random values of its fields before it is held to refuse them all.
+ATTEMPTS = 200
+
+
 class PluginError(Exception):
     """A type or a plugin cannot be used; the message names file, type, function and remedy."""
 
@@ -97,13 +101,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
     """
     _check_class(type_)
     rng = random.Random(seed)
-    bodies = {s: _random_pose(rng) for s in body_slots(type_)}
-    instance = type_(**{n: _random_field(spec, rng) for n, spec in specs_of(type_).items()})
-    set_ends(instance, lambda: _numbers(rng, 3))
-    try:
-        constants = prepared(instance, bodies)
-    except ValueError as error:
-        raise PluginError(f"{where_is(type_)}.prepare refuses random values: {error}") from error
+    constants = _random_constants(type_, rng)
     names = namespace(type_, constants)
     values = {n: _random(q.shape, rng) for n, q in names.items()}
     outputs = {}
@@ -123,6 +121,21 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
             _check_number(type_, kernel_name, value_at(value, path))
         outputs[kernel_name] = tuple(found)
     return Examined(type_, layout_of(type_, constants), names, outputs)
+
+
+def _random_constants(type_: type[TypeBase], rng: random.Random) -> dict[str, Any]:
+    """What ``prepare`` returns for some random instance; it may refuse many, but not all."""
+    for _ in range(ATTEMPTS):
+        bodies = {s: _random_pose(rng) for s in body_slots(type_)}
+        instance = type_(**{n: _random_field(spec, rng) for n, spec in specs_of(type_).items()})
+        set_ends(instance, lambda: _numbers(rng, 3))
+        try:
+            return prepared(instance, bodies)
+        except ValueError as error:
+            refusal = error
+    raise PluginError(
+        f"{where_is(type_)}.prepare refuses random values, {ATTEMPTS} times in a row: {refusal}"
+    ) from refusal
 
 
 def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:

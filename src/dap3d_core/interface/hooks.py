@@ -2,6 +2,8 @@
 
 import pluggy
 
+from dap3d_core.interface.types import Force, Function, Joint
+
 PROJECT = "dap3d"
 
 hookspec = pluggy.HookspecMarker(PROJECT)
@@ -9,17 +11,17 @@ hookimpl = pluggy.HookimplMarker(PROJECT)
 
 
 @hookspec
-def dap3d_joints():
+def dap3d_joints() -> list[type[Joint]]:
     """The joint types of a module: a list of subclasses of ``Joint``."""
 
 
 @hookspec
-def dap3d_forces():
+def dap3d_forces() -> list[type[Force]]:
     """The force types of a module: a list of subclasses of ``Force``."""
 
 
 @hookspec
-def dap3d_functions():
+def dap3d_functions() -> list[type[Function]]:
     """The function types of a module: a list of subclasses of ``Function``."""
 
 

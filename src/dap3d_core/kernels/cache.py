@@ -141,7 +141,7 @@ def reached(*functions) -> tuple[list, list[str]]:
 
 
 def sources(*functions) -> list[str | bytes]:
-    """Everything that decides what these functions compute: files, values of constants they read."""
+    """Everything that decides what these functions compute: files, and constants they read."""
     found, constants = reached(*functions)
     files: dict[str, bytes] = {}
     for function in found:

@@ -1,4 +1,4 @@
-"""What a group loop reads an instance's quantities with: vectors, matrices out of rows of arrays."""
+"""What a group loop reads an instance's quantities with: vectors, matrices from rows of arrays."""
 
 from dap3d_core.kernels.inline import inlined
 from dap3d_core.kernels.vectors import add, cross, rotate, sub
@@ -7,8 +7,23 @@ from dap3d_core.kernels.vectors import add, cross, rotate, sub
 #: (global), Euler parameters, mass, inertia matrix in body axes by rows.
 R, A, V, W, P, MASS, JP, BODY_WIDTH = 0, 3, 12, 15, 18, 22, 23, 32
 
-__all__ = ["JP", "MASS", "A", "P", "R", "V", "W", "add", "cross", "matrix_at", "matrix_in", "rotate", "sub",
-           "vector_at", "vector_in"]
+__all__ = [
+    "JP",
+    "MASS",
+    "A",
+    "P",
+    "R",
+    "V",
+    "W",
+    "add",
+    "cross",
+    "matrix_at",
+    "matrix_in",
+    "rotate",
+    "sub",
+    "vector_at",
+    "vector_in",
+]
 
 
 @inlined

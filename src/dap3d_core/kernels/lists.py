@@ -16,7 +16,9 @@ VECTOR, MATRIX = types.Array(float64, 1, "C"), types.Array(float64, 2, "C")
 INTEGERS, INTEGER_MATRIX = types.Array(int64, 1, "C"), types.Array(int64, 2, "C")
 
 #: Signature of every group loop (loops.py).
-LOOP = types.void(float64, MATRIX, MATRIX, INTEGERS, VECTOR, int64, int64, int64, VECTOR, VECTOR, VECTOR)
+LOOP = types.void(
+    float64, MATRIX, MATRIX, INTEGERS, VECTOR, int64, int64, int64, VECTOR, VECTOR, VECTOR
+)
 LOOP_TYPE = types.FunctionType(LOOP)
 LOOP_LIST = types.ListType(LOOP_TYPE)
 
@@ -41,7 +43,9 @@ def list_type(item: Any) -> Any:
     return types.ListType(item)
 
 
-def fill(empty: Callable[[], Any], append: Callable[..., None], item: Any, functions: Sequence[Callable]) -> Any:
+def fill(
+    empty: Callable[[], Any], append: Callable[..., None], item: Any, functions: Sequence[Callable]
+) -> Any:
     """A typed list of functions, by ``empty`` and ``append`` compiled for this item type alone."""
     if not jit_is_on():
         return list(functions)
@@ -70,5 +74,19 @@ def loop_list(loops: Sequence[Callable]) -> Any:
     return fill(_empty, _append, LOOP_TYPE, loops)
 
 
-__all__ = ["INTEGERS", "INTEGER_MATRIX", "LOOP", "LOOP_LIST", "LOOP_TYPE", "MATRIX", "VECTOR", "List", "fill",
-           "function_type", "list_type", "loop_list", "named_tuple_type", "step_signature"]
+__all__ = [
+    "INTEGERS",
+    "INTEGER_MATRIX",
+    "LOOP",
+    "LOOP_LIST",
+    "LOOP_TYPE",
+    "MATRIX",
+    "VECTOR",
+    "List",
+    "fill",
+    "function_type",
+    "list_type",
+    "loop_list",
+    "named_tuple_type",
+    "step_signature",
+]

@@ -32,6 +32,7 @@ from dap3d_core.kernels.cache import (
 from dap3d_core.kernels.inline import inlined
 from dap3d_core.kernels.lists import LOOP
 
+
 class Loop(NamedTuple):
     """What a loop module is written from."""
 

@@ -68,7 +68,7 @@ def _compiled_atan2(y, x):
 
 
 def where(condition, a, b):
-    """``a`` where the condition holds, else ``b``: a kernel's branch. Both numbers are evaluated."""
+    """``a`` where the condition holds, else ``b``: a kernel's branch. Both are evaluated."""
     if _symbolic(condition):
         sympy = _sympy()
         return sympy.Piecewise((a, condition), (b, True))

@@ -10,13 +10,16 @@ hub and -L L^T for a joint (its ``sign``). The diagonal of L is stored inverted.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dap3d_core.kernels.cache import compiled, compiled_inside
-from dap3d_core.linear.plan import COPY, DIAGONAL, IDENTITY, PRODUCTS, TRANSPOSE
+from dap3d_core.linear.plan import COPY, DIAGONAL, PRODUCTS, TRANSPOSE, Integers
+
+Floats = NDArray[np.float64]
 
 
 @compiled
-def scale_blocks(blocks, D, metric):
+def scale_blocks(blocks: Integers, D: Floats, metric: Floats) -> None:
     """Turn D into D^, in place.
 
     metric: (n+1, 16), with 1/sqrt(m) in column 0 and B by rows from column 7.
@@ -39,12 +42,12 @@ def scale_blocks(blocks, D, metric):
 
 
 @compiled
-def assemble(targets, contributions, D, K):
+def assemble(targets: Integers, contributions: Integers, D: Floats, K: Floats) -> None:
     """Fill K before its factorisation."""
     for q in range(targets.shape[0]):
         o, m, n, kind = targets[q, 0], targets[q, 1], targets[q, 2], targets[q, 5]
         first, last = targets[q, 3], targets[q, 4]
-        if kind == DIAGONAL or kind == PRODUCTS:
+        if kind in (DIAGONAL, PRODUCTS):
             if first == last:
                 for k in range(o, o + m * n):
                     K[k] = 0.0
@@ -55,7 +58,8 @@ def assemble(targets, contributions, D, K):
                     x3, x4, x5 = D[a + 3], D[a + 4], D[a + 5]
                     e = b
                     for k in range(o + r * n, o + r * n + (r + 1 if kind == DIAGONAL else n)):
-                        s = x0 * D[e] + x1 * D[e + 1] + x2 * D[e + 2] + x3 * D[e + 3] + x4 * D[e + 4] + x5 * D[e + 5]
+                        s = (x0 * D[e] + x1 * D[e + 1] + x2 * D[e + 2]
+                             + x3 * D[e + 3] + x4 * D[e + 4] + x5 * D[e + 5])  # fmt: skip
                         K[k] = -s if c == first else K[k] - s
                         e += 6
                     a += 6
@@ -75,7 +79,9 @@ def assemble(targets, contributions, D, K):
 
 
 @compiled
-def factor(nodes, columns, updates, K, smallest, drop):
+def factor(
+    nodes: Integers, columns: Integers, updates: Integers, K: Floats, smallest: Floats, drop: bool
+) -> int:
     """Factor K in place.
 
     Args:
@@ -115,8 +121,8 @@ def factor(nodes, columns, updates, K, smallest, drop):
                     K[o + c] = s * K[d + c * m + c]
                 o += m
         for q in range(nodes[k, 5], nodes[k + 1, 5]):
-            a, e, o, rows, cols, diagonal = (updates[q, 0], updates[q, 1], updates[q, 2], updates[q, 3], updates[q, 4],
-                                             updates[q, 5])  # fmt: skip
+            a, e, o = updates[q, 0], updates[q, 1], updates[q, 2]
+            rows, cols, diagonal = updates[q, 3], updates[q, 4], updates[q, 5]
             for r in range(rows):
                 for c in range(r + 1 if diagonal else cols):
                     s = 0.0
@@ -127,7 +133,7 @@ def factor(nodes, columns, updates, K, smallest, drop):
 
 
 @compiled_inside
-def solve(nodes, columns, K, x):
+def solve(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
     """Solve K z = x in place, with the factors of K."""
     count = nodes.shape[0] - 1
     for k in range(count):
@@ -162,7 +168,16 @@ def solve(nodes, columns, K, x):
 
 
 @compiled_inside
-def solve_saddle(blocks, hubs, nodes, columns, D, K, x, g):
+def solve_saddle(
+    blocks: Integers,
+    hubs: Integers,
+    nodes: Integers,
+    columns: Integers,
+    D: Floats,
+    K: Floats,
+    x: Floats,
+    g: Floats,
+) -> None:
     """Solve [I D^^T; D^ 0] (a; -lambda) = (g; x): g becomes a, and the rows of x become -lambda.
 
     Args:
@@ -173,8 +188,9 @@ def solve_saddle(blocks, hubs, nodes, columns, D, K, x, g):
         if blocks[q, 4] == 0:
             o, b, f = blocks[q, 0], 6 * blocks[q, 1], blocks[q, 3]
             for r in range(blocks[q, 2]):
-                x[f + r] -= (D[o] * g[b] + D[o + 1] * g[b + 1] + D[o + 2] * g[b + 2] + D[o + 3] * g[b + 3]
-                             + D[o + 4] * g[b + 4] + D[o + 5] * g[b + 5])  # fmt: skip
+                x[f + r] -= (D[o] * g[b] + D[o + 1] * g[b + 1] + D[o + 2] * g[b + 2]
+                             + D[o + 3] * g[b + 3] + D[o + 4] * g[b + 4]
+                             + D[o + 5] * g[b + 5])  # fmt: skip
                 o += 6
     for q in range(hubs.shape[0]):
         for c in range(6):
@@ -193,11 +209,12 @@ def solve_saddle(blocks, hubs, nodes, columns, D, K, x, g):
 
 
 @compiled_inside
-def add_product(blocks, D, g, residual):
+def add_product(blocks: Integers, D: Floats, g: Floats, residual: Floats) -> None:
     """Add D^ g to the residual, with g in scaled coordinates (6 (n+1),)."""
     for q in range(blocks.shape[0]):
         o, b, f = blocks[q, 0], 6 * blocks[q, 1], blocks[q, 3]
         for r in range(blocks[q, 2]):
-            residual[f + r] += (D[o] * g[b] + D[o + 1] * g[b + 1] + D[o + 2] * g[b + 2] + D[o + 3] * g[b + 3]
-                                + D[o + 4] * g[b + 4] + D[o + 5] * g[b + 5])  # fmt: skip
+            residual[f + r] += (D[o] * g[b] + D[o + 1] * g[b + 1] + D[o + 2] * g[b + 2]
+                                + D[o + 3] * g[b + 3] + D[o + 4] * g[b + 4]
+                                + D[o + 5] * g[b + 5])  # fmt: skip
             o += 6

@@ -31,11 +31,13 @@ class JointNode:
 
     Attributes:
         bodies: without ground.
+        grounded: whether ground is one of its bodies, too.
         joints: by index.
         rows: of all its joints.
     """
 
     bodies: tuple[int, ...]
+    grounded: bool
     joints: tuple[int, ...]
     rows: int
 
@@ -60,7 +62,9 @@ class Ordering:
     below: tuple[tuple[int, ...], ...]
 
 
-def order_nodes(body_count: int, joint_slots: Sequence[tuple[int, ...]], joint_rows: Sequence[int]) -> Ordering:
+def order_nodes(
+    body_count: int, joint_slots: Sequence[tuple[int, ...]], joint_rows: Sequence[int]
+) -> Ordering:
     """Find the order of elimination.
 
     Args:
@@ -85,26 +89,30 @@ def order_nodes(body_count: int, joint_slots: Sequence[tuple[int, ...]], joint_r
 
 
 def _merge(joint_slots: Sequence[tuple[int, ...]], joint_rows: Sequence[int]) -> list[JointNode]:
-    found: dict[tuple[int, ...], int] = {}
-    bodies: list[tuple[int, ...]] = []
+    found: dict[tuple[tuple[int, ...], bool], int] = {}
+    keys: list[tuple[tuple[int, ...], bool]] = []
     joints: list[list[int]] = []
     rows: list[int] = []
     for joint, (slots, m) in enumerate(zip(joint_slots, joint_rows, strict=True)):
-        key = tuple(sorted({b for b in slots if b}))
+        others = tuple(sorted({b for b in slots if b}))
+        key = others, 0 in slots or len(others) == 1
         node = found.get(key)
         if node is None or rows[node] + m > NODE_ROWS:
-            found[key] = len(bodies)
-            bodies.append(key)
+            found[key] = len(keys)
+            keys.append(key)
             joints.append([joint])
             rows.append(int(m))
         else:
             joints[node].append(joint)
             rows[node] += int(m)
-    return [JointNode(b, tuple(j), m) for b, j, m in zip(bodies, joints, rows, strict=True)]
+    return [JointNode(*key, tuple(j), m) for key, j, m in zip(keys, joints, rows, strict=True)]
 
 
 def _neighbours(
-    nodes: Sequence[JointNode], of_body: Sequence[list[int]], early: Iterable[int], hubs: Sequence[int]
+    nodes: Sequence[JointNode],
+    of_body: Sequence[list[int]],
+    early: Iterable[int],
+    hubs: Sequence[int],
 ) -> list[set[int]]:
     """Which joint nodes and hubs share a block once the early bodies are gone."""
     result: list[set[int]] = [set() for _ in range(len(nodes) + len(hubs))]
@@ -120,7 +128,9 @@ def _neighbours(
     return result
 
 
-def _eliminate(neighbours: list[set[int]], size: Sequence[int], waits: dict[int, set[int]]) -> tuple[list[int], dict[int, set[int]]]:
+def _eliminate(
+    neighbours: list[set[int]], size: Sequence[int], waits: dict[int, set[int]]
+) -> tuple[list[int], dict[int, set[int]]]:
     """Minimum degree, weighted by rows; no node is taken before the hubs that it waits for."""
     weight = [sum(size[m] for m in others) for others in neighbours]
     heap = [(w, k) for k, w in enumerate(weight) if not waits.get(k)]
@@ -155,7 +165,9 @@ def _eliminate(neighbours: list[set[int]], size: Sequence[int], waits: dict[int,
     return order, below
 
 
-def _waits(nodes: Sequence[JointNode], of_body: Sequence[list[int]], hubs: Sequence[int]) -> dict[int, set[int]]:
+def _waits(
+    nodes: Sequence[JointNode], of_body: Sequence[list[int]], hubs: Sequence[int]
+) -> dict[int, set[int]]:
     """For each joint node the hubs (as nodes) that must be eliminated before it."""
     number = {b: len(nodes) + k for k, b in enumerate(hubs)}
     tree, up = _spanning_tree(nodes, of_body, number)
@@ -190,14 +202,15 @@ def _spanning_tree(
             b = queue.popleft()
             for k in of_body[b]:
                 others = [x for x in nodes[k].bodies if x != b]
-                if k not in tree and len(others) == 1:
+                if k not in tree and len(others) == 1 and not nodes[k].grounded:
                     reach(k, others[0], b if b in number else above[b])
 
     for k, node in enumerate(nodes):
         if len(node.bodies) == 1:
             reach(k, node.bodies[0], 0)
     grow()
-    for b in sorted(range(1, len(of_body)), key=lambda b: -len(of_body[b])):  # what floats: from its largest hub
+    # what floats: from its largest hub
+    for b in sorted(range(1, len(of_body)), key=lambda b: -len(of_body[b])):
         if b not in above:
             reach(-1, b, 0)
             grow()
@@ -209,12 +222,12 @@ def _loop_hubs(node: JointNode, above: dict[int, int], number: dict[int, int]) -
 
     def chain(b: int) -> list[int]:
         found = []
-        while (b := above.get(b, 0)):
+        while b := above.get(b, 0):
             found.append(b)
         return found
 
     chains = [chain(b) for b in node.bodies]
-    if len(node.bodies) != 2:  # to ground, or between three and more: all of them
+    if len(node.bodies) != 2 or node.grounded:  # to ground, or between three and more: all
         return {number[h] for c in chains for h in c}
     common = [h for h in chains[0] if h in set(chains[1])]
     first = {common[0]} if common else set()

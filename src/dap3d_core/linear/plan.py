@@ -49,7 +49,8 @@ class Plan:
     @property
     def fill(self) -> int:
         """Blocks of K that are zero before the factorisation."""
-        return int(np.sum((self.targets[:, 5] == PRODUCTS) & (self.targets[:, 3] == self.targets[:, 4])))
+        first, last, kind = self.targets[:, 3], self.targets[:, 4], self.targets[:, 5]
+        return int(np.sum((kind == PRODUCTS) & (first == last)))
 
 
 #: Kinds of a target: off-diagonal sum of products, diagonal sum of products, copy of a block of D
@@ -57,7 +58,9 @@ class Plan:
 PRODUCTS, DIAGONAL, COPY, TRANSPOSE, IDENTITY = range(5)
 
 
-def make_plan(body_count: int, joint_slots: Sequence[tuple[int, ...]], joint_rows: Sequence[int]) -> Plan:
+def make_plan(
+    body_count: int, joint_slots: Sequence[tuple[int, ...]], joint_rows: Sequence[int]
+) -> Plan:
     """Find the elimination program of a model's sparsity.
 
     Args:
@@ -72,30 +75,50 @@ def make_plan(body_count: int, joint_slots: Sequence[tuple[int, ...]], joint_row
     place = {node: k for k, node in enumerate(found.order)}
     hubs = {b: node_count + h for h, b in enumerate(found.hubs)}
 
-    blocks, block_of, joint_row, joint_block, block_size = _lay_blocks(found, joint_slots, joint_rows, place, starts, hubs)
+    blocks, block_of, joint_row, joint_block, block_size = _lay_blocks(
+        found, joint_slots, joint_rows, place, starts, hubs
+    )
     diagonal, column_of, columns, column_start, matrix_size = _lay_matrix(found, sizes, starts)
-    targets, contributions = _targets(found, sizes, place, diagonal, column_of, block_of, hubs)
+    targets, contributions = _targets(found, sizes, place, diagonal, column_of, block_of)
     updates, update_start = _updates(found, sizes, diagonal, column_of)
     signs = [1 if k >= node_count else -1 for k in found.order]
-    nodes = np.array(
-        [*zip(sizes, starts[:-1], diagonal, signs, column_start[:-1], update_start[:-1], strict=True),
-         (0, starts[-1], matrix_size, 0, column_start[-1], update_start[-1])],
-        dtype=np.int64,
-    )
+    begins = zip(starts[:-1], diagonal, signs, column_start[:-1], update_start[:-1], strict=True)
+    nodes = [(size, *begin) for size, begin in zip(sizes, begins, strict=True)]
+    nodes.append((0, starts[-1], matrix_size, 0, column_start[-1], update_start[-1]))
     hub_rows = [(b, starts[place[hubs[b]]]) for b in found.hubs]
     return Plan(
-        found, np.array(joint_row, dtype=np.int64), tuple(joint_block), int(starts[-1]), block_size, matrix_size,
-        _table(blocks, 5), targets, contributions, nodes, _table(columns, 3), updates, _table(hub_rows, 2),
-    )  # fmt: skip
+        ordering=found,
+        joint_row=np.array(joint_row, dtype=np.int64),
+        joint_block=tuple(joint_block),
+        row_size=starts[-1],
+        block_size=block_size,
+        matrix_size=matrix_size,
+        blocks=_table(blocks, 5),
+        targets=targets,
+        contributions=contributions,
+        nodes=_table(nodes, 6),
+        columns=_table(columns, 3),
+        updates=updates,
+        hubs=_table(hub_rows, 2),
+    )
 
 
 def _table(rows: Sequence[Sequence[int]], width: int) -> Integers:
     return np.array(rows, dtype=np.int64).reshape(-1, width)
 
 
-def _lay_blocks(found, joint_slots, joint_rows, place, starts, hubs):  # type: ignore[no-untyped-def]
+def _lay_blocks(
+    found: Ordering,
+    joint_slots: Sequence[tuple[int, ...]],
+    joint_rows: Sequence[int],
+    place: dict[int, int],
+    starts: Sequence[int],
+    hubs: dict[int, int],
+) -> tuple[
+    list[tuple[int, ...]], dict[tuple[int, int], int], list[int], list[tuple[int, ...]], int
+]:
     """Places of the blocks of D: by node, then body, the node's joints below one another."""
-    blocks: list[tuple[int, int, int, int, int]] = []
+    blocks: list[tuple[int, ...]] = []
     block_of: dict[tuple[int, int], int] = {}
     joint_row = [0] * len(joint_slots)
     joint_block: list[tuple[int, ...]] = [()] * len(joint_slots)
@@ -109,15 +132,20 @@ def _lay_blocks(found, joint_slots, joint_rows, place, starts, hubs):  # type: i
         offset = 0
         for joint in node.joints:
             joint_row[joint] = first_row + offset
-            joint_block[joint] = tuple(block_of[k, b] + 6 * offset if b else 0 for b in joint_slots[joint])
+            slots = joint_slots[joint]
+            joint_block[joint] = tuple(block_of[k, b] + 6 * offset if b else 0 for b in slots)
             offset += int(joint_rows[joint])
     return blocks, block_of, joint_row, joint_block, size
 
 
-def _lay_matrix(found, sizes, starts):  # type: ignore[no-untyped-def]
+def _lay_matrix(
+    found: Ordering, sizes: Sequence[int], starts: Sequence[int]
+) -> tuple[list[int], list[dict[int, int]], list[tuple[int, ...]], list[int], int]:
     """Places of the blocks of K: column by column, the diagonal block first."""
-    diagonal, columns, column_start = [], [], [0]
+    diagonal: list[int] = []
     column_of: list[dict[int, int]] = []
+    columns: list[tuple[int, ...]] = []
+    column_start = [0]
     size = 0
     for k, below in enumerate(found.below):
         diagonal.append(size)
@@ -132,7 +160,14 @@ def _lay_matrix(found, sizes, starts):  # type: ignore[no-untyped-def]
     return diagonal, column_of, columns, column_start, size
 
 
-def _targets(found, sizes, place, diagonal, column_of, block_of, hubs):  # type: ignore[no-untyped-def]
+def _targets(
+    found: Ordering,
+    sizes: Sequence[int],
+    place: dict[int, int],
+    diagonal: Sequence[int],
+    column_of: Sequence[dict[int, int]],
+    block_of: dict[tuple[int, int], int],
+) -> tuple[Integers, Integers]:
     """What each block of K is made of before the factorisation."""
     node_count = len(found.nodes)
     products: dict[int, list[tuple[int, int]]] = {}
@@ -149,20 +184,22 @@ def _targets(found, sizes, place, diagonal, column_of, block_of, hubs):  # type:
     targets: list[tuple[int, ...]] = []
     contributions: list[tuple[int, int]] = []
 
-    def add(where: int, rows: int, cols: int, kind: int, sources: Sequence[tuple[int, int]]) -> None:
+    def add(
+        where: int, rows: int, cols: int, kind: int, made_of: Sequence[tuple[int, int]]
+    ) -> None:
         first = len(contributions)
-        contributions.extend(sources)
+        contributions.extend(made_of)
         targets.append((where, rows, cols, first, len(contributions), kind))
 
-    for column, node in enumerate(found.order):
+    for column, entry in enumerate(found.order):
         m = sizes[column]
-        is_hub = node >= node_count
+        is_hub = entry >= node_count
         kind = IDENTITY if is_hub else DIAGONAL
         add(diagonal[column], m, m, kind, () if is_hub else products.get(diagonal[column], ()))
         for row, where in column_of[column].items():
             other = found.order[row]
             if is_hub != (other >= node_count):
-                joint, hub = (other, node) if is_hub else (node, other)
+                joint, hub = (other, entry) if is_hub else (entry, other)
                 block = block_of.get((joint, found.hubs[hub - node_count]))
                 if block is not None:
                     add(where, sizes[row], m, COPY if is_hub else TRANSPOSE, [(block, block)])
@@ -171,7 +208,12 @@ def _targets(found, sizes, place, diagonal, column_of, block_of, hubs):  # type:
     return _table(targets, 6), _table(contributions, 2)
 
 
-def _updates(found, sizes, diagonal, column_of):  # type: ignore[no-untyped-def]
+def _updates(
+    found: Ordering,
+    sizes: Sequence[int],
+    diagonal: Sequence[int],
+    column_of: Sequence[dict[int, int]],
+) -> tuple[Integers, list[int]]:
     """Products that the elimination of each node subtracts from later blocks."""
     updates: list[tuple[int, ...]] = []
     starts = [0]
@@ -181,7 +223,9 @@ def _updates(found, sizes, diagonal, column_of):  # type: ignore[no-untyped-def]
             here = mine[right]
             updates.append((here, here, diagonal[right], sizes[right], sizes[right], 1))
             later = column_of[right]
-            for left in below[n + 1 :]:
-                updates.append((mine[left], here, later[left], sizes[left], sizes[right], 0))
+            updates.extend(
+                (mine[left], here, later[left], sizes[left], sizes[right], 0)
+                for left in below[n + 1 :]
+            )
         starts.append(len(updates))
     return _table(updates, 6), starts

@@ -2,12 +2,9 @@
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
-from dap3d_core.linear.blocks import assemble, factor, scale_blocks
-from dap3d_core.linear.plan import Plan
-
-Floats = NDArray[np.float64]
+from dap3d_core.linear.blocks import Floats, assemble, factor, scale_blocks
+from dap3d_core.linear.plan import Integers, Plan
 
 #: Up to this many rows the rank comes from singular values.
 DENSE_ROWS = 1000
@@ -67,7 +64,7 @@ def dense_rank(D: Floats) -> Rank:
     return Rank(rows, columns, rank, tolerance, "svd", tuple(int(k) for k in shared), null)
 
 
-def sparse_rank(plan: Plan, D: Floats, metric: Floats, row_places: NDArray[np.int64], columns: int) -> Rank:
+def sparse_rank(plan: Plan, D: Floats, metric: Floats, row_places: Integers, columns: int) -> Rank:
     """Rank by the pivots of the block factorisation, for many rows.
 
     The order of elimination is static, so this is weaker than singular values: a row counts as
@@ -94,8 +91,8 @@ def sparse_rank(plan: Plan, D: Floats, metric: Floats, row_places: NDArray[np.in
     inverse_pivot = np.ones(plan.row_size)
     for size, first, diagonal, *_ in plan.nodes[:-1]:
         inverse_pivot[first : first + size] = K[diagonal : diagonal + size * size : size + 1]
-    dependent = np.flatnonzero(inverse_pivot[row_places] == 0.0)
+    dependent = tuple(int(k) for k in np.flatnonzero(inverse_pivot[row_places] == 0.0))
     rows = len(row_places)
-    return Rank(
-        rows, columns, rows - len(dependent), PIVOT_TOLERANCE, "pivots", tuple(int(k) for k in dependent), np.zeros((0, rows))
-    )
+    rank = rows - len(dependent)
+    none_known = np.zeros((0, rows))
+    return Rank(rows, columns, rank, PIVOT_TOLERANCE, "pivots", dependent, none_known)

@@ -59,6 +59,21 @@ class CompiledModel:
         self._redundancy: Redundancy | None = None
         self.compile_time = time.perf_counter() - started
 
+    @property
+    def irc(self) -> NDArray[np.int64]:
+        """(n,) index in u of the first coordinate of each body; iru and irv as in ``Model``."""
+        return self.model.irc
+
+    @property
+    def iru(self) -> NDArray[np.int64]:
+        """(n,) index in u of the first velocity of each body."""
+        return self.model.iru
+
+    @property
+    def irv(self) -> NDArray[np.int64]:
+        """(n,) index in v_dot, and column in the Jacobian, of the first acceleration of each body."""
+        return self.model.irv
+
     @cached_property
     def scene_text(self) -> str:
         """The scene as the text of a scene file, for the record of its results."""

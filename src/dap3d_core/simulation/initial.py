@@ -51,7 +51,7 @@ def violation(machine: Machine, u: Floats, t: float = 0.0) -> tuple[float, float
 
 
 def correct_initial(machine: Machine, u: Floats, t: float = 0.0) -> Initial:
-    """Correct positions by Newton's method, velocities by one linear step, each by the least change.
+    """Correct positions by Newton's method, velocities by a linear step, each by the least change.
 
     The least change is that of the sum of squares of displacements, rotations and velocities, as in
     the manual. Rows without a position level do not take part in the position stage.

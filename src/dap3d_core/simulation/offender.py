@@ -16,7 +16,7 @@ AHEAD = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
 
 
 def find_offender(machine: Machine, t: float, y: Floats, t_stop: float) -> str:
-    """Name what is not finite at or just after time t with the integrated state y; "" for nothing."""
+    """Name what is not finite at or just after time t with the integrated state y; else ""."""
     for later in (t, t_stop, *(t + part * (1.0 + abs(t)) for part in AHEAD)):
         found = _at(machine, later, y)
         if found:

@@ -1,0 +1,28 @@
+"""Constant force in body axes."""
+
+from dap3d_core.interface import Body, Force, Point, body, hookimpl, point, vec3
+from dap3d_core.kernels import cross, rotate
+
+interface_version = 1
+
+
+class BodyForce(Force):
+    """A force at P_i of body i, constant in its axes (manual: ``fp``; spec 6).
+
+    Without P_i it acts at the mass centre. force = A_i fp, moment = s_i x A_i fp
+    """
+
+    keyword = "fp"
+    body_i: Body = body(default=None, doc="the body it acts on")
+    P_i: Point = point(default=None, doc="where it acts; the mass centre when left out")
+    fp: tuple = vec3(unit="N", doc="components in body axes")
+
+    def wrench(A_i, fp, s_P_i):
+        F = rotate(A_i, fp)
+        return ((F, cross(s_P_i, F)),)
+
+
+@hookimpl
+def dap3d_forces():
+    """The force types of this module."""
+    return [BodyForce]
