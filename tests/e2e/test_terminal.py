@@ -9,11 +9,18 @@ import struct
 import subprocess
 import sys
 import termios
+import time
 
 import pytest
 
 import dap3d_core as dap
 
+#: Makes the terminal the one that Ctrl-C is typed in, then becomes the command.
+IN_SESSION = (
+    "import fcntl, os, sys, termios;"
+    "fcntl.ioctl(0, termios.TIOCSCTTY, 0);"
+    "os.execv(sys.argv[1], sys.argv[1:])"
+)
 CONTROL = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
 
 
@@ -24,7 +31,7 @@ def in_terminal(dap3d, width, *arguments, answers="", **variables):
     main, child = pty.openpty()
     fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 40, width, 0, 0))
     process = subprocess.Popen(
-        [*COMMAND, *arguments],
+        [sys.executable, "-c", IN_SESSION, *COMMAND, *arguments],
         cwd=dap3d.folder,
         env=environment(TERM="xterm-256color", **variables),
         stdin=child,
@@ -34,7 +41,8 @@ def in_terminal(dap3d, width, *arguments, answers="", **variables):
     )
     os.close(child)
     shown, waiting = b"", answers.encode().splitlines(keepends=True)
-    while True:
+    end = time.monotonic() + 120
+    while time.monotonic() < end:
         ready, _, _ = select.select([main], [], [], 0.5)
         if not ready:
             if waiting:

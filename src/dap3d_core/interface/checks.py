@@ -9,6 +9,7 @@ import math
 import random
 from collections.abc import Mapping
 from difflib import get_close_matches
+from types import FunctionType
 from typing import Any
 
 import attrs
@@ -25,7 +26,6 @@ from dap3d_core.interface.namespace import (
 )
 from dap3d_core.interface.outputs import ShapeError, entries, value_at
 from dap3d_core.interface.types import Function, Joint, TypeBase
-
 
 #: How often a type may refuse random values of its fields before it is held to refuse them all.
 ATTEMPTS = 200
@@ -114,8 +114,9 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
         except ShapeError as error:
             raise PluginError(f"{where_is(type_)}.{kernel_name}: {error}") from None
         except Exception as error:
+            reason = f"{type(error).__name__}: {error}"
             raise PluginError(
-                f"{where_is(type_)}.{kernel_name} failed on a random input: {type(error).__name__}: {error}"
+                f"{where_is(type_)}.{kernel_name} failed on a random input: {reason}"
             ) from error
         for path in found:
             _check_number(type_, kernel_name, value_at(value, path))
@@ -152,13 +153,18 @@ def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
     except ValueError:  # a mistake in the scene, said in the type's own words
         raise
     except Exception as error:
-        raise PluginError(f"{where_is(type_)}.prepare failed: {type(error).__name__}: {error}") from error
+        reason = f"{type(error).__name__}: {error}"
+        raise PluginError(f"{where_is(type_)}.prepare failed: {reason}") from error
     if not isinstance(constants, Mapping):
-        raise PluginError(f"{where_is(type_)}.prepare should return a dict; it returned {constants!r}")
+        raise PluginError(
+            f"{where_is(type_)}.prepare should return a dict; it returned {constants!r}"
+        )
     try:
         return {str(n): _as_floats(v) for n, v in constants.items()}
     except (TypeError, ValueError):
-        raise PluginError(f"{where_is(type_)}.prepare should return numbers and tuples of numbers") from None
+        raise PluginError(
+            f"{where_is(type_)}.prepare should return numbers and tuples of numbers"
+        ) from None
 
 
 def set_ends(instance: Any, make: Any) -> None:
@@ -176,29 +182,37 @@ def _as_floats(value: Any) -> Any:
 
 
 def _check_class(type_: type[TypeBase]) -> None:
+    who, kind = where_is(type_), type_.kind
     if not type_.keyword:
-        raise PluginError(f"{where_is(type_)} has no keyword; add e.g. keyword = \"{type_.__name__.lower()}\"")
-    needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[type_.kind]
+        example = f'keyword = "{type_.__name__.lower()}"'
+        raise PluginError(f"{who} has no keyword; add e.g. {example}")
+    needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[kind]
     if issubclass(type_, Joint):
-        if type_.rows < 1:
-            raise PluginError(f"{where_is(type_)} declares rows = {type_.rows}; a joint has at least one row")
-        if not isinstance(type_.holonomic, bool) and len(type_.holonomic) != type_.rows:
-            raise PluginError(f"{where_is(type_)}.holonomic needs one truth value for each of its {type_.rows} rows")
+        rows, mask = type_.rows, type_.holonomic
+        if rows < 1:
+            raise PluginError(f"{who} declares rows = {rows}; a joint has at least one row")
+        if not isinstance(mask, bool) and len(mask) != rows:
+            raise PluginError(f"{who}.holonomic needs one truth value for each of its {rows} rows")
         needed += ["C"] if type_.position_rows() else []
-    if type_.kind != "function" and not body_slots(type_):
-        raise PluginError(f"{where_is(type_)} acts on no body; declare a field such as P_i: Point = point()")
+    if kind != "function" and not body_slots(type_):
+        raise PluginError(f"{who} acts on no body; declare a field such as P_i: Point = point()")
     allowed = [*type_.kernel_names, "prepare"]
     for name, value in vars(type_).items():
-        if isinstance(value, (staticmethod, type(_check_class))) and not name.startswith("_") and name not in allowed:
+        is_public = isinstance(value, (staticmethod, FunctionType)) and not name.startswith("_")
+        if is_public and name not in allowed:
             near = get_close_matches(name, allowed, 1)
-            hint = f"; did you mean {near[0]}?" if near else f"; a {type_.kind} may define {', '.join(allowed)}"
-            raise PluginError(f"{where_is(type_)} defines {name}, which nothing calls{hint}")
+            hint = (
+                f"did you mean {near[0]}?" if near else f"a {kind} may define {', '.join(allowed)}"
+            )
+            raise PluginError(f"{who} defines {name}, which nothing calls; {hint}")
     for name in needed:
         if name not in type_.kernels():
-            raise PluginError(f"{where_is(type_)} does not define {name}, which every {type_.kind} of its rows needs")
+            raise PluginError(f"{who} does not define {name}, which every {kind} of its rows needs")
 
 
-def _check_names(type_: type[TypeBase], kernel: str, asked: tuple[str, ...], names: Mapping[str, Quantity]) -> None:
+def _check_names(
+    type_: type[TypeBase], kernel: str, asked: tuple[str, ...], names: Mapping[str, Quantity]
+) -> None:
     for name in asked:
         if name not in names:
             near = get_close_matches(name, names, 1)
@@ -209,8 +223,9 @@ def _check_names(type_: type[TypeBase], kernel: str, asked: tuple[str, ...], nam
             )
         if names[name].velocity and kernel not in VELOCITY_KERNELS:
             raise PluginError(
-                f"{where_is(type_)}.{kernel} asks for {name}, a quantity of the velocity level; at position level "
-                "only positions and time may be used (move the term to gamma or wrench)"
+                f"{where_is(type_)}.{kernel} asks for {name}, a quantity of the velocity level; "
+                "at position level only positions and time may be used "
+                "(move the term to gamma or wrench)"
             )
 
 
@@ -232,7 +247,9 @@ def _expected(type_: type[TypeBase], kernel: str) -> tuple[tuple[int, ...], str]
 
 def _check_number(type_: type[TypeBase], kernel: str, value: Any) -> None:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise PluginError(f"{where_is(type_)}.{kernel} returned {value!r} where a finite number is expected")
+        raise PluginError(
+            f"{where_is(type_)}.{kernel} returned {value!r} where a finite number is expected"
+        )
 
 
 def _numbers(rng: random.Random, n: int) -> tuple[float, ...]:
@@ -255,7 +272,9 @@ def _random(shape: tuple[int, ...], rng: random.Random) -> Any:
         return _random_pose(rng).A
     if shape == (4,):
         return _unit(_numbers(rng, 4))
-    return tuple(_random(shape[1:], rng) for _ in range(shape[0])) if len(shape) > 1 else _numbers(rng, shape[0])
+    if len(shape) > 1:
+        return tuple(_random(shape[1:], rng) for _ in range(shape[0]))
+    return _numbers(rng, shape[0])
 
 
 def _random_field(spec: FieldSpec, rng: random.Random) -> Any:
@@ -274,4 +293,14 @@ def _random_field(spec: FieldSpec, rng: random.Random) -> Any:
     return None if spec.kind == "function" else "body"
 
 
-__all__ = ["BodyPose", "Examined", "PluginError", "examine", "pose", "prepared", "set_ends", "slot_of", "where_is"]
+__all__ = [
+    "BodyPose",
+    "Examined",
+    "PluginError",
+    "examine",
+    "pose",
+    "prepared",
+    "set_ends",
+    "slot_of",
+    "where_is",
+]

@@ -13,16 +13,19 @@ hookimpl = pluggy.HookimplMarker(PROJECT)
 @hookspec
 def dap3d_joints() -> list[type[Joint]]:
     """The joint types of a module: a list of subclasses of ``Joint``."""
+    raise NotImplementedError
 
 
 @hookspec
 def dap3d_forces() -> list[type[Force]]:
     """The force types of a module: a list of subclasses of ``Force``."""
+    raise NotImplementedError
 
 
 @hookspec
 def dap3d_functions() -> list[type[Function]]:
     """The function types of a module: a list of subclasses of ``Function``."""
+    raise NotImplementedError
 
 
 #: Entry-point group and hook of each kind.

@@ -128,7 +128,12 @@ def namespace(type_: type[TypeBase], constants: Mapping[str, Any]) -> dict[str, 
     names: dict[str, Quantity] = {}
 
     def offer(
-        name: str, shape: tuple[int, ...], code: str, needs: Iterable[str] = (), velocity: bool = False, doc: str = ""
+        name: str,
+        shape: tuple[int, ...],
+        code: str,
+        needs: Iterable[str] = (),
+        velocity: bool = False,
+        doc: str = "",
     ) -> None:
         names[name] = Quantity(name, shape, velocity, code, tuple(needs), doc)
 
@@ -150,10 +155,13 @@ def _offer_body(offer: Callable[..., None], s: str) -> None:
     offer(f"r_{s}", (3,), f"vector_at(body, {b}, R)", doc=f"position of body {s}, m")
     offer(f"A_{s}", (3, 3), f"matrix_at(body, {b}, A)", doc=f"rotation matrix of body {s}")
     offer(f"p_{s}", (4,), _tuple(f"body[{b}, P + {{}}]", 4), doc=f"Euler parameters of body {s}")
-    offer(f"v_{s}", (3,), f"vector_at(body, {b}, V)", velocity=True, doc=f"velocity of body {s}, m/s")
-    offer(f"w_{s}", (3,), f"vector_at(body, {b}, W)", velocity=True, doc=f"angular velocity of body {s}, global, rad/s")
+    speed = f"velocity of body {s}, m/s"
+    offer(f"v_{s}", (3,), f"vector_at(body, {b}, V)", velocity=True, doc=speed)
+    spin = f"angular velocity of body {s}, global, rad/s"
+    offer(f"w_{s}", (3,), f"vector_at(body, {b}, W)", velocity=True, doc=spin)
     offer(f"mass_{s}", (), f"body[{b}, MASS]", doc=f"mass of body {s}, kg")
-    offer(f"Jp_{s}", (3, 3), f"matrix_at(body, {b}, JP)", doc=f"inertia matrix of body {s} in its axes, kg m^2")
+    inertia = f"inertia matrix of body {s} in its axes, kg m^2"
+    offer(f"Jp_{s}", (3, 3), f"matrix_at(body, {b}, JP)", doc=inertia)
 
 
 def _offer_field(offer: Callable[..., None], name: str, spec: FieldSpec, layout: Layout) -> None:
@@ -164,8 +172,9 @@ def _offer_field(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
     elif spec.kind == "vector2":
         for end, slot in (("P_i", "i"), ("P_j", "j")):
             _offer_point(offer, end, slot, layout)
-        offer(name, (3,), "sub(x_r_P_j, x_r_P_i)", ("r_P_i", "r_P_j"), doc="vector from P_i to P_j, m")
-        offer(f"{name}_dot", (3,), "sub(x_v_P_j, x_v_P_i)", ("v_P_i", "v_P_j"), True, f"rate of {name}, m/s")
+        between, rate = "vector from P_i to P_j, m", f"rate of {name}, m/s"
+        offer(name, (3,), "sub(x_r_P_j, x_r_P_i)", ("r_P_i", "r_P_j"), doc=between)
+        offer(f"{name}_dot", (3,), "sub(x_v_P_j, x_v_P_i)", ("v_P_i", "v_P_j"), True, rate)
     elif spec.kind in ("number", "vec3", "matrix"):
         unit = f", {spec.unit}" if spec.unit else ""
         offer(name, layout.numbers[name][1], _stored(layout, name), doc=f"{spec.doc or name}{unit}")
@@ -173,24 +182,28 @@ def _offer_field(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
         f = "f" if name == "function" else name
         at = f"idx[b0 + {len(layout.slots) + layout.functions.index(name)}]"
         for order, suffix in enumerate(("", "_dot", "_ddot")):
-            offer(f"{f}{suffix}", (), f"F[{at}, {order}]", doc=f"function of time, derivative {order}")
+            doc = f"function of time, derivative {order}"
+            offer(f"{f}{suffix}", (), f"F[{at}, {order}]", doc=doc)
 
 
 def _offer_point(offer: Callable[..., None], name: str, s: str, layout: Layout) -> None:
-    offer(f"s_{name}", (3,), f"rotate(x_A_{s}, {_stored(layout, name)})", (f"A_{s}",), doc=f"arm of {name}, global, m")
-    offer(f"r_{name}", (3,), f"add(x_r_{s}, x_s_{name})", (f"r_{s}", f"s_{name}"), doc=f"position of {name}, m")
-    offer(f"s_{name}_dot", (3,), f"cross(x_w_{s}, x_s_{name})", (f"w_{s}", f"s_{name}"), True, "rate of the arm, m/s")
-    offer(
-        f"v_{name}", (3,), f"add(x_v_{s}, x_s_{name}_dot)", (f"v_{s}", f"s_{name}_dot"), True, f"velocity of {name}, m/s"
-    )
+    arm, rate, local = f"s_{name}", f"s_{name}_dot", _stored(layout, name)
+    place, speed = f"position of {name}, m", f"velocity of {name}, m/s"
+    offer(arm, (3,), f"rotate(x_A_{s}, {local})", (f"A_{s}",), doc=f"arm of {name}, global, m")
+    offer(f"r_{name}", (3,), f"add(x_r_{s}, x_{arm})", (f"r_{s}", arm), doc=place)
+    offer(rate, (3,), f"cross(x_w_{s}, x_{arm})", (f"w_{s}", arm), True, "rate of the arm, m/s")
+    offer(f"v_{name}", (3,), f"add(x_v_{s}, x_{rate})", (f"v_{s}", rate), True, speed)
 
 
 def _offer_vector(offer: Callable[..., None], name: str, s: str, layout: Layout) -> None:
-    offer(name, (3,), f"rotate(x_A_{s}, {_stored(layout, name)})", (f"A_{s}",), doc=f"vector fixed in body {s}, global")
-    offer(f"{name}_dot", (3,), f"cross(x_w_{s}, x_{name})", (f"w_{s}", name), True, f"rate of {name}, 1/s")
+    fixed, rate = f"vector fixed in body {s}, global", f"rate of {name}, 1/s"
+    offer(name, (3,), f"rotate(x_A_{s}, {_stored(layout, name)})", (f"A_{s}",), doc=fixed)
+    offer(f"{name}_dot", (3,), f"cross(x_w_{s}, x_{name})", (f"w_{s}", name), True, rate)
 
 
-def _offer_constant(offer: Callable[..., None], name: str, shape: tuple[int, ...], layout: Layout) -> None:
+def _offer_constant(
+    offer: Callable[..., None], name: str, shape: tuple[int, ...], layout: Layout
+) -> None:
     slot = slot_of(name)
     if shape == (3,) and slot in layout.slots:
         _offer_vector(offer, name, slot, layout)
@@ -218,9 +231,8 @@ def _tuple(pattern: str, n: int) -> str:
 
 def parameters(kernel: Callable[..., Any]) -> tuple[str, ...]:
     """The names a kernel asks for."""
-    return tuple(
-        n for n, p in signature(kernel).parameters.items() if p.kind in (Parameter.POSITIONAL_OR_KEYWORD, Parameter.POSITIONAL_ONLY)
-    )
+    positional = (Parameter.POSITIONAL_OR_KEYWORD, Parameter.POSITIONAL_ONLY)
+    return tuple(n for n, p in signature(kernel).parameters.items() if p.kind in positional)
 
 
 def in_order(names: Mapping[str, Quantity], wanted: Iterable[str]) -> list[Quantity]:

@@ -39,7 +39,7 @@ def write(examined: Examined, what: str) -> Loop | None:
     lines = [f"b0 = i0 + q * {stride(examined)}", f"p1 = p0 + q * {layout.par_width}"]
     lines += [f"b_{s} = idx[b0 + {n}]" for n, s in enumerate(layout.slots)]
     wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
-    lines += [f"x_{quantity.name} = {quantity.code}" for quantity in in_order(examined.names, wanted)]
+    lines += [f"x_{q.name} = {q.code}" for q in in_order(examined.names, wanted)]
     if examined.type.kind == "joint":
         lines.append(f"row = idx[b0 + {len(layout.slots) + len(layout.functions)}]")
     for name, kernel in kernels.items():

@@ -151,11 +151,11 @@ def _eliminate(
         others = below[k] = neighbours[k]
         for m in others:
             mine = neighbours[m]
-            if len(others) > 1:
-                mine |= others
-                mine.discard(m)
+            gained = others - mine
+            gained.discard(m)
+            mine |= gained
             mine.discard(k)
-            weight[m] = sum(size[x] for x in mine)
+            weight[m] += sum(size[x] for x in gained) - size[k]
             if not waits.get(m):
                 heapq.heappush(heap, (weight[m], m))
         for m in released.get(k, ()):

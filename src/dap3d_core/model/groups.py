@@ -50,7 +50,9 @@ class Group:
         return len(self.members)
 
 
-def make_groups(instances: Sequence[Instance], poses: Mapping[int, BodyPose], body_count: int) -> tuple[Group, ...]:
+def make_groups(
+    instances: Sequence[Instance], poses: Mapping[int, BodyPose], body_count: int
+) -> tuple[Group, ...]:
     """Sort instances by type, in the order in which types first appear.
 
     Args:
@@ -64,26 +66,30 @@ def make_groups(instances: Sequence[Instance], poses: Mapping[int, BodyPose], bo
     by_type: dict[type[TypeBase], list[int]] = {}
     for index, instance in enumerate(instances):
         by_type.setdefault(instance.examined.type, []).append(index)
-    return tuple(_group([instances[m] for m in members], members, poses, body_count) for members in by_type.values())
+    return tuple(
+        _group([instances[m] for m in members], members, poses, body_count)
+        for members in by_type.values()
+    )
 
 
 def _group(
     instances: list[Instance], members: list[int], poses: Mapping[int, BodyPose], body_count: int
 ) -> Group:
-    examined = instances[0].examined
+    examined, count = instances[0].examined, len(instances)
     constants = _prepare_all(examined, instances, members, poses)
-    numbers = np.empty((len(instances), examined.layout.par_width))
+    numbers = np.empty((count, examined.layout.par_width))
     for name, (offset, shape) in examined.layout.numbers.items():
         if constants and name in constants[0]:
             column = [c[name] for c in constants]
         else:
             column = [instance.values[name] for instance in instances]
-        numbers[:, offset : offset + size(shape)] = np.asarray(column, dtype=float).reshape(len(instances), -1)
-    bodies = np.array([instance.bodies for instance in instances], dtype=np.int64).reshape(len(instances), -1)
-    functions = np.array([instance.functions for instance in instances], dtype=np.int64).reshape(len(instances), -1)
+        values = np.asarray(column, dtype=float).reshape(count, -1)
+        numbers[:, offset : offset + size(shape)] = values
+    bodies = np.array([i.bodies for i in instances], dtype=np.int64).reshape(count, -1)
+    functions = np.array([i.functions for i in instances], dtype=np.int64).reshape(count, -1)
     places = np.array(members, dtype=np.int64)
     if getattr(examined.type, "each_body", False):
-        bodies = np.tile(np.arange(1, body_count + 1), len(instances))[:, None]
+        bodies = np.tile(np.arange(1, body_count + 1), count)[:, None]
         numbers = np.repeat(numbers, body_count, axis=0)
         functions = np.repeat(functions, body_count, axis=0)
         places = np.repeat(places, body_count)
@@ -94,7 +100,7 @@ def _prepare_all(
     examined: Examined, instances: list[Instance], members: list[int], poses: Mapping[int, BodyPose]
 ) -> list[dict[str, Any]]:
     """What ``prepare`` returns for each instance; empty where the type does not define it."""
-    type_ = examined.type
+    type_: Any = examined.type
     if type_.prepare in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__()):
         return []
     fields = specs_of(type_)
@@ -120,6 +126,8 @@ def _prepare_all(
         if expected is None:
             expected = shapes
         elif shapes != expected:
-            raise PrepareError(member, "prepare returned other names or shapes than for the first of its kind")
+            raise PrepareError(
+                member, "prepare returned other names or shapes than for the first of its kind"
+            )
         result.append(constants)
     return result

@@ -36,7 +36,9 @@ def to_global(p: ArrayLike, vector: ArrayLike) -> Floats:
 def _apply(A: Floats, vector: ArrayLike) -> Floats:
     """A a for each pair, written out: the same bits whether one vector is turned or many."""
     a = np.asarray(vector, dtype=float)
-    return A[..., 0] * a[..., None, 0] + A[..., 1] * a[..., None, 1] + A[..., 2] * a[..., None, 2]
+    x, y, z = a[..., None, 0], a[..., None, 1], a[..., None, 2]
+    turned: Floats = A[..., 0] * x + A[..., 1] * y + A[..., 2] * z
+    return turned
 
 
 def split(u: ArrayLike, n: int) -> tuple[Floats, Floats, Floats, Floats]:

@@ -47,10 +47,14 @@ class CompiledModel:
     ) -> None:
         """Check a scene, build its model, compile what it needs; arguments as for ``compile``."""
         started = time.perf_counter()
-        self.scene: Scene = scene if isinstance(scene, Scene) else load(Path(scene) if isinstance(scene, os.PathLike) else scene)
-        self.checked: Checked = check(self.scene, registry or load_registry(), allow_code=allow_code)
+        if not isinstance(scene, Scene):
+            scene = load(Path(scene) if isinstance(scene, os.PathLike) else scene)
+        registry = registry or load_registry()
+        self.scene: Scene = scene
+        self.checked: Checked = check(scene, registry, allow_code=allow_code)
         self.model: Model = _modelled(self.checked)
-        self.method, self.reason = choose_method(self.model, method or str(self.scene.simulation.method))
+        asked = method or str(scene.simulation.method)
+        self.method, self.reason = choose_method(self.model, asked)
         self.machine = Machine(self.model, self.method, announce)
         if announce is not None and not driver_is_cached("formulations"):
             announce(f"the solver ({self.method})")
@@ -88,8 +92,11 @@ class CompiledModel:
             ValueError: u has not 13 n finite numbers.
         """
         state = np.array(u, dtype=float)
-        if state.shape != (13 * self.model.body_count,) or not np.all(np.isfinite(state)):
-            raise ValueError(f"u must be {13 * self.model.body_count} finite numbers, 13 a body; its shape is {state.shape}")
+        count = 13 * self.model.body_count
+        if state.shape != (count,) or not np.all(np.isfinite(state)):
+            raise ValueError(
+                f"u must be {count} finite numbers, 13 a body; its shape is {state.shape}"
+            )
         return self.machine.rhs(t, state)
 
     def redundancy(self, u: ArrayLike | None = None) -> Redundancy:
@@ -106,7 +113,9 @@ class CompiledModel:
 
     def explain(self) -> str:
         """What was modelled, what was left out and why, and which method was chosen and why."""
-        return explain(self.checked, self.model, self.machine, self.method, self.reason, self.redundancy())
+        return explain(
+            self.checked, self.model, self.machine, self.method, self.reason, self.redundancy()
+        )
 
 
 def choose_method(model: Model, asked: str) -> tuple[str, str]:
@@ -122,13 +131,15 @@ def choose_method(model: Model, asked: str) -> tuple[str, str]:
         return "unconstrained", "the scene has no joints"
     if asked == "unconstrained" and constrained:
         raise SimulationError(
-            f"method unconstrained does not fit: the scene has {len(model.joint_names)} joints with "
-            f"{model.row_count} rows; use standard or auto"
+            "method unconstrained does not fit: the scene has "
+            f"{len(model.joint_names)} joints with {model.row_count} rows; use standard or auto"
         )
     if asked == "standard" and not constrained:
         return "unconstrained", "asked for standard, but the scene has no joints"
     if asked not in ("standard", "unconstrained"):
-        raise SimulationError(f"method {asked} is not there yet; use auto, standard or unconstrained")
+        raise SimulationError(
+            f"method {asked} is not there yet; use auto, standard or unconstrained"
+        )
     return asked, "asked for"
 
 
@@ -162,4 +173,6 @@ def compile_scene(
         PluginError: a type that the scene uses cannot be loaded.
         SimulationError: the method does not fit the scene.
     """
-    return CompiledModel(scene, method=method, allow_code=allow_code, registry=registry, announce=announce)
+    return CompiledModel(
+        scene, method=method, allow_code=allow_code, registry=registry, announce=announce
+    )

@@ -9,18 +9,28 @@ from dap3d_core.scene import Checked, Scene
 from dap3d_core.simulation.redundancy import Redundancy
 
 
-def explain(checked: Checked, model: Model, machine: Machine, method: str, reason: str, redundancy: Redundancy) -> str:
+def explain(
+    checked: Checked,
+    model: Model,
+    machine: Machine,
+    method: str,
+    reason: str,
+    redundancy: Redundancy,
+) -> str:
     """A text for people, one fact a line."""
     n, ordering = model.body_count, machine.plan.ordering
+    elements = {"joints": model.joints, "forces": model.forces, "functions": model.functions}
     lines = [f"scene {checked.scene.name or '(no name)'}"]
-    lines.append(f"  bodies     {n}: {_some(model.body_names)}; {13 * n} states, {6 * n} accelerations")
-    for title, groups in (("joints", model.joints), ("forces", model.forces), ("functions", model.functions)):
+    sizes = f"{13 * n} states, {6 * n} accelerations"
+    lines.append(f"  bodies     {n}: {_some(model.body_names)}; {sizes}")
+    for title, groups in elements.items():
         lines.append(f"  {title:10s} {_counts(groups)}")
     if model.row_count:
         lines.append(f"  rows       {redundancy.describe()}")
         lines.append(
-            f"  matrix     {len(ordering.early)} bodies eliminated first, then {len(ordering.nodes)} joint nodes and "
-            f"{len(ordering.hubs)} hubs; {machine.plan.fill} blocks of fill"
+            f"  matrix     {len(ordering.early)} bodies eliminated first, then "
+            f"{len(ordering.nodes)} joint nodes and {len(ordering.hubs)} hubs; "
+            f"{machine.plan.fill} blocks of fill"
         )
     lines.append(f"  method     {method}, because {reason}")
     compiled = sorted({f"{group.keyword} ({kind})" for kind, group in machine.what})
@@ -43,9 +53,10 @@ def _counts(groups: tuple[Group, ...]) -> str:
 
 def _left_out(checked: Checked, model: Model) -> list[str]:
     scene = checked.scene
+    elements = {"constraints": model.joints, "forces": model.forces, "functions": model.functions}
     result = []
-    for title, kind in (("constraints", model.joints), ("forces", model.forces), ("functions", model.functions)):
-        if not kind:
+    for title, groups in elements.items():
+        if not groups:
             result.append(f"{title}: the scene has none, so no code for them was loaded")
     if model.forces and not any(g.examined.type.keyword == "weight" for g in model.forces):
         result.append("weight: no force of this type, so there is no gravity")
@@ -59,7 +70,12 @@ def _left_out(checked: Checked, model: Model) -> list[str]:
 
 
 def _declared(scene: Scene) -> dict[str, Any]:
-    return {"points": scene.points, "vectors": scene.vectors, "vectors2": scene.vectors2, "functions": scene.functions}
+    return {
+        "points": scene.points,
+        "vectors": scene.vectors,
+        "vectors2": scene.vectors2,
+        "functions": scene.functions,
+    }
 
 
 def _used(scene: Scene) -> Counter[str]:

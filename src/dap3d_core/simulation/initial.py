@@ -1,5 +1,7 @@
 """Initial conditions brought onto the constraints, at position and at velocity level (spec 8)."""
 
+from itertools import pairwise
+
 import attrs
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +70,8 @@ def correct_initial(machine: Machine, u: Floats, t: float = 0.0) -> Initial:
     residual = _velocity_residual(rows, u)
     if _largest(residual) > 0.0:
         u = u.copy()
-        u[7 * machine.model.body_count :] -= _least_change(machine, rows, residual, t, u, positions=False)
+        velocities = u[7 * machine.model.body_count :]
+        velocities -= _least_change(machine, rows, residual, t, positions=False)
     moved, turned = _distance(start, u, machine.model.body_count)
     return Initial(u, before, violation(machine, u, t), passes, moved, turned)
 
@@ -81,15 +84,19 @@ def _correct_positions(machine: Machine, u: Floats, t: float) -> tuple[Floats, i
             return u, passes
         if passes == MOST_PASSES or not np.all(np.isfinite(rows.C)):
             break
-        change = _least_change(machine, rows, rows.C, t, u, positions=True).reshape(-1, 6)
+        change = _least_change(machine, rows, rows.C, t, positions=True).reshape(-1, 6)
         shift = float(np.max(np.linalg.norm(change[:, :3], axis=1)))
         turn = float(np.max(np.linalg.norm(change[:, 3:], axis=1)))
-        limit = min(1.0, MOST_SHIFT * size / shift if shift else 1.0, MOST_TURN / turn if turn else 1.0)
+        shift_limit = MOST_SHIFT * size / shift if shift else 1.0
+        turn_limit = MOST_TURN / turn if turn else 1.0
+        limit = min(1.0, shift_limit, turn_limit)
         u = _displaced(u, -limit * change, machine.model.body_count)
     raise AssemblyError(_failure(machine, rows.C))
 
 
-def _least_change(machine: Machine, rows: Rows, residual: Floats, t: float, u: Floats, *, positions: bool) -> Floats:
+def _least_change(
+    machine: Machine, rows: Rows, residual: Floats, t: float, *, positions: bool
+) -> Floats:
     """The shortest x (6 n,) with D x = residual, on the position rows or on all."""
     if machine.model.row_count <= DENSE_ROWS:
         D = rows.dense()
@@ -138,8 +145,10 @@ def _distance(u: Floats, other: Floats, n: int) -> tuple[float, float]:
     s, q, _, _ = split(other, n)
     cosine = np.clip(np.abs(np.sum(p * q, axis=1)), 0.0, 1.0)
     sine = np.linalg.norm(p - np.sign(np.sum(p * q, axis=1))[:, None] * q, axis=1)
-    angle = np.where(cosine > 0.9, 4.0 * np.arcsin(np.clip(sine / 2.0, 0, 1)), 2.0 * np.arccos(cosine))
-    return float(np.max(np.linalg.norm(r - s, axis=1), initial=0.0)), float(np.max(angle, initial=0.0))
+    small, large = 4.0 * np.arcsin(np.clip(sine / 2.0, 0, 1)), 2.0 * np.arccos(cosine)
+    angle = np.where(cosine > 0.9, small, large)
+    shift = np.linalg.norm(r - s, axis=1)
+    return float(np.max(shift, initial=0.0)), float(np.max(angle, initial=0.0))
 
 
 def _velocity_residual(rows: Rows, u: Floats) -> Floats:
@@ -159,10 +168,14 @@ def _largest(values: Floats) -> float:
 
 def _failure(machine: Machine, C: Floats) -> str:
     model = machine.model
-    lines = [f"the initial positions cannot be assembled: after {MOST_PASSES} passes these joints are still open"]
-    worst = np.array([_largest(C[a:b]) for a, b in zip(model.joint_start[:-1], model.joint_start[1:], strict=True)])
-    for k in np.argsort(-worst)[:10]:
-        if not worst[k] <= TOLERANCE:
-            lines.append(f"  {model.joint_names[k]}: residual {worst[k]:.3g}")
-    lines.append("check the points, axes and lengths of these joints; contradictory joints cannot be assembled")
-    return "\n".join(lines)
+    worst = np.array([_largest(C[a:b]) for a, b in pairwise(model.joint_start)])
+    still_open = [k for k in np.argsort(-worst)[:10] if not worst[k] <= TOLERANCE]
+    return "\n".join(
+        [
+            "the initial positions cannot be assembled: "
+            f"after {MOST_PASSES} passes these joints are still open",
+            *(f"  {model.joint_names[k]}: residual {worst[k]:.3g}" for k in still_open),
+            "check the points, axes and lengths of these joints; "
+            "contradictory joints cannot be assembled",
+        ]
+    )

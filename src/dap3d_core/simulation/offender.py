@@ -35,7 +35,8 @@ def _at(machine: Machine, t: float, y: Floats) -> str:
     for q, (kind, group) in enumerate(machine.what):
         for k in range(group.count):
             if not _one_is_finite(machine, q, k, kind, group, t):
-                return f"{_title(kind)} {_name(machine, kind, group, k)} (type {group.keyword}) is not finite"
+                name = _name(machine, kind, group, k)
+                return f"{_title(kind)} {name} (type {group.keyword}) is not finite"
     return _singular(machine, t)
 
 
@@ -44,16 +45,19 @@ def _one_is_finite(machine: Machine, q: int, k: int, kind: str, group: Group, t:
     i0, p0, _ = s.groups[q]
     for out in (s.force, s.gamma, s.nu, s.C, s.D):
         out[:] = 0.0
-    outs = {"acceleration": (s.D, s.gamma, s.nu), "position": (s.C, s.C, s.C)}.get(kind, (s.force,) * 3)
-    loop = machine.loops[q]
-    place = int(i0) + k * stride(group.examined)
-    loop(t, s.body, s.F, s.idx, s.par, place, int(p0) + k * group.examined.layout.par_width, 1, *outs)
+    joint_outs = {"acceleration": (s.D, s.gamma, s.nu), "position": (s.C, s.C, s.C)}
+    outs = joint_outs.get(kind, (s.force, s.force, s.force))
+    loop, examined = machine.loops[q], group.examined
+    i1 = int(i0) + k * stride(examined)
+    p1 = int(p0) + k * examined.layout.par_width
+    loop(t, s.body, s.F, s.idx, s.par, i1, p1, 1, *outs)
     return all(bool(np.all(np.isfinite(out))) for out in (*outs, s.F))
 
 
 def _title(kind: str) -> str:
     assert kind in KINDS
-    return {"value": "function", "wrench": "force", "energy": "the energy of force"}.get(kind, "joint")
+    titles = {"value": "function", "wrench": "force", "energy": "the energy of force"}
+    return titles.get(kind, "joint")
 
 
 def _name(machine: Machine, kind: str, group: Group, k: int) -> str:
@@ -77,5 +81,8 @@ def _singular(machine: Machine, t: float) -> str:
         if np.any(small):
             row = int(np.flatnonzero(s.row == first + int(np.flatnonzero(small)[0]))[0])
             joint = machine.model.row_owner(row)
-            return f"the pose is (nearly) singular, where the rows of joint {joint} depend on the others"
+            return (
+                "the pose is (nearly) singular, "
+                f"where the rows of joint {joint} depend on the others"
+            )
     return ""

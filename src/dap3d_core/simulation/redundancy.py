@@ -34,12 +34,15 @@ class Redundancy:
         if not rank.redundant:
             return f"{rank.rows} rows, all independent; {rank.dof} degrees of freedom"
         text = (
-            f"{rank.redundant} of {rank.rows} constraint rows are redundant (rank {rank.rank} by {rank.method}, "
-            f"tolerance {rank.tolerance:.1e}); {rank.dof} degrees of freedom. "
+            f"{rank.redundant} of {rank.rows} constraint rows are redundant (rank {rank.rank} "
+            f"by {rank.method}, tolerance {rank.tolerance:.1e}); {rank.dof} degrees of freedom. "
             f"The joints that share a freedom: {', '.join(self.joints)}"
         )
         if self.contradiction > CONSISTENT:
-            text += f". They contradict each other: their prescribed velocities disagree by {self.contradiction:.3g}"
+            text += (
+                ". They contradict each other: "
+                f"their prescribed velocities disagree by {self.contradiction:.3g}"
+            )
         return text
 
 
@@ -53,6 +56,9 @@ def redundancy_of(machine: Machine, u: Floats, t: float = 0.0) -> Redundancy:
         system = machine.system
         place_bodies(machine.integrated(u), system.body, system.metric)
         rank = sparse_rank(machine.plan, system.D, system.metric, system.row, 6 * model.body_count)
-    involved = sorted({int(np.searchsorted(model.joint_start, k, side="right")) - 1 for k in rank.shared})
-    gap = float(np.max(np.abs(rank.dependencies @ rows.nu), initial=0.0)) if rank.dependencies.size else 0.0
+    shared = np.array(rank.shared, dtype=np.int64)
+    involved = np.unique(np.searchsorted(model.joint_start, shared, side="right") - 1)
+    gap = 0.0
+    if rank.dependencies.size:
+        gap = float(np.max(np.abs(rank.dependencies @ rows.nu), initial=0.0))
     return Redundancy(rank, tuple(model.joint_names[k] for k in involved), gap)

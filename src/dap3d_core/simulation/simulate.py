@@ -9,7 +9,6 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-
 from dap3d_core.integrators import METHODS, Integration, Status
 from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import Result, Statistics
@@ -76,12 +75,14 @@ def simulate(
         AssemblyError: the initial positions cannot be assembled.
         SimulationError: the run stopped; ``.result`` is what was computed.
     """
-    compiled = scene if isinstance(scene, CompiledModel) else CompiledModel(
-        scene, method=method, allow_code=allow_code, announce=announce
-    )  # fmt: skip
-    given = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol, step=step,
-                 correct=correct, project=project)  # fmt: skip
-    settings = attrs.evolve(compiled.scene.simulation, **{k: v for k, v in given.items() if v is not None})
+    if isinstance(scene, CompiledModel):
+        compiled = scene
+    else:
+        compiled = CompiledModel(scene, method=method, allow_code=allow_code, announce=announce)
+    asked = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol,
+                 step=step, correct=correct, project=project)  # fmt: skip
+    given: dict[str, Any] = {k: v for k, v in asked.items() if v is not None}
+    settings = attrs.evolve(compiled.scene.simulation, **given)
     check_simulation(settings, compiled.model.body_names)
     return _Run(compiled, settings, announce).go(progress)
 
@@ -99,7 +100,7 @@ def report_times(t_end: float | None, dt: float | None) -> Floats:
         return np.zeros(1)
     dt = t_end / 100.0 if dt is None else dt
     count = int(np.floor(t_end / dt * (1.0 + 1e-12) + 1e-9))
-    times = dt * np.arange(count + 1)
+    times: Floats = dt * np.arange(count + 1)
     if t_end - times[-1] > 1e-9 * dt:
         return np.append(times, t_end)
     times[-1] = t_end
@@ -109,7 +110,9 @@ def report_times(t_end: float | None, dt: float | None) -> Floats:
 class _Run:
     """One run of a compiled model."""
 
-    def __init__(self, compiled: CompiledModel, settings: Any, announce: Callable[[str], None] | None) -> None:
+    def __init__(
+        self, compiled: CompiledModel, settings: Any, announce: Callable[[str], None] | None
+    ) -> None:
         self.announce = announce
         self.compiled = compiled
         self.machine = compiled.machine
@@ -147,25 +150,29 @@ class _Run:
         elif max(violation(machine, u0)) > OFF_CONSTRAINTS:
             position, velocity = violation(machine, u0)
             self.notes.append(
-                f"the initial conditions violate the constraints (position {position:.2g}, velocity {velocity:.2g}) "
-                "and were not corrected; switch correct on"
+                f"the initial conditions violate the constraints (position {position:.2g}, "
+                f"velocity {velocity:.2g}) and were not corrected; switch correct on"
             )
         if machine.model.row_count:
             redundancy = self.compiled.redundancy(u0)
             if redundancy.rank.redundant:
-                raise RedundantError(f"{redundancy.describe()}. The standard method needs independent rows")
+                raise RedundantError(
+                    f"{redundancy.describe()}. The standard method needs independent rows"
+                )
         return u0
 
     def _note_correction(self, initial: Initial) -> None:
         position, velocity = initial.violation
         if position > TOLERANCE:
             self.notes.append(
-                f"initial positions corrected in {initial.passes} passes: |C| {position:.2g} -> "
-                f"{initial.residual[0]:.2g}; bodies moved by up to {initial.moved:.2g} m and {initial.turned:.2g} rad"
+                f"initial positions corrected in {initial.passes} passes: "
+                f"|C| {position:.2g} -> {initial.residual[0]:.2g}; "
+                f"bodies moved by up to {initial.moved:.2g} m and {initial.turned:.2g} rad"
             )
         if velocity > TOLERANCE:
             self.notes.append(
-                f"initial velocities corrected: |D v - nu| {velocity:.2g} -> {initial.residual[1]:.2g}"
+                "initial velocities corrected: "
+                f"|D v - nu| {velocity:.2g} -> {initial.residual[1]:.2g}"
             )
 
     def _integration(self, u0: Floats) -> Integration:
@@ -224,7 +231,9 @@ class _Run:
             Status.NOT_FINITE: "a number became infinite or not a number",
             Status.PROJECTION_FAILED: "the state could not be projected onto the constraints",
         }[integration.status]
-        message = f"the run stopped at t = {t:.9g} s: {reason}" + (f": {culprit}" if culprit else "")
+        message = f"the run stopped at t = {t:.9g} s: {reason}"
+        if culprit:
+            message += f": {culprit}"
         self.notes.append(message)
         result = self._result(integration, "stopped") if any(len(r) for r in self.rows) else None
         return SimulationError(message, result)
@@ -238,16 +247,24 @@ class _Run:
             scene_text=self.compiled.scene_text,
             rows=np.concatenate(self.rows),
             stats=Statistics(
-                steps=counts.steps, rejected=counts.rejected, rhs=counts.rhs, projections=counts.projections,
-                wall_time_s=wall, compile_time_s=self.compiled.compile_time + self.compile_time,
+                steps=counts.steps,
+                rejected=counts.rejected,
+                rhs=counts.rhs,
+                projections=counts.projections,
+                wall_time_s=wall,
+                compile_time_s=self.compiled.compile_time + self.compile_time,
             ),
             status=status,
             method=self.compiled.method,
             integrator=self.settings.integrator,
             notes=self.notes,
             settings={
-                "t_end": float(self.times[-1]), "dt": self.settings.dt, "rtol": self.settings.rtol,
-                "atol": self.settings.atol, "step": self.settings.step, "project": bool(self.settings.project),
+                "t_end": float(self.times[-1]),
+                "dt": self.settings.dt,
+                "rtol": self.settings.rtol,
+                "atol": self.settings.atol,
+                "step": self.settings.step,
+                "project": bool(self.settings.project),
                 "correct": bool(self.settings.correct),
             },
-        )  # fmt: skip
+        )
