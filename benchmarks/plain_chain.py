@@ -19,15 +19,23 @@ def rhs(u, du, n, mass, J, A, w, f, s, D, S, x, gravity):
         e0, e1, e2, e3 = u[k + 3], u[k + 4], u[k + 5], u[k + 6]
         q = 2.0 / (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
         a = A[b]
-        a[0, 0], a[0, 1], a[0, 2] = 1 - q * (e2 * e2 + e3 * e3), q * (e1 * e2 - e0 * e3), q * (e1 * e3 + e0 * e2)
-        a[1, 0], a[1, 1], a[1, 2] = q * (e1 * e2 + e0 * e3), 1 - q * (e1 * e1 + e3 * e3), q * (e2 * e3 - e0 * e1)
-        a[2, 0], a[2, 1], a[2, 2] = q * (e1 * e3 - e0 * e2), q * (e2 * e3 + e0 * e1), 1 - q * (e1 * e1 + e2 * e2)
+        a[0, 0] = 1 - q * (e2 * e2 + e3 * e3)
+        a[0, 1] = q * (e1 * e2 - e0 * e3)
+        a[0, 2] = q * (e1 * e3 + e0 * e2)
+        a[1, 0] = q * (e1 * e2 + e0 * e3)
+        a[1, 1] = 1 - q * (e1 * e1 + e3 * e3)
+        a[1, 2] = q * (e2 * e3 - e0 * e1)
+        a[2, 0] = q * (e1 * e3 - e0 * e2)
+        a[2, 1] = q * (e2 * e3 + e0 * e1)
+        a[2, 2] = 1 - q * (e1 * e1 + e2 * e2)
         for c in range(3):
             w[b, c] = u[m + 3 + c]
         l0 = a[0, 0] * w[b, 0] + a[1, 0] * w[b, 1] + a[2, 0] * w[b, 2]
         l1 = a[0, 1] * w[b, 0] + a[1, 1] * w[b, 1] + a[2, 1] * w[b, 2]
         l2 = a[0, 2] * w[b, 0] + a[1, 2] * w[b, 1] + a[2, 2] * w[b, 2]
-        g0, g1, g2 = (J[b, 1] - J[b, 2]) * l1 * l2, (J[b, 2] - J[b, 0]) * l2 * l0, (J[b, 0] - J[b, 1]) * l0 * l1
+        g0 = (J[b, 1] - J[b, 2]) * l1 * l2
+        g1 = (J[b, 2] - J[b, 0]) * l2 * l0
+        g2 = (J[b, 0] - J[b, 1]) * l0 * l1
         for c in range(3):
             f[b, c] = mass[b] * gravity[c]
             f[b, 3 + c] = a[c, 0] * g0 + a[c, 1] * g1 + a[c, 2] * g2
@@ -68,7 +76,8 @@ def rhs(u, du, n, mass, J, A, w, f, s, D, S, x, gravity):
         h = 1.0 / np.sqrt(mass[b])
         for c in range(3):
             du[m + c] = f[b, c] * h
-            du[m + 3 + c] = (a[0, c] * f[b, 3] + a[1, c] * f[b, 4] + a[2, c] * f[b, 5]) / np.sqrt(J[b, c])
+            moment = a[0, c] * f[b, 3] + a[1, c] * f[b, 4] + a[2, c] * f[b, 5]
+            du[m + 3 + c] = moment / np.sqrt(J[b, c])
     for j in range(n):
         for side in range(2):
             b = j - side
@@ -145,7 +154,9 @@ def rhs(u, du, n, mass, J, A, w, f, s, D, S, x, gravity):
     for b in range(n):
         k, m, a = 7 * b, 7 * n + 6 * b, A[b]
         h = 1.0 / np.sqrt(mass[b])
-        v0, v1, v2 = (du[m + 3] / np.sqrt(J[b, 0]), du[m + 4] / np.sqrt(J[b, 1]), du[m + 5] / np.sqrt(J[b, 2]))
+        v0 = du[m + 3] / np.sqrt(J[b, 0])
+        v1 = du[m + 4] / np.sqrt(J[b, 1])
+        v2 = du[m + 5] / np.sqrt(J[b, 2])
         for c in range(3):
             du[m + c] *= h
             du[m + 3 + c] = a[c, 0] * v0 + a[c, 1] * v1 + a[c, 2] * v2
@@ -173,5 +184,6 @@ def chain(n):
     s = np.zeros((n, 2, 3))
     s[:, 0, 0], s[:, 1, 0] = -0.5, 0.5
     J = np.tile([0.001, 1 / 12, 1 / 12], (n, 1))
-    arrays = (np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 6)), s, np.zeros(36 * n), np.zeros(18 * n + 18))
-    return u, (n, np.ones(n), J, *arrays, np.zeros((n, 3)), np.array([0.0, 0.0, -9.81]))
+    A, w, f = np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 6))
+    D, S, x = np.zeros(36 * n), np.zeros(18 * n + 18), np.zeros((n, 3))
+    return u, (n, np.ones(n), J, A, w, f, s, D, S, x, np.array([0.0, 0.0, -9.81]))

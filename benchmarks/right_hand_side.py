@@ -68,13 +68,21 @@ def measure(against=None):
             runs["mark"] = prototype(against, n)
         times = dict(zip(runs, median_seconds([f for _, f in runs.values()]), strict=True))
         per = {name: times[name] / runs[name][0] * 1e6 for name in runs}
-        row = {"mechanism": "chain, spherical", "bodies": n, "us": per["ours"], "us_per_body": per["ours"] / n,
-               "ratio_by_hand": per["ours"] / per["by hand"]}  # fmt: skip
+        row = {
+            "mechanism": "chain, spherical",
+            "bodies": n,
+            "us": per["ours"],
+            "us_per_body": per["ours"] / n,
+            "ratio_by_hand": per["ours"] / per["by hand"],
+        }
         if against:
             row["ratio_mark"] = per["ours"] / per["mark"]
         rows.append(row)
-    chains = {"chain, revolute": [(n, scenes.chain(n, "rev")) for n in SIZES[:-1]], "star": [(1001, scenes.star(1000))]}
-    for title, made in chains.items():
+    others = {
+        "chain, revolute": [(n, scenes.chain(n, "rev")) for n in SIZES[:-1]],
+        "star": [(1001, scenes.star(1000))],
+    }
+    for title, made in others.items():
         for n, scene in made:
             count, function = our(scene)
             us = median_seconds([function])[0] / count * 1e6

@@ -17,8 +17,6 @@ from rich.console import Console
 from rich.table import Table
 
 
-
-
 def table(console, title, rows):
     """Print rows of one shape."""
     keys = list(dict.fromkeys(key for row in rows for key in row))
@@ -54,7 +52,11 @@ def main():
         if arguments.only in (None, name):
             found[name] = measure()
             table(console, name.replace("_", " "), found[name])
-    versions = {"python": platform.python_version(), "numpy": numpy.__version__, "numba": numba.__version__}
+    versions = {
+        "python": platform.python_version(),
+        "numpy": numpy.__version__,
+        "numba": numba.__version__,
+    }
     path = Path(arguments.output)
     path.write_text(json.dumps({"versions": versions, **found}, indent=1))
     console.print(f"written to {path}")

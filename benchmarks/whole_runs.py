@@ -1,7 +1,6 @@
 """Runs from start to end: accuracy against time, start-up of the program, size."""
 
 import os
-
 import statistics
 import subprocess
 import sys
@@ -43,17 +42,25 @@ def dop853_on_a_chain():
             result = run(rtol)
             times.append(time.perf_counter() - start)
         error = float(np.max(np.linalg.norm(result.r[-1] - reference, axis=1)))
-        rows.append({"rtol": rtol, "error_m": error, "ms": 1e3 * statistics.median(times), "steps": result.stats.steps,
-                     "rhs": result.stats.rhs})  # fmt: skip
+        rows.append(
+            {
+                "rtol": rtol,
+                "error_m": error,
+                "ms": 1e3 * statistics.median(times),
+                "steps": result.stats.steps,
+                "rhs": result.stats.rhs,
+            }
+        )
     return rows
 
 
 def large(n=100_000):
     """Building and compiling a chain of n bodies in a fresh process."""
     script = LARGE.format(folder=os.path.dirname(__file__), n=n)
-    output = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True).stdout
-    scene_s, compile_s, memory_gib = map(float, output.split())
-    return [{"bodies": n, "scene_s": scene_s, "compile_s": compile_s, "peak_memory_gib": memory_gib}]
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    scene_s, compile_s, memory = map(float, done.stdout.split())
+    return [{"bodies": n, "scene_s": scene_s, "compile_s": compile_s, "peak_memory_gib": memory}]
 
 
 def start_up():
@@ -75,5 +82,3 @@ def start_up():
                 times.append(time.perf_counter() - start)
             rows.append({"command": title, "seconds": statistics.median(times), "runs": repeats})
     return rows
-
-

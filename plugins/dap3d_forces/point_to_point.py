@@ -20,7 +20,7 @@ class PointToPoint(Force):
     k: float = number(default=0.0, unit="N/m", doc="stiffness")
     c: float = number(default=0.0, unit="N s/m", doc="damping coefficient")
     l0: float = number(default=0.0, unit="m", minimum=0.0, doc="undeformed length")
-    f_a: float = number(default=0.0, unit="N", doc="constant force of the actuator, tension positive")
+    f_a: float = number(default=0.0, unit="N", doc="force of the actuator, tension positive")
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a):
         length = sqrt(dot(d, d))

@@ -9,7 +9,9 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 class Weight(Force):
-    """Every body is pulled along wgt by its mass times gravity (manual: ``weight``; spec 6).
+    """Every body is pulled along wgt by its mass times gravity (manual: ``weight``).
+
+    Spec 6. On each body, at its mass centre:
 
         force = mass gravity wgt,  moment = 0,  energy = -mass gravity wgt . r
     """

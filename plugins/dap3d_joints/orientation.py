@@ -16,7 +16,7 @@ def conjugate(a):
 
 
 def error(p_j, p_c, p_i):
-    """q = p_j o conj(p_c) o conj(p_i) with q0 >= 0, as (q0, e); identity where A_i^T A_j = A_c."""
+    """Error q = p_j o conj(p_c) o conj(p_i) as (q0, e), q0 >= 0; e = 0 where A_i^T A_j = A_c."""
     q = product(p_j, conjugate(product(p_i, p_c)))
     sign = where(q[0] < 0.0, -1.0, 1.0)
     return sign * q[0], scale(sign, (q[1], q[2], q[3]))
@@ -29,7 +29,7 @@ def error_rate(q0, e, w_i, w_j):
 
 
 def quaternion(A):
-    """Euler parameters of a rotation matrix (three rows), by the largest of the four; for ``prepare``."""
+    """Euler parameters of a rotation matrix, by the largest of the four; for ``prepare``."""
     trace = A[0][0] + A[1][1] + A[2][2]
     squares = [1 + trace, *(1 + 2 * A[k][k] - trace for k in range(3))]
     k = max(range(4), key=lambda n: squares[n])

@@ -1,4 +1,4 @@
-"""Relative translation driver: prescribes how fast one body's mass centre moves against another's."""
+"""Relative translation driver: prescribes how fast a mass centre moves against another."""
 
 from dap3d_core.interface import Body, Joint, Vector, body, function, hookimpl, vector
 from dap3d_core.kernels import dot, neg, row, sub

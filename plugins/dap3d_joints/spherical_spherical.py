@@ -20,14 +20,19 @@ class SphericalSpherical(Joint):
 
     keyword, rows = "sph-sph", 1
     d: Vector2 = vector2(doc="from the link's end on body i to its end on body j")
-    length: float = number(default=None, unit="m", positive=True, doc="length of the link; as it stands at the start when left out")
+    length: float = number(
+        default=None, unit="m", positive=True, doc="length of the link; left out, as at the start"
+    )
 
     def prepare(self, bodies):
         if self.length is not None:
             return {}
         d = sub(bodies["j"].place(self.P_j), bodies["i"].place(self.P_i))
         if norm2(d) == 0.0:
-            raise ValueError("the two points of the link coincide, so its direction is undefined; give other points")
+            raise ValueError(
+                "the two points of the link coincide, so its direction is undefined; "
+                "give other points"
+            )
         return {"length": norm2(d) ** 0.5}
 
     def C(d, length):

@@ -26,7 +26,8 @@ class Translational(Joint):
         J_i   = [-b^T, -(s_i x b)^T],  J_j = [b^T, ((s_j - d) x b)^T]
         gamma = (w_i x s_i_dot) . b + (w_j x d + s_j_dot - 2 d_dot) . b_dot
 
-    On the constraints these are the manual's; it prints J = [0, -I], [0, I] and gamma = 0 for rows 1 to 3.
+    On the constraints these are the manual's; it prints J = [0, -I], [0, I] and gamma = 0 for rows
+    1 to 3.
     """
 
     keyword, rows = "tran", 5

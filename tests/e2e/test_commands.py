@@ -113,7 +113,7 @@ def test_info_says_what_a_file_holds(dap3d, result):
     assert found["settings"]["rtol"] == 1e-8
     assert found["ledger"].keys() == result.ledger.keys()
     shown = dap3d("info", "pen1.nc").stdout
-    for words in ("cone", "J1", "numba", "energy", "dop853", "correct off"):
+    for words in ("cone", "J1", "numba", "energy", "dop853", "project on"):
         assert words in shown
     for name in ("gone.nc", "."):
         assert dap3d("info", name).returncode == 2
@@ -160,7 +160,7 @@ def test_plot_draws_into_files(dap3d, result):
     assert (dap3d.folder / "pen1.png").read_bytes().startswith(b"\x89PNG")
     curves = dap3d("plot", "pen1.nc", "cone.r.z", "J1.force", "--x", "cone.r.y", "-o", "a.svg")
     assert curves.returncode == 0, curves.stderr
-    assert "cone.r.z" in (dap3d.folder / "a.svg").read_text()
+    assert "position of cone" in (dap3d.folder / "a.svg").read_text()
     unknown = dap3d("plot", "pen1.nc", "cone.rr.z", "-o", "b.png")
     assert unknown.returncode == 2
     assert "did you mean 'cone.r.z'" in unknown.stderr

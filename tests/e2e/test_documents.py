@@ -68,3 +68,15 @@ def test_every_decision_and_document_that_is_named_exists():
             assert (document.parent / link).exists() or Path(link).is_absolute(), (
                 f"{document.name}: {link}"
             )
+
+
+def test_the_commands_on_the_pages_of_the_models_are_there():
+    """Every ``dap3d`` command that a model's page shows exists and takes the options shown."""
+    for page in (REPOSITORY / "models").glob("*/README.md"):
+        found = commands(page.read_text(), "dap3d")
+        assert found, page
+        for words in found:
+            done = dap3d([words[0], "--help"], REPOSITORY)
+            assert done.returncode == 0, f"{page}: {words}"
+            for option in (w for w in words if w.startswith("--")):
+                assert option in done.stdout, f"{page}: {words}"

@@ -37,7 +37,7 @@ def breaking(scene_file):
     """A model folder with a type of its own that returns NaN after t = 0.05 s."""
     fields = 'type = "breaking"\nbody_i = "stone"'
     scene = scene_file(('type = "weight"', fields), name="breaking/scene.toml")
-    (scene.parent / "plugin.py").write_text(PLUGIN)
+    (scene.parent / "plugin.py").write_text(f"# {scene}\n{PLUGIN}")
     return scene.parent
 
 

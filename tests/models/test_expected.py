@@ -11,8 +11,11 @@ import pytest
 
 import dap3d_core as dap
 
-EXPECTED = {name: tomllib.loads((folder / "expected.toml").read_text()) for name, folder in dap.shipped_models().items()
-            if (folder / "expected.toml").exists()}  # fmt: skip
+EXPECTED = {
+    name: tomllib.loads((folder / "expected.toml").read_text())
+    for name, folder in dap.shipped_models().items()
+    if (folder / "expected.toml").exists()
+}
 CHECKS = [(name, check) for name, content in EXPECTED.items() for check in content["check"]]
 COUNTS = ("rows", "rank", "dof")
 

@@ -35,7 +35,8 @@ class Motion:
             r.append([x(t) for x in self.r[b]])
             v.append([x.deriv()(t) for x in self.r[b]])
             a.append([x.deriv(2)(t) for x in self.r[b]])
-            q, q1, q2 = (np.array([x.deriv(k)(t) if k else x(t) for x in self.q[b]]) for k in range(3))
+            q = np.array([x(t) for x in self.q[b]])
+            q1, q2 = (np.array([x.deriv(k)(t) for x in self.q[b]]) for k in (1, 2))
             n = np.linalg.norm(q)
             n1 = q @ q1 / n
             n2 = (q1 @ q1 + q @ q2 - n1 * n1) / n

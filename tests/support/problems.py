@@ -21,12 +21,13 @@ def four_bar():
     """
     scene = dap.Scene(name="A02")
     for k in range(2):
-        scene.add_body(f"crank{k}", Jp=(1 / 12, 1e-3, 1 / 12), mass=1.0, r=(k, 0.5, 0.0), r_dot=(0.5, 0.0, 0.0),
-                       w=(0.0, 0.0, -1.0))  # fmt: skip
-        scene.add_point(f"low{k}", f"crank{k}", (0.0, -0.5, 0.0))
-        scene.add_point(f"high{k}", f"crank{k}", (0.0, 0.5, 0.0))
-        scene.add_point(f"pivot{k}", "ground", (float(k), 0.0, 0.0))
-        scene.add_joint("rev", f"A{k}", P_i=f"low{k}", P_j=f"pivot{k}", a_i=f"crank{k}.z", a_j="ground.z")
+        crank, low, pivot = f"crank{k}", f"low{k}", f"pivot{k}"
+        scene.add_body(crank, mass=1.0, Jp=(1 / 12, 1e-3, 1 / 12), r=(k, 0.5, 0.0),
+                       r_dot=(0.5, 0.0, 0.0), w=(0.0, 0.0, -1.0))  # fmt: skip
+        scene.add_point(low, crank, (0.0, -0.5, 0.0))
+        scene.add_point(f"high{k}", crank, (0.0, 0.5, 0.0))
+        scene.add_point(pivot, "ground", (float(k), 0.0, 0.0))
+        scene.add_joint("rev", f"A{k}", P_i=low, P_j=pivot, a_i=f"{crank}.z", a_j="ground.z")
     scene.add_body("coupler", mass=1.0, Jp=ROD, r=(0.5, 1.0, 0.0), r_dot=(1.0, 0.0, 0.0))
     for k in range(2):
         scene.add_point(f"end{k}", "coupler", (k - 0.5, 0.0, 0.0))
@@ -55,8 +56,9 @@ def heavy_top(theta, spin, precession):
     # axial omega is the whole component along the axis; the rest comes from the precession about z
     w = spin * axis + precession * (np.array([0.0, 0.0, 1.0]) - c * axis)
     r = 0.1 * axis
-    scene.add_body("top", mass=1.0, Jp=(0.02 - 0.01, 0.02 - 0.01, 0.005), r=r, r_dot=np.cross(w, r), w=w,
-                   p=(np.cos(theta / 2), -np.sin(theta / 2), 0.0, 0.0))  # fmt: skip
+    p = (np.cos(theta / 2), -np.sin(theta / 2), 0.0, 0.0)
+    Jp = (0.02 - 0.01, 0.02 - 0.01, 0.005)
+    scene.add_body("top", mass=1.0, Jp=Jp, r=r, p=p, r_dot=np.cross(w, r), w=w)
     scene.add_point("tip", "top", (0.0, 0.0, -0.1))
     scene.add_joint("sph", "pivot", P_i="tip", P_j="ground.O")
     scene.add_force("weight", "gravity")

@@ -21,7 +21,8 @@ def scene_for(examined, rng, *, ground=None):
         L = rng.uniform(-0.3, 0.3, (3, 3))
         J = L @ L.T + 0.5 * np.eye(3)
         p = rng.normal(size=4)
-        scene.add_body(name, mass=rng.uniform(0.5, 2.0), Jp=J, r=rng.uniform(-1, 1, 3), p=p / (p @ p) ** 0.5)
+        p = p / (p @ p) ** 0.5
+        scene.add_body(name, mass=rng.uniform(0.5, 2.0), Jp=J, r=rng.uniform(-1, 1, 3), p=p)
     if ground:
         owner[ground] = "ground"
     fields = {}

@@ -1,11 +1,15 @@
 """Compiled code is kept under a digest of all it was made from: never stale, never made twice."""
 
+import shutil
+
 import pytest
-from support.process import run, start
+from support.process import REPOSITORY, run, start
 
 from dap3d_core.kernels.cache import jit_is_on
 
-pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled with NUMBA_DISABLE_JIT=1")
+pytestmark = pytest.mark.skipif(
+    not jit_is_on(), reason="nothing is compiled with NUMBA_DISABLE_JIT=1"
+)
 
 #: A force type whose kernel calls a helper in another module, and that calls one in a third.
 PLUGIN = """
@@ -43,8 +47,8 @@ from dap3d_core.kernels.loops import build, compiled_here
 from plugin import Push
 loop = build(write(examine(Push), "wrench"))
 body = np.zeros((2, BODY_WIDTH)); body[1, MASS] = 2.0
-force = np.zeros(12)
-loop(0.0, body, np.zeros((1, 4)), np.ones(1, dtype=np.int64), np.zeros(1), 0, 0, 1, force, force, force)
+F, idx, par, force = np.zeros((1, 4)), np.ones(1, dtype=np.int64), np.zeros(1), np.zeros(12)
+loop(0.0, body, F, idx, par, 0, 0, 1, force, force, force)
 print(force[6], len(compiled_here))
 """
 #: Runs a pendulum and prints its last state, and how many functions were compiled on the way.
@@ -112,3 +116,22 @@ def test_a_cache_that_cannot_be_written_does_no_harm(tmp_path, where):
     if where == "nowhere":
         script = "import dap3d_core.kernels.cache as c; c._candidates = lambda: iter(())\n" + script
     assert run(script, blocked / "cache", cwd=tmp_path, XDG_CACHE_HOME=blocked).split()[0] == "6.5"
+
+
+OWN_TYPE = """
+import sys
+import dap3d_core as dap
+result = dap.simulate(dap.load(sys.argv[1]), t_end=0.1, dt=0.1, allow_code=True)
+print(result.r[-1, 0, 2])
+"""
+
+
+def test_a_model_with_its_own_types_can_be_copied(tmp_path):
+    """The same plugin.py in another folder is another module: the cached code of the first does not serve it."""
+    ball = REPOSITORY / "models" / "ball1"
+    printed = []
+    for name in ("first", "second"):
+        shutil.copytree(ball, tmp_path / name)
+        script = OWN_TYPE.replace("sys.argv[1]", repr(str(tmp_path / name)))
+        printed.append(run(script))
+    assert printed[0] == printed[1]

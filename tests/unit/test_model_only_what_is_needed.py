@@ -20,7 +20,9 @@ def test_importing_the_package_imports_nothing_heavy():
 
 def test_the_command_help_imports_nothing_heavy():
     """``dap3d --help`` answers without numpy, scipy, numba and matplotlib."""
-    script = "from dap3d_core.cli import main\ntry:\n    main(['--help'])\nexcept SystemExit:\n    pass"
+    script = (
+        "from dap3d_core.cli import main\ntry:\n    main(['--help'])\nexcept SystemExit:\n    pass"
+    )
     assert not imported(script) & HEAVY
 
 
@@ -28,7 +30,11 @@ def test_the_command_help_imports_nothing_heavy():
     ("model", "present", "absent"),
     [
         ("bodies2", {"dap3d_forces.point_to_point"}, {"dap3d_joints", "dap3d_functions"}),
-        ("pen1", {"dap3d_joints.spherical"}, {"dap3d_joints.revolute", "dap3d_forces.point_to_point", "dap3d_functions"}),
+        (
+            "pen1",
+            {"dap3d_joints.spherical"},
+            {"dap3d_joints.revolute", "dap3d_forces.point_to_point", "dap3d_functions"},
+        ),
     ],
 )
 def test_a_model_loads_only_its_own_types(model, present, absent):

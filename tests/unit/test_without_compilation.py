@@ -8,8 +8,8 @@ from dap3d_core.kernels.cache import jit_is_on
 
 SCRIPT = """
 import dap3d_core as dap
-result = dap.simulate(dap.load({model!r}), t_end=0.02, dt=0.01, integrator={integrator!r}, step=0.005,
-                      allow_code=True)
+result = dap.simulate(dap.load({model!r}), t_end=0.02, dt=0.01, integrator={integrator!r},
+                      step=0.005, allow_code=True)
 for array in (result.u, result.v_dot, result.Lam, result.energy.total):
     print(" ".join(repr(float(x)) for x in array.ravel()))
 """
@@ -18,10 +18,19 @@ for array in (result.u, result.v_dot, result.Lam, result.energy.total):
 @pytest.mark.skipif(not jit_is_on(), reason="compares with compiled code")
 @pytest.mark.parametrize(
     ("model", "integrator"),
-    [("bodies2", "rk4"), ("ball1", "dopri5"), ("pen2", "dop853"), ("fourbar2", "rk4"), ("fourbar3", "dopri5")],
+    [
+        ("bodies2", "rk4"),
+        ("ball1", "dopri5"),
+        ("pen2", "dop853"),
+        ("fourbar2", "rk4"),
+        ("fourbar3", "dopri5"),
+    ],
 )
 def test_plain_python_gives_the_numbers_of_compiled_code(model, integrator):
-    """Every stored array agrees to 1e-11 of its size: some hundred roundings, and the condition of the constraints."""
+    """Every stored array agrees to 1e-11 of its size.
+
+    That is some hundred roundings, and the condition of the constraints.
+    """
     script = SCRIPT.format(model=model, integrator=integrator)
     compiled, plain = (run(script, NUMBA_DISABLE_JIT=off).split("\n") for off in (0, 1))
     for a, b in zip(compiled, plain, strict=True):

@@ -4,6 +4,8 @@ Each reference is good to about 1e-11. A tolerance is stated with its reason: at
 global error of these runs is some 10 to 100 times the tolerance over their length.
 """
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from support import problems
@@ -19,9 +21,11 @@ def last(scene, t, **settings):
 
 
 A01 = {
-    1.0: (0.98629175113187532, -0.16501085312554117, 0.29690551591631582, 1.7746436411126556, 4.8562694074846766),
-    10.0: (-0.27508746257611686, -0.96141920509912506, 4.1755981009517288, -1.1947490545604753, 28.294567206067251),
-}
+    1.0: (0.98629175113187532, -0.16501085312554117,
+          0.29690551591631582, 1.7746436411126556, 4.8562694074846766),
+    10.0: (-0.27508746257611686, -0.96141920509912506,
+           4.1755981009517288, -1.1947490545604753, 28.294567206067251),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("t", A01)
@@ -32,7 +36,8 @@ def test_pendulum(t, integrator):
     x, y, vx, vy, tension = A01[t]
     assert result.r[-1, 0, :2] == pytest.approx([x, y], abs=2e-9)
     assert result.rd[-1, 0, :2] == pytest.approx([vx, vy], abs=5e-9)
-    assert -result.Lam[-1, 0] * 1.0 == pytest.approx(tension, abs=1e-8)  # lambda |d|, negative in tension
+    # lambda |d| with |d| = 1 m, negative in tension
+    assert -result.Lam[-1, 0] * 1.0 == pytest.approx(tension, abs=1e-8)
 
 
 def test_pendulum_tension_throughout():
@@ -49,8 +54,8 @@ def test_four_bar_through_its_singular_pose():
     formulation.
     """
     result = last(problems.four_bar(), 10.0, rtol=1e-8, atol=1e-9)
-    B, v = 2 * result.r[-1, 0, :2], 2 * result.rd[-1, 0, :2]
-    assert B == pytest.approx([0.47838505776097056, 0.8781501787912093], abs=1e-6)
+    tip, v = 2 * result.r[-1, 0, :2], 2 * result.rd[-1, 0, :2]
+    assert tip == pytest.approx([0.47838505776097056, 0.8781501787912093], abs=1e-6)
     assert v == pytest.approx([1.7272640755471536, -0.94095217937151564], abs=1e-6)
 
 
@@ -80,10 +85,13 @@ def test_flip_of_the_asymmetric_body():
     fine = last(scene, 10.0, rtol=1e-13, atol=1e-15)
     assert np.max(np.abs(coarse.w[-1] - fine.w[-1])) < 1e-6
     assert np.max(np.abs(coarse.p[-1] - fine.p[-1])) < 1e-6
-    assert fine.wp[:, 0, 1].min() < 0.0 or abs(fine.wp[-1, 0, 0]) > 0.01  # it has left the unstable axis
+    # it has left the unstable axis
+    assert fine.wp[:, 0, 1].min() < 0.0 or abs(fine.wp[-1, 0, 0]) > 0.01
 
 
-@pytest.mark.parametrize("precession", [0.998260295360957858, 56.7367666236016186], ids=["slow", "fast"])
+@pytest.mark.parametrize(
+    "precession", [0.998260295360957858, 56.7367666236016186], ids=["slow", "fast"]
+)
 def test_heavy_top_precesses_steadily(precession):
     """G4: lean, spin and precession stay those of the closed form.
 
@@ -95,7 +103,8 @@ def test_heavy_top_precesses_steadily(precession):
     axis = result.r[:, 0] / 0.1
     expected = np.column_stack([-np.sin(theta) * np.sin(heading), np.sin(theta) * np.cos(heading),
                                 np.full(len(heading), np.cos(theta))])  # fmt: skip
-    assert axis == pytest.approx(expected, abs=1e-7)  # 200 rad of spin at 1e-11 a step, read at a tenth of a metre
+    # 200 rad of spin at 1e-11 a step, read at a tenth of a metre
+    assert axis == pytest.approx(expected, abs=1e-7)
     assert result.wp[:, 0, 2] == pytest.approx(200.0, abs=1e-7)
 
 
@@ -128,7 +137,8 @@ def test_observed_order(problem, integrator):
     The steps are those where the leading term rules: errors from 1e-7 to 1e-13.
     """
     order, *steps = ORDERS[problem, integrator]
-    scene, t = (problems.pendulum(), 1.0) if problem == "A01" else (problems.free_body((1, 2, 3), (1, 2, 0.5)), 1.0)
+    scenes = {"A01": problems.pendulum(), "G1": problems.free_body((1, 2, 3), (1, 2, 0.5))}
+    scene, t = scenes[problem], 1.0
 
     def error(n):
         result = last(scene, t, integrator=integrator, step=t / n, project=False)
@@ -158,4 +168,4 @@ def test_error_follows_tolerance(integrator):
         return np.linalg.norm(result.r[-1, 0, :2] - A01[1.0][:2])
 
     errors = [error(rtol) for rtol in (1e-4, 1e-6, 1e-8, 1e-10)]
-    assert all(b < a / 10 for a, b in zip(errors, errors[1:], strict=False)), errors
+    assert all(b < a / 10 for a, b in pairwise(errors)), errors

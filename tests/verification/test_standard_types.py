@@ -1,4 +1,7 @@
-"""Standard types on mechanisms with closed forms. Tolerances: rtol 1e-11 over a second leaves some 1e-10."""
+"""Standard types on mechanisms with closed forms.
+
+Tolerances: rtol 1e-11 over a second leaves some 1e-10.
+"""
 
 import numpy as np
 import pytest
@@ -46,7 +49,7 @@ def test_a_ring_falls_along_its_axis_and_keeps_its_spin():
 
 
 def test_a_fixed_body_stays_and_carries_its_weight():
-    """fix: the pose of the scene, whatever acts on it; the reaction is the weight and the moment applied."""
+    """fix: the pose stays, whatever acts on it; the reaction is weight and moment applied."""
     scene = block(angle=0.7, r=(1.0, 2.0, 3.0))
     scene.add_joint("fix", "wall", body_i="block")
     scene.add_force("weight", "gravity")
@@ -76,7 +79,7 @@ def test_a_universal_joint_leaves_two_rotations():
 
 
 def test_a_driven_slide_follows_its_function():
-    """rel-tran with function b: the block, body i, moves against the sign, by f_end - f_start, and rests."""
+    """rel-tran with function b: the block, body i, moves by f_start - f_end, and rests."""
     scene = block()
     scene.add_joint("tran", "guide", a_j="ground.x", P_i="block.O", P_j="ground.O")
     scene.add_function("b", "stroke", x_start=0.1, x_end=0.9, f_start=0.0, f_end=0.25)
@@ -125,7 +128,7 @@ def values(keyword, fields, x):
 
 
 def test_functions_meet_their_ends():
-    """b, c, d: values, slopes and curvatures at the ends and beyond as the manual states (spec 7)."""
+    """b, c, d: values, slopes, curvatures at the ends and beyond as the manual states (spec 7)."""
     b = {"x_start": 0.5, "x_end": 2.0, "f_start": 1.0, "f_end": -1.0}
     assert values("b", b, 0.4)[:3] == pytest.approx([1.0, 0.0, 0.0], abs=0.0)
     assert values("b", b, 1.25)[:3] == pytest.approx([0.0, -2.0 * 1.875 / 1.5, 0.0], abs=1e-14)

@@ -175,6 +175,8 @@ def _default(field: dict[str, Any]) -> str:
     if field["required"]:
         return "required"
     default = field["default"]
+    if isinstance(default, (tuple, list)):
+        return f"[{', '.join(f'{x:g}' for x in default)}]"
     return (
         "-" if default is None else f"{default:g}" if isinstance(default, float) else str(default)
     )

@@ -21,7 +21,8 @@ def report(error: BaseException, *, debug: bool, as_json: bool) -> int:
     mistakes = mistakes_of(error)
     if as_json:
         found: dict[str, Any] = {"error": words, "exit_code": code}
-        print_json({"mistakes": mistakes, **found} if mistakes else found)
+        with contextlib.suppress(OSError):
+            print_json({"mistakes": mistakes, **found} if mistakes else found)
     with contextlib.suppress(OSError):  # stderr is closed or full: the exit code remains
         console = messages()
         if mistakes:
@@ -78,6 +79,9 @@ def _judge(error: BaseException) -> tuple[int, str]:
     if _is_unexpected(error):
         words = " ".join(str(error).split())
         return exits.FAILED, f"unexpected {type(error).__name__}" + (f": {words}" if words else "")
+    if isinstance(error, OSError) and error.strerror:
+        file = f"{error.filename}: " if error.filename else ""
+        return exits.FAILED, f"cannot read or write: {file}{error.strerror}"
     return exits.FAILED, str(error)
 
 

@@ -11,7 +11,7 @@ import click
 
 from dap3d_core.cli import exits
 from dap3d_core.cli.signals import Stopping
-from dap3d_core.cli.streams import leave_stdout, print_anything
+from dap3d_core.cli.streams import leave_stdout, prepare_streams
 
 
 class Command(click.Command):
@@ -97,7 +97,7 @@ def dap3d(debug: bool) -> None:
 
 def run_line(argv: Sequence[str] | None) -> int:
     """Run the words of a command line, by default those of the process; returns the exit code."""
-    print_anything()
+    prepare_streams()
     try:
         code = dap3d.main(
             args=None if argv is None else list(argv), prog_name="dap3d", standalone_mode=False
@@ -109,12 +109,19 @@ def run_line(argv: Sequence[str] | None) -> int:
     except BrokenPipeError:  # the reader has seen enough
         leave_stdout()
         return exits.DONE
+    except OSError as error:
+        leave_stdout()
+        print(f"cannot write the output: {error.strerror or error}", file=sys.stderr)
+        return exits.FAILED
     return code if isinstance(code, int) else exits.DONE
 
 
 def _tell_usage(error: click.ClickException) -> None:
     from dap3d_core.cli.rendering import messages, say
 
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        error.show()
+        return
     console = messages()
     ctx = getattr(error, "ctx", None)
     if ctx is not None:

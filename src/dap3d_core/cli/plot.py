@@ -1,11 +1,15 @@
 """``dap3d plot``: quantities of a result as curves in a file."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from dap3d_core.cli.exits import DONE, Refused
 from dap3d_core.cli.group import Command
+
+if TYPE_CHECKING:
+    from dap3d_core.result import Result
 
 ENERGIES = ("energy.kinetic", "energy.potential", "energy.total")
 
@@ -23,10 +27,10 @@ def plot(
     """Draw quantities of a RESULT; without any, its energies.
 
     \b
-    BODY.r .p .rd .w .wp .rdd .wd .wpd   coordinates, velocities, accelerations
-    POINT.r .v .a                        motion of a point
-    JOINT.force .moment .lambda          reactions, Lagrange multipliers
-    energy.kinetic .potential .total, work
+    BODY.r .p .rd .w .wp .rdd .wd .wpd     motion of a body
+    POINT.r .v .a                          motion of a point
+    JOINT.force .moment .lambda            reactions
+    energy.kinetic .potential .total       energies, work
     constraint.position .velocity .acceleration
 
     A component follows with another dot, crank.r.z; .norm is the length of a vector. Quantities of
@@ -44,7 +48,9 @@ def plot(
     return DONE
 
 
-def _draw(result: object, names: tuple[str, ...], target: Path, x: str | None, force: bool) -> None:
+def _draw(
+    result: "Result", names: tuple[str, ...], target: Path, x: str | None, force: bool
+) -> None:
     from dap3d_core.plot import save_plot
     from dap3d_core.result import UnknownNameError
 

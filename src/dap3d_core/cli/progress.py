@@ -1,6 +1,5 @@
 """What a run shows while it works: a bar on a terminal, now and then a line elsewhere."""
 
-import threading
 import time
 from types import TracebackType
 from typing import Any
@@ -11,8 +10,6 @@ from rich.text import Text
 from dap3d_core.cli.rendering import Terminal, clean, messages, say, seconds
 
 ONCE = "compiling for the first time; this happens once"
-#: A start that takes longer than this is explained, s.
-LONG_START = 1.5
 #: Lines of progress come after this time, then ever more rarely, s.
 FIRST_LINE, LONGEST_PAUSE = 1.0, 60.0
 
@@ -32,7 +29,6 @@ class RunProgress:
         self._told_once = False
         self._begun: float | None = None
         self._next_line = FIRST_LINE
-        self._timer: threading.Timer | None = None
         live = self._console.file.isatty() and not self._console.is_dumb_terminal
         if live and not quiet:
             self._bar = _bar(self._console)
@@ -49,7 +45,6 @@ class RunProgress:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._cancel_timer()
         if self._bar is not None:
             self._bar.stop()
 
@@ -59,17 +54,13 @@ class RunProgress:
         self._describe(f"compiling {kernel}", line=f"  {kernel}")
 
     def start(self) -> None:
-        """The model is ready; the first step may have to wait for the solver's compilation."""
+        """The model is ready; its initial conditions are next."""
         self._describe("starting")
-        self._timer = threading.Timer(LONG_START, self._explain_start)
-        self._timer.daemon = True
-        self._timer.start()
 
     def advance(self, t: float, t_end: float) -> None:
         """The run has come to simulated time t of t_end, s."""
         if self._begun is None:
             self._begun = time.monotonic()
-            self._cancel_timer()
         if self._bar is not None:
             words = f"t = {t:.4g} of {t_end:.4g} s"
             self._bar.update(self._task, total=t_end, completed=t, description=words)
@@ -83,11 +74,6 @@ class RunProgress:
         words = f"t = {t:.4g} of {t_end:.4g} s ({t / t_end:.0%}), about {left} left"
         self._print(words)
         self._next_line = elapsed + min(max(elapsed, FIRST_LINE), LONGEST_PAUSE)
-
-    def _explain_start(self) -> None:
-        if self._begun is None:
-            self._tell_once()
-            self._describe("compiling the solver", line="  the solver")
 
     def _tell_once(self) -> None:
         if not self._told_once:
@@ -103,11 +89,6 @@ class RunProgress:
     def _print(self, words: str) -> None:
         if not self._quiet:
             say(self._console, words)
-
-    def _cancel_timer(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
 
 
 class _Left(TextColumn):

@@ -178,8 +178,10 @@ def print_json(data: Any) -> None:
     try:
         sys.stdout.write(json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
         sys.stdout.flush()
-    except BrokenPipeError:
+    except OSError as error:
         leave_stdout()
+        if not isinstance(error, BrokenPipeError):
+            raise
 
 
 def plain(value: Any) -> Any:

@@ -1,6 +1,6 @@
 """``dap3d run``: simulate a model and write its result."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from dap3d_core.cli.group import Command
 if TYPE_CHECKING:
     from dap3d_core.cli.outcome import Outcome
     from dap3d_core.cli.signals import Stopping
-    from dap3d_core.scene import Scene
+    from dap3d_core.scene import Scene, SceneError
 
 #: Settings of a run that the command line overrides, with the options that do.
 SETTINGS = {
@@ -154,9 +154,21 @@ def _check_settings(scene: "Scene", given: dict[str, Any]) -> None:
         about = said.keys() | ({"dt"} if "t_end" in said else set())
         mistakes = [m for m in error.mistakes if m.key in about]
         if mistakes:  # others are found again with the whole scene, with their lines
-            raise SceneError(
-                attrs.evolve(m, key=SETTINGS[m.key]) if m.key in said else m for m in mistakes
-            ) from error
+            raise _in_options(SceneError(mistakes), said) from error
+
+
+def _in_options(error: "SceneError", said: Collection[str]) -> "SceneError":
+    """The same mistakes, those of some settings under the names of their options."""
+    import attrs
+
+    from dap3d_core.scene import MISSING, SceneError
+
+    return SceneError(
+        attrs.evolve(m, key=SETTINGS[m.key], value=MISSING if m.value is None else m.value)
+        if m.key in said and not m.file
+        else m
+        for m in error.mistakes
+    )
 
 
 def _simulate(
@@ -172,6 +184,7 @@ def _simulate(
     import dap3d_core as dap
     from dap3d_core.cli.outcome import Outcome
     from dap3d_core.cli.progress import RunProgress
+    from dap3d_core.scene import SceneError
 
     with RunProgress(quiet=quiet) as progress:
 
@@ -190,10 +203,14 @@ def _simulate(
             raise Refused(str(error)) from error
         progress.start()
         try:
-            result = dap.simulate(compiled, progress=on_progress, **given)
+            result = dap.simulate(
+                compiled, progress=on_progress, announce=progress.announce, **given
+            )
         except (Exception, KeyboardInterrupt) as error:
             kept = getattr(error, "result", None)
             if kept is None:
+                if isinstance(error, SceneError):  # settings that only the integrator can judge
+                    raise _in_options(error, SETTINGS) from error
                 raise
             if debug:
                 import traceback

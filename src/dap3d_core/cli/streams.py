@@ -5,8 +5,11 @@ import os
 import sys
 
 
-def print_anything() -> None:
-    """Names that the terminal's encoding cannot write are escaped instead of raising."""
+def prepare_streams() -> None:
+    """Streams that were closed lead nowhere; what an encoding cannot write is escaped."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:  # also keeps its number from being given to a result file
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(AttributeError, ValueError, OSError):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]

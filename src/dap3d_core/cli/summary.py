@@ -125,15 +125,18 @@ def show_state(console: Terminal, title_words: str, bodies: dict[str, Any], more
         more: how many further bodies there are.
     """
     title(console, title_words)
-    rows: list[tuple[str, ...]] = []
+    say(console, _line("", ["x, e0", "y, e1", "z, e2", "e3"]))
     for name, state in bodies.items():
-        rows.append((name, "", "", "", ""))
+        say(console, name, "cyan", indent=2)
         for symbol, values in state.items():
-            rows.append((f"  {symbol}", *([_short(x) for x in values] + [""])[:4]))
-    show(console, table(("", "x, e0", "y, e1", "z, e2", "e3"), rows, right=(1, 2, 3, 4),
-                        fixed=(1, 2, 3, 4)))  # fmt: skip
+            say(console, _line(symbol, [_short(x) for x in values]))
     if more:
         say(console, f"and {count(more, 'body', 'bodies')} more", indent=2)
+
+
+def _line(symbol: str, words: list[str]) -> str:
+    """A row of at most 53 columns."""
+    return f"    {symbol:5}" + "".join(f"{word:>11}" for word in words)
 
 
 def _short(x: float) -> str:

@@ -9,6 +9,7 @@ import math
 import random
 from collections.abc import Mapping
 from difflib import get_close_matches
+from keyword import iskeyword
 from types import FunctionType
 from typing import Any
 
@@ -23,6 +24,7 @@ from dap3d_core.interface.namespace import (
     layout_of,
     namespace,
     parameters,
+    shape_of,
 )
 from dap3d_core.interface.outputs import ShapeError, entries, value_at
 from dap3d_core.interface.types import Function, Joint, TypeBase
@@ -143,7 +145,8 @@ def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
     """What ``prepare`` returns for an instance, checked and as plain tuples of floats.
 
     Raises:
-        ValueError: the type refuses these values of its fields, in its own words.
+        ValueError: the type refuses these values of its fields, in its own words; or they lead to
+            a number that is not finite.
         PluginError: it failed otherwise, or returned something else than a dict of numbers and
             tuples of numbers.
     """
@@ -159,12 +162,27 @@ def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
         raise PluginError(
             f"{where_is(type_)}.prepare should return a dict; it returned {constants!r}"
         )
+    return {name: _constant(type_, name, value) for name, value in constants.items()}
+
+
+def _constant(type_: type[TypeBase], name: Any, value: Any) -> Any:
+    """A constant that ``prepare`` returned, as plain tuples of floats."""
+    who = f"{where_is(type_)}.prepare"
+    if not (isinstance(name, str) and name.isidentifier() and not iskeyword(name)):
+        raise PluginError(f"{who} returned {name!r}, which no kernel can have for a parameter")
     try:
-        return {str(n): _as_floats(v) for n, v in constants.items()}
-    except (TypeError, ValueError):
+        found = _as_floats(value)
+        numbers = [value_at(found, path) for path in entries(found, shape_of(found), name)]
+    except (TypeError, ValueError, OverflowError):
+        numbers = []
+    if not numbers:
         raise PluginError(
-            f"{where_is(type_)}.prepare should return numbers and tuples of numbers"
-        ) from None
+            f"{who} should return numbers and tuples of numbers (of tuples of one length); "
+            f"{name} is {value!r}"
+        )
+    if not all(math.isfinite(x) for x in numbers):
+        raise ValueError(f"{name} comes out as {value!r}, which is not finite")
+    return found
 
 
 def set_ends(instance: Any, make: Any) -> None:
@@ -189,21 +207,25 @@ def _check_class(type_: type[TypeBase]) -> None:
     needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[kind]
     if issubclass(type_, Joint):
         rows, mask = type_.rows, type_.holonomic
-        if rows < 1:
-            raise PluginError(f"{who} declares rows = {rows}; a joint has at least one row")
+        if not isinstance(rows, int) or rows < 1:
+            raise PluginError(f"{who} declares rows = {rows!r}; a joint has one row or more")
         if not isinstance(mask, bool) and len(mask) != rows:
             raise PluginError(f"{who}.holonomic needs one truth value for each of its {rows} rows")
         needed += ["C"] if type_.position_rows() else []
     if kind != "function" and not body_slots(type_):
         raise PluginError(f"{who} acts on no body; declare a field such as P_i: Point = point()")
+    if sum(spec.kind == "vector2" for spec in specs_of(type_).values()) > 1:
+        raise PluginError(
+            f"{who} declares more than one vector2, and each would have the ends P_i and P_j; "
+            "declare points, and form the others in the kernel: sub(r_Q_j, r_Q_i)"
+        )
     allowed = [*type_.kernel_names, "prepare"]
     for name, value in vars(type_).items():
         is_public = isinstance(value, (staticmethod, FunctionType)) and not name.startswith("_")
         if is_public and name not in allowed:
             near = get_close_matches(name, allowed, 1)
-            hint = (
-                f"did you mean {near[0]}?" if near else f"a {kind} may define {', '.join(allowed)}"
-            )
+            choice = f"a {kind} may define {', '.join(allowed)}"
+            hint = f"did you mean {near[0]}?" if near else choice
             raise PluginError(f"{who} defines {name}, which nothing calls; {hint}")
     for name in needed:
         if name not in type_.kernels():

@@ -219,10 +219,14 @@ def _stored(layout: Layout, name: str) -> str:
         return f"vector_in(par, p1 + {offset})"
     if shape == (3, 3):
         return f"matrix_in(par, p1 + {offset})"
-    if len(shape) == 1:
-        return _tuple(f"par[p1 + {offset} + {{}}]", shape[0])
-    rows = (_tuple(f"par[p1 + {offset + r * shape[1]} + {{}}]", shape[1]) for r in range(shape[0]))
-    return f"({', '.join(rows)},)"
+    return _nested(shape, offset)
+
+
+def _nested(shape: tuple[int, ...], offset: int) -> str:
+    if not shape:
+        return f"par[p1 + {offset}]"
+    parts = (_nested(shape[1:], offset + k * size(shape[1:])) for k in range(shape[0]))
+    return f"({', '.join(parts)},)"
 
 
 def _tuple(pattern: str, n: int) -> str:

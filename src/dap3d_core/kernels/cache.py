@@ -141,13 +141,18 @@ def reached(*functions) -> tuple[list, list[str]]:
 
 
 def sources(*functions) -> list[str | bytes]:
-    """Everything that decides what these functions compute: files, and constants they read."""
+    """What decides what these functions compute: source files, constants, and names of modules.
+
+    The names, because cached code imports its modules by name: a model's own file has another one
+    in each folder.
+    """
     found, constants = reached(*functions)
     files: dict[str, bytes] = {}
     for function in found:
         _add_file(files, function.__code__.co_filename)
+    modules = sorted({function.__module__ for function in found})
     contents = (part for path in sorted(files) for part in (Path(path).name, files[path]))
-    return [*constants, *contents]
+    return [*constants, *modules, *contents]
 
 
 def _named_values(function):

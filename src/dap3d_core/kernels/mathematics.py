@@ -22,6 +22,11 @@ def _sympy():
     return sympy
 
 
+def _like(x, value):
+    """A value as the kind of float that x is: numpy's divide by zero as compiled code does."""
+    return type(x)(value) if isinstance(x, float) else value
+
+
 def _generic(name):
     real, other = getattr(math, name), getattr(cmath, name)
 
@@ -31,9 +36,9 @@ def _generic(name):
         if _symbolic(x):
             return getattr(_sympy(), name)(x)
         try:
-            return real(x)
+            return _like(x, real(x))
         except ValueError:
-            return math.nan
+            return _like(x, math.nan)
 
     function.__name__ = function.__qualname__ = name
     function.__doc__ = f"{name}(x) of a number (float, complex or sympy)."
@@ -55,11 +60,12 @@ def atan2(y, x):
     """Angle of the point (x, y) in (-pi, pi]; complex: its first-order continuation."""
     if isinstance(y, complex) or isinstance(x, complex):
         y, x = complex(y), complex(x)
-        slope = (x.real * y.imag - y.real * x.imag) / (x.real**2 + y.real**2)
+        square = x.real**2 + y.real**2
+        slope = (x.real * y.imag - y.real * x.imag) / square if square else math.nan
         return complex(math.atan2(y.real, x.real), slope)
     if _symbolic(y) or _symbolic(x):
         return _sympy().atan2(y, x)
-    return math.atan2(y, x)
+    return _like(x + y, math.atan2(y, x))
 
 
 @overload(atan2, jit_options=INLINE_OPTIONS)

@@ -75,20 +75,20 @@ def make_groups(
 def _group(
     instances: list[Instance], members: list[int], poses: Mapping[int, BodyPose], body_count: int
 ) -> Group:
-    examined, count = instances[0].examined, len(instances)
-    constants = _prepare_all(examined, instances, members, poses)
-    numbers = np.empty((count, examined.layout.par_width))
-    for name, (offset, shape) in examined.layout.numbers.items():
-        if constants and name in constants[0]:
-            column = [c[name] for c in constants]
-        else:
-            column = [instance.values[name] for instance in instances]
-        values = np.asarray(column, dtype=float).reshape(count, -1)
-        numbers[:, offset : offset + size(shape)] = values
+    examined = instances[0].examined
+    on_each = bool(getattr(examined.type, "each_body", False))
+    if on_each and _prepares(examined.type):  # its constants may differ from body to body
+        on_each = False
+        members = [m for m in members for _ in range(body_count)]
+        instances = [
+            attrs.evolve(i, bodies=(b,)) for i in instances for b in range(1, body_count + 1)
+        ]
+    count = len(instances)
+    numbers = _numbers(examined, instances, members, poses)
     bodies = np.array([i.bodies for i in instances], dtype=np.int64).reshape(count, -1)
     functions = np.array([i.functions for i in instances], dtype=np.int64).reshape(count, -1)
     places = np.array(members, dtype=np.int64)
-    if getattr(examined.type, "each_body", False):
+    if on_each:
         bodies = np.tile(np.arange(1, body_count + 1), count)[:, None]
         numbers = np.repeat(numbers, body_count, axis=0)
         functions = np.repeat(functions, body_count, axis=0)
@@ -96,38 +96,54 @@ def _group(
     return Group(examined, places, bodies, functions, numbers)
 
 
-def _prepare_all(
+def _numbers(
     examined: Examined, instances: list[Instance], members: list[int], poses: Mapping[int, BodyPose]
-) -> list[dict[str, Any]]:
-    """What ``prepare`` returns for each instance; empty where the type does not define it."""
+) -> Floats:
+    """(m, par_width) numbers of all instances, from their fields and from ``prepare``."""
+    given = [instance.values for instance in instances]
+    if _prepares(examined.type):
+        prepared_ones = [
+            _prepared(examined, instance, member, poses)
+            for instance, member in zip(instances, members, strict=True)
+        ]
+        given = [values | found for values, found in zip(given, prepared_ones, strict=True)]
+    numbers = np.empty((len(instances), examined.layout.par_width))
+    for name, (offset, shape) in examined.layout.numbers.items():
+        column = [values.get(name) for values in given]
+        if None in column:
+            is_field = name in specs_of(examined.type)
+            words = "is missing" if is_field else "is not among what prepare returned"
+            raise PrepareError(members[column.index(None)], f"{name} {words}")
+        values = np.asarray(column, dtype=float).reshape(len(instances), -1)
+        numbers[:, offset : offset + size(shape)] = values
+    return numbers
+
+
+def _prepares(type_: Any) -> bool:
+    """Whether a type defines ``prepare``."""
+    return type_.prepare not in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__())
+
+
+def _prepared(
+    examined: Examined, instance: Instance, member: int, poses: Mapping[int, BodyPose]
+) -> dict[str, Any]:
+    """What ``prepare`` returns for an instance: the names and shapes that were examined."""
     type_: Any = examined.type
-    if type_.prepare in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__()):
-        return []
-    fields = specs_of(type_)
-    has_vector2 = any(spec.kind == "vector2" for spec in fields.values())
-    result = []
-    expected = None
-    for member, instance in zip(members, instances, strict=True):
-        values = instance.values
-        thing = type_(**{n: values[n] for n in fields if n in values})
-        if has_vector2:
-            thing.P_i, thing.P_j = values["P_i"], values["P_j"]
-        bodies = {s: poses[b] for s, b in zip(examined.layout.slots, instance.bodies, strict=False)}
-        try:
-            constants = prepared(thing, bodies)
-        except ValueError as error:
-            raise PrepareError(member, str(error)) from error
-        shapes = {n: shape_of(v) for n, v in constants.items()}
-        for name, spec in fields.items():
-            if spec.kind == "number" and name in examined.layout.numbers and name not in constants:
-                if values.get(name) is None:
-                    raise PrepareError(member, f"{name} needs a number")
-                constants[name], shapes[name] = values[name], ()
-        if expected is None:
-            expected = shapes
-        elif shapes != expected:
+    fields, values = specs_of(type_), instance.values
+    thing = type_(**{n: values[n] for n in fields if n in values})
+    if any(spec.kind == "vector2" for spec in fields.values()):
+        thing.P_i, thing.P_j = values["P_i"], values["P_j"]
+    bodies = {s: poses[b] for s, b in zip(examined.layout.slots, instance.bodies, strict=True)}
+    try:
+        constants = prepared(thing, bodies)
+    except ValueError as error:
+        raise PrepareError(member, str(error)) from error
+    for name, value in constants.items():
+        _, shape = examined.layout.numbers.get(name, (0, None))
+        if shape_of(value) != shape:
             raise PrepareError(
-                member, "prepare returned other names or shapes than for the first of its kind"
+                member,
+                f"prepare returned {name} of shape {shape_of(value)}, and for random values of the "
+                f"fields {'none' if shape is None else shape}; names and shapes must stay the same",
             )
-        result.append(constants)
-    return result
+    return constants

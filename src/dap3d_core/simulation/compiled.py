@@ -75,7 +75,7 @@ class CompiledModel:
 
     @property
     def irv(self) -> NDArray[np.int64]:
-        """(n,) index in v_dot, and column in the Jacobian, of the first acceleration of each body."""
+        """(n,) index in v_dot, column in the Jacobian, of the first acceleration of each body."""
         return self.model.irv
 
     @cached_property

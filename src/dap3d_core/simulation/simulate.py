@@ -100,7 +100,7 @@ def report_times(t_end: float | None, dt: float | None) -> Floats:
         return np.zeros(1)
     dt = t_end / 100.0 if dt is None else dt
     count = int(np.floor(t_end / dt * (1.0 + 1e-12) + 1e-9))
-    times: Floats = dt * np.arange(count + 1)
+    times = dt * np.arange(count + 1, dtype=np.float64)
     if t_end - times[-1] > 1e-9 * dt:
         return np.append(times, t_end)
     times[-1] = t_end

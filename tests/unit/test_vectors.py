@@ -1,0 +1,302 @@
+"""The words that kernels are written with: vectors, matrices and scalar mathematics."""
+
+import cmath
+import inspect
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dap3d_core import kernels
+from dap3d_core.kernels import (
+    add,
+    atan2,
+    cos,
+    cross,
+    dot,
+    eye,
+    hstack,
+    neg,
+    norm2,
+    normals,
+    rotate,
+    row,
+    scale,
+    sin,
+    skew,
+    sqrt,
+    sub,
+    tanh,
+    where,
+)
+from dap3d_core.kernels.cache import compiled_in, jit_is_on
+
+number = st.floats(-1e3, 1e3, allow_subnormal=False)
+vec = st.tuples(number, number, number)
+mat = st.tuples(vec, vec, vec)
+many = settings(max_examples=50, deadline=None)
+
+
+def near(found, wanted, size=1.0):
+    """Equal but for rounding: sums of three products of numbers up to ``size``."""
+    return np.allclose(np.array(found), np.array(wanted), rtol=1e-14, atol=1e-14 * size)
+
+
+# ------------------------------------------------------------------ identities
+
+
+@many
+@given(vec, vec, number)
+def test_sums_and_products_are_those_of_numpy(a, b, x):
+    """Each component one operation: equal to the last bit, but for sums of products."""
+    A, B = np.array(a), np.array(b)
+    assert add(a, b) == tuple((A + B).tolist())
+    assert sub(a, b) == tuple((A - B).tolist())
+    assert neg(a) == tuple((-A).tolist())
+    assert scale(x, a) == tuple((x * A).tolist())
+    assert near(dot(a, b), A @ B, 3e6)
+    assert near(norm2(a), A @ A, 3e6)
+    assert near(cross(a, b), np.cross(A, B), 2e6)
+
+
+@many
+@given(vec, vec)
+def test_skew_matrix_is_the_vector_product(a, b):
+    """skew(a) b = a x b exactly (a zero is added, no more), and skew(-a) is its transpose."""
+    assert rotate(skew(a), b) == cross(a, b)
+    assert np.array_equal(np.array(skew(neg(a))), np.array(skew(a)).T)
+
+
+@many
+@given(mat, vec)
+def test_rotate_is_a_matrix_times_a_vector(A, s):
+    """rotate(A, s) = A s, sums of three products; the identity returns s itself."""
+    assert near(rotate(A, s), np.array(A) @ np.array(s), 3e6)
+    assert rotate(eye(1.0), s) == s
+
+
+@many
+@given(vec, vec, vec)
+def test_triple_products(a, b, c):
+    """a . (b x c) is invariant under rotation of its three; a x (b x c) = b (a.c) - c (a.b).
+
+    Products of three numbers up to 1e3, six of them.
+    """
+    assert near(dot(a, cross(b, c)), dot(c, cross(a, b)), 6e9)
+    assert near(cross(a, cross(b, c)), sub(scale(dot(a, c), b), scale(dot(a, b), c)), 6e9)
+
+
+def test_blocks_of_a_jacobian():
+    """row and hstack put the translational part first; eye is a multiple of the identity."""
+    assert row((1, 2, 3), (4, 5, 6)) == (1, 2, 3, 4, 5, 6)
+    P, Q = ((1, 2, 3), (4, 5, 6), (7, 8, 9)), ((-1, -2, -3), (-4, -5, -6), (-7, -8, -9))
+    assert np.array_equal(hstack(P, Q), np.hstack([P, Q]))
+    assert np.array_equal(eye(2.5), 2.5 * np.eye(3))
+
+
+# ------------------------------------------------------------------ normals
+
+
+AXES = [
+    (1.0, 0.0, 0.0),
+    (0.0, -2.0, 0.0),
+    (0.0, 0.0, 1e-12),
+    (1.0, 1.0, 1.0),
+    (1.0, -1.0, 1e-9),
+    (-3e5, 4e5, 5e5),
+    *(tuple(a) for a in np.random.default_rng(0).normal(size=(50, 3)).tolist()),
+]
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_normals_complete_an_axis_to_a_right_handed_triad(axis):
+    """For the unit axis a: a x n = m, n x m = a, m x a = n, of unit length, to rounding."""
+    n, m = normals(axis)
+    a = np.array(axis) / np.linalg.norm(axis)
+    assert near(np.cross(a, n), m, 4.0)
+    assert near(np.cross(n, m), a, 4.0)
+    assert near(np.cross(m, a), n, 4.0)
+    assert near([n @ np.array(n), m @ np.array(m)], [1.0, 1.0], 4.0)
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_first_normal_is_the_coordinate_axis_least_aligned(axis):
+    """n lies in the plane of the axis and the coordinate axis least aligned, on its side."""
+    n, _ = normals(axis)
+    k = int(np.argmin(np.abs(axis)))
+    u = np.eye(3)[k]
+    assert n[k] > 0.5  # at least sqrt(2/3) for the axis of equal components
+    assert abs(np.linalg.det([n, u, np.array(axis) / np.linalg.norm(axis)])) < 1e-14
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 0.0), (math.nan, 1.0, 0.0)])
+def test_an_axis_needs_a_length(axis):
+    """No triad is made from nothing."""
+    with pytest.raises(ValueError, match="needs a length"):
+        normals(axis)
+
+
+# ------------------------------------------------------------------ mathematics
+
+
+ONE = [
+    (sqrt, math.sqrt, lambda x: 0.5 / math.sqrt(x), [1e-3, 0.5, 2.0, 1e6]),
+    (sin, math.sin, math.cos, [-3.0, -1e-8, 0.5, 2.0]),
+    (cos, math.cos, lambda x: -math.sin(x), [-3.0, 1e-8, 0.5, 2.0]),
+    (tanh, math.tanh, lambda x: 1.0 - math.tanh(x) ** 2, [-2.0, 0.0, 0.5, 5.0]),
+]
+one = pytest.mark.parametrize(
+    ("function", "real", "slope", "x"),
+    [(f, r, s, x) for f, r, s, values in ONE for x in values],
+    ids=lambda v: getattr(v, "__name__", str(v)),
+)
+POINTS = [(0.3, 0.7), (0.3, -0.7), (-0.3, -0.7), (-0.3, 0.7), (1.0, 0.0), (-2.0, 0.0), (0.0, 2.0)]
+
+
+@one
+def test_functions_of_a_float_are_those_of_the_library(function, real, slope, x):
+    """The same float, and one of numpy gives one of numpy, so that 1 / 0 is then no exception."""
+    assert function(x) == real(x)
+    found = function(np.float64(x))
+    assert found == real(x)
+    assert type(found) is np.float64
+
+
+@one
+def test_complex_step_is_the_derivative(function, real, slope, x):
+    """Im f(x + ih) / h = f'(x) with h = 1e-30: no difference is taken, so rounding alone is left.
+
+    tanh near one loses digits of 1 - tanh^2 in the expected value: 1e-11.
+    """
+    found = function(complex(x, 1e-30))
+    assert found.real == pytest.approx(real(x), rel=1e-15)
+    assert found.imag / 1e-30 == pytest.approx(slope(x), rel=1e-11)
+
+
+@pytest.mark.parametrize(("y", "x"), POINTS)
+def test_complex_step_of_atan2_is_its_derivative_in_all_quadrants(y, x):
+    """d atan2 = (x dy - y dx) / (x^2 + y^2), the branch cut's both sides included; rounding."""
+    h, square = 1e-30, x * x + y * y
+    assert atan2(y, x) == math.atan2(y, x)
+    along_y, along_x = atan2(complex(y, h), x), atan2(y, complex(x, h))
+    assert along_y.real == along_x.real == math.atan2(y, x)
+    assert along_y.imag / h == pytest.approx(x / square, rel=1e-15)
+    assert along_x.imag / h == pytest.approx(-y / square, rel=1e-15)
+
+
+def test_vectors_of_complex_numbers_carry_derivatives():
+    """d/dx |a x b| along a by complex step equals (a x b) . (e x b) / |a x b|; rounding."""
+    a, b, e, h = (0.3, -1.2, 0.8), (1.1, 0.4, -0.6), (0.2, 0.5, -0.3), 1e-30
+    stepped = tuple(complex(x, h * y) for x, y in zip(a, e, strict=True))
+    found = sqrt(norm2(cross(stepped, b)))
+    c, d = np.cross(a, b), np.cross(e, b)
+    assert found.real == pytest.approx(np.linalg.norm(c), rel=1e-14)
+    assert found.imag / h == pytest.approx(c @ d / np.linalg.norm(c), rel=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("function", "x"), [(sqrt, -1.0), (sin, math.inf), (cos, -math.inf), (sqrt, math.nan)]
+)
+@pytest.mark.parametrize("kind", [float, np.float64])
+def test_outside_its_domain_a_function_is_nan(function, x, kind):
+    """NaN and no exception, as in compiled code: the run finds it and names its source."""
+    assert math.isnan(function(kind(x)))
+
+
+def test_atan2_of_nothing_has_a_value_and_no_slope():
+    """At the origin the angle is that of the library, zero, and its derivative is NaN."""
+    assert atan2(0.0, 0.0) == 0.0
+    stepped = atan2(complex(0.0, 1e-30), complex(0.0, 0.0))
+    assert stepped.real == 0.0
+    assert math.isnan(stepped.imag)
+
+
+def test_where_takes_one_of_two():
+    """Numbers, complex numbers and vectors; the condition may be numpy's."""
+    assert where(True, 1.0, 2.0) == 1.0
+    assert where(np.float64(1.0) > 2.0, 1.0, 2.0) == 2.0
+    assert where(False, 1.0, 2j) == 2j
+    assert where(True, (1.0, 2.0, 3.0), (0.0, 0.0, 0.0)) == (1.0, 2.0, 3.0)
+
+
+def test_complex_functions_are_those_of_the_library():
+    """Off the real axis, too; the last bit is the library's."""
+    z = complex(0.3, -0.7)
+    for function, other in [(sqrt, cmath.sqrt), (sin, cmath.sin), (cos, cmath.cos)]:
+        assert function(z) == other(z)
+    assert tanh(z) == cmath.tanh(z)
+
+
+# ------------------------------------------------------------------ sympy
+
+
+def test_symbols_pass_through_all_words():
+    """Every word takes sympy symbols; with numbers put in, the result is that of floats (1e-14)."""
+    sympy = pytest.importorskip("sympy")
+    symbols = sympy.symbols("a0:3 b0:3", real=True)
+    values = (0.3, -1.2, 0.8, 1.1, 0.4, -0.6)
+    expressions, wanted = formula(*symbols), formula(*values)
+    found = [
+        float(sympy.sympify(e).subs(dict(zip(symbols, values, strict=True)))) for e in expressions
+    ]
+    assert found == pytest.approx(wanted, rel=1e-14, abs=1e-14)
+
+
+def test_symbols_can_be_differentiated():
+    """The derivative of a kernel's formula by sympy is that of the complex step (1e-13)."""
+    sympy = pytest.importorskip("sympy")
+    x = sympy.symbols("x", real=True)
+
+    def f(x):
+        a = (x, x * x, 1.0)
+        return atan2(sqrt(norm2(a)), tanh(dot(a, (1.0, 2.0, 3.0)))) + sin(x) * cos(x)
+
+    exact = float(sympy.diff(f(x), x).subs(x, 0.7))
+    assert f(complex(0.7, 1e-30)).imag / 1e-30 == pytest.approx(exact, rel=1e-13)
+
+
+# ------------------------------------------------------------------ compiled code
+
+
+def formula(a0, a1, a2, b0, b1, b2):
+    """Every word of the kernels, in one tuple of numbers."""
+    a, b = (a0, a1, a2), (b0, b1, b2)
+    A = skew(a)
+    H = hstack(eye(b0), A)
+    r = row(add(a, b), sub(a, b))
+    return (
+        *scale(dot(a, b), cross(a, neg(b))),
+        *rotate(A, b),
+        *H[0],
+        *H[1],
+        *H[2],
+        *r,
+        sqrt(norm2(a)),
+        sin(a0) + cos(a1),
+        tanh(b0 * b1),
+        atan2(b0, b1),
+        where(a0 > b0, a1, b1),
+        where(a0 < b0, a2, b2),
+    )
+
+
+def test_the_formula_uses_every_word():
+    """What the tests above and below run over is complete: all public words but ``normals``."""
+    used = set(formula.__code__.co_names)
+    assert used == set(kernels.__all__) - {"normals"}
+    assert all(inspect.getdoc(getattr(kernels, word)) for word in kernels.__all__)
+
+
+@pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled with NUMBA_DISABLE_JIT=1")
+def test_compiled_words_are_the_plain_ones():
+    """Compiled code may fuse a product and a sum: each number differs by some roundings of its
+    terms at most, and NaN is NaN."""
+    fast = compiled_in(None, "", formula)
+    for values in np.random.default_rng(1).normal(size=(20, 6)).tolist():
+        assert fast(*values) == pytest.approx(formula(*values), rel=1e-14, abs=1e-14)
+    for values in [(-1.0, math.inf, 0.0, 0.0, 0.0, 0.0), (math.nan, 1.0, 2.0, 3.0, 4.0, 5.0)]:
+        with np.errstate(all="ignore"):
+            wanted = formula(*(np.float64(v) for v in values))
+        assert fast(*values) == pytest.approx(wanted, rel=1e-14, nan_ok=True)
