@@ -128,10 +128,10 @@ print(result.r[-1, 0, 2])
 
 def test_a_model_with_its_own_types_can_be_copied(tmp_path):
     """The same plugin.py in another folder is another module: the cached code of the first does not serve it."""
-    ball = REPOSITORY / "models" / "ball1"
-    printed = []
-    for name in ("first", "second"):
-        shutil.copytree(ball, tmp_path / name)
-        script = OWN_TYPE.replace("sys.argv[1]", repr(str(tmp_path / name)))
-        printed.append(run(script))
-    assert printed[0] == printed[1]
+    assert run_copy(tmp_path / "first") == run_copy(tmp_path / "second")
+
+
+def run_copy(folder):
+    """Copy ball1 to a folder and run it there."""
+    shutil.copytree(REPOSITORY / "models" / "ball1", folder)
+    return run(OWN_TYPE.replace("sys.argv[1]", repr(str(folder))))

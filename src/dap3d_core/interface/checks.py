@@ -24,9 +24,9 @@ from dap3d_core.interface.namespace import (
     layout_of,
     namespace,
     parameters,
-    shape_of,
+    size,
 )
-from dap3d_core.interface.outputs import ShapeError, entries, value_at
+from dap3d_core.interface.outputs import ShapeError, checked_shape, entries, value_at
 from dap3d_core.interface.types import Function, Joint, TypeBase
 
 #: How often a type may refuse random values of its fields before it is held to refuse them all.
@@ -172,15 +172,15 @@ def _constant(type_: type[TypeBase], name: Any, value: Any) -> Any:
         raise PluginError(f"{who} returned {name!r}, which no kernel can have for a parameter")
     try:
         found = _as_floats(value)
-        numbers = [value_at(found, path) for path in entries(found, shape_of(found), name)]
+        count = size(checked_shape(found))
     except (TypeError, ValueError, OverflowError):
-        numbers = []
-    if not numbers:
+        count = 0
+    if not count:
         raise PluginError(
-            f"{who} should return numbers and tuples of numbers (of tuples of one length); "
+            f"{who} should return numbers and tuples of numbers or of tuples of one length; "
             f"{name} is {value!r}"
         )
-    if not all(math.isfinite(x) for x in numbers):
+    if not _is_finite(found):
         raise ValueError(f"{name} comes out as {value!r}, which is not finite")
     return found
 
@@ -197,6 +197,10 @@ def _as_floats(value: Any) -> Any:
     if isinstance(value, (tuple, list)):
         return tuple(_as_floats(v) for v in value)
     return float(value)
+
+
+def _is_finite(value: Any) -> bool:
+    return all(map(_is_finite, value)) if isinstance(value, tuple) else math.isfinite(value)
 
 
 def _check_class(type_: type[TypeBase]) -> None:

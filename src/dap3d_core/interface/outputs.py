@@ -26,15 +26,16 @@ def entries(value: Any, shape: tuple[int, ...], what: str, name: str = "out") ->
     Raises:
         ShapeError: the value has another shape.
     """
-    found = _checked_shape(value)
+    found = checked_shape(value)
     if size(found) != size(shape) or [n for n in found if n > 1] != [n for n in shape if n > 1]:
         raise ShapeError(f"it should return {what}, shape {shape}; it returned shape {found}")
     return _paths(found, name)
 
 
-def _checked_shape(value: Any) -> tuple[int, ...]:
+def checked_shape(value: Any) -> tuple[int, ...]:
+    """Shape of a number or a nested tuple of numbers, whose rows must be of one length."""
     shape = shape_of(value)
-    if shape and any(_checked_shape(v) != shape[1:] for v in value):
+    if shape and any(checked_shape(v) != shape[1:] for v in value):
         raise ShapeError("its rows differ in length")
     return shape
 

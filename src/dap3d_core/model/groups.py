@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.interface.checks import BodyPose, Examined, prepared
-from dap3d_core.interface.fields import specs_of
+from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.namespace import shape_of, size
 from dap3d_core.interface.types import TypeBase
 from dap3d_core.scene import Instance
@@ -100,10 +100,10 @@ def _numbers(
     examined: Examined, instances: list[Instance], members: list[int], poses: Mapping[int, BodyPose]
 ) -> Floats:
     """(m, par_width) numbers of all instances, from their fields and from ``prepare``."""
-    given = [instance.values for instance in instances]
+    given, fields = [instance.values for instance in instances], specs_of(examined.type)
     if _prepares(examined.type):
         prepared_ones = [
-            _prepared(examined, instance, member, poses)
+            _prepared(examined, fields, instance, member, poses)
             for instance, member in zip(instances, members, strict=True)
         ]
         given = [values | found for values, found in zip(given, prepared_ones, strict=True)]
@@ -111,8 +111,7 @@ def _numbers(
     for name, (offset, shape) in examined.layout.numbers.items():
         column = [values.get(name) for values in given]
         if None in column:
-            is_field = name in specs_of(examined.type)
-            words = "is missing" if is_field else "is not among what prepare returned"
+            words = "is missing" if name in fields else "is not among what prepare returned"
             raise PrepareError(members[column.index(None)], f"{name} {words}")
         values = np.asarray(column, dtype=float).reshape(len(instances), -1)
         numbers[:, offset : offset + size(shape)] = values
@@ -125,11 +124,15 @@ def _prepares(type_: Any) -> bool:
 
 
 def _prepared(
-    examined: Examined, instance: Instance, member: int, poses: Mapping[int, BodyPose]
+    examined: Examined,
+    fields: Mapping[str, FieldSpec],
+    instance: Instance,
+    member: int,
+    poses: Mapping[int, BodyPose],
 ) -> dict[str, Any]:
     """What ``prepare`` returns for an instance: the names and shapes that were examined."""
     type_: Any = examined.type
-    fields, values = specs_of(type_), instance.values
+    values = instance.values
     thing = type_(**{n: values[n] for n in fields if n in values})
     if any(spec.kind == "vector2" for spec in fields.values()):
         thing.P_i, thing.P_j = values["P_i"], values["P_j"]
