@@ -168,3 +168,14 @@ def test_plot_draws_into_files(dap3d, result):
     for arguments in (("-o", "b.bmp"), ("-o", "a.svg"), ("-o", "no/b.png"), ("--x", "cone.r")):
         assert dap3d("plot", "pen1.nc", "cone.r.z", *arguments).returncode == 2, arguments
     assert dap3d("plot", "gone.nc").returncode == 2
+
+
+def test_check_tells_that_joints_cannot_be_assembled(dap3d, scene_file):
+    scene_file(("[simulation]", '[points.P]\nbody = "ground"\nsPp = [0.0, 0.0, 1.0]\n'
+                '[joints.J]\ntype = "sph"\nP_i = "stone.O"\nP_j = "ground.O"\n'
+                '[joints.K]\ntype = "sph"\nP_i = "stone.O"\nP_j = "P"\n[simulation]'))  # fmt: skip
+    refused = dap3d("check", "fall.toml", "--json")
+    assert refused.returncode == 2
+    found = json.loads(refused.stdout)
+    assert "cannot be assembled" in found["mistakes"][0]["what"]
+    assert (found["rows"], found["rank"], found["joints"]) == (6, 3, ["J", "K"])

@@ -4,11 +4,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.exits import DONE, Refused
+from dap3d_core.cli.exits import DONE, REFUSED, Refused
 from dap3d_core.cli.group import Command
 
 if TYPE_CHECKING:
     from dap3d_core.simulation import CompiledModel
+
+#: Prescribed velocities of dependent rows that differ by more contradict each other.
+CONTRADICTION = 1e-8
 
 
 @click.command(cls=Command, short_help="Validate a model, count its degrees of freedom.")
@@ -40,14 +43,25 @@ def check(model: str, *, method: str | None, allow_code: bool, as_json: bool) ->
         print_json(found)
     else:
         _show(output(), compiled, found)
-    return DONE
+    return REFUSED if found["mistakes"] else DONE
 
 
 def facts_of(compiled: "CompiledModel") -> dict[str, Any]:
-    """The facts of a model as they are given: rank and violation at its initial conditions."""
-    from dap3d_core.simulation.initial import violation
+    """The facts of a model: its violation as given, its rank where a run would start.
 
-    model, redundancy = compiled.model, compiled.redundancy()
+    A start that cannot be corrected is the one mistake that is found only here.
+    """
+    from dap3d_core.simulation import AssemblyError
+    from dap3d_core.simulation.initial import correct_initial, violation
+
+    model, start = compiled.model, None
+    mistakes: list[dict[str, Any]] = []
+    if model.row_count and compiled.scene.simulation.correct:
+        try:
+            start = correct_initial(compiled.machine, model.u0).u
+        except AssemblyError as error:
+            mistakes.append({"key": "joints", "what": str(error)})
+    redundancy = compiled.redundancy(start)
     rank = redundancy.rank
     position, velocity = violation(compiled.machine, model.u0)
     return {
@@ -66,6 +80,7 @@ def facts_of(compiled: "CompiledModel") -> dict[str, Any]:
         "force_types": _types(model.forces),
         "function_types": _types(model.functions),
         "notes": list(compiled.notes),
+        "mistakes": mistakes,
     }
 
 
@@ -90,7 +105,7 @@ def _show(console: Any, compiled: "CompiledModel", found: dict[str, Any]) -> Non
             ("joints", _listed(found["joint_types"])),
             ("forces", _listed(found["force_types"])),
             ("functions", _listed(found["function_types"])),
-            ("freedoms", compiled.redundancy().describe()),
+            ("freedoms", _freedoms(found)),
             ("violation", _violation(violation, compiled) if found["rows"] else ""),
             ("method", f"{found['method']}: {found['reason']}"),
         ],
@@ -98,7 +113,10 @@ def _show(console: Any, compiled: "CompiledModel", found: dict[str, Any]) -> Non
     if found["redundant"]:
         say(console, _about_redundancy(found), "yellow")
     show_notes(console, found["notes"])
-    say(console, "no mistakes found", "green")
+    for mistake in found["mistakes"]:
+        say(console, mistake["what"], "bold red")
+    if not found["mistakes"]:
+        say(console, "no mistakes found", "green")
 
 
 def _listed(types: dict[str, int]) -> str:
@@ -114,12 +132,21 @@ def _violation(violation: dict[str, float], compiled: "CompiledModel") -> str:
     return f"{words}; {remedy}"
 
 
+def _freedoms(found: dict[str, Any]) -> str:
+    from dap3d_core.cli.rendering import count
+
+    words = f"{count(found['rows'], 'row')}, rank {found['rank']}"
+    return f"{words}; {count(found['dof'], 'degree')} of freedom".replace("no degrees", "0 degrees")
+
+
 def _about_redundancy(found: dict[str, Any]) -> str:
-    joints = ", ".join(found["joints"])
     words = (
         f"redundant constraints: {found['redundant']} of {found['rows']} rows say what others say, "
-        f"in the joints {joints}. Accelerations are unique, some reactions of these joints are not."
+        f"in the joints {', '.join(found['joints'])}. Accelerations are unique, some reactions of "
+        "these joints are not."
     )
+    if found["contradiction"] > CONTRADICTION:
+        words += f" They contradict each other by {found['contradiction']:.2g}."
     if found["method"] == "standard":
         words += " The standard method refuses to run: replace a joint by one with fewer rows."
     return words

@@ -167,9 +167,10 @@ def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
 
 def _constant(type_: type[TypeBase], name: Any, value: Any) -> Any:
     """A constant that ``prepare`` returned, as plain tuples of floats."""
-    who = f"{where_is(type_)}.prepare"
     if not (isinstance(name, str) and name.isidentifier() and not iskeyword(name)):
-        raise PluginError(f"{who} returned {name!r}, which no kernel can have for a parameter")
+        raise PluginError(
+            f"{where_is(type_)}.prepare returned {name!r}, which no kernel can name as a parameter"
+        )
     try:
         found = _as_floats(value)
         count = size(checked_shape(found))
@@ -177,8 +178,8 @@ def _constant(type_: type[TypeBase], name: Any, value: Any) -> Any:
         count = 0
     if not count:
         raise PluginError(
-            f"{who} should return numbers and tuples of numbers or of tuples of one length; "
-            f"{name} is {value!r}"
+            f"{where_is(type_)}.prepare should return numbers and tuples of numbers or of tuples "
+            f"of one length; {name} is {value!r}"
         )
     if not _is_finite(found):
         raise ValueError(f"{name} comes out as {value!r}, which is not finite")
