@@ -37,13 +37,13 @@ run: $(VENV)/.installed  ## simulate MODEL (fourbar3), write runs/MODEL.nc and a
 install: $(VENV)/.installed  ## put dap3d into .venv, editable (what run, test and lint do themselves)
 
 test: $(VENV)/.installed-test  ## the quick tests
-	@$(PYTHON) -m pytest -m "not slow"
+	@$(PYTHON) -m pytest -n auto -m "not slow"
 
 test-all: $(VENV)/.installed-test  ## all tests, the slow verification as well
-	@$(PYTHON) -m pytest
+	@$(PYTHON) -m pytest -n auto
 
 verify: $(VENV)/.installed-test  ## the slow verification alone
-	@$(PYTHON) -m pytest -m slow
+	@$(PYTHON) -m pytest -n auto -m slow
 
 unit-nojit: $(VENV)/.installed-test  ## unit tests with kernels as plain Python, and their coverage
 	@NUMBA_DISABLE_JIT=1 $(PYTHON) -m coverage run -m pytest tests/unit

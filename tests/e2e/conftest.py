@@ -52,6 +52,27 @@ def dap3d(tmp_path):
     return CommandLine(tmp_path)
 
 
+@pytest.fixture
+def refuse(dap3d, monkeypatch, capfd):
+    """Run a command in this process, which is quicker, and see it refused; what it says."""
+    from dap3d_core.cli import main
+
+    monkeypatch.chdir(dap3d.folder)
+    monkeypatch.delenv("COLUMNS", raising=False)
+
+    def call(*arguments):
+        code = main([str(a) for a in arguments])
+        out, err = capfd.readouterr()
+        assert code == 2, (arguments, out, err)
+        assert err
+        assert "Traceback" not in err
+        assert not err.startswith("unexpected")
+        assert out == ""
+        return err
+
+    return call
+
+
 SCENE = """\
 [scene]
 name = "fall"

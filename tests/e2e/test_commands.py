@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -39,9 +40,9 @@ def test_check_tells_redundant_joints(dap3d, scene_file):
     found = json.loads(done.stdout)
     assert (found["rows"], found["rank"], found["redundant"], found["dof"]) == (10, 5, 5, 1)
     assert found["joints"] == ["low", "high"]
-    told = dap3d("check", "fall.toml")
-    assert "redundant" in told.stdout
-    assert "low, high" in told.stdout
+    told = " ".join(dap3d("check", "fall.toml").stdout.split())
+    assert "redundant constraints: 5 of 10 rows" in told
+    assert "in the joints low, high." in told
 
 
 def test_check_prints_all_mistakes_as_json(dap3d, scene_file):
@@ -54,15 +55,13 @@ def test_check_prints_all_mistakes_as_json(dap3d, scene_file):
     assert mistakes[1]["nearest"] == "rtol"
 
 
-def test_check_of_what_is_no_scene(dap3d):
+def test_check_of_what_is_no_scene(dap3d, refuse):
     (dap3d.folder / "empty").mkdir()
     (dap3d.folder / "image.toml").write_bytes(b"\x89PNG\r\n\x1a\n\0\0")
     (dap3d.folder / "cut.toml").write_text("[bodies.a]\nmass = [1.0,\n")
-    for name in ("empty", "image.toml", "cut.toml", "https://a.org/b.toml", "pen9", ""):
-        refused = dap3d("check", name)
-        assert refused.returncode == 2, name
-        assert refused.stdout == ""
-    assert "did you mean" in dap3d("check", "pen9").stderr
+    for name in ("empty", "image.toml", "cut.toml", "https://a.org/b.toml", ""):
+        refuse("check", name)
+    assert "did you mean" in refuse("check", "pen9")
 
 
 def test_models_and_plugins_are_listed(dap3d):
@@ -99,11 +98,19 @@ def test_describe_explains_a_type(dap3d):
     assert "did you mean 'rev'" in unknown.stderr
 
 
+@pytest.fixture(scope="module")
+def run_file(tmp_path_factory):
+    """The file of a short run of pen1."""
+    file = tmp_path_factory.mktemp("run") / "pen1.nc"
+    dap.simulate("pen1", t_end=0.1).save(file)
+    return file
+
+
 @pytest.fixture
-def result(dap3d):
-    """A short run of pen1 and its file."""
-    assert dap3d("run", "pen1", "--t-end", "0.1", "--quiet").returncode == 0
-    return dap.open(dap3d.folder / "pen1.nc")
+def result(dap3d, run_file):
+    """The result of a short run, which lies in the folder as pen1.nc."""
+    shutil.copy(run_file, dap3d.folder / "pen1.nc")
+    return dap.open(run_file)
 
 
 def test_info_says_what_a_file_holds(dap3d, result):
@@ -115,8 +122,6 @@ def test_info_says_what_a_file_holds(dap3d, result):
     shown = dap3d("info", "pen1.nc").stdout
     for words in ("cone", "J1", "numba", "energy", "dop853", "project on"):
         assert words in shown
-    for name in ("gone.nc", "."):
-        assert dap3d("info", name).returncode == 2
 
 
 def test_post_writes_a_table_that_reads_back_bit_for_bit(dap3d, result):
@@ -140,9 +145,6 @@ def test_post_writes_a_table_that_reads_back_bit_for_bit(dap3d, result):
     for name in column:  # what the table calls it, plots understand
         if ".Jac." not in name:
             assert result.quantity(name).values.tolist() == column[name].tolist()
-    assert dap3d("post", "pen1.nc", "-o", "all.csv").returncode == 2
-    assert dap3d("post", "pen1.nc", "-o", "all.xls").returncode == 2
-    assert dap3d("post", "pen1.nc", "-o", "pen1.nc", "--force").returncode == 2
 
 
 def test_post_writes_named_dimensions(dap3d, result):
@@ -161,13 +163,23 @@ def test_plot_draws_into_files(dap3d, result):
     curves = dap3d("plot", "pen1.nc", "cone.r.z", "J1.force", "--x", "cone.r.y", "-o", "a.svg")
     assert curves.returncode == 0, curves.stderr
     assert "position of cone" in (dap3d.folder / "a.svg").read_text()
-    unknown = dap3d("plot", "pen1.nc", "cone.rr.z", "-o", "b.png")
-    assert unknown.returncode == 2
-    assert "did you mean 'cone.r.z'" in unknown.stderr
+
+
+def test_results_that_cannot_be_read_or_drawn_are_refused(refuse, dap3d, result):
+    (dap3d.folder / "there.png").write_text("mine")
+    (dap3d.folder / "text.nc").write_text("no result")
+    for name in ("gone.nc", ".", "text.nc"):
+        for command in (("info",), ("plot",), ("post", "-o", "a.csv")):
+            assert "cannot read" in refuse(*command, name)
+    assert "did you mean 'cone.r.z'" in refuse("plot", "pen1.nc", "cone.rr.z", "-o", "b.png")
+    for target in ("b.bmp", "there.png", "no/b.png", "pen1.nc"):
+        refuse("plot", "pen1.nc", "cone.r.z", "-o", target)
+    refuse("plot", "pen1.nc", "cone.r.z", "--x", "cone.r")
+    for target in ("there.png", "a.xls", "pen1.nc"):
+        refuse("post", "pen1.nc", "-o", target)
+    refuse("post", "pen1.nc", "-o", "pen1.nc", "--force")
     assert not (dap3d.folder / "b.png").exists()
-    for arguments in (("-o", "b.bmp"), ("-o", "a.svg"), ("-o", "no/b.png"), ("--x", "cone.r")):
-        assert dap3d("plot", "pen1.nc", "cone.r.z", *arguments).returncode == 2, arguments
-    assert dap3d("plot", "gone.nc").returncode == 2
+    assert (dap3d.folder / "there.png").read_text() == "mine"
 
 
 def test_check_tells_that_joints_cannot_be_assembled(dap3d, scene_file):

@@ -83,13 +83,11 @@ def test_output_that_exists_is_refused_before_running(dap3d):
     assert dap.open(dap3d.folder / "pen1.nc").status == "done"
 
 
-def test_output_that_cannot_be_written_is_refused_before_running(dap3d, scene_file):
+def test_output_that_cannot_be_written_is_refused_before_running(refuse, scene_file):
     scene = scene_file()
     text = scene.read_text()
     for target in ("nowhere/a.nc", "fall.toml/a.nc", ".", "fall.toml", "/dev/full", "x" * 300):
-        refused = dap3d("run", "fall.toml", "-o", target, "--force")
-        assert refused.returncode == 2, (target, refused)
-        assert len(refused.stderr.splitlines()) == 1
+        assert len(refuse("run", "fall.toml", "-o", target, "--force").splitlines()) == 1
     assert scene.read_text() == text
 
 
@@ -108,34 +106,31 @@ def test_without_a_model_and_without_a_terminal_it_is_a_usage_error(dap3d):
     assert "MODEL" in refused.stderr
 
 
-def test_settings_are_refused_before_compiling_and_by_their_option(dap3d):
+def test_settings_are_refused_before_compiling_and_by_their_option(refuse):
     for option, value in (("--t-end", "inf"), ("--t-end", "-1"), ("--rtol", "0"), ("--dt", "nan"),
                           ("--atol", "-1"), ("--step", "0"), ("--dt", "100")):  # fmt: skip
-        refused = dap3d("run", "pen1", option, value)
-        assert refused.returncode == 2, (option, value, refused)
-        assert refused.stderr.startswith(option)
-    misspelt = dap3d("run", "pen1", "--integrator", "dop85")
-    assert misspelt.returncode == 2
-    assert "did you mean 'dop853'" in misspelt.stderr
-    unfit = dap3d("run", "pen1", "--method", "unconstrained")
-    assert unfit.returncode == 2
-    assert "1 joints" in unfit.stderr or "joint" in unfit.stderr
+        assert refuse("run", "pen1", option, value).startswith(option)
+    assert "did you mean 'dop853'" in refuse("run", "pen1", "--integrator", "dop85")
+    assert refuse("run", "pen1", "--integrator", "rk4").startswith("--step")
+    assert "unconstrained does not fit" in refuse("run", "pen1", "--method", "unconstrained")
 
 
-def test_usage_errors(dap3d):
-    for arguments, words in (
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
         (("run", "pen1", "--t_end", "1"), "--t-end"),
         (("run", "pen1", "--dt", "0.1", "--dt", "0.2"), "--dt is given more than once"),
         (("run", "pen1", "--correct", "--no-correct"), "more than once"),
         (("run", "pen1", "pen2"), "pen2"),
         (("run", "pen1", "--dt", "1,5"), "1,5"),
+        (("run", "pen1", "-o"), "-o"),
         (("rnu", "pen1"), "did you mean 'run'"),
         (("check",), "MODEL"),
-    ):
-        refused = dap3d(*arguments)
-        assert refused.returncode == 2, arguments
-        assert words in refused.stderr, arguments
-        assert refused.stdout == ""
+        ((), "Commands:"),
+    ],
+)
+def test_usage_errors(refuse, arguments, words):
+    assert words in refuse(*arguments)
 
 
 def test_mistakes_of_a_scene_are_all_told_with_place_and_remedy(dap3d, scene_file):

@@ -4,7 +4,6 @@ import shlex
 import subprocess
 
 import pytest
-
 from tests.e2e.conftest import COMMAND, environment
 
 

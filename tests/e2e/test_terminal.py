@@ -43,7 +43,7 @@ def in_terminal(dap3d, width, *arguments, answers="", **variables):
     shown, waiting = b"", answers.encode().splitlines(keepends=True)
     end = time.monotonic() + 120
     while time.monotonic() < end:
-        ready, _, _ = select.select([main], [], [], 0.5)
+        ready, _, _ = select.select([main], [], [], 0.2)
         if not ready:
             if waiting:
                 os.write(main, waiting.pop(0))

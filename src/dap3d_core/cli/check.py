@@ -10,9 +10,6 @@ from dap3d_core.cli.group import Command
 if TYPE_CHECKING:
     from dap3d_core.simulation import CompiledModel
 
-#: Prescribed velocities of dependent rows that differ by more contradict each other.
-CONTRADICTION = 1e-8
-
 
 @click.command(cls=Command, short_help="Validate a model, count its degrees of freedom.")
 @click.argument("model")
@@ -140,12 +137,14 @@ def _freedoms(found: dict[str, Any]) -> str:
 
 
 def _about_redundancy(found: dict[str, Any]) -> str:
+    from dap3d_core.simulation.redundancy import CONSISTENT
+
     words = (
         f"redundant constraints: {found['redundant']} of {found['rows']} rows say what others say, "
         f"in the joints {', '.join(found['joints'])}. Accelerations are unique, some reactions of "
         "these joints are not."
     )
-    if found["contradiction"] > CONTRADICTION:
+    if found["contradiction"] > CONSISTENT:
         words += f" They contradict each other by {found['contradiction']:.2g}."
     if found["method"] == "standard":
         words += " The standard method refuses to run: replace a joint by one with fewer rows."

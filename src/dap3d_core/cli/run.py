@@ -104,13 +104,9 @@ def run(
         quiet=quiet,
         debug=ctx.meta["dap3d.debug"],
         stopping=ctx.meta["dap3d.stopping"],
+        target=target,
+        force=force,
     )
-    try:
-        outcome.result.save(target, force=force)
-    except OSError as error:
-        if outcome.reason:
-            raise OSError(f"{outcome.reason}; and then: {error}") from error
-        raise
     return tell(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
 
 
@@ -179,8 +175,10 @@ def _simulate(
     quiet: bool,
     debug: bool,
     stopping: "Stopping",
+    target: Path,
+    force: bool,
 ) -> "Outcome":
-    """Compile and simulate; a run that ends early gives what it computed."""
+    """Compile and simulate into a file; a run that ends early gives what it computed."""
     import dap3d_core as dap
     from dap3d_core.cli.outcome import Outcome
     from dap3d_core.cli.progress import RunProgress
@@ -204,11 +202,16 @@ def _simulate(
         progress.start()
         try:
             result = dap.simulate(
-                compiled, progress=on_progress, announce=progress.announce, **given
+                compiled,
+                progress=on_progress,
+                announce=progress.announce,
+                output=target,
+                force=force,
+                **given,
             )
         except (Exception, KeyboardInterrupt) as error:
             kept = getattr(error, "result", None)
-            if kept is None:
+            if kept is None or isinstance(error, OSError):
                 if isinstance(error, SceneError):  # settings that only the integrator can judge
                     raise _in_options(error, SETTINGS) from error
                 raise

@@ -131,7 +131,7 @@ class Machine:
         s.C[:] = 0.0
         self._call(POSITION, t, s.C, s.C, s.C)
         self._call(ACCELERATION, t, s.D, s.gamma, s.nu)
-        row, column, place = self._pattern
+        row, column, place = self.pattern
         shape = (self.model.row_count, 6 * self.model.body_count)
         return Rows(s.C[s.row], s.nu[s.row], s.gamma[s.row], row, column, s.D[place], shape)
 
@@ -146,8 +146,8 @@ class Machine:
                    s.par, s.groups, self.loops, out1, out2, out3)  # fmt: skip
 
     @cached_property
-    def _pattern(self) -> tuple[Integers, Integers, Integers]:
-        """Row, column and place in D of the Jacobian's entries."""
+    def pattern(self) -> tuple[Integers, Integers, Integers]:
+        """Row, column and place in D of the Jacobian's entries, in the order of ``rows``."""
         s = self.system
         blocks = self.plan.blocks
         heights = blocks[:, 2]

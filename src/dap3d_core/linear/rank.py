@@ -64,6 +64,24 @@ def dense_rank(D: Floats) -> Rank:
     return Rank(rows, columns, rank, tolerance, "svd", tuple(int(k) for k in shared), null)
 
 
+def factor_independent(plan: Plan, D: Floats, K: Floats) -> None:
+    """Fill and factor K, leaving out rows that depend on those before; their unknowns become zero.
+
+    Args:
+        plan: the elimination program.
+        D: (block_size,) scaled blocks.
+        K: (matrix_size,) gets the factors.
+    """
+    assemble(plan.targets, plan.contributions, D, K)
+    heights = plan.blocks[:, 2]
+    within = np.arange(heights.sum()) - np.repeat(np.cumsum(heights) - heights, heights)
+    place = np.repeat(plan.blocks[:, 0], heights) + 6 * within
+    squares = np.sum(D[place[:, None] + np.arange(6)] ** 2, axis=1)
+    row = np.repeat(plan.blocks[:, 3], heights) + within
+    smallest = PIVOT_TOLERANCE * np.bincount(row, squares, minlength=plan.row_size)
+    factor(plan.nodes, plan.columns, plan.updates, K, smallest, True)
+
+
 def sparse_rank(plan: Plan, D: Floats, metric: Floats, row_places: Integers, columns: int) -> Rank:
     """Rank by the pivots of the block factorisation, for many rows.
 
@@ -81,13 +99,7 @@ def sparse_rank(plan: Plan, D: Floats, metric: Floats, row_places: Integers, col
     D = D.copy()
     scale_blocks(plan.blocks, D, metric)
     K = np.zeros(plan.matrix_size)
-    assemble(plan.targets, plan.contributions, D, K)
-    smallest = np.zeros(plan.row_size)
-    for place, _, height, first, _ in plan.blocks:
-        block = D[place : place + 6 * height].reshape(height, 6)
-        smallest[first : first + height] += np.sum(block**2, axis=1)
-    smallest *= PIVOT_TOLERANCE
-    factor(plan.nodes, plan.columns, plan.updates, K, smallest, True)
+    factor_independent(plan, D, K)
     inverse_pivot = np.ones(plan.row_size)
     for size, first, diagonal, *_ in plan.nodes[:-1]:
         inverse_pivot[first : first + size] = K[diagonal : diagonal + size * size : size + 1]

@@ -1,6 +1,7 @@
 """The result floor: what a run left behind, on disk and in memory; the post-processor's arrays."""
 
 from dap3d_core.result.errors import ResultError, UnknownNameError
+from dap3d_core.result.files import check_target
 from dap3d_core.result.ledger import Entry
 from dap3d_core.result.motion import Energy
 from dap3d_core.result.quantities import Quantity, find
@@ -21,6 +22,7 @@ __all__ = [
     "ResultWriter",
     "Statistics",
     "UnknownNameError",
+    "check_target",
     "current_versions",
     "find",
     "open_result",

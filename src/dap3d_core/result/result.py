@@ -98,6 +98,14 @@ class Result:
         self._fill(subject, arrays_of(rows, subject), record, lambda: (model, machine_of))
 
     @classmethod
+    def of_run(
+        cls, model: Model, rows: Floats, record: Record, machine_of: "Callable[[], Machine]"
+    ) -> Self:
+        """The result of a run whose record is at hand; arguments as for the class itself."""
+        subject = subject_of(model)
+        return cls.of_parts(subject, arrays_of(rows, subject), record, lambda: (model, machine_of))
+
+    @classmethod
     def of_parts(
         cls, subject: Subject, arrays: Arrays, record: Record, origin: Callable[[], Origin]
     ) -> Self:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 
+import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -14,7 +15,15 @@ from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.linear.rank import Rank
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.registry import Registry, load_registry
-from dap3d_core.scene import Checked, Scene, SceneError, check, load, mistake_at
+from dap3d_core.scene import (
+    Checked,
+    Scene,
+    SceneError,
+    check,
+    check_simulation,
+    load,
+    mistake_at,
+)
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.explanation import explain
 from dap3d_core.simulation.redundancy import Redundancy, redundancy_of
@@ -53,6 +62,9 @@ class CompiledModel:
         self.scene: Scene = scene
         self.checked: Checked = check(scene, registry, allow_code=allow_code)
         self.model: Model = _modelled(self.checked)
+        if method is not None:
+            settings = attrs.evolve(scene.simulation, method=method)
+            check_simulation(settings, self.model.body_names)
         asked = method or str(scene.simulation.method)
         self.method, self.reason = choose_method(self.model, asked)
         self.machine = Machine(self.model, self.method, announce)

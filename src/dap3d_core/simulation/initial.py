@@ -1,5 +1,6 @@
 """Initial conditions brought onto the constraints, at position and at velocity level (spec 8)."""
 
+from collections.abc import Collection
 from itertools import pairwise
 
 import attrs
@@ -9,7 +10,8 @@ from numpy.typing import NDArray
 from dap3d_core.assembly.system import System
 from dap3d_core.formulations.build import set_metric
 from dap3d_core.formulations.machine import Machine, Rows
-from dap3d_core.linear.rank import DENSE_ROWS
+from dap3d_core.linear.plan import Integers
+from dap3d_core.linear.rank import DENSE_ROWS, factor_independent
 from dap3d_core.model.kinematics import join, split
 from dap3d_core.simulation.errors import AssemblyError
 
@@ -52,11 +54,19 @@ def violation(machine: Machine, u: Floats, t: float = 0.0) -> tuple[float, float
     return _largest(rows.C), _largest(_velocity_residual(rows, u))
 
 
-def correct_initial(machine: Machine, u: Floats, t: float = 0.0) -> Initial:
+def correct_initial(
+    machine: Machine, u: Floats, t: float = 0.0, hold: Collection[int] = ()
+) -> Initial:
     """Correct positions by Newton's method, velocities by a linear step, each by the least change.
 
     The least change is that of the sum of squares of displacements, rotations and velocities, as in
     the manual. Rows without a position level do not take part in the position stage.
+
+    Args:
+        machine: the model.
+        u: (13 n,) the state as given.
+        t: time, s.
+        hold: bodies, from 1, that the position stage leaves where they are.
 
     Raises:
         AssemblyError: the position residual does not vanish; the message has that of each joint.
@@ -65,18 +75,19 @@ def correct_initial(machine: Machine, u: Floats, t: float = 0.0) -> Initial:
     if not machine.model.row_count:
         return Initial(u, before, before, 0, 0.0, 0.0)
     start = u
-    u, passes = _correct_positions(machine, u, t)
+    held = np.array(sorted(hold), dtype=np.int64)
+    u, passes = _correct_positions(machine, u, t, held)
     rows = machine.rows(t, u)
     residual = _velocity_residual(rows, u)
     if _largest(residual) > 0.0:
         u = u.copy()
         velocities = u[7 * machine.model.body_count :]
-        velocities -= _least_change(machine, rows, residual, t, positions=False)
+        velocities -= _least_change(machine, rows, residual, t)
     moved, turned = _distance(start, u, machine.model.body_count)
     return Initial(u, before, violation(machine, u, t), passes, moved, turned)
 
 
-def _correct_positions(machine: Machine, u: Floats, t: float) -> tuple[Floats, int]:
+def _correct_positions(machine: Machine, u: Floats, t: float, held: Integers) -> tuple[Floats, int]:
     size = _model_size(machine)
     for passes in range(MOST_PASSES + 1):
         rows = machine.rows(t, u)
@@ -84,33 +95,37 @@ def _correct_positions(machine: Machine, u: Floats, t: float) -> tuple[Floats, i
             return u, passes
         if passes == MOST_PASSES or not np.all(np.isfinite(rows.C)):
             break
-        change = _least_change(machine, rows, rows.C, t, positions=True).reshape(-1, 6)
+        change = _least_change(machine, rows, rows.C, t, held).reshape(-1, 6)
         shift = float(np.max(np.linalg.norm(change[:, :3], axis=1)))
         turn = float(np.max(np.linalg.norm(change[:, 3:], axis=1)))
         shift_limit = MOST_SHIFT * size / shift if shift else 1.0
         turn_limit = MOST_TURN / turn if turn else 1.0
         limit = min(1.0, shift_limit, turn_limit)
         u = _displaced(u, -limit * change, machine.model.body_count)
-    raise AssemblyError(_failure(machine, rows.C))
+    raise AssemblyError(_failure(machine, rows.C, passes, held))
 
 
 def _least_change(
-    machine: Machine, rows: Rows, residual: Floats, t: float, *, positions: bool
+    machine: Machine, rows: Rows, residual: Floats, t: float, held: Integers | None = None
 ) -> Floats:
-    """The shortest x (6 n,) with D x = residual, on the position rows or on all."""
-    if machine.model.row_count <= DENSE_ROWS:
-        D = rows.dense()
-        keep = machine.model.position_row if positions else np.ones(len(residual), dtype=bool)
-        solution: Floats = np.linalg.lstsq(D[keep], residual[keep], rcond=RCOND)[0]
-        return solution
-    return _sparse_least_change(machine, residual, t)
+    """The shortest x (6 n,) with D x = residual, on all rows.
 
-
-def _sparse_least_change(machine: Machine, residual: Floats, t: float) -> Floats:
-    """The same by the block factorisation, every mass and inertia set to one; for many rows.
-
-    Rows without a position level are kept here: the correction does not move along them.
+    With ``held`` (bodies, maybe none) on the position rows alone, and zero on these bodies.
     """
+    if machine.model.row_count > DENSE_ROWS:
+        return _sparse_least_change(machine, residual, t, held)
+    D = rows.dense()
+    if held is not None:
+        keep = machine.model.position_row
+        D, residual = D[keep], residual[keep]
+        D.reshape(len(D), -1, 6)[:, held - 1] = 0.0
+    return np.asarray(np.linalg.lstsq(D, residual, rcond=RCOND)[0], dtype=np.float64)
+
+
+def _sparse_least_change(
+    machine: Machine, residual: Floats, t: float, held: Integers | None
+) -> Floats:
+    """The same by the block factorisation, every mass and inertia set to one; for many rows."""
     from dap3d_core.formulations.standard import correct, linearise
 
     system: System = machine.system
@@ -119,7 +134,13 @@ def _sparse_least_change(machine: Machine, residual: Floats, t: float) -> Floats
     try:
         set_metric(system.metric, np.ones(n), np.tile(np.eye(3), (n, 1, 1)))
         system.metric[1:, 7:16] = system.body[1:, 3:12]
-        linearise(t, system, machine.loops, True)
+        if held is not None:
+            system.metric[held] = 0.0
+        linearise(t, system, machine.loops, False)
+        if held is not None:
+            row, _, place = machine.pattern
+            system.D[place[~machine.model.position_row[row]]] = 0.0
+        factor_independent(machine.plan, system.D, system.K)
         system.C[:] = 0.0
         system.C[system.row] = -residual
         correct(system)
@@ -166,16 +187,19 @@ def _largest(values: Floats) -> float:
     return float(np.max(np.abs(values), initial=0.0))
 
 
-def _failure(machine: Machine, C: Floats) -> str:
+def _failure(machine: Machine, C: Floats, passes: int, held: Integers) -> str:
     model = machine.model
     worst = np.array([_largest(C[a:b]) for a, b in pairwise(model.joint_start)])
-    still_open = [k for k in np.argsort(-worst)[:10] if not worst[k] <= TOLERANCE]
+    order = np.argsort(-np.nan_to_num(worst, nan=np.inf))
+    still_open = [k for k in order[:10] if not worst[k] <= TOLERANCE]
+    names = ", ".join(model.body_names[b - 1] for b in held)
     return "\n".join(
         [
             "the initial positions cannot be assembled: "
-            f"after {MOST_PASSES} passes these joints are still open",
+            f"after {passes} passes these joints are still open",
             *(f"  {model.joint_names[k]}: residual {worst[k]:.3g}" for k in still_open),
             "check the points, axes and lengths of these joints; "
             "contradictory joints cannot be assembled",
+            *([f"held where they are: {names}"] if names else []),
         ]
     )

@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import attrs
@@ -11,9 +12,9 @@ from numpy.typing import NDArray
 
 from dap3d_core.integrators import METHODS, Integration, Status
 from dap3d_core.kernels.cache import driver_is_cached
-from dap3d_core.result import Result, Statistics
+from dap3d_core.result import Record, Result, ResultWriter, Statistics, check_target
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, check_simulation
-from dap3d_core.simulation.compiled import CompiledModel
+from dap3d_core.simulation.compiled import CompiledModel, choose_method
 from dap3d_core.simulation.errors import RedundantError, SimulationError
 from dap3d_core.simulation.initial import TOLERANCE, Initial, correct_initial, violation
 from dap3d_core.simulation.offender import find_offender
@@ -23,6 +24,8 @@ Progress = Callable[[float, float], None]
 
 #: Seconds that a compiled chunk should take: Ctrl-C and the progress bar wait for its end.
 CHUNK_SECONDS = 0.1
+#: A run that lasts longer writes its rows to disk as they come, so that it may be killed.
+SHORT_SECONDS = 1.0
 #: Numbers that wait in the row buffer at most.
 BUFFER_NUMBERS = 4_000_000
 #: A start this far off the constraints, left uncorrected, gets a note.
@@ -44,6 +47,8 @@ def simulate(
     progress: Progress | None = None,
     allow_code: bool = False,
     announce: Callable[[str], None] | None = None,
+    output: str | os.PathLike[str] | None = None,
+    force: bool = False,
 ) -> Result:
     """Simulate a scene from t = 0 to t_end.
 
@@ -62,29 +67,46 @@ def simulate(
         correct: bring the initial conditions onto the constraints first.
         project: bring every accepted step and reported state onto the constraints.
         progress: called as progress(t, t_end) between chunks of some 0.1 s.
-        allow_code: whether the model's own types (plugin.py in its folder) may be loaded.
-        announce: called with the name of each kernel that has to be compiled anew.
+        allow_code, announce: as ``compile`` has them.
+        output: result file to write. While a run of more than a second goes on its rows stand in
+            ``NAME.part``, synced after every chunk: readable also when the run is killed.
+        force: whether an existing output is overwritten.
 
     Returns:
         the result. Any exception that ends the integration carries what was computed until then as
         ``.result``; KeyboardInterrupt and exceptions of ``progress`` come out as they are.
 
     Raises:
-        SceneError, PluginError: as ``compile``; also for settings that make no sense.
-        RedundantError: the constraints depend on each other.
-        AssemblyError: the initial positions cannot be assembled.
+        SceneError, PluginError, ResultError: as ``compile``; settings or an output that won't do.
+        RedundantError, AssemblyError: dependent constraints; positions that cannot be assembled.
         SimulationError: the run stopped; ``.result`` is what was computed.
     """
-    if isinstance(scene, CompiledModel):
-        compiled = scene
-    else:
-        compiled = CompiledModel(scene, method=method, allow_code=allow_code, announce=announce)
+    compiled = _compiled(scene, method, allow_code, announce)
     asked = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol,
                  step=step, correct=correct, project=project)  # fmt: skip
     given: dict[str, Any] = {k: v for k, v in asked.items() if v is not None}
     settings = attrs.evolve(compiled.scene.simulation, **given)
     check_simulation(settings, compiled.model.body_names)
-    return _Run(compiled, settings, announce).go(progress)
+    return _Run(compiled, settings, announce).go(progress, output, force=force)
+
+
+def _compiled(
+    scene: Scene | str | os.PathLike[str] | CompiledModel,
+    method: str | None,
+    allow_code: bool,
+    announce: Callable[[str], None] | None,
+) -> CompiledModel:
+    """The compiled model of a scene; one that was compiled before must have the method asked for.
+
+    Raises:
+        SimulationError: it has another.
+    """
+    if not isinstance(scene, CompiledModel):
+        return CompiledModel(scene, method=method, allow_code=allow_code, announce=announce)
+    if method is not None and choose_method(scene.model, method)[0] != scene.method:
+        words = f"the model was compiled for method {scene.method}; compile it for {method}"
+        raise SimulationError(words)
+    return scene
 
 
 def report_times(t_end: float | None, dt: float | None) -> Floats:
@@ -120,31 +142,43 @@ class _Run:
         self.times = report_times(settings.t_end, settings.dt)
         self.notes = [*compiled.notes, f"method {compiled.method}: {compiled.reason}"]
         self.rows: list[Floats] = []
+        self.output: Path | None = None
+        self.force = False
+        self.writer: ResultWriter | None = None
         self.started = self.compile_time = 0.0
 
-    def go(self, progress: Progress | None) -> Result:
+    def go(
+        self, progress: Progress | None, output: str | os.PathLike[str] | None, *, force: bool
+    ) -> Result:
         self.started = time.perf_counter()
         u0 = self._start()
         integration = self._integration(u0)
         self._compile(integration)
+        if output is not None:
+            self.output = check_target(output, force)
+            self.force = force
         try:
             self._advance(integration, progress)
         except BaseException as error:
-            self.rows.append(integration.rows())
-            if self.rows and len(np.concatenate(self.rows)):
-                status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
-                error.result = self._result(integration, status)  # type: ignore[attr-defined]
+            if isinstance(error, OSError):  # the disk: what is there stays as it is
+                raise
+            self._take_rows(integration)
+            status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
+            error.result = self._kept(integration, status)  # type: ignore[attr-defined]
             raise
         if integration.status is not Status.FINISHED:
             raise self._stopped(integration)
-        return self._result(integration, "done")
+        result = self._kept(integration, "done")
+        assert result is not None
+        return result
 
     def _start(self) -> Floats:
         """The initial state, corrected if asked for; constraints must be independent there."""
         machine, settings = self.machine, self.settings
         u0 = machine.model.u0
         if settings.correct:
-            initial = correct_initial(machine, u0)
+            hold = [machine.model.body_names.index(name) + 1 for name in settings.hold]
+            initial = correct_initial(machine, u0, hold=hold)
             u0 = initial.u
             self._note_correction(initial)
         elif max(violation(machine, u0)) > OFF_CONSTRAINTS:
@@ -214,12 +248,25 @@ class _Run:
         while integration.status is Status.RUNNING:
             before, clock = integration.statistics.rhs, time.perf_counter()
             integration.advance(budget)
-            self.rows.append(integration.rows())
+            self._take_rows(integration)
             done, seconds = integration.statistics.rhs - before, time.perf_counter() - clock
             if progress is not None:
                 progress(integration.t, t_end)
             if done and seconds > 0.0:
                 budget = int(min(max(1.0, done * CHUNK_SECONDS / seconds), 4.0 * budget, 1e9))
+
+    def _take_rows(self, integration: Integration) -> None:
+        """Take what was reported since the last chunk; in a long run, also onto disk."""
+        rows = integration.rows()
+        if not len(rows):
+            return
+        self.rows.append(rows)
+        if self.writer is not None:
+            self.writer.append(rows)
+        elif self.output and time.perf_counter() - self.started > SHORT_SECONDS:
+            record, model = self._record(integration, "done"), self.machine.model
+            self.writer = ResultWriter(self.output, model, record, force=self.force)
+            self.writer.append(np.concatenate(self.rows))
 
     def _stopped(self, integration: Integration) -> SimulationError:
         """Why the integration ended early, with what was computed."""
@@ -235,23 +282,34 @@ class _Run:
         if culprit:
             message += f": {culprit}"
         self.notes.append(message)
-        result = self._result(integration, "stopped") if any(len(r) for r in self.rows) else None
-        return SimulationError(message, result)
+        return SimulationError(message, self._kept(integration, "stopped"))
 
-    def _result(self, integration: Integration, status: str) -> Result:
+    def _kept(self, integration: Integration, status: str) -> Result | None:
+        """The result of what was computed, whole on disk if asked for; None where nothing was."""
+        if not self.rows:
+            return None
+        record = self._record(integration, status)
+        result = Result.of_run(
+            self.machine.model, np.concatenate(self.rows), record, lambda: self.machine
+        )
+        if self.writer is not None:
+            self.writer.leave()
+        if self.output is not None:
+            result.save(self.output, force=self.force)
+        if self.writer is not None:
+            self.writer.part.unlink(missing_ok=True)
+        return result
+
+    def _record(self, integration: Integration, status: str) -> Record:
         counts = integration.statistics
-        wall = time.perf_counter() - self.started
-        return Result(
-            model=self.machine.model,
-            machine_of=lambda: self.machine,
+        return Record(
             scene_text=self.compiled.scene_text,
-            rows=np.concatenate(self.rows),
             stats=Statistics(
                 steps=counts.steps,
                 rejected=counts.rejected,
                 rhs=counts.rhs,
                 projections=counts.projections,
-                wall_time_s=wall,
+                wall_time_s=time.perf_counter() - self.started,
                 compile_time_s=self.compiled.compile_time + self.compile_time,
             ),
             status=status,

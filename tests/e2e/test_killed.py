@@ -1,0 +1,46 @@
+"""A long run that is killed leaves what it had reported."""
+
+import subprocess
+import sys
+import time
+
+import numpy as np
+from support.process import environment
+
+import dap3d_core as dap
+
+
+def test_a_killed_run_leaves_a_readable_part(tmp_path):
+    """SIGKILL in the middle: NAME.part opens, its rows are whole and start at t = 0."""
+    command = [
+        sys.executable,
+        "-m",
+        "dap3d_core.cli",
+        "run",
+        "pen1",
+        "--t-end",
+        "1e6",
+        "--dt",
+        "0.1",
+    ]
+    process = subprocess.Popen(
+        command,
+        cwd=tmp_path,
+        env=environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    part = tmp_path / "pen1.nc.part"
+    deadline = time.monotonic() + 120
+    while not part.exists() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    time.sleep(1.0)
+    process.kill()
+    process.wait()
+    assert not (tmp_path / "pen1.nc").exists()
+    result = dap.open(part)
+    assert result.status == "interrupted"
+    assert len(result.t) > 10
+    assert result.t[0] == 0.0
+    assert np.allclose(np.diff(result.t), 0.1)
+    assert np.all(np.isfinite(result.u))
