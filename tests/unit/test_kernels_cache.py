@@ -127,7 +127,7 @@ print(result.r[-1, 0, 2])
 
 
 def test_a_model_with_its_own_types_can_be_copied(tmp_path):
-    """The same plugin.py in another folder is another module: the cached code of the first does not serve it."""
+    """The same plugin.py in another folder is another module, with compiled code of its own."""
     assert run_copy(tmp_path / "first") == run_copy(tmp_path / "second")
 
 
