@@ -48,6 +48,8 @@ class Rows:
         return csr_array((self.value, (self.row, self.column)), shape=self.shape)
 
 
+#: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
+AS_COMPILED = np.errstate(all="ignore")
 #: Pivots are squares of lengths: a hundredth in length of what it was at the start.
 POOR = 1e-4
 
@@ -85,6 +87,7 @@ class Machine:
         """The integrated state y (13 n + 1,) of a state u (13 n,)."""
         return to_integrated(np.asarray(u, dtype=float), self.model.body_count)
 
+    @AS_COMPILED
     def rhs(self, t: float, u: ArrayLike) -> Floats:
         """du/dt (13 n,) at time t in s and state u (13 n,).
 
@@ -98,6 +101,7 @@ class Machine:
         w_dot[:] = to_global(split(y, n)[1], w_dot)  # omega_dot = A omega'_dot, no extra term
         return out[: 13 * n]
 
+    @AS_COMPILED
     def report(self, t: float, u: ArrayLike) -> Floats:
         """What a run reports at a state, (report_size,).
 
@@ -107,6 +111,7 @@ class Machine:
         self.functions[REPORT](float(t), self.integrated(u), out, self.system, self.loops)
         return out
 
+    @AS_COMPILED
     def watch_pivots(self, t: float, u: ArrayLike) -> None:
         """Remember the pivots at a state u (13 n,): below POOR of it a pose is near a singular one.
 
@@ -124,6 +129,7 @@ class Machine:
             inverse = s.K[diagonal : diagonal + size * size : size + 1]
             s.smallest[first : first + size] = POOR / inverse**2
 
+    @AS_COMPILED
     def rows(self, t: float, u: ArrayLike) -> Rows:
         """All constraint rows at time t and state u (13 n,)."""
         s = self.system

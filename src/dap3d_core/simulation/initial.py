@@ -14,6 +14,7 @@ from dap3d_core.linear.plan import Integers
 from dap3d_core.linear.rank import DENSE_ROWS, factor_independent
 from dap3d_core.model.kinematics import join, split
 from dap3d_core.simulation.errors import AssemblyError
+from dap3d_core.simulation.offender import find_offender
 
 Floats = NDArray[np.float64]
 
@@ -46,11 +47,28 @@ class Initial:
     turned: float
 
 
+def finite_rows(machine: Machine, t: float, u: Floats) -> Rows:
+    """All constraint rows at a state u (13 n,).
+
+    Raises:
+        AssemblyError: one of them is not finite there; the message names joint or function.
+    """
+    rows = machine.rows(t, u)
+    good = np.isfinite(rows.C) & np.isfinite(rows.nu) & np.isfinite(rows.gamma)
+    good[rows.row[~np.isfinite(rows.value)]] = False
+    if not np.all(good):
+        joint = machine.model.row_owner(int(np.argmin(good)))
+        culprit = find_offender(machine, t, machine.integrated(u), t)
+        culprit = culprit or f"joint {joint} is not finite"
+        raise AssemblyError(f"the initial positions cannot be assembled: {culprit}")
+    return rows
+
+
 def violation(machine: Machine, u: Floats, t: float = 0.0) -> tuple[float, float]:
     """Largest residuals |C| and |D v - nu| of a state u (13 n,)."""
     if not machine.model.row_count:
         return 0.0, 0.0
-    rows = machine.rows(t, u)
+    rows = finite_rows(machine, t, u)
     return _largest(rows.C), _largest(_velocity_residual(rows, u))
 
 
@@ -77,7 +95,7 @@ def correct_initial(
     start = u
     held = np.array(sorted(hold), dtype=np.int64)
     u, passes = _correct_positions(machine, u, t, held)
-    rows = machine.rows(t, u)
+    rows = finite_rows(machine, t, u)
     residual = _velocity_residual(rows, u)
     if _largest(residual) > 0.0:
         u = u.copy()
@@ -90,10 +108,10 @@ def correct_initial(
 def _correct_positions(machine: Machine, u: Floats, t: float, held: Integers) -> tuple[Floats, int]:
     size = _model_size(machine)
     for passes in range(MOST_PASSES + 1):
-        rows = machine.rows(t, u)
+        rows = finite_rows(machine, t, u)
         if _largest(rows.C) <= TOLERANCE:
             return u, passes
-        if passes == MOST_PASSES or not np.all(np.isfinite(rows.C)):
+        if passes == MOST_PASSES:
             break
         change = _least_change(machine, rows, rows.C, t, held).reshape(-1, 6)
         shift = float(np.max(np.linalg.norm(change[:, :3], axis=1)))
@@ -115,11 +133,15 @@ def _least_change(
     if machine.model.row_count > DENSE_ROWS:
         return _sparse_least_change(machine, residual, t, held)
     D = rows.dense()
-    if held is not None:
+    if held is None:
+        held = np.zeros(0, dtype=np.int64)
+    else:
         keep = machine.model.position_row
         D, residual = D[keep], residual[keep]
-        D.reshape(len(D), -1, 6)[:, held - 1] = 0.0
-    return np.asarray(np.linalg.lstsq(D, residual, rcond=RCOND)[0], dtype=np.float64)
+    D.reshape(len(D), -1, 6)[:, held - 1] = 0.0
+    solution: Floats = np.asarray(np.linalg.lstsq(D, residual, rcond=RCOND)[0], dtype=np.float64)
+    solution.reshape(-1, 6)[held - 1] = 0.0  # rounding
+    return solution
 
 
 def _sparse_least_change(
@@ -190,8 +212,7 @@ def _largest(values: Floats) -> float:
 def _failure(machine: Machine, C: Floats, passes: int, held: Integers) -> str:
     model = machine.model
     worst = np.array([_largest(C[a:b]) for a, b in pairwise(model.joint_start)])
-    order = np.argsort(-np.nan_to_num(worst, nan=np.inf))
-    still_open = [k for k in order[:10] if not worst[k] <= TOLERANCE]
+    still_open = [k for k in np.argsort(-worst)[:10] if worst[k] > TOLERANCE]
     names = ", ".join(model.body_names[b - 1] for b in held)
     return "\n".join(
         [

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.assembly.evaluate import place_bodies
 from dap3d_core.assembly.system import KINDS
-from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.machine import AS_COMPILED, Machine
 from dap3d_core.interface.writer import stride
 from dap3d_core.model import Group
 
@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 AHEAD = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
 
 
+@AS_COMPILED
 def find_offender(machine: Machine, t: float, y: Floats, t_stop: float) -> str:
     """Name what is not finite at or just after time t with the integrated state y; else ""."""
     for later in (t, t_stop, *(t + part * (1.0 + abs(t)) for part in AHEAD)):
@@ -32,6 +33,7 @@ def _at(machine: Machine, t: float, y: Floats) -> str:
             return f"the state of body {name}"
     s = machine.system
     place_bodies(y, s.body, s.metric)
+    s.F[:] = 0.0  # filled again one by one: what stands there may be of no finite number
     for q, (kind, group) in enumerate(machine.what):
         for k in range(group.count):
             if not _one_is_finite(machine, q, k, kind, group, t):

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from dap3d_core.assembly.evaluate import place_bodies
 from dap3d_core.formulations.machine import Machine
 from dap3d_core.linear.rank import DENSE_ROWS, Rank, dense_rank, sparse_rank
+from dap3d_core.simulation.initial import finite_rows
 
 Floats = NDArray[np.float64]
 
@@ -47,9 +48,13 @@ class Redundancy:
 
 
 def redundancy_of(machine: Machine, u: Floats, t: float = 0.0) -> Redundancy:
-    """Rank of the constraints of a model at a state u (13 n,)."""
+    """Rank of the constraints of a model at a state u (13 n,).
+
+    Raises:
+        AssemblyError: a row is not finite there.
+    """
     model = machine.model
-    rows = machine.rows(t, u)
+    rows = finite_rows(machine, t, u)
     if model.row_count <= DENSE_ROWS:
         rank = dense_rank(rows.dense())
     else:

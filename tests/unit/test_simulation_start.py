@@ -1,0 +1,342 @@
+"""How a run starts: positions and velocities corrected, constraints independent (spec 8)."""
+
+import numpy as np
+import pytest
+from support.mechanisms import (
+    bent_chain,
+    door,
+    planar_four_bar,
+    rough_four_bar,
+    torn,
+    two_motors,
+)
+from support.own_types import registry_of
+
+import dap3d_core as dap
+from dap3d_core.interface import Function, Joint, Vector2, number, vector2
+from dap3d_core.kernels import cross, dot, neg, row, scale, sqrt, where
+from dap3d_core.model.kinematics import split
+from dap3d_core.simulation import initial, redundancy
+from dap3d_core.simulation.initial import correct_initial, violation
+
+
+def corrected(scene, **options):
+    """A scene's machine and its corrected start."""
+    machine = dap.compile(scene).machine
+    return machine, correct_initial(machine, machine.model.u0, **options)
+
+
+@pytest.fixture
+def many_rows(monkeypatch):
+    """Every scene is treated as one of many rows."""
+    for module in (initial, redundancy):
+        monkeypatch.setattr(module, "DENSE_ROWS", 0)
+
+
+def turn_of(u, v, n):
+    """Angles (n,) between the poses of two states, rad."""
+    cosine = np.abs(np.sum(split(u, n)[1] * split(v, n)[1], axis=1))
+    return 2.0 * np.arccos(np.minimum(cosine, 1.0))
+
+
+# ------------------------------------------------------------------ positions
+
+
+def test_rough_four_bar_converges_quadratically(monkeypatch):
+    """max |C| before each pass is 1.2e-3, 1.6e-6, 1.3e-12 (spec 8, 14), to the digits printed."""
+    residuals = []
+    for tolerance in (1.0, 1e-4, 1e-10):
+        monkeypatch.setattr(initial, "TOLERANCE", tolerance)
+        found = corrected(rough_four_bar())[1]
+        residuals.append(found.residual[0])
+        assert found.passes == len(residuals) - 1
+        assert found.violation[0] == pytest.approx(residuals[0], rel=1e-12)
+    assert residuals == pytest.approx([1.2e-3, 1.6e-6, 1.3e-12], rel=0.05)
+
+
+def test_the_first_pass_is_the_least_change(monkeypatch):
+    """A pass moves by -pinv(D) C of the position rows: r in metres, rotations in rad, to the second
+    order of a rotation of 1e-3."""
+    monkeypatch.setattr(initial, "TOLERANCE", 1e-5)
+    machine, found = corrected(rough_four_bar())
+    assert found.passes == 1
+    u0, n = machine.model.u0, 3
+    rows, keep = machine.rows(0.0, u0), machine.model.position_row
+    change = -np.linalg.pinv(rows.dense()[keep]) @ rows.C[keep]
+    shift, turn = change.reshape(n, 6)[:, :3], change.reshape(n, 6)[:, 3:]
+    assert split(found.u, n)[0] - split(u0, n)[0] == pytest.approx(shift, abs=1e-15)
+    assert turn_of(u0, found.u, n) == pytest.approx(np.linalg.norm(turn, axis=1), abs=1e-7)
+    assert found.moved == pytest.approx(np.max(np.linalg.norm(shift, axis=1)), rel=1e-9)
+    assert found.turned == pytest.approx(np.max(np.linalg.norm(turn, axis=1)), rel=1e-3)
+
+
+def test_a_velocity_row_holds_nothing():
+    """The crank of the rough four-bar leaves the vertical by 0.08 degrees (spec 8): its driver does
+    not take part in the correction of positions."""
+    machine, found = corrected(rough_four_bar())
+    assert np.degrees(turn_of(machine.model.u0, found.u, 3)[0]) == pytest.approx(0.08, abs=0.005)
+
+
+@pytest.mark.parametrize("rows", ["few", "many"])
+def test_held_bodies_stay_where_they_are(rows, request):
+    """With ``hold`` the crank keeps its pose bit for bit, and the others are assembled to it."""
+    if rows == "many":
+        request.getfixturevalue("many_rows")
+    scene = rough_four_bar()
+    scene.simulation.hold = ("crank",)
+    result = dap.simulate(scene, t_end=0.0)
+    assert result.r[0, 0].tolist() == [0.0, 0.0, 1.0]
+    assert result.p[0, 0].tolist() == [1.0, 0.0, 0.0, 0.0]
+    assert result.ledger["position"].value < 1e-10
+    assert result.w[0, 0] == pytest.approx([-2 * np.pi, 0, 0], abs=1e-10)  # velocities are not held
+
+
+def test_holding_too_much_is_an_error_that_says_so():
+    """With all bodies held nothing can be assembled: the held ones are named."""
+    scene = rough_four_bar()
+    scene.simulation.hold = ("crank", "coupler", "follower")
+    with pytest.raises(dap.AssemblyError, match="held where they are: crank, coupler, follower"):
+        dap.simulate(scene, t_end=0.0)
+
+
+@pytest.mark.parametrize("angle", [0.3, 2.0, 3.0])
+def test_a_large_turn_is_made_in_limited_passes(angle):
+    """A wheel whose axis lies off by up to 3 rad is turned by at most 0.5 rad a pass until it fits:
+    it ends on the constraints, its axis along that of ground."""
+    scene = dap.Scene(name="wheel")
+    p = (np.cos(angle / 2), np.sin(angle / 2), 0.0, 0.0)
+    scene.add_body("wheel", mass=1.0, Jp=(1, 1, 1), r=(7.0, 0.0, 0.0), p=p)
+    scene.add_joint("rev", "axle", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
+    _, found = corrected(scene)
+    assert found.residual[0] <= 1e-10
+    limit = min(angle, np.pi - angle) / initial.MOST_TURN
+    assert max(limit, 2.0) <= found.passes < 15
+    assert found.turned == pytest.approx(min(angle, np.pi - angle), abs=1e-9)
+    assert found.moved == pytest.approx(7.0, abs=1e-9)
+
+
+def test_contradictory_joints_are_named_with_their_residuals():
+    """Two joints that want a body in places 2 m apart share the gap; the third is not accused."""
+    with pytest.raises(dap.AssemblyError) as caught:
+        dap.simulate(torn(), t_end=1.0)
+    words = str(caught.value)
+    assert "after 25 passes" in words
+    assert "  first: residual 1\n" in words
+    assert "  second: residual 1\n" in words
+    assert "content" not in words
+    assert isinstance(caught.value, dap.SimulationError)
+    assert caught.value.result is None
+
+
+class Rod(Joint):
+    """A distance by its root, which has no derivative where the points coincide."""
+
+    keyword, rows = "rod", 1
+    d: Vector2 = vector2()
+    length: float = number(default=0.0)
+
+    def C(d, length):
+        return sqrt(dot(d, d)) - length
+
+    def J(d, s_P_i, s_P_j):
+        u = scale(1.0 / sqrt(dot(d, d)), d)
+        return row(neg(u), cross(u, s_P_i)), row(u, cross(s_P_j, u))
+
+    def gamma(t):
+        return 0.0
+
+
+class Late(Function):
+    """A function that has no value before t = 0.1."""
+
+    keyword = "late"
+
+    def value(x):
+        f = where(x < 0.1, sqrt(-1.0 - x), x)
+        return f, f, 0.0, 0.0
+
+
+@pytest.mark.parametrize("correct", [True, False])
+def test_a_joint_without_finite_rows_is_named(correct):
+    """Neither a crash of the linear algebra nor a NaN: the joint, or the function behind it."""
+    scene = dap.Scene(name="point")
+    scene.add_body("a", mass=1.0, Jp=(1, 1, 1))
+    scene.add_joint("rod", "short", P_i="a.O", P_j="ground.O")
+    compiled = dap.compile(scene, registry=registry_of(Rod))
+    with pytest.raises(dap.SimulationError, match=r"joint short \(type rod\) is not finite"):
+        dap.simulate(compiled, t_end=1.0, correct=correct)
+    scene = two_motors()
+    scene.functions["fast_angle"].type = "late"
+    scene.functions["fast_angle"].fields.clear()
+    compiled = dap.compile(scene, registry=registry_of(Late))
+    with pytest.raises(dap.SimulationError, match=r"function fast_angle .* is not finite"):
+        dap.simulate(compiled, t_end=1.0, correct=correct)
+
+
+# ------------------------------------------------------------------ velocities
+
+
+def test_corrected_velocities_are_the_least_change():
+    """v - pinv(D) (D v - nu) by numpy, and v = D v - nu = 0 after it; from rest and from others."""
+    scene = dap.load("fourbar3")
+    for seed in (None, 1, 2):
+        machine = dap.compile(scene).machine
+        u = machine.model.u0.copy()
+        if seed is not None:
+            u[21:] = np.random.default_rng(seed).normal(size=18)
+        found = correct_initial(machine, u)
+        rows = machine.rows(0.0, found.u)
+        D, v = rows.dense(), u[21:]
+        wanted = v - np.linalg.pinv(D) @ (D @ v - rows.nu)
+        assert found.u[21:] == pytest.approx(wanted, abs=1e-12)
+        assert found.residual[1] == pytest.approx(np.max(np.abs(D @ found.u[21:] - rows.nu)))
+        assert found.residual[1] < 1e-12
+
+
+def test_corrected_velocities_of_the_four_bar_are_those_of_the_specification():
+    """Minimum-norm velocities from rest: 11 digits of an independent simulator (spec 14)."""
+    _, found = corrected(dap.load("fourbar3"))
+    _, _, v, w = split(found.u, 3)
+    assert v[0] == pytest.approx([0, 2 * np.pi, 0], abs=1e-10)
+    assert v[1] == pytest.approx([-6.27981570662, 12.56300101380, 0.00897437616], abs=2e-11)
+    assert w[1] == pytest.approx([0.00257327185, -1.53315922740, 1.22499197617], abs=2e-11)
+    assert w[2] == pytest.approx([-1.79423397512, -1.79423397512, 0.0], abs=2e-11)
+
+
+def test_a_good_start_is_left_alone():
+    """pen2 is assembled: its state is used bit for bit, and nothing is noted."""
+    scene = dap.load("pen2")
+    machine, found = corrected(scene)
+    assert np.array_equal(found.u, machine.model.u0)
+    assert (found.passes, found.moved, found.turned) == (0, 0.0, 0.0)
+    result = dap.simulate(scene, t_end=0.0, correct=True)
+    assert not any("corrected" in note for note in result.notes)
+
+
+def test_what_was_corrected_is_noted():
+    """Passes, residuals before and after, and how far bodies went (promise: no silent change)."""
+    result = dap.simulate(rough_four_bar(), t_end=0.0)
+    (positions,) = [n for n in result.notes if "initial positions corrected" in n]
+    (velocities,) = [n for n in result.notes if "initial velocities corrected" in n]
+    assert "in 2 passes: |C| 0.0012 -> 1.3e-12" in positions
+    assert "|D v - nu| 6.3 -> " in velocities
+
+
+def test_without_correction_the_state_is_left_and_noted():
+    """correct=False: the run starts from the state as given, and says how far off it is."""
+    scene = rough_four_bar()
+    result = dap.simulate(scene, t_end=0.0, correct=False)
+    assert np.array_equal(result.u[0], dap.compile(scene).model.u0)
+    (note,) = [n for n in result.notes if "not corrected" in n]
+    assert "position 0.0012, velocity 6.3" in note
+
+
+def test_a_scene_without_joints_needs_no_correction():
+    """Nothing is evaluated: no violation, no passes."""
+    machine, found = corrected(dap.load("bodies2"))
+    assert violation(machine, machine.model.u0) == (0.0, 0.0)
+    assert np.array_equal(found.u, machine.model.u0)
+
+
+# ------------------------------------------------------------------ many rows
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [rough_four_bar(), bent_chain(5), door(0.02), planar_four_bar(0.02)],
+    ids=lambda scene: scene.name,
+)
+def test_the_correction_of_many_rows_is_that_of_few(scene, monkeypatch):
+    """The block factorisation finds the least change that numpy finds, redundant rows or not: both
+    end within 1e-10 of the constraints, after passes that agree to rounding times the condition."""
+    _, few = corrected(scene)
+    for module in (initial, redundancy):
+        monkeypatch.setattr(module, "DENSE_ROWS", 0)
+    machine, many = corrected(scene)
+    metric = machine.system.metric.copy()
+    assert many.passes == few.passes > 0
+    assert many.u == pytest.approx(few.u, abs=1e-10)
+    assert max(many.residual) < 1e-9
+    dap.compile(scene).redundancy()
+    assert np.array_equal(machine.system.metric, metric)  # masses are those of the model again
+
+
+def test_contradictory_joints_of_many_rows_are_named(many_rows):
+    """The row left out as dependent keeps its gap, and is named; no NaN comes of it."""
+    with pytest.raises(dap.AssemblyError, match=r"second: residual 2\n"):
+        dap.simulate(torn(), t_end=1.0)
+
+
+# ------------------------------------------------------------------ redundancy
+
+REDUNDANT = [
+    (door(), 15, 5, 2, ("lower", "upper")),
+    (planar_four_bar(), 20, 3, 1, ("J1", "J2", "J3", "J4")),
+    (two_motors(), 7, 1, 0, ("slow", "fast")),
+    (dap.load("fourbar3"), 17, 0, 1, ()),
+    (dap.load("pen1"), 3, 0, 3, ()),
+    (dap.load("bodies2"), 0, 0, 12, ()),
+]
+
+
+@pytest.mark.parametrize(
+    ("scene", "rows", "redundant", "dof", "joints"), REDUNDANT, ids=lambda s: getattr(s, "name", "")
+)
+def test_redundancy_is_counted_and_the_joints_named(scene, rows, redundant, dof, joints):
+    """Exact counts at the state as given: rows, rank, degrees of freedom, joints that share one."""
+    found = dap.compile(scene).redundancy()
+    assert (found.rank.rows, found.rank.redundant, found.rank.dof) == (rows, redundant, dof)
+    assert found.joints == joints
+    if redundant:
+        assert f"{redundant} of {rows} constraint rows are redundant" in found.describe()
+    else:
+        assert "all independent" in found.describe()
+
+
+@pytest.mark.parametrize(
+    ("scene", "rows", "redundant", "dof", "joints"), REDUNDANT, ids=lambda s: getattr(s, "name", "")
+)
+def test_many_rows_count_the_same(scene, rows, redundant, dof, joints, many_rows):
+    """By pivots: the same counts, and joints among those that singular values name."""
+    found = dap.compile(scene).redundancy()
+    assert (found.rank.rows, found.rank.redundant, found.rank.dof) == (rows, redundant, dof)
+    assert set(found.joints) <= set(joints)
+    assert bool(found.joints) == bool(redundant)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.02])
+@pytest.mark.parametrize("rows", ["few", "many"])
+def test_a_redundant_scene_is_refused_with_the_joints(shift, rows, request):
+    """The standard method cannot solve it; nothing is computed, also where the start had to be
+    corrected first."""
+    if rows == "many":
+        request.getfixturevalue("many_rows")
+    with pytest.raises(dap.RedundantError, match=r"5 of 15 .* upper.*independent rows") as caught:
+        dap.simulate(door(shift), t_end=1.0)
+    assert isinstance(caught.value, dap.SimulationError)
+    assert caught.value.result is None
+    with pytest.raises(dap.RedundantError, match=r"3 of 20 .* J4.*independent rows"):
+        dap.simulate(planar_four_bar(shift), t_end=1.0)
+
+
+def test_drivers_that_contradict_each_other_are_told():
+    """Unit combination of the two rows: the rates 1 and 2 disagree by 1 / sqrt(2); where they are
+    equal nothing is said."""
+    found = dap.compile(two_motors()).redundancy()
+    assert found.contradiction == pytest.approx(1 / np.sqrt(2), rel=1e-12)
+    assert "contradict each other" in found.describe()
+    scene = two_motors()
+    scene.functions["fast_angle"].fields["coeff"] = (0.5, 1.0, 0.0)
+    assert dap.compile(scene).redundancy().contradiction < 1e-14
+
+
+def test_redundancy_depends_on_the_state():
+    """A state may be given: with the top of the parallelogram lifted by 1 m the four axes are still
+    parallel, and three rows dependent; turned bodies make them independent."""
+    compiled = dap.compile(planar_four_bar())
+    u = compiled.model.u0.copy()
+    u[8] += 1.0
+    assert compiled.redundancy(u).rank.redundant == 3
+    u[3:7] = 0.6, 0.0, 0.8, 0.0
+    assert compiled.redundancy(u).rank.redundant < 3
+    assert compiled.redundancy().rank.redundant == 3
