@@ -197,8 +197,8 @@ def test_a_type_may_refuse_some_instances():
 
 
 def test_a_kernel_may_be_undefined_for_some_numbers():
-    """sqrt(t - 1) and 1 / (r < 0) have a value for one in two of the random inputs: that is enough,
-    for the run names what is not finite where it happens."""
+    """What has a value for one in two of the random inputs is good enough: the run names what is
+    not finite where it happens."""
     assert "energy" in examine(force(energy=lambda t: sqrt(t - 1.0))).outputs
     assert "C" in examine(joint(C=lambda r_i: where(r_i[0] < 0.0, math.nan, 1.0))).outputs
 

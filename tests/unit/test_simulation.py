@@ -1,5 +1,7 @@
 """A run: settings, reporting times, progress, interruption, failure, and what is left behind."""
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 from scipy.integrate import simpson
@@ -9,11 +11,11 @@ from support.own_types import registry_of
 import dap3d_core as dap
 from dap3d_core.interface import Body, Force, Function, body, number
 from dap3d_core.kernels import scale, sqrt, where
-from dap3d_core.simulation import report_times, simulate
+from dap3d_core.simulation import report_times
 
 ZERO = (0.0, 0.0, 0.0)
-#: The module, whose name in its package is also that of its function.
-MODULE = __import__("sys").modules[simulate.__module__]
+#: The module; its name in its package is taken by its function.
+MODULE = import_module("dap3d_core.simulation.simulate")
 
 
 def mass_point(**fields):
