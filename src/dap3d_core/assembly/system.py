@@ -26,8 +26,10 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: The order of the group loops in the list: all loops of one kind stand together.
-KINDS = ("value", "wrench", "energy", "acceleration", "position")
-VALUE, WRENCH, ENERGY, ACCELERATION, POSITION = range(len(KINDS))
+KINDS = (
+    "value", "wrench", "energy", "acceleration", "position", "friction", "angle", "switch"
+)  # fmt: skip
+VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, SWITCH = range(len(KINDS))
 
 
 class System(NamedTuple):
@@ -35,7 +37,7 @@ class System(NamedTuple):
 
     body: Floats  # (n+1, BODY_WIDTH) state and constants of each body (kernels/gather.py)
     metric: Floats  # (n+1, 16): 1/sqrt(m); U = L^-T by rows, upper triangle; B = A U by rows
-    F: Floats  # (functions+1, 4) functions of time
+    F: Floats  # (functions+1, 5) functions of time, at t and (the last column) at 0
     par: Floats  # numbers of all instances
     force: Floats  # (6 (n+1),) force and moment on each body; then the acceleration
     gamma: Floats  # (rows,)

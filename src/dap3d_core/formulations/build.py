@@ -27,12 +27,16 @@ def build_loops(
     for kind in KINDS:
         if kind not in kinds:
             continue
-        for group in (*model.functions, *model.forces, *model.joints):
+        for group in _groups_for(model, kind):
             loop = write(group.examined, kind)
             if loop is not None:
                 loops.append(_compiled(loop, group, announce))
                 what.append((kind, group))
     return loop_list(loops), what
+
+
+def _groups_for(model: Model, kind: str) -> tuple[Group, ...]:
+    return model.friction if kind == "friction" else (*model.functions, *model.forces, *model.joints)
 
 
 def _compiled(loop: Loop, group: Group, announce: Callable[[str], None] | None) -> Any:
@@ -67,7 +71,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
     return System(
         body=body,
         metric=metric,
-        F=np.zeros((model.function_count + 1, 4)),
+        F=np.zeros((model.function_count + 1, 5)),
         par=par,
         force=np.zeros(6 * (n + 1)),
         gamma=np.zeros(plan.row_size),
@@ -118,9 +122,10 @@ def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[An
         if id(group) not in at:
             table = _integers_of(group, plan)
             at[id(group)] = (i0, p0)
+            numbers = _numbers_of(group, p0)
             idx.append(table.ravel())
-            par.append(group.numbers.ravel())
-            i0, p0 = i0 + table.size, p0 + group.numbers.size
+            par.append(numbers)
+            i0, p0 = i0 + table.size, p0 + numbers.size
         rows.append((*at[id(group)], group.count))
     kinds = [kind for kind, _ in what]
     starts = [sum(KINDS.index(k) < n for k in kinds) for n in range(len(KINDS) + 1)]
@@ -132,13 +137,24 @@ def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[An
     )
 
 
+def _numbers_of(group: Group, p0: int) -> Floats:
+    """The numbers of a group, its tables behind them, each table's place put in."""
+    numbers = group.numbers.copy()
+    end = p0 + numbers.size
+    for k, offset, rows in group.tables:
+        numbers[k, offset] = end
+        end += rows.size
+    return np.concatenate([numbers.ravel(), *(rows.ravel() for _, _, rows in group.tables)])
+
+
 def _integers_of(group: Group, plan: Plan) -> Integers:
     """The rows of ``idx`` of a group, as interface/writer.py lays them out."""
     kind = group.examined.type.kind
     parts = [group.bodies, group.functions]
     if kind == "joint":
-        parts.append(plan.joint_row[group.members][:, None])
-        parts.append(np.array([plan.joint_block[m] for m in group.members], dtype=np.int64))
+        joints = group.members if group.joints is None else group.joints
+        parts.append(plan.joint_row[joints][:, None])
+        parts.append(np.array([plan.joint_block[m] for m in joints], dtype=np.int64))
     elif kind == "function":
         parts.append(1 + group.members[:, None])
     table = np.ascontiguousarray(np.hstack(parts), dtype=np.int64)

@@ -76,7 +76,15 @@ class Machine:
         self.plan: Plan = make_plan(model.body_count, model.joint_slots, model.joint_rows.tolist())
         self.loops, self.what = build_loops(model, LOOPS[method], announce)
         self.system: System = build_system(model, self.plan, self.what)
+        self.start_functions()
         self.report_size = 6 * model.body_count + model.row_count + 4
+
+    @AS_COMPILED
+    def start_functions(self, t: float = 0.0) -> None:
+        """Keep each function's value at the start, for drivers that count from it."""
+        s = self.system
+        self._call(VALUE, t, s.force, s.force, s.force)
+        s.F[:, 4] = s.F[:, 0]
 
     @cached_property
     def functions(self) -> Any:

@@ -15,18 +15,18 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
+from dap3d_core.interface.fields import slot_of, specs_of
+from dap3d_core.interface.layout import Layout, body_slots, layout_of, size
 from dap3d_core.interface.namespace import (
     VELOCITY_KERNELS,
-    Layout,
     Quantity,
-    body_slots,
-    layout_of,
+    friction_names,
     namespace,
     parameters,
-    size,
 )
 from dap3d_core.interface.outputs import ShapeError, checked_shape, entries, value_at
+from dap3d_core.interface.poses import BodyPose, pose
+from dap3d_core.interface.samples import numbers, random_field, random_pose, random_quantity
 from dap3d_core.interface.types import Function, Joint, TypeBase
 
 #: How often a type may refuse random values, or have none for them, before it is held to do so
@@ -39,27 +39,6 @@ class PluginError(Exception):
 
 
 @attrs.frozen
-class BodyPose:
-    """A body as ``prepare`` sees it: position r, Euler parameters p, rotation matrix A (rows)."""
-
-    r: tuple[float, ...]
-    p: tuple[float, ...]
-    A: tuple[tuple[float, ...], ...]
-
-    def to_local(self, s: Any) -> tuple[float, ...]:
-        """Components on the body of a global 3-vector."""
-        return tuple(sum(self.A[r][c] * s[r] for r in range(3)) for c in range(3))
-
-    def to_global(self, s: Any) -> tuple[float, ...]:
-        """Global components of a 3-vector given on the body."""
-        return tuple(sum(self.A[r][c] * s[c] for c in range(3)) for r in range(3))
-
-    def place(self, s: Any) -> tuple[float, ...]:
-        """Global position of a point given by its coordinates on the body."""
-        return tuple(a + b for a, b in zip(self.r, self.to_global(s), strict=True))
-
-
-@attrs.frozen
 class Examined:
     """A type that passed, with what the loops are written from.
 
@@ -68,23 +47,30 @@ class Examined:
         layout: how instances are stored.
         names: every name its kernels may use.
         outputs: kernel -> expressions of its numbers in the order of their shape.
+        kernels: its pure functions.
+        variants: types that stand in for it: (values of fields, the type).
+        given: what completes it, for titles: the types of its functions of an argument.
     """
 
     type: type[TypeBase]
     layout: Layout
     names: dict[str, Quantity]
     outputs: dict[str, tuple[str, ...]]
+    kernels: dict[str, Callable[..., Any]]
+    variants: tuple[tuple[Mapping[str, Any], "Examined"], ...] = ()
+    given: str = ""
+
+    def chosen(self, values: Mapping[str, Any]) -> "Examined":
+        """The variant for the values of an instance's fields; itself where none fits."""
+        for conditions, examined in self.variants:
+            if all(_holds(self.type, n, wanted, values[n]) for n, wanted in conditions.items()):
+                return examined
+        return self
 
 
-def pose(r: Any, p: Any) -> BodyPose:
-    """A body's pose from its position and (unit) Euler parameters."""
-    e0, e1, e2, e3 = (float(x) for x in p)
-    matrix = (
-        (1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)),
-        (2 * (e1 * e2 + e0 * e3), 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 - e0 * e1)),
-        (2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), 1 - 2 * (e1 * e1 + e2 * e2)),
-    )
-    return BodyPose(tuple(float(x) for x in r), (e0, e1, e2, e3), matrix)
+def _holds(type_: type[TypeBase], name: str, wanted: Any, value: Any) -> bool:
+    is_function = specs_of(type_)[name].kind == "function"
+    return (value is not None) == wanted if is_function else bool(value == wanted)
 
 
 def where_is(type_: type) -> str:
@@ -102,31 +88,37 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
     Raises:
         PluginError: with file, type, function and remedy.
     """
-    _check_class(type_)
+    own_variants = type_.variants if "variants" in vars(type_) else ()
+    variants = tuple((conditions, examine(class_, seed)) for conditions, class_ in own_variants)
+    _check_class(type_, is_abstract=bool(variants))
+    for conditions, variant in variants:
+        _check_conditions(type_, conditions, variant.type)
     rng = random.Random(seed)
-    constants = _random_constants(type_, rng)
-    names = namespace(type_, constants)
+    layout = layout_of(type_, _random_constants(type_, rng))
+    names = namespace(type_, layout)
     outputs = {}
     for kernel_name, kernel in type_.kernels().items():
-        asked = parameters(kernel)
-        _check_names(type_, kernel_name, asked, names)
-        shapes = [names[n].shape for n in asked]
-        outputs[kernel_name] = _output(type_, kernel_name, kernel, shapes, rng)
-    return Examined(type_, layout_of(type_, constants), names, outputs)
+        asked, offered = parameters(kernel), names
+        if kernel_name == "friction" and issubclass(type_, Joint):
+            offered = friction_names(type_.rows) | names
+        _check_names(type_, kernel_name, asked, offered)
+        quantities = [offered[n] for n in asked]
+        outputs[kernel_name] = _output(type_, kernel_name, kernel, quantities, rng)
+    return Examined(type_, layout, names, outputs, type_.kernels(), variants)
 
 
 def _output(
     type_: type[TypeBase],
     kernel_name: str,
     kernel: Callable[..., Any],
-    shapes: Sequence[tuple[int, ...]],
+    quantities: Sequence[Quantity],
     rng: random.Random,
 ) -> tuple[str, ...]:
     """Where the numbers of a kernel stand; it may be undefined for some random inputs, not all."""
     who = f"{where_is(type_)}.{kernel_name}"
     for _ in range(ATTEMPTS):
         try:
-            value = kernel(*(_random(shape, rng) for shape in shapes))
+            value = kernel(*(random_quantity(q, rng) for q in quantities))
             found = entries(value, *_expected(type_, kernel_name))
         except ShapeError as error:
             raise PluginError(f"{who}: {error}") from None
@@ -145,10 +137,12 @@ def _output(
 
 def _random_constants(type_: type[TypeBase], rng: random.Random) -> dict[str, Any]:
     """What ``prepare`` returns for some random instance; it may refuse many, but not all."""
+    conditions = next((dict(c) for c, class_ in type_.variants if class_ is type_), {})
     for _ in range(ATTEMPTS):
-        bodies = {s: _random_pose(rng) for s in body_slots(type_)}
-        instance = type_(**{n: _random_field(spec, rng) for n, spec in specs_of(type_).items()})
-        set_ends(instance, lambda: _numbers(rng, 3))
+        bodies = {s: random_pose(rng) for s in body_slots(type_)}
+        fields = {n: random_field(spec, rng) for n, spec in specs_of(type_).items()}
+        instance = type_(**(fields | conditions))
+        set_ends(instance, lambda: numbers(rng, 3))
         try:
             return prepared(instance, bodies)
         except ValueError as error:
@@ -179,6 +173,9 @@ def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
         raise PluginError(
             f"{where_is(type_)}.prepare should return a dict; it returned {constants!r}"
         )
+    wanted = {n for n, s in specs_of(type_).items() if s.kind == "table" and not s.given}
+    if missing := sorted(wanted - set(constants)):
+        raise PluginError(f"{where_is(type_)}.prepare returns no {', '.join(missing)}")
     return {name: _constant(type_, name, value) for name, value in constants.items()}
 
 
@@ -221,20 +218,36 @@ def _is_finite(value: Any) -> bool:
     return all(map(_is_finite, value)) if isinstance(value, tuple) else math.isfinite(value)
 
 
-def _check_class(type_: type[TypeBase]) -> None:
+def _check_conditions(type_: type[TypeBase], conditions: Mapping[str, Any], variant: type) -> None:
+    """What a variant asks of fields: a word of a choice, or whether a function is given."""
+    specs = specs_of(type_)
+    for name, wanted in conditions.items():
+        spec = specs.get(name)
+        allowed = spec.choices if spec is not None and spec.kind == "choice" else (True, False)
+        if spec is None or spec.kind not in ("choice", "function") or wanted not in allowed:
+            raise PluginError(
+                f"{where_is(variant)} is the variant for {name} = {wanted!r}, "
+                f"which no choice or function of {type_.__name__} can be"
+            )
+
+
+def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     who, kind = where_is(type_), type_.kind
     if not type_.keyword:
         example = f'keyword = "{type_.__name__.lower()}"'
         raise PluginError(f"{who} has no keyword; add e.g. {example}")
     needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[kind]
-    if issubclass(type_, Joint):
+    by_joint = any(spec.kind == "joint" for spec in specs_of(type_).values())
+    if (is_abstract and not type_.kernels()) or by_joint:
+        needed = []
+    elif issubclass(type_, Joint):
         rows, mask = type_.rows, type_.holonomic
         if not isinstance(rows, int) or rows < 1:
             raise PluginError(f"{who} declares rows = {rows!r}; a joint has one row or more")
         if not isinstance(mask, bool) and len(mask) != rows:
             raise PluginError(f"{who}.holonomic needs one truth value for each of its {rows} rows")
         needed += ["C"] if type_.position_rows() else []
-    if kind != "function" and not body_slots(type_):
+    if kind != "function" and not by_joint and not body_slots(type_):
         raise PluginError(f"{who} acts on no body; declare a field such as P_i: Point = point()")
     if sum(spec.kind == "vector2" for spec in specs_of(type_).values()) > 1:
         raise PluginError(
@@ -275,7 +288,7 @@ def _check_names(
 
 def _expected(type_: type[TypeBase], kernel: str) -> tuple[tuple[int, ...], str]:
     slots = len(body_slots(type_))
-    if issubclass(type_, Joint):
+    if issubclass(type_, Joint) and kernel not in ("friction", "switch"):
         if kernel == "C":
             n = len(type_.position_rows())
             return (n,), f"{n} numbers, one for each row of the position level"
@@ -284,50 +297,9 @@ def _expected(type_: type[TypeBase], kernel: str) -> tuple[tuple[int, ...], str]
         return (type_.rows,), f"{type_.rows} numbers, one for each row"
     if issubclass(type_, Function):
         return (4,), "(f, f', f'', f''')"
-    if kernel == "wrench":
+    if kernel in ("wrench", "friction"):
         return (slots, 2, 3), f"(force, moment) for each of {slots} bodies"
     return (), "one number"
-
-
-def _numbers(rng: random.Random, n: int) -> tuple[float, ...]:
-    return tuple(rng.uniform(0.5, 1.5) * rng.choice((-1.0, 1.0)) for _ in range(n))
-
-
-def _unit(values: tuple[float, ...]) -> tuple[float, ...]:
-    length = math.sqrt(sum(x * x for x in values))
-    return tuple(x / length for x in values)
-
-
-def _random_pose(rng: random.Random) -> BodyPose:
-    return pose(_numbers(rng, 3), _unit(_numbers(rng, 4)))
-
-
-def _random(shape: tuple[int, ...], rng: random.Random) -> Any:
-    if shape == ():
-        return rng.uniform(0.5, 1.5)
-    if shape == (3, 3):
-        return _random_pose(rng).A
-    if shape == (4,):
-        return _unit(_numbers(rng, 4))
-    if len(shape) > 1:
-        return tuple(_random(shape[1:], rng) for _ in range(shape[0]))
-    return _numbers(rng, shape[0])
-
-
-def _random_field(spec: FieldSpec, rng: random.Random) -> Any:
-    if spec.kind in ("point", "vec3", "vector2"):
-        return _numbers(rng, 3)
-    if spec.kind == "vector":
-        return _unit(_numbers(rng, 3))
-    if spec.kind == "matrix":
-        return _random_pose(rng).A
-    if spec.kind == "number":
-        low = 0.5 if spec.minimum is None else spec.minimum + 0.5
-        value = rng.uniform(low, low + 1.0)
-        return value if spec.maximum is None else min(value, spec.maximum)
-    if spec.kind == "choice":
-        return spec.choices[0]
-    return None if spec.kind == "function" else "body"
 
 
 __all__ = [

@@ -5,7 +5,7 @@ i, j and k, names the body slot it belongs to. The maker says what the scene may
 ``namespace.py`` says which names it offers.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NewType
 
 import attrs
@@ -24,13 +24,20 @@ class FieldSpec:
     """What a field is, for validation, documentation and the writing of loops.
 
     Attributes:
-        kind: body, point, vector, vector2, number, vec3, matrix, function or choice.
+        kind: body, point, vector, vector2, number, vec3, matrix, table, function, choice, joint or
+            angle.
         default: value when the scene gives none; REQUIRED when it must.
         unit: SI unit of a number, "" for none.
         doc: what it means, one short sentence.
         positive, minimum, maximum: what a number must satisfy beyond being finite.
-        choices: allowed words of a choice.
+        choices: allowed words of a choice (or False and True).
+        aliases: other words for some of them.
         unit_length: whether a vector is normalised (with a warning where its length was not 1).
+        ground: whether a vector must be fixed in ground.
+        argument: what a function is a function of; "" for time.
+        columns: numbers in a row of a table.
+        given: whether a table is given in the scene; False: ``prepare`` finds it.
+        axes: the fields an angle is measured between: two vectors, and the axis.
     """
 
     kind: str
@@ -40,8 +47,14 @@ class FieldSpec:
     positive: bool = False
     minimum: float | None = None
     maximum: float | None = None
-    choices: tuple[str, ...] = ()
+    choices: tuple[Any, ...] = ()
+    aliases: Mapping[str, str] = attrs.field(factory=dict)
     unit_length: bool = False
+    ground: bool = False
+    argument: str = ""
+    columns: int = 1
+    given: bool = True
+    axes: tuple[str, str, str] = ("", "", "")
 
     @property
     def required(self) -> bool:
@@ -63,12 +76,14 @@ def point(default: Any = REQUIRED, *, doc: str = "") -> Any:
     return _field(FieldSpec("point", default, unit="m", doc=doc))
 
 
-def vector(default: Any = REQUIRED, *, doc: str = "") -> Any:
+def vector(default: Any = REQUIRED, *, ground: bool = False, doc: str = "") -> Any:
     """A unit vector fixed in a body (type 1), by name; ``a_i`` is fixed in the body of slot i.
 
-    It is normalised, with a warning where its length was not 1.
+    It is normalised, with a warning where its length was not 1. A vector whose name ends in no slot
+    (``axis``) may be fixed in any body of the element. With ``ground`` it must be fixed in ground,
+    and makes no body slot.
     """
-    return _field(FieldSpec("vector", default, doc=doc, unit_length=True))
+    return _field(FieldSpec("vector", default, doc=doc, unit_length=True, ground=ground))
 
 
 def vector2(default: Any = REQUIRED, *, doc: str = "") -> Any:
@@ -100,14 +115,53 @@ def matrix(default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
     return _field(FieldSpec("matrix", default, unit, doc))
 
 
-def function(default: Any = None, *, doc: str = "") -> Any:
-    """A function of time, by name; absent, it is zero. Offers ``f``, ``f_dot``, ``f_ddot``."""
-    return _field(FieldSpec("function", default, doc=doc))
+def table(*, columns: int = 1, given: bool = True, unit: str = "", doc: str = "") -> Any:
+    """Numbers of any count, which kernels read by ``lookup``.
+
+    A table of one column is given in the scene as a list. With ``given=False`` it is not in the
+    scene: ``prepare`` returns it under the field's name, rows of ``columns`` numbers whose first
+    ones increase.
+    """
+    default = REQUIRED if given else None
+    return _field(FieldSpec("table", default, unit, doc, columns=columns, given=given))
 
 
-def choice(choices: Sequence[str], default: Any = REQUIRED, *, doc: str = "") -> Any:
-    """One of several words."""
-    return _field(FieldSpec("choice", default, doc=doc, choices=tuple(choices)))
+def function(default: Any = None, *, argument: str = "", doc: str = "") -> Any:
+    """A function by name; absent, it is zero.
+
+    Of time it offers its value and derivatives ``f``, ``f_dot``, ``f_ddot``, and ``f_0``, its value
+    at t = 0. With ``argument`` (what it is a function of, in words) kernels call ``f(x)``,
+    ``f_dot(x)``, ``f_ddot(x)``: value, first and second derivative for the argument; such kernels
+    stand in a variant of the type for ``function=True``.
+    """
+    return _field(FieldSpec("function", default, doc=doc, argument=argument))
+
+
+def choice(
+    choices: Sequence[Any],
+    default: Any = REQUIRED,
+    *,
+    aliases: Mapping[str, str] | None = None,
+    doc: str = "",
+) -> Any:
+    """One of several words, or of False and True; ``aliases`` are other words for some of them."""
+    spec = FieldSpec("choice", default, doc=doc, choices=tuple(choices), aliases=aliases or {})
+    return _field(spec)
+
+
+def joint(*, doc: str = "") -> Any:
+    """A joint by name, whose kernel ``friction`` the force acts by."""
+    return _field(FieldSpec("joint", doc=doc))
+
+
+def angle(first: str, second: str, about: str, *, doc: str = "") -> Any:
+    """The angle from one vector field to another about a third; no field of the scene.
+
+    Offers ``theta`` and ``theta_dot`` under its name: atan2(k . (a x b), a . b - (a . k) (b . k)),
+    unwound (turns are counted at accepted steps), and its rate k . (w_j - w_i).
+    """
+    spec = FieldSpec("angle", None, "rad", doc, given=False, axes=(first, second, about))
+    return _field(spec)
 
 
 def specs_of(type_: type) -> dict[str, FieldSpec]:

@@ -5,11 +5,16 @@
 | body slot i (``body_i``, point or vector on it) | ``r_i A_i p_i mass_i Jp_i``; ``v_i w_i`` |
 | point ``P_i`` | ``s_P_i`` (arm, global) ``r_P_i``; ``s_P_i_dot v_P_i`` |
 | vector ``a_i`` | ``a_i``; ``a_i_dot`` |
+| vector ``axis`` of no slot, on any body of the element | ``axis``; ``axis_dot`` |
 | vector2 ``d`` | ``d`` and its ends as points ``P_i``, ``P_j``; ``d_dot`` |
 | number, vec3, matrix | itself |
-| function ``function`` | ``f f_dot f_ddot``; of another name ``g``: ``g g_dot g_ddot`` |
+| function ``function`` of time | ``f f_dot f_ddot f_0``; of another name ``g``: ``g g_dot ...`` |
+| function of an argument | the same names, to be called: ``f(x)``, ``f_dot(x)``, ``f_ddot(x)`` |
+| table ``x`` | ``x``, for ``lookup(x, ...)`` |
+| angle ``theta`` | ``theta``; ``theta_dot`` |
 | what ``prepare`` returns | itself; a 3-tuple ``n_j``: a vector fixed in body j, with ``n_j_dot`` |
 | always | ``t`` |
+| a joint's ``friction`` | ``lam`` (its multipliers) ``mu v_tol radius`` |
 
 Names after a semicolon are of the velocity level: a position-level kernel may not ask for them.
 """
@@ -21,11 +26,15 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
+from dap3d_core.interface.layout import Layout, size
 from dap3d_core.interface.types import TypeBase
 
-SLOTS = ("i", "j", "k")
 #: Kernels that may name quantities of the velocity level; all others see positions and time only.
-VELOCITY_KERNELS = ("gamma", "wrench")
+VELOCITY_KERNELS = ("gamma", "wrench", "friction", "switch")
+#: What a force ``friction`` hands to the kernel ``friction`` of its joint.
+FRICTION_NUMBERS = ("mu", "v_tol", "radius")
+#: Suffixes of a function's value and derivatives.
+DERIVATIVES = ("", "_dot", "_ddot")
 
 
 @attrs.frozen
@@ -39,6 +48,8 @@ class Quantity:
         code: Python expression over the loop's variables and ``needs`` (prefixed by ``x_``).
         needs: names that must be computed before.
         doc: what it is, for ``describe``.
+        columns: of a table; 0 for all else.
+        derivative: of a function to be called, which derivative; -1 for all else.
     """
 
     name: str
@@ -47,84 +58,12 @@ class Quantity:
     code: str
     needs: tuple[str, ...] = ()
     doc: str = ""
+    columns: int = 0
+    derivative: int = -1
 
 
-@attrs.frozen
-class Layout:
-    """Where one instance's integers and numbers stand.
-
-    Attributes:
-        slots: body slots, in the order of the J blocks.
-        functions: function fields, in order; their rows of F follow the bodies in ``idx``.
-        numbers: name -> (offset in ``par``, shape) of what is stored for each instance.
-        par_width: numbers an instance takes.
-    """
-
-    slots: tuple[str, ...]
-    functions: tuple[str, ...]
-    numbers: dict[str, tuple[int, tuple[int, ...]]]
-    par_width: int
-
-
-def body_slots(type_: type[TypeBase]) -> tuple[str, ...]:
-    """The body slots of a type, in the order i, j, k."""
-    found = {"i"} if getattr(type_, "each_body", False) else set()
-    for name, spec in specs_of(type_).items():
-        if spec.kind == "vector2":
-            found |= {"i", "j"}
-        elif spec.kind in ("body", "point", "vector") and (slot := slot_of(name)):
-            found.add(slot)
-    return tuple(s for s in SLOTS if s in found)
-
-
-def size(shape: tuple[int, ...]) -> int:
-    """How many numbers a shape holds."""
-    n = 1
-    for extent in shape:
-        n *= extent
-    return n
-
-
-def shape_of(value: Any) -> tuple[int, ...]:
-    """Shape of a number or a nested tuple of numbers."""
-    if isinstance(value, (tuple, list)):
-        return (len(value), *shape_of(value[0])) if value else (0,)
-    return ()
-
-
-def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> Layout:
-    """How instances of a type are stored, given what ``prepare`` returned for one of them."""
-    numbers: dict[str, tuple[int, tuple[int, ...]]] = {}
-    width = 0
-
-    def keep(name: str, shape: tuple[int, ...]) -> None:
-        nonlocal width
-        numbers[name] = (width, shape)
-        width += size(shape)
-
-    functions = []
-    for name, spec in specs_of(type_).items():
-        if name in constants:
-            continue
-        if spec.kind == "vector2":
-            keep("P_i", (3,))
-            keep("P_j", (3,))
-        elif spec.kind in ("point", "vector", "vec3"):
-            keep(name, (3,))
-        elif spec.kind == "matrix":
-            keep(name, (3, 3))
-        elif spec.kind == "number":
-            keep(name, ())
-        elif spec.kind == "function":
-            functions.append(name)
-    for name, value in constants.items():
-        keep(name, shape_of(value))
-    return Layout(body_slots(type_), tuple(functions), numbers, width)
-
-
-def namespace(type_: type[TypeBase], constants: Mapping[str, Any]) -> dict[str, Quantity]:
-    """Every name that the kernels of a type may use."""
-    layout = layout_of(type_, constants)
+def namespace(type_: type[TypeBase], layout: Layout) -> dict[str, Quantity]:
+    """Every name that the kernels of a type may use, stored as the layout says."""
     names: dict[str, Quantity] = {}
 
     def offer(
@@ -134,8 +73,10 @@ def namespace(type_: type[TypeBase], constants: Mapping[str, Any]) -> dict[str, 
         needs: Iterable[str] = (),
         velocity: bool = False,
         doc: str = "",
+        columns: int = 0,
+        derivative: int = -1,
     ) -> None:
-        names[name] = Quantity(name, shape, velocity, code, tuple(needs), doc)
+        names[name] = Quantity(name, shape, velocity, code, tuple(needs), doc, columns, derivative)
 
     offer("t", (), "t", doc="time, s")
     if type_.kind == "function":
@@ -143,11 +84,21 @@ def namespace(type_: type[TypeBase], constants: Mapping[str, Any]) -> dict[str, 
     for s in layout.slots:
         _offer_body(offer, s)
     for name, spec in specs_of(type_).items():
-        if name not in constants:
+        if name not in layout.constants and name not in names:  # x is a function's argument
             _offer_field(offer, name, spec, layout)
-    for name, value in constants.items():
-        _offer_constant(offer, name, shape_of(value), layout)
+    for name in layout.constants:
+        _offer_constant(offer, name, layout)
     return names
+
+
+def friction_names(rows: int) -> dict[str, Quantity]:
+    """What the kernel ``friction`` of a joint may name besides; numbers stand behind its own."""
+    reaction = f"({''.join(f'-out2[row + {k}], ' for k in range(rows))})"
+    docs = ("friction coefficient", "velocity below which friction fades, m/s", "of the pin, m")
+    found = {"lam": Quantity("lam", (rows,), True, reaction, doc="its multipliers")}
+    for name, doc in zip(FRICTION_NUMBERS, docs, strict=True):
+        found[name] = Quantity(name, (), False, "", doc=doc)
+    return found
 
 
 def _offer_body(offer: Callable[..., None], s: str) -> None:
@@ -167,8 +118,10 @@ def _offer_body(offer: Callable[..., None], s: str) -> None:
 def _offer_field(offer: Callable[..., None], name: str, spec: FieldSpec, layout: Layout) -> None:
     if spec.kind == "point" and (slot := slot_of(name)):
         _offer_point(offer, name, slot, layout)
-    elif spec.kind == "vector" and (slot := slot_of(name)):
-        _offer_vector(offer, name, slot, layout)
+    elif spec.kind == "vector" and spec.ground:
+        offer(name, (3,), _stored(layout, name), doc="vector fixed in ground")
+    elif spec.kind == "vector":
+        _offer_vector(offer, name, slot_of(name) if name not in layout.others else name, layout)
     elif spec.kind == "vector2":
         for end, slot in (("P_i", "i"), ("P_j", "j")):
             _offer_point(offer, end, slot, layout)
@@ -176,14 +129,41 @@ def _offer_field(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
         offer(name, (3,), "sub(x_r_P_j, x_r_P_i)", ("r_P_i", "r_P_j"), doc=between)
         offer(f"{name}_dot", (3,), "sub(x_v_P_j, x_v_P_i)", ("v_P_i", "v_P_j"), True, rate)
     elif spec.kind in ("number", "vec3", "matrix"):
-        unit = f", {spec.unit}" if spec.unit else ""
-        offer(name, layout.numbers[name][1], _stored(layout, name), doc=f"{spec.doc or name}{unit}")
+        doc = f"{spec.doc or name}{f', {spec.unit}' if spec.unit else ''}"
+        offer(name, layout.numbers[name][1], _stored(layout, name), doc=doc)
     elif spec.kind == "function":
-        f = "f" if name == "function" else name
-        at = f"idx[b0 + {len(layout.slots) + layout.functions.index(name)}]"
-        for order, suffix in enumerate(("", "_dot", "_ddot")):
-            doc = f"function of time, derivative {order}"
-            offer(f"{f}{suffix}", (), f"F[{at}, {order}]", doc=doc)
+        _offer_function(offer, name, spec, layout)
+    elif spec.kind == "table":
+        offset, columns = layout.tables[name]
+        sample = f"({'0.0, ' * columns})"
+        code = f"(par, par[p1 + {offset}], par[p1 + {offset + 1}], {sample})"
+        offer(name, (4,), code, doc=f"{spec.doc or name}, by lookup", columns=columns)
+    elif spec.kind == "angle":
+        _offer_angle(offer, name, spec, layout)
+
+
+def _offer_function(offer: Callable[..., None], name: str, spec: FieldSpec, layout: Layout) -> None:
+    f = "f" if name == "function" else name
+    if spec.argument:
+        for order, suffix in enumerate(DERIVATIVES):
+            doc = f"function of {spec.argument}, derivative {order}; to be called"
+            offer(f"{f}{suffix}", (), "", doc=doc, derivative=order)
+        return
+    at = f"idx[b0 + {len(layout.slots) + layout.functions.index(name)}]"
+    for order, suffix in enumerate(DERIVATIVES):
+        offer(f"{f}{suffix}", (), f"F[{at}, {order}]", doc=f"function of time, derivative {order}")
+    offer(f"{f}_0", (), f"F[{at}, 4]", doc="its value at t = 0")
+
+
+def _offer_angle(offer: Callable[..., None], name: str, spec: FieldSpec, layout: Layout) -> None:
+    u, v, k = spec.axes
+    at, axes = f"par[p1 + {layout.angles[name]}]", f"x_{u}, x_{v}, x_{k}"
+    code = f"unwound(angle_about({axes}), {at})"
+    offer(name, (), code, (u, v, k), doc=f"angle from {u} to {v} about {k}, rad")
+    one, other = slot_of(u), slot_of(v)
+    rate = f"dot(x_{k}, sub(x_w_{other}, x_w_{one}))"
+    needs = (k, f"w_{one}", f"w_{other}")
+    offer(f"{name}_dot", (), rate, needs, True, f"rate of {name}, rad/s")
 
 
 def _offer_point(offer: Callable[..., None], name: str, s: str, layout: Layout) -> None:
@@ -195,16 +175,22 @@ def _offer_point(offer: Callable[..., None], name: str, s: str, layout: Layout) 
     offer(f"v_{name}", (3,), f"add(x_v_{s}, x_{rate})", (f"v_{s}", rate), True, speed)
 
 
-def _offer_vector(offer: Callable[..., None], name: str, s: str, layout: Layout) -> None:
-    fixed, rate = f"vector fixed in body {s}, global", f"rate of {name}, 1/s"
-    offer(name, (3,), f"rotate(x_A_{s}, {_stored(layout, name)})", (f"A_{s}",), doc=fixed)
-    offer(f"{name}_dot", (3,), f"cross(x_w_{s}, x_{name})", (f"w_{s}", name), True, rate)
+def _offer_vector(offer: Callable[..., None], name: str, s: str | None, layout: Layout) -> None:
+    """A vector fixed in the body of slot s, or in a body of its own where s is its own name."""
+    local = _stored(layout, name)
+    if s in layout.slots:
+        turned, turning, needs = f"x_A_{s}", f"x_w_{s}", (f"A_{s}", f"w_{s}")
+        fixed = f"vector fixed in body {s}, global"
+    else:
+        turned, turning, needs = f"matrix_at(body, b_{s}, A)", f"vector_at(body, b_{s}, W)", ()
+        fixed = "vector fixed in a body of the element, global"
+    offer(name, (3,), f"rotate({turned}, {local})", needs[:1], doc=fixed)
+    rate = f"cross({turning}, x_{name})"
+    offer(f"{name}_dot", (3,), rate, (*needs[1:], name), True, f"rate of {name}, 1/s")
 
 
-def _offer_constant(
-    offer: Callable[..., None], name: str, shape: tuple[int, ...], layout: Layout
-) -> None:
-    slot = slot_of(name)
+def _offer_constant(offer: Callable[..., None], name: str, layout: Layout) -> None:
+    slot, shape = slot_of(name), layout.numbers[name][1]
     if shape == (3,) and slot in layout.slots:
         _offer_vector(offer, name, slot, layout)
     else:

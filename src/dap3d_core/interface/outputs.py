@@ -7,7 +7,7 @@ that reaches it.
 
 from typing import Any
 
-from dap3d_core.interface.namespace import shape_of, size
+from dap3d_core.interface.layout import shape_of, size
 
 
 class ShapeError(ValueError):

@@ -20,11 +20,16 @@ class TypeBase:
     kind: ClassVar[str] = ""
     kernel_names: ClassVar[tuple[str, ...]] = ()
     keyword: ClassVar[str] = ""
+    #: Classes that stand in for this one where fields have certain values: (conditions, class).
+    variants: ClassVar[tuple[tuple[Mapping[str, Any], type["TypeBase"]], ...]] = ()
 
-    def __init_subclass__(cls, **options: Any) -> None:
-        super().__init_subclass__(**options)
+    def __init_subclass__(cls, **conditions: Any) -> None:
+        super().__init_subclass__()
         if "kernel_names" in vars(cls):  # Joint, Force, Function themselves
             return
+        if conditions:  # class NoSlip(Disk, slip="xyz"): a variant of the type that has the keyword
+            root = next(base for base in cls.__mro__ if "keyword" in vars(base))
+            root.variants = (*root.variants, (conditions, cls))
         for name in cls.kernel_names:
             function = vars(cls).get(name)
             if callable(function):
@@ -48,7 +53,17 @@ class Joint(TypeBase):
     * ``gamma``  right-hand side of the acceleration level, J v_dot = gamma;
     * ``nu``     right-hand side of the velocity level, J v = nu; zero where not defined.
 
-    ``prepare(self, bodies)`` may return constants found once on the poses as given.
+    It may define, besides:
+
+    * ``friction``  the wrench of its Coulomb friction on each body, as a force returns it; takes
+      ``lam`` (its multipliers), ``mu``, ``v_tol``, ``radius``; a force ``friction`` switches it on;
+    * ``switch``    a number that is positive as long as the element makes sense; the run ends where
+      it becomes negative, with ``switch_words``.
+
+    ``prepare(self, bodies)`` may return constants found once on the poses as given. A subclass that
+    names values of fields, ``class NoSlip(Disk, slip="xyz")``, is a variant of the type: it takes
+    its place, with its own rows and kernels, where the fields have these values (True for a
+    function: one is given).
 
     Attributes:
         keyword: the word that names the type in a scene.
@@ -57,7 +72,8 @@ class Joint(TypeBase):
     """
 
     kind = "joint"
-    kernel_names = ("C", "J", "gamma", "nu")
+    kernel_names = ("C", "J", "gamma", "nu", "friction", "switch")
+    switch_words: ClassVar[str] = ""
     rows: ClassVar[int] = 0
     holonomic: ClassVar[bool | tuple[bool, ...]] = True
 
@@ -81,7 +97,9 @@ class Force(TypeBase):
     """A force element: what acts on one, two or more bodies.
 
     Subclasses define ``wrench``, which returns for each body slot a pair (force, moment about the
-    mass centre) in global axes, and where there is one ``energy``, the potential in J.
+    mass centre) in global axes, and where there is one ``energy``, the potential in J. Variants and
+    ``switch`` are as for joints. A force with a ``joint`` field defines no ``wrench``: it switches
+    on the friction of that joint.
 
     Attributes:
         keyword: the word that names the type in a scene.
@@ -89,7 +107,8 @@ class Force(TypeBase):
     """
 
     kind = "force"
-    kernel_names = ("wrench", "energy")
+    kernel_names = ("wrench", "energy", "switch")
+    switch_words: ClassVar[str] = ""
     each_body: ClassVar[bool] = False
 
     def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:

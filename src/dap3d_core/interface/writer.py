@@ -1,8 +1,8 @@
 """From a type to its group loops: gather the named quantities, call the kernels, store numbers.
 
 An instance's integers stand in ``idx`` from ``b0``: the bodies of its slots, the rows of F of its
-functions, then for a joint the place of its first row in the row vectors and for each slot the
-place of its block in D; its numbers stand in ``par`` from ``p1``.
+functions, the bodies of its vectors of no slot, then for a joint the place of its first row in the
+row vectors and for each slot the place of its block in D; its numbers stand in ``par`` from ``p1``.
 """
 
 from collections.abc import Iterable
@@ -19,12 +19,15 @@ LOOP_KINDS = {
     "wrench": ("wrench",),
     "energy": ("energy",),
     "value": ("value",),
+    "friction": ("friction",),
+    "switch": ("switch",),
+    "angle": (),  # the angles of the type's fields, as they stand at an accepted step
 }
 
 
 def stride(examined: Examined) -> int:
     """Integers that an instance takes in ``idx``."""
-    n = len(examined.layout.slots) + len(examined.layout.functions)
+    n = examined.layout.integers
     if examined.type.kind == "joint":
         return n + 1 + len(examined.layout.slots)
     return n + 1 if examined.type.kind == "function" else n
@@ -32,27 +35,32 @@ def stride(examined: Examined) -> int:
 
 def write(examined: Examined, what: str) -> Loop | None:
     """The loop that computes ``what`` (a key of LOOP_KINDS); None where there is no such kernel."""
-    kernels = {n: k for n, k in examined.type.kernels().items() if n in LOOP_KINDS[what]}
-    if not kernels:
-        return None
+    kernels = {n: k for n, k in examined.kernels.items() if n in LOOP_KINDS[what]}
     layout = examined.layout
+    wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
+    wanted += layout.angles if what == "angle" else ()
+    if not kernels and not wanted:
+        return None
     lines = [f"b0 = i0 + q * {stride(examined)}", f"p1 = p0 + q * {layout.par_width}"]
     lines += [f"b_{s} = idx[b0 + {n}]" for n, s in enumerate(layout.slots)]
-    wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
-    lines += [f"x_{q.name} = {q.code}" for q in in_order(examined.names, wanted)]
+    first = len(layout.slots) + len(layout.functions)
+    lines += [f"b_{name} = idx[b0 + {first + n}]" for n, name in enumerate(layout.others)]
     if examined.type.kind == "joint":
-        lines.append(f"row = idx[b0 + {len(layout.slots) + len(layout.functions)}]")
+        lines.append(f"row = idx[b0 + {layout.integers}]")
+    lines += [f"x_{q.name} = {q.code}" for q in in_order(examined.names, wanted) if q.code]
+    if what == "angle":
+        lines += [f"par[p1 + {at}] = x_{name}" for name, at in layout.angles.items()]
     for name, kernel in kernels.items():
         arguments = ", ".join(f"x_{n}" for n in parameters(kernel))
         lines.append(f"out = kernel_{name}({arguments})")
         lines += _store(examined, name)
-    title = f"{examined.type.keyword}: {', '.join(kernels)}"
+    title = f"{examined.type.keyword}{examined.given}: {', '.join(kernels) or what}"
     return Loop(title, {f"kernel_{n}": k for n, k in kernels.items()}, lines)
 
 
 def _store(examined: Examined, kernel: str) -> Iterable[str]:
     paths, layout, type_ = examined.outputs[kernel], examined.layout, examined.type
-    first_block = len(layout.slots) + len(layout.functions) + 1
+    first_block = layout.integers + 1
     if kernel == "J":
         assert issubclass(type_, Joint)
         for n in range(len(layout.slots)):
@@ -66,12 +74,14 @@ def _store(examined: Examined, kernel: str) -> Iterable[str]:
     elif kernel in ("gamma", "nu"):
         for k, path in enumerate(paths):
             yield f"{'out2' if kernel == 'gamma' else 'out3'}[row + {k}] = {path}"
-    elif kernel == "wrench":
+    elif kernel in ("wrench", "friction"):
         for n, s in enumerate(layout.slots):
             for k in range(6):
                 yield f"out1[6 * b_{s} + {k}] += {paths[6 * n + k]}"
     elif kernel == "energy":
         yield f"out1[0] += {paths[0]}"
+    elif kernel == "switch":
+        yield f"out1[0] = min(out1[0], {paths[0]})"
     else:
         yield "row = idx[b0]"
         for k, path in enumerate(paths):

@@ -5,6 +5,7 @@ serve the core.
 """
 
 from dap3d_core.kernels.mathematics import atan2, cos, sin, sqrt, tanh, where
+from dap3d_core.kernels.tables import lookup
 from dap3d_core.kernels.vectors import (
     add,
     cross,
@@ -29,6 +30,7 @@ __all__ = [
     "dot",
     "eye",
     "hstack",
+    "lookup",
     "neg",
     "norm2",
     "normals",

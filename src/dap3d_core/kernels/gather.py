@@ -1,11 +1,13 @@
 """What a group loop reads an instance's quantities with: vectors, matrices from rows of arrays."""
 
 from dap3d_core.kernels.inline import inlined
-from dap3d_core.kernels.vectors import add, cross, rotate, sub
+from dap3d_core.kernels.mathematics import atan2
+from dap3d_core.kernels.vectors import add, cross, dot, rotate, sub
 
 #: Columns of the body array: position, rotation matrix by rows, velocity, angular velocity
 #: (global), Euler parameters, mass, inertia matrix in body axes by rows.
 R, A, V, W, P, MASS, JP, BODY_WIDTH = 0, 3, 12, 15, 18, 22, 23, 32
+TURN = 6.283185307179586
 
 __all__ = [
     "JP",
@@ -16,11 +18,14 @@ __all__ = [
     "V",
     "W",
     "add",
+    "angle_about",
     "cross",
+    "dot",
     "matrix_at",
     "matrix_in",
     "rotate",
     "sub",
+    "unwound",
     "vector_at",
     "vector_in",
 ]
@@ -48,3 +53,15 @@ def vector_in(array, k):
 def matrix_in(array, k):
     """The 3x3 matrix at k of a flat array, by rows."""
     return (vector_in(array, k), vector_in(array, k + 3), vector_in(array, k + 6))
+
+
+@inlined
+def angle_about(u, v, k):
+    """The angle from u to v about the unit vector k, in (-pi, pi]; spec 6."""
+    return atan2(dot(k, cross(u, v)), dot(u, v) - dot(u, k) * dot(v, k))
+
+
+@inlined
+def unwound(angle, last):
+    """The angle, whole turns added, that lies within half a turn of the last one."""
+    return angle + TURN * round((last - angle) / TURN)

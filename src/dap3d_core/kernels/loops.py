@@ -7,7 +7,7 @@ one list and is never recompiled for a new type:
     loop(t, body, F, idx, par, i0, p0, count, out1, out2, out3)
 
     body (n+1, BODY_WIDTH)  state and constants of each body, ground first (columns: gather.py)
-    F    (functions+1, 4)   f, f', f'', f''' of each function at t; row 0 is the absent function
+    F    (functions+1, 5)   f, f', f'', f''' of each function at t, f at 0; row 0 is the absent one
     idx, par                integers and numbers of all instances; this group's begin at i0 and p0
     out1, out2, out3        what the kernels return
 """
@@ -65,7 +65,8 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
         announce: called with the loop's name before it is compiled anew.
     """
     text = source_of(loop)
-    key = digest(text, *sources(*loop.kernels.values(), gather.vector_at, gather.matrix_at))
+    gathering = (gather.vector_at, gather.matrix_at, gather.unwound)
+    key = digest(text, *sources(*loop.kernels.values(), *gathering))
     if key in _built:
         return _built[key]
     folder = cache_folder()

@@ -1,5 +1,6 @@
 """Instances of one type, side by side: what one group loop runs over."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -7,9 +8,11 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.interface.binding import argument_functions, bind_friction, bind_functions
 from dap3d_core.interface.checks import BodyPose, Examined, prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.interface.namespace import shape_of, size
+from dap3d_core.interface.layout import shape_of, size
+from dap3d_core.interface.namespace import parameters
 from dap3d_core.interface.types import TypeBase
 from dap3d_core.scene import Instance
 
@@ -29,8 +32,11 @@ class Group:
         examined: the type, its layout and names.
         members: (m,) their places among the scene's elements of this kind.
         bodies: (m, slots) body indices, ground 0.
-        functions: (m, functions) rows of F, 0 for an absent function.
+        functions: (m, functions) rows of F, 0 for an absent function; then the bodies of vectors
+            of no slot.
         numbers: (m, par_width) their numbers, as the layout says.
+        tables: (instance, offset in its numbers, rows) of each table; the offset takes its place.
+        joints: (m,) of friction, the joints it acts in; None for all else.
     """
 
     examined: Examined
@@ -38,6 +44,8 @@ class Group:
     bodies: Integers
     functions: Integers
     numbers: Floats
+    tables: tuple[tuple[int, int, Floats], ...] = ()
+    joints: Integers | None = None
 
     @property
     def keyword(self) -> str:
@@ -50,72 +58,178 @@ class Group:
         return len(self.members)
 
 
-def make_groups(
-    instances: Sequence[Instance], poses: Mapping[int, BodyPose], body_count: int
-) -> tuple[Group, ...]:
-    """Sort instances by type, in the order in which types first appear.
+class Grouping:
+    """Makes groups of a scene's elements.
 
     Args:
-        instances: checked joints, forces or functions of a scene, in file order.
+        kind: joint, force or function.
         poses: pose of each body index, ground included, as given.
         body_count: number of bodies without ground, for elements that act on each.
+        functions: the scene's functions, for elements that take one of another argument than time.
 
-    Raises:
-        PrepareError: a type refuses the values of an instance.
+    Attributes:
+        notes: what the ``prepare`` of types warned about, with the element's name.
     """
-    by_type: dict[type[TypeBase], list[int]] = {}
-    for index, instance in enumerate(instances):
-        by_type.setdefault(instance.examined.type, []).append(index)
-    return tuple(
-        _group([instances[m] for m in members], members, poses, body_count)
-        for members in by_type.values()
-    )
 
+    def __init__(
+        self,
+        kind: str,
+        poses: Mapping[int, BodyPose],
+        body_count: int,
+        functions: Sequence[Instance] = (),
+    ) -> None:
+        self.kind, self.poses, self.body_count = kind, poses, body_count
+        self.functions = {f.name: f for f in functions}
+        self.notes: list[str] = []
 
-def _group(
-    instances: list[Instance], members: list[int], poses: Mapping[int, BodyPose], body_count: int
-) -> Group:
-    examined = instances[0].examined
-    on_each = bool(getattr(examined.type, "each_body", False))
-    if on_each and _prepares(examined.type):  # its constants may differ from body to body
-        on_each = False
-        members = [m for m in members for _ in range(body_count)]
-        instances = [
-            attrs.evolve(i, bodies=(b,)) for i in instances for b in range(1, body_count + 1)
-        ]
-    count = len(instances)
-    numbers = _numbers(examined, instances, members, poses)
-    bodies = np.array([i.bodies for i in instances], dtype=np.int64).reshape(count, -1)
-    functions = np.array([i.functions for i in instances], dtype=np.int64).reshape(count, -1)
-    places = np.array(members, dtype=np.int64)
-    if on_each:
-        bodies = np.tile(np.arange(1, body_count + 1), count)[:, None]
-        numbers = np.repeat(numbers, body_count, axis=0)
-        functions = np.repeat(functions, body_count, axis=0)
-        places = np.repeat(places, body_count)
-    return Group(examined, places, bodies, functions, numbers)
+    def groups(self, instances: Sequence[Instance], members: Sequence[int]) -> tuple[Group, ...]:
+        """Sort instances by type, in the order in which types first appear.
 
+        Args:
+            instances: checked elements, in file order.
+            members: their places among all elements of the kind.
 
-def _numbers(
-    examined: Examined, instances: list[Instance], members: list[int], poses: Mapping[int, BodyPose]
-) -> Floats:
-    """(m, par_width) numbers of all instances, from their fields and from ``prepare``."""
-    given, fields = [instance.values for instance in instances], specs_of(examined.type)
-    if _prepares(examined.type):
-        prepared_ones = [
-            _prepared(examined, fields, instance, member, poses)
-            for instance, member in zip(instances, members, strict=True)
-        ]
-        given = [values | found for values, found in zip(given, prepared_ones, strict=True)]
-    numbers = np.empty((len(instances), examined.layout.par_width))
-    for name, (offset, shape) in examined.layout.numbers.items():
-        column = [values.get(name) for values in given]
-        if None in column:
-            words = "is missing" if name in fields else "is not among what prepare returned"
-            raise PrepareError(members[column.index(None)], f"{name} {words}")
-        values = np.asarray(column, dtype=float).reshape(len(instances), -1)
-        numbers[:, offset : offset + size(shape)] = values
-    return numbers
+        Raises:
+            PrepareError: a type refuses the values of an instance.
+        """
+        by_type: dict[Any, list[int]] = {}
+        for place, instance in enumerate(instances):
+            given = [f.examined.type for f in self._given(instance)]
+            by_type.setdefault((instance.examined.type, *given), []).append(place)
+        return tuple(
+            self._group([instances[k] for k in places], [members[k] for k in places])
+            for places in by_type.values()
+        )
+
+    def friction(
+        self, forces: Sequence[tuple[int, Instance]], joints: Mapping[str, tuple[int, Instance]]
+    ) -> tuple[Group, ...]:
+        """Groups of the friction kernels of joints that forces switch on.
+
+        Args:
+            forces: (place among all forces, instance).
+            joints: name -> (place among all joints, instance).
+
+        Raises:
+            PrepareError: a joint has no friction, or a number is missing.
+        """
+        by_type: dict[Any, list[tuple[int, Instance, int, Instance]]] = {}
+        for place, force in forces:
+            row, joint = joints[force.values["joint"]]
+            by_type.setdefault(joint.examined.type, []).append((place, force, row, joint))
+        return tuple(self._friction(pairs) for pairs in by_type.values())
+
+    def _friction(self, pairs: list[tuple[int, Instance, int, Instance]]) -> Group:
+        examined = pairs[0][3].examined
+        if "friction" not in examined.kernels:
+            words = f"joint {pairs[0][3].name}: type {examined.type.keyword} has no friction"
+            raise PrepareError(pairs[0][0], words)
+        bound = bind_friction(examined)
+        group = self._group([joint for *_, joint in pairs], [row for _, _, row, _ in pairs])
+        wanted = [n for n in bound.layout.numbers if n not in examined.layout.numbers]
+        asked = {q for q in wanted if q in parameters(bound.kernels["friction"])}
+        extra = np.zeros((len(pairs), len(wanted)))
+        for k, (place, force, _, _) in enumerate(pairs):
+            for c, name in enumerate(wanted):
+                value = force.values.get(name)
+                if value is None and name in asked:
+                    raise PrepareError(
+                        place, f"{name} is missing, which friction in {examined.type.keyword} needs"
+                    )
+                extra[k, c] = 0.0 if value is None else value
+        members = np.array([place for place, *_ in pairs], dtype=np.int64)
+        numbers = np.hstack([group.numbers, extra])
+        return attrs.evolve(group, examined=bound, numbers=numbers, joints=group.members,
+                            members=members)  # fmt: skip
+
+    def _given(self, instance: Instance) -> list[Instance]:
+        """The functions of an argument that an instance is given."""
+        names = [instance.values[n] for n in argument_functions(instance.examined.type)]
+        return [self.functions[n] for n in names if n is not None]
+
+    def _group(self, instances: list[Instance], members: list[int]) -> Group:
+        examined = instances[0].examined
+        on_each = bool(getattr(examined.type, "each_body", False))
+        n = self.body_count
+        if on_each and _prepares(examined.type):  # its constants may differ from body to body
+            on_each = False
+            members = [m for m in members for _ in range(n)]
+            instances = [attrs.evolve(i, bodies=(b,)) for i in instances for b in range(1, n + 1)]
+        count = len(instances)
+        numbers, tables = self._numbers(examined, instances, members)
+        functions = [self._given(i) for i in instances]
+        if functions[0]:
+            examined, numbers, more = self._with_functions(examined, functions, numbers, members)
+            tables += more
+        bodies = np.array([i.bodies for i in instances], dtype=np.int64).reshape(count, -1)
+        others = [(*i.functions, *i.others) for i in instances]
+        integers = np.array(others, dtype=np.int64).reshape(count, -1)
+        places = np.array(members, dtype=np.int64)
+        if on_each:
+            bodies = np.tile(np.arange(1, n + 1), count)[:, None]
+            numbers = np.repeat(numbers, n, axis=0)
+            integers = np.repeat(integers, n, axis=0)
+            places = np.repeat(places, n)
+        return Group(examined, places, bodies, integers, numbers, tuple(tables))
+
+    def _with_functions(
+        self,
+        examined: Examined,
+        functions: list[list[Instance]],
+        numbers: Floats,
+        members: Sequence[int],
+    ) -> tuple[Examined, Floats, list[tuple[int, int, Floats]]]:
+        """The type with its functions known, their numbers behind its own, their tables."""
+        fields = argument_functions(examined.type)
+        types = {n: f.examined for n, f in zip(fields, functions[0], strict=True)}
+        tables: list[tuple[int, int, Floats]] = []
+        for column in zip(*functions, strict=True):
+            try:
+                more, found = self._numbers(column[0].examined, list(column), range(len(column)))
+            except PrepareError as error:
+                k, words = error.args
+                raise PrepareError(members[k], f"function {column[k].name}: {words}") from error
+            tables += [(k, numbers.shape[1] + offset, rows) for k, offset, rows in found]
+            numbers = np.hstack([numbers, more])
+        return bind_functions(examined, types), numbers, tables
+
+    def _numbers(
+        self, examined: Examined, instances: list[Instance], members: Sequence[int]
+    ) -> tuple[Floats, list[tuple[int, int, Floats]]]:
+        """(m, par_width) numbers of all instances, from their fields and ``prepare``; tables."""
+        given, fields = [i.values for i in instances], specs_of(examined.type)
+        if _prepares(examined.type):
+            with warnings.catch_warnings(record=True) as record:
+                warnings.simplefilter("always")
+                found = []
+                for instance, member in zip(instances, members, strict=True):
+                    found.append(_prepared(examined, fields, instance, member, self.poses))
+                    self._note(record, instance)
+            given = [values | constants for values, constants in zip(given, found, strict=True)]
+        numbers = np.zeros((len(instances), examined.layout.par_width))
+        for name, (offset, shape) in examined.layout.numbers.items():
+            column = [values.get(name) for values in given]
+            if None in column:
+                words = "is missing" if name in fields else "is not among what prepare returned"
+                raise PrepareError(members[column.index(None)], f"{name} {words}")
+            values = np.asarray(column, dtype=float).reshape(len(instances), -1)
+            numbers[:, offset : offset + size(shape)] = values
+        tables = []
+        for name, (offset, columns) in examined.layout.tables.items():
+            for k, values in enumerate(given):
+                rows = np.asarray(values[name], dtype=float).reshape(-1, columns)
+                numbers[k, offset + 1] = len(rows)
+                tables.append((k, offset, rows))
+        return numbers, tables
+
+    def _note(self, record: list[warnings.WarningMessage], instance: Instance) -> None:
+        """What ``prepare`` warned about becomes a note."""
+        keyword = instance.examined.type.keyword
+        for warning in record:
+            note = f"{self.kind} {instance.name} ({keyword}): {warning.message}"
+            if note not in self.notes:
+                self.notes.append(note)
+        record.clear()
 
 
 def _prepares(type_: Any) -> bool:
@@ -142,6 +256,8 @@ def _prepared(
     except ValueError as error:
         raise PrepareError(member, str(error)) from error
     for name, value in constants.items():
+        if name in examined.layout.tables:
+            continue
         _, shape = examined.layout.numbers.get(name, (0, None))
         if shape_of(value) != shape:
             raise PrepareError(

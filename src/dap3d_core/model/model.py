@@ -4,13 +4,16 @@ Coordinates stand in the state u in the order of the manual: r, p of every body,
 of every body.
 """
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 
 import attrs
 import numpy as np
 
 from dap3d_core.interface.checks import BodyPose, pose
-from dap3d_core.model.groups import Floats, Group, Integers, PrepareError, make_groups
+from dap3d_core.interface.fields import specs_of
+from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.scene import Checked, Instance
 
 
@@ -28,9 +31,12 @@ class Model:
         joint_start: (joints + 1,) first row of each joint in C, nu, gamma and lambda.
         joint_slots: bodies of each joint by slot, ground 0, in file order.
         position_row: (rows,) True where a row has an equation at position level.
-        joints, forces, functions: groups of instances of one type.
+        joints, forces, functions: groups of instances of one type; of the functions those of time
+            that an element uses.
+        friction: groups of joints' own friction, switched on by forces.
         function_count: number of functions; F has one row more, for the absent one.
         point_names, point_body (points,), point_local (points, 3): for rP; animation points last.
+        notes: what types warned about.
     """
 
     body_names: tuple[str, ...]
@@ -50,10 +56,12 @@ class Model:
     joints: tuple[Group, ...]
     forces: tuple[Group, ...]
     functions: tuple[Group, ...]
+    friction: tuple[Group, ...]
     function_count: int
     point_names: tuple[str, ...]
     point_body: Integers
     point_local: Floats
+    notes: tuple[str, ...] = ()
 
     @property
     def body_count(self) -> int:
@@ -102,10 +110,10 @@ def build_model(checked: Checked) -> Model:
         ModelError: the ``prepare`` of a type refuses an element.
         PluginError: the ``prepare`` of a type failed.
     """
-    n = len(checked.body_names)
     poses = _Poses(checked)
     rows = np.array([_rows(j) for j in checked.joints], dtype=np.int64)
     mask = [_position_mask(j) for j in checked.joints]
+    groups = _Groups(checked, poses)
     return Model(
         body_names=tuple(checked.body_names),
         mass=checked.mass,
@@ -121,22 +129,61 @@ def build_model(checked: Checked) -> Model:
         joint_start=np.concatenate([[0], np.cumsum(rows)]).astype(np.int64),
         joint_slots=tuple(j.bodies for j in checked.joints),
         position_row=np.array([there for m in mask for there in m], dtype=bool),
-        joints=_groups("joint", checked.joints, poses, n),
-        forces=_groups("force", checked.forces, poses, n),
-        functions=_groups("function", checked.functions, poses, n),
+        joints=groups.joints,
+        forces=groups.forces,
+        functions=groups.functions,
+        friction=groups.friction,
         function_count=len(checked.functions),
         point_names=tuple(checked.point_names),
         point_body=checked.point_body,
         point_local=checked.point_local,
+        notes=tuple(groups.notes),
     )
 
 
-def _groups(kind: str, instances: list[Instance], poses: "_Poses", n: int) -> tuple[Group, ...]:
+class _Groups:
+    """The groups of a scene's elements; each kind names its own elements where one is refused."""
+
+    def __init__(self, checked: Checked, poses: "_Poses") -> None:
+        n = len(checked.body_names)
+        kinds = ("joint", "force", "function")
+        by_kind = {k: Grouping(k, poses, n, checked.functions) for k in kinds}
+        every = (*checked.joints, *checked.forces)
+        used = {place - 1 for instance in every for place in instance.functions}
+        functions = [(k, f) for k, f in enumerate(checked.functions) if k in used]
+        through = [(k, f) for k, f in enumerate(checked.forces) if _acts_through_joint(f)]
+        direct = [(k, f) for k, f in enumerate(checked.forces) if not _acts_through_joint(f)]
+        joints = {j.name: (k, j) for k, j in enumerate(checked.joints)}
+        names = {
+            "joint": checked.joints,
+            "force": checked.forces,
+            "function": checked.functions,
+        }
+
+        def made(kind: str, elements: Sequence[tuple[int, Instance]]) -> tuple[Group, ...]:
+            places, instances = [k for k, _ in elements], [i for _, i in elements]
+            with _named(kind, names[kind]):
+                return by_kind[kind].groups(instances, places)
+
+        self.joints = made("joint", list(joints.values()))
+        self.forces = made("force", direct)
+        self.functions = made("function", functions)
+        with _named("force", checked.forces):
+            self.friction = by_kind["force"].friction(through, joints)
+        self.notes = [note for grouping in by_kind.values() for note in grouping.notes]
+
+
+@contextmanager
+def _named(kind: str, instances: Sequence[Instance]) -> Iterator[None]:
     try:
-        return make_groups(instances, poses, n)
+        yield
     except PrepareError as error:
         member, words = error.args
         raise ModelError(kind, instances[member].name, words) from error
+
+
+def _acts_through_joint(force: Instance) -> bool:
+    return any(spec.kind == "joint" for spec in specs_of(force.examined.type).values())
 
 
 def _rows(joint: Instance) -> int:

@@ -27,10 +27,11 @@ class Instance:
             element that acts on each body.
         functions: for each of ``examined.layout.functions`` 0 where absent, else 1 + its place
             among the functions of the scene.
+        others: body index of each of ``examined.layout.others``, vectors that no slot belongs to.
         values: field -> plain value. Points and vectors: 3 numbers on their body, vectors of unit
             length; a vector2 gives the two points ``P_i`` and ``P_j``; numbers: floats, or None
             where ``prepare`` finds them; vec3, table: tuples; matrix: three rows; references to
-            bodies, functions and joints, choices: words.
+            bodies, functions and joints: words; choices: words, False or True.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Instance:
     bodies: tuple[int, ...]
     functions: tuple[int, ...]
     values: dict[str, Any]
+    others: tuple[int, ...] = ()
 
 
 @attrs.frozen(eq=False)

@@ -33,8 +33,6 @@ from dap3d_core.scene.values import (
 
 #: An angle beyond a full turn is probably given in degrees.
 TURN = 6.283185307179586
-#: Kinds of fields that a scene never gives.
-DERIVED = ("angle",)
 #: The two points that may stand for a vector of type 2.
 ENDS = ("P_i", "P_j")
 
@@ -55,13 +53,17 @@ class _Field:
 
 @attrs.define
 class _Work:
-    """An element that is being read: what was found, and which field told the body of each slot."""
+    """An element that is being read.
+
+    What was found, which field told the body of each slot, and the bodies of vectors of no slot.
+    """
 
     element: Element
     key: Key
     values: dict[str, Any]
     bodies: list[int]
     told_by: list[str]
+    others: dict[str, int] = attrs.field(factory=dict)
     good: bool = True
 
 
@@ -83,7 +85,7 @@ class Reader:
         self.body_names = (GROUND, *geometry.bodies.names)
         self.slots = () if getattr(examined.type, "each_body", False) else examined.layout.slots
         self.function_place = {name: k for k, name in enumerate(report.scene.functions, 1)}
-        specs = {n: s for n, s in specs_of(examined.type).items() if s.kind not in DERIVED}
+        specs = {n: s for n, s in specs_of(examined.type).items() if s.given}
         takes_ends = ENDS[0] not in specs and any(s.kind == "vector2" for s in specs.values())
         self.ends = ENDS if takes_ends else ()
         self.fields = [self._field(name, spec) for name, spec in specs.items()]
@@ -128,10 +130,12 @@ class Reader:
             if values[field.name] is None:
                 is_point = field.spec.kind == "point"
                 values[field.name] = ZERO if is_point else self.body_names[bodies[field.slot]]
+        examined = self.examined.chosen(values) if self.examined.variants else self.examined
         functions = tuple(
-            [self.function_place.get(values[name], 0) for name in self.examined.layout.functions]
+            [self.function_place.get(values[name], 0) for name in examined.layout.functions]
         )
-        return Instance(element.name, self.examined, bodies, functions, values)
+        others = tuple([work.others[name] for name in examined.layout.others])
+        return Instance(element.name, examined, bodies, functions, values, others)
 
     # ---------------------------------------------------------------- fields, by kind
 
@@ -166,6 +170,11 @@ class Reader:
             work.good = False
             return
         work.values[field.name] = found[1]
+        if field.spec.ground and found[0] > 0:
+            what = f"is on {self.body_names[found[0]]}; it is to be a vector of ground"
+            self._refuse(work, (*work.key, field.name), self._given(work, field.name), what)
+        elif field.slot < 0 and field.spec.kind == "vector" and not field.spec.ground:
+            work.others[field.name] = found[0]
         self._tell(field.name, field.slot, found[0], work)
 
     def _vector2(self, field: _Field, value: Any, work: _Work) -> None:
@@ -248,7 +257,7 @@ class Reader:
         elif spec.kind == "table":
             found = list_of(value)
         elif spec.kind == "choice":
-            found = word_of(value, spec.choices)
+            found = word_of(value, spec.choices, spec.aliases)
         if isinstance(found, Fault):
             self.report.add((*work.key, field.name), value, found.what, found.nearest, found.remedy)
             work.good = False
@@ -270,6 +279,8 @@ class Reader:
         bodies = work.bodies
         if not bodies:
             return
+        if _UNKNOWN not in bodies:
+            self._check_others(work)
         if bodies[0] > 0 and bodies[-1] >= 0 and len(set(bodies)) == len(bodies) < 3:
             return  # what nearly all elements are
         if work.good and _UNKNOWN in bodies:
@@ -287,6 +298,14 @@ class Reader:
                 remedy = "an element acts between different bodies"
                 field = work.told_by[n]
                 self._refuse(work, (*work.key, field), self._given(work, field), what, remedy)
+
+    def _check_others(self, work: _Work) -> None:
+        """Vectors of no slot stand on one of the element's bodies."""
+        for name, body in work.others.items():
+            if body != BAD and body not in work.bodies:
+                names = " or ".join(self.body_names[b] for b in work.bodies)
+                what = f"is on {self.body_names[body]}; it is to be a vector of {names}"
+                self._refuse(work, (*work.key, name), self._given(work, name), what)
 
     def _report_ground(self, work: _Work) -> None:
         name = work.told_by[0]

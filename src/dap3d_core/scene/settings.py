@@ -5,12 +5,14 @@ from typing import Any
 
 from dap3d_core.registry.spelling import nearest
 from dap3d_core.scene.description import HEADER_KEYS, SCHEMA, Scene, Simulation
-from dap3d_core.scene.mistakes import Key, Mistake, SceneError, dotted
+from dap3d_core.scene.mistakes import MISSING, Key, Mistake, SceneError, dotted
 from dap3d_core.scene.values import Fault, bounded, number_of, text_of, truth_of, word_of
 
 #: What ``method`` and ``integrator`` may say.
 METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq")
 INTEGRATORS = ("dopri5", "dop853", "rk4")
+#: Integrators without an error estimate, which need a step.
+FIXED_STEP = ("rk4",)
 #: Relative tolerances below are beyond double precision.
 SMALLEST_RTOL = 1e-14
 #: More reported times are refused before anything is computed.
@@ -62,9 +64,20 @@ def simulation_mistakes(
             found.append(_mistake((*key, name), value, result))
         else:
             good[name] = result
+    found += _step_mistakes(simulation, good, key)
     found += _span_mistakes(simulation, good, len(body_names), key)
     found += _hold_mistakes(simulation.hold, body_names, (*key, "hold"))
     return found
+
+
+def _step_mistakes(
+    simulation: Simulation, good: dict[str, Any], key: Key
+) -> list[tuple[Key, Mistake]]:
+    if good.get("integrator") not in FIXED_STEP or simulation.step is not None:
+        return []
+    words = f"{simulation.integrator} does not choose its step"
+    fault = Fault(f"{words}: give step, or take an adaptive method")
+    return [_mistake((*key, "step"), MISSING, fault)]
 
 
 def _span_mistakes(

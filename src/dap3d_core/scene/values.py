@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 from dap3d_core.registry.spelling import nearest
@@ -102,11 +102,15 @@ def list_of(value: Any) -> tuple[float, ...] | Fault:
     return numbers_of(value, len(value))
 
 
-def word_of(value: Any, allowed: Collection[str]) -> str | Fault:
-    """One of the allowed words, or what is wrong."""
+def word_of(value: Any, allowed: Collection[Any], aliases: Mapping[str, str] | None = None) -> Any:
+    """One of the allowed words (or truth values), by its own or another name; else what's wrong."""
     value = plain(value)
-    if type(value) is str and value in allowed:
+    if type(value) is str and aliases and value in aliases:
+        value = aliases[value]
+    if type(value) in (str, bool) and value in allowed:
         return value
+    if set(allowed) == {False, True}:
+        return truth_of(value)
     words = ", ".join(f'"{w}"' for w in allowed)
     return Fault(f"should be one of {words}", nearest=nearest(value, allowed))
 

@@ -71,7 +71,7 @@ class CompiledModel:
         if announce is not None and not driver_is_cached("formulations"):
             announce(f"the solver ({self.method})")
         _ = self.machine.functions  # compiled here, and not on the clock of the first run
-        self.notes: list[str] = list(self.checked.notes)
+        self.notes: list[str] = [*self.checked.notes, *self.model.notes]
         self._redundancy: Redundancy | None = None
         self.compile_time = time.perf_counter() - started
 

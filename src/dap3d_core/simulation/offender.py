@@ -33,7 +33,7 @@ def _at(machine: Machine, t: float, y: Floats) -> str:
             return f"the state of body {name}"
     s = machine.system
     place_bodies(y, s.body, s.metric)
-    s.F[:] = 0.0  # filled again one by one: what stands there may be of no finite number
+    s.F[:, :4] = 0.0  # filled again one by one: what stands there may be of no finite number
     for q, (kind, group) in enumerate(machine.what):
         for k in range(group.count):
             if not _one_is_finite(machine, q, k, kind, group, t):

@@ -1,0 +1,107 @@
+"""How the instances of a type are stored: which integers and which numbers each takes."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+
+from dap3d_core.interface.fields import slot_of, specs_of
+from dap3d_core.interface.types import TypeBase
+
+SLOTS = ("i", "j", "k")
+
+#: A constant or a field in the numbers of an instance: where it begins, its shape.
+Place = tuple[int, tuple[int, ...]]
+
+
+@attrs.frozen
+class Layout:
+    """Where one instance's integers and numbers stand.
+
+    Attributes:
+        slots: body slots, in the order of the J blocks.
+        functions: function fields of time, in order; their rows of F follow the bodies in ``idx``.
+        others: vector fields of no slot, in order; the bodies they are fixed in come next.
+        constants: names that ``prepare`` returns.
+        numbers: name -> (offset in ``par``, shape) of what is stored for each instance.
+        tables: name -> (offset of its place and its number of rows, columns).
+        angles: name -> offset of the angle at the last accepted step.
+        par_width: numbers an instance takes.
+    """
+
+    slots: tuple[str, ...]
+    functions: tuple[str, ...]
+    others: tuple[str, ...]
+    constants: tuple[str, ...]
+    numbers: dict[str, Place]
+    tables: dict[str, tuple[int, int]]
+    angles: dict[str, int]
+    par_width: int
+
+    @property
+    def integers(self) -> int:
+        """Bodies and functions that an instance has in ``idx``."""
+        return len(self.slots) + len(self.functions) + len(self.others)
+
+
+def body_slots(type_: type[TypeBase]) -> tuple[str, ...]:
+    """The body slots of a type, in the order i, j, k."""
+    found = {"i"} if getattr(type_, "each_body", False) else set()
+    for name, spec in specs_of(type_).items():
+        if spec.kind == "vector2":
+            found |= {"i", "j"}
+        elif spec.ground:
+            continue
+        elif spec.kind in ("body", "point", "vector") and (slot := slot_of(name)):
+            found.add(slot)
+    return tuple(s for s in SLOTS if s in found)
+
+
+def size(shape: tuple[int, ...]) -> int:
+    """How many numbers a shape holds."""
+    n = 1
+    for extent in shape:
+        n *= extent
+    return n
+
+
+def shape_of(value: Any) -> tuple[int, ...]:
+    """Shape of a number or a nested tuple of numbers."""
+    if isinstance(value, (tuple, list)):
+        return (len(value), *shape_of(value[0])) if value else (0,)
+    return ()
+
+
+def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> Layout:
+    """How instances of a type are stored, given what ``prepare`` returned for one of them."""
+    numbers: dict[str, Place] = {}
+    tables: dict[str, tuple[int, int]] = {}
+    angles: dict[str, int] = {}
+    functions, others = [], []
+    slots = body_slots(type_)
+    width = 0
+    shapes = {"number": (), "point": (3,), "vector": (3,), "vec3": (3,), "matrix": (3, 3)}
+    for name, spec in specs_of(type_).items():
+        if spec.kind == "table":
+            tables[name] = width, spec.columns
+            width += 2
+        elif name in constants:
+            continue
+        elif spec.kind == "vector2":
+            numbers["P_i"], numbers["P_j"] = (width, (3,)), (width + 3, (3,))
+            width += 6
+        elif spec.kind in shapes:
+            numbers[name] = width, shapes[spec.kind]
+            width += size(shapes[spec.kind])
+            if spec.kind == "vector" and not spec.ground and slot_of(name) not in slots:
+                others.append(name)
+        elif spec.kind == "function" and not spec.argument:
+            functions.append(name)
+        elif spec.kind == "angle":
+            angles[name] = width
+            width += 1
+    kept = tuple(name for name in constants if name not in tables)
+    for name in kept:
+        numbers[name] = width, shape_of(constants[name])
+        width += size(numbers[name][1])
+    return Layout(slots, tuple(functions), tuple(others), kept, numbers, tables, angles, width)

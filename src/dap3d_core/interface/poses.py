@@ -1,0 +1,37 @@
+"""A body's pose as the ``prepare`` of a type sees it."""
+
+from typing import Any
+
+import attrs
+
+
+@attrs.frozen
+class BodyPose:
+    """A body as ``prepare`` sees it: position r, Euler parameters p, rotation matrix A (rows)."""
+
+    r: tuple[float, ...]
+    p: tuple[float, ...]
+    A: tuple[tuple[float, ...], ...]
+
+    def to_local(self, s: Any) -> tuple[float, ...]:
+        """Components on the body of a global 3-vector."""
+        return tuple(sum(self.A[r][c] * s[r] for r in range(3)) for c in range(3))
+
+    def to_global(self, s: Any) -> tuple[float, ...]:
+        """Global components of a 3-vector given on the body."""
+        return tuple(sum(self.A[r][c] * s[c] for c in range(3)) for r in range(3))
+
+    def place(self, s: Any) -> tuple[float, ...]:
+        """Global position of a point given by its coordinates on the body."""
+        return tuple(a + b for a, b in zip(self.r, self.to_global(s), strict=True))
+
+
+def pose(r: Any, p: Any) -> BodyPose:
+    """A body's pose from its position and (unit) Euler parameters."""
+    e0, e1, e2, e3 = (float(x) for x in p)
+    matrix = (
+        (1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)),
+        (2 * (e1 * e2 + e0 * e3), 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 - e0 * e1)),
+        (2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), 1 - 2 * (e1 * e1 + e2 * e2)),
+    )
+    return BodyPose(tuple(float(x) for x in r), (e0, e1, e2, e3), matrix)
