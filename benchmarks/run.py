@@ -9,6 +9,7 @@ import platform
 import sys
 from pathlib import Path
 
+import kernels
 import numba
 import numpy
 import right_hand_side
@@ -41,6 +42,7 @@ def main():
     arguments = parser.parse_args()
     benchmarks = {
         "right_hand_side": lambda: right_hand_side.measure(arguments.against),
+        "kernels": kernels.measure,
         "dop853_on_a_chain": whole_runs.dop853_on_a_chain,
         "large": whole_runs.large,
         "start_up": whole_runs.start_up,

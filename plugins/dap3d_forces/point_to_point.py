@@ -1,6 +1,6 @@
 """Point-to-point spring, damper and actuator."""
 
-from dap3d_core.interface import Force, Vector2, hookimpl, number, vector2
+from dap3d_core.interface import Force, Vector2, function, hookimpl, number, vector2
 from dap3d_core.kernels import cross, dot, neg, scale, sqrt
 
 interface_version = 1
@@ -13,6 +13,9 @@ class PointToPoint(Force):
 
         F = k (l - l0) + c l_dot + f_a,  force F u at P_i on body i and -F u at P_j on body j
         energy = k (l - l0)^2 / 2 + f_a l
+
+    A function of l - l0 takes the place of k (l - l0): F = f(l - l0) + c l_dot + f_a, without an
+    energy. Where the two points coincide u is undefined, and a run stops and says so.
     """
 
     keyword = "ptp"
@@ -22,15 +25,33 @@ class PointToPoint(Force):
     l0: float = number(default=0.0, unit="m", minimum=0.0, doc="undeformed length")
     f_a: float = number(default=0.0, unit="N", doc="force of the actuator, tension positive")
 
+    function: str = function(argument="l - l0", doc="force, N, in place of k (l - l0)")
+
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a):
         length = sqrt(dot(d, d))
         u = scale(1.0 / length, d)
-        F = scale(k * (length - l0) + c * dot(u, d_dot) + f_a, u)
-        return (F, cross(s_P_i, F)), (neg(F), neg(cross(s_P_j, F)))
+        return pull(k * (length - l0) + c * dot(u, d_dot) + f_a, u, s_P_i, s_P_j)
 
     def energy(d, k, l0, f_a):
         length = sqrt(dot(d, d))
         return 0.5 * k * (length - l0) * (length - l0) + f_a * length
+
+
+class Curve(PointToPoint, function=True):
+    """The spring is a function of the elongation."""
+
+    energy = None
+
+    def wrench(d, d_dot, s_P_i, s_P_j, c, l0, f_a, f):
+        length = sqrt(dot(d, d))
+        u = scale(1.0 / length, d)
+        return pull(f(length - l0) + c * dot(u, d_dot) + f_a, u, s_P_i, s_P_j)
+
+
+def pull(T, u, s_i, s_j):
+    """The tension T along u at the ends of the arms."""
+    F = scale(T, u)
+    return (F, cross(s_i, F)), (neg(F), neg(cross(s_j, F)))
 
 
 @hookimpl

@@ -14,7 +14,8 @@ class SmoothHump(Function):
         f = f_start + q3 u^3 + q4 u^4 + q5 u^5 + q6 u^6 + q7 u^7,  constant before and after
 
     The five coefficients give value f_end with slope and curvature zero at u = 1, and value f_max
-    with slope zero at x_max. The curve may leave the range of the three values elsewhere.
+    with slope zero at x_max. Elsewhere the curve may leave the range from f_start and f_end to
+    f_max; a warning says by how much.
     """
 
     keyword = "c"
@@ -26,6 +27,8 @@ class SmoothHump(Function):
     f_max: float = number(doc="the extreme value")
 
     def prepare(self, bodies):
+        import warnings
+
         import numpy as np
 
         D = self.x_end - self.x_start
@@ -37,7 +40,20 @@ class SmoothHump(Function):
         k, m = np.arange(3.0, 8.0), (self.x_max - self.x_start) / D
         equations = [np.ones(5), k, k * (k - 1.0), m**k, k * m ** (k - 1.0)]
         values = [self.f_end - self.f_start, 0.0, 0.0, self.f_max - self.f_start, 0.0]
-        return {"q": np.linalg.solve(equations, values)}
+        q = np.linalg.solve(equations, values)
+        given = np.array([self.f_start, self.f_end, self.f_max])
+        u = np.linspace(0.0, 1.0, 1001)
+        f = self.f_start + u**3 * np.polyval(q[::-1], u)
+        low, high = given.min() - f.min(), f.max() - given.max()
+        if max(low, high) > 1e-3 * np.ptp(given):
+            worst = np.argmin(f) if low > high else np.argmax(f)
+            warnings.warn(
+                f"reaches {f[worst]:.6g} at x = {self.x_start + D * u[worst]:.4g}, outside the "
+                f"range {given.min():g} to {given.max():g} of f_start, f_end and f_max; "
+                "an x_max nearer to the middle mends it",
+                stacklevel=2,
+            )
+        return {"q": q}
 
     def value(x, x_start, x_end, f_start, f_end, q):
         D = x_end - x_start

@@ -1,7 +1,8 @@
 """Cylindrical joint: a body turns about an axis and slides along it."""
 
 from dap3d_core.interface import Joint, Vector, Vector2, hookimpl, vector, vector2
-from dap3d_core.kernels import add, cross, dot, neg, normals, row, scale, sub
+from dap3d_core.kernels import add, cross, dot, neg, normals, row, scale, sub, tanh
+from dap3d_joints.coulomb import magnitude
 
 interface_version = 1
 
@@ -20,6 +21,10 @@ class Cylindrical(Joint):
         J_j   = [0, -(a_i x b)^T]                      J_j   = [b^T, ((s_j - d) x b)^T]
         gamma = (a_i_dot x b + a_i x b_dot).(w_j - w_i)
         gamma = (w_i x s_i_dot).b + (w_j x d + s_j_dot - 2 d_dot).b_dot
+
+    Friction, on a rod of the radius given, with N = lambda_3 n_j + lambda_4 m_j (spec 6.1): a force
+    mu |N| S(v / v_tol) along a_j at P_i, against the speed v of P_i along a_j as seen from body j,
+    and a moment mu radius |N| S(radius w / v_tol) about a_j, against w = a_j . (w_i - w_j).
     """
 
     keyword, rows = "cyl", 4
@@ -34,9 +39,9 @@ class Cylindrical(Joint):
     def C(a_i, n_j, m_j, d):
         return dot(a_i, n_j), dot(a_i, m_j), dot(d, n_j), dot(d, m_j)
 
-    def J(a_i, n_j, m_j, d, s_P_i, s_P_j):
+    def J(a_i, n_j, m_j, s_P_i, r_P_i, r_j):
         p, q = cross(a_i, n_j), cross(a_i, m_j)
-        arm = sub(s_P_j, d)
+        arm = sub(r_P_i, r_j)  # s_j - d
         return (
             (
                 row(ZERO, p),
@@ -64,6 +69,14 @@ class Cylindrical(Joint):
             dot(centripetal, n_j) + dot(slide, n_j_dot),
             dot(centripetal, m_j) + dot(slide, m_j_dot),
         )
+
+    def friction(lam, mu, v_tol, radius, a_j, s_P_i, r_P_i, v_P_i, r_j, v_j, w_i, w_j):
+        load, arm = mu * magnitude((lam[2], lam[3])), sub(r_P_i, r_j)
+        v = dot(a_j, sub(sub(v_P_i, v_j), cross(w_j, arm)))
+        F = scale(-load * tanh(v / v_tol), a_j)
+        turning = radius * dot(a_j, sub(w_i, w_j))
+        moment = scale(-radius * load * tanh(turning / v_tol), a_j)
+        return (F, add(cross(s_P_i, F), moment)), (neg(F), neg(add(cross(arm, F), moment)))
 
 
 @hookimpl

@@ -1,8 +1,8 @@
 """Fixed body: keeps the pose it was given."""
 
 from dap3d_core.interface import Body, Joint, body, hookimpl
-from dap3d_core.kernels import add, cross, eye, hstack, row, scale, skew, sub
-from dap3d_joints.orientation import error, error_rate
+from dap3d_core.kernels import add, cross, eye, hstack, scale, sub
+from dap3d_joints.orientation import error, error_rate, turn
 
 interface_version = 1
 
@@ -33,13 +33,7 @@ class Fixed(Joint):
 
     def J(p_i, orientation):
         q0, e = error(p_i, IDENTITY, orientation)
-        x, y, z = skew(e)
-        turn = (
-            row(ZERO, sub((q0, 0.0, 0.0), x)),
-            row(ZERO, sub((0.0, q0, 0.0), y)),
-            row(ZERO, sub((0.0, 0.0, q0), z)),
-        )
-        return (hstack(eye(1.0), eye(0.0)) + turn,)
+        return (hstack(eye(1.0), eye(0.0)) + hstack(eye(0.0), turn(q0, e)),)
 
     def gamma(p_i, orientation, w_i):
         q0, e = error(p_i, IDENTITY, orientation)

@@ -28,6 +28,12 @@ def error_rate(q0, e, w_i, w_j):
     return -0.5 * dot(e, w), scale(0.5, add(scale(q0, w), cross(add(w_i, w_j), e)))
 
 
+def turn(q0, e):
+    """The matrix q0 I - e~, three rows: the error's Jacobian of body j, and of body i for -q0."""
+    x, y, z = e
+    return ((q0, z, -y), (-z, q0, x), (y, -x, q0))
+
+
 def quaternion(A):
     """Euler parameters of a rotation matrix, by the largest of the four; for ``prepare``."""
     trace = A[0][0] + A[1][1] + A[2][2]

@@ -1,7 +1,21 @@
 """Revolute joint: two bodies share a point and an axis through it."""
 
 from dap3d_core.interface import Joint, Point, Vector, hookimpl, point, vector
-from dap3d_core.kernels import add, cross, dot, eye, hstack, neg, normals, row, skew, sub
+from dap3d_core.kernels import (
+    add,
+    cross,
+    dot,
+    eye,
+    hstack,
+    neg,
+    normals,
+    row,
+    scale,
+    skew,
+    sub,
+    tanh,
+)
+from dap3d_joints.coulomb import magnitude
 
 interface_version = 1
 
@@ -19,7 +33,8 @@ class Revolute(Joint):
         gamma = (a_i_dot x b + a_i x b_dot) . (w_j - w_i)
 
     The manual writes a_j for a_i in rows 4 and 5, the same on the constraint manifold only; these
-    are exact everywhere.
+    are exact everywhere. Friction, on a pin of the radius given: a moment about a_j,
+    mu radius |lambda_1..3| S(radius w / v_tol) against w = a_j . (w_i - w_j) (spec 6.1).
     """
 
     keyword, rows = "rev", 5
@@ -48,6 +63,12 @@ class Revolute(Joint):
         m_dot = add(cross(a_i_dot, m_j), cross(a_i, m_j_dot))
         point_rows = sub(cross(w_i, cross(w_i, s_P_i)), cross(w_j, cross(w_j, s_P_j)))
         return (*point_rows, dot(n_dot, w), dot(m_dot, w))
+
+    def friction(lam, mu, v_tol, radius, a_j, w_i, w_j):
+        load = mu * magnitude((lam[0], lam[1], lam[2]))
+        sliding = radius * dot(a_j, sub(w_i, w_j))
+        moment = scale(-radius * load * tanh(sliding / v_tol), a_j)
+        return (ZERO, moment), (ZERO, neg(moment))
 
 
 @hookimpl

@@ -1,9 +1,12 @@
 """Spherical joint: point P_i of body i and point P_j of body j stay together."""
 
 from dap3d_core.interface import Joint, Point, hookimpl, point
-from dap3d_core.kernels import cross, eye, hstack, neg, skew, sub
+from dap3d_core.kernels import cross, eye, hstack, neg, scale, skew, sub
+from dap3d_joints.coulomb import against, magnitude
 
 interface_version = 1
+
+ZERO = (0.0, 0.0, 0.0)
 
 
 class Spherical(Joint):
@@ -14,6 +17,9 @@ class Spherical(Joint):
         C     = r_Pj - r_Pi
         J_i   = [-I, s_i~],  J_j = [I, -s_j~]
         gamma = w_i x (w_i x s_i) - w_j x (w_j x s_j)
+
+    Friction, on a ball of the radius given: a moment mu radius |lambda| S(radius |w| / v_tol)
+    against the relative angular velocity w = w_i - w_j (spec 6.1).
     """
 
     keyword, rows = "sph", 3
@@ -28,6 +34,11 @@ class Spherical(Joint):
 
     def gamma(s_P_i, s_P_j, w_i, w_j):
         return sub(cross(w_i, cross(w_i, s_P_i)), cross(w_j, cross(w_j, s_P_j)))
+
+    def friction(lam, mu, v_tol, radius, w_i, w_j):
+        sliding = scale(radius, sub(w_i, w_j))
+        moment = scale(radius, against(sliding, mu * magnitude(lam), v_tol))
+        return (ZERO, moment), (ZERO, neg(moment))
 
 
 @hookimpl

@@ -1,12 +1,24 @@
 """Translational joint: a body slides along an axis without turning against the other."""
 
 from dap3d_core.interface import Joint, Vector, Vector2, hookimpl, matrix, vector, vector2
-from dap3d_core.kernels import add, cross, dot, neg, normals, row, scale, skew, sub
-from dap3d_joints.orientation import error, error_rate, quaternion
+from dap3d_core.kernels import (
+    add,
+    cross,
+    dot,
+    eye,
+    hstack,
+    neg,
+    normals,
+    row,
+    scale,
+    sub,
+    tanh,
+)
+from dap3d_joints.coulomb import magnitude
+from dap3d_joints.orientation import error, error_rate, quaternion, turn
 
 interface_version = 1
 
-ZERO = (0.0, 0.0, 0.0)
 NO_TURN = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -27,7 +39,8 @@ class Translational(Joint):
         gamma = (w_i x s_i_dot) . b + (w_j x d + s_j_dot - 2 d_dot) . b_dot
 
     On the constraints these are the manual's; it prints J = [0, -I], [0, I] and gamma = 0 for rows
-    1 to 3.
+    1 to 3. Friction, with N = lambda_4 n_j + lambda_5 m_j (spec 6.1): a force mu |N| S(v / v_tol)
+    along a_j at P_i, against the speed v of P_i along a_j as seen from body j.
     """
 
     keyword, rows = "tran", 5
@@ -44,23 +57,17 @@ class Translational(Joint):
         _, e = error(p_j, p_c, p_i)
         return (*scale(2.0, e), dot(d, n_j), dot(d, m_j))
 
-    def J(p_i, p_j, p_c, d, n_j, m_j, s_P_i, s_P_j):
+    def J(p_i, p_j, p_c, n_j, m_j, s_P_i, r_P_i, r_j):
         q0, e = error(p_j, p_c, p_i)
-        x, y, z = skew(e)
-        X, Y, Z = (q0, 0.0, 0.0), (0.0, q0, 0.0), (0.0, 0.0, q0)
-        arm = sub(s_P_j, d)
+        arm = sub(r_P_i, r_j)  # s_j - d
         return (
             (
-                row(ZERO, neg(add(X, x))),
-                row(ZERO, neg(add(Y, y))),
-                row(ZERO, neg(add(Z, z))),
+                *hstack(eye(0.0), turn(-q0, e)),
                 row(neg(n_j), neg(cross(s_P_i, n_j))),
                 row(neg(m_j), neg(cross(s_P_i, m_j))),
             ),
             (
-                row(ZERO, sub(X, x)),
-                row(ZERO, sub(Y, y)),
-                row(ZERO, sub(Z, z)),
+                *hstack(eye(0.0), turn(q0, e)),
                 row(n_j, cross(arm, n_j)),
                 row(m_j, cross(arm, m_j)),
             ),
@@ -69,14 +76,20 @@ class Translational(Joint):
     def gamma(p_i, p_j, p_c, d, d_dot, n_j, m_j, n_j_dot, m_j_dot, s_P_i_dot, s_P_j_dot, w_i, w_j):
         q0, e = error(p_j, p_c, p_i)
         q0_dot, e_dot = error_rate(q0, e, w_i, w_j)
-        turn = add(scale(-q0_dot, sub(w_j, w_i)), cross(e_dot, add(w_i, w_j)))
+        turning = add(scale(-q0_dot, sub(w_j, w_i)), cross(e_dot, add(w_i, w_j)))
         centripetal = cross(w_i, s_P_i_dot)
         slide = sub(add(cross(w_j, d), s_P_j_dot), scale(2.0, d_dot))
         return (
-            *turn,
+            *turning,
             dot(centripetal, n_j) + dot(slide, n_j_dot),
             dot(centripetal, m_j) + dot(slide, m_j_dot),
         )
+
+    def friction(lam, mu, v_tol, a_j, s_P_i, r_P_i, v_P_i, r_j, v_j, w_j):
+        arm = sub(r_P_i, r_j)
+        v = dot(a_j, sub(sub(v_P_i, v_j), cross(w_j, arm)))
+        F = scale(-mu * magnitude((lam[3], lam[4])) * tanh(v / v_tol), a_j)
+        return (F, cross(s_P_i, F)), (neg(F), neg(cross(arm, F)))
 
 
 def check_rotation(A):

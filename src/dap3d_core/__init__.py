@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from dap3d_core.interface import PluginError
+    from dap3d_core.matlab import import_matlab
     from dap3d_core.plot import plot
     from dap3d_core.registry import load_registry
     from dap3d_core.result import Result
@@ -30,6 +31,7 @@ _HOMES = {
     "SceneError": ("scene", "SceneError"),
     "SimulationError": ("simulation", "SimulationError"),
     "compile": ("simulation", "compile_scene"),
+    "import_matlab": ("matlab", "import_matlab"),
     "load": ("scene", "load"),
     "load_registry": ("registry", "load_registry"),
     "open": ("simulation", "open_result"),
@@ -47,6 +49,7 @@ __all__ = [
     "SceneError",
     "SimulationError",
     "compile",
+    "import_matlab",
     "load",
     "load_registry",
     "open",

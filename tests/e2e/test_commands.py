@@ -1,12 +1,11 @@
 """The other commands, as a user meets them."""
 
-import csv
 import json
 import shutil
 
 import numpy as np
 import pytest
-import xarray
+from support.mechanisms import four_bar_row, torn, two_motors
 
 import dap3d_core as dap
 
@@ -42,7 +41,41 @@ def test_check_tells_redundant_joints(dap3d, scene_file):
     assert found["joints"] == ["low", "high"]
     told = " ".join(dap3d("check", "fall.toml").stdout.split())
     assert "redundant constraints: 5 of 10 rows" in told
-    assert "in the joints low, high." in told
+    assert "The joints that share a freedom: low, high" in told
+    # the hinges' axis runs through the mass centre, so no share of theirs turns the body about it
+    assert "moment z alone unique: low, high" in told
+    assert found["groups"] == [{"joints": ["low", "high"], "redundant": 5}]
+    assert (found["everywhere"], found["redundant_elsewhere"]) == (True, 5)
+    assert found["contradictions"] == []
+    assert found["reactions"]["unique"] == []
+    assert found["reactions"]["shared"]["low"]["unique_rows"] == []
+
+
+def test_check_tells_what_is_redundant_at_this_pose_alone(dap3d):
+    """Two four-bars with all links in line: 27 of 35 rows are independent, 29 elsewhere (IFToMM
+    A02)."""
+    four_bar_row(2, np.pi / 2).save(dap3d.folder / "flat.toml")
+    found = json.loads(dap3d("check", "flat.toml", "--json").stdout)
+    assert (found["rows"], found["rank"], found["redundant"], found["dof"]) == (35, 27, 8, 3)
+    assert (found["everywhere"], found["redundant_elsewhere"]) == (False, 6)
+    assert found["poses"] == [29, 29, 29]
+    told = " ".join(dap3d("check", "flat.toml").stdout.split())
+    assert "2 of the 8 are redundant only at this pose" in told
+
+
+def test_check_names_joints_that_contradict_each_other(dap3d):
+    """Two drivers of one angle at rates 1 and 2, and two joints 2 m apart: the second cannot be
+    assembled, and the command says which joints are open."""
+    two_motors().save(dap3d.folder / "motors.toml")
+    found = json.loads(dap3d("check", "motors.toml", "--json").stdout)
+    (contradiction,) = found["contradictions"]
+    assert (contradiction["level"], contradiction["joints"]) == ("velocity", ["slow", "fast"])
+    assert contradiction["size"] == pytest.approx(1 / np.sqrt(2), rel=1e-12)
+    torn().save(dap3d.folder / "torn.toml")
+    done = dap3d("check", "torn.toml")
+    assert done.returncode == 2
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert "first sph 1 1" in " ".join(done.stdout.split())
 
 
 def test_check_prints_all_mistakes_as_json(dap3d, scene_file):
@@ -71,11 +104,22 @@ def test_models_and_plugins_are_listed(dap3d):
     assert all(name in shown.stdout for name in listed)
     assert listed["fourbar3"]["bodies"] == 3
     assert listed["fourbar3"]["joints"] == {"rev": 2, "sph": 2, "rel-rot": 1}
+    assert listed["fourbar3"]["group"] == ""
+    assert listed["A04"]["group"] == "benchmarks"
+    lines = [line.strip() for line in shown.stdout.splitlines()]
+    assert lines.count("benchmarks") == 1, "a heading above the models of the group"
     types = json.loads(dap3d("plugins", "--json").stdout)["types"]
     found = {(t["kind"], t["keyword"]): t for t in types}
     assert found["joint", "sph"]["state"] == "ok"
     assert found["joint", "sph"]["distribution"] == "dap3d"
     assert "weight" in dap3d("plugins").stdout
+
+
+def test_a_model_of_a_group_runs_with_and_without_it(dap3d):
+    for name in ("N1", "benchmarks/N1"):
+        done = dap3d("run", name, "--t-end", "0.1", "--force")
+        assert done.returncode == 0, done.stderr
+        (dap3d.folder / "N1.nc").unlink()
 
 
 def test_a_blocked_type_is_listed_with_the_reason(dap3d):
@@ -122,39 +166,6 @@ def test_info_says_what_a_file_holds(dap3d, result):
     shown = dap3d("info", "pen1.nc").stdout
     for words in ("cone", "J1", "numba", "energy", "dop853", "project on"):
         assert words in shown
-
-
-def test_post_writes_a_table_that_reads_back_bit_for_bit(dap3d, result):
-    done = dap3d("post", "pen1.nc", "-o", "all.csv", "--jac")
-    assert done.returncode == 0, done.stderr
-    with (dap3d.folder / "all.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    column = {name: np.array([float(r[name]) for r in rows]) for name in rows[0]}
-    for name, values in (
-        ("t", result.t),
-        ("cone.r.z", result.r[:, 0, 2]),
-        ("cone.p.e0", result.p[:, 0, 0]),
-        ("cone.wpd.y", result.wpd[:, 0, 1]),
-        ("P1.r.x", result.rP[:, 0, 0]),
-        ("animation.4.v.z", result.rPd[:, 5, 2]),
-        ("J1.lambda.3", result.Lam[:, 2]),
-        ("J1.Jac.1.cone.rd.x", result.Jac[:, 0, 0]),
-        ("J1.Jac.3.cone.w.z", result.Jac[:, 2, 5]),
-    ):
-        assert column[name].tolist() == values.tolist(), name
-    for name in column:  # what the table calls it, plots understand
-        if ".Jac." not in name:
-            assert result.quantity(name).values.tolist() == column[name].tolist()
-
-
-def test_post_writes_named_dimensions(dap3d, result):
-    assert dap3d("post", "pen1.nc", "-o", "all.nc", "--jac").returncode == 0
-    with xarray.open_dataset(dap3d.folder / "all.nc") as data:
-        for name in ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd", "rP", "rPd", "Lam", "Jac"):
-            assert data[name].values.tolist() == getattr(result, name).tolist()
-            assert "units" in data[name].attrs
-        assert data["rdd"].sel(body="cone", axis="z").dims == ("time",)
-    assert dap3d("info", "all.nc").returncode == 2  # it is no result
 
 
 def test_plot_draws_into_files(dap3d, result):

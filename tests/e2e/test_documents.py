@@ -47,6 +47,25 @@ def test_the_readme(tmp_path):
     assert (tmp_path / "cone.nc").exists()
 
 
+def test_the_page_on_post_processing(tmp_path):
+    """Its commands, in their order, and its scripts, which hold assertions of their own."""
+    text = (REPOSITORY / "docs" / "post-processing.md").read_text()
+    found = commands(text, "dap3d")
+    assert [words[0] for words in found] == ["run", "post", "post", "post", "plot", "run", "post"]
+    for words in found:
+        done = dap3d(words, tmp_path)
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "contact.csv").read_text().startswith("t [s],contact.force.z [N]\n0.0,0.0\n")
+    scripts = blocks(text, "python")
+    assert len(scripts) == 3
+    for script in scripts:
+        done = subprocess.run(
+            [sys.executable, "-c", script],
+            cwd=tmp_path, env=environment(), capture_output=True, text=True,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+
+
 def test_the_first_commands_of_the_readme_are_targets():
     """The two commands at the top exist in the Makefile."""
     text = (REPOSITORY / "README.md").read_text()

@@ -37,7 +37,12 @@ def run_to(name, t):
     return dap.simulate(compiled(name), t_end=t, dt=max(t, 1.0) if t == 0.0 else t, **settings)
 
 
-@pytest.mark.parametrize(("name", "check"), CHECKS, ids=[title(*c) for c in CHECKS])
+def marked(name, check):
+    marks = [pytest.mark.slow] if check.get("slow") else []
+    return pytest.param(name, check, id=title(name, check), marks=marks)
+
+
+@pytest.mark.parametrize(("name", "check"), [marked(*c) for c in CHECKS])
 def test_expected(name, check):
     """The quantity agrees with the independent value."""
     value = np.array(check["value"], dtype=float)
@@ -73,7 +78,8 @@ def at_end(result, quantity):
     if head == "reaction":
         joint, side, what = rest
         return getattr(result.reaction(joint)[side], what)[-1]
-    return getattr(result, head)[-1, result.model.body_names.index(rest[0])]
+    names = result.model.point_names if head in ("rP", "rPd") else result.model.body_names
+    return getattr(result, head)[-1, names.index(rest[0])]
 
 
 def time_of(name, crossing):

@@ -1,5 +1,7 @@
 """A scene for any registered type, its fields filled at random by what they declare."""
 
+from itertools import product
+
 import numpy as np
 
 from dap3d_core.interface.fields import slot_of, specs_of
@@ -7,14 +9,58 @@ from dap3d_core.model.kinematics import rotation
 from dap3d_core.scene import Scene
 
 
-def scene_for(examined, rng, *, ground=None):
+def cases(registry, kind):
+    """(keyword, values of fields) for each type of a kind as it is, and for each of its variants.
+
+    A type whose variants leave no place for itself is there by its variants alone.
+    """
+    found = []
+    for row in registry.listing():
+        if row.kind == kind and row.state == "ok":
+            examined = registry.get(kind, row.keyword)
+            own = _own_values(examined)
+            found += [] if own is None else [(row.keyword, own)]
+            found += [(row.keyword, dict(conditions)) for conditions, _ in examined.variants]
+    return found
+
+
+def case_names(found):
+    """Names of cases for reports: ``disk[slip=nz]``."""
+    return [f"{k}{[f'{n}={v}' for n, v in values.items()] or ''}" for k, values in found]
+
+
+def variant(registry, kind, keyword, values):
+    """What stands for a type where its fields have these values."""
+    examined = registry.get(kind, keyword)
+    return next((e for conditions, e in examined.variants if conditions == values), examined)
+
+
+def _own_values(examined):
+    """Values of choices for which no variant takes the type's place; None where there are none."""
+    specs = specs_of(examined.type)
+    asked = {n for conditions, _ in examined.variants for n in conditions}
+    ways = [
+        [(n, w) for w in (specs[n].choices if specs[n].kind == "choice" else (False,))]
+        for n in specs
+        if n in asked
+    ]
+    for values in map(dict, product(*ways)):
+        given = {n: v or None if specs[n].kind == "function" else v for n, v in values.items()}
+        if examined.chosen(given) is examined:
+            return values
+    return None
+
+
+def scene_for(examined, rng, *, ground=None, values=None):
     """A scene of three bodies with one element of a type; slot ``ground`` is put on ground.
 
     Args:
         examined: the type.
         rng: numpy generator.
         ground: "j" to tie slot j to ground, or None.
+        values: of choices, and whether functions are given, for a variant of the type.
     """
+    values = values or {}
     scene = Scene(name="contract")
     owner = {"i": "b1", "j": "b2", "k": "b3"}
     for name in owner.values():
@@ -27,7 +73,7 @@ def scene_for(examined, rng, *, ground=None):
         owner[ground] = "ground"
     fields = {}
     for name, spec in specs_of(examined.type).items():
-        value = _field(scene, name, spec, owner, rng)
+        value = _field(scene, name, spec, owner, rng, values.get(name))
         if value is not None:
             fields[name] = value
     for name, spec in specs_of(examined.type).items():
@@ -39,10 +85,14 @@ def scene_for(examined, rng, *, ground=None):
     return scene
 
 
-def _field(scene, name, spec, owner, rng):
+def _field(scene, name, spec, owner, rng, wanted):
+    if not spec.given:
+        return None
     body = owner.get(slot_of(name) or "", "b1")
     if spec.kind == "point":
         return scene.add_point(name, body, rng.uniform(-1, 1, 3))
+    if spec.kind == "vector" and spec.ground:
+        return scene.add_vector(name, "ground", rng.normal(size=3))
     if spec.kind == "vector":
         return scene.add_vector(name, body, rng.normal(size=3))
     if spec.kind == "body":
@@ -55,8 +105,12 @@ def _field(scene, name, spec, owner, rng):
         return rng.uniform(-1, 1, 3)
     if spec.kind == "matrix":
         return rotation(rng.normal(size=4))
+    if spec.kind == "table":  # increasing: a table of arguments is one
+        return np.cumsum(rng.uniform(0.1, 0.5, 8))
+    if spec.kind == "function" and spec.argument and not wanted:
+        return None
     if spec.kind == "function":
         return scene.add_function("a", f"{name}_of_time", coeff=rng.uniform(-1, 1, 3))
     if spec.kind == "choice":
-        return spec.choices[0]
+        return spec.choices[0] if wanted is None else wanted
     return "vector2"

@@ -11,17 +11,15 @@ import pytest
 from click.testing import CliRunner
 
 from dap3d_core.cli import exits, main
-from dap3d_core.cli.example import example_of
 from dap3d_core.cli.failures import report
 from dap3d_core.cli.group import dap3d
 from dap3d_core.cli.rendering import clean, count, plain, seconds, size
 from dap3d_core.cli.run import SETTINGS
 from dap3d_core.cli.signals import Stopping
-from dap3d_core.registry import load_registry
-from dap3d_core.scene import INTEGRATORS, METHODS, Mistake, SceneError, Simulation, check
-from dap3d_core.scene.reading import parse
+from dap3d_core.scene import INTEGRATORS, METHODS, Mistake, SceneError, Simulation
 
-COMMANDS = ("run", "check", "models", "plugins", "describe", "info", "post", "plot")
+COMMANDS = ("run", "check", "models", "plugins", "describe", "info", "post", "plot",
+            "import-matlab")  # fmt: skip
 
 
 def test_every_command_is_there_and_has_help():
@@ -50,35 +48,6 @@ def test_options_of_run_are_settings_of_a_scene():
     options = {option for p in dap3d.commands["run"].params for option in p.opts}
     assert SETTINGS.keys() <= known
     assert set(SETTINGS.values()) <= options
-
-
-BODIES = """
-[bodies.crank]
-mass = 1.0
-Jp = [1.0, 1.0, 1.0]
-[bodies.rod]
-mass = 1.0
-Jp = [1.0, 1.0, 1.0]
-r = [0.0, 1.0, 0.0]
-[bodies.slider]
-mass = 1.0
-Jp = [1.0, 1.0, 1.0]
-r = [0.0, 0.0, 1.0]
-"""
-MOTOR = '[functions.motor]\ntype = "a"\ncoeff = [0.0, 1.0, 0.0]\n'
-
-
-TYPES = sorted(load_registry().sources)
-
-
-@pytest.mark.parametrize(("kind", "keyword"), TYPES, ids=["-".join(t) for t in TYPES])
-def test_the_example_of_every_type_is_accepted_in_a_scene(kind, keyword):
-    registry = load_registry()
-    text = BODIES + MOTOR + example_of(registry.get(kind, keyword).type)
-    if 'joint = "J1"' in text:
-        text += '[joints.J1]\ntype = "sph"\nP_i = "crank.O"\nP_j = "ground.O"\n'
-    checked = check(parse(text), registry)
-    assert keyword in {e.examined.type.keyword for e in getattr(checked, f"{kind}s")}
 
 
 # ---------------------------------------------------------------------------- failures

@@ -129,7 +129,10 @@ def prepare(constants):
         # the class
         (joint(gamma=None, gama=lambda w_i: 0.0), ["defines gama", "did you mean gamma?"]),
         (joint(gama=lambda w_i: 0.0), ["defines gama", "nothing calls", "did you mean gamma?"]),
-        (joint(helper=lambda w_i: 0.0), ["defines helper", "may define C, J, gamma, nu, friction, switch, prepare"]),
+        (
+            joint(helper=lambda w_i: 0.0),
+            ["defines helper", "may define C, J, gamma, nu, friction, switch, prepare"],
+        ),
         (force(energie=lambda r_i: 0.0), ["defines energie", "did you mean energy?"]),
         (joint(gamma=None), ["does not define gamma"]),
         (joint(J=None), ["does not define J"]),

@@ -16,6 +16,7 @@ from support.graphs import (
     wheel,
 )
 
+from dap3d_core.linear import rank
 from dap3d_core.linear.plan import make_plan
 from dap3d_core.linear.rank import dense_rank, sparse_rank
 
@@ -86,36 +87,112 @@ def stiff(graph):
     return n, [(slots, 5 + (k % 2)) for k, (slots, _) in enumerate(joints)]
 
 
-@pytest.mark.parametrize("name", REDUNDANT)
-def test_both_ranks_agree(name):
-    """Singular values and pivots find the same rank; without the rows that the pivots name, the
-    others are independent and as many as the rank.
+WAYS = ("parts", "elimination", "iteration")
 
-    Pivots are squares of lengths and 1e-10 of a row's is zero. Without pivoting one in some hundred
-    random graphs has a prefix so near to singular that rounding comes up to that; these have not.
+
+@pytest.fixture
+def sparse(request, monkeypatch):
+    """The sparse rank, made to go one of its three ways, whatever the number of rows."""
+    if request.param != "parts":
+        monkeypatch.setattr(rank, "PART_ROWS", 0)
+    if request.param == "iteration":
+        monkeypatch.setattr(rank, "by_elimination", lambda problem, K: None)
+    return sparse_rank
+
+
+def projector(found):
+    """(rows, rows) on the span of the combinations that vanish: the same for every basis of it."""
+    P = np.zeros((found.rows, found.rows))
+    for dependency in found.dependencies:
+        N, rows = dependency.combinations, dependency.rows
+        assert pytest.approx(np.eye(len(N)), abs=1e-12) == N @ N.T
+        P[np.ix_(rows, rows)] = N.T @ N
+    return P
+
+
+@pytest.mark.parametrize("sparse", WAYS, indirect=True)
+@pytest.mark.parametrize("name", REDUNDANT)
+def test_both_ranks_agree(name, sparse):
+    """By the blocks the same rank is found as by singular values, the same combinations and the
+    same sets of rows that depend on each other.
+
+    Combinations are as good as rounding over the smallest singular value that is not zero, squared
+    at worst before refinement: 1e-16 / 1e-4^2.
     """
     for seed in range(4):
         rng = np.random.default_rng(seed)
         case = Case(REDUNDANT[name](rng), rng)
         dense = dense_rank(case.dense)
-        sparse = sparse_rank(case.plan, case.D, case.metric, case.places, 6 * case.n)
-        assert (dense.rank, dense.redundant, dense.dof) == (
-            sparse.rank,
-            sparse.redundant,
-            sparse.dof,
-        )
-        assert (dense.method, sparse.method) == ("svd", "pivots")
-        kept = np.delete(case.dense, sparse.shared, axis=0)
-        assert len(kept) == np.linalg.matrix_rank(kept, tol=1e-9) == dense.rank
+        found = sparse(case.plan, case.D, case.places, 6 * case.n)
+        assert (dense.rank, dense.redundant, dense.dof) == (found.rank, found.redundant, found.dof)
+        assert projector(found) == pytest.approx(projector(dense), abs=1e-8)
+        sets = [[d.rows.tolist() for d in r.dependencies] for r in (dense, found)]
+        assert sets[0] == sets[1]
 
 
-def test_sparse_rank_leaves_the_blocks_as_they_were():
-    """The blocks are scaled in a copy: D is the caller's, bit for bit."""
+def test_the_ways_are_the_ones_that_were_meant(monkeypatch):
+    """A ring has a part: singular values, elimination, inverse iteration; a chain has none."""
+    case = full_case("chain")
+    assert sparse_rank(case.plan, case.D, case.places, 6 * case.n).method == "leaves"
+    rng = np.random.default_rng(0)
+    case = Case(ring(9, 5), rng)
+    methods = []
+    for limit, proof in ((300, True), (0, True), (0, False)):
+        monkeypatch.setattr(rank, "PART_ROWS", limit)
+        if not proof:
+            monkeypatch.setattr(rank, "by_elimination", lambda problem, K: None)
+        methods.append(sparse_rank(case.plan, case.D, case.places, 6 * case.n).method)
+    assert methods == ["svd of parts", "elimination", "inverse iteration"]
+
+
+@pytest.mark.parametrize("sparse", WAYS, indirect=True)
+def test_sparse_rank_leaves_the_blocks_as_they_were(sparse):
+    """D is the caller's, bit for bit."""
     case = full_case("wheel")
-    case.metric[1:] *= 3.0
     before = case.D.copy()
-    sparse_rank(case.plan, case.D, case.metric, case.places, 6 * case.n)
+    sparse(case.plan, case.D, case.places, 6 * case.n)
     assert np.array_equal(case.D, before)
+
+
+@pytest.mark.parametrize("sparse", WAYS, indirect=True)
+@pytest.mark.parametrize("factor", [1e-3, 1e3])
+def test_rank_does_not_depend_on_the_size_of_a_row(sparse, factor):
+    """A row a thousand times shorter or longer than the others is no less and no more a row."""
+    rng = np.random.default_rng(5)
+    case = Case(ring(6, 5), rng)
+    before = sparse(case.plan, case.D, case.places, 6 * case.n)
+    case.scale_row(7, factor)
+    after = sparse(case.plan, case.D, case.places, 6 * case.n)
+    assert before.rank == after.rank == np.linalg.matrix_rank(case.dense)
+    assert np.array_equal(before.shared, after.shared)
+
+
+@pytest.mark.parametrize("sparse", WAYS, indirect=True)
+@pytest.mark.parametrize("name", ["no joints", "ring", "wheel", "two wheels", "floating"])
+def test_independent_rows_are_found_independent(sparse, name):
+    """Loops with freedoms enough: nothing depends on anything, by any way."""
+    case = full_case(name)
+    found = sparse(case.plan, case.D, case.places, 6 * case.n)
+    assert (found.rank, found.dependencies) == (len(case.dense), ())
+    assert found.shared.shape == (0,)
+
+
+def test_a_pivot_that_rounding_hides_is_no_proof():
+    """A row 1e-6 from another falls below the tolerance of pivots, the square, and depends on none:
+    its combination does not vanish, elimination gives up, and inverse iteration counts the row."""
+    rng = np.random.default_rng(3)
+    case = Case(ring(7, 3), rng)
+    row = case.start[1] + 1  # close to the row before it, by 1e-6 of its length
+    joint, place = 1, case.plan.joint_block[1]
+    for b, at in zip(case.joints[joint][0], place, strict=True):
+        if b:
+            case.D[at + 6 : at + 12] = case.D[at : at + 6] + 1e-6 * case.D[at + 6 : at + 12]
+            case.dense[row, 6 * b - 6 : 6 * b] = case.D[at + 6 : at + 12]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rank, "PART_ROWS", 0)
+        found = sparse_rank(case.plan, case.D, case.places, 6 * case.n)
+    assert found.method == "inverse iteration"
+    assert found.rank == np.linalg.matrix_rank(case.dense, tol=1e-10) == 24
 
 
 def test_dense_rank_names_the_rows_of_a_dependency():
@@ -126,9 +203,33 @@ def test_dense_rank_names_the_rows_of_a_dependency():
     D[3] = D[0] + 2.0 * D[1]
     found = dense_rank(D)
     assert (found.rows, found.columns, found.rank, found.redundant, found.dof) == (5, 12, 4, 1, 8)
-    assert found.shared == (0, 1, 3)
-    assert found.dependencies @ D == pytest.approx(np.zeros((1, 12)), abs=1e-14)
-    weights = found.dependencies[0] / found.dependencies[0, 3]
-    assert weights == pytest.approx([-1.0, -2.0, 0.0, 1.0, 0.0], abs=1e-13)
+    assert found.shared.tolist() == [0, 1, 3]
+    (dependency,) = found.dependencies
+    assert dependency.combinations @ D[[0, 1, 3]] == pytest.approx(np.zeros((1, 12)), abs=1e-14)
+    weights = dependency.combinations[0] / dependency.combinations[0, 2]
+    assert weights == pytest.approx([-1.0, -2.0, 1.0], abs=1e-13)
     assert dense_rank(np.zeros((0, 6))).rank == 0
     assert dense_rank(np.zeros((2, 6))).rank == 0
+
+
+def test_rows_that_depend_on_different_ones_are_told_apart():
+    """Rows 0, 3 and 5 vanish in one combination, rows 1 and 4 in another, whatever the mixture of
+    the two that the singular vectors are."""
+    rng = np.random.default_rng(6)
+    D = rng.normal(size=(6, 12))
+    D[5] = D[0] - 3.0 * D[3]
+    D[4] = 0.5 * D[1]
+    found = dense_rank(D)
+    assert [d.rows.tolist() for d in found.dependencies] == [[0, 3, 5], [1, 4]]
+    assert [d.combinations.shape for d in found.dependencies] == [(1, 3), (1, 2)]
+    for dependency in found.dependencies:
+        assert dependency.combinations @ D[dependency.rows] == pytest.approx(0.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("blur", [0.0, 1e-7])
+def test_a_row_within_the_blur_is_dependent(blur):
+    """Two rows 1e-9 apart: independent to rounding, dependent where 1e-7 is no difference."""
+    rng = np.random.default_rng(7)
+    D = rng.normal(size=(3, 6))
+    D[2] = D[1] + 1e-9 * rng.normal(size=6)
+    assert dense_rank(D, blur).redundant == int(blur > 0.0)

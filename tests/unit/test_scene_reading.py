@@ -9,6 +9,7 @@ import pytest
 
 import dap3d_core.scene.reading as reading
 from dap3d_core.scene import SceneError, load, shipped_models
+from dap3d_core.scene.reading import group_of
 
 TEXT = '[scene]\nname = "small"\n\n[bodies.a]\nmass = 1.0\nJp = [1.0, 1.0, 1.0]\n'
 
@@ -42,6 +43,17 @@ def test_shipped_models_are_read_by_name(monkeypatch, tmp_path):
     assert models, "there are some"
     for name, folder in models.items():
         assert load(name).path == folder / "scene.toml"
+
+
+def test_models_of_a_group_are_read_with_and_without_it(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    models = shipped_models()
+    groups = [group_of(folder) for folder in models.values()]
+    assert groups == sorted(groups), "models without a group come first"
+    assert set(groups) == {"", "benchmarks"}
+    assert load("benchmarks/A04").path == load("A04").path == models["A04"] / "scene.toml"
+    for name in ("benchmarks/pen1", "models/pen1", "other/A04", "/A04", "/pen1", "benchmarks"):
+        refused(name)
 
 
 def test_a_folder_of_the_users_own_goes_before_a_shipped_model_and_says_so(monkeypatch, tmp_path):

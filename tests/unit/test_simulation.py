@@ -492,7 +492,7 @@ def test_a_compiled_model_says_what_it_is():
     for words in [
         "3: crank, coupler, follower; 39 states, 18 accelerations",
         "2 rev, 2 sph, 1 rel-rot",
-        "17 rows, all independent; 1 degrees of freedom",
+        "17 rows, all independent; 1 degree of freedom",
         "method     standard, because the scene has joints",
         "rev (acceleration)",
         "weight: no force of this type, so there is no gravity",

@@ -31,6 +31,10 @@ KINDS = (
 )  # fmt: skip
 VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, SWITCH = range(len(KINDS))
 
+# Places in ``settings``: projection tolerances of position and velocity, a scratch number, how
+# often the multipliers did not settle with friction, and the numbers of the penalty formulation.
+TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SETTINGS = range(8)
+
 
 class System(NamedTuple):
     """Arrays of the driver. n bodies, ground is 0; rows in the order of the plan."""
@@ -44,10 +48,15 @@ class System(NamedTuple):
     nu: Floats  # (rows,)
     C: Floats  # (rows,)
     x: Floats  # (rows,) right-hand side, then -lambda
+    z: Floats  # (rows,) -lambda so far, where it comes in several passes
+    compliance: Floats  # (rows,) what regularises the joint rows
     D: Floats  # blocks of the Jacobian
     K: Floats  # blocks of what remains to be factored
     smallest: Floats  # (rows,) a pivot not above this is singular
-    settings: Floats  # projection tolerances of position and velocity; a scratch number
+    settings: Floats  # (SETTINGS,) see above
+    applied: Floats  # (6 (n+1),) scaled applied forces; this and what follows where joints rub
+    rubbing: Floats  # (6 (n+1),) friction on each body
+    memory: Floats  # (3, rows) what the iteration for friction remembers
     idx: Integers  # integers of all instances
     groups: Integers  # (loops, 3) i0, p0, count
     kinds: Integers  # (KINDS + 1,) first loop of each kind
@@ -61,9 +70,12 @@ class System(NamedTuple):
     hubs: Integers
 
 
-_matrices = ("body", "metric", "F")
+_matrices = ("body", "metric", "F", "memory")
 _integers = ("idx", "kinds", "row")
-_floats = ("par", "force", "gamma", "nu", "C", "x", "D", "K", "smallest", "settings")
+_floats = (
+    "par", "force", "gamma", "nu", "C", "x", "z", "compliance", "D", "K", "smallest", "settings",
+    "applied", "rubbing",
+)  # fmt: skip
 
 
 def _member_type(name: str) -> Any:

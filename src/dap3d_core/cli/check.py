@@ -9,20 +9,31 @@ from dap3d_core.cli.group import Command
 
 if TYPE_CHECKING:
     from dap3d_core.simulation import CompiledModel
+    from dap3d_core.simulation.redundancy import Redundancy
 
 
 @click.command(cls=Command, short_help="Validate a model, count its degrees of freedom.")
 @click.argument("model")
 @click.option("--method", metavar="NAME", help="Formulation, in place of the scene's.")
 @click.option(
+    "--correct-metric",
+    type=click.Choice(["unit", "mass"]),
+    help="The least correction is that in m and rad, or weighted by masses.",
+)
+@click.option(
     "--allow-code", is_flag=True, help="Allow the model's own types (plugin.py in its folder)."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
-def check(model: str, *, method: str | None, allow_code: bool, as_json: bool) -> int:
+def check(
+    model: str, *, method: str | None, correct_metric: str | None, allow_code: bool, as_json: bool
+) -> int:
     """Validate a MODEL; count its rows, rank and degrees of freedom.
 
     All mistakes are reported at once, each with file, line, key, what is allowed and the nearest
     right spelling; the exit code is then 2. Nothing is simulated.
+
+    Where constraints are redundant: which joints share a freedom, whether that is so at other
+    poses, whether the redundant rows agree, and which reactions are unique all the same.
     """
     import dap3d_core as dap
     from dap3d_core.cli.progress import RunProgress
@@ -35,7 +46,7 @@ def check(model: str, *, method: str | None, allow_code: bool, as_json: bool) ->
             )
         except dap.SimulationError as error:  # a method that does not fit the scene
             raise Refused(str(error)) from error
-        found = facts_of(compiled)
+        found = facts_of(compiled, correct_metric)
     if as_json:
         print_json(found)
     else:
@@ -43,22 +54,31 @@ def check(model: str, *, method: str | None, allow_code: bool, as_json: bool) ->
     return REFUSED if found["mistakes"] else DONE
 
 
-def facts_of(compiled: "CompiledModel") -> dict[str, Any]:
+def facts_of(compiled: "CompiledModel", metric: str | None = None) -> dict[str, Any]:
     """The facts of a model: its violation as given, its rank where a run would start.
 
     A start that cannot be corrected is the one mistake that is found only here.
-    """
-    from dap3d_core.simulation import AssemblyError
-    from dap3d_core.simulation.initial import correct_initial, violation
 
-    model, start = compiled.model, None
+    Args:
+        compiled: the model.
+        metric: of the correction, in place of the scene's.
+    """
+    from dap3d_core.cli.start import start_facts
+    from dap3d_core.simulation import AssemblyError
+    from dap3d_core.simulation.initial import violation
+
+    model, settings = compiled.model, compiled.scene.simulation
+    u, initial = model.u0, None
     mistakes: list[dict[str, Any]] = []
-    if model.row_count and compiled.scene.simulation.correct:
-        try:
-            start = correct_initial(compiled.machine, model.u0).u
-        except AssemblyError as error:
-            mistakes.append({"key": "joints", "what": str(error)})
-    redundancy = compiled.redundancy(start)
+    try:
+        metric = metric or str(settings.correct_metric)
+        start = compiled.start(bool(settings.correct), settings.hold, metric)
+        u, redundancy = start.u, start.redundancy
+        if start.initial is not None and model.row_count:
+            initial = start_facts(model.body_names, model.u0, u)
+    except AssemblyError as error:
+        mistakes.append({"key": "joints", "what": str(error)})
+        redundancy = compiled.redundancy()
     rank = redundancy.rank
     position, velocity = violation(compiled.machine, model.u0)
     return {
@@ -70,7 +90,9 @@ def facts_of(compiled: "CompiledModel") -> dict[str, Any]:
         "dof": rank.dof,
         "joints": list(redundancy.joints),
         "contradiction": redundancy.contradiction,
+        **_redundancy_facts(compiled, u, redundancy, assembled=not mistakes),
         "violation": {"position": position, "velocity": velocity},
+        "initial": initial,
         "method": compiled.method,
         "reason": compiled.reason,
         "joint_types": _types(model.joints),
@@ -81,6 +103,39 @@ def facts_of(compiled: "CompiledModel") -> dict[str, Any]:
     }
 
 
+def _redundancy_facts(
+    compiled: "CompiledModel", u: Any, redundancy: "Redundancy", *, assembled: bool
+) -> dict[str, Any]:
+    """Groups, other poses, contradictions, reactions; ``about`` has the same in sentences."""
+    import attrs
+
+    from dap3d_core.simulation.elsewhere import Elsewhere, redundancy_elsewhere
+
+    rank, elsewhere = redundancy.rank, Elsewhere((), None, None)
+    about: list[str] = []
+    if rank.redundant:
+        if assembled:
+            elsewhere = redundancy_elsewhere(compiled.machine, u, redundancy)
+            about.append(elsewhere.describe(redundancy))
+        about.insert(0, redundancy.describe_groups())
+        about += redundancy.describe_contradictions()
+    return {
+        "rank_method": rank.method,
+        "rank_tolerance": rank.tolerance,
+        "groups": [attrs.asdict(group) for group in redundancy.groups],
+        "everywhere": elsewhere.everywhere,
+        "redundant_elsewhere": elsewhere.redundant,
+        "poses": list(elsewhere.poses),
+        "contradictions": [attrs.asdict(c) for c in redundancy.contradictions],
+        "reactions": {
+            "unique": list(redundancy.unique_joints),
+            "shared": {r.joint: attrs.asdict(r) for r in redundancy.reactions()},
+        },
+        "about": about,
+        "about_reactions": redundancy.describe_reactions(),
+    }
+
+
 def _types(groups: Any) -> dict[str, int]:
     """Keyword -> how many elements of this type there are."""
     return {group.keyword: len(set(group.members.tolist())) for group in groups}
@@ -88,6 +143,7 @@ def _types(groups: Any) -> dict[str, int]:
 
 def _show(console: Any, compiled: "CompiledModel", found: dict[str, Any]) -> None:
     from dap3d_core.cli.rendering import count, facts, say, title
+    from dap3d_core.cli.start import show_start
     from dap3d_core.cli.summary import show_notes
 
     title(console, found["scene"] or "scene without a name")
@@ -108,7 +164,9 @@ def _show(console: Any, compiled: "CompiledModel", found: dict[str, Any]) -> Non
         ],
     )
     if found["redundant"]:
-        say(console, _about_redundancy(found), "yellow")
+        _show_redundancy(console, found)
+    if found["initial"] and found["initial"]["changed"]:
+        show_start(console, found["initial"])
     show_notes(console, found["notes"])
     for mistake in found["mistakes"]:
         say(console, mistake["what"], "bold red")
@@ -136,16 +194,21 @@ def _freedoms(found: dict[str, Any]) -> str:
     return f"{words}; {count(found['dof'], 'degree')} of freedom".replace("no degrees", "0 degrees")
 
 
-def _about_redundancy(found: dict[str, Any]) -> str:
-    from dap3d_core.simulation.redundancy import CONSISTENT
+def _show_redundancy(console: Any, found: dict[str, Any]) -> None:
+    from dap3d_core.cli.rendering import items, say, title
 
     words = (
-        f"redundant constraints: {found['redundant']} of {found['rows']} rows say what others say, "
-        f"in the joints {', '.join(found['joints'])}. Accelerations are unique, some reactions of "
-        "these joints are not."
+        f"redundant constraints: {found['redundant']} of {found['rows']} rows say what others say"
     )
-    if found["contradiction"] > CONSISTENT:
-        words += f" They contradict each other by {found['contradiction']:.2g}."
-    if found["method"] == "standard":
-        words += " The standard method refuses to run: replace a joint by one with fewer rows."
-    return words
+    say(console, words, "yellow")
+    said = list(found["about"])
+    if found["contradictions"]:
+        said.append("No motion satisfies rows that contradict each other")
+    elif found["method"] == "standard":
+        said.append(
+            "The standard method refuses to run: replace a joint by one with fewer rows, or take "
+            "--method lsq"
+        )
+    items(console, said)
+    title(console, "reactions (accelerations are unique)")
+    items(console, found["about_reactions"])

@@ -1,5 +1,6 @@
 """``dap3d describe``: a type of joint, force or function, its fields and its equations."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -8,6 +9,7 @@ from dap3d_core.cli.exits import DONE, Refused
 from dap3d_core.cli.group import Command
 
 if TYPE_CHECKING:
+    from dap3d_core.interface.checks import Examined
     from dap3d_core.registry import Registry
 
 
@@ -78,7 +80,7 @@ def type_facts(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
         "doc": inspect.cleandoc(type_.__doc__ or ""),
         "bodies": list(slots),
         "kernels": list(type_.kernels()),
-        "fields": [_field(name, spec) for name, spec in specs_of(type_).items()],
+        "fields": [_field(name, spec) for name, spec in specs_of(type_).items() if spec.given],
         "names": [
             {
                 "name": q.name,
@@ -88,15 +90,38 @@ def type_facts(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
             }
             for q in examined.names.values()
         ],
-        "example": example_of(type_),
+        "variants": [_variant(conditions, e) for conditions, e in examined.variants],
+        "example": example_of(examined, registry),
     }
     if kind == "joint":
-        facts["rows"] = type_.rows
-        facts["position_rows"] = len(type_.position_rows())
-        facts["freedoms"] = 6 * max(len(slots) - 1, 1) - type_.rows
+        facts |= _counts(examined)
     if kind == "force":
         facts["each_body"] = bool(type_.each_body)
     return facts
+
+
+def _counts(examined: "Examined") -> dict[str, Any]:
+    """Rows of a joint, how many of them are there at position level, and the freedoms it leaves."""
+    type_: Any = examined.type
+    return {
+        "rows": type_.rows,
+        "position_rows": len(type_.position_rows()),
+        "freedoms": 6 * max(len(examined.layout.slots) - 1, 1) - type_.rows,
+    }
+
+
+def _variant(conditions: Mapping[str, Any], examined: "Examined") -> dict[str, Any]:
+    """What stands for the type where fields have certain values."""
+    import inspect
+
+    type_: Any = examined.type
+    facts = {
+        "with": dict(conditions),
+        "class": type_.__name__,
+        "doc": inspect.cleandoc(type_.__doc__ or ""),
+        "kernels": list(type_.kernels()),
+    }
+    return facts | _counts(examined) if type_.kind == "joint" else facts
 
 
 def _field(name: str, spec: Any) -> dict[str, Any]:
@@ -113,9 +138,10 @@ def _field(name: str, spec: Any) -> dict[str, Any]:
 
 def _allowed(spec: Any) -> str:
     """What a value must satisfy beyond its kind."""
-    words = []
+    words = [f"of {spec.argument or 'time'}"] if spec.kind == "function" else []
     if spec.choices:
-        words.append(", ".join(spec.choices))
+        words.append(", ".join(map(_word, spec.choices)))
+        words += [f"{word} is {other}" for word, other in spec.aliases.items()]
     if spec.positive:
         words.append("> 0")
     if spec.minimum is not None:
@@ -145,6 +171,9 @@ def _show(console: Any, found: dict[str, Any], *, names: bool) -> None:
         show(console, table(columns, rows, fixed=(0, 1, 3)))
     else:
         say(console, "none", indent=2)
+    if found["variants"]:
+        title(console, "variants")
+        show(console, table(*_variants(found), fixed=(0,)))
     if names:
         title(console, f"names for its kernels ({', '.join(found['kernels'])})")
         offered = [(n["name"], _shape(n["shape"]), n["level"], n["doc"]) for n in found["names"]]
@@ -165,10 +194,32 @@ def _rows(found: dict[str, Any]) -> str:
     rows, freedoms, bodies = found["rows"], found["freedoms"], len(found["bodies"])
     words = f"{rows} constraint equation{'s' if rows > 1 else ''}"
     if found["position_rows"] < rows:
-        words += f", {found['position_rows']} of them at position level"
-    if bodies == 2:
-        words += f"; leaves {freedoms} of 6 freedoms between two bodies"
-    return words
+        words += f", {found['position_rows'] or 'none'} of them at position level"
+    if bodies < 3:
+        between = "between two bodies" if bodies == 2 else "of the body"
+        words += f"; leaves {freedoms} of 6 freedoms {between}"
+    return words + ("; see the variants" if found["variants"] else "")
+
+
+def _variants(found: dict[str, Any]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Columns and rows of the table of variants; the last row is the type itself."""
+    is_joint = found["kind"] == "joint"
+    columns = ("where", "rows", "leaves", "is") if is_joint else ("where", "is")
+    rows = []
+    for facts in found["variants"]:
+        where = ", ".join(f"{n} = {_word(v)}" for n, v in facts["with"].items())
+        rows.append((where, facts, facts["doc"].partition("\n\n")[0].replace("\n", " ")))
+    if found["kernels"]:
+        rows.append(("otherwise", found, "as above"))
+    return columns, [
+        (where, str(facts["rows"]), str(facts["freedoms"]), words) if is_joint else (where, words)
+        for where, facts, words in rows
+    ]
+
+
+def _word(value: Any) -> str:
+    """A word of a choice as a scene has it; whether a function is given."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _default(field: dict[str, Any]) -> str:
@@ -176,10 +227,15 @@ def _default(field: dict[str, Any]) -> str:
         return "required"
     default = field["default"]
     if isinstance(default, (tuple, list)):
-        return f"[{', '.join(f'{x:g}' for x in default)}]"
-    return (
-        "-" if default is None else f"{default:g}" if isinstance(default, float) else str(default)
-    )
+        return _list(default)
+    if isinstance(default, float):
+        return f"{default:g}"
+    return "-" if default is None else _word(default)
+
+
+def _list(values: Any) -> str:
+    words = [_list(x) if isinstance(x, (tuple, list)) else f"{x:g}" for x in values]
+    return f"[{', '.join(words)}]"
 
 
 def _about(field: dict[str, Any]) -> str:

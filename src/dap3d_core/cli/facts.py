@@ -54,6 +54,13 @@ def remarks_of(facts: dict[str, Any]) -> list[str]:
     return [n for n in facts["notes"] if not _is_choice(n, facts)]
 
 
+def warnings_of(facts: dict[str, Any]) -> list[str]:
+    """The notes that tell of a change of what was asked for; others are for information."""
+    from dap3d_core.result import INFORMATION
+
+    return [n for n in remarks_of(facts) if not n.startswith(INFORMATION)]
+
+
 def violations_of(facts: dict[str, Any]) -> list[str]:
     """The entries of the ledger that are beyond their limits, in words."""
     return [

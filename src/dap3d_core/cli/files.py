@@ -38,8 +38,13 @@ def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) 
     return path
 
 
-def open_result(path: str) -> "Result":
+def open_result(path: str, *, model: str | None = None, allow_code: bool = False) -> "Result":
     """The result in a file.
+
+    Args:
+        path: the file.
+        model: the model whose own types the run used.
+        allow_code: whether they may be loaded.
 
     Raises:
         Refused: it cannot be read; says why.
@@ -48,6 +53,6 @@ def open_result(path: str) -> "Result":
     from dap3d_core.result import ResultError
 
     try:
-        return dap.open(path)
+        return dap.open(path, model=model, allow_code=allow_code)
     except ResultError as error:
         raise Refused(str(error)) from error

@@ -31,7 +31,8 @@ class Command(click.Command):
         if not ctx.resilient_parsing:
             _, _, order = self.make_parser(ctx).parse_args(args=list(args))
             for option in order:
-                if isinstance(option, click.Option) and order.count(option) > 1:
+                once = isinstance(option, click.Option) and not option.multiple
+                if once and order.count(option) > 1:
                     words = f"the option {' / '.join(option.opts)} is given more than once"
                     raise click.UsageError(words, ctx)
         return super().parse_args(ctx, args)
@@ -133,6 +134,7 @@ def _tell_usage(error: click.ClickException) -> None:
 def _add_commands() -> None:
     from dap3d_core.cli.check import check
     from dap3d_core.cli.describe import describe
+    from dap3d_core.cli.import_matlab import import_matlab
     from dap3d_core.cli.info import info
     from dap3d_core.cli.models import models
     from dap3d_core.cli.plot import plot
@@ -140,7 +142,7 @@ def _add_commands() -> None:
     from dap3d_core.cli.post import post
     from dap3d_core.cli.run import run
 
-    for command in (run, check, models, plugins, describe, info, post, plot):
+    for command in (run, check, models, plugins, describe, info, post, plot, import_matlab):
         dap3d.add_command(command)
 
 

@@ -13,7 +13,7 @@ from dap3d_core.cli.group import Command
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 def models(*, as_json: bool) -> int:
     """List the shipped models."""
-    from dap3d_core.cli.rendering import output, print_json, say, show, table
+    from dap3d_core.cli.rendering import output, print_json, say, show, table, title
     from dap3d_core.scene import shipped_models
 
     found = {name: _facts(folder) for name, folder in shipped_models().items()}
@@ -21,11 +21,16 @@ def models(*, as_json: bool) -> int:
         print_json({"models": found})
         return DONE
     console = output()
-    rows = [
-        (name, str(f["bodies"]), ", ".join(f["joints"]) or "-", f["description"])
-        for name, f in found.items()
-    ]
-    show(console, table(("model", "bodies", "joints", "what it is"), rows, right=(1,), fixed=(0,)))
+    for group in dict.fromkeys(f["group"] for f in found.values()):
+        rows = [
+            (name, str(f["bodies"]), ", ".join(f["joints"]) or "-", f["description"])
+            for name, f in found.items()
+            if f["group"] == group
+        ]
+        if group:
+            title(console, group)
+        columns = ("model", "bodies", "joints", "what it is")
+        show(console, table(columns, rows, right=(1,), fixed=(0,)))
     if any(f["own_types"] for f in found.values()):
         own = ", ".join(name for name, f in found.items() if f["own_types"])
         say(console, f"With a type of its own, to be run with --allow-code: {own}")
@@ -35,12 +40,14 @@ def models(*, as_json: bool) -> int:
 def _facts(folder: Path) -> dict[str, Any]:
     """Description, bodies and joints of a model; only its scene file is read."""
     from dap3d_core.scene import SceneError, load
-    from dap3d_core.scene.reading import PLUGIN_FILE
+    from dap3d_core.scene.reading import PLUGIN_FILE, group_of
 
+    group = group_of(folder)
     try:
         scene = load(folder)
     except SceneError as error:
         return {
+            "group": group,
             "description": str(error),
             "bodies": 0,
             "joints": {},
@@ -51,6 +58,7 @@ def _facts(folder: Path) -> dict[str, Any]:
     for joint in scene.joints.values():
         joints[str(joint.type)] = joints.get(str(joint.type), 0) + 1
     return {
+        "group": group,
         "description": str(scene.description),
         "bodies": len(scene.bodies),
         "joints": joints,

@@ -7,27 +7,24 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from dap3d_core.cli import exits
-from dap3d_core.cli.facts import facts_of, remarks_of, violations_of
+from dap3d_core.cli.facts import facts_of, violations_of, warnings_of
 from dap3d_core.cli.rendering import (
     Terminal,
     facts,
     items,
     messages,
     output,
-    plain,
     print_json,
     say,
     size,
     title,
 )
-from dap3d_core.cli.summary import run_pairs, show_ledger, show_remarks, show_state
+from dap3d_core.cli.start import show_start, start_facts
+from dap3d_core.cli.summary import run_pairs, show_ledger, show_remarks
 
 if TYPE_CHECKING:
     from dap3d_core.result import Result
     from dap3d_core.simulation import CompiledModel
-
-#: Bodies whose corrected initial conditions are printed; the result has all of them.
-MOST_BODIES = 10
 
 
 @attrs.frozen(eq=False)
@@ -56,7 +53,7 @@ def tell(
         found["dof"] = outcome.compiled.redundancy(outcome.result.u[0]).rank.dof
     faults = violations_of(found)
     code = outcome.code
-    if strict and code == exits.DONE and (faults or remarks_of(found)):
+    if strict and code == exits.DONE and (faults or warnings_of(found)):
         code = exits.FAILED
     if as_json:
         print_json(
@@ -74,7 +71,7 @@ def tell(
     if outcome.reason or (quiet and not as_json):
         _show_faults(messages(), outcome, faults if quiet else [], target)
     if code != outcome.code:
-        say(messages(), "--strict: there are notes, or the ledger does not close; exit code 1")
+        say(messages(), "--strict: there are warnings, or the ledger does not close; exit code 1")
     return code
 
 
@@ -105,31 +102,14 @@ def _show_faults(console: Terminal, outcome: Outcome, faults: list[str], target:
 
 
 def _show_corrected(console: Terminal, outcome: Outcome) -> None:
-    """The corrected initial conditions, as the manual reports them."""
     initial = _initial(outcome)
-    if initial is None:
-        return
-    if not initial["changed"]:
-        say(console, "initial conditions: they fulfil the constraints, nothing was changed")
-        return
-    bodies = dict(list(initial["bodies"].items())[:MOST_BODIES])
-    more = len(initial["bodies"]) - len(bodies)
-    show_state(console, "corrected initial conditions (SI, global axes)", bodies, more)
+    if initial is not None:
+        show_start(console, initial)
 
 
 def _initial(outcome: Outcome) -> dict[str, Any] | None:
     """The initial conditions after their correction; None where none was asked for or needed."""
-    import numpy as np
-
     result = outcome.result
     if not (result.settings.get("correct") and result.subject.row_count and len(result.t)):
         return None
-    arrays = {"r": result.r[0], "p": result.p[0], "r_dot": result.rd[0], "w": result.w[0]}
-    given = outcome.compiled.model.u0
-    return {
-        "changed": bool(np.any(np.abs(result.u[0] - given) > 1e-12 * (1.0 + np.abs(given)))),
-        "bodies": {
-            name: {q: plain(values[k]) for q, values in arrays.items()}
-            for k, name in enumerate(result.subject.body_names)
-        },
-    }
+    return start_facts(result.subject.body_names, outcome.compiled.model.u0, result.u[0])

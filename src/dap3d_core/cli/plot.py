@@ -29,7 +29,9 @@ def plot(
     \b
     BODY.r .p .rd .w .wp .rdd .wd .wpd     motion of a body
     POINT.r .v .a                          motion of a point
-    JOINT.force .moment .lambda            reactions
+    JOINT.force .moment .lambda            reactions; JOINT.j.force on the body of slot j
+    JOINT.force_body .moment_body          in body axes; .moment_at_point about the joint's point
+    FORCE.length .tension .energy .force   of a spring or another force
     energy.kinetic .potential .total       energies, work
     constraint.position .velocity .acceleration
 

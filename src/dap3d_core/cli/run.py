@@ -26,6 +26,7 @@ SETTINGS = {
     "step": "--step",
     "correct": "--correct",
     "project": "--project",
+    "correct_metric": "--correct-metric",
 }
 
 _OPTIONS = (
@@ -44,11 +45,13 @@ _OPTIONS = (
                  help="Fixed step in s, without error control."),
     click.option("--correct/--no-correct", default=None,
                  help="Correct the initial conditions so that they fulfil the constraints."),
+    click.option("--correct-metric", type=click.Choice(["unit", "mass"]), default=None,
+                 help="The least correction is that in m and rad, or weighted by masses."),
     click.option("--project/--no-project", default=None,
                  help="Bring every step onto the constraints."),
     click.option("--strict", is_flag=True,
-                 help="Exit with 1 if there are notes or the ledger does not close; the result is "
-                      "saved all the same."),
+                 help="Exit with 1 if there are warnings (notes that tell of a change) or the "
+                      "ledger does not close; the result is saved all the same."),
     click.option("--force", is_flag=True, help="Overwrite an existing result."),
     click.option("--allow-code", is_flag=True,
                  help="Allow the model's own types (plugin.py in its folder) to run."),

@@ -5,17 +5,31 @@ from typing import Any
 
 from dap3d_core.assembly.system import step_functions
 
+#: Group loops of every formulation, and those of joints; each is there where the scene needs it.
+_ALL = ("value", "wrench", "energy", "angle", "switch")
+_WITH_JOINTS = (*_ALL, "acceleration", "position", "friction")
+
 #: Formulation -> the kinds of group loops that it calls.
 LOOPS = {
-    "unconstrained": ("value", "wrench", "energy"),
-    "standard": ("value", "wrench", "energy", "acceleration", "position"),
+    "unconstrained": _ALL,
+    "standard": _WITH_JOINTS,
+    "penalty": _WITH_JOINTS,
+    "lsq": _WITH_JOINTS,
 }
 
 #: Places of a formulation's functions in the list that an integrator takes.
-RHS, PROJECT, REPORT = range(3)
+RHS, PROJECT, REPORT, ACCEPTED = range(4)
 
 
-def functions_of(method: str) -> Any:
-    """A formulation's compiled (rhs, project, report) as the list that an integrator takes."""
+def functions_of(method: str, *, watched: bool) -> Any:
+    """A formulation's compiled functions as the list that an integrator takes.
+
+    They are rhs, project, report, and where something is ``watched`` at accepted steps, accepted.
+    """
     module: Any = import_module(f"dap3d_core.formulations.{method}")
-    return step_functions(module.rhs, module.project, module.report)
+    functions = [module.rhs, module.project, module.report]
+    if watched:
+        from dap3d_core.formulations.accepted import accepted
+
+        functions.append(accepted)
+    return step_functions(*functions)

@@ -14,6 +14,9 @@ from dap3d_core.kernels.loops import Loop, build
 from dap3d_core.linear.plan import Plan
 from dap3d_core.model import Group, Model
 
+#: Usual alpha, Omega (1/s), mu of the penalty formulation (spec 9).
+PENALTY = (1e7, 10.0, 1.0)
+
 
 def build_loops(
     model: Model, kinds: tuple[str, ...], announce: Callable[[str], None] | None = None
@@ -36,7 +39,9 @@ def build_loops(
 
 
 def _groups_for(model: Model, kind: str) -> tuple[Group, ...]:
-    return model.friction if kind == "friction" else (*model.functions, *model.forces, *model.joints)
+    if kind == "friction":
+        return model.friction
+    return (*model.functions, *model.forces, *model.joints)
 
 
 def _compiled(loop: Loop, group: Group, announce: Callable[[str], None] | None) -> Any:
@@ -78,10 +83,15 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         nu=np.zeros(plan.row_size),
         C=np.zeros(plan.row_size),
         x=np.zeros(plan.row_size),
+        z=np.zeros(plan.row_size),
+        compliance=np.zeros(plan.row_size),
         D=np.zeros(plan.block_size),
         K=np.zeros(plan.matrix_size),
         smallest=np.zeros(plan.row_size),
-        settings=np.array([1e-15, 1e-15, 0.0]),
+        settings=np.array([1e-15, 1e-15, 0.0, 0.0, *PENALTY]),
+        applied=np.zeros(6 * (n + 1) if model.friction else 0),
+        rubbing=np.zeros(6 * (n + 1) if model.friction else 0),
+        memory=np.zeros((3, plan.row_size if model.friction else 0)),
         idx=idx,
         groups=groups,
         kinds=starts,

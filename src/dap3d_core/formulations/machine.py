@@ -9,7 +9,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dap3d_core.assembly.evaluate import call_loops, place_bodies
-from dap3d_core.assembly.system import ACCELERATION, POSITION, VALUE, Floats, Integers, System
+from dap3d_core.assembly.system import (
+    ACCELERATION,
+    ALPHA,
+    ANGLE,
+    MU,
+    OMEGA,
+    POSITION,
+    SWITCH,
+    UNSETTLED,
+    VALUE,
+    Floats,
+    Integers,
+    System,
+)
 from dap3d_core.formulations import LOOPS, REPORT, RHS, functions_of
 from dap3d_core.formulations.build import build_loops, build_system
 from dap3d_core.linear.plan import Plan, make_plan
@@ -52,6 +65,8 @@ class Rows:
 AS_COMPILED = np.errstate(all="ignore")
 #: Pivots are squares of lengths: a hundredth in length of what it was at the start.
 POOR = 1e-4
+#: A row whose pivot is below this many times what regularises it depends on other rows.
+REDUNDANT = 100.0
 
 
 class Machine:
@@ -61,6 +76,7 @@ class Machine:
         model, plan, system, loops: what it evaluates.
         method: name of the formulation.
         report_size: numbers that ``report`` writes (formulations/standard.py).
+        length_count: lengths that ``project`` gives (formulations/constraints.py).
     """
 
     def __init__(
@@ -68,7 +84,7 @@ class Machine:
     ) -> None:
         """Args:
         model: what to evaluate.
-        method: "unconstrained" or "standard".
+        method: "unconstrained", "standard", "penalty" or "lsq".
         announce: called with the name of each group loop that has to be compiled.
         """
         self.model = model
@@ -78,6 +94,31 @@ class Machine:
         self.system: System = build_system(model, self.plan, self.what)
         self.start_functions()
         self.report_size = 6 * model.body_count + model.row_count + 4
+        self.length_count = self.plan.row_size
+
+    @property
+    def watched(self) -> bool:
+        """Whether angles or switches are looked at, at accepted steps."""
+        kinds = self.system.kinds
+        return bool(kinds[SWITCH + 1] > kinds[ANGLE])
+
+    @property
+    def unsettled(self) -> int:
+        """How often since the start the multipliers did not settle with friction."""
+        return int(self.system.settings[UNSETTLED])
+
+    @AS_COMPILED
+    def start(self, t: float, u: ArrayLike) -> None:
+        """Make ready for a run from a state u (13 n,): whole turns are counted from here."""
+        for q, (kind, group) in enumerate(self.what):
+            if kind == "angle":
+                p0, width = int(self.system.groups[q, 1]), group.examined.layout.par_width
+                for offset in group.examined.layout.angles.values():
+                    self.system.par[p0 + offset : p0 + width * group.count : width] = 0.0
+        self._place(t, u)
+        s = self.system
+        s.settings[UNSETTLED] = 0.0
+        self._call(ANGLE, t, s.force, s.force, s.force)
 
     @AS_COMPILED
     def start_functions(self, t: float = 0.0) -> None:
@@ -86,10 +127,14 @@ class Machine:
         self._call(VALUE, t, s.force, s.force, s.force)
         s.F[:, 4] = s.F[:, 0]
 
+    def set_penalty(self, alpha: float, Omega: float, mu: float) -> None:
+        """Numbers of the penalty formulation; Omega in 1/s."""
+        self.system.settings[[ALPHA, OMEGA, MU]] = alpha, Omega, mu
+
     @cached_property
     def functions(self) -> Any:
         """The compiled functions (rhs, project, report) as the list that an integrator takes."""
-        return functions_of(self.method)
+        return functions_of(self.method, watched=self.watched)
 
     def integrated(self, u: ArrayLike) -> Floats:
         """The integrated state y (13 n + 1,) of a state u (13 n,)."""
@@ -123,19 +168,32 @@ class Machine:
     def watch_pivots(self, t: float, u: ArrayLike) -> None:
         """Remember the pivots at a state u (13 n,): below POOR of it a pose is near a singular one.
 
-        Relative to the start, because masses of very different size make small pivots, too.
+        Relative to the start, because masses of very different size make small pivots, too. Rows
+        that depend on others from the start are left alone.
         """
-        if self.method != "standard" or not self.model.row_count:
+        if self.method == "unconstrained" or not self.model.row_count:
             return
-        from dap3d_core.formulations.standard import linearise
-
         s = self.system
         self._place(t, u)
         s.smallest[:] = 0.0
-        linearise(float(t), s, self.loops, True)
+        pivots = self.pivots(t)
+        if self.method != "standard":
+            pivots[pivots < REDUNDANT * s.compliance[s.row]] = 0.0
+        s.smallest[s.row] = POOR * pivots
+
+    @AS_COMPILED
+    def pivots(self, t: float) -> Floats:
+        """(rows,) pivots of the formulation's factors at the bodies as placed; model's order."""
+        from dap3d_core.formulations.constraints import PART, factorise, linearise
+
+        s = self.system
+        linearise(float(t), s, self.loops)
+        factorise(s, None if self.method == "standard" else PART)
+        inverse = np.ones(self.plan.row_size)
         for size, first, diagonal, *_ in self.plan.nodes[:-1]:
-            inverse = s.K[diagonal : diagonal + size * size : size + 1]
-            s.smallest[first : first + size] = POOR / inverse**2
+            inverse[first : first + size] = s.K[diagonal : diagonal + size * size : size + 1]
+        result: Floats = 1.0 / inverse[s.row] ** 2
+        return result
 
     @AS_COMPILED
     def rows(self, t: float, u: ArrayLike) -> Rows:

@@ -132,7 +132,12 @@ def error_norm(
     if integer[ERRORS] == 1:
         return main
     combine(error, 0.0, y, h, table, first + 1, k)
-    other = scaled_largest(error, y, trial, size, rtol, atol)
+    return joined(main, scaled_largest(error, y, trial, size, rtol, atol))
+
+
+@compiled_inside
+def joined(main: float, other: float) -> float:
+    """One error from the estimates of order 5 and 3."""
     total = main * main + 0.01 * other * other
     if total == 0.0:
         return 0.0

@@ -60,6 +60,8 @@ class Integration:
         Number of values that ``report`` gives.
     buffer_rows
         Number of rows that wait at most to be taken by ``rows``.
+    length_count
+        Number of lengths that ``project`` gives, which vanish at singular states (crossing.py).
 
     Raises
     ------
@@ -84,6 +86,7 @@ class Integration:
         error_size: int | None = None,
         report_size: int = 0,
         buffer_rows: int = 256,
+        length_count: int = 0,
     ) -> None:
         self.method = method
         self._arguments = (functions, system, loops)
@@ -97,17 +100,18 @@ class Integration:
         if buffer_rows < 1:
             raise ValueError(f"buffer_rows is {buffer_rows}; at least one row must fit")
 
-        real = np.zeros(at.REALS)
+        real = np.zeros(at.LENGTHS + length_count)
         real[at.RTOL], real[at.ATOL] = rtol, max(atol, _SMALLEST_ATOL)
         real[at.STEP], real[at.H] = step or 0.0, first_step or 0.0
         real[at.EXPONENT], real[at.BETA] = method.exponent, method.beta
         real[at.FACTOR_MIN], real[at.FACTOR_MAX] = method.factor_min, method.factor_max
-        real[at.T], real[at.ERROR_OLD] = instants[0], 1e-4
+        real[at.T], real[at.ERROR_OLD], real[at.CALM] = instants[0], 1e-4, method.calm
         integer = np.zeros(at.INTEGERS, dtype=np.int64)
         integer[at.STAGES], integer[at.ORDER] = method.stages, method.order
         integer[at.ERROR_SIZE], integer[at.ERRORS] = error_size, len(method.e)
         integer[at.ERROR_USES_RESULT] = method.error_uses_result
         integer[at.DENSE], integer[at.PROJECT_ON] = method.dense, project_on
+        integer[at.WATCHED] = len(functions) > 3
         state = np.zeros((at.STATES, y.size))
         state[at.Y] = y
         #: All the state there is, as arrays: copied and put back, the run goes on from there.
@@ -120,6 +124,7 @@ class Integration:
             terms=np.zeros((4 + len(method.d), y.size)),
             rows=np.empty((buffer_rows, 1 + y.size + report_size)),
             table=combinations(method),
+            lengths=np.full((2, length_count), np.nan),
         )
 
     def compile(self) -> None:

@@ -70,6 +70,13 @@ class Method:
         return len(self.d) > 0
 
     @property
+    def calm(self) -> float:
+        """The middle of the widest gap between the abscissae of the stages: nothing is sampled."""
+        c = np.unique(self.c[: self.stages])
+        widest = int(np.argmax(np.diff(c)))
+        return float(0.5 * (c[widest] + c[widest + 1]))
+
+    @property
     def error_uses_result(self) -> bool:
         """Whether the error estimate needs f at the result of the step."""
         return self.adaptive and bool(np.any(self.e[:, self.stages] != 0.0))

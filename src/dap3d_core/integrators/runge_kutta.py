@@ -1,12 +1,15 @@
 """The one algorithm of all explicit Runge-Kutta methods: a compiled loop that can stop and go on.
 
-It knows a vector y and three first-class functions ``f(t, y, out, system, loops)``:
+It knows a vector y and first-class functions ``f(t, y, out, system, loops)``:
 
     rhs      out = dy/dt
     project  moves y onto its constraints in place; out[0] = 1 where y changed by more than the
              rounding of a normalisation (so that a stored dy/dt is stale), out[1] = 1 where that
-             failed, 2 where the state is too close to a singular one to go on from
+             failed, 2 where the state is too close to a singular one to go on from; out[4:] =
+             lengths that go linearly through zero at a singular state
     report   out = what else is reported at (t, y): accelerations, multipliers, ...
+    accepted (only where something is watched) takes note of an accepted state; out[0] < 0 ends the
+             run there
 
 Everything that decides what comes next lies in the arrays of ``Work``: however a run is cut into
 calls of ``advance``, its numbers are the same bit for bit. Source: Hairer, Norsett, Wanner, Solving
@@ -19,7 +22,7 @@ Ordinary Differential Equations I (HNW), II.4 to II.6.
 from collections.abc import Sequence
 from typing import Any
 
-from dap3d_core.integrators.combination import all_finite, combine, interpolate
+from dap3d_core.integrators.combination import all_finite, combine, interpolate, scaled_largest
 from dap3d_core.integrators.control import (
     LARGEST,
     SAFETY,
@@ -27,11 +30,16 @@ from dap3d_core.integrators.control import (
     end_of_step,
     error_norm,
     first_step,
+    joined,
     reject,
 )
+from dap3d_core.integrators.crossing import aim, is_near, look_ahead, look_back
 from dap3d_core.integrators.method import ABSCISSA, Floats, Integers
 from dap3d_core.integrators.work import (
+    ATOL,
+    CALM,
     DENSE,
+    ERROR_SIZE,
     ERROR_USES_RESULT,
     ERRORS,
     EXPONENT,
@@ -39,8 +47,10 @@ from dap3d_core.integrators.work import (
     FINISHED,
     FRESH,
     H_DENSE,
+    LENGTHS,
     NEXT,
     NOT_FINITE,
+    OTHER,
     OUTCOME,
     POOR,
     PROJECT_ON,
@@ -49,15 +59,20 @@ from dap3d_core.integrators.work import (
     REPORTS,
     RHS,
     ROW,
+    RTOL,
     RUNNING,
     SCRATCH,
     STAGES,
     STATUS,
     STEP,
     STEP_FLOOR,
+    STEPS,
+    SWITCH,
+    SWITCHED,
     T_DENSE,
     T_STOP,
     TRIAL,
+    WATCHED,
     Function,
     H,
     T,
@@ -91,10 +106,15 @@ def advance(
         if times[integer[NEXT]] <= real[T]:
             if not report_reached(work, project, report, system, loops):
                 return
+        elif real[SWITCH] < 0.0:
+            real[T_STOP], integer[STATUS] = real[T], SWITCHED
         elif integer[RHS] > limit:
             return
         else:
+            steps = integer[STEPS]
             step(work, rhs, project, system, loops)
+            if integer[WATCHED] != 0 and integer[STEPS] > steps:
+                functions[3](real[T], work.state[Y], real[SWITCH:], system, loops)
 
 
 @compiled_inside
@@ -163,8 +183,7 @@ def project_state(
 def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) -> None:
     """Try one step: accept it, reject it, or stop the run."""
     real, integer, times, k = work.real, work.integer, work.times, work.k
-    t, y, trial, argument = real[T], work.state[Y], work.state[TRIAL], work.state[SCRATCH]
-    stages, table = integer[STAGES], work.table
+    t, y = real[T], work.state[Y]
     if integer[FRESH] == 0:
         integer[RHS] += 1
         rhs(t, y, k[0], system, loops)
@@ -174,26 +193,33 @@ def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) 
             return
     adaptive = real[STEP] == 0.0
     if adaptive and real[H] == 0.0:
-        real[H] = first_step(real, integer, times, y, k, argument, rhs, system, loops)
+        scratch = work.state[SCRATCH]
+        real[H] = first_step(real, integer, times, y, k, scratch, rhs, system, loops)
     t1 = end_of_step(real, integer, times)
-    h = t1 - t
-    last = stages if integer[ERROR_USES_RESULT] != 0 else stages - 1
-    for i in range(1, stages + 1):
-        x = trial if i == stages else argument
-        combine(x, 1.0, y, h, table, i, k)
-        if i <= last:
-            c = table[i, ABSCISSA]
-            rhs(t1 if c == 1.0 else t + c * h, x, k[i], system, loops)
-    integer[RHS] += last
-    error = error_norm(real, integer, work.state, k, table, h) if adaptive else 0.0
+    longest = t1 - t
+    h = aim(work.lengths, real[CALM], longest) if adaptive else longest
+    if h < longest:
+        t1 = t + h
+    near = integer[PROJECT_ON] != 0 and is_near(work.lengths, h)
+    take_stages(work, t1, h, near, rhs, project, system, loops)
+    error = 0.0
+    if adaptive and near:
+        error = kept_error(work, t1, h, project, system, loops)
+    elif adaptive:
+        error = error_norm(real, integer, work.state, k, work.table, h)
     if error <= 1.0:
         failure = land(work, t1, rhs, project, system, loops)
         if failure == RUNNING and adaptive and is_poor(real, integer, times, t1):
             integer[POOR] += 1
-            reject(real, integer, times, t1, h * ELSEWHERE, STEP_FLOOR)
+            look_ahead(work.lengths, real[LENGTHS:], h)
+            shorter = h if aim(work.lengths, real[CALM], h) < h else h * ELSEWHERE
+            reject(real, integer, times, t1, shorter, STEP_FLOOR)
         elif failure == RUNNING:
             integer[POOR] = 0
+            look_back(work.lengths, real[LENGTHS:], h)
             accept(real, integer, times, work.state, k, t1, error)
+            if h < longest:
+                real[H] = max(real[H], longest)
         else:
             reject(real, integer, times, t1, h * RETREAT, failure)
     elif error <= LARGEST:
@@ -201,6 +227,68 @@ def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) 
         reject(real, integer, times, t1, h * factor, STEP_FLOOR)
     else:
         reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)
+
+
+@compiled_inside
+def take_stages(
+    work: Work,
+    t1: float,
+    h: float,
+    near: bool,
+    rhs: Function,
+    project: Function,
+    system: Any,
+    loops: Any,
+) -> None:
+    """Stages and trial state of a step to t1; each on the constraints if ``near``."""
+    real, integer, k, table = work.real, work.integer, work.k, work.table
+    stages = integer[STAGES]
+    last = stages if integer[ERROR_USES_RESULT] != 0 else stages - 1
+    for i in range(1, stages + 1):
+        x = work.state[TRIAL] if i == stages else work.state[SCRATCH]
+        combine(x, 1.0, work.state[Y], h, table, i, k)
+        if i <= last:
+            c = table[i, ABSCISSA]
+            t = t1 if c == 1.0 else real[T] + c * h
+            if near:
+                on_constraints(work, t, x, project, system, loops)
+                x = work.state[SCRATCH]
+            rhs(t, x, k[i], system, loops)
+    integer[RHS] += last
+
+
+@compiled_inside
+def on_constraints(
+    work: Work, t: float, x: Floats, project: Function, system: Any, loops: Any
+) -> None:
+    """The state x of a stage, projected, into the scratch row (x may be that row)."""
+    argument = work.state[SCRATCH]
+    for i in range(x.size):
+        argument[i] = x[i]
+    project_state(work.real, work.integer, t, argument, project, system, loops)
+
+
+@compiled_inside
+def kept_error(
+    work: Work, t1: float, h: float, project: Function, system: Any, loops: Any
+) -> float:
+    """The error of a step as ``error_norm`` has it, but of the projected result.
+
+    Near a singular state rounding errors are large in a direction that projection takes away.
+    """
+    real, integer, table, k = work.real, work.integer, work.table, work.k
+    y, trial, result, other = (work.state[Y], work.state[TRIAL], work.state[SCRATCH],
+                               work.state[OTHER])  # fmt: skip
+    on_constraints(work, t1, trial, project, system, loops)
+    main = 0.0
+    for e in range(integer[ERRORS]):
+        combine(other, 1.0, trial, -h, table, k.shape[0] + e, k)
+        project_state(real, integer, t1, other, project, system, loops)
+        for i in range(other.size):
+            other[i] -= result[i]
+        size = scaled_largest(other, y, result, integer[ERROR_SIZE], real[RTOL], real[ATOL])
+        main = size if e == 0 else joined(main, size)
+    return main
 
 
 @compiled_inside
@@ -225,13 +313,17 @@ def land(work: Work, t1: float, rhs: Function, project: Function, system: Any, l
     known = integer[ERROR_USES_RESULT] != 0
     if integer[DENSE] != 0 and times[integer[NEXT]] < t1:
         t, argument, table = real[T], work.state[SCRATCH], work.table
+        near = integer[PROJECT_ON] != 0 and is_near(work.lengths, t1 - t)
         if not known:
             integer[RHS] += 1
             rhs(t1, trial, k[result], system, loops)
             known = True
         for i in range(result + 1, k.shape[0]):
+            at = t + table[i, ABSCISSA] * (t1 - t)
             combine(argument, 1.0, y, t1 - t, table, i, k)
-            rhs(t + table[i, ABSCISSA] * (t1 - t), argument, k[i], system, loops)
+            if near:
+                on_constraints(work, at, argument, project, system, loops)
+            rhs(at, argument, k[i], system, loops)
         integer[RHS] += k.shape[0] - 1 - result
         prepare_dense(real, integer, work.state, k, work.terms, table, t1)
     failure = project_state(real, integer, t1, trial, project, system, loops)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from dap3d_core.integrators.method import Floats, Integers
 
-#: ``f(t, y, out, system, loops)``: rhs, project or report (runge_kutta.py).
+#: ``f(t, y, out, system, loops)``: rhs, project, report or accepted (runge_kutta.py).
 Function = Callable[..., None]
 
 
@@ -18,34 +18,35 @@ class Status(IntEnum):
     STEP_FLOOR = 2  # the error asks for a step that time cannot resolve
     NOT_FINITE = 3  # dy/dt, y or a reported quantity became infinite or not a number
     PROJECTION_FAILED = 4
+    SWITCHED = 5  # a switch of the model became negative
 
 
 # The same as plain integers, for compiled code.
 RUNNING, FINISHED = int(Status.RUNNING), int(Status.FINISHED)
 STEP_FLOOR, NOT_FINITE = int(Status.STEP_FLOOR), int(Status.NOT_FINITE)
-PROJECTION_FAILED = int(Status.PROJECTION_FAILED)
+PROJECTION_FAILED, SWITCHED = int(Status.PROJECTION_FAILED), int(Status.SWITCHED)
 
-# Places in ``real``. Settings; a STEP of 0 lets the error choose it.
-RTOL, ATOL, STEP, EXPONENT, BETA, FACTOR_MIN, FACTOR_MAX = range(7)
+# Places in ``real``. Settings; a STEP of 0 lets the error choose it. CALM: see Method.calm.
+RTOL, ATOL, STEP, EXPONENT, BETA, FACTOR_MIN, FACTOR_MAX, CALM = range(8)
 # What changes: time, next step, error of the last accepted step, start and length of the step that
 # the dense output belongs to, start of the present run of equal steps, time of what stopped
-# the run, and the four numbers that project gives.
-T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, OUTCOME = range(7, 15)
-REALS = OUTCOME + 4
+# the run, the lowest switch of the model, and what project gives: four numbers, then lengths.
+T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, SWITCH, OUTCOME = range(8, 17)
+LENGTHS = OUTCOME + 4
 # Places in ``integer``. Settings.
-STAGES, ORDER, ERROR_SIZE, ERRORS, ERROR_USES_RESULT, DENSE, PROJECT_ON = range(7)
+STAGES, ORDER, ERROR_SIZE, ERRORS, ERROR_USES_RESULT, DENSE, PROJECT_ON, WATCHED = range(8)
 # What changes. POOR: landings in a row that project called poor. FRESH: k[0] is f(t, y).
 # GAP_STEP of GAP_STEPS: in the present run of equal steps.
-STATUS, NEXT, ROW, FRESH, LAST_REJECTED, GAP_STEP, GAP_STEPS = range(7, 14)
-STEPS, REJECTED, RHS, PROJECTIONS, REPORTS, POOR, INTEGERS = range(14, 21)
+STATUS, NEXT, ROW, FRESH, LAST_REJECTED, GAP_STEP, GAP_STEPS = range(8, 15)
+STEPS, REJECTED, RHS, PROJECTIONS, REPORTS, POOR, INTEGERS = range(15, 22)
 # Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch.
-Y, TRIAL, SCRATCH, STATES = range(4)
+Y, TRIAL, SCRATCH, OTHER, STATES = range(5)
 
 
 class Work(NamedTuple):
     """All that ``advance`` reads and writes; n components, S stages (method.Method)."""
 
-    real: Floats  # (REALS,)
+    real: Floats  # (LENGTHS + m,) m lengths that project gives
     integer: Integers  # (INTEGERS,)
     times: Floats  # (nt,) reporting times, increasing, t0 first and t_end last
     state: Floats  # (STATES, n)
@@ -53,3 +54,4 @@ class Work(NamedTuple):
     terms: Floats  # (4 + rows of d, n) of the dense output over the last step
     rows: Floats  # (capacity, 1 + n + report_size) rows t, y, report that wait to be taken
     table: Floats  # method.combinations
+    lengths: Floats  # (2, m) at t, and their rates over the last step (crossing.py)

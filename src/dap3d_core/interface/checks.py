@@ -89,10 +89,10 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
         PluginError: with file, type, function and remedy.
     """
     own_variants = type_.variants if "variants" in vars(type_) else ()
+    for conditions, class_ in own_variants:
+        _check_conditions(type_, conditions, class_)
     variants = tuple((conditions, examine(class_, seed)) for conditions, class_ in own_variants)
     _check_class(type_, is_abstract=bool(variants))
-    for conditions, variant in variants:
-        _check_conditions(type_, conditions, variant.type)
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
     names = namespace(type_, layout)
@@ -254,6 +254,10 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
             f"{who} declares more than one vector2, and each would have the ends P_i and P_j; "
             "declare points, and form the others in the kernel: sub(r_Q_j, r_Q_i)"
         )
+    taken = {f"{q}_{s}" for q in ("r", "A", "p", "w", "mass", "Jp") for s in body_slots(type_)}
+    for name in specs_of(type_):
+        if name in taken:
+            raise PluginError(f"{who} has a field {name}, which is the body's; take another name")
     allowed = [*type_.kernel_names, "prepare"]
     for name, value in vars(type_).items():
         is_public = isinstance(value, (staticmethod, FunctionType)) and not name.startswith("_")

@@ -151,7 +151,7 @@ def choice(
 
 def joint(*, doc: str = "") -> Any:
     """A joint by name, whose kernel ``friction`` the force acts by."""
-    return _field(FieldSpec("joint", doc=doc))
+    return _field(FieldSpec("joint", REQUIRED, doc=doc))
 
 
 def angle(first: str, second: str, about: str, *, doc: str = "") -> Any:

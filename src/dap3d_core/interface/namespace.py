@@ -16,6 +16,7 @@
 | always | ``t`` |
 | a joint's ``friction`` | ``lam`` (its multipliers) ``mu v_tol radius`` |
 
+A field ``v_i`` takes the place of the velocity of that name; other names of a body are taken.
 Names after a semicolon are of the velocity level: a position-level kernel may not ask for them.
 """
 
@@ -84,7 +85,8 @@ def namespace(type_: type[TypeBase], layout: Layout) -> dict[str, Quantity]:
     for s in layout.slots:
         _offer_body(offer, s)
     for name, spec in specs_of(type_).items():
-        if name not in layout.constants and name not in names:  # x is a function's argument
+        is_argument = name == "x" and type_.kind == "function"
+        if name not in layout.constants and not is_argument:  # v_i may be a vector, not a velocity
             _offer_field(offer, name, spec, layout)
     for name in layout.constants:
         _offer_constant(offer, name, layout)
@@ -172,17 +174,19 @@ def _offer_point(offer: Callable[..., None], name: str, s: str, layout: Layout) 
     offer(arm, (3,), f"rotate(x_A_{s}, {local})", (f"A_{s}",), doc=f"arm of {name}, global, m")
     offer(f"r_{name}", (3,), f"add(x_r_{s}, x_{arm})", (f"r_{s}", arm), doc=place)
     offer(rate, (3,), f"cross(x_w_{s}, x_{arm})", (f"w_{s}", arm), True, "rate of the arm, m/s")
-    offer(f"v_{name}", (3,), f"add(x_v_{s}, x_{rate})", (f"v_{s}", rate), True, speed)
+    code = f"add(vector_at(body, b_{s}, V), x_{rate})"  # a field may have the name v_i
+    offer(f"v_{name}", (3,), code, (rate,), True, speed)
 
 
 def _offer_vector(offer: Callable[..., None], name: str, s: str | None, layout: Layout) -> None:
     """A vector fixed in the body of slot s, or in a body of its own where s is its own name."""
     local = _stored(layout, name)
+    needs: tuple[str, ...] = ()
     if s in layout.slots:
         turned, turning, needs = f"x_A_{s}", f"x_w_{s}", (f"A_{s}", f"w_{s}")
         fixed = f"vector fixed in body {s}, global"
     else:
-        turned, turning, needs = f"matrix_at(body, b_{s}, A)", f"vector_at(body, b_{s}, W)", ()
+        turned, turning = f"matrix_at(body, b_{s}, A)", f"vector_at(body, b_{s}, W)"
         fixed = "vector fixed in a body of the element, global"
     offer(name, (3,), f"rotate({turned}, {local})", needs[:1], doc=fixed)
     rate = f"cross({turning}, x_{name})"

@@ -28,7 +28,7 @@ class TypeBase:
         if "kernel_names" in vars(cls):  # Joint, Force, Function themselves
             return
         if conditions:  # class NoSlip(Disk, slip="xyz"): a variant of the type that has the keyword
-            root = next(base for base in cls.__mro__ if "keyword" in vars(base))
+            root: Any = next(base for base in cls.__mro__ if "keyword" in vars(base))
             root.variants = (*root.variants, (conditions, cls))
         for name in cls.kernel_names:
             function = vars(cls).get(name)

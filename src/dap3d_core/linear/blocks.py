@@ -7,6 +7,10 @@ is then [I D^^T; D^ 0], and eliminating a body leaves -D^ D^^T between its joint
 
 K holds the blocks that remain, by columns of the lower triangle. The pivot of a node is L L^T for a
 hub and -L L^T for a joint (its ``sign``). The diagonal of L is stored inverted.
+
+With ``regularise`` the matrix is [I D^^T; D^ -E] with a positive diagonal E, the compliance of the
+rows: it can be factored in any order, whatever the rank of D^ (Vanderbei, Symmetric quasidefinite
+matrices, SIAM J. Optim. 5, 1995).
 """
 
 import numpy as np
@@ -78,6 +82,31 @@ def assemble(targets: Integers, contributions: Integers, D: Floats, K: Floats) -
                     K[o + r * n + k] = 1.0 if r == k else 0.0
 
 
+@compiled_inside
+def weigh_rows(blocks: Integers, D: Floats, part: float, compliance: Floats) -> None:
+    """E of each joint row, ``part`` of the squared length of the row in D^; zero on hub rows."""
+    for k in range(compliance.shape[0]):
+        compliance[k] = 0.0
+    for q in range(blocks.shape[0]):
+        o, f = blocks[q, 0], blocks[q, 3]
+        for r in range(blocks[q, 2]):
+            s = 0.0
+            for c in range(o, o + 6):
+                s += D[c] * D[c]
+            compliance[f + r] += part * s
+            o += 6
+
+
+@compiled
+def regularise(nodes: Integers, compliance: Floats, K: Floats) -> None:
+    """Subtract E from the pivots of the joints, between ``assemble`` and ``factor``."""
+    for k in range(nodes.shape[0] - 1):
+        m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        if nodes[k, 3] < 0:
+            for r in range(m):
+                K[d + r * (m + 1)] -= compliance[f + r]
+
+
 @compiled
 def factor(
     nodes: Integers, columns: Integers, updates: Integers, K: Floats, smallest: Floats, drop: bool
@@ -133,6 +162,20 @@ def factor(
 
 
 @compiled_inside
+def pivot_lengths(nodes: Integers, K: Floats, smallest: Floats, lengths: Floats) -> None:
+    """Square roots of the pivots, from the factors of K; of a pivot that is not positive, 0.
+
+    Near a singular pose they go linearly through zero. Rows that nobody watches (``smallest`` is
+    zero) give 1.
+    """
+    for k in range(nodes.shape[0] - 1):
+        m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        for r in range(m):
+            length = 1.0 / K[d + r * (m + 1)] if smallest[f + r] > 0.0 else 1.0
+            lengths[f + r] = length if length > 0.0 else 0.0
+
+
+@compiled_inside
 def solve(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
     """Solve K z = x in place, with the factors of K."""
     count = nodes.shape[0] - 1
@@ -179,6 +222,8 @@ def solve_saddle(
     g: Floats,
 ) -> None:
     """Solve [I D^^T; D^ 0] (a; -lambda) = (g; x): g becomes a, and the rows of x become -lambda.
+
+    With factors of a regularised K: [I D^^T; D^ -E] (a; -lambda) = (g; x).
 
     Args:
         g: (6 (n+1),) in the bodies' scaled coordinates; ground's six stay zero.

@@ -216,8 +216,8 @@ class Grouping:
             numbers[:, offset : offset + size(shape)] = values
         tables = []
         for name, (offset, columns) in examined.layout.tables.items():
-            for k, values in enumerate(given):
-                rows = np.asarray(values[name], dtype=float).reshape(-1, columns)
+            for k, of_instance in enumerate(given):
+                rows = np.asarray(of_instance[name], dtype=float).reshape(-1, columns)
                 numbers[k, offset + 1] = len(rows)
                 tables.append((k, offset, rows))
         return numbers, tables

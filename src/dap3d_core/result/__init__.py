@@ -7,11 +7,12 @@ from dap3d_core.result.motion import Energy
 from dap3d_core.result.quantities import Quantity, find
 from dap3d_core.result.reactions import Reaction
 from dap3d_core.result.reading import open_result
-from dap3d_core.result.record import Record, Statistics, current_versions
+from dap3d_core.result.record import INFORMATION, Record, Statistics, current_versions
 from dap3d_core.result.result import Result
 from dap3d_core.result.writing import ResultWriter
 
 __all__ = [
+    "INFORMATION",
     "Energy",
     "Entry",
     "Quantity",

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dap3d_core.result.arrays import COLUMNS
-from dap3d_core.result.layout import CONSTANTS, attributes
-from dap3d_core.result.quantities import AXES, EULER
+from dap3d_core.result.kinds import AXES, EULER
+from dap3d_core.result.layout import CONSTANTS, NAMES, attributes
 
 if TYPE_CHECKING:
     import xarray
@@ -55,14 +55,19 @@ def dataset_of(result: "Result") -> "xarray.Dataset":
         about = {"units": constant.unit, "long_name": constant.meaning}
         variables[constant.name] = (constant.dimensions, getattr(subject, constant.name), about)
     owners = np.repeat(np.array(subject.joint_names, dtype=str), subject.joint_rows)
+    labels = {
+        "body": subject.body_names,
+        "point": subject.point_names,
+        "joint": subject.joint_names,
+        "axis": AXES,
+        "euler": EULER,
+    }
     coordinates = {
+        name: (name, np.array(names, dtype=str), {"units": "1", "long_name": NAMES[name]})
+        for name, names in labels.items()
+    } | {
         "time": ("time", result.t, {"units": "s", "long_name": "time"}),
-        "body": ("body", np.array(subject.body_names, dtype=str)),
-        "point": ("point", np.array(subject.point_names, dtype=str)),
-        "joint": ("joint", np.array(subject.joint_names, dtype=str)),
-        "row_joint": ("row", owners, {"long_name": "joint of the constraint row"}),
-        "axis": ("axis", list(AXES)),
-        "euler": ("euler", list(EULER)),
+        "row_joint": ("row", owners, {"units": "1", "long_name": "joint of the constraint row"}),
     }
     about_all = attributes(subject, result.record)
     return xarray.Dataset(variables, coordinates, about_all)

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.result.arrays import COLUMNS, Arrays, column_sizes
-from dap3d_core.result.quantities import AXES, EULER
+from dap3d_core.result.kinds import AXES, EULER
 from dap3d_core.result.record import Record, Statistics, to_json
 
 if TYPE_CHECKING:

@@ -17,25 +17,35 @@ def accelerations(v_dot: Floats) -> tuple[Floats, Floats]:
 def point_motion(
     subject: Subject, u: Floats, v_dot: Floats, points: Integers, level: int
 ) -> Floats:
-    """Position, velocity or acceleration of points, global axes.
+    """Position, velocity or acceleration of points of a subject, (nt, k, 3), global axes.
+
+    Args:
+        subject: whose points.
+        u, v_dot, level: as ``motion_of`` has them.
+        points: (k,) places of the points.
+    """
+    return motion_of(subject.point_body[points], subject.point_local[points], u, v_dot, level)
+
+
+def motion_of(body: Integers, local: Floats, u: Floats, v_dot: Floats, level: int) -> Floats:
+    """Position, velocity or acceleration of points fixed in bodies, global axes.
 
     r_P = r + s, v_P = r_dot + omega x s, a_P = r_ddot + omega_dot x s + omega x (omega x s).
 
     Args:
-        subject: whose points.
+        body: (k,) body of each point, 0 for ground.
+        local: (k, 3) place of each in the axes of its body, m.
         u: (nt, 13 n) states.
         v_dot: (nt, 6 n) accelerations.
-        points: (k,) places of the points.
         level: 0 position (m), 1 velocity (m/s), 2 acceleration (m/s^2).
 
     Returns:
         (nt, k, 3). Points of the ground stand still.
     """
-    body, local = subject.point_body[points], subject.point_local[points]
     out = np.zeros((len(u), len(body), 3))
     moving = body > 0
     b = body[moving] - 1
-    r, p, rd, w = split(u, subject.body_count)
+    r, p, rd, w = split(u, v_dot.shape[-1] // 6)
     s = to_global(p[:, b], local[moving])
     if level == 0:
         out[:, ~moving] = local[~moving]

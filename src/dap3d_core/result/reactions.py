@@ -1,14 +1,17 @@
 """What joints do to bodies, and the Jacobian: evaluated again at reported states (spec 2, 10)."""
 
+from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
-from dap3d_core.model.groups import Floats, Group
+from dap3d_core.model import Model
+from dap3d_core.model.groups import Floats, Group, Integers
+from dap3d_core.model.kinematics import split, to_body, to_global
 
 if TYPE_CHECKING:
-    from dap3d_core.formulations.machine import Machine
+    from dap3d_core.formulations.machine import Machine, Rows
 
 #: With more constraint rows than this the Jacobian is a list of sparse arrays.
 DENSE_ROWS = 1000
@@ -16,17 +19,48 @@ DENSE_ROWS = 1000
 
 @attrs.frozen(eq=False)
 class Reaction:
-    """What a joint exerts on one of its bodies.
+    """What a joint, or a force element, exerts on one of its bodies at nt instants.
 
     Attributes:
         body: name of the body.
         force: (nt, 3) N, global axes.
         moment: (nt, 3) N m about the body's mass centre, global axes; for ground about the origin.
+        p: (nt, 4) Euler parameters of the body.
+        local: (3,) m, the element's own point on this body (``P_i`` for slot i), body axes; None
+            where its type has none.
     """
 
     body: str
     force: Floats
     moment: Floats
+    p: Floats
+    local: Floats | None
+
+    @property
+    def force_body(self) -> Floats:
+        """(nt, 3) N, the force in body axes: A^T f."""
+        return to_body(self.p, self.force)
+
+    @property
+    def moment_body(self) -> Floats:
+        """(nt, 3) N m, the moment about the mass centre in body axes: A^T n."""
+        return to_body(self.p, self.moment)
+
+    @property
+    def moment_at_point(self) -> Floats | None:
+        """(nt, 3) N m, the moment about the element's own point on this body, global axes.
+
+        n - s x f with the arm s of the point; None where the type has no such point.
+        """
+        if self.local is None:
+            return None
+        return self.moment - np.cross(to_global(self.p, self.local), self.force)
+
+
+def rows_at(machine: "Machine", t: Floats, u: Floats) -> Iterator["Rows"]:
+    """The constraint rows at each instant, one after the other."""
+    for time, state in zip(t, u, strict=True):
+        yield machine.rows(time, state)
 
 
 def jacobians(machine: "Machine", t: Floats, u: Floats) -> Any:
@@ -42,81 +76,115 @@ def jacobians(machine: "Machine", t: Floats, u: Floats) -> Any:
     """
     model = machine.model
     if model.row_count > DENSE_ROWS:
-        return [machine.rows(time, state).sparse() for time, state in zip(t, u, strict=True)]
+        return [rows.sparse() for rows in rows_at(machine, t, u)]
     D = np.zeros((len(t), model.row_count, 6 * model.body_count))
-    for k, (time, state) in enumerate(zip(t, u, strict=True)):
-        D[k] = machine.rows(time, state).dense()
+    for k, rows in enumerate(rows_at(machine, t, u)):
+        D[k] = rows.dense()
     return D
 
 
+@np.errstate(all="ignore")  # as compiled code does
 def reactions(
-    machine: "Machine", t: Floats, u: Floats, Lam: Floats, joint: int
-) -> dict[str, Reaction]:
-    """What one joint exerts on each of its bodies: D_slot^T lambda (spec 2).
-
-    The joint's own loop fills blocks of its own, so that ground has its block too: in the driver
-    the blocks of ground share a place that nothing reads.
+    machine: "Machine", t: Floats, u: Floats, Lam: Floats, joints: Collection[int]
+) -> dict[int, dict[str, Reaction]]:
+    """What joints exert on each of their bodies: D_slot^T lambda (spec 2).
 
     Args:
         machine: evaluates the model.
         t: (nt,) s.
         u: (nt, 13 n) states.
         Lam: (nt, m) multipliers, m rows in the order of the model.
-        joint: place of the joint in the model.
+        joints: places of the joints in the model.
 
     Returns:
-        A reaction for each slot, by its letter.
+        For each joint a reaction for each slot, by its letter.
     """
-    from dap3d_core.assembly.evaluate import call_loops, place_bodies
-    from dap3d_core.assembly.system import VALUE
-
-    model, s = machine.model, machine.system
-    q, group, member = _loop_of(machine, joint)
-    slots, rows = group.examined.layout.slots, int(model.joint_rows[joint])
-    idx, groups = _own_place(machine, q, group, member, rows)
-    D, gamma, nu = np.zeros(len(slots) * rows * 6), np.zeros(rows), np.zeros(rows)
-    first = int(model.joint_start[joint])
-    out = np.empty((len(t), len(slots), 6))
-    for k, (time, state) in enumerate(zip(t, u, strict=True)):
-        place_bodies(machine.integrated(state), s.body, s.metric)
-        shared = (float(time), s.body, s.F)
-        call_loops(s.kinds[VALUE], s.kinds[VALUE + 1], *shared, s.idx, s.par, s.groups,
-                   machine.loops, s.force, s.force, s.force)  # fmt: skip
-        call_loops(q, q + 1, *shared, idx, s.par, groups, machine.loops, D, gamma, nu)
-        blocks = D.reshape(len(slots), rows, 6)
-        out[k] = np.einsum("srv,r->sv", blocks, Lam[k, first : first + rows])
-    names = ("ground", *model.body_names)
+    loops = _own_loops(machine, np.array(list(joints), dtype=np.int64))
+    found = [np.empty((len(t), *loop.shape)) for loop in loops]
+    for k, time in placed(machine, t, u):
+        for loop, out in zip(loops, found, strict=True):
+            out[k] = loop.wrenches(time, Lam[k])
     return {
-        slot: Reaction(names[body], out[:, n, :3], out[:, n, 3:])
-        for n, (slot, body) in enumerate(zip(slots, model.joint_slots[joint], strict=True))
+        int(joint): actions_of(machine.model, u, loop.group, place, out[:, n])
+        for loop, out in zip(loops, found, strict=True)
+        for n, (joint, place) in enumerate(zip(loop.joints, loop.places, strict=True))
     }
 
 
-def _loop_of(machine: "Machine", joint: int) -> tuple[np.int64, Group, int]:
-    """The loop that evaluates a joint's rows, its group, and the joint's place there."""
+def placed(machine: "Machine", t: Floats, u: Floats) -> Iterator[tuple[int, float]]:
+    """Put the bodies and functions of a machine to each instant in turn: its place, the time."""
+    from dap3d_core.assembly.evaluate import call_loops, place_bodies
+    from dap3d_core.assembly.system import VALUE
+
+    s = machine.system
+    for k, y in enumerate(machine.integrated(u) if len(t) else ()):
+        time = float(t[k])
+        place_bodies(y, s.body, s.metric)
+        call_loops(s.kinds[VALUE], s.kinds[VALUE + 1], time, s.body, s.F, s.idx, s.par, s.groups,
+                   machine.loops, s.force, s.force, s.force)  # fmt: skip
+        yield k, time
+
+
+def actions_of(
+    model: Model, u: Floats, group: Group, place: int, wrenches: Floats
+) -> dict[str, Reaction]:
+    """Wrenches (nt, slots, 6) of an instance of a group, at its place there, by slot."""
+    layout, p = group.examined.layout, split(u, model.body_count)[1]
+    names, found = ("ground", *model.body_names), {}
+    for n, (slot, body) in enumerate(zip(layout.slots, group.bodies[place], strict=True)):
+        at, shape = layout.numbers.get(f"P_{slot}", (0, ()))
+        local = group.numbers[place, at : at + 3] if shape == (3,) else None
+        turned = p[:, body - 1] if body else np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(u), 4))
+        force, moment = wrenches[:, n, :3], wrenches[:, n, 3:]
+        found[slot] = Reaction(names[body], force, moment, turned, local)
+    return found
+
+
+def _own_loops(machine: "Machine", joints: Integers) -> list["_OwnLoop"]:
+    """Loops over some joints, each with arrays of its own, by type."""
+    loops = []
     for q, (kind, group) in enumerate(machine.what):
         if kind == "acceleration":
-            found = np.flatnonzero(group.members == joint)
-            if len(found):
-                return np.int64(q), group, int(found[0])
-    raise AssertionError("every joint has a loop")
+            places = np.flatnonzero(np.isin(group.members, joints))
+            if len(places):
+                loops.append(_OwnLoop(machine, q, group, places))
+    return loops
 
 
-def _own_place(
-    machine: "Machine", q: np.int64, group: Group, member: int, rows: int
-) -> tuple[Any, Any]:
-    """Integers and group table with which the loop q runs over one joint, into arrays of its own.
+class _OwnLoop:
+    """The loop of a type over some of its joints, into arrays of its own.
 
+    So that ground has its blocks, too: in the driver they share a place that nothing reads.
     interface/writer.py says how an instance's integers are laid out: row and blocks stand last.
     """
-    from dap3d_core.interface.writer import stride
 
-    s, examined = machine.system, group.examined
-    width, slots = stride(examined), len(examined.layout.slots)
-    i0, p0, _ = s.groups[q]
-    idx = s.idx[i0 + member * width : i0 + (member + 1) * width].copy()
-    idx[-slots - 1] = 0
-    idx[-slots:] = 6 * rows * np.arange(slots)
-    groups = s.groups.copy()
-    groups[q] = 0, p0 + member * examined.layout.par_width, 1
-    return idx, groups
+    def __init__(self, machine: "Machine", q: int, group: Group, places: Integers) -> None:
+        from dap3d_core.interface.writer import stride
+
+        s, model, count = machine.system, machine.model, len(places)
+        self.machine, self.q, self.group, self.places = machine, q, group, places
+        self.joints = group.members[places]
+        slots, rows = len(group.examined.layout.slots), int(model.joint_rows[self.joints[0]])
+        self.shape = count, slots, 6
+        self._rows = model.joint_start[self.joints][:, None] + np.arange(rows)
+        width, numbers = stride(group.examined), group.examined.layout.par_width
+        i0, p0, _ = s.groups[q]
+        idx = s.idx[i0 : i0 + group.count * width].reshape(-1, width)[places]
+        idx[:, -slots - 1] = rows * np.arange(count)
+        idx[:, -slots:] = 6 * rows * np.arange(count * slots).reshape(count, slots)
+        self._idx = idx.ravel()
+        par = s.par[p0 : p0 + group.count * numbers].reshape(group.count, numbers)
+        self._par = np.concatenate([s.par, par[places].ravel()])  # tables keep their places
+        self._groups = s.groups.copy()
+        self._groups[q] = 0, len(s.par), count
+        self._D = np.zeros((count, slots, rows, 6))
+        self._gamma, self._nu = np.zeros(count * rows), np.zeros(count * rows)
+
+    def wrenches(self, time: float, Lam: Floats) -> Floats:
+        """(joints, slots, 6) D^T lambda where the bodies stand, with multipliers Lam (m,)."""
+        from dap3d_core.assembly.evaluate import call_loops
+
+        s, D = self.machine.system, self._D.reshape(-1)
+        call_loops(self.q, self.q + 1, time, s.body, s.F, self._idx, self._par,
+                   self._groups, self.machine.loops, D, self._gamma, self._nu)  # fmt: skip
+        return np.asarray(np.einsum("msrv,mr->msv", self._D, Lam[self._rows]))

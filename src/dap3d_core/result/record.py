@@ -12,6 +12,8 @@ import attrs
 
 #: How a run can have ended.
 STATUSES = ("done", "interrupted", "stopped")
+#: How a note begins that changes nothing of what was asked for: no warning to ``--strict``.
+INFORMATION = "for information: "
 #: Stands in a file that is still being written, or whose writer was killed.
 RUNNING = "running"
 
@@ -104,6 +106,14 @@ class Record:
             return str(tomllib.loads(head)["scene"]["name"])
         except (tomllib.TOMLDecodeError, KeyError, TypeError):
             return ""
+
+    @property
+    def force_names(self) -> tuple[str, ...]:
+        """Names of the forces of the scene, in file order."""
+        try:
+            return tuple(tomllib.loads(self.scene_text).get("forces", {}))
+        except (tomllib.TOMLDecodeError, TypeError):
+            return ()
 
     @property
     def tolerances(self) -> tuple[float, float] | None:

@@ -5,15 +5,14 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-import numpy as np
-
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats
-from dap3d_core.model.kinematics import split, to_body
+from dap3d_core.result.applied import Applied, applied
 from dap3d_core.result.arrays import COLUMNS, Arrays, arrays_of
 from dap3d_core.result.errors import ResultError, unknown
+from dap3d_core.result.kinematics import Kinematics
 from dap3d_core.result.ledger import Entry, ledger_of
-from dap3d_core.result.motion import Energy, accelerations, kinetic_energy, point_motion
+from dap3d_core.result.motion import Energy, kinetic_energy
 from dap3d_core.result.quantities import find
 from dap3d_core.result.reactions import Reaction, jacobians, reactions
 from dap3d_core.result.record import Record, Statistics
@@ -38,7 +37,7 @@ class Values(NamedTuple):
     unit: str
 
 
-class Result:
+class Result(Kinematics):
     """What a run left behind: n bodies, m constraint rows, nP points at nt instants.
 
     Stored are t, u, v_dot, Lam, work and the potential energy; the other arrays of the manual's
@@ -51,8 +50,6 @@ class Result:
         record: what the run says of itself.
     """
 
-    subject: Subject
-    arrays: Arrays
     record: Record
 
     def __init__(
@@ -125,6 +122,7 @@ class Result:
         self.subject, self.arrays, self.record = subject, arrays, record
         self._make_origin = origin
         self._reactions: dict[str, dict[str, Reaction]] = {}
+        self._applied: dict[str, Applied] = {}
 
     def __reduce__(self) -> Any:
         """For other processes: everything but the model and the machine."""
@@ -139,21 +137,6 @@ class Result:
         )
 
     # ------------------------------------------------------------------ what is stored
-
-    @property
-    def t(self) -> Floats:
-        """(nt,) reported instants, s. T of the manual."""
-        return self.arrays.t
-
-    @property
-    def u(self) -> Floats:
-        """(nt, 13 n) states: r, p, then r_dot, omega of each body; uT of the manual."""
-        return self.arrays.u
-
-    @property
-    def v_dot(self) -> Floats:
-        """(nt, 6 n) accelerations: r_ddot (m/s^2), omega_dot (rad/s^2) of each body."""
-        return self.arrays.v_dot
 
     @property
     def Lam(self) -> Floats:
@@ -205,69 +188,6 @@ class Result:
         """The scene that was run, as the text of a scene file."""
         return self.record.scene_text
 
-    # ------------------------------------------------------------------ bodies
-
-    @property
-    def r(self) -> Floats:
-        """(nt, n, 3) positions of the mass centres, m."""
-        return split(self.u, self.subject.body_count)[0]
-
-    @property
-    def p(self) -> Floats:
-        """(nt, n, 4) Euler parameters."""
-        return split(self.u, self.subject.body_count)[1]
-
-    @property
-    def rd(self) -> Floats:
-        """(nt, n, 3) velocities, m/s."""
-        return split(self.u, self.subject.body_count)[2]
-
-    @property
-    def w(self) -> Floats:
-        """(nt, n, 3) angular velocities, rad/s, global axes."""
-        return split(self.u, self.subject.body_count)[3]
-
-    @cached_property
-    def wp(self) -> Floats:
-        """(nt, n, 3) angular velocities, rad/s, body axes: A^T omega."""
-        return to_body(self.p, self.w)
-
-    @property
-    def rdd(self) -> Floats:
-        """(nt, n, 3) accelerations, m/s^2."""
-        return accelerations(self.v_dot)[0]
-
-    @property
-    def wd(self) -> Floats:
-        """(nt, n, 3) angular accelerations, rad/s^2, global axes."""
-        return accelerations(self.v_dot)[1]
-
-    @cached_property
-    def wpd(self) -> Floats:
-        """(nt, n, 3) angular accelerations, rad/s^2, body axes: A^T omega_dot (spec 1)."""
-        return to_body(self.p, self.wd)
-
-    # ------------------------------------------------------------------ points
-
-    @cached_property
-    def rP(self) -> Floats:
-        """(nt, nP, 3) positions of the points, m; animation points come last."""
-        return self._points(0)
-
-    @cached_property
-    def rPd(self) -> Floats:
-        """(nt, nP, 3) velocities of the points, m/s."""
-        return self._points(1)
-
-    @cached_property
-    def rPdd(self) -> Floats:
-        """(nt, nP, 3) accelerations of the points, m/s^2."""
-        return self._points(2)
-
-    def _points(self, level: int) -> Floats:
-        every = np.arange(len(self.subject.point_names))
-        return point_motion(self.subject, self.u, self.v_dot, every, level)
-
     # ------------------------------------------------------------------ joints
 
     @property
@@ -284,7 +204,12 @@ class Result:
         return self._make_origin()
 
     @cached_property
-    def _machine(self) -> "Machine":
+    def machine(self) -> "Machine":
+        """What evaluates the model.
+
+        Raises:
+            ResultError: as ``model``.
+        """
         return self._origin[1]()
 
     @cached_property
@@ -295,7 +220,7 @@ class Result:
         Raises:
             ResultError: as ``model``.
         """
-        return jacobians(self._machine, self.t, self.u)
+        return jacobians(self.machine, self.t, self.u)
 
     def reaction(self, joint: str) -> Mapping[str, Reaction]:
         """What a joint exerts on each of its bodies: D^T lambda (spec 2).
@@ -308,7 +233,8 @@ class Result:
 
         Returns:
             By slot ("i", "j", "k"): ``.force`` (nt, 3) N, ``.moment`` (nt, 3) N m about the body's
-            mass centre, global axes; ``.body`` its name.
+            mass centre, global axes; ``.force_body``, ``.moment_body`` the same in body axes;
+            ``.moment_at_point`` about the joint's own point, global axes; ``.body`` its name.
 
         Raises:
             UnknownNameError: there is no such joint; names the nearest.
@@ -318,8 +244,49 @@ class Result:
         if place is None:
             raise unknown("joint", joint, self.subject.joint_names)
         if joint not in self._reactions:
-            self._reactions[joint] = reactions(self._machine, self.t, self.u, self.Lam, place)
+            self._find_reactions([place])
         return dict(self._reactions[joint])
+
+    def reactions(self) -> dict[str, Mapping[str, Reaction]]:
+        """The reactions of all joints by name, found in one pass; else as ``reaction``."""
+        names = self.subject.joint_names
+        self._find_reactions([k for k, name in enumerate(names) if name not in self._reactions])
+        return {name: dict(self._reactions[name]) for name in names}
+
+    def _find_reactions(self, joints: list[int]) -> None:
+        if joints:
+            found = reactions(self.machine, self.t, self.u, self.Lam, joints)
+            names = self.subject.joint_names
+            self._reactions |= {names[joint]: one for joint, one in found.items()}
+
+    # ------------------------------------------------------------------ forces
+
+    @cached_property
+    def force_names(self) -> tuple[str, ...]:
+        """Names of the force elements, as they stand in the scene."""
+        return self.record.force_names
+
+    def force(self, name: str) -> Applied:
+        """What a force element did, its kernels evaluated again at the reported states (spec 6).
+
+        Args:
+            name: of an element that acts on bodies of its own (not ``weight``).
+
+        Returns:
+            ``.on["i"]`` what it exerts on the body of that slot, as ``reaction`` has it;
+            ``.length``, ``.length_rate``, ``.tension`` and ``.energy``, (nt,) each, where its type
+            has them, else None.
+
+        Raises:
+            UnknownNameError: there is no such force; names the nearest.
+            ResultError: as ``model``.
+        """
+        if name not in self.force_names:
+            raise unknown("force", name, self.force_names)
+        if name not in self._applied:
+            place = self.model.force_names.index(name)
+            self._applied[name] = applied(self.machine, self.t, self.u, self.v_dot, name, place)
+        return self._applied[name]
 
     # ------------------------------------------------------------------ the whole
 
@@ -344,7 +311,7 @@ class Result:
 
         Raises:
             UnknownNameError: there is no such quantity; names the nearest.
-            ResultError: reactions of a result from a file, as ``model``.
+            ResultError: reactions and forces of a result from a file, as ``model``.
         """
         found = find(self, name)
         return Values(found.values, found.label, found.unit)

@@ -149,6 +149,7 @@ class Simulation:
         correct: whether initial positions and velocities are corrected to fulfil the constraints.
         project: whether states are projected on the constraints along the run.
         hold: names of bodies that the correction leaves where they are.
+        correct_metric: "unit" or "mass": how the least correction is measured.
         alpha, Omega, mu: parameters of the penalty formulation.
     """
 
@@ -162,6 +163,7 @@ class Simulation:
     correct: Any = attrs.field(default=True, converter=plain)
     project: Any = attrs.field(default=True, converter=plain)
     hold: Any = attrs.field(default=(), converter=plain)
+    correct_metric: Any = attrs.field(default="unit", converter=plain)
     alpha: Any = attrs.field(default=1e7, converter=plain)
     Omega: Any = attrs.field(default=10.0, converter=plain)
     mu: Any = attrs.field(default=1.0, converter=plain)

@@ -33,7 +33,8 @@ def load(source: str | os.PathLike[str]) -> Scene:
     """Read a scene; its values are checked later, all at once, by ``check``.
 
     Args:
-        source: a folder with a ``scene.toml``, a TOML file, or the name of a shipped model.
+        source: a folder with a ``scene.toml``, a TOML file, or the name of a shipped model, with
+            or without its group (``A04``, ``benchmarks/A04``).
 
     Raises:
         SceneError: there is no such file, or it is not TOML; says where and what to do.
@@ -56,13 +57,18 @@ def parse(text: str) -> Scene:
 
 
 def shipped_models() -> dict[str, Path]:
-    """The folders of the models that come with dap3d, by name."""
-    package = Path(__file__).parents[1]
-    installed = package / "models_shipped"
-    root = installed if installed.is_dir() else package.parents[1] / "models"
-    if not root.is_dir():
-        return {}
-    return {f.name: f for f in sorted(root.iterdir()) if (f / SCENE_FILE).is_file()}
+    """The folders of the models that come with dap3d, by name; those of a group come last.
+
+    A group is a folder of models, such as ``benchmarks``.
+    """
+    root = _models_folder()
+    found = [sorted(root.glob(f"{depth}/{SCENE_FILE}")) for depth in ("*", "*/*")]
+    return {file.parent.name: file.parent for group in found for file in group}
+
+
+def group_of(folder: Path) -> str:
+    """The group that the folder of a shipped model belongs to, "" if to none."""
+    return folder.parent.name if folder.parent != _models_folder() else ""
 
 
 def scene_of(data: dict[str, Any]) -> Scene:
@@ -157,24 +163,41 @@ def _find(source: Any) -> tuple[Path, list[str]]:
     if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", text):
         raise _refused(text, "a URL cannot be loaded", remedy="download it and give the file")
     path, models = Path(text), shipped_models()
+    shipped = _shipped(text, models)
     try:
         mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError, ValueError):
-        if text in models:
-            return models[text] / SCENE_FILE, []
+        if shipped is not None:
+            return shipped / SCENE_FILE, []
         raise _not_found(path, text, models) from None
     except OSError as error:
         raise _unreadable(path, error) from None
     if not stat.S_ISDIR(mode):
         return path, []
     if not (path / SCENE_FILE).exists():
-        if text in models:
-            return models[text] / SCENE_FILE, []
+        if shipped is not None:
+            return shipped / SCENE_FILE, []
         raise _no_scene_in(path, models)
     notes = []
-    if text in models and models[text].resolve() != path.resolve():
+    if shipped is not None and shipped.resolve() != path.resolve():
         notes.append(f"{text} is also the name of a shipped model; the folder {path} was read")
     return path / SCENE_FILE, notes
+
+
+def _shipped(text: str, models: dict[str, Path]) -> Path | None:
+    """The folder of the shipped model that NAME or GROUP/NAME means."""
+    folder = models.get(text.rpartition("/")[2])
+    if folder is None:
+        return None
+    names = (folder.name, Path(group_of(folder), folder.name).as_posix())
+    return folder if text in names else None
+
+
+def _models_folder() -> Path:
+    """Where the shipped models lie: in the package once installed, beside the sources before."""
+    package = Path(__file__).parents[1]
+    installed = package / "models_shipped"
+    return installed if installed.is_dir() else package.parents[1] / "models"
 
 
 def _read(path: Path) -> str:

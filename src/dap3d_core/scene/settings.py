@@ -11,6 +11,8 @@ from dap3d_core.scene.values import Fault, bounded, number_of, text_of, truth_of
 #: What ``method`` and ``integrator`` may say.
 METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq")
 INTEGRATORS = ("dopri5", "dop853", "rk4")
+#: What ``correct_metric`` may say (simulation/initial.py).
+CORRECT_METRICS = ("unit", "mass")
 #: Integrators without an error estimate, which need a step.
 FIXED_STEP = ("rk4",)
 #: Relative tolerances below are beyond double precision.
@@ -28,6 +30,7 @@ _READ: dict[str, Callable[[Any], Any]] = {
     "step": lambda v: bounded(number_of(v), positive=True),
     "correct": truth_of,
     "project": truth_of,
+    "correct_metric": lambda v: word_of(v, CORRECT_METRICS),
     "alpha": lambda v: bounded(number_of(v), positive=True),
     "Omega": lambda v: bounded(number_of(v), positive=True),
     "mu": lambda v: bounded(number_of(v), positive=True),

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from dap3d_core.formulations.machine import Machine
 from dap3d_core.kernels.cache import driver_is_cached
-from dap3d_core.linear.rank import Rank
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.scene import (
@@ -24,9 +23,10 @@ from dap3d_core.scene import (
     load,
     mistake_at,
 )
-from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.explanation import explain
 from dap3d_core.simulation.redundancy import Redundancy, redundancy_of
+from dap3d_core.simulation.start import Start, find_start
 
 Floats = NDArray[np.float64]
 Announce = Callable[[str], None]
@@ -39,7 +39,7 @@ class CompiledModel:
         scene: the scene, as it was when it was compiled.
         checked: the scene after its check.
         model: arrays, groups, row and column pointers (irc, iru, irv).
-        method: the formulation, "unconstrained" or "standard".
+        method: the formulation, "unconstrained", "standard", "penalty" or "lsq".
         reason: why this formulation.
         notes: what was changed or assumed.
         compile_time: seconds that checking, modelling and compiling took.
@@ -66,8 +66,12 @@ class CompiledModel:
             settings = attrs.evolve(scene.simulation, method=method)
             check_simulation(settings, self.model.body_names)
         asked = method or str(scene.simulation.method)
-        self.method, self.reason = choose_method(self.model, asked)
-        self.machine = Machine(self.model, self.method, announce)
+        self._starts: dict[tuple[bool, tuple[str, ...], str], Start] = {}
+        self.machine = Machine(self.model, choose_method(self.model, asked)[0], announce)
+        self.method, self.reason = self.choice(asked)
+        self.machine.method = self.method
+        settings = scene.simulation
+        self.machine.set_penalty(settings.alpha, settings.Omega, settings.mu)
         if announce is not None and not driver_is_cached("formulations"):
             announce(f"the solver ({self.method})")
         _ = self.machine.functions  # compiled here, and not on the clock of the first run
@@ -113,28 +117,63 @@ class CompiledModel:
 
     def redundancy(self, u: ArrayLike | None = None) -> Redundancy:
         """Rank of the constraints at a state u (13 n,), or as given; see ``Redundancy``."""
+        state = self.model.u0 if u is None else np.asarray(u, dtype=float)
+        for start in self._starts.values():
+            if np.array_equal(start.u, state):
+                return start.redundancy
         if u is not None:
-            return redundancy_of(self.machine, np.asarray(u, dtype=float))
+            return redundancy_of(self.machine, state)
         if self._redundancy is None:
-            if self.model.row_count:
-                self._redundancy = redundancy_of(self.machine, self.model.u0)
-            else:
-                nothing = Rank(0, 6 * self.model.body_count, 0, 0.0, "svd", (), np.zeros((0, 0)))
-                self._redundancy = Redundancy(nothing, (), 0.0)
+            self._redundancy = redundancy_of(self.machine, state)
         return self._redundancy
 
+    def start(self, correct: bool, hold: tuple[str, ...], metric: str = "unit") -> Start:
+        """Where a run starts, found once; arguments and errors as of ``find_start``."""
+        key = correct, tuple(hold), metric
+        if key not in self._starts:
+            self._starts[key] = find_start(self.machine, *key)
+        return self._starts[key]
+
+    def choice(self, asked: str) -> tuple[str, str]:
+        """The formulation that a run takes when ``asked`` for one, and the reason in words.
+
+        Raises:
+            SimulationError: the method asked for does not fit the scene.
+        """
+        method, reason = choose_method(self.model, asked)
+        if asked != "auto" or not self.model.row_count:
+            return method, reason
+        settings = self.scene.simulation
+        try:
+            start = self.start(settings.correct, settings.hold, str(settings.correct_metric))
+        except AssemblyError:  # a run tells it
+            return method, reason
+        found = start.redundancy
+        if found.rank.redundant:
+            return "lsq", f"{found.rank.redundant} of {found.rank.rows} rows are redundant"
+        return method, f"{reason}, and their rows are independent"
+
     def explain(self) -> str:
-        """What was modelled, what was left out and why, and which method was chosen and why."""
+        """What was modelled, what was left out and why, and which method was chosen and why.
+
+        The rank is that where a run would start, or as given where that cannot be assembled.
+        """
+        u, settings = self.model.u0, self.scene.simulation
+        try:
+            start = self.start(settings.correct, settings.hold, str(settings.correct_metric))
+            u, redundancy = start.u, start.redundancy
+        except AssemblyError:
+            redundancy = self.redundancy()
         return explain(
-            self.checked, self.model, self.machine, self.method, self.reason, self.redundancy()
+            self.checked, self.model, self.machine, self.method, self.reason, u, redundancy
         )
 
 
 def choose_method(model: Model, asked: str) -> tuple[str, str]:
-    """The formulation for a model, and the reason in words.
+    """The formulation for a model, as far as its number of rows decides, and the reason in words.
 
     Raises:
-        SimulationError: the method asked for does not fit the scene, or is not there yet.
+        SimulationError: the method asked for does not fit the scene.
     """
     constrained = model.row_count > 0
     if asked == "auto":
@@ -146,12 +185,8 @@ def choose_method(model: Model, asked: str) -> tuple[str, str]:
             "method unconstrained does not fit: the scene has "
             f"{len(model.joint_names)} joints with {model.row_count} rows; use standard or auto"
         )
-    if asked == "standard" and not constrained:
-        return "unconstrained", "asked for standard, but the scene has no joints"
-    if asked not in ("standard", "unconstrained"):
-        raise SimulationError(
-            f"method {asked} is not there yet; use auto, standard or unconstrained"
-        )
+    if asked != "unconstrained" and not constrained:
+        return "unconstrained", f"asked for {asked}, but the scene has no joints"
     return asked, "asked for"
 
 

@@ -3,10 +3,16 @@
 from collections import Counter
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dap3d_core.formulations.machine import Machine
 from dap3d_core.model import Group, Model
 from dap3d_core.scene import Checked, Scene
+from dap3d_core.simulation.elsewhere import redundancy_elsewhere
 from dap3d_core.simulation.redundancy import Redundancy
+
+Floats = NDArray[np.float64]
 
 
 def explain(
@@ -15,9 +21,10 @@ def explain(
     machine: Machine,
     method: str,
     reason: str,
+    u: Floats,
     redundancy: Redundancy,
 ) -> str:
-    """A text for people, one fact a line."""
+    """A text for people, one fact a line; u (13 n,) is where a run would start."""
     n, ordering = model.body_count, machine.plan.ordering
     elements = {"joints": model.joints, "forces": model.forces, "functions": model.functions}
     lines = [f"scene {checked.scene.name or '(no name)'}"]
@@ -27,6 +34,10 @@ def explain(
         lines.append(f"  {title:10s} {_counts(groups)}")
     if model.row_count:
         lines.append(f"  rows       {redundancy.describe()}")
+        lines += [f"  reactions  {words}" for words in redundancy.describe_reactions()]
+        if redundancy.rank.redundant:
+            elsewhere = redundancy_elsewhere(machine, u, redundancy)
+            lines.append(f"  poses      {elsewhere.describe(redundancy)}")
         lines.append(
             f"  matrix     {len(ordering.early)} bodies eliminated first, then "
             f"{len(ordering.nodes)} joint nodes and {len(ordering.hubs)} hubs; "

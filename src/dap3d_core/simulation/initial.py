@@ -1,4 +1,10 @@
-"""Initial conditions brought onto the constraints, at position and at velocity level (spec 8)."""
+"""Initial conditions brought onto the constraints, at position and at velocity level (spec 8).
+
+The change is the least one: of all that fulfil the linear equations D x = residual the one whose
+sum of squares is the smallest, of displacements in m and rotations in rad as they are (metric
+"unit", the manual's), or weighted by masses and inertias (metric "mass"): a heavy body then stays
+nearly where it is.
+"""
 
 from collections.abc import Collection
 from itertools import pairwise
@@ -13,6 +19,8 @@ from dap3d_core.formulations.machine import Machine, Rows
 from dap3d_core.linear.plan import Integers
 from dap3d_core.linear.rank import DENSE_ROWS, factor_independent
 from dap3d_core.model.kinematics import join, split
+from dap3d_core.result import INFORMATION
+from dap3d_core.scene import Body, Scene
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.offender import find_offender
 
@@ -23,6 +31,10 @@ TOLERANCE = 1e-10
 MOST_PASSES = 25
 #: A pass turns no body by more than this (rad), moves none by more than this part of the model.
 MOST_TURN, MOST_SHIFT = 0.5, 0.5
+#: A correction of this part of the model's size, or of the speeds, is one of rounding.
+ROUNDING = 1e-6
+#: Joints that the message of a failure lists.
+MOST_JOINTS = 10
 #: Singular values below this part of the largest are left out of the least-norm solution.
 RCOND = 1e-10
 
@@ -73,18 +85,22 @@ def violation(machine: Machine, u: Floats, t: float = 0.0) -> tuple[float, float
 
 
 def correct_initial(
-    machine: Machine, u: Floats, t: float = 0.0, hold: Collection[int] = ()
+    machine: Machine,
+    u: Floats,
+    t: float = 0.0,
+    hold: Collection[int] = (),
+    metric: str = "unit",
 ) -> Initial:
     """Correct positions by Newton's method, velocities by a linear step, each by the least change.
 
-    The least change is that of the sum of squares of displacements, rotations and velocities, as in
-    the manual. Rows without a position level do not take part in the position stage.
+    Rows without a position level do not take part in the position stage.
 
     Args:
         machine: the model.
         u: (13 n,) the state as given.
         t: time, s.
         hold: bodies, from 1, that the position stage leaves where they are.
+        metric: "unit" or "mass", see the head of this file.
 
     Raises:
         AssemblyError: the position residual does not vanish; the message has that of each joint.
@@ -94,71 +110,133 @@ def correct_initial(
         return Initial(u, before, before, 0, 0.0, 0.0)
     start = u
     held = np.array(sorted(hold), dtype=np.int64)
-    u, passes = _correct_positions(machine, u, t, held)
+    u, passes = correct_positions(machine, u, t, held, metric)
     rows = finite_rows(machine, t, u)
     residual = _velocity_residual(rows, u)
     if _largest(residual) > 0.0:
         u = u.copy()
         velocities = u[7 * machine.model.body_count :]
-        velocities -= _least_change(machine, rows, residual, t)
+        velocities -= least_change(machine, rows, residual, t, None, metric)
     moved, turned = _distance(start, u, machine.model.body_count)
     return Initial(u, before, violation(machine, u, t), passes, moved, turned)
 
 
-def _correct_positions(machine: Machine, u: Floats, t: float, held: Integers) -> tuple[Floats, int]:
-    size = _model_size(machine)
+def correction_notes(initial: Initial, machine: Machine, scene: Scene) -> list[str]:
+    """What was changed, in words.
+
+    No more than rounding, or velocities that the scene leaves open, is for information.
+    """
+    notes = []
+    position, velocity = initial.violation
+    if position > TOLERANCE:
+        mark = INFORMATION if position <= ROUNDING * model_size(machine) else ""
+        notes.append(
+            f"{mark}initial positions corrected in {initial.passes} passes: "
+            f"|C| {position:.2g} -> {initial.residual[0]:.2g}; "
+            f"bodies moved by up to {initial.moved:.2g} m and {initial.turned:.2g} rad"
+        )
+    if velocity > TOLERANCE:
+        speed = _largest(machine.model.u0[7 * machine.model.body_count :])
+        usual = attrs.fields(Body)
+        open_ = all(
+            body.r_dot is usual.r_dot.default and body.w is usual.w.default
+            for body in scene.bodies.values()
+        )
+        mark = INFORMATION if open_ or velocity <= ROUNDING * speed else ""
+        notes.append(
+            f"{mark}initial velocities corrected: "
+            f"|D v - nu| {velocity:.2g} -> {initial.residual[1]:.2g}"
+        )
+    return notes
+
+
+def correct_positions(
+    machine: Machine, u: Floats, t: float, held: Integers, metric: str = "unit"
+) -> tuple[Floats, int]:
+    """The position stage of ``correct_initial``: the state with other r and p, and the passes.
+
+    Raises:
+        AssemblyError: the residual does not vanish.
+    """
+    size = model_size(machine)
     for passes in range(MOST_PASSES + 1):
         rows = finite_rows(machine, t, u)
         if _largest(rows.C) <= TOLERANCE:
             return u, passes
         if passes == MOST_PASSES:
             break
-        change = _least_change(machine, rows, rows.C, t, held).reshape(-1, 6)
+        change = least_change(machine, rows, rows.C, t, held, metric).reshape(-1, 6)
         shift = float(np.max(np.linalg.norm(change[:, :3], axis=1)))
         turn = float(np.max(np.linalg.norm(change[:, 3:], axis=1)))
         shift_limit = MOST_SHIFT * size / shift if shift else 1.0
         turn_limit = MOST_TURN / turn if turn else 1.0
         limit = min(1.0, shift_limit, turn_limit)
-        u = _displaced(u, -limit * change, machine.model.body_count)
+        u = displaced(u, -limit * change, machine.model.body_count)
     raise AssemblyError(_failure(machine, rows.C, passes, held))
 
 
-def _least_change(
-    machine: Machine, rows: Rows, residual: Floats, t: float, held: Integers | None = None
+def least_change(
+    machine: Machine,
+    rows: Rows,
+    residual: Floats,
+    t: float,
+    held: Integers | None = None,
+    metric: str = "unit",
 ) -> Floats:
     """The shortest x (6 n,) with D x = residual, on all rows.
 
     With ``held`` (bodies, maybe none) on the position rows alone, and zero on these bodies.
     """
     if machine.model.row_count > DENSE_ROWS:
-        return _sparse_least_change(machine, residual, t, held)
+        return _sparse_least_change(machine, residual, t, held, metric)
     D = rows.dense()
     if held is None:
         held = np.zeros(0, dtype=np.int64)
     else:
         keep = machine.model.position_row
         D, residual = D[keep], residual[keep]
-    D.reshape(len(D), -1, 6)[:, held - 1] = 0.0
+    block = D.reshape(len(D), -1, 6)
+    block[:, held - 1] = 0.0
+    scale, frame = _scaling(machine)
+    if metric == "mass":
+        block[:, :, :3] *= scale
+        block[:, :, 3:] = np.einsum("mbr,brc->mbc", block[:, :, 3:], frame)
     solution: Floats = np.asarray(np.linalg.lstsq(D, residual, rcond=RCOND)[0], dtype=np.float64)
-    solution.reshape(-1, 6)[held - 1] = 0.0  # rounding
+    change = solution.reshape(-1, 6)
+    change[held - 1] = 0.0  # rounding
+    if metric == "mass":
+        _unscale(change, scale, frame)
     return solution
 
 
+def _scaling(machine: Machine) -> tuple[Floats, Floats]:
+    """1/sqrt(m) (n, 1) and B (n, 3, 3) of the bodies as placed (linear/blocks.py)."""
+    metric = machine.system.metric[1:]
+    return metric[:, :1], metric[:, 7:16].reshape(-1, 3, 3)
+
+
+def _unscale(change: Floats, scale: Floats, frame: Floats) -> None:
+    """From the coordinates in which masses are one to metres and rad in global axes, in place."""
+    change[:, :3] *= scale
+    change[:, 3:] = np.einsum("brc,bc->br", frame, change[:, 3:])
+
+
 def _sparse_least_change(
-    machine: Machine, residual: Floats, t: float, held: Integers | None
+    machine: Machine, residual: Floats, t: float, held: Integers | None, metric: str
 ) -> Floats:
-    """The same by the block factorisation, every mass and inertia set to one; for many rows."""
-    from dap3d_core.formulations.standard import correct, linearise
+    """The same by the block factorisation, for many rows; metric "unit" sets every mass to one."""
+    from dap3d_core.formulations.constraints import correct, linearise
 
     system: System = machine.system
-    metric = system.metric.copy()
+    before = system.metric.copy()
     n = machine.model.body_count
     try:
-        set_metric(system.metric, np.ones(n), np.tile(np.eye(3), (n, 1, 1)))
-        system.metric[1:, 7:16] = system.body[1:, 3:12]
+        if metric == "unit":
+            set_metric(system.metric, np.ones(n), np.tile(np.eye(3), (n, 1, 1)))
+            system.metric[1:, 7:16] = system.body[1:, 3:12]
         if held is not None:
             system.metric[held] = 0.0
-        linearise(t, system, machine.loops, False)
+        linearise(t, system, machine.loops)
         if held is not None:
             row, _, place = machine.pattern
             system.D[place[~machine.model.position_row[row]]] = 0.0
@@ -167,14 +245,13 @@ def _sparse_least_change(
         system.C[system.row] = -residual
         correct(system)
         change = system.force[6:].reshape(n, 6).copy()
+        _unscale(change, *_scaling(machine))
     finally:
-        system.metric[:] = metric
-    A = system.body[1:, 3:12].reshape(n, 3, 3)
-    change[:, 3:] = np.einsum("brc,bc->br", A, change[:, 3:])  # body axes there, global ones here
+        system.metric[:] = before
     return change.ravel()
 
 
-def _displaced(u: Floats, change: Floats, n: int) -> Floats:
+def displaced(u: Floats, change: Floats, n: int) -> Floats:
     """The state with r + dr, and with p + 1/2 G^T dtheta of unit length (dtheta global, small)."""
     r, p, v, w = split(u, n)
     e0, e, turn = p[:, :1], p[:, 1:], 0.5 * change[:, 3:]
@@ -199,7 +276,7 @@ def _velocity_residual(rows: Rows, u: Floats) -> Floats:
     return np.bincount(rows.row, rows.value * v[rows.column], minlength=rows.shape[0]) - rows.nu
 
 
-def _model_size(machine: Machine) -> float:
+def model_size(machine: Machine) -> float:
     """A length of the model: its extent, or one metre where it has none."""
     points = np.vstack([machine.model.r, machine.model.point_local])
     return float(np.max(np.abs(points), initial=0.0)) or 1.0
@@ -210,17 +287,31 @@ def _largest(values: Floats) -> float:
 
 
 def _failure(machine: Machine, C: Floats, passes: int, held: Integers) -> str:
+    """Why it failed: the joints that are open, the worst first, in lines of at most 80 columns."""
     model = machine.model
     worst = np.array([_largest(C[a:b]) for a, b in pairwise(model.joint_start)])
-    still_open = [k for k in np.argsort(-worst)[:10] if worst[k] > TOLERANCE]
+    still_open = [int(k) for k in np.argsort(-worst, kind="stable") if worst[k] > TOLERANCE]
+    types = {int(k): group.keyword for group in model.joints for k in group.members}
+    lines = [f"  {'joint':30} {'type':10} {'residual':>9}  rows"]
+    for k in still_open[:MOST_JOINTS]:
+        rows = np.flatnonzero(np.abs(C[slice(*model.joint_start[k : k + 2])]) > TOLERANCE) + 1
+        words = ", ".join(map(str, rows))
+        name = f"{_cut(model.joint_names[k], 30):30} {_cut(types[k], 10):10}"
+        lines.append(f"  {name} {worst[k]:9.3g}  {_cut(words, 25)}")
+    if len(still_open) > MOST_JOINTS:
+        lines.append(f"  and {len(still_open) - MOST_JOINTS} joints more")
     names = ", ".join(model.body_names[b - 1] for b in held)
     return "\n".join(
         [
-            "the initial positions cannot be assembled: "
+            "the initial positions cannot be assembled:",
             f"after {passes} passes these joints are still open",
-            *(f"  {model.joint_names[k]}: residual {worst[k]:.3g}" for k in still_open),
-            "check the points, axes and lengths of these joints; "
+            *lines,
+            "check the points, axes and lengths of these joints;",
             "contradictory joints cannot be assembled",
             *([f"held where they are: {names}"] if names else []),
         ]
     )
+
+
+def _cut(words: str, width: int) -> str:
+    return words if len(words) <= width else f"{words[: width - 3]}..."

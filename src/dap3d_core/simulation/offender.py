@@ -1,5 +1,7 @@
 """Who made a number that is not finite: the first body, force or joint to blame."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +27,30 @@ def find_offender(machine: Machine, t: float, y: Floats, t_stop: float) -> str:
     return ""
 
 
+@AS_COMPILED
+def find_switch(machine: Machine, t: float, y: Floats) -> str:
+    """Which switch is negative at time t with the integrated state y, and what that means."""
+    s = machine.system
+    place_bodies(y, s.body, s.metric)
+    for q, (kind, group) in enumerate(machine.what):
+        if kind != "switch":
+            continue
+        for k in range(group.count):
+            s.force[0] = 1.0
+            _call_one(machine, q, k, group, t, (s.force, s.force, s.force))
+            if s.force[0] < 0.0:
+                type_: Any = group.examined.type
+                words = type_.switch_words or "its switch became negative"
+                return f"{type_.kind} {_element(machine, group, k)} ({group.keyword}): {words}"
+    return ""
+
+
+def _element(machine: Machine, group: Group, k: int) -> str:
+    model = machine.model
+    is_joint = group.examined.type.kind == "joint"
+    return (model.joint_names if is_joint else model.force_names)[int(group.members[k])]
+
+
 def _at(machine: Machine, t: float, y: Floats) -> str:
     n = machine.model.body_count
     for b, name in enumerate(machine.model.body_names):
@@ -44,47 +70,46 @@ def _at(machine: Machine, t: float, y: Floats) -> str:
 
 def _one_is_finite(machine: Machine, q: int, k: int, kind: str, group: Group, t: float) -> bool:
     s = machine.system
-    i0, p0, _ = s.groups[q]
-    for out in (s.force, s.gamma, s.nu, s.C, s.D):
+    for out in (s.force, s.gamma, s.nu, s.C, s.D, s.x):
         out[:] = 0.0
-    joint_outs = {"acceleration": (s.D, s.gamma, s.nu), "position": (s.C, s.C, s.C)}
+    joint_outs = {"acceleration": (s.D, s.gamma, s.nu), "position": (s.C, s.C, s.C),
+                  "friction": (s.force, s.x, s.x)}  # fmt: skip
     outs = joint_outs.get(kind, (s.force, s.force, s.force))
-    loop, examined = machine.loops[q], group.examined
-    i1 = int(i0) + k * stride(examined)
-    p1 = int(p0) + k * examined.layout.par_width
-    loop(t, s.body, s.F, s.idx, s.par, i1, p1, 1, *outs)
-    return all(bool(np.all(np.isfinite(out))) for out in (*outs, s.F))
+    _call_one(machine, q, k, group, t, outs)
+    return all(bool(np.all(np.isfinite(out))) for out in (*outs, s.F[:, :4]))
+
+
+def _call_one(
+    machine: Machine, q: int, k: int, group: Group, t: float, outs: tuple[Floats, Floats, Floats]
+) -> None:
+    """Call loop q for instance k of its group alone."""
+    s = machine.system
+    i0, p0, _ = s.groups[q]
+    i1 = int(i0) + k * stride(group.examined)
+    p1 = int(p0) + k * group.examined.layout.par_width
+    machine.loops[q](t, s.body, s.F, s.idx, s.par, i1, p1, 1, *outs)
 
 
 def _title(kind: str) -> str:
     assert kind in KINDS
-    titles = {"value": "function", "wrench": "force", "energy": "the energy of force"}
+    titles = {"value": "function", "wrench": "force", "energy": "the energy of force",
+              "friction": "the friction of force"}  # fmt: skip
     return titles.get(kind, "joint")
 
 
 def _name(machine: Machine, kind: str, group: Group, k: int) -> str:
     names = {"value": machine.model.function_names, "wrench": machine.model.force_names}
-    names["energy"] = machine.model.force_names
+    names["energy"] = names["friction"] = machine.model.force_names
     return str(names.get(kind, machine.model.joint_names)[int(group.members[k])])
 
 
 def _singular(machine: Machine, t: float) -> str:
     """The joint whose rows (nearly) depend on those before, where the pose is (nearly) singular."""
-    if machine.method != "standard" or not machine.model.row_count:
+    if machine.method == "unconstrained" or not machine.model.row_count:
         return ""
-    from dap3d_core.formulations.standard import linearise
-
     s = machine.system
-    if not linearise(t, s, machine.loops, True):
+    row = np.flatnonzero(~(machine.pivots(t) > s.smallest[s.row]))
+    if not len(row):
         return ""
-    for size, first, diagonal, *_ in machine.plan.nodes[:-1]:
-        inverse = s.K[diagonal : diagonal + size * size : size + 1]
-        small = ~(1.0 / inverse**2 > s.smallest[first : first + size])
-        if np.any(small):
-            row = int(np.flatnonzero(s.row == first + int(np.flatnonzero(small)[0]))[0])
-            joint = machine.model.row_owner(row)
-            return (
-                "the pose is (nearly) singular, "
-                f"where the rows of joint {joint} depend on the others"
-            )
-    return ""
+    joint = machine.model.row_owner(int(row[0]))
+    return f"the pose is (nearly) singular, where the rows of joint {joint} depend on the others"

@@ -4,29 +4,63 @@ import os
 from collections.abc import Callable
 
 from dap3d_core.formulations.machine import Machine
+from dap3d_core.interface import PluginError
 from dap3d_core.model import Model
-from dap3d_core.result import Result
+from dap3d_core.result import Result, ResultError
 from dap3d_core.result import open_result as open_file
-from dap3d_core.scene import parse
+from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.simulation.compiled import CompiledModel
+from dap3d_core.simulation.errors import SimulationError
 
 
-def open_result(path: str | os.PathLike[str]) -> Result:
+def open_result(
+    path: str | os.PathLike[str],
+    *,
+    model: str | os.PathLike[str] | None = None,
+    allow_code: bool = False,
+) -> Result:
     """Open a result file.
 
-    Positions, velocities, accelerations, multipliers and energies come from the file; the Jacobian
-    and reactions are computed when asked for, which loads the types that the stored scene names
-    (never types of a model's own file).
+    Positions, velocities, accelerations, multipliers and energies come from the file; the Jacobian,
+    reactions and quantities of forces are computed when asked for, which loads the types that the
+    stored scene names.
 
     Args:
         path: a NetCDF file that ``Result.save`` or ``dap3d run`` wrote.
+        model: the model (a name, a folder, a file) whose own types, in its ``plugin.py``, the run
+            used. A result does not say where they stand, so that opening one never runs a file
+            that it points to.
+        allow_code: whether that ``plugin.py`` may be loaded.
 
     Raises:
         ResultError: missing, truncated, newer, or not a result.
+        SceneError: there is no such model.
     """
-    return open_file(path, _rebuild)
+    home = None if model is None else load(model).path
+
+    def rebuild(scene_text: str) -> tuple[Model, Callable[[], Machine]]:
+        scene = parse(scene_text)
+        scene.path = home
+        try:
+            compiled = CompiledModel(scene, allow_code=allow_code)
+        except (PluginError, SceneError, SimulationError) as error:
+            raise _unmade(path, error, allow_code and home is not None) from error
+        return compiled.model, lambda: compiled.machine
+
+    return open_file(path, rebuild)
 
 
-def _rebuild(scene_text: str) -> tuple[Model, Callable[[], Machine]]:
-    compiled = CompiledModel(parse(scene_text))
-    return compiled.model, lambda: compiled.machine
+def _unmade(path: str | os.PathLike[str], error: Exception, allowed: bool) -> ResultError:
+    """The error for a model that cannot be made again from the scene in a result."""
+    mistakes = getattr(error, "mistakes", None)
+    reason = mistakes[0].what if mistakes else str(error)
+    remedy = (
+        "install what brings the type"
+        if allowed
+        else "install what brings the type or, where that is the plugin.py of the model, open the "
+        "result with model=FOLDER and allow_code=True (dap3d post --model FOLDER --allow-code)"
+    )
+    return ResultError(
+        f"the model of {path} cannot be made again, which the Jacobian, reactions and forces need: "
+        f"{reason}; {remedy}. All other arrays are in the file"
+    )

@@ -10,14 +10,17 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.formulations.friction import PASSES
 from dap3d_core.integrators import METHODS, Integration, Status
 from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import Record, Result, ResultWriter, Statistics, check_target
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, check_simulation
-from dap3d_core.simulation.compiled import CompiledModel, choose_method
+from dap3d_core.simulation.compiled import CompiledModel
+from dap3d_core.simulation.elsewhere import redundancy_elsewhere
 from dap3d_core.simulation.errors import RedundantError, SimulationError
-from dap3d_core.simulation.initial import TOLERANCE, Initial, correct_initial, violation
-from dap3d_core.simulation.offender import find_offender
+from dap3d_core.simulation.initial import correction_notes, violation
+from dap3d_core.simulation.offender import find_offender, find_switch
+from dap3d_core.simulation.redundancy import CONSISTENT, Redundancy
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
@@ -49,6 +52,7 @@ def simulate(
     announce: Callable[[str], None] | None = None,
     output: str | os.PathLike[str] | None = None,
     force: bool = False,
+    correct_metric: str | None = None,
 ) -> Result:
     """Simulate a scene from t = 0 to t_end.
 
@@ -60,7 +64,7 @@ def simulate(
         t_end: final time, s; 0 solves once at t = 0.
         dt: reporting step, s; t_end / 100 when nobody gives one. When it does not divide t_end,
             t_end is reported too.
-        method: "auto", "unconstrained" or "standard".
+        method: "auto", "unconstrained", "standard", "penalty" or "lsq".
         integrator: "dopri5", "dop853" or "rk4" (which needs ``step``).
         rtol, atol: tolerances of the step's error.
         step: fixed step, s, without error control.
@@ -71,6 +75,7 @@ def simulate(
         output: result file to write. While a run of more than a second goes on its rows stand in
             ``NAME.part``, synced after every chunk: readable also when the run is killed.
         force: whether an existing output is overwritten.
+        correct_metric: "unit" or "mass": the least correction in m and rad, or by masses.
 
     Returns:
         the result. Any exception that ends the integration carries what was computed until then as
@@ -83,7 +88,8 @@ def simulate(
     """
     compiled = _compiled(scene, method, allow_code, announce)
     asked = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol,
-                 step=step, correct=correct, project=project)  # fmt: skip
+                 step=step, correct=correct, project=project,
+                 correct_metric=correct_metric)  # fmt: skip
     given: dict[str, Any] = {k: v for k, v in asked.items() if v is not None}
     settings = attrs.evolve(compiled.scene.simulation, **given)
     check_simulation(settings, compiled.model.body_names)
@@ -103,7 +109,7 @@ def _compiled(
     """
     if not isinstance(scene, CompiledModel):
         return CompiledModel(scene, method=method, allow_code=allow_code, announce=announce)
-    if method is not None and choose_method(scene.model, method)[0] != scene.method:
+    if method is not None and scene.choice(method)[0] != scene.method:
         words = f"the model was compiled for method {scene.method}; compile it for {method}"
         raise SimulationError(words)
     return scene
@@ -139,6 +145,7 @@ class _Run:
         self.compiled = compiled
         self.machine = compiled.machine
         self.settings = settings
+        self.machine.set_penalty(settings.alpha, settings.Omega, settings.mu)
         self.times = report_times(settings.t_end, settings.dt)
         self.notes = [*compiled.notes, f"method {compiled.method}: {compiled.reason}"]
         self.rows: list[Floats] = []
@@ -173,45 +180,41 @@ class _Run:
         return result
 
     def _start(self) -> Floats:
-        """The initial state, corrected if asked for; constraints must be independent there."""
-        machine, settings = self.machine, self.settings
-        u0 = machine.model.u0
-        if settings.correct:
-            hold = [machine.model.body_names.index(name) + 1 for name in settings.hold]
-            initial = correct_initial(machine, u0, hold=hold)
-            u0 = initial.u
-            self._note_correction(initial)
-        elif max(violation(machine, u0)) > OFF_CONSTRAINTS:
-            position, velocity = violation(machine, u0)
+        """The initial state, corrected if asked for; its rank must suit the method."""
+        settings, scene = self.settings, self.compiled.scene
+        metric = str(settings.correct_metric)
+        start = self.compiled.start(bool(settings.correct), settings.hold, metric)
+        if start.initial is not None:
+            self.notes += correction_notes(start.initial, self.machine, scene)
+        elif max(violation(self.machine, start.u)) > OFF_CONSTRAINTS:
+            position, velocity = violation(self.machine, start.u)
             self.notes.append(
                 f"the initial conditions violate the constraints (position {position:.2g}, "
                 f"velocity {velocity:.2g}) and were not corrected; switch correct on"
             )
-        if machine.model.row_count:
-            redundancy = self.compiled.redundancy(u0)
-            if redundancy.rank.redundant:
-                raise RedundantError(
-                    f"{redundancy.describe()}. The standard method needs independent rows"
-                )
-        return u0
+        if start.redundancy.rank.redundant:
+            self._judge_redundancy(start.redundancy, start.u)
+        return start.u
 
-    def _note_correction(self, initial: Initial) -> None:
-        position, velocity = initial.violation
-        if position > TOLERANCE:
-            self.notes.append(
-                f"initial positions corrected in {initial.passes} passes: "
-                f"|C| {position:.2g} -> {initial.residual[0]:.2g}; "
-                f"bodies moved by up to {initial.moved:.2g} m and {initial.turned:.2g} rad"
+    def _judge_redundancy(self, redundancy: Redundancy, u: Floats) -> None:
+        """Refuse redundant rows, or note what they leave open."""
+        words = redundancy.describe()
+        if self.compiled.method == "standard":
+            elsewhere = redundancy_elsewhere(self.machine, u, redundancy).describe(redundancy)
+            raise RedundantError(
+                f"{words}; {elsewhere}. The standard method needs independent rows"
             )
-        if velocity > TOLERANCE:
-            self.notes.append(
-                "initial velocities corrected: "
-                f"|D v - nu| {velocity:.2g} -> {initial.residual[1]:.2g}"
-            )
+        if redundancy.contradiction > CONSISTENT:
+            raise RedundantError(f"{words}. No motion satisfies them all")
+        least = " (reported are those of least |lambda|)" if self.compiled.method == "lsq" else ""
+        self.notes.append(
+            f"{words}. Accelerations are unique; reactions in these joints are not{least}"
+        )
 
     def _integration(self, u0: Floats) -> Integration:
         machine, settings = self.machine, self.settings
         machine.watch_pivots(0.0, u0)
+        machine.start(0.0, u0)
         y0 = machine.integrated(u0)
         width = 1 + len(y0) + machine.report_size
         try:
@@ -228,6 +231,7 @@ class _Run:
                 project_on=settings.project,
                 error_size=len(y0) - 1,  # the work does not steer the step
                 report_size=machine.report_size,
+                length_count=machine.length_count,
                 buffer_rows=max(1, min(len(self.times), BUFFER_NUMBERS // width)),
             )
         except ValueError as error:
@@ -277,8 +281,11 @@ class _Run:
             Status.STEP_FLOOR: "the step size fell to the resolution of time",
             Status.NOT_FINITE: "a number became infinite or not a number",
             Status.PROJECTION_FAILED: "the state could not be projected onto the constraints",
+            Status.SWITCHED: "",
         }[integration.status]
-        message = f"the run stopped at t = {t:.9g} s: {reason}"
+        if integration.status is Status.SWITCHED:
+            culprit = find_switch(self.machine, t, integration.y)
+        message = f"the run stopped at t = {t:.9g} s{': ' if reason else ''}{reason}"
         if culprit:
             message += f": {culprit}"
         self.notes.append(message)
@@ -288,6 +295,12 @@ class _Run:
         """The result of what was computed, whole on disk if asked for; None where nothing was."""
         if not self.rows:
             return None
+        if count := self.machine.unsettled:
+            self.notes.append(
+                f"friction: the multipliers did not settle in {PASSES} passes, {count} times of "
+                f"{integration.statistics.rhs} or more; the last ones were used. Motion there is "
+                "uncertain: a high mu may lock the joint by itself"
+            )
         record = self._record(integration, status)
         result = Result.of_run(
             self.machine.model, np.concatenate(self.rows), record, lambda: self.machine
@@ -324,5 +337,6 @@ class _Run:
                 "step": self.settings.step,
                 "project": bool(self.settings.project),
                 "correct": bool(self.settings.correct),
+                "correct_metric": str(self.settings.correct_metric),
             },
         )

@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from rigid import GRAVITY, Array, Trajectory, Z, cross, quaternion_rate, rotation, spring
+from rigid import GRAVITY, Array, Trajectory, cross, quaternion_rate, rotation, spring
 
 GROUND = -1
 
@@ -130,7 +130,7 @@ def distance(name: str, P_i: Fixed, P_j: Fixed, length: float) -> Joint:
 
 
 class Driver(NamedTuple):
-    """A driver at velocity level: a.(w_j - w_i) = rate, j the ground, a constant, rate constant."""
+    """A driver at velocity level: a.(w_j - w_i) = rate, body j at rest, a and rate constant."""
 
     name: str
     i: int
@@ -139,23 +139,37 @@ class Driver(NamedTuple):
 
 
 class Spring(NamedTuple):
-    """A linear spring between a point on a body and another point."""
+    """A linear spring, with a damper beside it, between a point on a body and another point."""
 
     tail: Fixed
     head: Fixed
     k: float
     length: float
+    c: float = 0.0
+
+
+class Moment(NamedTuple):
+    """A constant moment on a body, in global axes."""
+
+    body: int
+    n: tuple[float, float, float]
 
 
 @dataclass
 class System:
-    """Bodies, joints, one optional driver, springs and weight; see the functions for its use."""
+    """Bodies, joints, one optional driver, springs, moments and weight.
+
+    With `redundant` rows the multipliers are those of least norm; the accelerations are unique.
+    """
 
     bodies: list[Body]
     joints: list[Joint]
     driver: Driver | None = None
     springs: list[Spring] = field(default_factory=list)
+    moments: list[Moment] = field(default_factory=list)
     weight: bool = True
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    redundant: bool = False
 
     @property
     def n(self) -> int:
@@ -179,6 +193,9 @@ class System:
         if self.driver:
             row, column = np.zeros((1, 6 * self.n)), 6 * self.driver.i + 3
             row[0, column : column + 3] = -np.array(self.driver.axis.local)
+            if self.driver.axis.body != GROUND:
+                column = 6 * self.driver.axis.body + 3
+                row[0, column : column + 3] = self.driver.axis.local
             D, nu = np.concatenate([D, row]), np.append(nu, self.driver.rate)
             gamma = np.append(gamma, 0.0)
         return C, D, nu, gamma
@@ -211,13 +228,15 @@ class System:
             J = A[i] @ np.diag(body.Jp) @ A[i].T
             g[6 * i + 3 : 6 * i + 6] -= cross(w, J @ w)
             if self.weight:
-                g[6 * i : 6 * i + 3] -= body.mass * GRAVITY * Z
-                potential += body.mass * GRAVITY * r[i][2]
+                g[6 * i : 6 * i + 3] -= body.mass * GRAVITY * np.array(self.up)
+                potential += body.mass * GRAVITY * (r[i] @ self.up)
+        for moment in self.moments:
+            g[6 * moment.body + 3 : 6 * moment.body + 6] += moment.n
         motion = Motion(r, A, v[:, None])
         for element in self.springs:
             tail, head = motion.point(element.tail), motion.point(element.head)
             ends = [x[:, 0] for x in (tail.f0, tail.f1, head.f0, head.f1)]
-            F, energy, _ = spring(*ends, element.k, 0.0, element.length)
+            F, energy, _ = spring(*ends, element.k, element.c, element.length)
             potential += energy
             for end, sign in ((element.tail, 1.0), (element.head, -1.0)):
                 if end.body != GROUND:
@@ -232,7 +251,11 @@ class System:
         g, _ = self.loads(r, A, v)
         m = len(D)
         K = np.block([[self.mass_matrix(A), -D.T], [D, np.zeros((m, m))]])
-        x = np.linalg.solve(K, np.concatenate([g, gamma]))
+        right = np.concatenate([g, gamma])
+        if self.redundant:
+            x = np.linalg.lstsq(K, right, rcond=1e-11)[0]
+        else:
+            x = np.linalg.solve(K, right)
         return x[: 6 * self.n], x[6 * self.n :]
 
     def corrected(self) -> tuple[Array, Array, Array, list[float]]:
@@ -324,7 +347,7 @@ class System:
             out[f"wpd.{body.name}"] = A[i].T @ acceleration[3:]
         ends = [(joint.name, joint.i, joint.j) for joint in self.joints]
         if self.driver:
-            ends.append((self.driver.name, self.driver.i, GROUND))
+            ends.append((self.driver.name, self.driver.i, self.driver.axis.body))
         for name, i, j in ends:
             rows = self.row_range(name)
             out[f"lambda.{name}"] = lam[rows]

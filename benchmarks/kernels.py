@@ -1,0 +1,141 @@
+"""What one call of each kernel of each registered type costs, with gathering and storing.
+
+Each kernel stands alone in its loop here. In a run J, gamma and nu of a joint share one loop, and
+what they gather: that one is in the table too. The mark is 40 ns a kernel.
+"""
+
+import random
+
+import attrs
+import numpy as np
+from timing import median_seconds
+
+from dap3d_core.interface.binding import argument_functions, bind_friction, bind_functions
+from dap3d_core.interface.samples import random_pose, random_value
+from dap3d_core.interface.writer import LOOP_KINDS, stride, write
+from dap3d_core.kernels import gather
+from dap3d_core.kernels.loops import build
+from dap3d_core.registry import load_registry
+
+INSTANCES, CALLS, MARK = 1000, 50, 40.0
+#: Rows of a table, such as the pieces of a spline.
+TABLE_ROWS = 20
+
+
+def types(registry):
+    """(title, type) of all registered types and variants that have kernels."""
+    line = registry.get("function", "a")
+    for row in registry.listing():
+        if row.state != "ok":
+            continue
+        examined = registry.get(row.kind, row.keyword)
+        for conditions, e in (({}, examined), *examined.variants):
+            words = ", ".join(f"{n} = {v}" for n, v in conditions.items())
+            if any(conditions.get(n) for n in argument_functions(e.type)):
+                e = bind_functions(e, dict.fromkeys(argument_functions(e.type), line))
+            if e.kernels:
+                yield f"{row.keyword}{f' ({words})' if words else ''}", e
+
+
+def single(examined):
+    """(title of the kernel, kind of loop, type with this kernel alone), and J, gamma, nu at once.
+
+    What friction takes besides is put behind the joint's numbers.
+    """
+    for kind, names in LOOP_KINDS.items():
+        there = [n for n in names if n in examined.kernels]
+        for name in there:
+            if name == "friction":
+                yield name, kind, bind_friction(examined)
+            else:
+                yield name, kind, attrs.evolve(examined, kernels={name: examined.kernels[name]})
+        if len(there) > 1:
+            yield " + ".join(there), kind, examined
+
+
+def numbers(layout, rng):
+    """The numbers of all instances, at random; tables stand behind them."""
+    width = layout.par_width
+    par = np.array([random_value((), rng) for _ in range(INSTANCES * width)])
+    tables = []
+    for offset, columns in layout.tables.values():
+        start = len(par) + sum(t.size for t in tables)
+        rows = np.cumsum([[random_value((), rng)] * columns for _ in range(TABLE_ROWS)], axis=0)
+        par[offset : INSTANCES * width : width] = start
+        par[offset + 1 : INSTANCES * width : width] = TABLE_ROWS
+        tables.append(rows.ravel())
+    for offset, shape in layout.numbers.values():
+        if shape in ((3, 3), (4,)):  # rotation matrices, Euler parameters
+            for q in range(INSTANCES):
+                at = q * width + offset
+                values = np.ravel(random_value(shape, rng))
+                par[at : at + len(values)] = values
+    return np.concatenate([par, *tables])
+
+
+def integers(examined):
+    """A chain of bodies, one function for all, places of rows and blocks one after the other."""
+    layout, n = examined.layout, stride(examined)
+    idx = np.zeros((INSTANCES, n), dtype=np.int64)
+    q = np.arange(INSTANCES)
+    slots = len(layout.slots)
+    for k in range(slots):
+        idx[:, k] = 1 + (q + k) % INSTANCES
+    idx[:, slots : slots + len(layout.functions)] = 1
+    idx[:, slots + len(layout.functions) : layout.integers] = 1 + q[:, None]
+    if examined.type.kind == "joint":
+        rows = examined.type.rows
+        idx[:, layout.integers] = q * rows
+        for k in range(slots):
+            idx[:, layout.integers + 1 + k] = (q * slots + k) * 6 * rows
+    elif examined.type.kind == "function":
+        idx[:, -1] = 1
+    return idx.ravel()
+
+
+def bodies(rng):
+    """The body array: poses, velocities and inertias at random."""
+    body = np.array([[random_value((), rng) for _ in range(gather.BODY_WIDTH)]
+                     for _ in range(INSTANCES + 1)])  # fmt: skip
+    for one in body:
+        pose = random_pose(rng)
+        one[gather.A : gather.A + 9] = np.ravel(pose.A)
+        one[gather.P : gather.P + 4] = pose.p
+    return body
+
+
+def run(examined, kind, body, rng):
+    """A function that calls a loop CALLS times over all instances."""
+    loop = build(write(examined, kind))
+    rows = getattr(examined.type, "rows", 1)
+    F = np.array([[random_value((), rng) for _ in range(5)] for _ in range(2)])
+    size = INSTANCES * 6 * max(rows, 2) * 3
+    arguments = (0.3, body, F, integers(examined), numbers(examined.layout, rng), 0, 0, INSTANCES,
+                 np.zeros(size), np.ones(size), np.zeros(size))  # fmt: skip
+
+    def repeat():
+        for _ in range(CALLS):
+            loop(*arguments)
+
+    return repeat
+
+
+def nanoseconds(examined, kind, body, rng):
+    """The least of three medians: whatever else runs on the machine only adds."""
+    function = run(examined, kind, body, rng)
+    seconds = min(median_seconds([function], 5)[0] for _ in range(3))
+    return seconds / (CALLS * INSTANCES) * 1e9
+
+
+def measure():
+    """Rows of the table: type, kernel, nanoseconds an instance, and whether that is in the mark."""
+    rng = random.Random(1)
+    body, rows = bodies(rng), []
+    for title, examined in types(load_registry()):
+        for name, kind, one in single(examined):
+            ns = nanoseconds(one, kind, body, rng)
+            row = {"kind": examined.type.kind, "type": title, "kernel": name, "ns": ns}
+            if "+" not in name:
+                row["in_mark"] = "yes" if ns <= MARK else "no"
+            rows.append(row)
+    return rows

@@ -1,0 +1,106 @@
+"""Rotational spring, damper and actuator."""
+
+from dap3d_core.interface import (
+    Force,
+    Vector,
+    angle,
+    choice,
+    function,
+    hookimpl,
+    number,
+    vector,
+)
+from dap3d_core.kernels import atan2, cos, cross, dot, neg, scale, sin, sub
+
+interface_version = 1
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+class Torsion(Force):
+    """Spring, damper and actuator, in parallel, about an axis u common to two bodies.
+
+    Manual: ``rot_sda``; spec 6. theta is the angle of body j relative to body i about u, from v_i
+    to v_j, both projected on the plane normal to u; theta_dot = u . (w_j - w_i):
+
+        theta = atan2(u . (v_i x v_j), v_i . v_j - (v_i . u) (v_j . u))
+        T = k x + c theta_dot + n_a, moment T u on body i and -T u on body j
+        energy = k x^2 / 2
+
+    x = theta - theta_0, brought into (-pi, pi]: half a turn from theta_0 the moment of the spring
+    jumps. The actuator's moment n_a has no single-valued potential then and counts as work. With
+    ``turns`` x counts whole turns, and energy = k x^2 / 2 + n_a x. A function of x takes the place
+    of k x: T = f(x) + c theta_dot + n_a, without an energy.
+    """
+
+    keyword = "rot_sda"
+    v_i: Vector = vector(doc="direction the angle is measured from, on body i")
+    v_j: Vector = vector(doc="direction it is measured to, on body j")
+    axis: Vector = vector(doc="common axis, on either body")
+    k: float = number(default=0.0, unit="N m/rad", doc="stiffness")
+    c: float = number(default=0.0, unit="N m s/rad", doc="damping coefficient")
+    theta_0: float = number(default=0.0, unit="rad", doc="angle without moment of the spring")
+    n_a: float = number(default=0.0, unit="N m", doc="moment of the actuator, as of a spring")
+    turns: bool = choice((False, True), default=False, doc="whether whole turns are counted")
+    function: str = function(argument="theta - theta_0", doc="moment, N m, in place of k x")
+
+    def prepare(self, bodies):
+        return {"start": (cos(self.theta_0), sin(self.theta_0))}
+
+    def wrench(v_i, v_j, axis, start, w_i, w_j, k, c, n_a):
+        rate = dot(axis, sub(w_j, w_i))
+        return pair(k * wrapped(v_i, v_j, axis, start) + c * rate + n_a, axis)
+
+    def energy(v_i, v_j, axis, start, k):
+        x = wrapped(v_i, v_j, axis, start)
+        return 0.5 * k * x * x
+
+
+class Curve(Torsion, turns=False, function=True):
+    """The spring is a function of the angle."""
+
+    energy = None
+
+    def wrench(v_i, v_j, axis, start, w_i, w_j, c, n_a, f):
+        rate = dot(axis, sub(w_j, w_i))
+        return pair(f(wrapped(v_i, v_j, axis, start)) + c * rate + n_a, axis)
+
+
+class Turning(Torsion, turns=True, function=False):
+    """The spring winds up over whole turns."""
+
+    theta: float = angle("v_i", "v_j", "axis")
+
+    def wrench(axis, theta, theta_dot, k, c, theta_0, n_a):
+        return pair(k * (theta - theta_0) + c * theta_dot + n_a, axis)
+
+    def energy(theta, k, theta_0, n_a):
+        x = theta - theta_0
+        return (0.5 * k * x + n_a) * x
+
+
+class TurningCurve(Turning, turns=True, function=True):
+    """The spring is a function of the angle, over whole turns."""
+
+    energy = None
+
+    def wrench(axis, theta, theta_dot, c, theta_0, n_a, f):
+        return pair(f(theta - theta_0) + c * theta_dot + n_a, axis)
+
+
+def wrapped(v_i, v_j, axis, start):
+    """The angle theta - theta_0 in (-pi, pi]; start holds cosine and sine of theta_0."""
+    y, x = dot(axis, cross(v_i, v_j)), dot(v_i, v_j) - dot(v_i, axis) * dot(v_j, axis)
+    return atan2(y * start[0] - x * start[1], x * start[0] + y * start[1])
+
+
+def pair(T, axis):
+    """The moment T about the axis on body i, and its opposite on body j."""
+    moment = scale(T, axis)
+    return (ZERO, moment), (ZERO, neg(moment))
+
+
+@hookimpl
+def dap3d_forces():
+    """The force types of this module."""
+    return [Torsion]

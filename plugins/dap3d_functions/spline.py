@@ -1,0 +1,58 @@
+"""Spline function: a smooth curve through points."""
+
+from dap3d_core.interface import Function, hookimpl, table
+from dap3d_core.kernels import lookup
+
+interface_version = 1
+
+
+class Spline(Function):
+    """The cubic spline through the points (x_k, y_k), x increasing; two points or more.
+
+    f, f' and f'' are continuous inside. At both ends f'' = 0 (natural spline), and beyond them f
+    goes on as the straight line that touches the curve there, so that f, f' and f'' are continuous
+    everywhere. In piece k, u = x - x_k:
+
+        f = y_k + u (b_k + u (c_k + u d_k))
+
+    Give y(x) so that it is at rest at the ends where a driver is to stop there.
+    """
+
+    keyword = "spline"
+    x: tuple = table(doc="arguments of the points, increasing")
+    y: tuple = table(doc="values of the points, as many")
+    pieces: tuple = table(columns=5, given=False)
+
+    def prepare(self, bodies):
+        import numpy as np
+        from scipy.interpolate import CubicSpline
+
+        x, y = np.array(self.x), np.array(self.y)
+        if len(x) != len(y):
+            raise ValueError(f"x has {len(x)} numbers and y has {len(y)}; give as many of each")
+        if len(x) < 2:
+            raise ValueError(f"a spline takes two points or more; x and y have {len(x)}")
+        if (back := np.flatnonzero(np.diff(x) <= 0.0)).size:
+            k = int(back[0]) + 1
+            raise ValueError(
+                f"x must increase; number {k + 1}, {x[k]:g}, is not beyond the one before it, "
+                f"{x[k - 1]:g}"
+            )
+        d, c, b, a = CubicSpline(x, y, bc_type="natural").c
+        inner = np.stack([x[:-1], a, b, c, d], axis=1)
+        last = x[-1] - x[-2]
+        slope = b[-1] + last * (2.0 * c[-1] + last * 3.0 * d[-1])
+        before, after = (x[0] - last, y[0] - b[0] * last, b[0]), (x[-1], y[-1], slope)
+        return {"pieces": [[*before, 0.0, 0.0], *inner.tolist(), [*after, 0.0, 0.0]]}
+
+    def value(x, pieces):
+        start, a, b, c, d = lookup(pieces, x)
+        u = x - start
+        f = a + u * (b + u * (c + u * d))
+        return f, b + u * (2.0 * c + u * 3.0 * d), 2.0 * c + u * 6.0 * d, 6.0 * d
+
+
+@hookimpl
+def dap3d_functions():
+    """The function types of this module."""
+    return [Spline]

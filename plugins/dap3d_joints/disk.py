@@ -1,0 +1,160 @@
+"""Thin rigid disk that rolls or slides on the ground plane z = 0."""
+
+from dap3d_core.interface import Body, Joint, body, choice, hookimpl, number
+from dap3d_core.kernels import add, cross, dot, row, scale, sqrt, sub, tanh, where
+from dap3d_joints.coulomb import against
+
+interface_version = 1
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+class Disk(Joint):
+    """A disk of radius R, its axis the eta axis of body i, on the plane z = 0 (manual: ``disk``).
+
+    Spec 5. With k = z, c = k . eta and sigma = sqrt(1 - c^2), the sine of the angle between disk
+    and ground, the body origin being the disk's centre:
+
+        t = (k x eta) / sigma     longitudinal, along the track
+        n = (eta - c k) / sigma   lateral
+        s = R (c n - sigma k)     from the centre to the point of contact
+        v_c = r_dot + w x s       velocity of the material point there
+
+    slip names the rows: ``z``; ``nz``: z, n (no lateral slip); ``tz``: z, t (no longitudinal slip);
+    ``xyz``: x, y, z (no slip). Row z is the contact, also at position level; the rows u = x, y, t
+    and n say u . v_c = 0 and are of the velocity level alone:
+
+        C     = r_z - R sigma
+        J     = [u^T, (s x u)^T], for row z u = k
+        gamma = -u . (w x s_dot) - u_dot . v_c
+
+    lambda of row z is the load that the ground carries; where it is negative the ground pulls, and
+    a real disk would lift off. Friction acts along the free directions of v_c, mu max(lambda_z, 0).
+    """
+
+    keyword, rows, holonomic = "disk", 3, (False, False, True)
+    switch_words = (
+        "the disk lies down (sine of the angle between disk and ground below 0.02), "
+        "so its point of contact is undefined"
+    )
+    body_i: Body = body(doc="the disk; its origin is the centre, its y axis the disk's axis")
+    slip: str = choice(
+        ("z", "nz", "tz", "xyz"),
+        default="xyz",
+        aliases={"zn": "nz", "zt": "tz"},
+        doc="directions without slip",
+    )
+    radius: float = number(default=1.0, unit="m", positive=True, doc="radius of the disk")
+
+    def C(r_i, A_i, radius):
+        return r_i[2] - radius * axis(A_i)[1]
+
+    def J(A_i, radius):
+        _, _, s = contact(A_i, radius)
+        return row(X, cross(s, X)), row(Y, cross(s, Y)), row(Z, cross(s, Z))
+
+    def gamma(A_i, w_i, radius):
+        _, s_dot = contact_rate(A_i, w_i, radius)
+        return sub((0.0, 0.0, 0.0), cross(w_i, s_dot))
+
+    def switch(A_i):
+        return axis(A_i)[1] - 0.02
+
+
+class Sliding(Disk, slip="z"):
+    """The disk touches the ground and slides freely: row z."""
+
+    rows, holonomic = 1, True
+
+    def J(A_i, radius):
+        _, _, s = contact(A_i, radius)
+        return row(Z, cross(s, Z))
+
+    def gamma(A_i, w_i, radius):
+        _, s_dot = contact_rate(A_i, w_i, radius)
+        return -dot(Z, cross(w_i, s_dot))
+
+    def friction(lam, mu, v_tol, A_i, v_i, w_i, radius):
+        _, _, s = contact(A_i, radius)
+        v = add(v_i, cross(w_i, s))
+        F = against((v[0], v[1], 0.0), mu * pressed(lam[0]), v_tol)
+        return ((F, cross(s, F)),)
+
+
+class NoLateralSlip(Disk, slip="nz"):
+    """The disk slides along its track alone: rows z and n."""
+
+    rows, holonomic = 2, (True, False)
+
+    def J(A_i, radius):
+        _, n, s = contact(A_i, radius)
+        return row(Z, cross(s, Z)), row(n, cross(s, n))
+
+    def gamma(A_i, v_i, w_i, radius):
+        t, n, s = contact(A_i, radius)
+        turn, s_dot = contact_rate(A_i, w_i, radius)
+        a = cross(w_i, s_dot)  # n_dot = turn t
+        return -a[2], -dot(n, a) - turn * dot(t, add(v_i, cross(w_i, s)))
+
+    def friction(lam, mu, v_tol, A_i, v_i, w_i, radius):
+        t, _, s = contact(A_i, radius)
+        v = dot(t, add(v_i, cross(w_i, s)))
+        F = scale(-mu * pressed(lam[0]) * tanh(v / v_tol), t)
+        return ((F, cross(s, F)),)
+
+
+class NoLongitudinalSlip(Disk, slip="tz"):
+    """The disk rolls along its track and slides across it: rows z and t."""
+
+    rows, holonomic = 2, (True, False)
+
+    def J(A_i, radius):
+        t, _, s = contact(A_i, radius)
+        return row(Z, cross(s, Z)), row(t, cross(s, t))
+
+    def gamma(A_i, v_i, w_i, radius):
+        t, n, s = contact(A_i, radius)
+        turn, s_dot = contact_rate(A_i, w_i, radius)
+        a = cross(w_i, s_dot)  # t_dot = -turn n
+        return -a[2], -dot(t, a) + turn * dot(n, add(v_i, cross(w_i, s)))
+
+    def friction(lam, mu, v_tol, A_i, v_i, w_i, radius):
+        _, n, s = contact(A_i, radius)
+        v = dot(n, add(v_i, cross(w_i, s)))
+        F = scale(-mu * pressed(lam[0]) * tanh(v / v_tol), n)
+        return ((F, cross(s, F)),)
+
+
+def axis(A):
+    """The disk's axis eta, and sigma."""
+    eta = (A[0][1], A[1][1], A[2][1])
+    return eta, sqrt(eta[0] * eta[0] + eta[1] * eta[1])
+
+
+def contact(A, radius):
+    """t, n and s."""
+    eta, sigma = axis(A)
+    n = (eta[0] / sigma, eta[1] / sigma, 0.0)
+    c = radius * eta[2]
+    return (-n[1], n[0], 0.0), n, (c * n[0], c * n[1], -radius * sigma)
+
+
+def contact_rate(A, w, radius):
+    """The rate of turn of t and n about k, and s_dot."""
+    eta, sigma = axis(A)
+    t, n, _ = contact(A, radius)
+    eta_dot = cross(w, eta)
+    turn, c, c_dot = dot(t, eta_dot) / sigma, eta[2], eta_dot[2]
+    level = add(scale(c_dot, n), scale(c * turn, t))
+    return turn, scale(radius, add(level, (0.0, 0.0, c * c_dot / sigma)))
+
+
+def pressed(load):
+    """The load between disk and ground; none where the ground would have to pull."""
+    return where(load > 0.0, load, 0.0)
+
+
+@hookimpl
+def dap3d_joints():
+    """The joint types of this module."""
+    return [Disk]

@@ -1,0 +1,229 @@
+"""What the formulations with joints share: rows, factors, projection onto the constraints, reports.
+
+Each formulation compiles what it uses of them. ``part`` says which matrix is factored: None for
+[I D^^T; D^ 0], which needs independent rows, a number for [I D^^T; D^ -E] with e_i = part |D^_i|^2.
+As None it is known when the code is compiled, so that ``standard`` has no line of the other.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+from dap3d_core.assembly.evaluate import (
+    call_loops,
+    largest,
+    place_bodies,
+    scale_forces,
+    scale_velocities,
+    zero,
+)
+from dap3d_core.assembly.system import (
+    ACCELERATION,
+    ENERGY,
+    POSITION,
+    SCRATCH,
+    TOLERANCE_C,
+    TOLERANCE_V,
+    VALUE,
+    WRENCH,
+    Floats,
+    System,
+)
+from dap3d_core.formulations.moves import change_velocity, move, normalise, size_of
+from dap3d_core.kernels.cache import compiled, compiled_inside
+from dap3d_core.linear.blocks import (
+    add_product,
+    assemble,
+    factor,
+    pivot_lengths,
+    regularise,
+    scale_blocks,
+    solve_saddle,
+    weigh_rows,
+)
+
+#: Newton passes of one projection; the second already stands at rounding.
+PASSES = 5
+
+#: e_i of regularised factors as part of the squared length of row i: far above rounding, and small
+#: enough that two passes leave nothing of a row that is a tenth independent of the others.
+PART = 1e-9
+
+#: A residual that stays above this many times the tolerance means that the projection did not find
+#: the constraints.
+LOST = 1e6
+
+
+@compiled
+def linearise(t: float, system: System, loops: Any) -> None:
+    """D^, gamma and nu of all joints at the bodies as placed."""
+    kinds, D = system.kinds, system.D
+    call_loops(kinds[ACCELERATION], kinds[ACCELERATION + 1], t, system.body, system.F, system.idx,
+               system.par, system.groups, loops, D, system.gamma, system.nu)  # fmt: skip
+    scale_blocks(system.blocks, D, system.metric)
+
+
+@compiled
+def factorise(system: System, part: float | None) -> int:
+    """The factors of D^ as it stands, in K.
+
+    Returns the number of pivots that have become small (``system.smallest``): the pose is near a
+    singular one.
+    """
+    assemble(system.targets, system.contributions, system.D, system.K)
+    if part is not None:
+        weigh_rows(system.blocks, system.D, part, system.compliance)
+        regularise(system.nodes, system.compliance, system.K)
+    return factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+
+
+@compiled_inside
+def gather_forces(t: float, y: Floats, system: System, loops: Any) -> float:
+    """Place the bodies of a state; scaled forces into ``force``; returns the power of the forces.
+
+    Functions of time stand ready after that.
+    """
+    body, metric, force, kinds = system.body, system.metric, system.force, system.kinds
+    place_bodies(y, body, metric)
+    zero(force)
+    call_loops(kinds[VALUE], kinds[WRENCH + 1], t, body, system.F, system.idx,
+               system.par, system.groups, loops, force, force, force)  # fmt: skip
+    return scale_forces(body, metric, force)
+
+
+@compiled_inside
+def solve_rows(system: System) -> None:
+    """Accelerations from the forces in ``force``, into ``force``; from x = gamma, x = -lambda."""
+    solve_saddle(system.blocks, system.hubs, system.nodes, system.columns, system.D, system.K,
+                 system.x, system.force)  # fmt: skip
+
+
+@compiled_inside
+def power_of_drivers(system: System) -> float:
+    """Power of the reactions, with -lambda in ``x``: only moving constraints do work."""
+    power = 0.0
+    for k in range(system.x.shape[0]):
+        power -= system.x[k] * system.nu[k]
+    return power
+
+
+@compiled_inside
+def residuals(t: float, system: System, loops: Any) -> float:
+    """Position-level residuals (zero where a row has none) into C; returns the largest size."""
+    kinds, C = system.kinds, system.C
+    zero(C)
+    call_loops(kinds[POSITION], kinds[POSITION + 1], t, system.body, system.F, system.idx,
+               system.par, system.groups, loops, C, C, C)  # fmt: skip
+    return largest(C)
+
+
+@compiled_inside
+def velocity_residuals(system: System) -> float:
+    """D v - nu into C, with D^ as it stands; returns the largest magnitude."""
+    C = system.C
+    scale_velocities(system.body, system.metric, system.force)
+    for k in range(C.shape[0]):
+        C[k] = -system.nu[k]
+    add_product(system.blocks, system.D, system.force, C)
+    return largest(C)
+
+
+@compiled
+def correct(system: System) -> None:
+    """The least scaled change of the bodies that removes the residuals in C, into ``force``."""
+    x, C = system.x, system.C
+    zero(system.force)
+    for k in range(x.shape[0]):
+        x[k] = -C[k]
+    solve_rows(system)
+
+
+@compiled_inside
+def project_onto(
+    t: float, y: Floats, out: Floats, system: System, loops: Any, part: float | None
+) -> None:
+    """Move a state onto its constraints, by the least change in the metric of the masses.
+
+    With regularised factors the passes are those of the proximal method as well: each leaves a
+    ``part`` of what the one before has left.
+
+    out: 1.0 if y changed beyond rounding; 1.0 if it did not converge, 2.0 if the pose is close to a
+    singular one; largest residuals of position and velocity; lengths (rows) that go
+    linearly through zero at a singular pose.
+    """
+    body, metric, force, kinds = system.body, system.metric, system.force, system.kinds
+    n = body.shape[0] - 1
+    out[0] = out[1] = 0.0
+    normalise(y, n)
+    place_bodies(y, body, metric)
+    call_loops(kinds[VALUE], kinds[VALUE + 1], t, body, system.F, system.idx,
+               system.par, system.groups, loops, force, force, force)  # fmt: skip
+    worst = residuals(t, system, loops)
+    limit = system.settings[TOLERANCE_C] * size_of(y, 0, n, 7, 3)
+    factored, poor = False, False
+    if not worst <= limit:
+        linearise(t, system, loops)
+        poor = factorise(system, part) > 0
+        factored = True
+        for _ in range(PASSES):
+            before = worst
+            correct(system)
+            move(y, metric, force)
+            place_bodies(y, body, metric)
+            worst = residuals(t, system, loops)
+            if not worst > limit or not worst < 0.5 * before:
+                break
+        out[0] = 1.0
+        if not worst <= LOST * limit:
+            out[1] = 1.0
+    out[2] = worst
+    linearise(t, system, loops)
+    if not factored:
+        poor = factorise(system, part) > 0
+    worst = velocity_residuals(system)
+    limit = system.settings[TOLERANCE_V] * size_of(y, 7 * n, n, 6, 6)
+    if not worst <= limit:
+        for _ in range(PASSES):
+            before = worst
+            correct(system)
+            change_velocity(y, metric, force)
+            add_product(system.blocks, system.D, force, system.C)
+            worst = largest(system.C)
+            if not worst > limit or not worst < 0.5 * before:
+                break
+        out[0] = 1.0
+        if not worst <= LOST * limit:
+            out[1] = 1.0
+    out[3] = worst
+    pivot_lengths(system.nodes, system.K, system.smallest, out[4:])
+    if poor and out[1] == 0.0:
+        out[1] = 2.0
+
+
+@compiled_inside
+def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
+    """Energy and residuals into the last four of out, with the accelerations in ``force``.
+
+    That is the potential energy and the largest residuals of position, velocity and acceleration.
+    """
+    kinds, value, C = system.kinds, system.settings[SCRATCH : SCRATCH + 1], system.C
+    last = out.shape[0] - 4
+    for k in range(C.shape[0]):
+        C[k] = -system.gamma[k]
+    add_product(system.blocks, system.D, system.force, C)
+    out[last + 3] = largest(C)
+    out[last + 2] = velocity_residuals(system)
+    out[last + 1] = residuals(t, system, loops)
+    value[0] = 0.0
+    call_loops(kinds[ENERGY], kinds[ENERGY + 1], t, system.body, system.F, system.idx,
+               system.par, system.groups, loops, value, value, value)  # fmt: skip
+    out[last] = value[0]
+
+
+@compiled_inside
+def report_multipliers(system: System, out: Floats) -> None:
+    """Multipliers in the order of the model, after the accelerations, from -lambda in ``x``."""
+    first = 6 * (system.body.shape[0] - 1)
+    for k in range(system.row.shape[0]):
+        out[first + k] = -system.x[system.row[k]]

@@ -1,0 +1,87 @@
+"""Coulomb friction in joints: forces that depend on the multipliers they change (spec 6.1).
+
+The multipliers are found by a fixed-point iteration, from those without friction: equal states give
+equal accelerations, whatever came before. Each pass is accelerated by one secant step
+(Irons and Tuck, Int. J. Numer. Meth. Engng 1 (1969) 275).
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+from dap3d_core.assembly.evaluate import call_loops, zero
+from dap3d_core.assembly.system import FRICTION, UNSETTLED, System
+from dap3d_core.kernels.cache import compiled_inside
+
+#: The multipliers have settled where a pass changes them by less than this part of the largest.
+SETTLED = 1e-10
+#: Passes at most; the last one is then used, and counted as not settled.
+PASSES = 25
+
+
+@compiled_inside
+def rubs(system: System) -> bool:
+    """Whether the scene has friction in joints."""
+    return bool(system.kinds[FRICTION + 1] > system.kinds[FRICTION])
+
+
+@compiled_inside
+def keep_applied(system: System) -> None:
+    """Remember the scaled applied forces before they become accelerations."""
+    for k in range(system.force.shape[0]):
+        system.applied[k] = system.force[k]
+
+
+@compiled_inside
+def rub(t: float, system: System, loops: Any) -> float:
+    """Friction for the multipliers in x, added to the scaled applied forces; returns its power."""
+    kinds, rubbing, body, metric = system.kinds, system.rubbing, system.body, system.metric
+    force = system.force
+    zero(rubbing)
+    call_loops(kinds[FRICTION], kinds[FRICTION + 1], t, body, system.F, system.idx,
+               system.par, system.groups, loops, rubbing, system.x, system.x)  # fmt: skip
+    power = 0.0
+    for k in range(6):
+        force[k] = 0.0
+    for b in range(1, body.shape[0]):
+        s, k, o = body[b], metric[b], 6 * b
+        for c in range(6):
+            power += rubbing[o + c] * s[12 + c]
+        n0, n1, n2 = rubbing[o + 3], rubbing[o + 4], rubbing[o + 5]
+        for c in range(3):
+            force[o + c] = system.applied[o + c] + k[0] * rubbing[o + c]
+            turned = k[7 + c] * n0 + k[10 + c] * n1 + k[13 + c] * n2
+            force[o + 3 + c] = system.applied[o + 3 + c] + turned
+    return power
+
+
+@compiled_inside
+def settle(system: System, passes: int) -> bool:
+    """Whether the multipliers in x have settled; else x becomes what the next pass starts from."""
+    x, memory = system.x, system.memory
+    guess, result, change = memory[0], memory[1], memory[2]
+    if passes == 0:
+        for k in range(x.shape[0]):
+            guess[k] = x[k]
+        return False
+    size = largest_change = upper = lower = 0.0
+    for k in range(x.shape[0]):
+        now = x[k] - guess[k]
+        size = max(size, abs(x[k]))
+        largest_change = max(largest_change, abs(now))
+        if passes > 1:
+            upper += now * (now - change[k])
+            lower += (now - change[k]) * (now - change[k])
+    if not largest_change > SETTLED * size:
+        return True
+    share = upper / lower if lower > 0.0 else 0.0
+    if passes == PASSES:
+        system.settings[UNSETTLED] += 1.0
+        return True
+    for k in range(x.shape[0]):
+        now = x[k] - guess[k]
+        mixed = x[k] - share * (x[k] - result[k]) if passes > 1 else x[k]
+        result[k], change[k], guess[k] = x[k], now, mixed
+        x[k] = mixed
+    return False

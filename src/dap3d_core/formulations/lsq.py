@@ -1,0 +1,147 @@
+"""Least-squares formulation: the saddle-point equations where rows may depend on each other.
+
+    [I   D^^T] (a      )   (g                  )
+    [D^  -E  ] (-lambda) = (gamma + E lambda_0 ),        e_i = part |D^_i|^2,
+
+in the bodies' scaled coordinates, with lambda_0 the multipliers of the pass before: the proximal
+method (method of multipliers). A pass divides what is left of a row's residual by 1 + s / part,
+where s is the squared singular value of the scaled rows, so a few passes stand at rounding.
+Weights that follow the length of their rows make the motion independent of how rows are scaled.
+
+Accelerations are unique, multipliers are not: reported are those of least |lambda|, what
+numpy.linalg.lstsq or pinv give.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.assembly.evaluate import global_accelerations, largest, rates, zero
+from dap3d_core.assembly.system import Floats, System
+from dap3d_core.formulations.constraints import (
+    PART,
+    factorise,
+    gather_forces,
+    linearise,
+    power_of_drivers,
+    project_onto,
+    report_levels,
+    report_multipliers,
+    solve_rows,
+)
+from dap3d_core.formulations.friction import keep_applied, rub, rubs, settle
+from dap3d_core.kernels.cache import compiled, compiled_inside
+from dap3d_core.linear.blocks import assemble, factor, regularise, weigh_rows
+
+#: How often the rows are solved.
+SOLVES = 3
+
+#: For the least multipliers: e as part of the longest row's square, and passes at most. More of
+#: them than it takes would gather rounding.
+LEAST_PART, LEAST_SOLVES = 1e-5, 50
+
+
+@compiled_inside
+def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
+    """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers."""
+    power = gather_forces(t, y, system, loops)
+    linearise(t, system, loops)
+    factorise(system, PART)
+    if rubs(system):
+        keep_applied(system)
+    solve(system)
+    if rubs(system):
+        power += with_friction(t, system, loops)
+    return power + power_of_drivers(system)
+
+
+@compiled_inside
+def solve(system: System) -> None:
+    """Scaled accelerations from the scaled forces in ``force``, -lambda into ``x``.
+
+    Each pass starts from the accelerations of the one before, so that it solves for what is left.
+    """
+    x, z = system.x, system.z
+    zero(z)
+    for _ in range(SOLVES):
+        for k in range(x.shape[0]):
+            x[k] = system.gamma[k]
+        solve_rows(system)
+        for k in range(x.shape[0]):
+            z[k] += x[k]
+    for k in range(x.shape[0]):
+        x[k] = z[k]
+
+
+@compiled_inside
+def with_friction(t: float, system: System, loops: Any) -> float:
+    """Go on from the multipliers without friction until they settle; power of the friction."""
+    power, passes = 0.0, 0
+    while not settle(system, passes):
+        passes += 1
+        power = rub(t, system, loops)
+        solve(system)
+    return power
+
+
+@compiled_inside
+def take_least(system: System) -> None:
+    """Replace -lambda in ``x`` by the least one that gives the same D^T lambda.
+
+    With one weight e for all rows, n -> e (D^ D^^T + e)^-1 n keeps what D^T does not see, and
+    takes away the rest. That is subtracted.
+    """
+    x, z, compliance = system.x, system.z, system.compliance
+    weigh_rows(system.blocks, system.D, 1.0, compliance)
+    e = LEAST_PART * largest(compliance)
+    for k in range(x.shape[0]):
+        if compliance[k] == 0.0:  # a hub's place, or a row that does nothing
+            x[k] = 0.0
+        compliance[k], z[k], system.C[k] = e, x[k], x[k]
+    before = np.inf
+    assemble(system.targets, system.contributions, system.D, system.K)
+    regularise(system.nodes, compliance, system.K)
+    factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+    for _ in range(LEAST_SOLVES):
+        zero(system.force)
+        solve_rows(system)
+        change = 0.0
+        for q in range(system.hubs.shape[0]):
+            for c in range(system.hubs[q, 1], system.hubs[q, 1] + 6):
+                x[c] = 0.0
+        for k in range(x.shape[0]):
+            x[k] *= -e
+            change = max(change, abs(x[k] - z[k]))
+            z[k] = x[k]
+        if not change < 0.5 * before:
+            break
+        before = change
+    for k in range(x.shape[0]):
+        x[k] = system.C[k] - z[k]
+
+
+@compiled
+def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """dy/dt of a state, the power of forces and drivers last."""
+    power = accelerate(t, y, system, loops)
+    rates(y, system.metric, system.force, out)
+    out[out.shape[0] - 1] = power
+
+
+@compiled
+def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """Move a state onto its constraints; out as in ``project_onto``."""
+    project_onto(t, y, out, system, loops, PART)
+
+
+@compiled
+def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
+    accelerate(t, y, system, loops)
+    global_accelerations(system.metric, system.force, out)
+    report_levels(t, out, system, loops)
+    take_least(system)
+    report_multipliers(system, out)

@@ -1,0 +1,113 @@
+"""Penalty formulation: constraints as stiff, damped springs on the accelerations.
+
+Manual: analysis_p; spec 9. With gamma' = gamma - 2 mu Omega (D v - nu) - Omega^2 C,
+
+    (M + alpha D^T D) v_dot = g + alpha D^T gamma'        lambda = -alpha (D v_dot - gamma')
+
+which is [I D^^T; D^ -I/alpha] (v_dot; -lambda) = (g; gamma') in the bodies' scaled coordinates,
+solved by the block LDL^T of linear/blocks.py: no product alpha D^T D is formed, of which the
+masses' digits would be lost. Rows may depend on each other. C is zero on rows that have none.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+from dap3d_core.assembly.evaluate import (
+    call_loops,
+    global_accelerations,
+    place_bodies,
+    rates,
+    scale_forces,
+    zero,
+)
+from dap3d_core.assembly.system import ALPHA, MU, OMEGA, VALUE, WRENCH, Floats, System
+from dap3d_core.formulations.constraints import (
+    PART,
+    linearise,
+    power_of_drivers,
+    project_onto,
+    report_levels,
+    report_multipliers,
+    residuals,
+    solve_rows,
+    velocity_residuals,
+)
+from dap3d_core.formulations.friction import keep_applied, rub, rubs, settle
+from dap3d_core.kernels.cache import compiled, compiled_inside
+from dap3d_core.linear.blocks import assemble, factor, regularise
+
+
+@compiled_inside
+def solve(system: System) -> None:
+    """Scaled accelerations from the scaled forces in ``force``, -lambda into ``x``; gamma' is z."""
+    for k in range(system.x.shape[0]):
+        system.x[k] = system.z[k]
+    solve_rows(system)
+
+
+@compiled_inside
+def with_friction(t: float, system: System, loops: Any) -> float:
+    """Go on from the multipliers without friction until they settle; power of the friction."""
+    power, passes = 0.0, 0
+    while not settle(system, passes):
+        passes += 1
+        power = rub(t, system, loops)
+        solve(system)
+    return power
+
+
+@compiled_inside
+def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
+    """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers."""
+    body, metric, force, kinds = system.body, system.metric, system.force, system.kinds
+    target, C, settings = system.z, system.C, system.settings
+    place_bodies(y, body, metric)
+    call_loops(kinds[VALUE], kinds[VALUE + 1], t, body, system.F, system.idx,
+               system.par, system.groups, loops, force, force, force)  # fmt: skip
+    linearise(t, system, loops)
+    residuals(t, system, loops)
+    stiffness, damping = settings[OMEGA] ** 2, 2.0 * settings[MU] * settings[OMEGA]
+    for k in range(target.shape[0]):
+        target[k] = system.gamma[k] - stiffness * C[k]
+    velocity_residuals(system)
+    for k in range(target.shape[0]):
+        target[k] -= damping * C[k]
+        system.compliance[k] = 1.0 / settings[ALPHA]
+    zero(force)
+    call_loops(kinds[WRENCH], kinds[WRENCH + 1], t, body, system.F, system.idx,
+               system.par, system.groups, loops, force, force, force)  # fmt: skip
+    power = scale_forces(body, metric, force)
+    assemble(system.targets, system.contributions, system.D, system.K)
+    regularise(system.nodes, system.compliance, system.K)
+    factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+    if rubs(system):
+        keep_applied(system)
+    solve(system)
+    if rubs(system):
+        power += with_friction(t, system, loops)
+    return power + power_of_drivers(system)
+
+
+@compiled
+def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """dy/dt of a state, the power of forces and drivers last."""
+    power = accelerate(t, y, system, loops)
+    rates(y, system.metric, system.force, out)
+    out[out.shape[0] - 1] = power
+
+
+@compiled
+def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """Move a state onto its constraints; out as in ``project_onto``."""
+    project_onto(t, y, out, system, loops, PART)
+
+
+@compiled
+def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
+    accelerate(t, y, system, loops)
+    global_accelerations(system.metric, system.force, out)
+    report_multipliers(system, out)
+    report_levels(t, out, system, loops)

@@ -1,0 +1,179 @@
+"""A MATLAB file as a tree. The grammar is that of tree-sitter-matlab; nothing is ever run."""
+
+import os
+import stat
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+
+from dap3d_core.scene import MISSING, Mistake, SceneError
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+#: Larger files are refused before they are read: recovering from errors takes time.
+LARGEST_FILE = 2**20
+#: Errors of syntax that are reported of one file: the first ones explain the others.
+SYNTAX_ERRORS = 5
+
+EXTRA = "matlab"
+#: Characters that a text processor or a PDF puts where MATLAB has others.
+_TYPOGRAPHIC = frozenset("‘’“”–−")
+
+
+@attrs.frozen
+class Place:
+    """Where something stands: file and line, from 1."""
+
+    file: str
+    line: int | None = None
+
+
+@attrs.frozen
+class Source:
+    """A MATLAB file.
+
+    Attributes:
+        path: of the file.
+        text: its text, lines ended by line feeds.
+    """
+
+    path: Path
+    text: str
+
+    def line(self, node: "Node") -> int:
+        """The line of a node, from 1."""
+        return int(node.start_point[0]) + 1
+
+    def place(self, node: "Node") -> Place:
+        """Where a node stands."""
+        return Place(str(self.path), self.line(node))
+
+    def mistake(
+        self, node: "Node", what: str, remedy: str = "", nearest: str = "", key: str = ""
+    ) -> Mistake:
+        """A mistake at a node; without a key the words begin with its text."""
+        words = what if key else f"{excerpt(node)}: {what}"
+        return Mistake(
+            key, MISSING, words, nearest, remedy, file=str(self.path), line=self.line(node)
+        )
+
+
+def text_of(node: "Node") -> str:
+    """The text of a node."""
+    return (node.text or b"").decode("utf-8", "replace")
+
+
+def excerpt(node: "Node", width: int = 60) -> str:
+    """The text of a node in one line, cut where it is long."""
+    words = " ".join(text_of(node)[: 4 * width].split())
+    return words if len(words) <= width else f"{words[: width - 4]} ..."
+
+
+def refused(
+    file: str | Path, what: str, *, line: int | None = None, remedy: str = ""
+) -> SceneError:
+    """The error for a file or folder as a whole."""
+    return SceneError([Mistake("", MISSING, what, remedy=remedy, file=str(file), line=line)])
+
+
+def read_source(path: Path) -> Source:
+    """The text of a MATLAB file, which is UTF-8 and of reasonable size.
+
+    Raises:
+        SceneError: says what is wrong with the file.
+    """
+    try:
+        info = path.stat()
+        if not stat.S_ISREG(info.st_mode):
+            raise refused(path, "is not a regular file")
+        if info.st_size > LARGEST_FILE:
+            what = f"has {info.st_size / 2**20:.1f} MiB; at most {LARGEST_FILE >> 20} MiB are read"
+            raise refused(path, what, remedy="build a scene of this size with a script")
+        data = path.read_bytes()
+    except OSError as error:
+        raise refused(path, f"cannot be read: {error.strerror or error}") from None
+    if b"\0" in data:
+        raise refused(path, "is not a text file: it holds NUL bytes")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        what = f"is not UTF-8 text: byte {error.object[error.start]:#04x} cannot be read"
+        remedy = "save it as UTF-8 (in MATLAB: Save As, encoding UTF-8)"
+        raise refused(path, what, line=line, remedy=remedy) from None
+    return Source(path, text.replace("\r\n", "\n").replace("\r", "\n"))
+
+
+class Grammar:
+    """The parser; made once for all files of a folder.
+
+    Raises:
+        SceneError: tree-sitter or its MATLAB grammar is not installed, or too old.
+    """
+
+    def __init__(self) -> None:
+        remedy = f'install them with the extra "{EXTRA}": pip install "dap3d[{EXTRA}]"'
+        needed = "reading MATLAB files needs the packages tree-sitter and tree-sitter-matlab"
+        try:
+            import tree_sitter
+            import tree_sitter_matlab
+        except ImportError as error:
+            what = f"{needed}, which cannot be imported ({error})"
+            raise SceneError([Mistake("", MISSING, what, remedy=remedy)]) from None
+        try:
+            language = tree_sitter.Language(tree_sitter_matlab.language())
+            self._parser: Any = tree_sitter.Parser(language)
+        except (TypeError, ValueError) as error:  # versions that do not fit each other
+            what = f"{needed} in versions that fit each other: {error}"
+            raise SceneError([Mistake("", MISSING, what, remedy=remedy)]) from None
+
+    def tree(self, source: Source) -> "Node":
+        """The root of the tree of a file, errors of syntax included."""
+        text = source.text if source.text.endswith("\n") else f"{source.text}\n"
+        root: Node = self._parser.parse(text.encode("utf-8")).root_node
+        return root
+
+
+def syntax_mistakes(source: Source, root: "Node") -> list[Mistake]:
+    """Where a file is not MATLAB: the first error of each line, a few of them."""
+    found: dict[int, Mistake] = {}
+    lines = source.text.split("\n")
+    waiting = [root] if root.has_error else []
+    while waiting and len(found) < SYNTAX_ERRORS:
+        node = waiting.pop()
+        if not (node.is_error or node.is_missing):
+            waiting += [n for n in reversed(node.children) if n.has_error or n.is_missing]
+            continue
+        line = source.line(node)
+        text = lines[line - 1].strip() if line <= len(lines) else ""
+        what = f"not valid MATLAB: {text[:60]}"
+        if node.is_missing:
+            what = f"not valid MATLAB, {node.type} is missing: {text[:60]}"
+        remedy = ""
+        if _TYPOGRAPHIC & set(text):
+            remedy = "quotes and minus signs of typography are no MATLAB: write ' and -"
+        found.setdefault(
+            line, Mistake("", MISSING, what, "", remedy, file=str(source.path), line=line)
+        )
+    return [found[line] for line in sorted(found)]
+
+
+def m_files(folder: Path) -> list[str]:
+    """The names of the MATLAB files in a folder, sorted.
+
+    Raises:
+        SceneError: there is no such folder, or it cannot be read.
+    """
+    try:
+        if not folder.is_dir():
+            if folder.exists():
+                remedy = f"give the folder that holds it: {folder.parent}"
+                raise refused(folder, "is a file; a MATLAB model is a folder", remedy=remedy)
+            raise refused(folder, "there is no such folder")
+        with os.scandir(folder) as entries:
+            return sorted(e.name for e in entries if e.name.lower().endswith(".m"))
+    except (OSError, ValueError) as error:  # ValueError: NUL in the path
+        reason = getattr(error, "strerror", None) or error
+        raise refused(folder, f"cannot be read: {reason}") from None

@@ -1,0 +1,48 @@
+"""The state that a run starts from: corrected if asked for, with the rank of its constraints."""
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.simulation.initial import Initial, correct_initial
+from dap3d_core.simulation.redundancy import Redundancy, redundancy_of
+
+Floats = NDArray[np.float64]
+
+
+@attrs.frozen(eq=False)
+class Start:
+    """Where a run starts.
+
+    Attributes:
+        u: (13 n,) the state.
+        initial: what its correction did; None where it was not corrected.
+        redundancy: of the constraints there.
+    """
+
+    u: Floats
+    initial: Initial | None
+    redundancy: Redundancy
+
+
+def find_start(
+    machine: Machine, correct: bool, hold: tuple[str, ...], metric: str = "unit"
+) -> Start:
+    """The start of a run.
+
+    Args:
+        machine: the model.
+        correct: whether its initial conditions are brought onto the constraints.
+        hold: names of bodies that the correction of positions leaves where they are.
+        metric: "unit" or "mass", of ``correct_initial``.
+
+    Raises:
+        AssemblyError: the positions cannot be assembled, or a row is not finite.
+    """
+    u, initial = machine.model.u0, None
+    if correct:
+        held = [machine.model.body_names.index(name) + 1 for name in hold]
+        initial = correct_initial(machine, u, hold=held, metric=metric)
+        u = initial.u
+    return Start(u, initial, redundancy_of(machine, u))

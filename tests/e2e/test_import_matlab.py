@@ -1,0 +1,156 @@
+"""``dap3d import-matlab`` as a user meets it."""
+
+import json
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+
+import pytest
+from support.matlab import MODELS, write
+from support.process import REPOSITORY
+
+import dap3d_core as dap
+
+
+def test_import_check_and_run(dap3d):
+    """From a folder to a result, with a report on the way."""
+    done = dap3d("import-matlab", MODELS / "pen2", "-o", "pen2.toml")
+    assert done.returncode == 0, done.stderr
+    told = " ".join(done.stdout.split())
+    assert "inBodies.m read 2 bodies" in told
+    assert "inVectors2.m absent no vectors of type 2" in told
+    assert "pen2.toml: 2 bodies, 4 points, 2 vectors, 2 joints, 1 force" in told
+    assert "dap3d run pen2.toml --t-end 2 --dt 0.02" in told
+    assert "user_force" not in told
+    checked = json.loads(dap3d("check", "pen2.toml", "--json").stdout)
+    # a ball joint and a revolute joint on two bodies (models/pen2)
+    assert (checked["rows"], checked["dof"]) == (8, 4)
+    done = dap3d("run", "pen2.toml", "--t-end", "0.1", "--dt", "0.05", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["status"] == "done"
+
+
+def test_what_is_written_reads_as_the_scene_of_the_library(dap3d):
+    assert dap3d("import-matlab", MODELS / "tri").returncode == 0
+    scene, _ = dap.import_matlab(MODELS / "tri")
+    assert dap.load(dap3d.folder / "scene.toml") == scene
+
+
+def test_the_report_as_json(dap3d):
+    done = dap3d("import-matlab", MODELS / "ball1", "--stub", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["scene"], found["plugin"]) == ("scene.toml", "plugin.py")
+    assert found["holds"]["bodies"] == 1
+    assert found["names"]["F1"] == "Forces(1) (S1)"
+    assert {"name": "user_force.m", "state": "shown", "holds": "a force of your own"} in (
+        found["files"]
+    )
+    assert found["user_force"] == (MODELS / "ball1" / "user_force.m").read_text()
+    assert found["stub"] == (dap3d.folder / "plugin.py").read_text()
+    assert found.keys() >= {"defaulted", "changed", "unused", "notes", "folder"}
+
+
+def test_a_stub_is_written_only_when_asked_for_and_refused_until_it_is_filled_in(dap3d):
+    done = dap3d("import-matlab", MODELS / "ball1")
+    assert done.returncode == 0, done.stderr
+    assert "depth = Bodies(1).r(3) - 0.1;" in done.stdout
+    assert "class UserForce(Force):" in done.stdout
+    assert [p.name for p in dap3d.folder.iterdir()] == ["scene.toml"]
+    run = dap3d("run", "scene.toml", "--t-end", "1", "--dt", "0.1", "--allow-code")
+    assert run.returncode == 2, "there is no type of this name"
+    assert dap3d("import-matlab", MODELS / "ball1", "--stub", "--force").returncode == 0
+    run = dap3d("run", "scene.toml", "--t-end", "1", "--dt", "0.1", "--allow-code")
+    assert run.returncode == 2
+    assert "write it here" in run.stderr
+    done = dap3d("import-matlab", MODELS / "pen1", "-o", "pen1.toml", "--stub")
+    assert "no plugin to fill in" in " ".join(done.stdout.split())
+
+
+def test_lines_fit_a_narrow_terminal(dap3d):
+    for name in ("ball1", "tri", "fourbar4"):
+        done = dap3d("import-matlab", MODELS / name, "--force", COLUMNS=60)
+        assert done.returncode == 0, done.stderr
+        assert max(len(line) for line in done.stdout.splitlines()) <= 60
+
+
+def test_files_are_not_overwritten_unasked(dap3d, refuse):
+    (dap3d.folder / "plugin.py").write_text("mine")
+    told = refuse("import-matlab", MODELS / "ball1", "--stub")
+    assert "plugin.py exists; --force overwrites it" in told
+    assert not (dap3d.folder / "scene.toml").exists(), "nothing is half written"
+    (dap3d.folder / "scene.toml").write_text("mine")
+    for option in ((), ("--stub",)):
+        told = refuse("import-matlab", MODELS / "ball1", *option)
+        assert "scene.toml exists; --force overwrites it" in told
+    assert (dap3d.folder / "scene.toml").read_text() == "mine"
+    assert (dap3d.folder / "plugin.py").read_text() == "mine"
+    shutil.copytree(MODELS / "pen1", dap3d.folder / "pen1")
+    source = dap3d.folder / "pen1" / "inBodies.m"
+    before = source.read_text()
+    refuse("import-matlab", "pen1", "-o", source, "--force")
+    assert source.read_text() == before
+
+
+@pytest.mark.parametrize("target", ["nowhere/scene.toml", "/dev/full", "/proc/scene.toml"])
+def test_targets_that_cannot_be_written(refuse, target):
+    refuse("import-matlab", MODELS / "pen1", "-o", target)
+
+
+def test_a_folder_takes_a_scene_toml(dap3d):
+    (dap3d.folder / "mine").mkdir()
+    assert dap3d("import-matlab", MODELS / "pen1", "-o", "mine").returncode == 0
+    assert (dap3d.folder / "mine" / "scene.toml").exists()
+
+
+def test_mistakes_are_told_at_once_and_nothing_is_written(dap3d, refuse):
+    write(
+        dap3d.folder / "bad",
+        inBodies="B1 = Body_struct; system('ls');\nB1.m = 2;\nBodies = [B1];\n",
+        inForces="Forces = [S1];\n",
+    )
+    told = refuse("import-matlab", "bad")
+    for words in (
+        "bad/inBodies.m:1: system('ls'): the function system is outside the language",
+        "bad/inBodies.m:2: B1.m: a Body_struct has no field m; did you mean 'mass'?",
+        "bad/inForces.m:1: S1: S1 is not defined",
+        "bad/inPoints.m:3: P3.Bindex = 2: there is no body 2; Bodies has 1",
+    ):
+        assert words in told
+    assert not (dap3d.folder / "scene.toml").exists()
+    done = dap3d("import-matlab", "bad", "--json")
+    assert done.returncode == 2
+    mistakes = json.loads(done.stdout)["mistakes"]
+    assert ("bad/inBodies.m", 2) in [(m["file"], m["line"]) for m in mistakes]
+    refuse("import-matlab", "nowhere")
+    refuse("import-matlab", "bad/inBodies.m")
+    refuse("import-matlab")
+
+
+def test_the_page_on_importing(dap3d):
+    """Its folder, its commands and its script, in this order, give what the page says."""
+    text = (REPOSITORY / "docs" / "import-matlab.md").read_text()
+
+    def blocks(language):
+        return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+
+    (dap3d.folder / "Cone").mkdir()
+    files = blocks("matlab")
+    for block in files:
+        name = re.match(r"function (\w+)\n", block)[1]
+        (dap3d.folder / "Cone" / f"{name}.m").write_text(block)
+    assert len(files) == 5
+    for line in re.findall(r"^    dap3d (.*)$", text, flags=re.MULTILINE):
+        done = dap3d(*shlex.split(line, comments=True))
+        assert done.returncode == 0, (line, done.stderr)
+    (scene,) = blocks("toml")
+    written = (dap3d.folder / "cone.toml").read_text()
+    for table in scene.strip().split("\n\n"):
+        assert table in written
+    (script,) = blocks("python")
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=dap3d.folder, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr

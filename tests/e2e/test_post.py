@@ -1,0 +1,187 @@
+"""``dap3d post`` as a user meets it: tables and files that other programs read."""
+
+import csv
+import json
+import shutil
+
+import numpy as np
+import pytest
+import xarray
+
+import dap3d_core as dap
+
+ARRAYS = ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd", "rP", "rPd", "rPdd", "Lam")
+PARTS = ("force", "moment", "force_body", "moment_body", "moment_at_point")
+
+
+@pytest.fixture(scope="module")
+def run_files(tmp_path_factory):
+    """Files of short runs, by model."""
+    folder = tmp_path_factory.mktemp("runs")
+    for name, code in (("pen1", False), ("bodies2", False), ("ball1", True)):
+        dap.simulate(name, t_end=0.1, allow_code=code).save(folder / f"{name}.nc")
+    return folder
+
+
+@pytest.fixture
+def result(dap3d, run_files):
+    """The result of a short run of pen1; all runs lie in the folder of the command line."""
+    for file in run_files.iterdir():
+        shutil.copy(file, dap3d.folder)
+    return dap.open(run_files / "pen1.nc")
+
+
+def table_of(file):
+    """Columns of a CSV file by heading, as Python reads them."""
+    with file.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+def test_a_table_reads_back_bit_for_bit(dap3d, result):
+    done = dap3d("post", "pen1.nc", "-o", "all.csv", "--jac")
+    assert done.returncode == 0, done.stderr
+    column = table_of(dap3d.folder / "all.csv")
+    for name, values in (
+        ("t [s]", result.t),
+        ("cone.r.z [m]", result.r[:, 0, 2]),
+        ("cone.p.e0 [1]", result.p[:, 0, 0]),
+        ("cone.wpd.y [rad/s^2]", result.wpd[:, 0, 1]),
+        ("P1.r.x [m]", result.rP[:, 0, 0]),
+        ("animation.4.v.z [m/s]", result.rPd[:, 5, 2]),
+        ("animation.1.a.x [m/s^2]", result.rPdd[:, 2, 0]),
+        ("J1.lambda.3 [SI]", result.Lam[:, 2]),
+        ("J1.i.force_body.y [N]", result.reaction("J1")["i"].force_body[:, 1]),
+        ("J1.j.moment.z [N m]", result.reaction("J1")["j"].moment[:, 2]),
+        ("energy.total [J]", result.energy.total),
+        ("constraint.position [SI]", result.arrays.position_residual),
+        ("J1.Jac.1.cone.rd.x [SI]", result.Jac[:, 0, 0]),
+        ("J1.Jac.3.cone.w.z [SI]", result.Jac[:, 2, 5]),
+    ):
+        assert column[name].tolist() == values.tolist(), name
+    for heading in column:  # what the table calls it, plots understand
+        name, unit = heading[:-1].split(" [")
+        if ".Jac." not in name:
+            quantity = result.quantity(name)
+            assert quantity.values.tolist() == column[heading].tolist()
+            assert quantity.unit == unit
+
+
+def test_a_table_of_picked_quantities(dap3d, result):
+    done = dap3d("post", "pen1.nc", "-o", "some.csv", "--select", "cone.r", "J1.force.norm")
+    assert done.returncode == 0, done.stderr
+    column = table_of(dap3d.folder / "some.csv")
+    assert list(column) == [
+        "t [s]", "cone.r.x [m]", "cone.r.y [m]", "cone.r.z [m]", "J1.force.norm [N]",
+    ]  # fmt: skip
+    assert column["J1.force.norm [N]"].tolist() == result.quantity("J1.force.norm").values.tolist()
+    twice = dap3d("post", "pen1.nc", "-o", "more.csv", "--select", "t", "--select", "energy.total")
+    assert twice.returncode == 0, twice.stderr
+    assert list(table_of(dap3d.folder / "more.csv")) == ["t [s]", "energy.total [J]"]
+
+
+def test_a_file_with_named_dimensions(dap3d, result):
+    assert dap3d("post", "pen1.nc", "-o", "all.nc", "--jacobian").returncode == 0
+    with xarray.open_dataset(dap3d.folder / "all.nc") as data:
+        for name in (*ARRAYS, "Jac"):
+            assert data[name].values.tolist() == getattr(result, name).tolist()
+        for name in data.variables:
+            assert "units" in data[name].attrs, name
+        assert data["r"].dims == ("time", "body", "axis")
+        assert data["rP"].dims == ("time", "point", "axis")
+        assert data["Jac"].dims == ("time", "row", "velocity")
+        assert data["rdd"].sel(body="cone", axis="z").dims == ("time",)
+        on = result.reaction("J1")
+        for part in PARTS:
+            for slot, body in (("i", "cone"), ("j", "ground")):
+                found = data[f"reaction_{part}"].sel(reaction=f"J1.{slot}")
+                assert found.values.tolist() == getattr(on[slot], part).tolist()
+                assert str(found["reaction_body"].values) == body
+        assert data["total_energy"].values.tolist() == result.energy.total.tolist()
+    assert dap3d("info", "all.nc").returncode == 2  # it is no result
+
+
+def test_picked_quantities_in_a_file(dap3d, result):
+    picked = ("cone.r", "cone.p", "J1.lambda", "energy.total", "cone.w.norm")
+    assert dap3d("post", "pen1.nc", "--format", "nc", "-o", "some", *picked).returncode == 0
+    with xarray.open_dataset(dap3d.folder / "some") as data:
+        assert set(data.data_vars) == set(picked)
+        for name in picked:
+            quantity = result.quantity(name)
+            assert data[name].values.tolist() == quantity.values.tolist()
+            assert data[name].attrs["units"] == quantity.unit
+        assert data["cone.r"].sel(axis="z").values.tolist() == result.r[:, 0, 2].tolist()
+
+
+def test_what_was_written_as_json(dap3d, result):
+    done = dap3d("post", "pen1.nc", "--json")
+    found = json.loads(done.stdout)
+    assert found["file"] == "pen1-post.nc"
+    assert (found["format"], found["instants"], found["notes"]) == ("nc", 6, [])
+    arrays = {a["name"]: a for a in found["arrays"]}
+    assert arrays["rP"]["shape"] == [6, 6, 3]
+    assert arrays["rP"]["dimensions"] == ["time", "point", "axis"]
+    assert arrays["wd"]["unit"] == "rad/s^2"
+    assert "Jac" not in arrays
+    with xarray.open_dataset(dap3d.folder / "pen1-post.nc") as data:
+        assert set(arrays) == set(data.variables)
+    columns = json.loads(dap3d("post", "pen1.nc", "--format", "csv", "--json").stdout)
+    assert columns["file"] == "pen1-post.csv"
+    headings = [f"{a['name']} [{a['unit']}]" for a in columns["arrays"]]
+    assert headings == list(table_of(dap3d.folder / "pen1-post.csv"))
+
+
+def test_a_scene_without_joints_has_no_rows_and_its_springs_have_quantities(dap3d, result):
+    done = dap3d("post", "bodies2.nc", "--jac", "-o", "b.nc")
+    assert done.returncode == 0, done.stderr
+    with xarray.open_dataset(dap3d.folder / "b.nc") as data:
+        assert {"r", "rPdd", "total_energy"} <= set(data.data_vars)
+        assert not {"Lam", "Jac", "reaction_force"} & set(data.data_vars)
+    picked = ("spring1.length", "spring1.tension", "spring2.i.moment_body.x")
+    assert dap3d("post", "bodies2.nc", "-o", "s.csv", *picked).returncode == 0
+    column = table_of(dap3d.folder / "s.csv")
+    assert column["spring1.length [m]"][0] == 1.5  # unstretched at the start (spec 12)
+    assert column["spring1.tension [N]"][0] == 0.0
+
+
+def test_types_of_the_model_itself_are_loaded_only_when_allowed(dap3d, result, refuse):
+    """A result does not say where they stand; the message says what to do."""
+    words = refuse("post", "ball1.nc", "contact.force", "-o", "a.csv")
+    for part in ("ball-contact", "--model FOLDER --allow-code", "model=FOLDER and allow_code=True"):
+        assert part in words
+    words = refuse("post", "ball1.nc", "contact.force", "-o", "a.csv", "--model", "ball1")
+    assert "not run unless it is allowed" in words
+    refuse("post", "ball1.nc", "-o", "a.csv", "--model", "ball9", "--allow-code")
+    done = dap3d("post", "ball1.nc", "contact.force", "-o", "a.csv", "--model", "ball1",
+                 "--allow-code")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    column = table_of(dap3d.folder / "a.csv")
+    assert set(column["contact.force.z [N]"]) == {0.0}  # it has not reached the ground
+
+
+def test_reactions_that_cannot_be_had_are_left_out_and_told(dap3d, result):
+    """The types of the joints are blocked, as if the package that brought them were gone."""
+    done = dap3d("post", "pen1.nc", "-o", "a.nc", DAP3D_BLOCK="dap3d")
+    assert done.returncode == 0, done.stderr
+    assert "reactions are left out: the model of pen1.nc cannot be made again" in done.stderr
+    with xarray.open_dataset(dap3d.folder / "a.nc") as data:
+        assert "reaction_force" not in data
+        assert data["Lam"].values.tolist() == result.Lam.tolist()
+    told = json.loads(dap3d("post", "pen1.nc", "-o", "b.csv", "--json", DAP3D_BLOCK="dap3d").stdout)
+    assert told["notes"][0].startswith("reactions are left out")
+    assert dap3d("post", "pen1.nc", "--jac", "-o", "c.nc", DAP3D_BLOCK="dap3d").returncode == 2
+    assert not (dap3d.folder / "c.nc").exists()
+
+
+def test_requests_that_are_refused_leave_nothing(refuse, dap3d, result):
+    (dap3d.folder / "there.csv").write_text("mine")
+    assert "--force overwrites it" in refuse("post", "pen1.nc", "-o", "there.csv")
+    assert "give --format" in refuse("post", "pen1.nc", "-o", "a.txt")
+    assert "differ" in refuse("post", "pen1.nc", "-o", "a.nc", "--format", "csv")
+    assert "did you mean 'cone.r.z'" in refuse("post", "pen1.nc", "-o", "a.csv", "cone.rr.z")
+    assert "did you mean 'cone.r.z'" in refuse("post", "pen1.nc", "-o", "a.nc", "cone.rr.z")
+    before = {"pen1.nc", "bodies2.nc", "ball1.nc", "there.csv"}
+    assert {file.name for file in dap3d.folder.iterdir()} == before
+    assert (dap3d.folder / "there.csv").read_text() == "mine"
+    assert dap3d("post", "pen1.nc", "-o", "there.csv", "t", "--force").returncode == 0
+    assert (dap3d.folder / "there.csv").read_text().startswith("t [s]\n0.0\n")

@@ -1,0 +1,4 @@
+function inPoints
+include_global
+
+Points = [];

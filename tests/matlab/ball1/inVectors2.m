@@ -1,0 +1,4 @@
+function inVectors2
+include_global
+
+Vectors2 = [];

@@ -1,0 +1,5 @@
+function inJoints
+include_global
+J1 = Joint_struct;          % there are none
+
+Joints = [];

@@ -1,0 +1,4 @@
+function inVectors1
+include_global
+
+Vectors1 = [];

@@ -1,0 +1,97 @@
+"""Problems with redundant rows and singular poses, made through the public API, with references."""
+
+import numpy as np
+from support.problems import ROD
+
+import dap3d_core as dap
+
+G = 9.81
+UPRIGHT = (1 / 12, 1e-3, 1 / 12)  # the same rod along y
+
+
+def four_bars(count):
+    """IFToMM A02: ``count`` parallelograms in a row, every joint a spatial revolute.
+
+    2 count + 1 rods of 1 m and 1 kg; cranks upright at the start, couplers level, vx(B0) = 1 m/s.
+    """
+    scene = dap.Scene(name=f"A02 of {count}")
+    for k in range(count + 1):
+        crank = f"crank{k}"
+        scene.add_body(crank, mass=1.0, Jp=UPRIGHT, r=(k, 0.5, 0.0),
+                       r_dot=(0.5, 0.0, 0.0), w=(0.0, 0.0, -1.0))  # fmt: skip
+        scene.add_point(f"low{k}", crank, (0.0, -0.5, 0.0))
+        scene.add_point(f"high{k}", crank, (0.0, 0.5, 0.0))
+        scene.add_point(f"pivot{k}", "ground", (float(k), 0.0, 0.0))
+        scene.add_joint("rev", f"A{k}", P_i=f"low{k}", P_j=f"pivot{k}",
+                        a_i=f"{crank}.z", a_j="ground.z")  # fmt: skip
+    for k in range(count):
+        coupler = f"coupler{k}"
+        scene.add_body(coupler, mass=1.0, Jp=ROD, r=(k + 0.5, 1.0, 0.0), r_dot=(1.0, 0.0, 0.0))
+        for side, end in enumerate(("left", "right")):
+            scene.add_point(f"{end}{k}", coupler, (side - 0.5, 0.0, 0.0))
+            scene.add_joint("rev", f"{end}_B{k}", P_i=f"{end}{k}", P_j=f"high{k + side}",
+                            a_i=f"{coupler}.z", a_j=f"crank{k + side}.z")  # fmt: skip
+    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
+    return scene
+
+
+def bricard():
+    """IFToMM A04: five rods on six revolutes, one freedom, 30 rows of which 29 are independent."""
+    corners = np.array(
+        [(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], dtype=float
+    )
+    axes = "yzxyzx"
+    scene = dap.Scene(name="A04")
+    for k in range(5):
+        along = corners[k + 1] - corners[k]
+        middle = 0.5 * (corners[k] + corners[k + 1])
+        Jp = np.where(np.abs(along) > 0.5, 1 / 600, 0.25 / 3 + 0.01 / 12)
+        scene.add_body(f"rod{k}", mass=1.0, Jp=tuple(Jp), r=tuple(middle))
+        scene.add_point(f"tail{k}", f"rod{k}", tuple(-0.5 * along))
+        scene.add_point(f"head{k}", f"rod{k}", tuple(0.5 * along))
+    scene.add_point("last", "ground", tuple(corners[5]))
+    for k, axis in enumerate(axes):
+        P_i = f"tail{k}" if k < 5 else "head4"
+        P_j = "ground.O" if k == 0 else f"head{k - 1}" if k < 5 else "last"
+        i = f"rod{min(k, 4)}"
+        j = "ground" if k in (0, 5) else f"rod{k - 1}"
+        scene.add_joint("rev", f"J{k}", P_i=P_i, P_j=P_j, a_i=f"{i}.{axis}", a_j=f"{j}.{axis}")
+    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
+    return scene
+
+
+def two_hinge_door():
+    """A door on two coaxial hinges, 10 rows of rank 5, its axis level, let go from level rest."""
+    scene = dap.Scene(name="two-hinge door")
+    scene.add_body("door", mass=12.0, Jp=(4.0, 1.0, 5.0), r=(0.0, -0.5, 0.0))
+    for k, x in enumerate((-0.9, 0.9)):
+        scene.add_point(f"hinge{k}", "door", (x, 0.5, 0.0))
+        scene.add_point(f"post{k}", "ground", (x, 0.0, 0.0))
+        scene.add_joint("rev", f"H{k}", P_i=f"hinge{k}", P_j=f"post{k}",
+                        a_i="door.x", a_j="ground.x")  # fmt: skip
+    scene.add_force("weight", "gravity", wgt=(0.0, 0.0, -1.0))
+    return scene
+
+
+def swing(rate, times, start):
+    """phi(t), phi_dot(t) of phi'' = rate sin phi from ``start``, to some 1e-12 (scipy, DOP853)."""
+    from scipy.integrate import solve_ivp
+
+    found = solve_ivp(
+        lambda t, y: (y[1], rate * np.sin(y[0])), (0.0, times[-1]), start, method="DOP853",
+        t_eval=times, rtol=3e-14, atol=1e-14,
+    )  # fmt: skip
+    return found.y
+
+
+def four_bars_tip(count, times):
+    """(nt, 4) x, y, vx, vy of B0 (benchmarks.md, A02), from the closed equation of the cranks."""
+    phi, rate = swing(1.5 * G * (3 * count + 1) / (4 * count + 1), times, (0.0, 1.0))
+    s, c = np.sin(phi), np.cos(phi)
+    return np.column_stack([s, c, c * rate, -s * rate])
+
+
+def error_of(found, reference):
+    """The error e of benchmarks.md, section 0, with y_thr = 1e-3; both (nt, components)."""
+    size = np.maximum(np.abs(reference), 1e-3)
+    return float(np.sqrt(np.mean(((found - reference) / size) ** 2)))

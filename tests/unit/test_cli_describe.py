@@ -1,0 +1,92 @@
+"""``dap3d describe`` for every registered type."""
+
+import json
+import tomllib
+
+import pytest
+from click.testing import CliRunner
+
+import dap3d_core as dap
+from dap3d_core.cli.example import example_of
+from dap3d_core.cli.group import dap3d
+from dap3d_core.interface.fields import specs_of
+from dap3d_core.registry import load_registry
+
+TYPES = sorted(load_registry().sources)
+each = pytest.mark.parametrize(("kind", "keyword"), TYPES, ids=["-".join(t) for t in TYPES])
+
+
+def described(keyword, *options, width=80):
+    done = CliRunner().invoke(dap3d, ["describe", keyword, *options], env={"COLUMNS": str(width)})
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@each
+def test_the_example_of_every_type_runs(kind, keyword, tmp_path):
+    """Written to a file as it is shown, it is simulated to its end; its element is of the type."""
+    registry = load_registry()
+    text = example_of(registry.get(kind, keyword), registry)
+    path = tmp_path / "example.toml"
+    path.write_text(text)
+    result = dap.simulate(path)
+    assert result.t[-1] == 0.2
+    used = tomllib.loads(text)[f"{kind}s"].values()
+    assert keyword in {element["type"] for element in used}
+
+
+@each
+def test_every_type_is_described(kind, keyword):
+    """Fields with unit, default and meaning; the docstring; what stands for it, where; in JSON."""
+    types = json.loads(described(keyword, "--json"))["types"]
+    (found,) = (t for t in types if t["kind"] == kind)
+    examined = load_registry().get(kind, keyword)
+    specs = {n: s for n, s in specs_of(examined.type).items() if s.given}
+    assert [f["name"] for f in found["fields"]] == list(specs)
+    for field in found["fields"]:
+        spec = specs[field["name"]]
+        assert field["unit"] == spec.unit
+        assert field["doc"], field["name"]
+        assert field["required"] == spec.required
+    assert len(found["doc"].splitlines()) >= 1
+    assert [v["class"] for v in found["variants"]] == [
+        e.type.__name__ for _, e in examined.variants
+    ]
+    assert all(v["doc"] for v in found["variants"])
+    text = described(keyword)
+    for name, spec in specs.items():
+        assert f"\n  {name} " in text
+        if spec.unit:
+            assert spec.unit in text
+
+
+@each
+def test_a_description_fits_60_columns(kind, keyword):
+    """No line is wider, the example's lines included."""
+    lines = described(keyword, "--names", width=60).splitlines()
+    assert [line for line in lines if len(line) > 60] == []
+
+
+def test_the_freedoms_that_joints_leave():
+    """6 less the rows, for each variant (spec 4 and 5)."""
+    left = {"sph": 3, "rev": 1, "sph-sph": 5, "cyl": 2, "tran": 1, "univ": 2, "fix": 0, "rP": 5}
+    left |= {"rel-rot": 5, "rel-tran": 5, "drive-rot": 5, "drive-tran": 5, "disk": 3}
+    joints = [keyword for kind, keyword in TYPES if kind == "joint"]
+    found = {k: json.loads(described(k, "--json"))["types"][0] for k in joints}
+    assert {k: found[k]["freedoms"] for k in left} == left
+    variants = {v["with"]["slip"]: v["freedoms"] for v in found["disk"]["variants"]}
+    assert variants == {"z": 5, "nz": 4, "tz": 4}
+    text = described("disk", width=200)
+    assert "leaves 3 of 6 freedoms of the body" in text
+    assert "slip = nz  2     4" in text
+    assert "otherwise  3     3" in text
+    assert "leaves 1 of 6 freedoms between two bodies" in described("rev", width=200)
+
+
+def test_words_and_functions_are_told():
+    """Allowed words with their aliases, words of true and false, what a function is of."""
+    assert "zn is nz" in described("disk", width=200)
+    text = described("rot_sda", width=200)
+    assert "false, true" in text
+    assert "of theta - theta_0" in text
+    assert "of time" in described("rel-rot", width=200)

@@ -1,0 +1,319 @@
+"""What types may do beyond named numbers: variants, functions of an argument, tables, angles."""
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+from support.own_types import registry_of
+
+import dap3d_core as dap
+from dap3d_core.assembly.evaluate import call_loops
+from dap3d_core.assembly.system import ANGLE
+from dap3d_core.interface import (
+    Body,
+    Force,
+    Function,
+    Joint,
+    PluginError,
+    Point,
+    Vector,
+    angle,
+    body,
+    choice,
+    examine,
+    function,
+    number,
+    point,
+    table,
+    vector,
+)
+from dap3d_core.kernels import dot, lookup, neg, row, scale, sqrt, sub
+from dap3d_core.scene import SceneError
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+class Pull(Force):
+    """A spring from P_i to the origin, linear or by a function of the distance."""
+
+    keyword = "pull"
+    P_i: Point = point()
+    k: float = number(default=1.0)
+    function: str = function(argument="distance, m")
+
+    def wrench(r_P_i, k):
+        return scale(-k, r_P_i), ZERO
+
+    def energy(r_P_i, k):
+        return 0.5 * k * dot(r_P_i, r_P_i)
+
+
+class PullByFunction(Pull, function=True):
+    """The same by a function, called twice to see that it can be."""
+
+    energy = None
+
+    def wrench(r_P_i, k, f, f_dot):
+        x = sqrt(dot(r_P_i, r_P_i))
+        F = f(x) + 0.0 * f_dot(f(x))
+        return scale(-F / x, r_P_i), (f_dot(x), 0.0, 0.0)
+
+
+class Keep(Joint):
+    """Keeps coordinates of the mass centre: which ones is a choice."""
+
+    keyword = "keep"
+    body_i: Body = body()
+    what: str = choice(("x", "xy"), default="x", aliases={"yx": "xy"})
+
+
+class KeepX(Keep, what="x"):
+    """One row."""
+
+    rows = 1
+
+    def C(r_i):
+        return r_i[0]
+
+    def J():
+        return row((1.0, 0.0, 0.0), ZERO)
+
+    def gamma():
+        return 0.0
+
+
+class KeepXY(Keep, what="xy"):
+    """Two rows."""
+
+    rows = 2
+
+    def C(r_i):
+        return r_i[0], r_i[1]
+
+    def J():
+        return row((1.0, 0.0, 0.0), ZERO), row((0.0, 1.0, 0.0), ZERO)
+
+    def gamma():
+        return 0.0, 0.0
+
+
+class Stairs(Function):
+    """Piecewise constant; its table is made by prepare, and read by lookup."""
+
+    keyword = "stairs"
+    x: tuple = table(doc="where each step begins")
+    y: tuple = table(doc="height of each step")
+    steps: tuple = table(columns=2, given=False)
+
+    def prepare(self, bodies):
+        if max(self.y) > 100.0:
+            warnings.warn("steep stairs", stacklevel=1)
+        return {"steps": list(zip(self.x, self.y, strict=True))}
+
+    def value(x, steps):
+        begin, height = lookup(steps, x)
+        return height, 0.0, 0.0, begin
+
+
+class Twist(Force):
+    """A torsion spring about an axis on either body."""
+
+    keyword = "twist"
+    u_i: Vector = vector()
+    u_j: Vector = vector()
+    axis: Vector = vector()
+    k: float = number()
+    theta: float = angle("u_i", "u_j", "axis")
+
+    def wrench(axis, k, theta, theta_dot):
+        T = k * theta + 0.0 * theta_dot
+        return (ZERO, scale(T, axis)), (ZERO, scale(-T, axis))
+
+
+class Level(Joint):
+    """Holds a point at a height above ground along a vector of ground."""
+
+    keyword, rows = "level", 1
+    P_i: Point = point()
+    a_j: Vector = vector(ground=True)
+
+    def C(r_P_i, a_j):
+        return dot(r_P_i, a_j)
+
+    def J(s_P_i, a_j):
+        return row(a_j, neg((a_j[1] * s_P_i[2] - a_j[2] * s_P_i[1],
+                             a_j[2] * s_P_i[0] - a_j[0] * s_P_i[2],
+                             a_j[0] * s_P_i[1] - a_j[1] * s_P_i[0])))  # fmt: skip
+
+    def gamma():
+        return 0.0
+
+
+REGISTRY = registry_of(Pull, Keep, Stairs, Twist, Level)
+
+
+def scene_of(**body_fields):
+    scene = dap.Scene(name="variants")
+    scene.add_body("ball", **({"mass": 2.0, "r": (3.0, 0.0, 4.0)} | body_fields))
+    return scene
+
+
+def accelerations(scene, u=None):
+    machine = dap.compile(scene, registry=REGISTRY).machine
+    u = machine.model.u0 if u is None else u
+    return machine, machine.report(0.0, u)[: 6 * machine.model.body_count].reshape(-1, 6)
+
+
+def test_a_function_of_an_argument_is_called_with_it():
+    """f = 1 + 2 x + 3 x^2 at the distance 5 m, and its derivative 2 + 6 x, closed form."""
+    scene = scene_of()
+    scene.add_function("a", "law", coeff=(1.0, 2.0, 3.0))
+    scene.add_force("pull", P_i="ball.O", function="law")
+    scene.add_force("pull", P_i="ball.O", k=7.0)
+    _, a = accelerations(scene)
+    by_law, linear = 1.0 + 10.0 + 75.0, 7.0 * 5.0
+    assert a[0, :3] == pytest.approx(np.array([-0.6, 0.0, -0.8]) * (by_law + linear) / 2.0)
+    assert a[0, 3] == pytest.approx(32.0)  # unit inertia
+
+
+def test_each_type_of_function_gets_its_own_loop():
+    """Springs by functions of two types are two groups, those without function a third."""
+    scene = scene_of()
+    scene.add_function("a", "law", coeff=(1.0, 0.0, 0.0))
+    scene.add_function("harmonic", "wave", amplitude=1.0, frequency=1.0)
+    scene.add_function("a", "other", coeff=(0.0, 1.0, 0.0))
+    for name in ("law", "wave", "other", None):
+        scene.add_force("pull", P_i="ball.O", **({"function": name} if name else {}))
+    machine, a = accelerations(scene)
+    assert [g.count for g in machine.model.forces] == [2, 1, 1]
+    assert not machine.model.functions  # none of them is a function of time
+    force = 1.0 + math.sin(5.0) + 5.0 + 5.0  # harmonic: amplitude sin(frequency x)
+    assert a[0, :3] == pytest.approx(np.array([-0.6, 0.0, -0.8]) * force / 2.0)
+
+
+def test_only_the_variant_for_the_word_is_used():
+    """Rows and kernels are those of the variant; an alias means the same word."""
+    for word, rows in (("x", 1), ("xy", 2), ("yx", 2)):
+        scene = scene_of()
+        scene.add_joint("keep", body_i="ball", what=word)
+        model = dap.compile(scene, registry=REGISTRY, method="standard").model
+        assert model.row_count == rows
+    scene = scene_of()
+    scene.add_joint("keep", body_i="ball", what="z")
+    with pytest.raises(SceneError, match='should be one of "x", "xy"'):
+        dap.compile(scene, registry=REGISTRY)
+
+
+def test_a_variant_is_for_a_word_that_its_type_knows():
+    """A variant for a word that no choice can say could never be used."""
+
+    class Lost(Keep, what="z"):
+        """A variant for a word that the choice does not have."""
+
+        rows = 1
+
+    try:
+        with pytest.raises(PluginError, match="Lost is the variant for what = 'z'"):
+            examine(Keep)
+    finally:
+        Keep.variants = Keep.variants[:-1]
+
+
+@pytest.mark.parametrize("x", [-1.0, 0.0, 0.5, 1.0, 2.9, 3.0, 9.0])
+def test_lookup_finds_the_last_row_that_begins_before(x):
+    """Against numpy's search; before the first row the first one."""
+    scene = scene_of()
+    begin, height = (0.0, 1.0, 3.0, 3.5), (5.0, 6.0, 7.0, 8.0)
+    scene.add_function("stairs", "stairs", x=begin, y=height)
+    scene.add_function("stairs", "more", x=begin[:2], y=height[:2])
+    for name in ("stairs", "more"):
+        scene.add_joint("rel-rot", body_i="ball", a_j="ground.z", function=name)
+    machine = dap.compile(scene, registry=REGISTRY, method="standard").machine
+    machine.rows(x, machine.model.u0)
+    for count, F in zip((4, 2), machine.system.F[1:], strict=True):
+        k = max(0, int(np.searchsorted(begin[:count], x, side="right")) - 1)
+        assert F[:4].tolist() == [height[k], 0.0, 0.0, begin[k]]
+
+
+def test_what_prepare_warns_about_is_a_note():
+    """With the element's name, once."""
+    scene = scene_of()
+    scene.add_function("stairs", "high", x=(0.0, 1.0), y=(0.0, 200.0))
+    scene.add_joint("rel-rot", body_i="ball", a_j="ground.z", function="high")
+    notes = dap.compile(scene, registry=REGISTRY, method="standard").notes
+    assert notes.count("function high (stairs): steep stairs") == 1
+
+
+@pytest.mark.parametrize("owner", ["ball", "ground"])
+def test_an_angle_is_unwound_by_the_last_accepted_one(owner):
+    """From 170 degrees on to 190; the loop of accepted steps keeps it, whole turns included."""
+    scene = scene_of()
+    half = math.radians(170.0) / 2.0
+    scene.bodies["ball"].p = (math.cos(half), 0.0, 0.0, math.sin(half))
+    scene.add_force("twist", u_i="ball.x", u_j="ground.x", axis=f"{owner}.z", k=-3.0)
+    machine, a = accelerations(scene)
+    assert a[0, 5] == pytest.approx(3.0 * math.radians(170.0))  # theta is -170 degrees
+
+    def turn_to(degrees):
+        u = machine.model.u0.copy()
+        half = math.radians(degrees) / 2.0
+        u[3:7] = math.cos(half), 0.0, 0.0, math.sin(half)
+        return machine.report(0.0, u)[5]
+
+    def keep():
+        s = machine.system
+        call_loops(s.kinds[ANGLE], s.kinds[ANGLE + 1], 0.0, s.body, s.F, s.idx, s.par,
+                   s.groups, machine.loops, s.force, s.force, s.force)  # fmt: skip
+
+    for degrees in (170.0, 190.0, 350.0, 370.0, 530.0):
+        assert turn_to(degrees) == pytest.approx(3.0 * math.radians(degrees))
+        keep()
+    assert turn_to(370.0) == pytest.approx(3.0 * math.radians(370.0))
+
+
+def test_a_vector_of_no_slot_is_on_a_body_of_the_element():
+    """One on a third body is refused by name."""
+    scene = scene_of()
+    scene.add_body("other")
+    scene.add_force("twist", "T", u_i="ball.x", u_j="ground.x", axis="other.z", k=1.0)
+    with pytest.raises(SceneError, match="is on other; it is to be a vector of ball or ground"):
+        dap.compile(scene, registry=REGISTRY)
+
+
+def test_a_vector_of_ground_makes_no_slot():
+    """One body, one block; a vector of a body is refused."""
+    scene = scene_of()
+    scene.add_joint("level", P_i="ball.O", a_j="ground.x")
+    machine = dap.compile(scene, registry=REGISTRY, method="standard").machine
+    assert machine.model.joint_slots == ((1,),)
+    assert machine.rows(0.0, machine.model.u0).C.tolist() == [3.0]
+    scene.joints.clear()
+    scene.add_joint("level", P_i="ball.O", a_j="ball.x")
+    with pytest.raises(SceneError, match="is on ball; it is to be a vector of ground"):
+        dap.compile(scene, registry=REGISTRY)
+
+
+class Hides(Force):
+    """Does with a function what cannot be pasted."""
+
+    keyword = "hides"
+    P_i: Point = point()
+    function: str = function(argument="distance, m")
+
+
+class HidesIt(Hides, function=True):
+    """Keeps the function under another name."""
+
+    def wrench(r_P_i, f):
+        g = f
+        return sub(ZERO, r_P_i), (g(1.0), 0.0, 0.0)
+
+
+def test_a_function_may_only_be_called():
+    """Anything else with it is refused, in words."""
+    scene = scene_of()
+    scene.add_function("a", "law", coeff=(1.0, 0.0, 0.0))
+    scene.add_force("hides", P_i="ball.O", function="law")
+    with pytest.raises(PluginError, match="may only call f"):
+        dap.compile(scene, registry=registry_of(Hides))

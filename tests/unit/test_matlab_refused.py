@@ -1,0 +1,268 @@
+"""Bad folders of MATLAB models: clear mistakes with file and line, all at once, no traceback."""
+
+import random
+import shutil
+
+import pytest
+from support.matlab import MODELS, SMALL, write
+
+import dap3d_core as dap
+from dap3d_core.matlab.source import LARGEST_FILE
+from dap3d_core.scene import MISSING, SceneError
+
+
+@pytest.fixture
+def refused(tmp_path):
+    """The mistakes of the small model with some files replaced, as messages without the folder."""
+
+    def call(**files):
+        folder = write(tmp_path / "small", **files)
+        with pytest.raises(SceneError) as caught:
+            dap.import_matlab(folder)
+        return [str(m).replace(f"{folder}/", "") for m in caught.value.mistakes]
+
+    return call
+
+
+def changed(name, old, new):
+    """A file of the small model with some words replaced."""
+    text = SMALL[f"{name}.m"]
+    assert old in text
+    return {name: text.replace(old, new)}
+
+
+def test_the_small_model_is_good(tmp_path):
+    scene, report = dap.import_matlab(write(tmp_path))
+    assert list(scene.bodies) == ["body1", "body2"]
+    assert report.unused == []
+    assert report.changed == []
+
+
+# ---------------------------------------------------------------- folders and files
+
+
+def test_folders_that_hold_no_model(tmp_path):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "main.m").write_text("x = 1;")
+    (tmp_path / "file.m").write_text("x = 1;")
+    for name, words in {
+        "nowhere": "there is no such folder",
+        "empty": "holds no MATLAB model: there is no inBodies.m",
+        "other": "it holds main.m",
+        "file.m": "is a file; a MATLAB model is a folder",
+        "file.m/x": "there is no such folder",
+        "a\0b": "there is no such folder",
+        "n" * 300: "cannot be read",
+    }.items():
+        with pytest.raises(SceneError) as caught:
+            dap.import_matlab(tmp_path / name)
+        assert words in str(caught.value), name
+    with pytest.raises(SceneError, match="a MATLAB model is a folder, not 3"):
+        dap.import_matlab(3)
+
+
+def test_the_file_of_the_bodies_is_needed(refused):
+    assert refused(inBodies=None)[0].endswith("there is no inBodies.m, which every model needs")
+
+
+def test_an_absent_file_explains_what_points_into_it(refused):
+    found = refused(inPoints=None)
+    joints = [m for m in found if m.startswith("inJoints.m:1: J1.iPindex = 1")]
+    assert joints[0].endswith("there is no point 1, because there is no file inPoints.m")
+
+
+def test_a_misspelt_file_is_no_absent_file(refused):
+    """The manual itself has the misprint."""
+    text = SMALL["inVectors2.m"]
+    (found,) = refused(inVectors2=None, inVctors2=text)
+    assert found.startswith("inVctors2.m: is no file of a model; inVectors2.m is one")
+    assert "rename it to inVectors2.m" in found
+    (found,) = refused(inVectors2=None, invectors2=text)
+    assert "rename it to inVectors2.m" in found
+
+
+def test_files_that_are_no_text(refused, tmp_path):
+    (found,) = refused(inForces=b"% gravit\xe9\nForces = [];\n")
+    assert found.startswith("inForces.m:1: is not UTF-8 text: byte 0xe9")
+    (found,) = refused(inForces=b"Forces = [];\0")
+    assert "NUL bytes" in found
+    (found,) = refused(inForces=b" " * (LARGEST_FILE + 1))
+    assert "at most 1 MiB" in found
+    shutil.rmtree(tmp_path / "small")
+    write(tmp_path / "small", inForces=None)
+    (tmp_path / "small" / "inForces.m").mkdir()
+    (found,) = refused(inForces=None)
+    assert found == "inForces.m: is not a regular file"
+
+
+def test_other_line_ends_and_a_mark_at_the_start_change_nothing(tmp_path):
+    expected, _ = dap.import_matlab(write(tmp_path / "model"))
+    files = {n.removesuffix(".m"): t for n, t in SMALL.items()}
+    for mark, end in ((b"\xef\xbb\xbf", b"\r\n"), (b"", b"\r")):
+        other = {n: mark + t.encode().replace(b"\n", end) for n, t in files.items()}
+        found, _ = dap.import_matlab(write(tmp_path / "model", **other))
+        assert found == expected
+
+
+# ---------------------------------------------------------------- within files
+
+
+def test_all_mistakes_of_all_files_at_once(refused):
+    found = refused(
+        **changed("inBodies", "B1.mass = 2", "B1.masss = 2; system('ls')"),
+        **changed("inPoints", "P3.Bindex = 2", "P3.Bindex = 7"),
+        **changed("inJoints", "'sph'", "'shp'"),
+        **changed("inForces", "'weight'", "‘weight’"),
+        inFuncts="C1 = Funct_struct;\nFuncts = [C1; C2];\n",
+    )
+    starts = [m.split("\n")[0] for m in found]
+    assert starts[0].startswith("inBodies.m:1: B1.masss: a Body_struct has no field masss; did you")
+    assert starts[1].startswith("inBodies.m:1: system('ls'): the function system is outside")
+    assert "inPoints.m:3: P3.Bindex = 7: there is no body 7; Bodies has 2" in starts
+    assert any(m.startswith('inJoints.m:1: J1.type = "shp"') for m in starts)
+    assert any("did you mean 'sph'?" in m for m in starts)
+    assert any(m.startswith("inForces.m:1: not valid MATLAB") for m in starts)
+    assert any(m.startswith("inFuncts.m:2: C2: C2 is not defined") for m in starts)
+
+
+def test_mistakes_carry_file_line_key_and_value(tmp_path):
+    folder = write(tmp_path, **changed("inPoints", "P3.Bindex = 2", "P3.Bindex = 7"))
+    with pytest.raises(SceneError) as caught:
+        dap.import_matlab(folder)
+    (mistake,) = caught.value.mistakes
+    assert (mistake.file, mistake.line) == (str(folder / "inPoints.m"), 3)
+    assert (mistake.key, mistake.value) == ("P3.Bindex", 7)
+    folder = write(tmp_path, **changed("inJoints", "J1.iPindex = 1; ", ""))
+    with pytest.raises(SceneError) as caught:
+        dap.import_matlab(folder)
+    assert caught.value.mistakes[0].value is MISSING
+
+
+def test_numbers_that_lead_nowhere(refused):
+    for old, new, words in (
+        ("iPindex = 1", "iPindex = 4", "J1.iPindex = 4: there is no point 4; Points has 3"),
+        ("iPindex = 1", "iPindex = 0", "J1.iPindex = 0: is required: the number of a point"),
+        ("iPindex = 1", "iPindex = 1.5", "J1.iPindex = 1.5: should be the number of a point"),
+        ("iPindex = 1", "iPindex = -1", "should be the number of a point, from 1"),
+        ("iPindex = 1", "iPindex = [1 2]", "should be a number; it is a matrix of 1x2"),
+        ("iPindex = 1", "iPindex = 'P1'", "should be a number; it is text"),
+        ("iPindex = 1", "iPindex = []", "should be a number; it is empty"),
+        ("'sph'", "3", "J1.type = 3: should be text in quotes; it is a number"),
+    ):
+        (found,) = refused(**changed("inJoints", old, new))
+        assert found.startswith("inJoints.m:1: ")
+        assert words in found
+
+
+def test_values_of_wrong_size(refused):
+    (found,) = refused(**changed("inPoints", "[1; 0; 0]", "[1; 0]"))
+    assert found == "inPoints.m:3: P3.sPp = [1, 0]: should be 3 numbers; it is a matrix of 2x1"
+    (found,) = refused(**changed("inBodies", "diag([1 2 2.5])", "[1 2 2.5]"))
+    assert "B1.Jp = [1, 2, 2.5]: should be 3x3 numbers" in found
+    assert "diag([...])" in found
+
+
+def test_what_the_scene_refuses_has_the_line_of_the_matlab_file(refused):
+    """The rules of a scene: masses, ground as body i, lengths."""
+    (found,) = refused(**changed("inBodies", "B1.mass = 2", "B1.mass = -2"))
+    assert found == "inBodies.m:1: bodies.body1.mass = -2.0: should be greater than 0"
+    (found,) = refused(**changed("inBodies", "B2.Jp = eye(3)", "B2.Jp = diag([1 1 5])"))
+    assert found.startswith("inBodies.m:2: bodies.body2.Jp")
+    text = SMALL["inJoints.m"].replace("iPindex = 1", "iPindex = 2")
+    (found,) = refused(inJoints=text.replace("jPindex = 2", "jPindex = 1"))
+    assert found.startswith('inJoints.m:1: joints.J1.P_i = "P2": body i is ground')
+    text = SMALL["inVectors2.m"].replace("iPindex = 3", "iPindex = 2")
+    (found,) = refused(inVectors2=text)
+    assert found.startswith('inVectors2.m:1: vectors2.d1.P_i = "P2": the vector starts on ground')
+    line = "J1 = Joint_struct; J1.type = 'sph-sph'; J1.V2index = 1; J1.el = 0;\nJoints = [J1];\n"
+    assert refused(inJoints=line)[0].startswith("inJoints.m:1: joints.J1.length = 0.0")
+
+
+def test_a_body_that_contradicts_the_points(refused):
+    (found,) = refused(**changed("inJoints", "iPindex = 1", "iPindex = 1; J1.iBindex = 2"))
+    assert "J1.iBindex = 2: is another body than that of iPindex, body 1" in found
+
+
+def test_arrays_that_are_not_there_or_of_another_kind(refused):
+    (found,) = refused(inForces="S1 = Force_struct;\n")
+    assert found.startswith("inForces.m: does not make the array Forces")
+    (found,) = refused(inForces="Forces = 3;\n")
+    assert found == "inForces.m:1: Forces: should be an array of Force_struct, not a number"
+    (found,) = refused(inForces="P = Point_struct;\nForces = [P];\n")
+    assert "not an array of Point_struct" in found
+    text = SMALL["inVectors1.m"] + "Vectors = Vectors1;\n"
+    (found,) = refused(inVectors1=text)
+    assert "makes both Vectors1 and Vectors" in found
+
+
+def test_nothing_is_run(tmp_path):
+    """Calls that would leave a file behind do not."""
+    trace = tmp_path / "trace"
+    code = "\n".join(
+        (
+            f"system('touch {trace}');",
+            f"!touch {trace}",
+            f"eval('system(''touch {trace}'')');",
+            f"fopen('{trace}', 'w');",
+            f"x = unix('touch {trace}');",
+            f"__import__('pathlib').Path('{trace}').touch();",
+        )
+    )
+    for name in ("inBodies", "inAnimate"):
+        folder = write(tmp_path / "model", **{name: code + "\n" + SMALL[f"{name}.m"]})
+        with pytest.raises(SceneError):
+            dap.import_matlab(folder)
+    assert not trace.exists()
+
+
+# ---------------------------------------------------------------- any bytes at all
+
+ALPHABET = b"()[]{}'\"=;:,.%+-*/^ \n\t0129eBPVJ_&|~!@#$\\\x00\xff\xe2\x80\x98"
+
+
+def mutated(data, rng):
+    """Bytes with a few places replaced, removed or doubled; half of the time a digit by another."""
+    data = bytearray(data)
+    for _ in range(rng.randrange(1, 4)):
+        at = rng.randrange(len(data) + 1)
+        digits = [k for k, byte in enumerate(data) if byte in b"0123456789"]
+        kind = rng.randrange(10)
+        if kind >= 5 and digits:
+            data[rng.choice(digits)] = rng.choice(b"0123456789")
+        elif kind == 0:
+            data[at : at + 1] = bytes([rng.choice(ALPHABET)])
+        elif kind == 1:
+            del data[at : at + rng.randrange(1, 20)]
+        elif kind == 2:
+            data[at:at] = data[at : at + rng.randrange(1, 30)]
+        elif kind == 3:
+            data[at:at] = bytes(rng.choice(ALPHABET) for _ in range(rng.randrange(1, 4)))
+        else:
+            other = rng.randrange(len(data) + 1)
+            data[at:at] = data[other : other + rng.randrange(1, 40)]
+    return bytes(data)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_changed_bytes_give_a_scene_or_mistakes(tmp_path, seed):
+    """Nothing but SceneError is ever raised, and each mistake names a file of the folder."""
+    rng = random.Random(seed)
+    registry = dap.load_registry()
+    names = sorted(p.parent.name for p in MODELS.glob("*/inBodies.m"))
+    kept = 0
+    for _ in range(60):
+        model = MODELS / rng.choice(names)
+        folder = tmp_path / "model"
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(model, folder)
+        file = rng.choice(sorted(folder.iterdir()))
+        file.write_bytes(mutated(file.read_bytes(), rng))
+        try:
+            scene, _ = dap.import_matlab(folder, registry)
+            kept += bool(scene.bodies)
+        except SceneError as error:
+            for mistake in error.mistakes:
+                assert mistake.what
+                assert mistake.file.startswith(str(folder)), mistake
+    assert kept, "some changes, such as those of comments, do not matter"
