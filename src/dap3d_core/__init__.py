@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from dap3d_core.matlab import import_matlab
     from dap3d_core.plot import plot
     from dap3d_core.registry import load_registry
+    from dap3d_core.report import report
     from dap3d_core.result import Result
     from dap3d_core.scene import Scene, SceneError, load, shipped_models
     from dap3d_core.simulation import AssemblyError, RedundantError, SimulationError, simulate
@@ -36,6 +37,7 @@ _HOMES = {
     "load_registry": ("registry", "load_registry"),
     "open": ("simulation", "open_result"),
     "plot": ("plot", "plot"),
+    "report": ("report", "report"),
     "shipped_models": ("scene", "shipped_models"),
     "simulate": ("simulation", "simulate"),
 }
@@ -54,6 +56,7 @@ __all__ = [
     "load_registry",
     "open",
     "plot",
+    "report",
     "shipped_models",
     "simulate",
 ]
@@ -64,7 +67,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     floor, attribute = _HOMES[name]
     value = getattr(import_module(f"dap3d_core.{floor}"), attribute)
-    if name != "plot":  # a module of that name stands beside it
+    if name not in ("plot", "report"):  # modules of these names stand beside them
         globals()[name] = value
     return value
 

@@ -66,6 +66,20 @@ def test_the_page_on_post_processing(tmp_path):
         assert done.returncode == 0, done.stderr
 
 
+def test_the_page_on_methods(tmp_path):
+    """Its command and its scripts, which hold assertions of their own."""
+    text = (REPOSITORY / "docs" / "methods.md").read_text()
+    (words,) = commands(text, "dap3d")
+    done = dap3d(words, tmp_path)
+    assert done.returncode == 0, done.stderr
+    for script in blocks(text, "python"):
+        done = subprocess.run(
+            [sys.executable, "-c", script],
+            cwd=tmp_path, env=environment(), capture_output=True, text=True,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+
+
 def test_the_first_commands_of_the_readme_are_targets():
     """The two commands at the top exist in the Makefile."""
     text = (REPOSITORY / "README.md").read_text()

@@ -37,12 +37,7 @@ def run_to(name, t):
     return dap.simulate(compiled(name), t_end=t, dt=max(t, 1.0) if t == 0.0 else t, **settings)
 
 
-def marked(name, check):
-    marks = [pytest.mark.slow] if check.get("slow") else []
-    return pytest.param(name, check, id=title(name, check), marks=marks)
-
-
-@pytest.mark.parametrize(("name", "check"), [marked(*c) for c in CHECKS])
+@pytest.mark.parametrize(("name", "check"), CHECKS, ids=[title(*c) for c in CHECKS])
 def test_expected(name, check):
     """The quantity agrees with the independent value."""
     value = np.array(check["value"], dtype=float)

@@ -89,4 +89,4 @@ def test_words_and_functions_are_told():
     text = described("rot_sda", width=200)
     assert "false, true" in text
     assert "of theta - theta_0" in text
-    assert "of time" in described("rel-rot", width=200)
+    assert "the bodies of its joint" in described("friction")

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from dap3d_core.interface import (
+    Body,
     Force,
     PluginError,
     Point,
     Vector,
     body,
+    choice,
     examine,
     joint,
     number,
@@ -98,3 +100,34 @@ def test_a_field_x_of_a_function_is_its_argument():
     spline = load_registry().get("function", "spline")
     assert specs_of(spline.type)["x"].kind == "table"
     assert spline.names["x"].doc == "the argument of the function"
+
+
+class Push(Force):
+    """Two variants that differ in a kernel alone, in one file, with the same names."""
+
+    keyword = "push"
+    body_i: Body = body()
+    way: str = choice(("up", "down"), default="up")
+
+    def wrench(t):
+        return ((ZERO, (t, 0.0, 0.0)),)
+
+
+class Down(Push, way="down"):
+    """The other way."""
+
+    def wrench(t):
+        return ((ZERO, (-t, 0.0, 0.0)),)
+
+
+def test_variants_in_one_file_have_loops_of_their_own():
+    """The code of one is not taken for that of another, in this process or from the cache."""
+    examined = examine(Push)
+    ((_, other),) = examined.variants
+    for one, sign in ((examined, 1.0), (other, -1.0)):
+        out, nothing = np.zeros(12), np.zeros(1)
+        body_array = np.zeros((2, gather.BODY_WIDTH))
+        loop = build(write(one, "wrench"))
+        loop(2.5, body_array, np.zeros((1, 5)), np.array([1]), nothing, 0, 0, 1, out, nothing,
+             nothing)  # fmt: skip
+        assert out[9] == sign * 2.5

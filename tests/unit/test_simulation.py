@@ -476,6 +476,17 @@ def test_energy_of_a_free_system_stays():
     assert result.ledger["total energy"].value < 1e-9
 
 
+@pytest.mark.parametrize(
+    ("model", "wanted"),
+    [("pen1", True), ("pen2", True), ("bodies2", False), ("fourbar3", False),
+     ("A05", False), ("A04", True), ("A03", False)],
+)  # fmt: skip
+def test_what_can_do_work_is_known(model, wanted):
+    """Dampers (bodies2, A05), a driver (fourbar3) and a torque (A03) can do work; pendulums, one
+    with a spinning wheel, and a linkage under gravity keep their energy."""
+    assert dap.compile(model, allow_code=True).is_conservative is wanted
+
+
 # ------------------------------------------------------------------ a compiled model
 
 

@@ -132,3 +132,22 @@ def test_the_switch_is_the_sine_of_the_lean():
         tilted = tuple(tuple(row) for row in np.array(A) @ [[1, 0, 0], [0, 0, -1], [0, 1, 0]])
         assert Disk.switch(tilted) == pytest.approx(np.sin(lean) - 0.02, abs=1e-12)
         assert np.sign(Disk.switch(tilted)) == sign
+
+
+def test_a_disk_that_falls_over_ends_the_run():
+    """The run ends where the contact becomes undefined, with what was computed until then.
+
+    On smooth ground the centre falls straight down; with theta the angle to the ground,
+    theta_dot^2 (J_t + m R^2 cos^2) / 2 = m g R (sin theta_0 - sin theta).
+    """
+    with pytest.raises(dap.SimulationError, match=r"ground contact.*the disk lies down") as caught:
+        dap.simulate(disk("z", lean=0.8), t_end=2.0, dt=0.02, **TIGHT)
+    result = caught.value.result
+    sine = result.r[:, 0, 2] / RADIUS
+    assert 0.02 < sine[-1] < 0.2
+    assert result.r[:, 0, :2] == pytest.approx(0.0, abs=1e-10)
+    inertia = ACROSS + MASS * RADIUS**2 * (1.0 - sine**2)
+    square = 2.0 * MASS * G * RADIUS * (np.sin(0.8) - sine) / inertia
+    assert np.linalg.norm(result.w[:, 0], axis=1) == pytest.approx(
+        np.sqrt(np.maximum(square, 0.0)), abs=1e-6
+    )  # at rest the root turns 1e-13 of sine into 1e-6

@@ -110,7 +110,7 @@ def test_a_scene_without_friction_compiles_and_keeps_nothing_of_it():
     scene = incline(0.0)
     del scene.forces["rub"]
     system = dap.compile(scene).machine.system
-    assert system.applied.size == system.rubbing.size == system.memory.size == 0
+    assert system.friction.size == 0
     assert "friction" not in {kind for kind, _ in dap.compile(scene).machine.what}
 
 

@@ -47,16 +47,12 @@ class System(NamedTuple):
     gamma: Floats  # (rows,)
     nu: Floats  # (rows,)
     C: Floats  # (rows,)
-    x: Floats  # (rows,) right-hand side, then -lambda
-    z: Floats  # (rows,) -lambda so far, where it comes in several passes
-    compliance: Floats  # (rows,) what regularises the joint rows
+    x: Floats  # (rows,) right-hand side, then -lambda; between these, what regularises the rows
     D: Floats  # blocks of the Jacobian
     K: Floats  # blocks of what remains to be factored
     smallest: Floats  # (rows,) a pivot not above this is singular
     settings: Floats  # (SETTINGS,) see above
-    applied: Floats  # (6 (n+1),) scaled applied forces; this and what follows where joints rub
-    rubbing: Floats  # (6 (n+1),) friction on each body
-    memory: Floats  # (3, rows) what the iteration for friction remembers
+    friction: Floats  # where joints rub: two of the size of ``force``, three of the size of ``x``
     idx: Integers  # integers of all instances
     groups: Integers  # (loops, 3) i0, p0, count
     kinds: Integers  # (KINDS + 1,) first loop of each kind
@@ -70,11 +66,11 @@ class System(NamedTuple):
     hubs: Integers
 
 
-_matrices = ("body", "metric", "F", "memory")
+_matrices = ("body", "metric", "F")
 _integers = ("idx", "kinds", "row")
 _floats = (
-    "par", "force", "gamma", "nu", "C", "x", "z", "compliance", "D", "K", "smallest", "settings",
-    "applied", "rubbing",
+    "par", "force", "gamma", "nu", "C", "x", "D", "K", "smallest", "settings",
+    "friction",
 )  # fmt: skip
 
 

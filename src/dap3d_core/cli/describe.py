@@ -138,7 +138,7 @@ def _field(name: str, spec: Any) -> dict[str, Any]:
 
 def _allowed(spec: Any) -> str:
     """What a value must satisfy beyond its kind."""
-    words = [f"of {spec.argument or 'time'}"] if spec.kind == "function" else []
+    words = [f"of {spec.argument}"] if spec.argument else []
     if spec.choices:
         words.append(", ".join(map(_word, spec.choices)))
         words += [f"{word} is {other}" for word, other in spec.aliases.items()]
@@ -187,6 +187,8 @@ def _acts_on(found: dict[str, Any]) -> str:
         return "its argument x, time where a force or joint does not say otherwise"
     if found.get("each_body"):
         return "every body of the scene"
+    if not found["bodies"]:
+        return "the bodies of its joint"
     return f"{', '.join(found['bodies'])}; a field's last letter says whose it is"
 
 

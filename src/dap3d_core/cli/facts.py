@@ -31,10 +31,19 @@ def facts_of(result: "Result") -> dict[str, Any]:
         "t_start": float(result.t[0]) if instants else None,
         "t_end": float(result.t[-1]) if instants else None,
         **attrs.asdict(result.stats),
+        "error_estimate": _error_estimate(result),
         "ledger": {name: attrs.asdict(entry) for name, entry in result.ledger.items()},
         "notes": result.notes,
         "versions": result.versions,
     }
+
+
+def _error_estimate(result: "Result") -> dict[str, Any] | None:
+    """The largest estimated errors by symbol, and from when on they are too large to be of use."""
+    error = result.error
+    if error is None:
+        return None
+    return {**error.largest, "meaningless_from": error.meaningless_from}
 
 
 def reason_of(facts: dict[str, Any]) -> str:

@@ -140,9 +140,10 @@ def _add_commands() -> None:
     from dap3d_core.cli.plot import plot
     from dap3d_core.cli.plugins import plugins
     from dap3d_core.cli.post import post
+    from dap3d_core.cli.report import report
     from dap3d_core.cli.run import run
 
-    for command in (run, check, models, plugins, describe, info, post, plot, import_matlab):
+    for command in (run, check, models, plugins, describe, info, post, plot, report, import_matlab):
         dap3d.add_command(command)
 
 

@@ -2,7 +2,7 @@
 
 import time
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 from rich.progress import BarColumn, Progress, SpinnerColumn, Task, TaskProgressColumn, TextColumn
 from rich.text import Text
@@ -28,12 +28,13 @@ class RunProgress:
         self._task: Any = None
         self._told_once = False
         self._begun: float | None = None
+        self._reached = 0.0
         self._next_line = FIRST_LINE
         live = self._console.file.isatty() and not self._console.is_dumb_terminal
         if live and not quiet:
             self._bar = _bar(self._console)
 
-    def __enter__(self) -> "RunProgress":
+    def __enter__(self) -> Self:
         if self._bar is not None:
             self._bar.start()
             self._task = self._bar.add_task("preparing", total=None)
@@ -59,8 +60,9 @@ class RunProgress:
 
     def advance(self, t: float, t_end: float) -> None:
         """The run has come to simulated time t of t_end, s."""
-        if self._begun is None:
-            self._begun = time.monotonic()
+        if self._begun is None or t < self._reached:  # a second run begins
+            self._begun, self._next_line = time.monotonic(), FIRST_LINE
+        self._reached = t
         if self._bar is not None:
             words = f"t = {t:.4g} of {t_end:.4g} s"
             self._bar.update(self._task, total=t_end, completed=t, description=words)

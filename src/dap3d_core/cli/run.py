@@ -49,6 +49,9 @@ _OPTIONS = (
                  help="The least correction is that in m and rad, or weighted by masses."),
     click.option("--project/--no-project", default=None,
                  help="Bring every step onto the constraints."),
+    click.option("--error", "estimate_error", is_flag=True,
+                 help="Estimate the error of all positions and velocities by a second run at "
+                      "tolerances ten times tighter, or half the step."),
     click.option("--strict", is_flag=True,
                  help="Exit with 1 if there are warnings (notes that tell of a change) or the "
                       "ledger does not close; the result is saved all the same."),
@@ -76,6 +79,7 @@ def run(
     model: str | None,
     *,
     output: str | None,
+    estimate_error: bool,
     strict: bool,
     force: bool,
     allow_code: bool,
@@ -102,7 +106,7 @@ def run(
     _check_settings(scene, given)
     outcome = _simulate(
         scene,
-        given,
+        given | {"estimate_error": estimate_error},
         allow_code=allow_code,
         quiet=quiet,
         debug=ctx.meta["dap3d.debug"],
@@ -153,10 +157,10 @@ def _check_settings(scene: "Scene", given: dict[str, Any]) -> None:
         about = said.keys() | ({"dt"} if "t_end" in said else set())
         mistakes = [m for m in error.mistakes if m.key in about]
         if mistakes:  # others are found again with the whole scene, with their lines
-            raise _in_options(SceneError(mistakes), said) from error
+            raise in_options(SceneError(mistakes), said) from error
 
 
-def _in_options(error: "SceneError", said: Collection[str]) -> "SceneError":
+def in_options(error: "SceneError", said: Collection[str]) -> "SceneError":
     """The same mistakes, those of some settings under the names of their options."""
     import attrs
 
@@ -216,7 +220,7 @@ def _simulate(
             kept = getattr(error, "result", None)
             if kept is None or isinstance(error, OSError):
                 if isinstance(error, SceneError):  # settings that only the integrator can judge
-                    raise _in_options(error, SETTINGS) from error
+                    raise in_options(error, SETTINGS) from error
                 raise
             if debug:
                 import traceback

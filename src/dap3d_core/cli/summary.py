@@ -27,6 +27,7 @@ def run_pairs(found: dict[str, Any]) -> list[tuple[str, str]]:
         ("steps", f"{found['steps']:,} taken, {found['rejected']:,} rejected"),
         ("evaluations", evaluations(found)),
         ("duration", duration(found)),
+        ("error", error_estimate(found)),
     ]
 
 
@@ -107,6 +108,21 @@ def evaluations(found: dict[str, Any]) -> str:
 def duration(found: dict[str, Any]) -> str:
     """Wall time of the run and of what came before."""
     return f"{seconds(found['wall_time_s'])}; to prepare {seconds(found['compile_time_s'])}"
+
+
+def error_estimate(found: dict[str, Any]) -> str:
+    """The largest estimated errors; "" where none were asked for."""
+    error = found["error_estimate"]
+    if error is None:
+        return ""
+    words = (
+        f"estimated, at most {error['r']:.1e} m and {error['rd']:.1e} m/s of mass centres, "
+        f"{error['p']:.1e} of Euler parameters, {error['w']:.1e} rad/s; no bound"
+    )
+    when = error["meaningless_from"]
+    if when is None:
+        return words
+    return f"{words}. From t = {when:.6g} s on beyond 1e-3 of the size: no longer meaningful"
 
 
 def _verdict(ok: bool | None) -> Text:

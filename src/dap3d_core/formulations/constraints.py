@@ -31,7 +31,7 @@ from dap3d_core.assembly.system import (
     System,
 )
 from dap3d_core.formulations.moves import change_velocity, move, normalise, size_of
-from dap3d_core.kernels.cache import compiled, compiled_inside
+from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
 from dap3d_core.linear.blocks import (
     add_product,
     assemble,
@@ -55,7 +55,7 @@ PART = 1e-9
 LOST = 1e6
 
 
-@compiled
+@compiled_into
 def linearise(t: float, system: System, loops: Any) -> None:
     """D^, gamma and nu of all joints at the bodies as placed."""
     kinds, D = system.kinds, system.D
@@ -64,21 +64,21 @@ def linearise(t: float, system: System, loops: Any) -> None:
     scale_blocks(system.blocks, D, system.metric)
 
 
-@compiled
+@compiled_into
 def factorise(system: System, part: float | None) -> int:
-    """The factors of D^ as it stands, in K.
+    """The factors of D^ as it stands, in K; E, where there is one, is left in x.
 
     Returns the number of pivots that have become small (``system.smallest``): the pose is near a
     singular one.
     """
     assemble(system.targets, system.contributions, system.D, system.K)
     if part is not None:
-        weigh_rows(system.blocks, system.D, part, system.compliance)
-        regularise(system.nodes, system.compliance, system.K)
+        weigh_rows(system.blocks, system.D, part, system.x)
+        regularise(system.nodes, system.x, system.K)
     return factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
 
 
-@compiled_inside
+@compiled_into
 def gather_forces(t: float, y: Floats, system: System, loops: Any) -> float:
     """Place the bodies of a state; scaled forces into ``force``; returns the power of the forces.
 
@@ -92,14 +92,14 @@ def gather_forces(t: float, y: Floats, system: System, loops: Any) -> float:
     return scale_forces(body, metric, force)
 
 
-@compiled_inside
+@compiled_into
 def solve_rows(system: System) -> None:
     """Accelerations from the forces in ``force``, into ``force``; from x = gamma, x = -lambda."""
     solve_saddle(system.blocks, system.hubs, system.nodes, system.columns, system.D, system.K,
                  system.x, system.force)  # fmt: skip
 
 
-@compiled_inside
+@compiled_into
 def power_of_drivers(system: System) -> float:
     """Power of the reactions, with -lambda in ``x``: only moving constraints do work."""
     power = 0.0
@@ -179,7 +179,7 @@ def project_onto(
             out[1] = 1.0
     out[2] = worst
     linearise(t, system, loops)
-    if not factored:
+    if not factored or part is not None:  # of old factors the null space would be wrong
         poor = factorise(system, part) > 0
     worst = velocity_residuals(system)
     limit = system.settings[TOLERANCE_V] * size_of(y, 7 * n, n, 6, 6)

@@ -30,14 +30,15 @@ def rubs(system: System) -> bool:
 def keep_applied(system: System) -> None:
     """Remember the scaled applied forces before they become accelerations."""
     for k in range(system.force.shape[0]):
-        system.applied[k] = system.force[k]
+        system.friction[k] = system.force[k]
 
 
 @compiled_inside
 def rub(t: float, system: System, loops: Any) -> float:
     """Friction for the multipliers in x, added to the scaled applied forces; returns its power."""
-    kinds, rubbing, body, metric = system.kinds, system.rubbing, system.body, system.metric
-    force = system.force
+    kinds, body, metric, force = system.kinds, system.body, system.metric, system.force
+    size = force.shape[0]
+    applied, rubbing = system.friction[:size], system.friction[size : 2 * size]
     zero(rubbing)
     call_loops(kinds[FRICTION], kinds[FRICTION + 1], t, body, system.F, system.idx,
                system.par, system.groups, loops, rubbing, system.x, system.x)  # fmt: skip
@@ -50,17 +51,18 @@ def rub(t: float, system: System, loops: Any) -> float:
             power += rubbing[o + c] * s[12 + c]
         n0, n1, n2 = rubbing[o + 3], rubbing[o + 4], rubbing[o + 5]
         for c in range(3):
-            force[o + c] = system.applied[o + c] + k[0] * rubbing[o + c]
+            force[o + c] = applied[o + c] + k[0] * rubbing[o + c]
             turned = k[7 + c] * n0 + k[10 + c] * n1 + k[13 + c] * n2
-            force[o + 3 + c] = system.applied[o + 3 + c] + turned
+            force[o + 3 + c] = applied[o + 3 + c] + turned
     return power
 
 
 @compiled_inside
 def settle(system: System, passes: int) -> bool:
     """Whether the multipliers in x have settled; else x becomes what the next pass starts from."""
-    x, memory = system.x, system.memory
-    guess, result, change = memory[0], memory[1], memory[2]
+    x, rows = system.x, system.x.shape[0]
+    memory = system.friction[2 * system.force.shape[0] :]
+    guess, result, change = memory[:rows], memory[rows : 2 * rows], memory[2 * rows :]
     if passes == 0:
         for k in range(x.shape[0]):
             guess[k] = x[k]

@@ -63,17 +63,18 @@ def solve(system: System) -> None:
     """Scaled accelerations from the scaled forces in ``force``, -lambda into ``x``.
 
     Each pass starts from the accelerations of the one before, so that it solves for what is left.
+    C holds the sum of the passes.
     """
-    x, z = system.x, system.z
-    zero(z)
+    x, C = system.x, system.C
+    zero(C)
     for _ in range(SOLVES):
         for k in range(x.shape[0]):
             x[k] = system.gamma[k]
         solve_rows(system)
         for k in range(x.shape[0]):
-            z[k] += x[k]
+            C[k] += x[k]
     for k in range(x.shape[0]):
-        x[k] = z[k]
+        x[k] = C[k]
 
 
 @compiled_inside
@@ -92,18 +93,22 @@ def take_least(system: System) -> None:
     """Replace -lambda in ``x`` by the least one that gives the same D^T lambda.
 
     With one weight e for all rows, n -> e (D^ D^^T + e)^-1 n keeps what D^T does not see, and
-    takes away the rest. That is subtracted.
+    takes away the rest. That is subtracted. gamma keeps what is given, C holds n.
     """
-    x, z, compliance = system.x, system.z, system.compliance
-    weigh_rows(system.blocks, system.D, 1.0, compliance)
-    e = LEAST_PART * largest(compliance)
+    x, given, n = system.x, system.gamma, system.C
     for k in range(x.shape[0]):
-        if compliance[k] == 0.0:  # a hub's place, or a row that does nothing
-            x[k] = 0.0
-        compliance[k], z[k], system.C[k] = e, x[k], x[k]
+        given[k] = x[k]
+    weigh_rows(system.blocks, system.D, 1.0, x)
+    e = LEAST_PART * largest(x)
+    for k in range(x.shape[0]):
+        if x[k] == 0.0:  # a hub's place, or a row that does nothing
+            given[k] = 0.0
+        n[k], x[k] = given[k], e
     before = np.inf
     assemble(system.targets, system.contributions, system.D, system.K)
-    regularise(system.nodes, compliance, system.K)
+    regularise(system.nodes, x, system.K)
+    for k in range(x.shape[0]):
+        x[k] = n[k]
     factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
     for _ in range(LEAST_SOLVES):
         zero(system.force)
@@ -114,13 +119,13 @@ def take_least(system: System) -> None:
                 x[c] = 0.0
         for k in range(x.shape[0]):
             x[k] *= -e
-            change = max(change, abs(x[k] - z[k]))
-            z[k] = x[k]
+            change = max(change, abs(x[k] - n[k]))
+            n[k] = x[k]
         if not change < 0.5 * before:
             break
         before = change
     for k in range(x.shape[0]):
-        x[k] = system.C[k] - z[k]
+        x[k] = given[k] - n[k]
 
 
 @compiled

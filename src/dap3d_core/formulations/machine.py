@@ -178,7 +178,7 @@ class Machine:
         s.smallest[:] = 0.0
         pivots = self.pivots(t)
         if self.method != "standard":
-            pivots[pivots < REDUNDANT * s.compliance[s.row]] = 0.0
+            pivots[pivots < REDUNDANT * s.x[s.row]] = 0.0
         s.smallest[s.row] = POOR * pivots
 
     @AS_COMPILED

@@ -41,9 +41,9 @@ from dap3d_core.linear.blocks import assemble, factor, regularise
 
 @compiled_inside
 def solve(system: System) -> None:
-    """Scaled accelerations from the scaled forces in ``force``, -lambda into ``x``; gamma' is z."""
+    """Scaled accelerations from the scaled forces in ``force``, -lambda into ``x``; C is gamma'."""
     for k in range(system.x.shape[0]):
-        system.x[k] = system.z[k]
+        system.x[k] = system.C[k]
     solve_rows(system)
 
 
@@ -62,25 +62,25 @@ def with_friction(t: float, system: System, loops: Any) -> float:
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers."""
     body, metric, force, kinds = system.body, system.metric, system.force, system.kinds
-    target, C, settings = system.z, system.C, system.settings
+    x, C, settings = system.x, system.C, system.settings
     place_bodies(y, body, metric)
     call_loops(kinds[VALUE], kinds[VALUE + 1], t, body, system.F, system.idx,
                system.par, system.groups, loops, force, force, force)  # fmt: skip
     linearise(t, system, loops)
     residuals(t, system, loops)
     stiffness, damping = settings[OMEGA] ** 2, 2.0 * settings[MU] * settings[OMEGA]
-    for k in range(target.shape[0]):
-        target[k] = system.gamma[k] - stiffness * C[k]
+    for k in range(x.shape[0]):
+        x[k] = system.gamma[k] - stiffness * C[k]
     velocity_residuals(system)
-    for k in range(target.shape[0]):
-        target[k] -= damping * C[k]
-        system.compliance[k] = 1.0 / settings[ALPHA]
+    for k in range(x.shape[0]):
+        C[k] = x[k] - damping * C[k]
+        x[k] = 1.0 / settings[ALPHA]
     zero(force)
     call_loops(kinds[WRENCH], kinds[WRENCH + 1], t, body, system.F, system.idx,
                system.par, system.groups, loops, force, force, force)  # fmt: skip
     power = scale_forces(body, metric, force)
     assemble(system.targets, system.contributions, system.D, system.K)
-    regularise(system.nodes, system.compliance, system.K)
+    regularise(system.nodes, x, system.K)
     factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
     if rubs(system):
         keep_applied(system)

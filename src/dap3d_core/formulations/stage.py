@@ -7,8 +7,10 @@ hold, and mu, the multipliers of the position level, vanish in the solution:
 
 An implicit stage asks for s z - J z = r with the tangent J, and s real or complex. Unknowns are, in
 the bodies' scaled coordinates, displacement x and velocity v of each body and mu, lambda of each
-joint node. A change of Euler parameters is p = 1/2 L^T theta' + p n, with n along p: n is
-eliminated in closed form, so that a body has twelve unknowns.
+joint node. Each stage has them in the axes that its bodies have there, translations too: one
+tangent for all stages would otherwise be wrong by stiffness times the rotation during a step. A
+change of Euler parameters is 1/2 L^T theta' + p n, with n along p: n is eliminated in closed form,
+so that a body has twelve unknowns.
 
 A row without a position level has mu = 0 as its equation.
 """
@@ -28,7 +30,7 @@ from dap3d_core.formulations.constraints import (
     velocity_residuals,
 )
 from dap3d_core.formulations.friction import keep_applied, rub, rubs
-from dap3d_core.formulations.tangent import Tangent
+from dap3d_core.formulations.tangent import Tangent, turn_to_body
 from dap3d_core.kernels.cache import compiled, compiled_inside
 
 
@@ -44,7 +46,6 @@ class Matrix(NamedTuple):
     block_place: Integers  # (b, 3) of each block of D: (joint, body), (body, joint), first unknown
     joint_place: Integers  # (joint nodes, 3) diagonal block, rows, first row
     held: Integers  # (row_size,) 1 where a row has a position level
-    frame: Floats  # (n + 1, 4) Euler parameters
     spin: Floats  # (n + 1, 15): L^T [w' x] U / 2 by rows; L^T w'; U^T w'
     D: Floats  # (block_size,)
     compliance: Floats  # (row_size,) what regularises the rows
@@ -78,6 +79,19 @@ def add_displacement(y: Floats, metric: Floats, force: Floats, out: Floats) -> N
         out[c + 4] += e0 * w0 - e3 * w1 + e2 * w2
         out[c + 5] += e3 * w0 + e0 * w1 - e1 * w2
         out[c + 6] += -e2 * w0 + e1 * w1 + e0 * w2
+
+
+@compiled_inside
+def add_velocity(metric: Floats, force: Floats, out: Floats) -> None:
+    """Add a scaled velocity in ``force`` to the velocities (6 n,)."""
+    for b in range(1, metric.shape[0]):
+        f, o, k = 6 * (b - 1), 6 * b, metric[b]
+        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
+        for d in range(3):
+            out[f + d] += k[0] * force[o + d]
+        out[f + 3] += k[1] * a0 + k[2] * a1 + k[3] * a2
+        out[f + 4] += k[4] * a1 + k[5] * a2
+        out[f + 5] += k[6] * a2
 
 
 @compiled
@@ -126,8 +140,12 @@ def evaluate_stage(
 @compiled_inside
 def keep_state(system: System, matrix: Matrix, part: float) -> None:
     """Keep what the matrix needs of the bodies as placed and of D^ as it stands."""
-    for k in range(system.D.shape[0]):
-        matrix.D[k] = system.D[k]
+    for q in range(system.blocks.shape[0]):
+        s = system.body[system.blocks[q, 1]]
+        for o in range(system.blocks[q, 0], system.blocks[q, 0] + 6 * system.blocks[q, 2], 6):
+            for c in range(o, o + 6):
+                matrix.D[c] = system.D[c]
+            turn_to_body(matrix.D, o, s)
     zero(matrix.compliance)
     for q in range(system.blocks.shape[0] if part > 0.0 else 0):
         o, f = system.blocks[q, 0], system.blocks[q, 3]
@@ -137,8 +155,6 @@ def keep_state(system: System, matrix: Matrix, part: float) -> None:
             o += 6
     for b in range(1, system.body.shape[0]):
         s, k, z = system.body[b], system.metric[b], matrix.spin[b]
-        for c in range(4):
-            matrix.frame[b, c] = s[18 + c]
         w0 = s[3] * s[15] + s[6] * s[16] + s[9] * s[17]
         w1 = s[4] * s[15] + s[7] * s[16] + s[10] * s[17]
         w2 = s[5] * s[15] + s[8] * s[16] + s[11] * s[17]
@@ -207,8 +223,25 @@ def fill_matrix(s: Any, K: Any, blocks: Integers, matrix: Matrix, tangent: Tange
 
 
 @compiled_inside
+def keep_frames(body: Floats, frames: Floats) -> None:
+    """The axes and Euler parameters of the bodies as placed."""
+    for b in range(1, body.shape[0]):
+        for c in range(9):
+            frames[b, c] = body[b, 3 + c]
+        for c in range(4):
+            frames[b, 9 + c] = body[b, 18 + c]
+
+
+@compiled_inside
 def scale_residual(
-    R: Floats, rows: Floats, blocks: Integers, metric: Floats, matrix: Matrix, x: Floats, n: Floats
+    R: Floats,
+    rows: Floats,
+    blocks: Integers,
+    metric: Floats,
+    matrix: Matrix,
+    frames: Floats,
+    x: Floats,
+    n: Floats,
 ) -> None:
     """Residuals of y (13 n + 1,) and of both levels (2, rows) as right-hand side x.
 
@@ -217,14 +250,15 @@ def scale_residual(
     count = metric.shape[0] - 1
     for b in range(1, count + 1):
         c, f, o = 7 * (b - 1), 7 * count + 6 * (b - 1), matrix.body_first[b]
-        k, e = metric[b], matrix.frame[b]
+        k, e = metric[b], frames[b]
         for d in range(3):
-            x[o + d], x[o + 6 + d] = R[c + d] / k[0], R[f + d] / k[0]
+            x[o + d] = (e[d] * R[c] + e[3 + d] * R[c + 1] + e[6 + d] * R[c + 2]) / k[0]
+            x[o + 6 + d] = (e[d] * R[f] + e[3 + d] * R[f + 1] + e[6 + d] * R[f + 2]) / k[0]
         p0, p1, p2, p3 = R[c + 3], R[c + 4], R[c + 5], R[c + 6]
-        t0 = -e[1] * p0 + e[0] * p1 + e[3] * p2 - e[2] * p3
-        t1 = -e[2] * p0 - e[3] * p1 + e[0] * p2 + e[1] * p3
-        t2 = -e[3] * p0 + e[2] * p1 - e[1] * p2 + e[0] * p3
-        n[b] = e[0] * p0 + e[1] * p1 + e[2] * p2 + e[3] * p3
+        t0 = -e[10] * p0 + e[9] * p1 + e[12] * p2 - e[11] * p3
+        t1 = -e[11] * p0 - e[12] * p1 + e[9] * p2 + e[10] * p3
+        t2 = -e[12] * p0 + e[11] * p1 - e[10] * p2 + e[9] * p3
+        n[b] = e[9] * p0 + e[10] * p1 + e[11] * p2 + e[12] * p3
         unscale(k, t0, t1, t2, 2.0, x, o + 3, 1)
         unscale(k, R[f + 3], R[f + 4], R[f + 5], 1.0, x, o + 9, 1)
     for q in range(blocks.shape[0]):
@@ -253,22 +287,31 @@ def find_length(s: Any, x: Any, n: Any, matrix: Matrix) -> None:
 
 @compiled_inside
 def unscale_solution(
-    x: Floats, n: Floats, blocks: Integers, metric: Floats, matrix: Matrix, out: Floats, rows: Floats
+    x: Floats,
+    n: Floats,
+    blocks: Integers,
+    metric: Floats,
+    matrix: Matrix,
+    frames: Floats,
+    out: Floats,
+    rows: Floats,
 ) -> None:
     """A solution x as a change of y (13 n + 1,) and of the multipliers (2, rows)."""
     count = metric.shape[0] - 1
     for b in range(1, count + 1):
         c, f, o = 7 * (b - 1), 7 * count + 6 * (b - 1), matrix.body_first[b]
-        k, e, along = metric[b], matrix.frame[b], n[b]
+        k, e, along = metric[b], frames[b], n[b]
         for d in range(3):
-            out[c + d], out[f + d] = k[0] * x[o + d], k[0] * x[o + 6 + d]
+            g = 3 * d
+            out[c + d] = k[0] * (e[g] * x[o] + e[g + 1] * x[o + 1] + e[g + 2] * x[o + 2])
+            out[f + d] = k[0] * (e[g] * x[o + 6] + e[g + 1] * x[o + 7] + e[g + 2] * x[o + 8])
         w0 = 0.5 * (k[1] * x[o + 3] + k[2] * x[o + 4] + k[3] * x[o + 5])
         w1 = 0.5 * (k[4] * x[o + 4] + k[5] * x[o + 5])
         w2 = 0.5 * k[6] * x[o + 5]
-        out[c + 3] = e[0] * along - e[1] * w0 - e[2] * w1 - e[3] * w2
-        out[c + 4] = e[1] * along + e[0] * w0 - e[3] * w1 + e[2] * w2
-        out[c + 5] = e[2] * along + e[3] * w0 + e[0] * w1 - e[1] * w2
-        out[c + 6] = e[3] * along - e[2] * w0 + e[1] * w1 + e[0] * w2
+        out[c + 3] = e[9] * along - e[10] * w0 - e[11] * w1 - e[12] * w2
+        out[c + 4] = e[10] * along + e[9] * w0 - e[12] * w1 + e[11] * w2
+        out[c + 5] = e[11] * along + e[12] * w0 + e[9] * w1 - e[10] * w2
+        out[c + 6] = e[12] * along - e[11] * w0 + e[10] * w1 + e[9] * w2
         out[f + 3] = k[1] * x[o + 9] + k[2] * x[o + 10] + k[3] * x[o + 11]
         out[f + 4] = k[4] * x[o + 10] + k[5] * x[o + 11]
         out[f + 5] = k[6] * x[o + 11]

@@ -26,10 +26,10 @@ from dap3d_core.formulations.constraints import (
     solve_rows,
 )
 from dap3d_core.formulations.friction import keep_applied, rub, rubs, settle
-from dap3d_core.kernels.cache import compiled, compiled_inside
+from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
 
 
-@compiled_inside
+@compiled_into
 def solve(system: System) -> None:
     """Scaled accelerations from the scaled forces in ``force``, -lambda into ``x``."""
     for k in range(system.x.shape[0]):

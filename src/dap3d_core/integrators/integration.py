@@ -62,6 +62,8 @@ class Integration:
         Number of rows that wait at most to be taken by ``rows``.
     length_count
         Number of lengths that ``project`` gives, which vanish at singular states (crossing.py).
+    watched
+        Whether there is a fourth function, which is called with each accepted state.
 
     Raises
     ------
@@ -87,6 +89,7 @@ class Integration:
         report_size: int = 0,
         buffer_rows: int = 256,
         length_count: int = 0,
+        watched: bool = False,
     ) -> None:
         self.method = method
         self._arguments = (functions, system, loops)
@@ -111,7 +114,7 @@ class Integration:
         integer[at.ERROR_SIZE], integer[at.ERRORS] = error_size, len(method.e)
         integer[at.ERROR_USES_RESULT] = method.error_uses_result
         integer[at.DENSE], integer[at.PROJECT_ON] = method.dense, project_on
-        integer[at.WATCHED] = len(functions) > 3
+        integer[at.WATCHED] = watched
         state = np.zeros((at.STATES, y.size))
         state[at.Y] = y
         #: All the state there is, as arrays: copied and put back, the run goes on from there.

@@ -20,7 +20,7 @@ class RadauMethod(NamedTuple):
     """Radau IIA; T^-1 A^-1 T = [[gamma, 0, 0], [0, alpha, -beta], [0, beta, alpha]]."""
 
     c: Floats  # (3,) abscissae
-    b: Floats  # (3,) weights
+    A: Floats  # (3, 3); its last row holds the weights
     inverse: Floats  # (3, 3) A^-1
     T: Floats  # (3, 3)
     T_inverse: Floats  # (3, 3)
@@ -47,4 +47,4 @@ def radau_method() -> RadauMethod:
     poles = np.array([values[real].real, values[pair].real, -values[pair].imag])
     e = np.array([-(13 + 7 * q) / 3, (-13 + 7 * q) / 3, -1 / 3])
     c = np.array([(4 - q) / 10, (4 + q) / 10, 1.0])
-    return RadauMethod(c, A[2].copy(), inverse, np.ascontiguousarray(T), np.linalg.inv(T), e, poles)
+    return RadauMethod(c, A, inverse, np.ascontiguousarray(T), np.linalg.inv(T), e, poles)

@@ -200,7 +200,7 @@ def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) 
     h = aim(work.lengths, real[CALM], longest) if adaptive else longest
     if h < longest:
         t1 = t + h
-    near = integer[PROJECT_ON] != 0 and is_near(work.lengths, h)
+    near = integer[PROJECT_ON] != 0 and is_near(work.lengths, longest)
     take_stages(work, t1, h, near, rhs, project, system, loops)
     error = 0.0
     if adaptive and near:
@@ -208,8 +208,8 @@ def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) 
     elif adaptive:
         error = error_norm(real, integer, work.state, k, work.table, h)
     if error <= 1.0:
-        failure = land(work, t1, rhs, project, system, loops)
-        if failure == RUNNING and adaptive and is_poor(real, integer, times, t1):
+        failure = land(work, t1, near, rhs, project, system, loops)
+        if failure == RUNNING and adaptive and not near and is_poor(real, integer, times, t1):
             integer[POOR] += 1
             look_ahead(work.lengths, real[LENGTHS:], h)
             shorter = h if aim(work.lengths, real[CALM], h) < h else h * ELSEWHERE
@@ -303,7 +303,9 @@ def is_poor(real: Floats, integer: Integers, times: Floats, t1: float) -> bool:
 
 
 @compiled_inside
-def land(work: Work, t1: float, rhs: Function, project: Function, system: Any, loops: Any) -> int:
+def land(
+    work: Work, t1: float, near: bool, rhs: Function, project: Function, system: Any, loops: Any
+) -> int:
     """Prepare dense output, project the trial state, evaluate f; why that failed, or RUNNING.
 
     Dense output belongs to the step as the method took it; what it gives is projected by itself.
@@ -313,7 +315,6 @@ def land(work: Work, t1: float, rhs: Function, project: Function, system: Any, l
     known = integer[ERROR_USES_RESULT] != 0
     if integer[DENSE] != 0 and times[integer[NEXT]] < t1:
         t, argument, table = real[T], work.state[SCRATCH], work.table
-        near = integer[PROJECT_ON] != 0 and is_near(work.lengths, t1 - t)
         if not known:
             integer[RHS] += 1
             rhs(t1, trial, k[result], system, loops)

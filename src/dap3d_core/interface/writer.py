@@ -41,7 +41,8 @@ def write(examined: Examined, what: str) -> Loop | None:
     wanted += layout.angles if what == "angle" else ()
     if not kernels and not wanted:
         return None
-    lines = [f"b0 = i0 + q * {stride(examined)}", f"p1 = p0 + q * {layout.par_width}"]
+    lines = [f"b0 = i0 + q * {stride(examined)}"]
+    lines += [f"p1 = p0 + q * {layout.par_width}"]
     lines += [f"b_{s} = idx[b0 + {n}]" for n, s in enumerate(layout.slots)]
     first = len(layout.slots) + len(layout.functions)
     lines += [f"b_{name} = idx[b0 + {first + n}]" for n, name in enumerate(layout.others)]
@@ -64,7 +65,7 @@ def _store(examined: Examined, kernel: str) -> Iterable[str]:
     if kernel == "J":
         assert issubclass(type_, Joint)
         for n in range(len(layout.slots)):
-            yield f"d = idx[b0 + {first_block + n}]"
+            yield f"d = idx[b0 + {first_block + n}] & NATURAL"
             for k in range(6 * type_.rows):
                 yield f"out1[d + {k}] = {paths[6 * type_.rows * n + k]}"
     elif kernel == "C":
@@ -76,8 +77,9 @@ def _store(examined: Examined, kernel: str) -> Iterable[str]:
             yield f"{'out2' if kernel == 'gamma' else 'out3'}[row + {k}] = {path}"
     elif kernel in ("wrench", "friction"):
         for n, s in enumerate(layout.slots):
+            yield f"d = 6 * b_{s} & NATURAL"
             for k in range(6):
-                yield f"out1[6 * b_{s} + {k}] += {paths[6 * n + k]}"
+                yield f"out1[d + {k}] += {paths[6 * n + k]}"
     elif kernel == "energy":
         yield f"out1[0] += {paths[0]}"
     elif kernel == "switch":

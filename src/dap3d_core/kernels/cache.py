@@ -92,6 +92,15 @@ def compiled_inside(function):
     return compiled_in(cache_folder(), _driver_folder(function), function, **options)
 
 
+def compiled_into(function):
+    """The same for a function that is put into its callers before they are compiled.
+
+    For parts of a right-hand side that hand on a tuple of many arrays: as calls, four of them cost
+    as much as the physics of one body.
+    """
+    return compiled_in(cache_folder(), _driver_folder(function), function, inline="always")
+
+
 def driver_is_cached(floor: str) -> bool:
     """Whether compiled code of a floor of the core is there from an earlier process."""
     folder = cache_folder()

@@ -8,10 +8,14 @@ from dap3d_core.kernels.vectors import add, cross, dot, rotate, sub
 #: (global), Euler parameters, mass, inertia matrix in body axes by rows.
 R, A, V, W, P, MASS, JP, BODY_WIDTH = 0, 3, 12, 15, 18, 22, 23, 32
 TURN = 6.283185307179586
+#: ``d & NATURAL`` is d, and tells the compiler that no index d + k is negative. It would test each
+#: otherwise, for those count from the end: half the time of a Jacobian.
+NATURAL = (1 << 40) - 1
 
 __all__ = [
     "JP",
     "MASS",
+    "NATURAL",
     "A",
     "P",
     "R",

@@ -66,7 +66,7 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
     """
     text = source_of(loop)
     gathering = (gather.vector_at, gather.matrix_at, gather.unwound)
-    key = digest(text, *sources(*loop.kernels.values(), *gathering))
+    key = digest(text, *_identities(loop), *sources(*loop.kernels.values(), *gathering))
     if key in _built:
         return _built[key]
     folder = cache_folder()
@@ -88,6 +88,13 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
             compiled_here.append(loop.name)
     _built[key] = function
     return function
+
+
+def _identities(loop: Loop) -> list[str | bytes]:
+    """Which functions of their files the kernels are: variants of a type stand in one file."""
+    codes = [kernel.__code__ for kernel in loop.kernels.values()]
+    places = [f"{c.co_qualname} {c.co_firstlineno}" for c in codes]
+    return [*places, *(c.co_code for c in codes)]
 
 
 def _is_cached(folder: Path | None, name: str) -> bool:

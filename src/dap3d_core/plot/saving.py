@@ -1,7 +1,7 @@
 """Figures as files, without a window."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -51,19 +51,47 @@ def save_plot(
         ResultError: the file cannot be written, or exists and ``force`` is off.
     """
     target = Path(path)
-    suffix = target.suffix.lower()
-    if suffix not in FORMATS:
-        raise ValueError(f"cannot write {target}: a figure is one of {', '.join(FORMATS)}")
+    check_suffix(target)
     names = [quantities] if isinstance(quantities, str) else list(quantities)
     drawing = gather(result, names, x)
     size = (width, height_of(drawing) if height is None else height)
+    return save_figure(lambda figure: draw(figure, drawing, result), target, size, dpi, force=force)
+
+
+def check_suffix(target: Path) -> str:
+    """The suffix of a picture's file.
+
+    Raises:
+        ValueError: it is none of FORMATS.
+    """
+    suffix = target.suffix.lower()
+    if suffix not in FORMATS:
+        raise ValueError(f"cannot write {target}: a figure is one of {', '.join(FORMATS)}")
+    return suffix
+
+
+def save_figure(
+    paint: Callable[[Figure], object],
+    target: Path,
+    size: tuple[float, float],
+    dpi: float,
+    *,
+    force: bool,
+) -> Path:
+    """Let something be drawn on an empty figure of a size (inches), and write it to a file.
+
+    Raises:
+        ValueError: a suffix or a size that cannot be.
+        ResultError: the file cannot be written, or exists and ``force`` is off.
+    """
+    suffix = check_suffix(target)
     if not all(0.5 <= s <= 100.0 for s in size) or not 10.0 <= dpi <= 1200.0:
         raise ValueError(f"a figure of {size[0]:g} x {size[1]:g} inches at {dpi:g} dpi cannot be")
     # Text in an SVG stays text; its identifiers do not change from run to run.
     with matplotlib.rc_context({"svg.hashsalt": "dap3d", "svg.fonttype": "none"}):
         figure = Figure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)
-        draw(figure, drawing, result)
+        paint(figure)
         with whole_file(target, force) as part:
             try:
                 figure.savefig(part, format=suffix[1:], dpi=dpi, metadata=FORMATS[suffix])

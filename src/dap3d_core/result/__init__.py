@@ -1,6 +1,7 @@
 """The result floor: what a run left behind, on disk and in memory; the post-processor's arrays."""
 
 from dap3d_core.result.errors import ResultError, UnknownNameError
+from dap3d_core.result.estimate import ErrorEstimate, estimated_error
 from dap3d_core.result.files import check_target
 from dap3d_core.result.ledger import Entry
 from dap3d_core.result.motion import Energy
@@ -15,6 +16,7 @@ __all__ = [
     "INFORMATION",
     "Energy",
     "Entry",
+    "ErrorEstimate",
     "Quantity",
     "Reaction",
     "Record",
@@ -25,6 +27,7 @@ __all__ = [
     "UnknownNameError",
     "check_target",
     "current_versions",
+    "estimated_error",
     "find",
     "open_result",
 ]

@@ -55,6 +55,7 @@ class Arrays:
         work: (nt,) J, done on the system by forces and drivers.
         potential_energy: (nt,) J.
         position_residual, velocity_residual, acceleration_residual: (nt,) largest magnitude.
+        u_error: (nt, 13 n) estimated error of u (estimate.py); None where none was asked for.
     """
 
     t: Floats
@@ -66,10 +67,13 @@ class Arrays:
     position_residual: Floats
     velocity_residual: Floats
     acceleration_residual: Floats
+    u_error: Floats | None = None
 
     def __attrs_post_init__(self) -> None:
         for column in COLUMNS:
             getattr(self, column.name).flags.writeable = False
+        if self.u_error is not None:
+            self.u_error.flags.writeable = False
 
 
 def column_sizes(subject: Subject) -> dict[str, int]:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dap3d_core.result.arrays import COLUMNS
+from dap3d_core.result.estimate import U_ERROR
 from dap3d_core.result.kinds import AXES, EULER
 from dap3d_core.result.layout import CONSTANTS, NAMES, attributes
 
@@ -41,7 +42,8 @@ def dataset_of(result: "Result") -> "xarray.Dataset":
 
     subject = result.subject
     variables: dict[str, Any] = {}
-    for column in COLUMNS[1:]:
+    optional = () if result.arrays.u_error is None else (U_ERROR,)
+    for column in (*COLUMNS[1:], *optional):
         dimensions = ("time", column.dimension) if column.dimension else ("time",)
         about = {"units": column.unit, "long_name": column.meaning}
         variables[column.name] = (dimensions, getattr(result.arrays, column.name), about)

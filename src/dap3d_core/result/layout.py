@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.result.arrays import COLUMNS, Arrays, column_sizes
+from dap3d_core.result.estimate import U_ERROR
 from dap3d_core.result.kinds import AXES, EULER
 from dap3d_core.result.record import Record, Statistics, to_json
 
@@ -94,13 +95,16 @@ def record_of(found: dict[str, Any]) -> Record:
     )
 
 
-def define(dataset: Any, subject: "Subject", record: Record, nt: int | None) -> None:
+def define(
+    dataset: Any, subject: "Subject", record: Record, nt: int | None, *, with_error: bool = False
+) -> None:
     """Define everything in a new file and write all but the rows.
 
     Args:
         dataset: a netCDF4.Dataset, empty.
         subject, record: what the file is about.
         nt: number of reported instants; None lets the file grow.
+        with_error: whether an estimate of the error of u comes, too.
     """
     length = sizes(subject)
     dataset.createDimension("time", nt or None)
@@ -123,7 +127,7 @@ def define(dataset: Any, subject: "Subject", record: Record, nt: int | None) -> 
             )
             _describe(variable, constant.unit, constant.meaning)
             variable[:] = values
-    for column in COLUMNS:
+    for column in (*COLUMNS, U_ERROR) if with_error else COLUMNS:
         count = length[column.dimension] if column.dimension else 1
         if count:
             dimensions = ("time", column.dimension) if column.dimension else ("time",)
@@ -154,7 +158,7 @@ def write_attributes(dataset: Any, found: dict[str, Any]) -> None:
 def write_rows(dataset: Any, arrays: Arrays, first: int) -> None:
     """Write arrays into the rows of a file from ``first`` on."""
     rows = slice(first, first + len(arrays.t))
-    for column in COLUMNS:
+    for column in (*COLUMNS, U_ERROR):
         if column.name in dataset.variables:
             dataset.variables[column.name][rows] = getattr(arrays, column.name)
 

@@ -54,7 +54,8 @@ def _entry(value: float, limit: float | None, unit: str, text: str) -> Entry:
     return Entry(value, limit, None if limit is None else bool(value <= limit), unit, text)
 
 
-#: Work of dampers and drivers below this part of all work is taken for an error of integration.
+#: Work of dampers and drivers below this part of all work is taken for an error of integration,
+#: where the elements of the scene do no such work.
 CONSERVATIVE = 1e-3
 
 
@@ -125,9 +126,13 @@ def _energy(subject: Subject, arrays: Arrays, record: Record) -> Entry:
 
 
 def _is_conservative(subject: Subject, arrays: Arrays, record: Record) -> bool:
-    """Whether potentials account for all work, as measured: neither dampers nor drivers did any."""
+    """Whether potentials account for all work: by what the elements are, and as measured.
+
+    As measured, because a damper may act only where bodies touch.
+    """
     other = (arrays.work - arrays.work[0]) + (arrays.potential_energy - arrays.potential_energy[0])
-    return _largest(other) <= CONSERVATIVE * _energy_scale(subject, arrays, record)
+    little = _largest(other) <= CONSERVATIVE * _energy_scale(subject, arrays, record)
+    return little and bool(record.settings.get("conservative"))
 
 
 def _total_energy(subject: Subject, arrays: Arrays, record: Record) -> Entry:

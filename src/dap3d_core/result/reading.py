@@ -11,6 +11,7 @@ import numpy as np
 
 from dap3d_core.result.arrays import COLUMNS, Arrays, column_sizes
 from dap3d_core.result.errors import ResultError
+from dap3d_core.result.estimate import U_ERROR
 from dap3d_core.result.files import cannot
 from dap3d_core.result.layout import CONSTANTS, CONVENTIONS, FORMAT, record_of
 from dap3d_core.result.record import RUNNING, Record
@@ -108,7 +109,8 @@ def _read(dataset: Any) -> tuple[Subject, Record, Arrays]:
     nt = len(dataset.dimensions["time"])
     width = {"": None, **column_sizes(subject)}
     columns: list[Floats] = []
-    for column in COLUMNS:
+    optional = (U_ERROR,) if U_ERROR.name in dataset.variables else ()
+    for column in (*COLUMNS, *optional):
         size = width[column.dimension]
         shape = (nt,) if size is None else (nt, size)
         if size == 0:

@@ -10,6 +10,7 @@ from dap3d_core.model.groups import Floats
 from dap3d_core.result.applied import Applied, applied
 from dap3d_core.result.arrays import COLUMNS, Arrays, arrays_of
 from dap3d_core.result.errors import ResultError, unknown
+from dap3d_core.result.estimate import ErrorEstimate, estimate_of
 from dap3d_core.result.kinematics import Kinematics
 from dap3d_core.result.ledger import Entry, ledger_of
 from dap3d_core.result.motion import Energy, kinetic_energy
@@ -127,7 +128,7 @@ class Result(Kinematics):
     def __reduce__(self) -> Any:
         """For other processes: everything but the model and the machine."""
         arrays = tuple(getattr(self.arrays, column.name) for column in COLUMNS)
-        return _received, (self.subject, arrays, self.record)
+        return _received, (self.subject, (*arrays, self.arrays.u_error), self.record)
 
     def __repr__(self) -> str:
         times = f", t = {self.t[0]:g} ... {self.t[-1]:g} s" if len(self.t) else ""
@@ -147,6 +148,14 @@ class Result(Kinematics):
     def work(self) -> Floats:
         """(nt,) work done on the system by forces and drivers since the start, J."""
         return self.arrays.work
+
+    @property
+    def error(self) -> ErrorEstimate | None:
+        """Estimated global error of the state: ``.r``, ``.p``, ``.rd``, ``.w``, ``.u``; no bound.
+
+        None unless asked for (``simulate(..., estimate_error=True)``) and found.
+        """
+        return estimate_of(self.t, self.u, self.arrays.u_error)
 
     @property
     def status(self) -> str:
@@ -337,7 +346,7 @@ class Result(Kinematics):
         return dataset_of(self)
 
 
-def _received(subject: Subject, arrays: tuple[Floats, ...], record: Record) -> Result:
+def _received(subject: Subject, arrays: tuple[Any, ...], record: Record) -> Result:
     """A result from another process."""
     return Result.of_parts(subject, Arrays(*arrays), record, _no_origin)
 

@@ -37,7 +37,13 @@ def save(result: "Result", path: str | os.PathLike[str], force: bool = False) ->
         try:
             _guarded(
                 Path(path),
-                lambda: define(dataset, result.subject, result.record, len(result.t)),
+                lambda: define(
+                    dataset,
+                    result.subject,
+                    result.record,
+                    len(result.t),
+                    with_error=result.arrays.u_error is not None,
+                ),
                 lambda: write_rows(dataset, result.arrays, 0),
             )
         finally:

@@ -23,6 +23,7 @@ from dap3d_core.scene import (
     load,
     mistake_at,
 )
+from dap3d_core.simulation.conservation import is_conservative
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.explanation import explain
 from dap3d_core.simulation.redundancy import Redundancy, redundancy_of
@@ -93,6 +94,11 @@ class CompiledModel:
     def irv(self) -> NDArray[np.int64]:
         """(n,) index in v_dot, column in the Jacobian, of the first acceleration of each body."""
         return self.model.irv
+
+    @cached_property
+    def is_conservative(self) -> bool:
+        """Whether potentials account for all work that can be done in the scene."""
+        return is_conservative(self.machine, self.model.u0)
 
     @cached_property
     def scene_text(self) -> str:

@@ -14,13 +14,14 @@ from dap3d_core.formulations.friction import PASSES
 from dap3d_core.integrators import METHODS, Integration, Status
 from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import Record, Result, ResultWriter, Statistics, check_target
-from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, check_simulation
+from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, Simulation, check_simulation
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.elsewhere import redundancy_elsewhere
 from dap3d_core.simulation.errors import RedundantError, SimulationError
 from dap3d_core.simulation.initial import correction_notes, violation
 from dap3d_core.simulation.offender import find_offender, find_switch
 from dap3d_core.simulation.redundancy import CONSISTENT, Redundancy
+from dap3d_core.simulation.second_run import Again, add_error
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
@@ -53,6 +54,7 @@ def simulate(
     output: str | os.PathLike[str] | None = None,
     force: bool = False,
     correct_metric: str | None = None,
+    estimate_error: bool = False,
 ) -> Result:
     """Simulate a scene from t = 0 to t_end.
 
@@ -76,6 +78,7 @@ def simulate(
             ``NAME.part``, synced after every chunk: readable also when the run is killed.
         force: whether an existing output is overwritten.
         correct_metric: "unit" or "mass": the least correction in m and rad, or by masses.
+        estimate_error: estimate ``result.error`` by a second, finer run (second_run.py).
 
     Returns:
         the result. Any exception that ends the integration carries what was computed until then as
@@ -87,13 +90,23 @@ def simulate(
         SimulationError: the run stopped; ``.result`` is what was computed.
     """
     compiled = _compiled(scene, method, allow_code, announce)
-    asked = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol,
-                 step=step, correct=correct, project=project,
-                 correct_metric=correct_metric)  # fmt: skip
-    given: dict[str, Any] = {k: v for k, v in asked.items() if v is not None}
+    settings = _settings(compiled, t_end=t_end, dt=dt, method=method, integrator=integrator,
+                         rtol=rtol, atol=atol, step=step, correct=correct, project=project,
+                         correct_metric=correct_metric)  # fmt: skip
+    run = _Run(compiled, settings, announce)
+    return run.go(progress, output, force=force, estimate_error=estimate_error)
+
+
+def _settings(compiled: CompiledModel, **asked: Any) -> Simulation:
+    """The scene's settings with what is given (not None) in their places.
+
+    Raises:
+        SceneError: they make no sense.
+    """
+    given = {k: v for k, v in asked.items() if v is not None}
     settings = attrs.evolve(compiled.scene.simulation, **given)
     check_simulation(settings, compiled.model.body_names)
-    return _Run(compiled, settings, announce).go(progress, output, force=force)
+    return settings
 
 
 def _compiled(
@@ -153,9 +166,15 @@ class _Run:
         self.force = False
         self.writer: ResultWriter | None = None
         self.started = self.compile_time = 0.0
+        self.first_step: float | None = None
 
     def go(
-        self, progress: Progress | None, output: str | os.PathLike[str] | None, *, force: bool
+        self,
+        progress: Progress | None,
+        output: str | os.PathLike[str] | None,
+        *,
+        force: bool,
+        estimate_error: bool = False,
     ) -> Result:
         self.started = time.perf_counter()
         u0 = self._start()
@@ -177,7 +196,19 @@ class _Run:
             raise self._stopped(integration)
         result = self._kept(integration, "done")
         assert result is not None
+        if estimate_error:
+            add_error(result, self.settings, self._again(progress), output)
         return result
+
+    def _again(self, progress: Progress | None) -> Again:
+        """Makes a run with other settings and another first step, in memory."""
+
+        def again(settings: Simulation, first_step: float | None) -> Result:
+            run = _Run(self.compiled, settings, self.announce)
+            run.first_step = first_step
+            return run.go(progress, None, force=False)
+
+        return again
 
     def _start(self) -> Floats:
         """The initial state, corrected if asked for; its rank must suit the method."""
@@ -228,10 +259,12 @@ class _Run:
                 rtol=settings.rtol,
                 atol=settings.atol,
                 step=settings.step,
+                first_step=self.first_step,
                 project_on=settings.project,
                 error_size=len(y0) - 1,  # the work does not steer the step
                 report_size=machine.report_size,
                 length_count=machine.length_count,
+                watched=machine.watched,
                 buffer_rows=max(1, min(len(self.times), BUFFER_NUMBERS // width)),
             )
         except ValueError as error:
@@ -337,6 +370,7 @@ class _Run:
                 "step": self.settings.step,
                 "project": bool(self.settings.project),
                 "correct": bool(self.settings.correct),
+                "conservative": self.compiled.is_conservative,
                 "correct_metric": str(self.settings.correct_metric),
             },
         )

@@ -1,0 +1,219 @@
+"""One implicit integration, seen from Python; it has the face of ``Integration``."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dap3d_core.formulations.constraints import PART as REGULAR
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.stage import Matrix
+from dap3d_core.formulations.tangent_tables import coupled_bodies, make_tangent
+from dap3d_core.integrators import radau_work as at
+from dap3d_core.integrators.integration import Integration, _check_control, _check_state_and_times
+from dap3d_core.integrators.radau import advance
+from dap3d_core.integrators.radau_method import ORDER, radau_method
+from dap3d_core.integrators.radau_work import RadauWork
+from dap3d_core.integrators import work
+from dap3d_core.integrators.work import Status
+from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.linear.lu_plan import LuPlan, make_lu_plan
+
+
+class Effort(NamedTuple):
+    """What an implicit integration has done besides what ``Statistics`` counts."""
+
+    iterations: int
+    jacobians: int
+    factorisations: int
+
+
+def make_matrix(machine: Machine, tangent: Any) -> tuple[Matrix, LuPlan]:
+    """Places of the parts of the matrix s - J, and its elimination program."""
+    plan, model = machine.plan, machine.model
+    nodes, n = plan.ordering.nodes, model.body_count
+    lu = make_lu_plan(n, nodes, coupled_bodies(tangent))
+    of_row = {}
+    joints = []
+    for k, node in enumerate(nodes):
+        first = int(plan.joint_row[node.joints[0]])
+        of_row[first] = k
+        joints.append((lu.joint_block(k), node.rows, first))
+    places = []
+    for _, b, _, first, _ in plan.blocks.tolist():
+        k = of_row[first]
+        places.append((*lu.joint_blocks(k, b), int(lu.joint_first[k])))
+    held = np.zeros(plan.row_size, dtype=np.int64)
+    held[machine.system.row] = model.position_row
+    blocks = tangent.blocks.tolist()
+    matrix = Matrix(
+        nodes=lu.nodes,
+        columns=lu.columns,
+        updates=lu.updates,
+        body_first=lu.body_first,
+        body_place=np.array([0, *(lu.body_block(b, b) for b in range(1, n + 1))], dtype=np.int64),
+        pair_place=np.array([lu.body_block(a, b) for _, a, b in blocks], dtype=np.int64),
+        block_place=np.array(places, dtype=np.int64).reshape(-1, 3),
+        joint_place=np.array(joints, dtype=np.int64).reshape(-1, 3),
+        held=held,
+        spin=np.zeros((n + 1, 15)),
+        D=np.zeros(plan.block_size),
+        compliance=np.zeros(plan.row_size),
+    )
+    return matrix, lu
+
+
+class RadauIntegration(Integration):
+    """An initial value problem on its way, integrated by Radau IIA of order 5.
+
+    Parameters
+    ----------
+    machine
+        The model; its formulation is unconstrained, standard or lsq.
+    y0, times, rtol, atol, step, first_step, project_on, error_size, report_size, buffer_rows
+        As for ``Integration``.
+
+    Raises
+    ------
+    ValueError
+        For a formulation, times, sizes, tolerances or steps that make no sense.
+    """
+
+    name = "radau"
+    adaptive = True
+
+    def __init__(
+        self,
+        machine: Machine,
+        y0: ArrayLike,
+        times: ArrayLike,
+        *,
+        rtol: float = 1e-8,
+        atol: float = 1e-10,
+        step: float | None = None,
+        first_step: float | None = None,
+        project_on: bool = False,
+        error_size: int | None = None,
+        report_size: int = 0,
+        buffer_rows: int = 256,
+    ) -> None:
+        if machine.method == "penalty":
+            raise ValueError(
+                "radau holds the constraints themselves, and penalty replaces them by springs: "
+                "take method lsq or standard, or an explicit integrator"
+            )
+        y = np.array(y0, dtype=np.float64)
+        instants = np.array(times, dtype=np.float64)
+        _check_state_and_times(y, instants)
+        _check_control(self, rtol, atol, instants, step=step, first_step=first_step)
+        error_size = y.size - 1 if error_size is None else error_size
+        if not 0 <= error_size < y.size:
+            raise ValueError(f"error_size is {error_size}, but y has {y.size} components")
+        if buffer_rows < 1:
+            raise ValueError(f"buffer_rows is {buffer_rows}; at least one row must fit")
+        tangent = make_tangent(machine)
+        matrix, lu = make_matrix(machine, tangent)
+        self.machine, self.lu_plan, self.tangent, self.matrix = machine, lu, tangent, matrix
+        self.work = _make_work(machine, lu, y, instants, buffer_rows, report_size)
+        real, own, integer = self.work.real, self.work.own, self.work.integer
+        real[work.RTOL], real[work.ATOL] = estimate_tolerances(rtol, atol)
+        real[work.STEP], real[work.H] = step or 0.0, first_step or 0.0
+        real[work.T] = instants[0]
+        own[at.FACCON] = own[at.ERROR_ACCEPTED] = 1.0
+        own[at.PART] = REGULAR if machine.method == "lsq" else 0.0
+        integer[work.ORDER], integer[work.ERROR_SIZE] = ORDER, error_size
+        integer[work.DENSE], integer[work.PROJECT_ON] = 1, project_on
+        integer[work.WATCHED] = len(machine.functions) > 3
+
+    def _advance(self, budget: int) -> None:
+        machine = self.machine
+        advance(
+            self.work, machine.functions, machine.system, machine.loops,
+            self.tangent, self.matrix, budget,
+        )  # fmt: skip
+
+    def compile(self) -> None:
+        """Compile what ``advance`` needs, or load it, without doing a step."""
+        status = int(self.work.integer[work.STATUS])
+        self.work.integer[work.STATUS] = Status.FINISHED
+        self._advance(0)
+        self.work.integer[work.STATUS] = status
+
+    def advance(self, budget: int) -> Status:
+        """Go on until more than ``budget`` stages are evaluated, the buffer is full, or the end.
+
+        How a run is cut into chunks changes no bit of its result. Take the ``rows`` after each.
+
+        Raises
+        ------
+        RuntimeError
+            If the buffer is full on entry, so that nothing can be done.
+        """
+        if int(self.work.integer[work.ROW]) == len(self.work.rows) and (
+            self.status is Status.RUNNING
+        ):
+            raise RuntimeError("the row buffer is full: take rows() before advancing")
+        if jit_is_on():
+            self._advance(budget)
+        else:
+            with np.errstate(all="ignore"):  # as in compiled code, which tests what matters
+                self._advance(budget)
+        return self.status
+
+    @property
+    def effort(self) -> Effort:
+        """What has been done besides steps and stages."""
+        integer = self.work.integer
+        names = (at.ITERATIONS, at.JACOBIANS, at.FACTORISATIONS)
+        return Effort(*(int(integer[k]) for k in names))
+
+    @property
+    def multipliers(self) -> tuple[Any, Any]:
+        """(rows,) mu and lambda of the last stage, in the order of the model."""
+        row = self.machine.system.row
+        last = self.work.last_multipliers[2]
+        return last[0, row].copy(), last[1, row].copy()
+
+
+def estimate_tolerances(rtol: float, atol: float) -> tuple[float, float]:
+    """Tolerances of the error estimate, which is of order 3, for those of the result (RADAU5)."""
+    leading = rtol if rtol > 0.0 else atol
+    factor = 0.1 * leading ** (2.0 / 3.0) / leading
+    return rtol * factor, max(atol * factor, 1e-290)
+
+
+def _make_work(
+    machine: Machine, lu: LuPlan, y: Any, times: Any, buffer_rows: int, report_size: int
+) -> RadauWork:
+    n, rows, bodies = y.size, machine.plan.row_size, machine.model.body_count + 1
+    state = np.zeros((at.RADAU_STATES, n))
+    state[work.Y] = y
+    return RadauWork(
+        real=np.zeros(work.LENGTHS + machine.length_count),
+        own=np.zeros(at.OWN),
+        integer=np.zeros(at.RADAU_INTEGERS, dtype=np.int64),
+        times=times,
+        state=state,
+        k=np.zeros((2, n)),
+        terms=np.zeros((at.TERMS, n)),
+        rows=np.empty((buffer_rows, 1 + n + report_size)),
+        Z=np.zeros((3, n)),
+        Z_old=np.zeros((3, n)),
+        F=np.zeros((3, n)),
+        R=np.zeros((3, n)),
+        multipliers=np.zeros((3, 2, rows)),
+        last_multipliers=np.zeros((3, 2, rows)),
+        G=np.zeros((3, 2, rows)),
+        frames=np.zeros((3, bodies, 13)),
+        x=np.zeros((3, lu.size)),
+        along=np.zeros((3, bodies)),
+        xr=np.zeros(lu.size),
+        alongr=np.zeros(bodies),
+        xc=np.zeros(lu.size, dtype=np.complex128),
+        alongc=np.zeros(bodies, dtype=np.complex128),
+        K=np.zeros(lu.matrix_size),
+        Kc=np.zeros(lu.matrix_size, dtype=np.complex128),
+        pivots=np.zeros(lu.size, dtype=np.int64),
+        pivotsc=np.zeros(lu.size, dtype=np.int64),
+        method=radau_method(),
+    )

@@ -1,0 +1,300 @@
+"""Radau IIA of order 5 on the stabilised equations of index 2: a compiled loop that can stop.
+
+It works as runge_kutta.py does, chunk by chunk, with the same functions and the same arrays; what
+it knows of mechanics is in formulations/stage.py and tangent.py. Source: Hairer, Wanner, Solving
+Ordinary Differential Equations II, IV.8, VII.4, and their code RADAU5.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+
+from collections.abc import Sequence
+from typing import Any
+
+from dap3d_core.assembly.system import Floats, System
+from dap3d_core.formulations.stage import Matrix
+from dap3d_core.formulations.tangent import Tangent
+from dap3d_core.integrators.combination import all_finite
+from dap3d_core.integrators.control import (
+    LARGEST,
+    SAFETY,
+    end_of_step,
+    first_step,
+    reject,
+    step_floor,
+)
+from dap3d_core.integrators.method import Integers
+from dap3d_core.integrators.radau_dense import find_slope, prepare_dense
+from dap3d_core.integrators.radau_newton import (
+    MOST,
+    SAME_STEP,
+    UNFOUND,
+    estimate_error,
+    factorise_both,
+    find_stages,
+    find_tangent,
+    predict,
+)
+from dap3d_core.integrators.radau_work import (
+    ACCEPTED,
+    ERROR_ACCEPTED,
+    H_ACCEPTED,
+    H_FACTORED,
+    LAST_ITERATIONS,
+    OLD,
+    OLD_SLOPE,
+    SLOPE,
+    TANGENT_HERE,
+    TANGENT_NEEDED,
+    THETA,
+    TRIAL_SLOPE,
+    RadauWork,
+)
+from dap3d_core.integrators.runge_kutta import (
+    ELSEWHERE,
+    RETREAT,
+    is_poor,
+    project_state,
+    report_reached,
+)
+from dap3d_core.integrators.work import (
+    DENSE,
+    FRESH,
+    GAP_STEP,
+    LAST_REJECTED,
+    NEXT,
+    NOT_FINITE,
+    POOR,
+    RHS,
+    RUNNING,
+    SCRATCH,
+    STATUS,
+    STEP,
+    STEP_FLOOR,
+    STEPS,
+    SWITCH,
+    SWITCHED,
+    T_STOP,
+    TRIAL,
+    WATCHED,
+    Function,
+    H,
+    T,
+    Y,
+)
+from dap3d_core.kernels.borrow import borrow
+from dap3d_core.kernels.cache import compiled, compiled_inside
+
+#: A step is not longer than this many of the one before, and not shorter than this part of it.
+GROWTH, SHRINKAGE = 8.0, 0.2
+#: The tangent is kept where the iteration converged faster than this; the step, and with it the
+#: factors, where the next one would be up to this factor longer.
+GOOD_TANGENT, SAME_FACTORS = 1e-3, 1.2
+#: Where the step is limited by the iteration its rate is about proportional to h^3. At this rate
+#: iterations for a second of motion are fewest.
+BEST_RATE, RATE_EXPONENT = 0.15, 1.0 / 3.0
+
+
+@compiled
+def advance(
+    work: RadauWork,
+    functions: Sequence[Function],
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
+    budget: int,
+) -> None:
+    """Go on until more than ``budget`` stages are evaluated, the rows are full, or the run ends."""
+    rhs, project, report = functions[0], functions[1], functions[2]
+    system = borrow(system)
+    real, integer, times = work.real, work.integer, work.times
+    limit = integer[RHS] + budget
+    while integer[STATUS] == RUNNING:
+        if times[integer[NEXT]] <= real[T]:
+            if not report_reached(work, project, report, system, loops):
+                return
+        elif real[SWITCH] < 0.0:
+            real[T_STOP], integer[STATUS] = real[T], SWITCHED
+        elif integer[RHS] > limit:
+            return
+        else:
+            steps = integer[STEPS]
+            if integer[FRESH] == 0:
+                start(work, rhs, project, system, loops)
+            else:
+                step(work, rhs, project, system, loops, tangent, matrix)
+            if integer[WATCHED] != 0 and integer[STEPS] > steps:
+                functions[3](real[T], work.state[Y], real[SWITCH:], system, loops)
+
+
+@compiled_inside
+def start(work: RadauWork, rhs: Function, project: Function, system: System, loops: Any) -> None:
+    """Where the run starts: on the constraints, with multipliers that belong to the state."""
+    real, integer, y = work.real, work.integer, work.state[Y]
+    failure = project_state(real, integer, real[T], y, project, system, loops)
+    if failure == RUNNING:
+        integer[RHS] += 1
+        rhs(real[T], y, work.k[0], system, loops)
+        if not all_finite(work.k[0]):
+            failure = NOT_FINITE
+    if failure != RUNNING:
+        real[T_STOP], integer[STATUS] = real[T], failure
+        return
+    for k in range(system.x.shape[0]):
+        work.last_multipliers[2, 1, k] = -system.x[k]
+    for k in range(y.shape[0]):
+        work.state[SLOPE, k] = work.k[0, k]
+    integer[FRESH] = integer[TANGENT_NEEDED] = 1
+    if real[STEP] == 0.0 and real[H] == 0.0:
+        real[H] = first_step(
+            real, integer, work.times, y, work.k, work.state[SCRATCH], rhs, system, loops
+        )
+
+
+@compiled_inside
+def step(
+    work: RadauWork,
+    rhs: Function,
+    project: Function,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
+) -> None:
+    """Try one step: accept it, reject it, or stop the run."""
+    real, integer, times, state = work.real, work.integer, work.times, work.state
+    own, adaptive = work.own, real[STEP] == 0.0
+    t = real[T]
+    t1 = end_of_step(real, integer, times)
+    h = t1 - t
+    predict(h, work)
+    if integer[TANGENT_NEEDED] != 0 and not find_tangent(
+        t, h, work, system, loops, tangent, matrix
+    ):
+        real[T_STOP], integer[STATUS] = t, NOT_FINITE
+        return
+    shorter = 0.0
+    if not abs(h - own[H_FACTORED]) <= SAME_STEP * h:
+        shorter = 0.0 if factorise_both(h, work, system, tangent, matrix) else UNFOUND
+    if shorter == 0.0:
+        shorter = find_stages(t, h, work, system, loops, matrix)
+    if shorter != 0.0:
+        refuse(work, t1, h, shorter)
+        return
+    for k in range(state.shape[1]):
+        state[TRIAL, k] = state[Y, k] + work.Z[2, k]
+    again = integer[ACCEPTED] == 0 or integer[LAST_REJECTED] != 0
+    # the multipliers of the first stage go into the estimate; those of the last one are kept
+    error = estimate_error(t, h, work, system, loops, matrix, again) if adaptive else 0.0
+    if error < 1.0:
+        failure = land(work, t1, h, project, system, loops)
+        if failure == RUNNING and adaptive and is_poor(real, integer, times, t1):
+            integer[POOR] += 1
+            reject(real, integer, times, t1, h * ELSEWHERE, STEP_FLOOR)
+        elif failure == RUNNING:
+            integer[POOR] = 0
+            accept(work, t1, h, error)
+        else:
+            reject(real, integer, times, t1, h * RETREAT, failure)
+    elif error <= LARGEST:
+        factor = max(SHRINKAGE, safety(integer) / error**0.25)
+        reject(real, integer, times, t1, h * factor, STEP_FLOOR)
+        if integer[ACCEPTED] == 0:
+            real[H] = min(real[H], 0.1 * h)
+        if integer[TANGENT_HERE] == 0:
+            integer[TANGENT_NEEDED] = 1
+    else:
+        reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)
+
+
+@compiled_inside
+def refuse(work: RadauWork, t1: float, h: float, shorter: float) -> None:
+    """Shorten a step whose stages were not found; with a new tangent if that is an old one."""
+    real, integer = work.real, work.integer
+    if integer[TANGENT_HERE] == 0:
+        integer[TANGENT_NEEDED] = 1
+    known = shorter > 0.0  # not NaN
+    cause = STEP_FLOOR if known else NOT_FINITE
+    if known and integer[TANGENT_NEEDED] != 0 and real[STEP] != 0.0:
+        return  # a fixed step is tried again
+    reject(real, integer, work.times, t1, h * (shorter if known else RETREAT), cause)
+
+
+@compiled_inside
+def safety(integer: Integers) -> float:
+    """Safety factor of the next step: smaller where the iteration took long (HW IV.8)."""
+    most = 2.0 * MOST
+    return min(SAFETY, SAFETY * (1.0 + most) / (integer[LAST_ITERATIONS] + most))
+
+
+@compiled_inside
+def land(
+    work: RadauWork, t1: float, h: float, project: Function, system: System, loops: Any
+) -> int:
+    """Project the trial state and prepare dense output; why that failed, or RUNNING."""
+    real, integer, n = work.real, work.integer, work.state.shape[1]
+    A = work.method.A
+    for i in range(3):  # the work is a quadrature
+        work.Z[i, n - 1] = h * (A[i, 0] * work.F[0, n - 1] + A[i, 1] * work.F[1, n - 1]
+                                + A[i, 2] * work.F[2, n - 1])  # fmt: skip
+    work.state[TRIAL, n - 1] = work.state[Y, n - 1] + work.Z[2, n - 1]
+    failure = project_state(real, integer, t1, work.state[TRIAL], project, system, loops)
+    if failure != RUNNING:
+        return failure
+    find_slope(t1, h, work, system, loops)
+    if not all_finite(work.state[TRIAL_SLOPE]):
+        return NOT_FINITE
+    if integer[DENSE] != 0 and work.times[integer[NEXT]] < t1:
+        prepare_dense(h, work)
+    return RUNNING
+
+
+@compiled_inside
+def accept(work: RadauWork, t1: float, h: float, error: float) -> None:
+    """Make the trial state the state; choose the next step (Gustafsson's control, HW IV.8)."""
+    real, own, integer, state = work.real, work.own, work.integer, work.state
+    for k in range(state.shape[1]):
+        state[OLD, k], state[Y, k] = state[Y, k], state[TRIAL, k]
+        state[OLD_SLOPE, k], state[SLOPE, k] = state[SLOPE, k], state[TRIAL_SLOPE, k]
+        for i in range(3):
+            work.Z_old[i, k] = work.Z[i, k]
+    for i in range(3):
+        for r in range(2):
+            for k in range(work.multipliers.shape[2]):
+                work.last_multipliers[i, r, k] = work.multipliers[i, r, k]
+    integer[STEPS] += 1
+    integer[TANGENT_HERE] = 0
+    good = own[THETA] <= GOOD_TANGENT
+    if real[STEP] != 0.0:
+        integer[GAP_STEP] += 1
+    else:
+        choose_next(work, h, error, good)
+    if not good:
+        integer[TANGENT_NEEDED] = 1
+    real[T], own[H_ACCEPTED] = t1, h
+    integer[ACCEPTED], integer[LAST_REJECTED] = 1, 0
+
+
+@compiled_inside
+def choose_next(work: RadauWork, h: float, error: float, good: bool) -> None:
+    """The next step, after an accepted one."""
+    real, own, integer = work.real, work.own, work.integer
+    divisor = error**0.25 / safety(integer)
+    if integer[ACCEPTED] != 0:
+        trend = (error * error / own[ERROR_ACCEPTED]) ** 0.25
+        divisor = max(divisor, own[H_ACCEPTED] / h * trend / SAFETY)
+    if integer[LAST_ITERATIONS] > 1:
+        divisor = max(divisor, (own[THETA] / BEST_RATE) ** RATE_EXPONENT)
+    factor = 1.0 / min(1.0 / SHRINKAGE, max(1.0 / GROWTH, divisor))
+    if integer[LAST_REJECTED] != 0:
+        factor = min(factor, 1.0)
+    own[ERROR_ACCEPTED] = max(error, 0.01)
+    if not (good and 1.0 <= factor <= SAME_FACTORS):
+        real[H] = max(h * factor, step_floor(real, work.times))
+    else:
+        real[H] = h
+
+
+

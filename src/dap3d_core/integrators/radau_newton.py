@@ -1,0 +1,328 @@
+"""The stages of a Radau step by simplified Newton iteration, and its error estimate.
+
+Source: Hairer, Wanner, Solving Ordinary Differential Equations II (HW), IV.8, VII.4, and their code
+RADAU5. The three stages are decoupled by T into one real and one complex system with the same
+tangent. Norms are the largest scaled component, as in control.py.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+from typing import Any
+
+from dap3d_core.assembly.evaluate import call_loops, place_bodies, zero
+from dap3d_core.assembly.system import VALUE, Floats, System
+from dap3d_core.formulations.constraints import linearise
+from dap3d_core.formulations.stage import (
+    Matrix,
+    add_displacement,
+    add_transposed,
+    add_velocity,
+    couple_length,
+    evaluate_stage,
+    fill_matrix,
+    find_length,
+    keep_frames,
+    keep_state,
+    scale_residual,
+    unscale_solution,
+)
+from dap3d_core.formulations.tangent import Tangent, differentiate
+from dap3d_core.integrators.combination import scaled_largest
+from dap3d_core.integrators.radau_work import (
+    ACCEPTED,
+    FACCON,
+    FACTORISATIONS,
+    H_ACCEPTED,
+    H_FACTORED,
+    ITERATIONS,
+    JACOBIANS,
+    LAST_ITERATIONS,
+    PART,
+    TANGENT_HERE,
+    TANGENT_NEEDED,
+    THETA,
+    RadauWork,
+)
+from dap3d_core.integrators.work import ATOL, ERROR_SIZE, RHS, RTOL, SCRATCH, TRIAL, Y
+from dap3d_core.kernels.cache import compiled, compiled_inside
+from dap3d_core.linear.lu import factor_lu, solve_lu
+
+ROUNDING = 2.220446049250313e-16
+#: Iterations at most.
+MOST = 7
+#: Factors that belong to a step this near the present one are used for it.
+SAME_STEP = 1e-3
+#: The middle stage of a step that is longer than this many of the one before is not foreseen.
+FAR = 8.1
+#: A step whose stages were not found is halved.
+UNFOUND = 0.5
+LARGEST = 1.7976931348623157e308
+#: A change of this many roundings is none; and the loosest limit, as part of the tolerance.
+ROUNDINGS, LOOSEST = 10.0, 0.1
+
+
+@compiled
+def find_tangent(
+    t: float, h: float, work: RadauWork, system: System, loops: Any, tangent: Tangent, matrix: Matrix
+) -> bool:
+    """The tangent of a step h at t, from its predicted middle stage; whether it is finite.
+
+    The directions of stiff elements change during a step: in its middle they err half as much. A
+    step that is much longer than the one before takes its start, which is known.
+    """
+    kinds, force, argument = system.kinds, system.force, work.state[SCRATCH]
+    known = work.integer[ACCEPTED] == 0 or h > FAR * work.own[H_ACCEPTED]
+    for k in range(argument.shape[0]):
+        argument[k] = work.state[Y, k] + (0.0 if known else work.Z[2, k])
+    at = t if known else t + h
+    place_bodies(argument, system.body, system.metric)
+    call_loops(kinds[VALUE], kinds[VALUE + 1], at, system.body, system.F, system.idx,
+               system.par, system.groups, loops, force, force, force)  # fmt: skip
+    linearise(at, system, loops)
+    keep_state(system, matrix, work.own[PART])
+    for k in range(system.x.shape[0]):
+        system.x[k] = -work.multipliers[2, 1, k]
+    work.integer[JACOBIANS] += 1
+    work.integer[TANGENT_NEEDED], work.integer[TANGENT_HERE] = 0, 1
+    work.own[H_FACTORED] = 0.0
+    return differentiate(at, system.x, system, loops, tangent)
+
+
+@compiled
+def factorise_both(
+    h: float, work: RadauWork, system: System, tangent: Tangent, matrix: Matrix
+) -> bool:
+    """Factors of the real and the complex system of a step h; False where one is singular."""
+    poles = work.method.poles
+    work.integer[FACTORISATIONS] += 1
+    work.own[H_FACTORED] = h
+    fill_matrix(poles[0] / h, work.K, system.blocks, matrix, tangent)
+    fill_matrix(complex(poles[1], poles[2]) / h, work.Kc, system.blocks, matrix, tangent)
+    return factor_lu(matrix.nodes, matrix.columns, matrix.updates, work.K, work.pivots) and (
+        factor_lu(matrix.nodes, matrix.columns, matrix.updates, work.Kc, work.pivotsc)
+    )
+
+
+@compiled
+def predict(h: float, work: RadauWork) -> None:
+    """Starting values of the stages: the polynomials of the last step, prolonged (HW IV.8).
+
+    mu is no smooth function: it has the same values at the stages of each step, but for h^3.
+    """
+    c, Z, old, now = work.method.c, work.Z, work.Z_old, work.multipliers
+    if work.integer[ACCEPTED] == 0:
+        for i in range(3):
+            zero(Z[i])
+            for k in range(now.shape[2]):
+                now[i, 0, k], now[i, 1, k] = 0.0, work.last_multipliers[2, 1, k]
+        return
+    ratio, last = h / work.own[H_ACCEPTED], work.last_multipliers
+    for i in range(3):
+        u = 1.0 + c[i] * ratio
+        v0 = (u - c[1]) * (u - 1.0) / ((c[0] - c[1]) * (c[0] - 1.0))
+        v1 = (u - c[0]) * (u - 1.0) / ((c[1] - c[0]) * (c[1] - 1.0))
+        v2 = (u - c[0]) * (u - c[1]) / ((1.0 - c[0]) * (1.0 - c[1]))
+        for k in range(now.shape[2]):
+            now[i, 0, k] = ratio * ratio * ratio * last[i, 0, k]
+            now[i, 1, k] = v0 * last[0, 1, k] + v1 * last[1, 1, k] + v2 * last[2, 1, k]
+        w0 = u * (u - c[1]) * (u - 1.0) / (c[0] * (c[0] - c[1]) * (c[0] - 1.0))
+        w1 = u * (u - c[0]) * (u - 1.0) / (c[1] * (c[1] - c[0]) * (c[1] - 1.0))
+        w2 = u * (u - c[0]) * (u - c[1]) / ((1.0 - c[0]) * (1.0 - c[1])) - 1.0
+        for k in range(Z.shape[1]):
+            Z[i, k] = w0 * old[0, k] + w1 * old[1, k] + w2 * old[2, k]
+
+
+@compiled
+def solve_first(h: float, work: RadauWork, system: System, matrix: Matrix) -> None:
+    """R[0], G[0] from the residual of one equation with the real matrix to the change."""
+    x, along, s = work.x[0], work.along[0], work.method.poles[0] / h
+    scale_residual(work.R[0], work.G[0], system.blocks, system.metric, matrix, work.frames[0],
+                   x, along)  # fmt: skip
+    couple_length(s, x, along, matrix)
+    solve_lu(matrix.nodes, matrix.columns, work.K, work.pivots, x)
+    find_length(s, x, along, matrix)
+    unscale_solution(x, along, system.blocks, system.metric, matrix, work.frames[0], work.R[0],
+                     work.G[0])  # fmt: skip
+
+
+@compiled_inside
+def separate(inverse: Floats, x: Floats, real: Floats, pair: Any) -> None:
+    """T^-1 x for three rows x: its first row, and the other two as one complex row."""
+    for k in range(real.shape[0]):
+        a, b, c = x[0, k], x[1, k], x[2, k]
+        real[k] = inverse[0, 0] * a + inverse[0, 1] * b + inverse[0, 2] * c
+        pair[k] = complex(inverse[1, 0] * a + inverse[1, 1] * b + inverse[1, 2] * c,
+                          inverse[2, 0] * a + inverse[2, 1] * b + inverse[2, 2] * c)  # fmt: skip
+
+
+@compiled_inside
+def unite(T: Floats, real: Floats, pair: Any, x: Floats) -> None:
+    """The inverse of ``separate``."""
+    for i in range(3):
+        for k in range(real.shape[0]):
+            x[i, k] = T[i, 0] * real[k] + T[i, 1] * pair[k].real + T[i, 2] * pair[k].imag
+
+
+@compiled
+def solve_stages(h: float, work: RadauWork, system: System, matrix: Matrix) -> None:
+    """R, G from the residuals of the three stages to the changes."""
+    x, along, poles = work.x, work.along, work.method.poles
+    s, sc = poles[0] / h, complex(poles[1], poles[2]) / h
+    for i in range(3):
+        scale_residual(work.R[i], work.G[i], system.blocks, system.metric, matrix, work.frames[i],
+                       x[i], along[i])  # fmt: skip
+    separate(work.method.T_inverse, x, work.xr, work.xc)
+    separate(work.method.T_inverse, along, work.alongr, work.alongc)
+    couple_length(s, work.xr, work.alongr, matrix)
+    couple_length(sc, work.xc, work.alongc, matrix)
+    solve_lu(matrix.nodes, matrix.columns, work.K, work.pivots, work.xr)
+    solve_lu(matrix.nodes, matrix.columns, work.Kc, work.pivotsc, work.xc)
+    find_length(s, work.xr, work.alongr, matrix)
+    find_length(sc, work.xc, work.alongc, matrix)
+    unite(work.method.T, work.xr, work.xc, x)
+    unite(work.method.T, work.alongr, work.alongc, along)
+    for i in range(3):
+        unscale_solution(x[i], along[i], system.blocks, system.metric, matrix, work.frames[i],
+                         work.R[i], work.G[i])  # fmt: skip
+
+
+@compiled
+def evaluate_stages(
+    t: float, h: float, work: RadauWork, system: System, loops: Any, matrix: Matrix
+) -> None:
+    """Residuals of the three stages: F - A^-1 Z / h into R, those of the rows into G."""
+    y, argument, c = work.state[Y], work.state[SCRATCH], work.method.c
+    Z, inverse = work.Z, work.method.inverse
+    for i in range(3):
+        for k in range(y.shape[0]):
+            argument[k] = y[k] + Z[i, k]
+        evaluate_stage(t + c[i] * h, argument, work.multipliers[i], matrix.held, work.F[i],
+                       work.G[i], system, loops)  # fmt: skip
+        keep_frames(system.body, work.frames[i])
+        a0, a1, a2 = inverse[i, 0] / h, inverse[i, 1] / h, inverse[i, 2] / h
+        for k in range(y.shape[0]):
+            work.R[i, k] = work.F[i, k] - (a0 * Z[0, k] + a1 * Z[1, k] + a2 * Z[2, k])
+    work.integer[RHS] += 3
+
+
+@compiled_inside
+def size_of_multipliers(h: float, change: Floats, work: RadauWork, system: System) -> float:
+    """Norm of multipliers (2, R): as changes of y, h M^-1 D^T times them (HW VII.4: index 2)."""
+    real, y, out = work.real, work.state[Y], work.state[SCRATCH]
+    force, n = system.force, system.metric.shape[0] - 1
+    zero(out)
+    zero(force)
+    add_transposed(system.blocks, system.D, change[0], h, force)
+    add_displacement(y, system.metric, force, out)
+    zero(force)
+    add_transposed(system.blocks, system.D, change[1], h, force)
+    add_velocity(system.metric, force, out[7 * n :])
+    return scaled_largest(out, y, y, work.integer[ERROR_SIZE], real[RTOL], real[ATOL])
+
+
+@compiled_inside
+def change_stages(h: float, work: RadauWork, system: System) -> float:
+    """Add the changes in R and G to the stages; returns their norm."""
+    real, y, worst = work.real, work.state[Y], 0.0
+    for i in range(3):
+        size = scaled_largest(work.R[i], y, y, work.integer[ERROR_SIZE], real[RTOL], real[ATOL])
+        other = size_of_multipliers(h, work.G[i], work, system)
+        if not (size <= worst and other <= worst):
+            worst = max(size, other) if size == size and other == other else math.nan
+        for k in range(y.shape[0]):
+            work.Z[i, k] += work.R[i, k]
+        for r in range(2):
+            for k in range(work.G.shape[2]):
+                work.multipliers[i, r, k] += work.G[i, r, k]
+    return worst
+
+
+@compiled_inside
+def newton_limit(work: RadauWork) -> float:
+    """Norm of a change at which the iteration ends (HW IV.8), not below what rounding allows."""
+    y, rtol, atol = work.state[Y], work.real[RTOL], work.real[ATOL]
+    n = (y.shape[0] - 1) // 13
+    limit = min(0.03, math.sqrt(rtol))
+    first = 0
+    for count in (7 * n, 6 * n):
+        top = 0.0
+        low = LARGEST
+        for k in range(first, first + count):
+            top, low = max(top, abs(y[k])), min(low, abs(y[k]))
+        if count > 0:
+            limit = max(limit, ROUNDINGS * ROUNDING * top / (atol + rtol * low))
+        first += count
+    return min(limit, LOOSEST)
+
+
+@compiled
+def find_stages(
+    t: float, h: float, work: RadauWork, system: System, loops: Any, matrix: Matrix
+) -> float:
+    """Newton's iteration for the stages of a step h.
+
+    Returns:
+        0 where they are found; else the factor on the step that is to be tried; NaN where a number
+        is not finite.
+    """
+    real, own, integer = work.real, work.own, work.integer
+    limit = newton_limit(work)
+    own[FACCON] = max(own[FACCON], ROUNDING) ** 0.8
+    before = ratio_before = 1.0
+    for done in range(1, MOST + 1):
+        evaluate_stages(t, h, work, system, loops, matrix)
+        solve_stages(h, work, system, matrix)
+        change = change_stages(h, work, system)
+        integer[ITERATIONS] += 1
+        integer[LAST_ITERATIONS] = done
+        if not change <= LARGEST:
+            return math.nan
+        if done > 1:
+            ratio = change / before
+            own[THETA] = ratio if done == 2 else math.sqrt(ratio * ratio_before)
+            ratio_before = ratio
+            if own[THETA] >= 0.99:
+                return UNFOUND
+            own[FACCON] = own[THETA] / (1.0 - own[THETA])
+            left = own[FACCON] * change * own[THETA] ** (MOST - 1 - done) / limit
+            if done < MOST and left >= 1.0:
+                excess = max(1e-4, min(20.0, left))
+                return 0.8 * excess ** (-1.0 / (3.0 + MOST - done))
+        before = max(change, ROUNDING)
+        if own[FACCON] * change <= limit:
+            return 0.0
+    return UNFOUND
+
+
+@compiled
+def estimate_error(
+    t: float, h: float, work: RadauWork, system: System, loops: Any, matrix: Matrix, again: bool
+) -> float:
+    """Norm of the error estimate (HW IV.8, (8.19), (8.20)); 1 is just good enough.
+
+    The multipliers steer no step: what a run reports of them comes from the reported state. Here a
+    change of lambda changes none of the other components.
+    """
+    real, y, argument, e = work.real, work.state[Y], work.state[SCRATCH], work.method.e
+    error = 0.0
+    for attempt in range(2 if again else 1):
+        for k in range(y.shape[0]):
+            argument[k] = y[k] + (work.R[0, k] if attempt == 1 else 0.0)
+        zero(work.multipliers[0, 0])
+        evaluate_stage(t, argument, work.multipliers[0], matrix.held, work.R[0], work.G[0],
+                       system, loops)  # fmt: skip
+        keep_frames(system.body, work.frames[0])
+        work.integer[RHS] += 1
+        for k in range(y.shape[0]):
+            total = e[0] * work.Z[0, k] + e[1] * work.Z[1, k] + e[2] * work.Z[2, k]
+            work.R[0, k] += total / h
+        for r in range(2):
+            zero(work.G[0, r])
+        solve_first(h, work, system, matrix)
+        error = scaled_largest(work.R[0], y, work.state[TRIAL], work.integer[ERROR_SIZE],
+                               real[RTOL], real[ATOL])  # fmt: skip
+        if not error >= 1.0:
+            return error
+    return error

@@ -1,0 +1,92 @@
+"""The error of a run, estimated by a second one: tolerances ten times tighter, or half the step."""
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+
+from dap3d_core.result import INFORMATION, Result, estimated_error
+from dap3d_core.scene import SceneError, Simulation
+from dap3d_core.scene.settings import SMALLEST_RTOL
+from dap3d_core.simulation.errors import SimulationError
+
+#: The second run's tolerances are those of the first divided by this.
+TIGHTER = 10.0
+#: Its first step, as a part of the mean step of the first run. Error control starts from a step
+#: that hardly depends on the tolerance, and lets it grow by a largest factor: two runs would begin
+#: with equal steps, and their equal errors would not show in the difference.
+FIRST_STEP = 0.01
+
+#: Makes a run with other settings, and another first step (s) where steps are controlled.
+Again = Callable[[Simulation, float | None], Result]
+
+
+def finer(settings: Simulation) -> Simulation | None:
+    """Settings of the second run; None where tolerances cannot be tightened any more."""
+    if settings.step is not None:
+        return attrs.evolve(settings, step=settings.step / 2.0)
+    rtol = float(settings.rtol)
+    if rtol / TIGHTER < SMALLEST_RTOL:
+        return None
+    return attrs.evolve(settings, rtol=rtol / TIGHTER, atol=float(settings.atol) / TIGHTER)
+
+
+def add_error(
+    result: Result,
+    settings: Simulation,
+    again: Again,
+    output: str | os.PathLike[str] | None,
+) -> None:
+    """Estimate the error of a result by a second run, and write it into its file as well.
+
+    Where the second run fails, the result stays as it is and a note says why it has no estimate.
+
+    Args:
+        result: of the first run, which reached its end.
+        settings: of that run.
+        again: makes the second run.
+        output: the file of the result, None where it has none.
+
+    Raises:
+        BaseException: whatever ends the second run from outside (Ctrl-C, an exception of
+            ``progress``); it carries the first result as ``.result``.
+    """
+    tighter = finer(settings)
+    if tighter is None:
+        note = f"its error was not estimated: rtol {settings.rtol:g} cannot be made any tighter"
+        _amend(result, output, note)
+        return
+    words = _words(tighter)
+    try:
+        second = again(tighter, _first_step(result, tighter))
+    except (SimulationError, SceneError) as error:
+        _amend(result, output, f"its error was not estimated: in a second run at {words}, {error}")
+        return
+    except BaseException as error:
+        _amend(result, output, "the estimate of its error was ended early and left out")
+        error.result = result  # type: ignore[attr-defined]
+        raise
+    steps = second.stats.steps
+    result.arrays = attrs.evolve(result.arrays, u_error=estimated_error(result.u, second.u, steps))
+    note = f"{INFORMATION}its error is estimated by a second run at {words} ({steps:,} steps)"
+    _amend(result, output, note)
+
+
+def _first_step(result: Result, settings: Simulation) -> float | None:
+    if settings.step is not None or not result.stats.steps:
+        return None
+    return FIRST_STEP * float(result.t[-1] - result.t[0]) / result.stats.steps
+
+
+def _words(settings: Any) -> str:
+    if settings.step is not None:
+        return f"steps of {settings.step:g} s"
+    return f"rtol {settings.rtol:g}, atol {settings.atol:g}"
+
+
+def _amend(result: Result, output: str | os.PathLike[str] | None, note: str) -> None:
+    """Add a note, and bring the file up to date."""
+    result.record = attrs.evolve(result.record, notes=(*result.notes, note))
+    if output is not None:
+        result.save(output, force=True)

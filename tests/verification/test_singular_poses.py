@@ -1,0 +1,118 @@
+"""Redundant rows, and motion through singular poses, against closed equations and published digits.
+
+The reference of A02 is its one closed equation, solved to 1e-12; the error e is that of
+benchmarks.md, section 0. Between rtol 1e-8 and the end lie ten crossings or so of the pose with all
+links in line, and ten seconds that multiply an error by about 100.
+"""
+
+import numpy as np
+import pytest
+from support import problems, redundant
+
+import dap3d_core as dap
+
+#: benchmarks.md, A02: good to 1e-11.
+TABULATED = {
+    (1, 10.0): (0.47838505776097056, 0.8781501787912093, 1.7272640755471536, -0.94095217937151564),
+    (2, 1.0): (-0.19502030194943509, -0.98079920566217383, -6.6766780368811581, 1.3275783251604872),
+    (2, 10.0): (0.32845811154081538, 0.94451853817860096, 1.4230514702069441, -0.49486884548704296),
+    (40, 10.0): (0.18051222668672839, 0.98357274058231157, 1.1484412774694141, -0.21077006677942393),
+}
+
+
+def tip(result):
+    """(nt, 4) x, y, vx, vy of B0: the first body is a crank of 1 m, its centre half way."""
+    return np.hstack([2.0 * result.r[:, 0, :2], 2.0 * result.rd[:, 0, :2]])
+
+
+@pytest.mark.parametrize(("count", "t"), TABULATED)
+def test_the_closed_equation_gives_the_published_digits(count, t):
+    """So that it can stand for them at other instants: 1e-11, what they are good to."""
+    found = redundant.four_bars_tip(count, np.array([t]))[-1]
+    assert found == pytest.approx(TABULATED[count, t], abs=2e-11)
+
+
+@pytest.mark.parametrize("count", [1, 2, pytest.param(40, marks=pytest.mark.slow)])
+def test_four_bars_at_the_default_tolerances(count):
+    """A02 on spatial revolutes, three redundant rows a loop: e < 1e-6 at the tabulated instants."""
+    instants = [t for n, t in TABULATED if n == count]
+    results = [dap.simulate(redundant.four_bars(count), t_end=t, dt=t) for t in instants]
+    assert {result.method for result in results} == {"lsq"}
+    found = np.array([tip(result)[-1] for result in results])
+    expected = redundant.four_bars_tip(count, np.array(instants))
+    assert redundant.error_of(found, expected) < 1e-6
+    assert all(result.ledger["position"].ok for result in results)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "dopri5"])
+@pytest.mark.parametrize("count", [1, 2, pytest.param(40, marks=pytest.mark.slow)])
+def test_four_bars_through_every_crossing(count, integrator):
+    """rtol 1e-10: e < 1e-6 over a thousand instants, interpolated ones and some beside the singular
+    pose among them; the energy holds to 1e-8 of what is exchanged."""
+    result = dap.simulate(
+        redundant.four_bars(count), t_end=10.0, dt=0.01, rtol=1e-10, atol=1e-12,
+        integrator=integrator,
+    )  # fmt: skip
+    expected = redundant.four_bars_tip(count, result.t)
+    crossings = np.sum(np.diff(np.sign(expected[:, 1])) != 0)
+    assert crossings >= 8
+    assert redundant.error_of(tip(result)[1:], expected[1:]) < 1e-6
+    assert result.ledger["energy"].value < 1e-8
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12])
+def test_independent_rows_cross_as_well_at_every_tolerance(rtol):
+    """The standard formulation, N = 1 made free of redundancy: the error follows the tolerance.
+
+    It is some 100 times the tolerance, and its part of a step's error is at least a hundredth.
+    """
+    result = dap.simulate(problems.four_bar(), t_end=10.0, dt=0.5, rtol=rtol, atol=rtol / 100)
+    assert result.method == "standard"
+    expected = redundant.four_bars_tip(1, result.t)
+    assert redundant.error_of(tip(result)[1:], expected[1:]) < max(500.0 * rtol, 1e-9)
+
+
+@pytest.mark.parametrize("penalty", [1e7, 1e9])
+def test_penalty_crosses_with_the_error_of_its_springs(penalty):
+    """N = 1 for one second, one crossing: the error is that of 1 / alpha against accelerations of
+    some hundred m/s^2 over the second: below 1e3 / alpha."""
+    scene = redundant.four_bars(1)
+    scene.simulation.alpha = penalty
+    result = dap.simulate(scene, t_end=1.0, dt=0.1, method="penalty")
+    expected = redundant.four_bars_tip(1, result.t)
+    assert np.max(np.abs(tip(result) - expected)) < 1e3 / penalty
+
+
+#: benchmarks.md, A04: third joint point, good to 1e-11.
+A04 = {
+    0.5: (0.7747178080393, -0.9798150476557, -0.1999061589534),
+    1.0: (0.2744813192646, -0.8867079387347, -0.4623300026874),
+    2.0: (-0.7781353730333, -0.9803526834433, -0.1972526706172),
+}
+
+
+def test_bricard():
+    """A04, 30 rows of rank 29 everywhere: e < 1e-6 at the defaults, and 1e-10 at rtol 1e-11."""
+    compiled = dap.compile(redundant.bricard())
+    rank = compiled.redundancy().rank
+    assert (rank.rows, rank.rank, rank.dof, compiled.method) == (30, 29, 1, "lsq")
+    for limit, settings in ((1e-6, {}), (1e-10, {"rtol": 1e-11, "atol": 1e-13})):
+        result = dap.simulate(compiled, t_end=2.0, dt=0.5, **settings)
+        head = list(result.model.point_names).index("head1")
+        found = result.rP[[1, 2, 4], head]
+        assert redundant.error_of(found, np.array(list(A04.values()))) < limit
+        assert result.energy.total[0] == pytest.approx(-29.43, abs=1e-12)
+
+
+def test_door_on_two_hinges():
+    """10 rows of rank 5: a pendulum, phi'' = (m g l / (J + m l^2)) sin phi with phi from upright,
+    let go level: e < 1e-6 over 5 s; the hinges share the load as the least multipliers do."""
+    result = dap.simulate(redundant.two_hinge_door(), t_end=5.0, dt=0.1)
+    m, length, J = 12.0, 0.5, 4.0
+    rate = m * redundant.G * length / (J + m * length**2)
+    phi = redundant.swing(rate, result.t, (np.pi / 2, 0.0))[0]
+    expected = length * np.column_stack([-np.sin(phi), np.cos(phi)])
+    assert redundant.error_of(result.r[:, 0, 1:], expected) < 1e-6
+    # mirror images about the middle of the door: each hinge carries half of the weight
+    force = [result.reaction(name)["i"].force for name in ("H0", "H1")]
+    assert force[0][:, 1:] == pytest.approx(force[1][:, 1:], abs=1e-6)
