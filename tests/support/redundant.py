@@ -1,9 +1,9 @@
 """Problems with redundant rows and singular poses, made through the public API, with references."""
 
 import numpy as np
-from support.problems import ROD
 
 import dap3d_core as dap
+from support.problems import ROD
 
 G = 9.81
 UPRIGHT = (1 / 12, 1e-3, 1 / 12)  # the same rod along y

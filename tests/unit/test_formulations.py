@@ -203,7 +203,7 @@ def test_what_cannot_be_assembled_is_told_by_the_run():
 @pytest.mark.parametrize("method", ["auto", "lsq", "penalty"])
 def test_rows_that_contradict_each_other_are_refused(method):
     """Two drivers of one wheel at different rates: no motion satisfies both."""
-    with pytest.raises(dap.RedundantError, match="slow, fast.*No motion"):
+    with pytest.raises(dap.RedundantError, match=r"slow, fast.*No motion"):
         dap.simulate(mechanisms.two_motors(), t_end=1.0, method=method)
 
 
@@ -217,6 +217,7 @@ print(len(regularise.signatures), len(weigh_rows.signatures),
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["standard", "penalty", "lsq"])
 def test_only_the_chosen_formulation_is_compiled(method, tmp_path):
     """In a fresh process with an empty cache: the modules of the other formulations are not even

@@ -31,7 +31,7 @@ from dap3d_core.formulations.constraints import (
 )
 from dap3d_core.formulations.friction import keep_applied, rub, rubs
 from dap3d_core.formulations.tangent import Tangent, turn_to_body
-from dap3d_core.kernels.cache import compiled, compiled_inside
+from dap3d_core.kernels.cache import compiled_inside
 
 
 class Matrix(NamedTuple):
@@ -94,7 +94,7 @@ def add_velocity(metric: Floats, force: Floats, out: Floats) -> None:
         out[f + 5] += k[6] * a2
 
 
-@compiled
+@compiled_inside
 def evaluate_stage(
     t: float,
     y: Floats,
@@ -182,7 +182,7 @@ def unscale(
     out[o + 2 * stride] = factor * z2
 
 
-@compiled
+@compiled_inside
 def fill_matrix(s: Any, K: Any, blocks: Integers, matrix: Matrix, tangent: Tangent) -> None:
     """K = s - J, for real or complex s in 1/s."""
     for k in range(K.shape[0]):

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 from dap3d_core.assembly.evaluate import largest, zero
 from dap3d_core.assembly.system import Floats, Integers, System
-from dap3d_core.kernels.cache import compiled, compiled_inside
+from dap3d_core.kernels.cache import compiled_inside
 
 #: Step of the differences: the cube root of a rounding balances its error with that of the formula.
 PART = 6e-6
@@ -97,6 +97,26 @@ def rotate_body(s: Floats, saved: Floats, axis: int, angle: float) -> None:
 
 
 @compiled_inside
+def call_one(
+    g: int,
+    t: float,
+    body: Floats,
+    F: Floats,
+    idx: Integers,
+    par: Floats,
+    i0: int,
+    p0: int,
+    loops: Any,
+    out1: Floats,
+    out2: Floats,
+    out3: Floats,
+) -> None:
+    """Call group loop g for the one instance at i0, p0."""
+    loop = loops[g]
+    loop(t, body, F, idx, par, i0, p0, 1, out1, out2, out3)
+
+
+@compiled_inside
 def call_element(
     t: float, e: int, q: int, x: Floats, out: Floats, system: System, loops: Any, tangent: Tangent
 ) -> None:
@@ -105,12 +125,12 @@ def call_element(
     g, kind, slots = row[LOOP], row[KIND], row[SLOT_COUNT]
     i0, p0 = system.groups[g, 0] + q * row[STRIDE], system.groups[g, 1] + q * row[WIDTH]
     body, idx, force, D = system.body, system.idx, tangent.force, tangent.D
-    loop = loops[g]
     for n in range(slots):
         for c in range(6 * idx[i0 + n], 6 * idx[i0 + n] + 6):
             force[c] = 0.0
     if kind == JOINT_ELEMENT:
-        loop(t, body, system.F, idx, system.par, i0, p0, 1, D, tangent.gamma, tangent.nu)
+        call_one(g, t, body, system.F, idx, system.par, i0, p0, loops, D, tangent.gamma,
+                 tangent.nu)  # fmt: skip
         r0, at = idx[i0 + row[ROW_AT]], i0 + row[ROW_AT] + 1
         for r in range(row[ROWS]):
             rate = -tangent.nu[r0 + r]
@@ -122,7 +142,7 @@ def call_element(
                         force[6 * b + c] -= D[d + c] * x[r0 + r]
             out[6 * slots + r] = rate
     else:
-        loop(t, body, system.F, idx, system.par, i0, p0, 1, force, x, x)
+        call_one(g, t, body, system.F, idx, system.par, i0, p0, loops, force, x, x)
     for n in range(slots):
         b = idx[i0 + n]
         for c in range(3):
@@ -293,7 +313,7 @@ def add_gyroscopic(system: System, tangent: Tangent) -> None:
         B[o + 25] += h0
 
 
-@compiled
+@compiled_inside
 def differentiate(t: float, x: Floats, system: System, loops: Any, tangent: Tangent) -> bool:
     """The tangent at the bodies as placed, functions of time as they stand.
 

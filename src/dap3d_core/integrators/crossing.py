@@ -46,7 +46,7 @@ def aim(lengths: Floats, calm: float, h: float) -> float:
         return h
     if left <= calm * h:
         return left / calm
-    return min(h, max(left - SPARE * calm * h, 0.5 * left))
+    return min(h, left - SPARE * calm * h)
 
 
 @compiled_inside

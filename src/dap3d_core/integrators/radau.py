@@ -93,7 +93,7 @@ GROWTH, SHRINKAGE = 8.0, 0.2
 GOOD_TANGENT, SAME_FACTORS = 1e-3, 1.2
 #: Where the step is limited by the iteration its rate is about proportional to h^3. At this rate
 #: iterations for a second of motion are fewest.
-BEST_RATE, RATE_EXPONENT = 0.15, 1.0 / 3.0
+BEST_RATE, RATE_EXPONENT = 0.15, 1.0 / 6.0
 
 
 @compiled
@@ -211,15 +211,14 @@ def step(
 
 @compiled_inside
 def refuse(work: RadauWork, t1: float, h: float, shorter: float) -> None:
-    """Shorten a step whose stages were not found; with a new tangent if that is an old one."""
+    """Shorten a step whose stages were not found; a fixed one is tried with a new tangent first."""
     real, integer = work.real, work.integer
-    if integer[TANGENT_HERE] == 0:
-        integer[TANGENT_NEEDED] = 1
-    known = shorter > 0.0  # not NaN
-    cause = STEP_FLOOR if known else NOT_FINITE
-    if known and integer[TANGENT_NEEDED] != 0 and real[STEP] != 0.0:
-        return  # a fixed step is tried again
-    reject(real, integer, work.times, t1, h * (shorter if known else RETREAT), cause)
+    stale = integer[TANGENT_HERE] == 0
+    integer[TANGENT_NEEDED] = 1
+    if not shorter > 0.0:  # NaN
+        reject(real, integer, work.times, t1, h * RETREAT, NOT_FINITE)
+    elif real[STEP] == 0.0 or not stale:
+        reject(real, integer, work.times, t1, h * shorter, STEP_FLOOR)
 
 
 @compiled_inside

@@ -25,11 +25,11 @@ from dap3d_core.integrators.radau_work import (
     RadauWork,
 )
 from dap3d_core.integrators.work import H_DENSE, T_DENSE, TRIAL, T, Y
-from dap3d_core.kernels.cache import compiled, compiled_inside
+from dap3d_core.kernels.cache import compiled_inside
 from dap3d_core.linear.blocks import add_product
 
 
-@compiled
+@compiled_inside
 def find_slope(t1: float, h: float, work: RadauWork, system: System, loops: Any) -> None:
     """dy/dt at the trial state, into TRIAL_SLOPE."""
     y, out, inverse, Z = work.state[TRIAL], work.state[TRIAL_SLOPE], work.method.inverse, work.Z
@@ -71,7 +71,7 @@ def scale_slopes(inverse: Floats, Z: Floats, h: float, metric: Floats, force: Fl
         force[o + 4], force[o + 5] = z1, z2
 
 
-@compiled
+@compiled_inside
 def prepare_dense(h: float, work: RadauWork) -> None:
     """Terms of dense output from t to the trial state, for combination.interpolate."""
     real, state, terms, Z, c = work.real, work.state, work.terms, work.Z, work.method.c

@@ -33,9 +33,10 @@ from dap3d_core.integrators.control import (
     joined,
     reject,
 )
-from dap3d_core.integrators.crossing import aim, is_near, look_ahead, look_back
+from dap3d_core.integrators.crossing import aim, is_near, look_ahead, look_back, singular_ahead
 from dap3d_core.integrators.method import ABSCISSA, Floats, Integers
 from dap3d_core.integrators.work import (
+    ACROSS,
     ATOL,
     CALM,
     DENSE,
@@ -88,6 +89,11 @@ RETREAT = 0.1
 FAILED, POOR_PLACE = 1.0, 2.0
 #: Factor on a step that should end elsewhere, and how often in a row that is tried.
 ELSEWHERE, ATTEMPTS = 0.6, 4
+
+#: Near a singular state nothing is known better than to this part of the largest component.
+BLURRED = 1e-11
+#: An error up to this may be rounding.
+ROUNDED = 100.0
 
 
 @compiled
@@ -207,6 +213,8 @@ def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) 
         error = kept_error(work, t1, h, project, system, loops)
     elif adaptive:
         error = error_norm(real, integer, work.state, k, work.table, h)
+    if near and error > 1.0 and is_rounding(real, work.lengths, h, error):
+        error = 1.0
     if error <= 1.0:
         failure = land(work, t1, near, rhs, project, system, loops)
         if failure == RUNNING and adaptive and not near and is_poor(real, integer, times, t1):
@@ -216,6 +224,8 @@ def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) 
             reject(real, integer, times, t1, shorter, STEP_FLOOR)
         elif failure == RUNNING:
             integer[POOR] = 0
+            if singular_ahead(work.lengths, h) < h:
+                real[ACROSS] = 0.0
             look_back(work.lengths, real[LENGTHS:], h)
             accept(real, integer, times, work.state, k, t1, error)
             if h < longest:
@@ -274,21 +284,36 @@ def kept_error(
 ) -> float:
     """The error of a step as ``error_norm`` has it, but of the projected result.
 
-    Near a singular state rounding errors are large in a direction that projection takes away.
+    Near a singular state errors are large in a direction that projection takes away, up to rounding
+    over the square of the distance: below BLURRED nothing is asked for.
     """
     real, integer, table, k = work.real, work.integer, work.table, work.k
     y, trial, result, other = (work.state[Y], work.state[TRIAL], work.state[SCRATCH],
                                work.state[OTHER])  # fmt: skip
     on_constraints(work, t1, trial, project, system, loops)
-    main = 0.0
+    atol, main = real[ATOL], 0.0
+    for i in range(integer[ERROR_SIZE]):
+        atol = max(atol, BLURRED * abs(y[i]))
     for e in range(integer[ERRORS]):
         combine(other, 1.0, trial, -h, table, k.shape[0] + e, k)
         project_state(real, integer, t1, other, project, system, loops)
         for i in range(other.size):
             other[i] -= result[i]
-        size = scaled_largest(other, y, result, integer[ERROR_SIZE], real[RTOL], real[ATOL])
+        size = scaled_largest(other, y, result, integer[ERROR_SIZE], real[RTOL], atol)
         main = size if e == 0 else joined(main, size)
     return main
+
+
+@compiled_inside
+def is_rounding(real: Floats, lengths: Floats, h: float, error: float) -> bool:
+    """Whether the error of a step across a singular state is rounding: a shorter one had no less.
+
+    It is mostly in the direction that projection takes away from there on.
+    """
+    if not (singular_ahead(lengths, h) < h and error < ROUNDED):
+        return False
+    before, real[ACROSS] = real[ACROSS], error
+    return before > 0.0 and error > 0.25 * before
 
 
 @compiled_inside

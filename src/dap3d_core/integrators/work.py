@@ -30,8 +30,9 @@ PROJECTION_FAILED, SWITCHED = int(Status.PROJECTION_FAILED), int(Status.SWITCHED
 RTOL, ATOL, STEP, EXPONENT, BETA, FACTOR_MIN, FACTOR_MAX, CALM = range(8)
 # What changes: time, next step, error of the last accepted step, start and length of the step that
 # the dense output belongs to, start of the present run of equal steps, time of what stopped
-# the run, the lowest switch of the model, and what project gives: four numbers, then lengths.
-T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, SWITCH, OUTCOME = range(8, 17)
+# the run, error of the last step that was to go across a singular state, the lowest switch of the
+# model, and what project gives: four numbers, then lengths.
+T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, ACROSS, SWITCH, OUTCOME = range(8, 18)
 LENGTHS = OUTCOME + 4
 # Places in ``integer``. Settings.
 STAGES, ORDER, ERROR_SIZE, ERRORS, ERROR_USES_RESULT, DENSE, PROJECT_ON, WATCHED = range(8)

@@ -10,7 +10,7 @@ empty, so factors that are zero are passed over.
 
 from typing import Any
 
-from dap3d_core.kernels.cache import compiled, compiled_inside
+from dap3d_core.kernels.cache import compiled_inside
 from dap3d_core.linear.plan import Integers
 
 
@@ -44,7 +44,7 @@ def factor_diagonal(m: int, d: int, first: int, K: Any, pivots: Integers) -> boo
     return True
 
 
-@compiled
+@compiled_inside
 def factor_lu(nodes: Integers, columns: Integers, updates: Integers, K: Any, pivots: Integers) -> bool:
     """Factor K in place.
 
@@ -97,7 +97,7 @@ def factor_lu(nodes: Integers, columns: Integers, updates: Integers, K: Any, piv
     return True
 
 
-@compiled
+@compiled_inside
 def solve_lu(nodes: Integers, columns: Integers, K: Any, pivots: Integers, x: Any) -> None:
     """Solve K z = x in place, with the factors of K."""
     count = nodes.shape[0] - 1

@@ -1,0 +1,33 @@
+"""The report floor: speed against error of every method and integrator on a user's own scene."""
+
+import sys
+from types import ModuleType
+from typing import Any
+
+from dap3d_core.report.bench import Refused
+from dap3d_core.report.making import report
+from dap3d_core.report.outcome import Failed, Report, Run
+from dap3d_core.report.recommending import Recommendation
+from dap3d_core.report.reference import Reference
+from dap3d_core.report.rungs import Setting
+
+__all__ = [
+    "Failed",
+    "Recommendation",
+    "Reference",
+    "Refused",
+    "Report",
+    "Run",
+    "Setting",
+    "report",
+]
+
+
+class _CallableModule(ModuleType):
+    """Lets ``dap3d_core.report(...)`` report whether or not this module is loaded."""
+
+    def __call__(self, *arguments: Any, **options: Any) -> Report:
+        return report(*arguments, **options)
+
+
+sys.modules[__name__].__class__ = _CallableModule

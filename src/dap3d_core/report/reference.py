@@ -1,0 +1,225 @@
+"""What a report measures errors against: two independent runs, and the model's expected numbers."""
+
+import tomllib
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from dap3d_core.model.groups import Floats
+from dap3d_core.report.bench import Bench
+from dap3d_core.report.measures import first_parting, trajectory_error
+from dap3d_core.report.rungs import ADAPTIVE, Setting, controlled
+from dap3d_core.result import Result
+from dap3d_core.scene import Scene, SceneError, load
+from dap3d_core.simulation import SimulationError
+
+#: Tolerances that are tried for a reference, the tightest first. That one is beyond the ladder; a
+#: run that has to serve as reference itself has no error, and is marked as not to be told.
+TIGHTEST = (1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8)
+#: Methods whose error does not fall below some level with the tolerance (the penalty formulation
+#: ends its passes at a residual): no references where another method fits.
+APPROXIMATE = ("penalty",)
+#: A run for a reference may take so many times longer than others.
+PATIENCE = 4.0
+
+Tick = Callable[[str], None]
+
+
+@attrs.frozen
+class Expected:
+    """How the reference compares with the expected.toml of the model.
+
+    Attributes:
+        count: numbers that could be compared: those of the state at reported instants.
+        deviation: the largest deviation of one (SI).
+        within: whether all are within the tolerances stated there.
+    """
+
+    count: int
+    deviation: float
+    within: bool
+
+
+@attrs.frozen(eq=False)
+class Reference:
+    """What errors are measured against.
+
+    Attributes:
+        t: (nt,) instants over which they are, s; fewer than reported where references part.
+        u: (nt, 13 n) states there.
+        settings: of the reference, and of the second one that it is compared with where there is.
+        uncertainty: the error e of the second against it: nothing below can be told; None where
+            there is no second.
+        meaningless_from: the instant, s, from which the two differ by more than 1e-3 of the size,
+            so that errors mean nothing; None where they never do.
+        expected: how it compares with independent numbers; None where there are none.
+        notes: what to know of it.
+    """
+
+    t: Floats
+    u: Floats
+    settings: tuple[Setting, ...]
+    uncertainty: float | None
+    meaningless_from: float | None
+    expected: Expected | None
+    notes: tuple[str, ...]
+
+
+def find_reference(bench: Bench, fixed: list[Setting], tick: Tick) -> Reference:
+    """The reference of a scene.
+
+    Two runs at the tightest tolerance that each can hold, with different integrators and, where
+    more than one method fits, different methods.
+
+    Args:
+        bench: what runs the settings.
+        fixed: settings of fixed steps that stand in where no tolerance can be held.
+        tick: told what is going on.
+
+    Raises:
+        SimulationError: not one run came to its end; says why.
+    """
+    failures: dict[str, str] = {}
+
+    def first_of(settings: Iterable[Setting]) -> tuple[Setting, Result] | None:
+        for setting in settings:
+            if setting.method not in bench.models:
+                continue
+            words = f"reference: {setting}"
+            tick(words)
+            limit = PATIENCE * bench.limit_s
+            found = bench.run(setting, partial(tick, words), limit_s=limit)
+            if isinstance(found, Result):
+                return setting, found
+            failures[f"{setting.method}, {setting.integrator}"] = found
+        return None
+
+    first = first_of(_candidates(bench, fixed))
+    if first is None:
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in failures.items())
+        reasons = reasons or "; ".join(f"{r.method}: {r.reason}" for r in bench.refused)
+        raise SimulationError(f"no run came to its end: {reasons}")
+    seconds = [first_of(_others(first[0], _candidates(bench, fixed)))]
+    if seconds[0] is not None and seconds[0][0].rtol not in TIGHTEST[:2]:  # steps may do better
+        others = [s for s in fixed if s.integrator != first[0].integrator]
+        seconds.append(first_of(sorted(others, key=lambda s: s.method in APPROXIMATE)))
+    there = [second for second in seconds if second is not None]
+    u = first[1].u
+    second = min(there, key=lambda other: trajectory_error(other[1].u, u), default=None)
+    return _reference(bench, first, second)
+
+
+def _candidates(bench: Bench, fixed: list[Setting]) -> Iterator[Setting]:
+    """Settings in the order in which they are wanted."""
+    exact = [name for name in bench.models if name not in APPROXIMATE]
+    for methods in (exact, APPROXIMATE):
+        for rtol in TIGHTEST:
+            for integrator in ADAPTIVE:
+                for method in methods:
+                    yield controlled(method, integrator, rtol)
+        yield from (setting for setting in fixed if setting.method in methods)
+
+
+def _others(first: Setting, settings: Iterator[Setting]) -> Iterator[Setting]:
+    """Those that share as little as can be with the first: integrator and method differ, or one."""
+    every = list(settings)
+    for rough in (False, True):
+        for same_integrator, same_method in ((False, False), (False, True), (True, False)):
+            for setting in every:
+                if (
+                    (setting.integrator == first.integrator) is same_integrator
+                    and (setting.method == first.method) is same_method
+                    and (setting.method in APPROXIMATE) is rough
+                ):
+                    yield setting
+
+
+def _reference(
+    bench: Bench, first: tuple[Setting, Result], second: tuple[Setting, Result] | None
+) -> Reference:
+    setting, result = first
+    settings: tuple[Setting, ...] = (setting,)
+    count, uncertainty = len(result.t), None
+    meaningless_from = None
+    notes = []
+    if second is None:
+        notes.append("the reference is a single run: its own uncertainty is not known")
+    else:
+        settings = (setting, second[0])
+        parting = first_parting(result.u, second[1].u)
+        if parting is not None:
+            count = max(parting, 1)
+            meaningless_from = float(result.t[parting])
+            notes.append(
+                f"the two reference runs differ by more than 1e-3 of the size from "
+                f"t = {meaningless_from:.6g} s on (chaos, or a fault in one): errors are "
+                "measured up to there alone"
+            )
+        uncertainty = trajectory_error(second[1].u[:count], result.u[:count])
+    for each in settings:
+        if each.rtol is None or each.rtol > TIGHTEST[0]:
+            tight = f"rtol {TIGHTEST[0]:g}"
+            notes.append(f"{each} stands in as reference: at {tight} none like it came to its end")
+    expected = compare_with_expected(bench, result)
+    if expected is not None and not expected.within:
+        notes.append(
+            f"the reference deviates from the model's expected.toml by {expected.deviation:.2g}, "
+            "more than the tolerance there"
+        )
+    return Reference(
+        result.t[:count],
+        result.u[:count],
+        settings,
+        uncertainty,
+        meaningless_from,
+        expected,
+        tuple(notes),
+    )
+
+
+def compare_with_expected(bench: Bench, result: Result) -> Expected | None:
+    """Compare with the expected.toml beside the scene; None where that says nothing of this run.
+
+    Compared are r, p, rd, w of bodies at reported instants after the start, each within the
+    tolerance stated there. A scene that was changed since it was read has no expected numbers.
+    """
+    path = bench.scene.path
+    if path is None or not _is_as_read(bench.scene, path):
+        return None
+    try:
+        checks = tomllib.loads((path.parent / "expected.toml").read_text("utf-8"))["check"]
+    except (OSError, ValueError, KeyError):
+        return None
+    count, deviation, within = 0, 0.0, True
+    for check in checks:
+        head, _, body = str(check["quantity"]).partition(".")
+        place = result.subject.body_index.get(body)
+        if head not in ("r", "p", "rd", "w") or place is None or not check.get("t"):
+            continue
+        (at,) = np.nonzero(np.abs(result.t - check["t"]) <= 1e-12 * abs(check["t"]))
+        if not len(at):
+            continue
+        value = np.array(check["value"], dtype=float)
+        found = getattr(result, head)[at[0], place]
+        if head == "p" and found @ value < 0.0:
+            found = -found
+        off = float(np.max(np.abs(found - value)))
+        count += 1
+        deviation, within = max(deviation, off), within and off <= check["tolerance"]
+    return Expected(count, deviation, within) if count else None
+
+
+def _is_as_read(scene: Scene, path: Path) -> bool:
+    """Whether a scene describes what its file does; how long and how it is run aside."""
+    try:
+        read = load(path)
+    except SceneError:
+        return False
+    settings = scene.simulation
+    asked = ("correct", "project", "hold", "correct_metric")
+    same = all(getattr(read.simulation, name) == getattr(settings, name) for name in asked)
+    read.simulation = settings
+    return same and read.to_toml() == scene.to_toml()

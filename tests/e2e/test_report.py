@@ -1,0 +1,124 @@
+"""``dap3d report`` and ``dap3d run --error`` as a user has them."""
+
+import csv
+import json
+import re
+import shlex
+import signal
+import subprocess
+import sys
+
+import pytest
+from support.process import REPOSITORY, environment
+
+import dap3d_core as dap
+
+QUICK = ("--quick", "--t-end", "0.2", "--dt", "0.05")
+
+
+def test_a_report_with_table_files_and_a_setting_that_can_be_run(dap3d):
+    done = dap3d("report", "pen1", *QUICK, "--target-error", "1e-6", "--plot", "a.svg",
+                 "--csv", "a.csv", "-o", "a.json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "standard, dop853" in done.stdout
+    assert "uncertainty" in done.stdout
+    assert "method unconstrained does not fit" in done.stdout
+    assert "* no faster run has a smaller error" in done.stdout
+    assert (dap3d.folder / "a.svg").read_text().startswith("<?xml")
+    found = json.loads((dap3d.folder / "a.json").read_text())
+    rows = list(csv.DictReader((dap3d.folder / "a.csv").read_text().splitlines()))
+    assert [float(row["error"]) for row in rows] == [run["error"] for run in found["runs"]]
+    (line,) = [ln for ln in done.stdout.splitlines() if ln.strip().startswith("dap3d run pen1")]
+    assert found["recommended"]["flags"] in line
+    again = dap3d(*shlex.split(line)[1:], "--json", "-o", "best.nc")
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout)["rhs"] == found["recommended"]["run"]["rhs"]
+
+
+def test_json_is_one_object_with_the_runs_and_nothing_else(dap3d):
+    done = dap3d("report", "pen1", *QUICK, "--integrator", "dop853", "--integrator", "rk4",
+                 "--method", "standard", "--json")  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    found = json.loads(done.stdout)
+    assert [run["integrator"] for run in found["runs"]] == ["dop853"] * 3 + ["rk4"] * 3
+    for run in found["runs"]:
+        assert run["time_s"] > 0.0
+        assert run["error"] > 0.0
+        assert run["energy_error"] >= 0.0
+        assert run["constraint_error"] >= 0.0
+        assert run["rhs"] >= run["steps"] > 0
+        assert ("rtol" in run) is (run["integrator"] == "dop853")
+        assert ("step" in run) is (run["integrator"] == "rk4")
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_tables_fit_the_width(dap3d, width):
+    done = dap3d("report", "pen1", *QUICK, "--method", "standard", COLUMNS=width)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert max(map(len, lines)) <= width
+    rows = [line for line in lines if "rtol 1e-07" in line and "ms" in line]
+    assert rows
+    assert all(len(row.split()) >= 6 for row in rows)  # no column is folded away
+
+
+def test_wrong_use_is_refused_before_anything_is_run(refuse, scene_file):
+    scene_file()
+    assert "did you mean 'dop853'" in refuse("report", "fall.toml", "--integrator", "dop85")
+    assert refuse("report", "fall.toml", "--rtol", "2").startswith("--rtol")
+    assert refuse("report", "fall.toml", "--t-end", "0").startswith("--t-end")
+    assert "one of .png" in refuse("report", "fall.toml", "--plot", "a.gif")
+    assert "fall.toml" in refuse("report", "fall.toml", "--csv", "fall.toml", "--force")
+    assert "twice" in refuse("report", "fall.toml", "--csv", "a", "-o", "a")
+    assert "positive" in refuse("report", "fall.toml", "--limit", "-1")
+    assert "no/such" in refuse("report", "no/such")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 3)])
+def test_signals_keep_what_was_measured(dap3d, number, code):
+    process = dap3d.start("report", "pen1", "--repeat", "10000", "--csv", "a.csv")
+    lines = []
+    for line in process.stderr:
+        lines.append(line)
+        if "left" in line:
+            break
+    process.send_signal(number)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == code, err
+    assert "Traceback" not in err
+    assert "interrupted" in out
+    assert "ended early" in err
+    assert len((dap3d.folder / "a.csv").read_text().splitlines()) > 2
+
+
+def test_the_page_on_reports(dap3d):
+    """Its commands, in their order, and its scripts, which hold assertions of their own."""
+    text = (REPOSITORY / "docs" / "report.md").read_text()
+    commands = [shlex.split(line) for line in re.findall(r"^    dap3d (.*)$", text, re.MULTILINE)]
+    assert [words[0] for words in commands] == ["report", "report", "run"]
+    for words in commands:
+        done = dap3d(*words)
+        assert done.returncode == 0, done.stderr
+    assert {"pen1.svg", "pen1.csv", "pen1.json"} <= {p.name for p in dap3d.folder.iterdir()}
+    scripts = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert len(scripts) == 2
+    for script in scripts:
+        done = subprocess.run(
+            [sys.executable, "-c", script],
+            cwd=dap3d.folder, env=environment(), capture_output=True, text=True,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+
+
+def test_the_error_of_a_run_is_estimated_shown_and_stored(dap3d):
+    done = dap3d("run", "pen1", "--t-end", "0.2", "--error")
+    assert done.returncode == 0, done.stderr
+    assert "no bound" in done.stdout
+    assert "second run at rtol 1e-09" in done.stdout
+    error = dap.open(dap3d.folder / "pen1.nc").error
+    assert 0.0 < error.largest["r"] < 1e-6
+    info = dap3d("info", "pen1.nc", "--json")
+    assert json.loads(info.stdout)["error_estimate"]["r"] == error.largest["r"]
+    plain = dap3d("run", "pen1", "--t-end", "0.2", "--force", "--json", "--strict")
+    assert json.loads(plain.stdout)["error_estimate"] is None

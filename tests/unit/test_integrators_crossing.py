@@ -1,0 +1,101 @@
+"""Where steps end for the sake of a singular state ahead, and that a run may be cut there."""
+
+import numpy as np
+import pytest
+from support import redundant
+from support.graphs import compiled_in
+
+import dap3d_core as dap
+from dap3d_core.integrators import METHODS, Integration, Status
+from dap3d_core.integrators import crossing as compiled
+from dap3d_core.integrators.crossing import NOW, RATE
+
+
+def _aim(lengths, calm, h):
+    return compiled.aim(lengths, calm, h)
+
+
+def _is_near(lengths, h):
+    return compiled.is_near(lengths, h)
+
+
+def _look_back(lengths, found, h):
+    compiled.look_back(lengths, found, h)
+
+
+#: What compiled code alone may call, with a door to Python.
+aim, is_near, look_back = (compiled_in(None, "", f) for f in (_aim, _is_near, _look_back))
+
+
+def lengths_of(*pairs):
+    """(2, m) from (length, rate) of each row."""
+    return np.array(pairs, dtype=float).T.copy()
+
+
+@pytest.mark.parametrize("calm", [0.25, 7 / 15, 0.55])
+@pytest.mark.parametrize("left", np.linspace(0.02, 2.5, 40))
+def test_the_step_across_has_the_singular_state_in_its_gap(calm, left):
+    """From any distance: no step is longer than allowed or ends close to the singular state, and
+    the one across has it at ``calm``, exactly. 2.5 steps away it is crossed by the fifth."""
+    h = 1.0
+    for _ in range(5):
+        step = aim(lengths_of((2.0 * left, -2.0), (1.0, 0.1)), calm, h)
+        assert 0.0 < step <= h
+        if step > left:
+            assert left / step == pytest.approx(calm, rel=1e-12)
+            return
+        left -= step
+        assert left >= 0.9 * calm * h
+    raise AssertionError(f"never across: {left} left")
+
+
+def test_nothing_ahead_leaves_the_step_alone():
+    """Rates that are zero, positive or unknown, and a state far away."""
+    for pair in ((1.0, 0.0), (1.0, 3.0), (np.nan, np.nan), (1.0, -0.1)):
+        assert aim(lengths_of(pair), 0.5, 1.0) == 1.0
+        assert not is_near(lengths_of(pair), 0.1)
+
+
+def test_lengths_count_from_the_far_side_after_a_crossing():
+    """They are square roots and turn round at zero: -0.2 -> 0.3 is a rate of 0.5, and of the row
+    that did not cross -0.1."""
+    lengths = lengths_of((0.2, -0.5), (1.0, -0.1))
+    look_back(lengths, np.array([0.3, 0.9]), 1.0)
+    assert lengths[NOW] == pytest.approx([0.3, 0.9])
+    assert lengths[RATE] == pytest.approx([0.5, -0.1])
+
+
+def test_the_middle_of_the_widest_gap():
+    """By hand from the tableaux: 1/3 to 3/5, 3/10 to 4/5."""
+    assert METHODS["dop853"].calm == pytest.approx((1 / 3 + 3 / 5) / 2)
+    assert METHODS["dopri5"].calm == pytest.approx((3 / 10 + 4 / 5) / 2)
+
+
+def test_a_run_across_is_the_same_however_it_is_cut():
+    """All that decides lies in the arrays of Work: step by step, in one go, and copied into a fresh
+    integration just before the first crossing (t = 0.7085 s), bit for bit."""
+    model = dap.compile(redundant.four_bars(1))
+    machine = model.machine
+    u = model.start(True, ()).u
+    y0 = machine.integrated(u)
+
+    def integration():
+        machine.watch_pivots(0.0, u)
+        return Integration(
+            METHODS["dop853"], machine.functions, machine.system, machine.loops, y0, [0.0, 1.0],
+            project_on=True, error_size=len(y0) - 1, report_size=machine.report_size,
+            length_count=machine.length_count,
+        )  # fmt: skip
+
+    whole, cut, fresh = integration(), integration(), integration()
+    assert whole.advance(10**9) is Status.FINISHED
+    while cut.t < 0.66:
+        cut.advance(0)
+    for mine, copy in zip(fresh.work, cut.work, strict=True):
+        mine[...] = copy
+    for one in (cut, fresh):
+        while one.status is Status.RUNNING:
+            one.advance(0)
+        assert np.array_equal(one.y, whole.y)
+        assert one.statistics == whole.statistics
+    assert whole.y[1] < 0.0  # the first crank hangs: it has crossed
