@@ -62,6 +62,16 @@ def test_tables_fit_the_width(dap3d, width):
     assert all(len(row.split()) >= 6 for row in rows)  # no column is folded away
 
 
+def test_a_bar_with_an_estimate_fits_a_narrow_terminal(dap3d):
+    from tests.e2e.test_terminal import in_terminal, lines
+
+    code, shown = in_terminal(dap3d, 60, "report", "pen1", "--integrator", "rk4")
+    assert code == 0, shown
+    assert max(map(len, lines(shown))) <= 60
+    assert any("%" in line and line.rstrip().endswith("left") for line in lines(shown))
+    assert "what to take" in shown
+
+
 def test_wrong_use_is_refused_before_anything_is_run(refuse, scene_file):
     scene_file()
     assert "did you mean 'dop853'" in refuse("report", "fall.toml", "--integrator", "dop85")

@@ -171,6 +171,20 @@ def test_the_reference_is_two_runs_that_differ_in_integrator_and_method(small):
     assert small.reference.expected is None
 
 
+def test_where_references_part_errors_are_measured_up_to_there(monkeypatch):
+    """Here already rounding counts as parting."""
+    monkeypatch.setattr("dap3d_core.report.measures.PARTED", 1e-300)
+    found = dap.report(
+        problems.pendulum(), quick=True, t_end=0.2, dt=0.05, integrators=["rk4"],
+        methods=["standard"],
+    )  # fmt: skip
+    reference = found.reference
+    assert 0.0 < reference.meaningless_from <= 0.2
+    assert reference.t[-1] < reference.meaningless_from
+    assert "errors are measured up to there alone" in reference.notes[0]
+    assert found.to_dict()["reference"]["meaningless_from"] == reference.meaningless_from
+
+
 def test_the_error_is_the_true_one():
     """Free fall, whose closed form explicit methods of order 2 and more give exactly."""
     scene = dap.Scene(name="fall")

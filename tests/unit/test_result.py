@@ -15,9 +15,7 @@ from dap3d_core.registry import load_registry
 from dap3d_core.result import Result, ResultError, Statistics, UnknownNameError
 from dap3d_core.scene import Scene, check, load
 
-CONTROLLED = dict(
-    rtol=1e-8, atol=1e-10, step=None, project=True, correct=True, conservative=True
-)
+CONTROLLED = dict(rtol=1e-8, atol=1e-10, step=None, project=True, correct=True, conservative=True)
 
 
 def model_of(scene):

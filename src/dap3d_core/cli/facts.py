@@ -7,15 +7,12 @@ import attrs
 if TYPE_CHECKING:
     from dap3d_core.result import Result
 
-#: Formulations that run only where all constraint rows are independent.
-INDEPENDENT = ("unconstrained", "standard")
-
 
 def facts_of(result: "Result") -> dict[str, Any]:
-    """The facts of a result; dof is None where the rows may depend on each other."""
+    """The facts of a result."""
     subject = result.subject
     instants = len(result.t)
-    dof = 6 * subject.body_count - subject.row_count if result.method in INDEPENDENT else None
+    dof = 6 * subject.body_count - result.settings.get("rank", subject.row_count)
     return {
         "scene": result.record.title,
         "status": result.status,

@@ -49,8 +49,6 @@ def tell(
 ) -> int:
     """Tell how a run ended that was saved; returns the exit code."""
     found = facts_of(outcome.result)
-    if found["dof"] is None:
-        found["dof"] = outcome.compiled.redundancy(outcome.result.u[0]).rank.dof
     faults = violations_of(found)
     code = outcome.code
     if strict and code == exits.DONE and (faults or warnings_of(found)):

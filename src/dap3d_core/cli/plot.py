@@ -27,12 +27,14 @@ def plot(
     """Draw quantities of a RESULT; without any, its energies.
 
     \b
-    BODY.r .p .rd .w .wp .rdd .wd .wpd     motion of a body
-    POINT.r .v .a                          motion of a point
-    JOINT.force .moment .lambda            reactions; JOINT.j.force on the body of slot j
-    JOINT.force_body .moment_body          in body axes; .moment_at_point about the joint's point
-    FORCE.length .tension .energy .force   of a spring or another force
-    energy.kinetic .potential .total       energies, work
+    BODY.r .p .rd .w .wp .rdd .wd .wpd  of a body
+    POINT.r .v .a                       of a point
+    JOINT.force .moment .lambda         reactions on body i
+    JOINT.j.force                       on the body of slot j
+    JOINT.force_body .moment_body       in body axes
+    JOINT.moment_at_point               about its own point
+    FORCE.length .tension .energy       of a spring
+    energy.kinetic .potential .total    and work
     constraint.position .velocity .acceleration
 
     A component follows with another dot, crank.r.z; .norm is the length of a vector. Quantities of

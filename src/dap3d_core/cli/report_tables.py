@@ -42,10 +42,10 @@ class ReportProgress(RunProgress):
         """Of ``total`` seconds of work, ``done`` are over; what is going on."""
         if self._bar is not None:
             shown = clean(words)[: max(12, self._console.width - 44)]
-            known = total > done
-            self._bar.update(
-                self._task, total=total if known else None, completed=done, description=shown
-            )
+            if total > done:  # of a part, as a changing total would make rich forget its estimate
+                self._bar.update(self._task, total=1.0, completed=done / total, description=shown)
+            else:
+                self._bar.update(self._task, description=shown)
         elif time.monotonic() - self._told > self._pause:
             self._told = time.monotonic()
             self._pause = min(2.0 * self._pause, LONGEST_PAUSE)

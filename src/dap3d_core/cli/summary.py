@@ -63,9 +63,8 @@ def modelled(found: dict[str, Any]) -> str:
     if found["joints"]:
         rows = count(found["rows"], "row")
         words += f", {count(found['joints'], 'joint')} ({rows})"
-    if found["dof"] is not None:
-        words += f"; {count(found['dof'], 'degree')} of freedom".replace("no degrees", "0 degrees")
-    return words
+    dof = count(found["dof"], "degree").replace("no degrees", "0 degrees")
+    return f"{words}; {dof} of freedom"
 
 
 def method(found: dict[str, Any]) -> str:

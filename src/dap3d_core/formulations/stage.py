@@ -53,7 +53,7 @@ class Matrix(NamedTuple):
 
 @compiled_inside
 def add_transposed(blocks: Integers, D: Floats, x: Floats, sign: float, g: Floats) -> None:
-    """g += sign D^T x, in scaled coordinates."""
+    """G += sign D^T x, in scaled coordinates."""
     for q in range(blocks.shape[0]):
         o, b, f = blocks[q, 0], 6 * blocks[q, 1], blocks[q, 3]
         for r in range(blocks[q, 2]):
@@ -174,7 +174,7 @@ def keep_state(system: System, matrix: Matrix, part: float) -> None:
 def unscale(
     k: Floats, a0: float, a1: float, a2: float, factor: float, out: Floats, o: int, stride: int
 ) -> None:
-    """factor U^-1 a, into out at o, o + stride, o + 2 stride."""
+    """Factor U^-1 a, into out at o, o + stride, o + 2 stride."""
     z2 = a2 / k[6]
     z1 = (a1 - k[5] * z2) / k[4]
     out[o] = factor * (a0 - k[2] * z1 - k[3] * z2) / k[1]

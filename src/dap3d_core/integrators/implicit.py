@@ -13,6 +13,7 @@ from dap3d_core.integrators import radau_work as at
 from dap3d_core.integrators.integration import Integration, _check_control, _check_state_and_times
 from dap3d_core.integrators.radau import advance
 from dap3d_core.integrators.radau_method import ORDER, radau_method
+from dap3d_core.integrators.radau_parts import radau_parts
 from dap3d_core.integrators.radau_work import RadauWork
 from dap3d_core.integrators import work
 from dap3d_core.integrators.work import Status
@@ -111,6 +112,7 @@ class RadauIntegration(Integration):
             raise ValueError(f"error_size is {error_size}, but y has {y.size} components")
         if buffer_rows < 1:
             raise ValueError(f"buffer_rows is {buffer_rows}; at least one row must fit")
+        self._parts = radau_parts()
         tangent = make_tangent(machine)
         matrix, lu = make_matrix(machine, tangent)
         self.machine, self.lu_plan, self.tangent, self.matrix = machine, lu, tangent, matrix
@@ -128,7 +130,7 @@ class RadauIntegration(Integration):
     def _advance(self, budget: int) -> None:
         machine = self.machine
         advance(
-            self.work, machine.functions, machine.system, machine.loops,
+            self.work, machine.functions, self._parts, machine.system, machine.loops,
             self.tangent, self.matrix, budget,
         )  # fmt: skip
 

@@ -25,17 +25,8 @@ from dap3d_core.integrators.control import (
     step_floor,
 )
 from dap3d_core.integrators.method import Integers
-from dap3d_core.integrators.radau_dense import find_slope, prepare_dense
-from dap3d_core.integrators.radau_newton import (
-    MOST,
-    SAME_STEP,
-    UNFOUND,
-    estimate_error,
-    factorise_both,
-    find_stages,
-    find_tangent,
-    predict,
-)
+from dap3d_core.integrators.radau_dense import prepare_dense
+from dap3d_core.integrators.radau_newton import MOST, SAME_STEP, predict
 from dap3d_core.integrators.radau_work import (
     ACCEPTED,
     ERROR_ACCEPTED,
@@ -100,6 +91,7 @@ BEST_RATE, RATE_EXPONENT = 0.15, 1.0 / 6.0
 def advance(
     work: RadauWork,
     functions: Sequence[Function],
+    parts: Sequence[Any],
     system: System,
     loops: Any,
     tangent: Tangent,
@@ -124,7 +116,7 @@ def advance(
             if integer[FRESH] == 0:
                 start(work, rhs, project, system, loops)
             else:
-                step(work, rhs, project, system, loops, tangent, matrix)
+                step(work, parts, project, system, loops, tangent, matrix)
             if integer[WATCHED] != 0 and integer[STEPS] > steps:
                 functions[3](real[T], work.state[Y], real[SWITCH:], system, loops)
 
@@ -156,7 +148,7 @@ def start(work: RadauWork, rhs: Function, project: Function, system: System, loo
 @compiled_inside
 def step(
     work: RadauWork,
-    rhs: Function,
+    parts: Sequence[Any],
     project: Function,
     system: System,
     loops: Any,
@@ -164,32 +156,37 @@ def step(
     matrix: Matrix,
 ) -> None:
     """Try one step: accept it, reject it, or stop the run."""
+    find_tangent, factorise_both, find_stages = parts[0], parts[1], parts[2]
+    estimate_error, find_slope = parts[3], parts[4]
     real, integer, times, state = work.real, work.integer, work.times, work.state
     own, adaptive = work.own, real[STEP] == 0.0
     t = real[T]
     t1 = end_of_step(real, integer, times)
     h = t1 - t
     predict(h, work)
-    if integer[TANGENT_NEEDED] != 0 and not find_tangent(
-        t, h, work, system, loops, tangent, matrix
-    ):
-        real[T_STOP], integer[STATUS] = t, NOT_FINITE
-        return
+    if integer[TANGENT_NEEDED] != 0:
+        found = find_tangent(t, h, work, system, loops, tangent, matrix)
+        if found != 0.0:
+            refuse(work, t1, h, found)
+            return
     shorter = 0.0
     if not abs(h - own[H_FACTORED]) <= SAME_STEP * h:
-        shorter = 0.0 if factorise_both(h, work, system, tangent, matrix) else UNFOUND
+        shorter = factorise_both(t, h, work, system, loops, tangent, matrix)
     if shorter == 0.0:
-        shorter = find_stages(t, h, work, system, loops, matrix)
+        shorter = find_stages(t, h, work, system, loops, tangent, matrix)
     if shorter != 0.0:
         refuse(work, t1, h, shorter)
         return
     for k in range(state.shape[1]):
         state[TRIAL, k] = state[Y, k] + work.Z[2, k]
-    again = integer[ACCEPTED] == 0 or integer[LAST_REJECTED] != 0
-    # the multipliers of the first stage go into the estimate; those of the last one are kept
-    error = estimate_error(t, h, work, system, loops, matrix, again) if adaptive else 0.0
+    error = 0.0
+    if adaptive:
+        error = estimate_error(t, h, work, system, loops, tangent, matrix)
     if error < 1.0:
         failure = land(work, t1, h, project, system, loops)
+        if failure == RUNNING:
+            find_slope(t, h, work, system, loops, tangent, matrix)
+            failure = finish(work, t1, h)
         if failure == RUNNING and adaptive and is_poor(real, integer, times, t1):
             integer[POOR] += 1
             reject(real, integer, times, t1, h * ELSEWHERE, STEP_FLOOR)
@@ -232,17 +229,20 @@ def safety(integer: Integers) -> float:
 def land(
     work: RadauWork, t1: float, h: float, project: Function, system: System, loops: Any
 ) -> int:
-    """Project the trial state and prepare dense output; why that failed, or RUNNING."""
+    """The work done, and the trial state projected; why that failed, or RUNNING."""
     real, integer, n = work.real, work.integer, work.state.shape[1]
     A = work.method.A
     for i in range(3):  # the work is a quadrature
         work.Z[i, n - 1] = h * (A[i, 0] * work.F[0, n - 1] + A[i, 1] * work.F[1, n - 1]
                                 + A[i, 2] * work.F[2, n - 1])  # fmt: skip
     work.state[TRIAL, n - 1] = work.state[Y, n - 1] + work.Z[2, n - 1]
-    failure = project_state(real, integer, t1, work.state[TRIAL], project, system, loops)
-    if failure != RUNNING:
-        return failure
-    find_slope(t1, h, work, system, loops)
+    return project_state(real, integer, t1, work.state[TRIAL], project, system, loops)
+
+
+@compiled_inside
+def finish(work: RadauWork, t1: float, h: float) -> int:
+    """Prepare dense output where a reporting time lies in the step; RUNNING, or NOT_FINITE."""
+    integer = work.integer
     if not all_finite(work.state[TRIAL_SLOPE]):
         return NOT_FINITE
     if integer[DENSE] != 0 and work.times[integer[NEXT]] < t1:

@@ -15,6 +15,8 @@ from typing import Any
 from dap3d_core.assembly.evaluate import call_loops, place_bodies, rates, zero
 from dap3d_core.assembly.system import VALUE, Floats, System
 from dap3d_core.formulations.constraints import PART, correct, factorise, linearise
+from dap3d_core.formulations.stage import Matrix
+from dap3d_core.formulations.tangent import Tangent
 from dap3d_core.integrators.radau_work import (
     ACCEPTED,
     H_ACCEPTED,
@@ -25,13 +27,17 @@ from dap3d_core.integrators.radau_work import (
     RadauWork,
 )
 from dap3d_core.integrators.work import H_DENSE, T_DENSE, TRIAL, T, Y
-from dap3d_core.kernels.cache import compiled_inside
+from dap3d_core.kernels.borrow import borrow
+from dap3d_core.kernels.cache import compiled, compiled_inside
 from dap3d_core.linear.blocks import add_product
 
 
-@compiled_inside
-def find_slope(t1: float, h: float, work: RadauWork, system: System, loops: Any) -> None:
-    """dy/dt at the trial state, into TRIAL_SLOPE."""
+@compiled
+def find_slope(
+    t: float, h: float, work: RadauWork, system: System, loops: Any, tangent: Tangent, matrix: Matrix
+) -> float:
+    """dy/dt at the trial state, at t + h, into TRIAL_SLOPE."""
+    t1, system = t + h, borrow(system)
     y, out, inverse, Z = work.state[TRIAL], work.state[TRIAL_SLOPE], work.method.inverse, work.Z
     force, kinds, metric, C = system.force, system.kinds, system.metric, system.C
     n = metric.shape[0] - 1
@@ -52,6 +58,7 @@ def find_slope(t1: float, h: float, work: RadauWork, system: System, loops: Any)
     for k in range(7 * n, 13 * n):
         out[k] += (inverse[2, 0] * Z[0, k] + inverse[2, 1] * Z[1, k] + inverse[2, 2] * Z[2, k]) / h
     out[13 * n] = work.F[2, 13 * n]
+    return 0.0
 
 
 @compiled_inside

@@ -45,13 +45,24 @@ from dap3d_core.integrators.radau_work import (
     THETA,
     RadauWork,
 )
-from dap3d_core.integrators.work import ATOL, ERROR_SIZE, RHS, RTOL, SCRATCH, TRIAL, Y
-from dap3d_core.kernels.cache import compiled_inside
+from dap3d_core.integrators.work import (
+    ATOL,
+    ERROR_SIZE,
+    LAST_REJECTED,
+    RHS,
+    RTOL,
+    SCRATCH,
+    STEP,
+    TRIAL,
+    Y,
+)
+from dap3d_core.kernels.borrow import borrow
+from dap3d_core.kernels.cache import compiled, compiled_inside
 from dap3d_core.linear.lu import factor_lu, solve_lu
 
 ROUNDING = 2.220446049250313e-16
-#: Iterations at most.
-MOST = 7
+#: Iterations at most; more where the step is fixed, for a shorter one is no choice there.
+MOST, MOST_FIXED = 7, 40
 #: Factors that belong to a step this near the present one are used for it.
 SAME_STEP = 1e-3
 #: A step whose stages were not found is halved.
@@ -61,16 +72,17 @@ LARGEST = 1.7976931348623157e308
 ROUNDINGS, LOOSEST = 10.0, 0.1
 
 
-@compiled_inside
+@compiled
 def find_tangent(
     t: float, h: float, work: RadauWork, system: System, loops: Any, tangent: Tangent, matrix: Matrix
-) -> bool:
-    """The tangent of a step h at t, at its end as predicted; whether it is finite.
+) -> float:
+    """The tangent of a step h at t, at its end as predicted; 0, or NaN where it is not finite.
 
     The directions of stiff elements change during a step, and of its stages the last one counts
     most: on the governor of A05 the iteration converges 20 times faster than with the tangent at
     the start of the step, three times faster than with that of its middle.
     """
+    system = borrow(system)
     kinds, force, argument = system.kinds, system.force, work.state[SCRATCH]
     for k in range(argument.shape[0]):
         argument[k] = work.state[Y, k] + work.Z[2, k]
@@ -85,22 +97,24 @@ def find_tangent(
     work.integer[JACOBIANS] += 1
     work.integer[TANGENT_NEEDED], work.integer[TANGENT_HERE] = 0, 1
     work.own[H_FACTORED] = 0.0
-    return differentiate(at, system.x, system, loops, tangent)
+    return 0.0 if differentiate(at, system.x, system, loops, tangent) else math.nan
 
 
-@compiled_inside
+@compiled
 def factorise_both(
-    h: float, work: RadauWork, system: System, tangent: Tangent, matrix: Matrix
-) -> bool:
-    """Factors of the real and the complex system of a step h; False where one is singular."""
+    t: float, h: float, work: RadauWork, system: System, loops: Any, tangent: Tangent, matrix: Matrix
+) -> float:
+    """Factors of the real and the complex system of a step h; 0, or UNFOUND if one is singular."""
     poles = work.method.poles
     work.integer[FACTORISATIONS] += 1
     work.own[H_FACTORED] = h
     fill_matrix(poles[0] / h, work.K, system.blocks, matrix, tangent)
     fill_matrix(complex(poles[1], poles[2]) / h, work.Kc, system.blocks, matrix, tangent)
-    return factor_lu(matrix.nodes, matrix.columns, matrix.updates, work.K, work.pivots) and (
-        factor_lu(matrix.nodes, matrix.columns, matrix.updates, work.Kc, work.pivotsc)
-    )
+    nodes, columns, updates = matrix.nodes, matrix.columns, matrix.updates
+    regular = factor_lu(nodes, columns, updates, work.K, work.pivots)
+    if regular and factor_lu(nodes, columns, updates, work.Kc, work.pivotsc):
+        return 0.0
+    return UNFOUND
 
 
 @compiled_inside
@@ -255,9 +269,9 @@ def newton_limit(work: RadauWork) -> float:
     return min(limit, LOOSEST)
 
 
-@compiled_inside
+@compiled
 def find_stages(
-    t: float, h: float, work: RadauWork, system: System, loops: Any, matrix: Matrix
+    t: float, h: float, work: RadauWork, system: System, loops: Any, tangent: Tangent, matrix: Matrix
 ) -> float:
     """Newton's iteration for the stages of a step h.
 
@@ -265,11 +279,13 @@ def find_stages(
         0 where they are found; else the factor on the step that is to be tried; NaN where a number
         is not finite.
     """
-    real, own, integer = work.real, work.own, work.integer
+    system = borrow(system)
+    own, integer = work.own, work.integer
     limit = newton_limit(work)
     own[FACCON] = max(own[FACCON], ROUNDING) ** 0.8
     before = ratio_before = 1.0
-    for done in range(1, MOST + 1):
+    most = MOST if work.real[STEP] == 0.0 else MOST_FIXED
+    for done in range(1, most + 1):
         evaluate_stages(t, h, work, system, loops, matrix)
         solve_stages(h, work, system, matrix)
         change = change_stages(h, work, system)
@@ -282,27 +298,29 @@ def find_stages(
             own[THETA] = ratio if done == 2 else math.sqrt(ratio * ratio_before)
             ratio_before = ratio
             if own[THETA] >= 0.99:
-                return UNFOUND
+                return 0.0 if change <= limit else UNFOUND
             own[FACCON] = own[THETA] / (1.0 - own[THETA])
-            left = own[FACCON] * change * own[THETA] ** (MOST - 1 - done) / limit
-            if done < MOST and left >= 1.0:
+            left = own[FACCON] * change * own[THETA] ** (most - 1 - done) / limit
+            if done < most and left >= 1.0:
                 excess = max(1e-4, min(20.0, left))
-                return 0.8 * excess ** (-1.0 / (3.0 + MOST - done))
+                return 0.8 * excess ** (-1.0 / (3.0 + most - done))
         before = max(change, ROUNDING)
         if own[FACCON] * change <= limit:
             return 0.0
     return UNFOUND
 
 
-@compiled_inside
+@compiled
 def estimate_error(
-    t: float, h: float, work: RadauWork, system: System, loops: Any, matrix: Matrix, again: bool
+    t: float, h: float, work: RadauWork, system: System, loops: Any, tangent: Tangent, matrix: Matrix
 ) -> float:
     """Norm of the error estimate (HW IV.8, (8.19), (8.20)); 1 is just good enough.
 
     The multipliers steer no step: what a run reports of them comes from the reported state. Here a
     change of lambda changes none of the other components.
     """
+    system = borrow(system)
+    again = work.integer[ACCEPTED] == 0 or work.integer[LAST_REJECTED] != 0
     real, y, argument, e = work.real, work.state[Y], work.state[SCRATCH], work.method.e
     error = 0.0
     for attempt in range(2 if again else 1):

@@ -7,13 +7,14 @@ two cached functions of known signature. Where kernels run as plain Python the l
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from numba import float64, int64, types
+from numba import complex128, float64, int64, types
 from numba.typed import List
 
 from dap3d_core.kernels.cache import compiled, jit_is_on
 
 VECTOR, MATRIX = types.Array(float64, 1, "C"), types.Array(float64, 2, "C")
 INTEGERS, INTEGER_MATRIX = types.Array(int64, 1, "C"), types.Array(int64, 2, "C")
+TENSOR, COMPLEX_VECTOR = types.Array(float64, 3, "C"), types.Array(complex128, 1, "C")
 
 #: Signature of every group loop (loops.py).
 LOOP = types.void(
@@ -31,6 +32,11 @@ def named_tuple_type(class_: type, members: Sequence[Any]) -> Any:
 def step_signature(system: Any) -> Any:
     """Signature of a formulation's functions: (t, y, out, system, loops)."""
     return types.void(float64, VECTOR, VECTOR, system, LOOP_LIST)
+
+
+def number_signature(*arguments: Any) -> Any:
+    """Signature of a function of two numbers and these arguments that returns a number."""
+    return types.float64(float64, float64, *arguments)
 
 
 def function_type(signature: Any) -> Any:
@@ -75,12 +81,14 @@ def loop_list(loops: Sequence[Callable]) -> Any:
 
 
 __all__ = [
+    "COMPLEX_VECTOR",
     "INTEGERS",
     "INTEGER_MATRIX",
     "LOOP",
     "LOOP_LIST",
     "LOOP_TYPE",
     "MATRIX",
+    "TENSOR",
     "VECTOR",
     "List",
     "fill",
@@ -88,5 +96,6 @@ __all__ = [
     "list_type",
     "loop_list",
     "named_tuple_type",
+    "number_signature",
     "step_signature",
 ]

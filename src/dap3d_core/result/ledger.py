@@ -93,14 +93,17 @@ def _energy_scale(subject: Subject, arrays: Arrays, record: Record) -> float:
     """What an imbalance of energy is compared with, J: the largest kinetic energy or work.
 
     Below a speed of atol / rtol error control is absolute: an error atol of the speed v is one of
-    m v atol in the energy, to which m v (atol / rtol) is the scale. A system that hangs at rest
-    has rounding errors of its potential for energy; they are given the share that ROUNDING is of
-    the limit.
+    m v atol in the energy, to which m v (atol / rtol) is the scale, and without a speed it is one
+    of m atol^2. A system that hangs at rest has rounding errors of its potential for energy; they
+    are given the share that ROUNDING is of the limit.
     """
     floor, limit = _floor(record), _relative_limit(record)
     speed, spin = _momenta(subject, arrays)
     kinetic = np.max(kinetic_energy(subject, arrays.u) + floor * (speed + spin))
-    rounding = 0.0 if limit is None else ROUNDING / limit * _largest(arrays.potential_energy)
+    rounding = 0.0
+    if limit is not None and record.tolerances is not None:
+        at_rest = record.tolerances[1] ** 2 * (subject.mass.sum() + _inertia(subject))
+        rounding = (ROUNDING * _largest(arrays.potential_energy) + at_rest) / limit
     work = _largest(arrays.work - arrays.work[0])
     return max(float(kinetic), work, rounding, float(np.finfo(float).tiny))
 
@@ -110,6 +113,11 @@ def _momenta(subject: Subject, arrays: Arrays) -> tuple[Floats, Floats]:
     _, _, rd, w = split(arrays.u, subject.body_count)
     inertia = np.linalg.norm(subject.Jp, ord=2, axis=(1, 2))
     return np.linalg.norm(rd, axis=2) @ subject.mass, np.linalg.norm(w, axis=2) @ inertia
+
+
+def _inertia(subject: Subject) -> float:
+    """Sum of the bodies' largest principal inertias, kg m^2."""
+    return float(np.linalg.norm(subject.Jp, ord=2, axis=(1, 2)).sum())
 
 
 def _energy(subject: Subject, arrays: Arrays, record: Record) -> Entry:
@@ -152,7 +160,7 @@ def _momentum(subject: Subject, arrays: Arrays, record: Record) -> Entry:
     r, _, rd, _ = split(arrays.u, subject.body_count)
     far, fast = np.linalg.norm(r, axis=2), np.linalg.norm(rd, axis=2)
     floor = _floor(record)  # of coordinates and velocities alike, to first order
-    inertia = float(np.linalg.norm(subject.Jp, ord=2, axis=(1, 2)).sum())
+    inertia = _inertia(subject)
     speed, spin = _momenta(subject, arrays)
     orbit = (far * fast + floor * (far + fast)) @ subject.mass
     scales = (
@@ -180,6 +188,8 @@ def _constraints(subject: Subject, arrays: Arrays, record: Record) -> dict[str, 
     speeds = arrays.u[:, 7 * subject.body_count :]
     sizes = [1.0 + _largest(a) for a in (r, speeds, arrays.v_dot)]
     limits = [*(_state_limit(record, size) for size in sizes[:2]), SOLVED * sizes[2]]
+    if record.method == "penalty":
+        limits[2] = None  # its springs give way, by lambda / alpha
     found = {}
     for name, residual, limit in zip(
         ("position", "velocity", "acceleration"), ("C", "D v - nu", "D v_dot - gamma"), limits,

@@ -166,6 +166,7 @@ class _Run:
         self.force = False
         self.writer: ResultWriter | None = None
         self.started = self.compile_time = 0.0
+        self.rank = 0
         self.first_step: float | None = None
 
     def go(
@@ -223,6 +224,7 @@ class _Run:
                 f"the initial conditions violate the constraints (position {position:.2g}, "
                 f"velocity {velocity:.2g}) and were not corrected; switch correct on"
             )
+        self.rank = start.redundancy.rank.rank
         if start.redundancy.rank.redundant:
             self._judge_redundancy(start.redundancy, start.u)
         return start.u
@@ -370,6 +372,7 @@ class _Run:
                 "step": self.settings.step,
                 "project": bool(self.settings.project),
                 "correct": bool(self.settings.correct),
+                "rank": self.rank,
                 "conservative": self.compiled.is_conservative,
                 "correct_metric": str(self.settings.correct_metric),
             },
