@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from support.process import REPOSITORY, environment
 
 
@@ -47,6 +48,7 @@ def test_the_readme(tmp_path):
     assert (tmp_path / "cone.nc").exists()
 
 
+@pytest.mark.slow
 def test_the_page_on_post_processing(tmp_path):
     """Its commands, in their order, and its scripts, which hold assertions of their own."""
     text = (REPOSITORY / "docs" / "post-processing.md").read_text()
@@ -66,6 +68,7 @@ def test_the_page_on_post_processing(tmp_path):
         assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_the_page_on_methods(tmp_path):
     """Its command and its scripts, which hold assertions of their own."""
     text = (REPOSITORY / "docs" / "methods.md").read_text()

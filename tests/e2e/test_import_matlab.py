@@ -129,6 +129,7 @@ def test_mistakes_are_told_at_once_and_nothing_is_written(dap3d, refuse):
     refuse("import-matlab")
 
 
+@pytest.mark.slow
 def test_the_page_on_importing(dap3d):
     """Its folder, its commands and its script, in this order, give what the page says."""
     text = (REPOSITORY / "docs" / "import-matlab.md").read_text()

@@ -16,6 +16,7 @@ import dap3d_core as dap
 QUICK = ("--quick", "--t-end", "0.2", "--dt", "0.05")
 
 
+@pytest.mark.slow
 def test_a_report_with_table_files_and_a_setting_that_can_be_run(dap3d):
     done = dap3d("report", "pen1", *QUICK, "--target-error", "1e-6", "--plot", "a.svg",
                  "--csv", "a.csv", "-o", "a.json")  # fmt: skip
@@ -51,6 +52,7 @@ def test_json_is_one_object_with_the_runs_and_nothing_else(dap3d):
         assert ("step" in run) is (run["integrator"] == "rk4")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [60, 80])
 def test_tables_fit_the_width(dap3d, width):
     done = dap3d("report", "pen1", *QUICK, "--method", "standard", COLUMNS=width)
@@ -102,6 +104,7 @@ def test_signals_keep_what_was_measured(dap3d, number, code):
     assert len((dap3d.folder / "a.csv").read_text().splitlines()) > 2
 
 
+@pytest.mark.slow
 def test_the_page_on_reports(dap3d):
     """Its commands, in their order, and its scripts, which hold assertions of their own."""
     text = (REPOSITORY / "docs" / "report.md").read_text()

@@ -65,6 +65,7 @@ def facts_of(compiled: "CompiledModel", metric: str | None = None) -> dict[str, 
     """
     from dap3d_core.cli.start import start_facts
     from dap3d_core.simulation import AssemblyError
+    from dap3d_core.simulation.explanation import types_of
     from dap3d_core.simulation.initial import violation
 
     model, settings = compiled.model, compiled.scene.simulation
@@ -95,9 +96,9 @@ def facts_of(compiled: "CompiledModel", metric: str | None = None) -> dict[str, 
         "initial": initial,
         "method": compiled.method,
         "reason": compiled.reason,
-        "joint_types": _types(model.joints),
-        "force_types": _types(model.forces),
-        "function_types": _types(model.functions),
+        "joint_types": types_of(compiled.checked.joints),
+        "force_types": types_of(compiled.checked.forces),
+        "function_types": types_of(compiled.checked.functions),
         "notes": list(compiled.notes),
         "mistakes": mistakes,
     }
@@ -134,11 +135,6 @@ def _redundancy_facts(
         "about": about,
         "about_reactions": redundancy.describe_reactions(),
     }
-
-
-def _types(groups: Any) -> dict[str, int]:
-    """Keyword -> how many elements of this type there are."""
-    return {group.keyword: len(set(group.members.tolist())) for group in groups}
 
 
 def _show(console: Any, compiled: "CompiledModel", found: dict[str, Any]) -> None:

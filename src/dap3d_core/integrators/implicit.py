@@ -70,14 +70,15 @@ class RadauIntegration(Integration):
     Parameters
     ----------
     machine
-        The model; its formulation is unconstrained, standard or lsq.
+        The model; its formulation is unconstrained, standard or lsq (whose rows may depend on each
+        other), not penalty.
     y0, times, rtol, atol, step, first_step, project_on, error_size, report_size, buffer_rows
         As for ``Integration``.
 
     Raises
     ------
     ValueError
-        For a formulation, times, sizes, tolerances or steps that make no sense.
+        For times, sizes, tolerances or steps that make no sense.
     """
 
     name = "radau"
@@ -98,11 +99,6 @@ class RadauIntegration(Integration):
         report_size: int = 0,
         buffer_rows: int = 256,
     ) -> None:
-        if machine.method == "penalty":
-            raise ValueError(
-                "radau holds the constraints themselves, and penalty replaces them by springs: "
-                "take method lsq or standard, or an explicit integrator"
-            )
         y = np.array(y0, dtype=np.float64)
         instants = np.array(times, dtype=np.float64)
         _check_state_and_times(y, instants)
@@ -125,7 +121,7 @@ class RadauIntegration(Integration):
         own[at.PART] = REGULAR if machine.method == "lsq" else 0.0
         integer[work.ORDER], integer[work.ERROR_SIZE] = ORDER, error_size
         integer[work.DENSE], integer[work.PROJECT_ON] = 1, project_on
-        integer[work.WATCHED] = len(machine.functions) > 3
+        integer[work.WATCHED] = machine.watched
 
     def _advance(self, budget: int) -> None:
         machine = self.machine

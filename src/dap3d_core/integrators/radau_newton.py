@@ -316,19 +316,20 @@ def estimate_error(
 ) -> float:
     """Norm of the error estimate (HW IV.8, (8.19), (8.20)); 1 is just good enough.
 
-    The multipliers steer no step: what a run reports of them comes from the reported state. Here a
-    change of lambda changes none of the other components.
+    The multipliers steer no step: what a run reports of them comes from the reported state. They
+    are those at the end of the last step: an error of theirs acts along D^T, which the matrix takes
+    away only as far as its own D is that of the state.
     """
     system = borrow(system)
     again = work.integer[ACCEPTED] == 0 or work.integer[LAST_REJECTED] != 0
     real, y, argument, e = work.real, work.state[Y], work.state[SCRATCH], work.method.e
-    error = 0.0
+    multipliers, error = work.last_multipliers[2], 0.0
+    zero(multipliers[0])
     for attempt in range(2 if again else 1):
         for k in range(y.shape[0]):
             argument[k] = y[k] + (work.R[0, k] if attempt == 1 else 0.0)
-        zero(work.multipliers[0, 0])
-        evaluate_stage(t, argument, work.multipliers[0], matrix.held, work.R[0], work.G[0],
-                       system, loops)  # fmt: skip
+        evaluate_stage(t, argument, multipliers, matrix.held, work.R[0], work.G[0], system,
+                       loops)  # fmt: skip
         keep_frames(system.body, work.frames[0])
         work.integer[RHS] += 1
         for k in range(y.shape[0]):

@@ -1,14 +1,15 @@
 """What was modelled, what was left out and why."""
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.machine import Machine
-from dap3d_core.model import Group, Model
-from dap3d_core.scene import Checked, Scene
+from dap3d_core.model import Model
+from dap3d_core.scene import Checked, Instance, Scene
 from dap3d_core.simulation.elsewhere import redundancy_elsewhere
 from dap3d_core.simulation.redundancy import Redundancy
 
@@ -26,12 +27,11 @@ def explain(
 ) -> str:
     """A text for people, one fact a line; u (13 n,) is where a run would start."""
     n, ordering = model.body_count, machine.plan.ordering
-    elements = {"joints": model.joints, "forces": model.forces, "functions": model.functions}
     lines = [f"scene {checked.scene.name or '(no name)'}"]
     sizes = f"{13 * n} states, {6 * n} accelerations"
     lines.append(f"  bodies     {n}: {_some(model.body_names)}; {sizes}")
-    for title, groups in elements.items():
-        lines.append(f"  {title:10s} {_counts(groups)}")
+    kinds = {"joints": checked.joints, "forces": checked.forces, "functions": checked.functions}
+    lines += [f"  {title:10s} {_counts(instances)}" for title, instances in kinds.items()]
     if model.row_count:
         lines.append(f"  rows       {redundancy.describe()}")
         lines += [f"  reactions  {words}" for words in redundancy.describe_reactions()]
@@ -58,8 +58,13 @@ def _some(names: tuple[str, ...], most: int = 8) -> str:
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
-def _counts(groups: tuple[Group, ...]) -> str:
-    return ", ".join(f"{len(set(g.members.tolist()))} {g.keyword}" for g in groups) or "none"
+def types_of(instances: Sequence[Instance]) -> dict[str, int]:
+    """Keyword -> how many elements of this type there are, in the order of the file."""
+    return dict(Counter(instance.examined.type.keyword for instance in instances))
+
+
+def _counts(instances: Sequence[Instance]) -> str:
+    return ", ".join(f"{count} {word}" for word, count in types_of(instances).items()) or "none"
 
 
 def _left_out(checked: Checked, model: Model) -> list[str]:

@@ -18,6 +18,7 @@ from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, Simulation, ch
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.elsewhere import redundancy_elsewhere
 from dap3d_core.simulation.errors import RedundantError, SimulationError
+from dap3d_core.simulation.implicit import implicit_integration
 from dap3d_core.simulation.initial import correction_notes, violation
 from dap3d_core.simulation.offender import find_offender, find_switch
 from dap3d_core.simulation.redundancy import CONSISTENT, Redundancy
@@ -67,7 +68,7 @@ def simulate(
         dt: reporting step, s; t_end / 100 when nobody gives one. When it does not divide t_end,
             t_end is reported too.
         method: "auto", "unconstrained", "standard", "penalty" or "lsq".
-        integrator: "dopri5", "dop853" or "rk4" (which needs ``step``).
+        integrator: "dopri5", "dop853", "radau" (implicit) or "rk4" (which needs ``step``).
         rtol, atol: tolerances of the step's error.
         step: fixed step, s, without error control.
         correct: bring the initial conditions onto the constraints first.
@@ -250,7 +251,19 @@ class _Run:
         machine.start(0.0, u0)
         y0 = machine.integrated(u0)
         width = 1 + len(y0) + machine.report_size
+        options: dict[str, Any] = dict(
+            rtol=settings.rtol,
+            atol=settings.atol,
+            step=settings.step,
+            first_step=self.first_step,
+            project_on=settings.project,
+            error_size=len(y0) - 1,  # the work does not steer the step
+            report_size=machine.report_size,
+            buffer_rows=max(1, min(len(self.times), BUFFER_NUMBERS // width)),
+        )
         try:
+            if settings.integrator == "radau":
+                return implicit_integration(machine, y0, self.times, options)
             return Integration(
                 METHODS[settings.integrator],
                 machine.functions,
@@ -258,16 +271,9 @@ class _Run:
                 machine.loops,
                 y0,
                 self.times,
-                rtol=settings.rtol,
-                atol=settings.atol,
-                step=settings.step,
-                first_step=self.first_step,
-                project_on=settings.project,
-                error_size=len(y0) - 1,  # the work does not steer the step
-                report_size=machine.report_size,
                 length_count=machine.length_count,
                 watched=machine.watched,
-                buffer_rows=max(1, min(len(self.times), BUFFER_NUMBERS // width)),
+                **options,
             )
         except ValueError as error:
             raise SceneError([Mistake("step", settings.step, str(error))]) from error
