@@ -210,6 +210,8 @@ def test_drivers_that_part_later_contradict_each_other_in_acceleration():
     (contradiction,) = compiled.redundancy(start.u).contradictions
     assert (contradiction.level, contradiction.joints) == ("acceleration", ("slow", "fast"))
     assert contradiction.size == pytest.approx(3 / np.sqrt(2), rel=1e-12)
+    with pytest.raises(dap.SimulationError, match="of the accelerations disagrees"):
+        dap.simulate(compiled, t_end=0.1)
 
 
 def test_joints_that_cannot_be_closed_are_named_and_the_others_are_not():

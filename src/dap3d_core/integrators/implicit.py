@@ -1,5 +1,6 @@
 """One implicit integration, seen from Python; it has the face of ``Integration``."""
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -108,7 +109,6 @@ class RadauIntegration(Integration):
             raise ValueError(f"error_size is {error_size}, but y has {y.size} components")
         if buffer_rows < 1:
             raise ValueError(f"buffer_rows is {buffer_rows}; at least one row must fit")
-        self._parts = radau_parts()
         tangent = make_tangent(machine)
         matrix, lu = make_matrix(machine, tangent)
         self.machine, self.lu_plan, self.tangent, self.matrix = machine, lu, tangent, matrix
@@ -122,6 +122,10 @@ class RadauIntegration(Integration):
         integer[work.ORDER], integer[work.ERROR_SIZE] = ORDER, error_size
         integer[work.DENSE], integer[work.PROJECT_ON] = 1, project_on
         integer[work.WATCHED] = machine.watched
+
+    @cached_property
+    def _parts(self) -> Any:
+        return radau_parts()
 
     def _advance(self, budget: int) -> None:
         machine = self.machine

@@ -82,9 +82,11 @@ GROWTH, SHRINKAGE = 8.0, 0.2
 #: The tangent is kept where the iteration converged faster than this; the step, and with it the
 #: factors, where the next one would be up to this factor longer.
 GOOD_TANGENT, SAME_FACTORS = 1e-3, 1.2
+#: An iteration that converges slower than this is not gone on with.
+HOPELESS = 0.9
 #: Where the step is limited by the iteration its rate is about proportional to h^3. At this rate
 #: iterations for a second of motion are fewest.
-BEST_RATE, RATE_EXPONENT = 0.15, 1.0 / 6.0
+BEST_RATE, RATE_EXPONENT = 0.3, 1.0 / 6.0
 
 
 @compiled
@@ -156,24 +158,18 @@ def step(
     matrix: Matrix,
 ) -> None:
     """Try one step: accept it, reject it, or stop the run."""
-    find_tangent, factorise_both, find_stages = parts[0], parts[1], parts[2]
     estimate_error, find_slope = parts[3], parts[4]
     real, integer, times, state = work.real, work.integer, work.times, work.state
-    own, adaptive = work.own, real[STEP] == 0.0
+    adaptive = real[STEP] == 0.0
     t = real[T]
     t1 = end_of_step(real, integer, times)
     h = t1 - t
     predict(h, work)
-    if integer[TANGENT_NEEDED] != 0:
-        found = find_tangent(t, h, work, system, loops, tangent, matrix)
-        if found != 0.0:
-            refuse(work, t1, h, found)
-            return
-    shorter = 0.0
-    if not abs(h - own[H_FACTORED]) <= SAME_STEP * h:
-        shorter = factorise_both(t, h, work, system, loops, tangent, matrix)
-    if shorter == 0.0:
-        shorter = find_stages(t, h, work, system, loops, tangent, matrix)
+    shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
+    if 0.0 < shorter and work.own[THETA] < HOPELESS:
+        # from where the iteration came to, the tangent at the end of the step is a better one
+        integer[TANGENT_NEEDED] = 1
+        shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
     if shorter != 0.0:
         refuse(work, t1, h, shorter)
         return
@@ -204,6 +200,29 @@ def step(
             integer[TANGENT_NEEDED] = 1
     else:
         reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)
+
+
+@compiled_inside
+def iterate(
+    t: float,
+    h: float,
+    work: RadauWork,
+    parts: Sequence[Any],
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
+) -> float:
+    """Find the stages from where they stand, with a new tangent if asked for; as find_stages."""
+    find_tangent, factorise_both, find_stages = parts[0], parts[1], parts[2]
+    wrong = 0.0
+    if work.integer[TANGENT_NEEDED] != 0:
+        wrong = find_tangent(t, h, work, system, loops, tangent, matrix)
+    if wrong == 0.0 and not abs(h - work.own[H_FACTORED]) <= SAME_STEP * h:
+        wrong = factorise_both(t, h, work, system, loops, tangent, matrix)
+    if wrong == 0.0:
+        wrong = find_stages(t, h, work, system, loops, tangent, matrix)
+    return wrong
 
 
 @compiled_inside

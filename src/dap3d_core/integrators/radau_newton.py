@@ -62,7 +62,9 @@ from dap3d_core.linear.lu import factor_lu, solve_lu
 
 ROUNDING = 2.220446049250313e-16
 #: Iterations at most; more where the step is fixed, for a shorter one is no choice there.
-MOST, MOST_FIXED = 7, 40
+MOST, MOST_FIXED = 10, 40
+#: An iteration that converges slower than this does not; with a fixed step, from this one on.
+SLOWEST, PATIENCE = 0.99, 5
 #: Factors that belong to a step this near the present one are used for it.
 SAME_STEP = 1e-3
 #: A step whose stages were not found is halved.
@@ -284,7 +286,8 @@ def find_stages(
     limit = newton_limit(work)
     own[FACCON] = max(own[FACCON], ROUNDING) ** 0.8
     before = ratio_before = 1.0
-    most = MOST if work.real[STEP] == 0.0 else MOST_FIXED
+    fixed = work.real[STEP] != 0.0
+    most = MOST_FIXED if fixed else MOST
     for done in range(1, most + 1):
         evaluate_stages(t, h, work, system, loops, matrix)
         solve_stages(h, work, system, matrix)
@@ -297,11 +300,15 @@ def find_stages(
             ratio = change / before
             own[THETA] = ratio if done == 2 else math.sqrt(ratio * ratio_before)
             ratio_before = ratio
-            if own[THETA] >= 0.99:
-                return 0.0 if change <= limit else UNFOUND
+            if own[THETA] >= SLOWEST:
+                if change <= limit:
+                    return 0.0
+                if done > PATIENCE or not fixed:
+                    return UNFOUND
+                own[THETA] = SLOWEST
             own[FACCON] = own[THETA] / (1.0 - own[THETA])
             left = own[FACCON] * change * own[THETA] ** (most - 1 - done) / limit
-            if done < most and left >= 1.0:
+            if done < most and left >= 1.0 and not fixed:
                 excess = max(1e-4, min(20.0, left))
                 return 0.8 * excess ** (-1.0 / (3.0 + most - done))
         before = max(change, ROUNDING)

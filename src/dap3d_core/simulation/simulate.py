@@ -21,7 +21,7 @@ from dap3d_core.simulation.errors import RedundantError, SimulationError
 from dap3d_core.simulation.implicit import implicit_integration
 from dap3d_core.simulation.initial import correction_notes, violation
 from dap3d_core.simulation.offender import find_offender, find_switch
-from dap3d_core.simulation.redundancy import CONSISTENT, Redundancy
+from dap3d_core.simulation.redundancy import Redundancy
 from dap3d_core.simulation.second_run import Again, add_error
 
 Floats = NDArray[np.float64]
@@ -238,7 +238,7 @@ class _Run:
             raise RedundantError(
                 f"{words}; {elsewhere}. The standard method needs independent rows"
             )
-        if redundancy.contradiction > CONSISTENT:
+        if redundancy.contradictions:
             raise RedundantError(f"{words}. No motion satisfies them all")
         least = " (reported are those of least |lambda|)" if self.compiled.method == "lsq" else ""
         self.notes.append(

@@ -1,0 +1,263 @@
+"""The implicit integrator's parts: elimination program, tangent, coefficients, chunks, refusals."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from support import mechanisms, problems
+from support.graphs import chain, star
+
+import dap3d_core as dap
+from dap3d_core.formulations.stage import evaluate_stage, keep_frames
+from dap3d_core.integrators import Status
+from dap3d_core.integrators.implicit import RadauIntegration, estimate_tolerances
+from dap3d_core.integrators.radau_method import radau_method
+from dap3d_core.integrators.radau_newton import factorise_both, find_tangent, solve_first
+from dap3d_core.kernels.cache import compiled_in
+from dap3d_core.linear.lu import factor_lu, solve_lu
+from dap3d_core.linear.lu_plan import make_lu_plan
+from dap3d_core.linear.ordering import order_nodes
+
+# What compiled code alone may call, with a door to Python.
+
+
+def door(function):
+    return compiled_in(None, "", function)
+
+
+@door
+def evaluate(t, y, multipliers, held, out, rows, system, loops):
+    evaluate_stage(t, y, multipliers, held, out, rows, system, loops)
+
+
+@door
+def solve_at(t, h, y, multipliers, work, system, loops, matrix):
+    """The change that belongs to the residual in R[0], G[0], in the axes of y."""
+    evaluate_stage(t, y, multipliers, matrix.held, work.R[1], work.G[1], system, loops)
+    keep_frames(system.body, work.frames[0])
+    solve_first(h, work, system, matrix)
+
+
+@door
+def factor_and_solve(nodes, columns, updates, K, pivots, x):
+    found = factor_lu(nodes, columns, updates, K, pivots)
+    solve_lu(nodes, columns, K, pivots, x)
+    return found
+
+
+# ---------------------------------------------------------------------------- elimination
+
+
+def lu_of(body_count, slots, rows, coupled=()):
+    nodes = order_nodes(body_count, slots, rows).nodes
+    return nodes, make_lu_plan(body_count, nodes, [*slots, *coupled])
+
+
+LOOP = (4, [(1, 0), (2, 1), (3, 2), (4, 3), (4, 0)], [5, 5, 3, 3, 2])
+
+
+@pytest.mark.parametrize("number", [float, complex])
+def test_block_lu_solves_what_numpy_solves(number):
+    """A loop with springs across it; well conditioned, so that 1e-10 is far above rounding."""
+    nodes, lu = lu_of(*LOOP, coupled=[(1, 3), (2, 4)])
+    rng = np.random.default_rng(3)
+    count = len(nodes)
+    first = np.concatenate([lu.joint_first, lu.body_first[1:]])
+    size = [2 * node.rows for node in nodes] + [12] * 4
+    dense = np.zeros((lu.size, lu.size), dtype=number)
+    K = np.zeros(lu.matrix_size, dtype=number)
+    for (a, b), place in lu._place.items():
+        block = rng.normal(size=(size[a], size[b])) + (4.0 * np.eye(size[a]) if a == b else 0.0)
+        if number is complex:
+            block = block + 1j * rng.normal(size=block.shape)
+        dense[first[a] : first[a] + size[a], first[b] : first[b] + size[b]] = block
+        K[place : place + block.size] = block.ravel()
+    assert count + 4 == len(first)
+    x = rng.normal(size=lu.size).astype(number)
+    expected = np.linalg.solve(dense, x)
+    pivots = np.zeros(lu.size, dtype=np.int64)
+    assert factor_and_solve(lu.nodes, lu.columns, lu.updates, K, pivots, x)
+    assert np.max(np.abs(x - expected)) < 1e-10 * np.max(np.abs(expected)) * np.linalg.cond(dense)
+
+
+@pytest.mark.parametrize("graph", [chain, star])
+def test_trees_have_no_fill_and_linear_size(graph):
+    """Ten times the bodies: ten times the numbers (but for the ends), and no block is added."""
+    plans = []
+    for n in (20, 200):
+        bodies, joints = graph(n)
+        plans.append(lu_of(bodies, [slots for slots, _ in joints], [rows for _, rows in joints])[1])
+    small, large = plans
+    assert small.fill == large.fill == 0
+    assert large.matrix_size / small.matrix_size == pytest.approx(10.0, rel=0.1)
+
+
+# ---------------------------------------------------------------------------- tangent
+
+
+def sprung():
+    """A moving chain with damped springs between its bodies and to ground, one of them rubbing."""
+    scene = mechanisms.bent_chain(4)
+    scene.add_force("weight", "gravity")
+    scene.add_point("post", "ground", (0.5, 2.0, 0.3))
+    for k, (i, j) in enumerate([("b0.O", "b2.O"), ("b3.O", "post"), ("b1.O", "b2.O")]):
+        scene.add_force("ptp", f"spring{k}", P_i=i, P_j=j, k=50.0 + k, c=3.0, l0=0.4)
+    scene.add_force("friction", "rub", joint="J1", mu=0.3, v_tol=0.5, radius=0.1)
+    return scene
+
+
+def disk():
+    scene = dap.Scene(name="disk")
+    scene.add_body("disk", mass=0.3, Jp=(2e-4, 4e-4, 2e-4), r=(0.0, 0.0, 0.0498),
+                   p=(np.cos(0.04), np.sin(0.04), 0.0, 0.0), r_dot=(0.5, 0.0, 0.0), w=(0.1, 10.0, 0.3))  # fmt: skip
+    scene.add_joint("disk", "contact", body_i="disk", slip="xyz", radius=0.05)
+    scene.add_force("weight", "gravity")
+    return scene
+
+
+def integration(scene, times=(0.0, 1.0), method=None, **settings):
+    compiled = dap.compile(scene, method=method)
+    machine = compiled.machine
+    u = compiled.start(True, ()).u
+    machine.watch_pivots(0.0, u)
+    machine.start(0.0, u)
+    return RadauIntegration(machine, machine.integrated(u), times,
+                            report_size=machine.report_size, **settings)  # fmt: skip
+
+
+@pytest.mark.parametrize("scene", [sprung, disk, problems.pendulum], ids=lambda f: f.__name__)
+@pytest.mark.parametrize("h", [1.0, 1e-2])
+def test_tangent_is_that_of_all_equations(scene, h):
+    """s z - J z = r for the solution z, J by central differences of all equations in all unknowns.
+
+    Both kinds of differences err by some 1e-9 of the largest term.
+    """
+    run = integration(scene())
+    machine, work, matrix = run.machine, run.work, run.matrix
+    system, rows = machine.system, machine.plan.row_size
+    rng = np.random.default_rng(7)
+    there = np.zeros((2, rows))
+    there[:, system.row] = 1.0
+    base = np.zeros((2, rows))
+    base[1] = 5.0 * rng.normal(size=rows) * there[1]
+    work.last_multipliers[2] = base
+    work.multipliers[2] = base
+    assert find_tangent(0.0, h, work, system, machine.loops, run.tangent, matrix) == 0.0
+    assert factorise_both(0.0, h, work, system, machine.loops, run.tangent, matrix) == 0.0
+    y0 = run.y
+    residual = rng.normal(size=y0.size)
+    residual[-1] = 0.0
+    of_rows = rng.normal(size=(2, rows)) * there
+    of_rows[0] *= matrix.held  # mu of a row without position level is zero from the start
+    work.R[0], work.G[0] = residual, of_rows
+    solve_at(0.0, h, y0, base, work, system, machine.loops, matrix)
+    change, multipliers = work.R[0].copy(), work.G[0].copy()
+
+    def equations(y, m):
+        out, levels = np.zeros_like(y), np.zeros((2, rows))
+        evaluate(0.0, y, m, matrix.held, out, levels, system, machine.loops)
+        out[-1] = 0.0
+        return np.concatenate([out, levels.ravel()])
+
+    def along(dy, dm):
+        size = max(np.max(np.abs(dy)), np.max(np.abs(dm)), 1e-300)
+        e = 1e-5 / size
+        return (equations(y0 + e * dy, base + e * dm) - equations(y0 - e * dy, base - e * dm)) / (
+            2.0 * e
+        )
+
+    nothing, none = np.zeros_like(change), np.zeros_like(multipliers)
+    terms = [along(change, none), along(nothing, multipliers)]
+    s = run.work.method.poles[0] / h
+    left = np.concatenate([s * change, np.zeros(2 * rows)]) - terms[0] - terms[1]
+    expected = np.concatenate([residual, of_rows.ravel()])
+    size = max(np.max(np.abs(term)) for term in (s * change, *terms, expected))
+    assert np.max(np.abs(left - expected)) < 2e-8 * size
+
+
+# ---------------------------------------------------------------------------- method
+
+
+def test_coefficients_have_order_five():
+    """B(5) and C(3) of Radau IIA, b the last row of A; its transformation; HW II, IV.5."""
+    m = radau_method()
+    for q in range(1, 6):
+        assert m.A[2] @ m.c ** (q - 1) == pytest.approx(1.0 / q, abs=1e-15)
+    for q in range(1, 4):
+        assert m.A @ m.c ** (q - 1) == pytest.approx(m.c**q / q, abs=1e-15)
+    gamma, alpha, beta = m.poles
+    blocks = np.array([[gamma, 0, 0], [0, alpha, -beta], [0, beta, alpha]])
+    assert m.T_inverse @ m.inverse @ m.T == pytest.approx(blocks, abs=1e-13)
+    # the error estimate is zero for polynomials up to degree 3: gamma h f(0) + e Z, scaled
+    for q in range(1, 4):
+        f0 = 1.0 if q == 1 else 0.0
+        assert f0 + m.e @ m.c**q == pytest.approx(0.0, abs=1e-13)
+
+
+def test_tolerances_of_the_estimate_keep_their_ratio():
+    rtol, atol = estimate_tolerances(1e-6, 1e-8)
+    assert (rtol, atol / rtol) == pytest.approx((1e-5, 1e-2))
+    assert estimate_tolerances(0.0, 1e-6) == pytest.approx((0.0, 1e-5))
+
+
+def rows_of(run, budget):
+    taken = []
+    while run.status is Status.RUNNING:
+        run.advance(budget)
+        taken.append(run.rows())
+    assert run.status is Status.FINISHED
+    return np.concatenate(taken)
+
+
+def test_chunks_change_no_bit():
+    """Everything that decides what comes next lies in arrays."""
+    times = np.linspace(0.0, 0.5, 23)
+    options = dict(rtol=1e-6, atol=1e-8, project_on=True, buffer_rows=5)
+    whole, cut = (rows_of(integration(sprung(), times, **options), n) for n in (10**9, 1))
+    assert np.array_equal(whole, cut)
+
+
+@pytest.mark.parametrize("scene", [sprung, disk, mechanisms.bricard], ids=lambda f: f.__name__)
+def test_motion_is_that_of_an_explicit_method(scene):
+    """Friction, rows without position level, redundant rows: within 1e-6 of dop853 at 1e-11."""
+    made = scene()
+    if not made.forces:
+        made.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
+    ours = dap.simulate(made, t_end=0.5, dt=0.05, integrator="radau", rtol=1e-9, atol=1e-11)
+    theirs = dap.simulate(made, t_end=0.5, dt=0.05, rtol=1e-11, atol=1e-13)
+    assert ours.method == theirs.method
+    assert np.max(np.abs(ours.u - theirs.u)) < 1e-6
+    # multipliers of redundant rows too: both report the least ones
+    assert np.max(np.abs(ours.Lam - theirs.Lam)) < 1e-4 * max(1.0, np.max(np.abs(theirs.Lam)))
+    assert all(entry.ok for entry in ours.ledger.values())
+
+
+def test_body_without_joints():
+    """G1 (elliptic functions, benchmarks): the method is an ordinary one where nothing is held."""
+    scene = problems.free_body((1.0, 2.0, 3.0), (1.0, 2.0, 0.5))
+    result = dap.simulate(scene, t_end=1.0, dt=1.0, integrator="radau", rtol=1e-10, atol=1e-12)
+    w = (0.50197928606713736, 2.1789944461516021, 0.025711240346541824)
+    assert result.wp[-1, 0] == pytest.approx(w, abs=1e-8)
+
+
+def test_penalty_is_refused():
+    with pytest.raises(dap.SimulationError, match="radau does not fit method penalty"):
+        dap.simulate(problems.pendulum(), t_end=0.1, method="penalty", integrator="radau")
+
+
+def test_a_fixed_step_without_stages_stops_the_run():
+    """Ten times the length of a swing: no stages are found, and nothing is reported as good."""
+    with pytest.raises(dap.SimulationError, match="the run stopped at t = 0 s"):
+        dap.simulate(problems.chain(2), t_end=50.0, dt=25.0, step=25.0, integrator="radau")
+
+
+def test_other_integrators_load_nothing_of_it():
+    """Who does not choose radau neither imports nor compiles it."""
+    code = (
+        "import sys, dap3d_core as dap\n"
+        "dap.simulate('pen1', t_end=0.01, dt=0.01)\n"
+        "names = [n for n in sys.modules if 'radau' in n or n.endswith(('.implicit', '.tangent', '.lu'))]\n"
+        "assert names in ([], ['dap3d_core.simulation.implicit']), names\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=300)

@@ -1,0 +1,147 @@
+"""Radau IIA against closed forms and published digits: stiff scenes, observed orders."""
+
+import numpy as np
+import pytest
+from support import problems
+
+import dap3d_core as dap
+from dap3d_core.integrators import Status
+from dap3d_core.integrators.implicit import RadauIntegration
+
+G = 9.81
+
+
+def radau(scene, t, **settings):
+    return dap.simulate(scene, t_end=t, integrator="radau", **({"dt": t} | settings))
+
+
+# ---------------------------------------------------------------------------- stiff scenes
+
+#: A05: height of the slider (benchmarks, section 1).
+GOVERNOR = {0.05: 0.506100897244, 0.1: 0.5238364755696, 0.5: 0.7432494247863}
+
+
+@pytest.fixture(scope="module")
+def governor():
+    return dap.compile("models/benchmarks/A05")
+
+
+@pytest.mark.parametrize("t", GOVERNOR)
+def test_governor(governor, t):
+    """A05 at rtol 1e-9: the digits to 1e-10, for the slider moves slowly; the energy ledger holds."""
+    result = radau(governor, t, rtol=1e-9, atol=1e-11)
+    slider = list(result.model.body_names).index("slider")
+    assert result.r[-1, slider, 2] == pytest.approx(GOVERNOR[t], abs=1e-10)
+    assert all(entry.ok for entry in result.ledger.values())
+
+
+def test_governor_in_a_fiftieth_of_the_steps(governor):
+    """A05 over 10 s at e = 1e-3 (benchmarks, section 0): 50 times fewer steps than rk4 needs.
+
+    rk4 is unstable above 3.4e-4 s (its interval 2.785 over the eigenvalue -8117 1/s), so it takes
+    29 400 steps. The reference is this method at 1e-9, which the test above holds to the digits.
+    """
+    t, dt = 10.0, 0.1
+    fine = radau(governor, t, dt=dt, rtol=1e-9, atol=1e-11)
+    coarse = radau(governor, t, dt=dt, rtol=1e-2, atol=1e-4)
+    scale = np.maximum(np.abs(fine.u), 1e-3)
+    assert np.sqrt(np.mean((np.abs(coarse.u - fine.u) / scale) ** 2)) < 1e-3
+    assert coarse.stats.steps < t / (2.785 / 8117.0) / 50.0
+
+
+def test_stiff_spring_is_a_rod():
+    """A spring of 1e9 N/m instead of the rod of A01: the pendulum's closed form to its stretch.
+
+    The stretch is tension / stiffness, below 3e-8 m; with the tension it changes the period by as
+    much. The spring's own frequency is 3.2e4 1/s, for which rk4 (2.785 over it) takes 11 350 steps.
+    """
+    scene = dap.Scene(name="spring pendulum")
+    scene.add_body("bob", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(-1.0, 0.0, 0.0))
+    scene.add_force("ptp", "spring", P_i="bob.O", P_j="ground.O", k=1e9, l0=1.0)
+    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
+    result = radau(scene, 1.0, rtol=1e-8, atol=1e-10)
+    assert result.r[-1, 0, :2] == pytest.approx([0.98629175113187532, -0.16501085312554117], abs=3e-7)
+    assert result.stats.steps < np.sqrt(1e9) / 2.785 / 20.0
+    # the radial velocity is the rate of the stretch, 1e-7 m/s, with no oscillation on top
+    radial = np.sum(result.r[-1, 0] * result.rd[-1, 0])
+    assert abs(radial) < 1e-6
+
+
+# ---------------------------------------------------------------------------- orders
+
+
+def order_of(errors, ratio=2.0):
+    return np.log(errors[:-1] / errors[1:]) / np.log(ratio)
+
+
+PENDULUM = np.array([0.98629175113187532, -0.16501085312554117, 0.29690551591631582,
+                     1.7746436411126556, 4.8562694074846766])  # fmt: skip
+
+
+def test_order_on_the_pendulum():
+    """A01 with fixed steps: order 5 within 0.2 in position, velocity and reported tension.
+
+    Index-3 codes lose an order in each of them in turn.
+    """
+    found = []
+    for n in (20, 40, 80):
+        result = radau(problems.pendulum(), 1.0, step=1.0 / n, rtol=1e-13, atol=1e-14, project=False)
+        now = [*result.r[-1, 0, :2], *result.rd[-1, 0, :2], -result.Lam[-1, 0]]
+        difference = np.abs(now - PENDULUM)
+        found.append([max(difference[:2]), max(difference[2:4]), difference[4]])
+    assert order_of(np.array(found)) == pytest.approx(5.0, abs=0.2)
+
+
+def test_order_of_the_multipliers_of_the_stages():
+    """A01: lambda of the last stage converges with the stage order 3, mu vanishes (HW VII.4)."""
+    compiled = dap.compile(problems.pendulum())
+    machine, u = compiled.machine, compiled.start(True, ()).u
+    errors, held = [], []
+    for n in (20, 40, 80):
+        machine.start(0.0, u)
+        run = RadauIntegration(machine, machine.integrated(u), [0.0, 1.0], step=1.0 / n, rtol=1e-13,
+                               atol=1e-14, report_size=machine.report_size)  # fmt: skip
+        while run.advance(10**9) is Status.RUNNING:
+            pass
+        mu, lam = run.multipliers
+        errors.append(abs(-lam[0] - PENDULUM[4]))
+        held.append(abs(mu[0]))
+    assert order_of(np.array(errors)) == pytest.approx(3.0, abs=0.4)
+    assert np.all(order_of(np.array(held)) > 2.6)
+
+
+def test_multipliers_of_the_heavy_top_do_not_oscillate():
+    """G4, fast precession: the force at the pivot at every step against the closed form, order 5.
+
+    In steady precession the centre goes round at radius l sin(theta): F = m (r_ddot + g z). An
+    oscillation from step to step would not fall with h^5, for its sum does not.
+    """
+    theta, W = np.radians(30.0), 56.7367666236016186
+    found = []
+    for n in (100, 200):
+        t = 0.1
+        result = radau(problems.heavy_top(theta, 200.0, W), t, dt=t / n, step=t / n, rtol=1e-12,
+                       atol=1e-13, project=False)  # fmt: skip
+        heading = W * result.t
+        out = 0.1 * np.sin(theta)
+        centre = np.column_stack([-out * np.sin(heading), out * np.cos(heading), 0.0 * heading])
+        force = -W * W * centre + [0.0, 0.0, G]
+        error = result.reaction("pivot")["i"].force - force
+        found.append([np.max(np.abs(error)), np.max(np.abs(np.diff(error, axis=0)))])
+    found = np.array(found)
+    assert order_of(found)[0, 0] == pytest.approx(5.0, abs=0.3)
+    # neighbouring steps differ by far less than the error itself: it drifts, and does not jump
+    assert found[1, 1] < 0.2 * found[1, 0]
+
+
+def test_reporting_times_cost_no_steps_and_no_order():
+    """A01: dense output at 37 instants has order 5, and as many steps as with one report."""
+    times = {"dt": 1.0 / 37.0}
+    fine = radau(problems.pendulum(), 1.0, rtol=1e-12, atol=1e-13, step=1e-3, **times)
+    errors = []
+    for n in (20, 40, 80):
+        settings = {"step": 1.0 / n, "rtol": 1e-12, "atol": 1e-13, "project": False}
+        result = radau(problems.pendulum(), 1.0, **settings, **times)
+        assert result.stats.steps == n
+        errors.append(np.max(np.abs(result.u[3:] - fine.u[3:])))
+    assert order_of(np.array(errors)) == pytest.approx(5.0, abs=0.4)
