@@ -28,7 +28,7 @@ def governor():
 
 @pytest.mark.parametrize("t", GOVERNOR)
 def test_governor(governor, t):
-    """A05 at rtol 1e-9: the digits to 1e-10, for the slider moves slowly; the energy ledger holds."""
+    """A05 at rtol 1e-9: the digits to 1e-10, for the slider moves slowly; every ledger holds."""
     result = radau(governor, t, rtol=1e-9, atol=1e-11)
     slider = list(result.model.body_names).index("slider")
     assert result.r[-1, slider, 2] == pytest.approx(GOVERNOR[t], abs=1e-10)
@@ -60,7 +60,9 @@ def test_stiff_spring_is_a_rod():
     scene.add_force("ptp", "spring", P_i="bob.O", P_j="ground.O", k=1e9, l0=1.0)
     scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
     result = radau(scene, 1.0, rtol=1e-8, atol=1e-10)
-    assert result.r[-1, 0, :2] == pytest.approx([0.98629175113187532, -0.16501085312554117], abs=3e-7)
+    assert result.r[-1, 0, :2] == pytest.approx(
+        [0.98629175113187532, -0.16501085312554117], abs=3e-7
+    )
     assert result.stats.steps < np.sqrt(1e9) / 2.785 / 20.0
     # the radial velocity is the rate of the stretch, 1e-7 m/s, with no oscillation on top
     radial = np.sum(result.r[-1, 0] * result.rd[-1, 0])
@@ -85,7 +87,9 @@ def test_order_on_the_pendulum():
     """
     found = []
     for n in (20, 40, 80):
-        result = radau(problems.pendulum(), 1.0, step=1.0 / n, rtol=1e-13, atol=1e-14, project=False)
+        result = radau(
+            problems.pendulum(), 1.0, step=1.0 / n, rtol=1e-13, atol=1e-14, project=False
+        )
         now = [*result.r[-1, 0, :2], *result.rd[-1, 0, :2], -result.Lam[-1, 0]]
         difference = np.abs(now - PENDULUM)
         found.append([max(difference[:2]), max(difference[2:4]), difference[4]])

@@ -14,8 +14,8 @@ displacement and v a velocity:
     turning   d(D v - nu) / dx, laid out as D
     rubbing   d(friction) / dlambda, laid out as D (transposed)
 
-In body axes a mechanism that turns as a whole keeps its tangent. What a wrench owes to the body axes in which its moment acts is in it; the gyroscopic moment is
-added in closed form.
+In body axes a mechanism that turns as a whole keeps its tangent. What a wrench owes to the body
+axes in which its moment acts is in it; the gyroscopic moment is added in closed form.
 """
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
@@ -243,43 +243,43 @@ def differentiate_friction(
 
 
 @compiled_inside
-def turn_to_body(B: Floats, o: int, s: Floats) -> None:
+def turn_to_body(block: Floats, o: int, s: Floats) -> None:
     """Three numbers at o along the global axes become those along the axes of body row s."""
-    x, y, z = B[o], B[o + 1], B[o + 2]
+    x, y, z = block[o], block[o + 1], block[o + 2]
     for c in range(3):
-        B[o + c] = x * s[3 + c] + y * s[6 + c] + z * s[9 + c]
+        block[o + c] = x * s[3 + c] + y * s[6 + c] + z * s[9 + c]
 
 
 @compiled_inside
-def scale_columns(B: Floats, o: int, k: Floats, s: Floats) -> None:
+def scale_columns(block: Floats, o: int, k: Floats, s: Floats) -> None:
     """Six numbers at o, derivatives by (r, rotation) of a body, become those in scaled ones."""
-    turn_to_body(B, o, s)
+    turn_to_body(block, o, s)
     for c in range(3):
-        B[o + c] *= k[0]
-    x, y, z = B[o + 3], B[o + 4], B[o + 5]
-    B[o + 3] = x * k[1]
-    B[o + 4] = x * k[2] + y * k[4]
-    B[o + 5] = x * k[3] + y * k[5] + z * k[6]
+        block[o + c] *= k[0]
+    x, y, z = block[o + 3], block[o + 4], block[o + 5]
+    block[o + 3] = x * k[1]
+    block[o + 4] = x * k[2] + y * k[4]
+    block[o + 5] = x * k[3] + y * k[5] + z * k[6]
 
 
 @compiled_inside
 def scale_tangent(system: System, tangent: Tangent) -> None:
     """Rows and columns of the derivatives into the bodies' scaled coordinates."""
-    metric, B = system.metric, tangent.coupling
+    metric, block = system.metric, tangent.coupling
     for p in range(tangent.blocks.shape[0]):
         o, a, b = tangent.blocks[p, 0], tangent.blocks[p, 1], tangent.blocks[p, 2]
         k, s = metric[a], system.body[a]
         for r in range(6):
-            scale_columns(B, o + 12 * r, metric[b], system.body[b])
-            scale_columns(B, o + 12 * r + 6, metric[b], system.body[b])
+            scale_columns(block, o + 12 * r, metric[b], system.body[b])
+            scale_columns(block, o + 12 * r + 6, metric[b], system.body[b])
         for c in range(o, o + 12):
-            x, y, z = B[c], B[c + 12], B[c + 24]
+            x, y, z = block[c], block[c + 12], block[c + 24]
             for r in range(3):
-                B[c + 12 * r] = k[0] * (x * s[3 + r] + y * s[6 + r] + z * s[9 + r])
-            x, y, z = B[c + 36], B[c + 48], B[c + 60]
-            B[c + 36] = k[1] * x
-            B[c + 48] = k[2] * x + k[4] * y
-            B[c + 60] = k[3] * x + k[5] * y + k[6] * z
+                block[c + 12 * r] = k[0] * (x * s[3 + r] + y * s[6 + r] + z * s[9 + r])
+            x, y, z = block[c + 36], block[c + 48], block[c + 60]
+            block[c + 36] = k[1] * x
+            block[c + 48] = k[2] * x + k[4] * y
+            block[c + 60] = k[3] * x + k[5] * y + k[6] * z
     for q in range(system.blocks.shape[0]):
         o, b = system.blocks[q, 0], system.blocks[q, 1]
         for _ in range(system.blocks[q, 2]):
@@ -291,7 +291,7 @@ def scale_tangent(system: System, tangent: Tangent) -> None:
 @compiled_inside
 def add_gyroscopic(system: System, tangent: Tangent) -> None:
     """d(-w' x J' w') / dw' of each body, unscaled, into its own block (the first n of them)."""
-    B = tangent.coupling
+    block = tangent.coupling
     for b in range(1, system.body.shape[0]):
         s, o = system.body[b], tangent.blocks[b - 1, 0] + 45
         w0 = s[3] * s[15] + s[6] * s[16] + s[9] * s[17]
@@ -299,18 +299,18 @@ def add_gyroscopic(system: System, tangent: Tangent) -> None:
         w2 = s[5] * s[15] + s[8] * s[16] + s[11] * s[17]
         for c in range(3):  # J' e_c x w'
             j0, j1, j2 = s[23 + c], s[26 + c], s[29 + c]
-            B[o + c] += j1 * w2 - j2 * w1
-            B[o + 12 + c] += j2 * w0 - j0 * w2
-            B[o + 24 + c] += j0 * w1 - j1 * w0
+            block[o + c] += j1 * w2 - j2 * w1
+            block[o + 12 + c] += j2 * w0 - j0 * w2
+            block[o + 24 + c] += j0 * w1 - j1 * w0
         h0 = s[23] * w0 + s[24] * w1 + s[25] * w2
         h1 = s[26] * w0 + s[27] * w1 + s[28] * w2
         h2 = s[29] * w0 + s[30] * w1 + s[31] * w2
-        B[o + 1] -= h2  # J' w' x e_c
-        B[o + 2] += h1
-        B[o + 12] += h2
-        B[o + 14] -= h0
-        B[o + 24] -= h1
-        B[o + 25] += h0
+        block[o + 1] -= h2  # J' w' x e_c
+        block[o + 2] += h1
+        block[o + 12] += h2
+        block[o + 14] -= h0
+        block[o + 24] -= h1
+        block[o + 25] += h0
 
 
 @compiled_inside

@@ -1,7 +1,7 @@
 """One implicit integration, seen from Python; it has the face of ``Integration``."""
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,12 +11,12 @@ from dap3d_core.formulations.machine import Machine
 from dap3d_core.formulations.stage import Matrix
 from dap3d_core.formulations.tangent_tables import coupled_bodies, make_tangent
 from dap3d_core.integrators import radau_work as at
+from dap3d_core.integrators import work
 from dap3d_core.integrators.integration import Integration, _check_control, _check_state_and_times
 from dap3d_core.integrators.radau import advance
 from dap3d_core.integrators.radau_method import ORDER, radau_method
 from dap3d_core.integrators.radau_parts import radau_parts
 from dap3d_core.integrators.radau_work import RadauWork
-from dap3d_core.integrators import work
 from dap3d_core.integrators.work import Status
 from dap3d_core.kernels.cache import jit_is_on
 from dap3d_core.linear.lu_plan import LuPlan, make_lu_plan
@@ -103,7 +103,7 @@ class RadauIntegration(Integration):
         y = np.array(y0, dtype=np.float64)
         instants = np.array(times, dtype=np.float64)
         _check_state_and_times(y, instants)
-        _check_control(self, rtol, atol, instants, step=step, first_step=first_step)
+        _check_control(cast(Any, self), rtol, atol, instants, step=step, first_step=first_step)
         error_size = y.size - 1 if error_size is None else error_size
         if not 0 <= error_size < y.size:
             raise ValueError(f"error_size is {error_size}, but y has {y.size} components")
@@ -112,8 +112,9 @@ class RadauIntegration(Integration):
         tangent = make_tangent(machine)
         matrix, lu = make_matrix(machine, tangent)
         self.machine, self.lu_plan, self.tangent, self.matrix = machine, lu, tangent, matrix
-        self.work = _make_work(machine, lu, y, instants, buffer_rows, report_size)
-        real, own, integer = self.work.real, self.work.own, self.work.integer
+        self._work = _make_work(machine, lu, y, instants, buffer_rows, report_size)
+        self.work = cast(Any, self._work)  # its first arrays are those of Integration
+        real, own, integer = self._work.real, self._work.own, self._work.integer
         real[work.RTOL], real[work.ATOL] = estimate_tolerances(rtol, atol)
         real[work.STEP], real[work.H] = step or 0.0, first_step or 0.0
         real[work.T] = instants[0]
@@ -130,7 +131,7 @@ class RadauIntegration(Integration):
     def _advance(self, budget: int) -> None:
         machine = self.machine
         advance(
-            self.work, machine.functions, self._parts, machine.system, machine.loops,
+            self._work, machine.functions, self._parts, machine.system, machine.loops,
             self.tangent, self.matrix, budget,
         )  # fmt: skip
 
@@ -173,7 +174,7 @@ class RadauIntegration(Integration):
     def multipliers(self) -> tuple[Any, Any]:
         """(rows,) mu and lambda of the last stage, in the order of the model."""
         row = self.machine.system.row
-        last = self.work.last_multipliers[2]
+        last = self._work.last_multipliers[2]
         return last[0, row].copy(), last[1, row].copy()
 
 

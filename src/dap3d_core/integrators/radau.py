@@ -8,11 +8,10 @@ Ordinary Differential Equations II, IV.8, VII.4, and their code RADAU5.
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-
 from collections.abc import Sequence
 from typing import Any
 
-from dap3d_core.assembly.system import Floats, System
+from dap3d_core.assembly.system import System
 from dap3d_core.formulations.stage import Matrix
 from dap3d_core.formulations.tangent import Tangent
 from dap3d_core.integrators.combination import all_finite
@@ -166,7 +165,7 @@ def step(
     h = t1 - t
     predict(h, work)
     shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
-    if 0.0 < shorter and work.own[THETA] < HOPELESS:
+    if shorter > 0.0 and work.own[THETA] < HOPELESS:
         # from where the iteration came to, the tangent at the end of the step is a better one
         integer[TANGENT_NEEDED] = 1
         shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
@@ -313,6 +312,3 @@ def choose_next(work: RadauWork, h: float, error: float, good: bool) -> None:
         real[H] = max(h * factor, step_floor(real, work.times))
     else:
         real[H] = h
-
-
-

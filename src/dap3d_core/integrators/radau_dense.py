@@ -34,11 +34,18 @@ from dap3d_core.linear.blocks import add_product
 
 @compiled
 def find_slope(
-    t: float, h: float, work: RadauWork, system: System, loops: Any, tangent: Tangent, matrix: Matrix
+    t: float,
+    h: float,
+    work: RadauWork,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
 ) -> float:
     """dy/dt at the trial state, at t + h, into TRIAL_SLOPE."""
     t1, system = t + h, borrow(system)
-    y, out, inverse, Z = work.state[TRIAL], work.state[TRIAL_SLOPE], work.method.inverse, work.Z
+    y, out = work.state[TRIAL], work.state[TRIAL_SLOPE]
+    inverse, stages = work.method.inverse, work.Z
     force, kinds, metric, C = system.force, system.kinds, system.metric, system.C
     n = metric.shape[0] - 1
     place_bodies(y, system.body, metric)
@@ -46,7 +53,7 @@ def find_slope(
         call_loops(kinds[VALUE], kinds[VALUE + 1], t1, system.body, system.F, system.idx,
                    system.par, system.groups, loops, force, force, force)  # fmt: skip
         linearise(t1, system, loops)
-        scale_slopes(inverse, Z, h, metric, force)
+        scale_slopes(inverse, stages, h, metric, force)
         for k in range(C.shape[0]):
             C[k] = -system.gamma[k]
         add_product(system.blocks, system.D, force, C)
@@ -56,20 +63,21 @@ def find_slope(
         zero(force)
     rates(y, metric, force, out)
     for k in range(7 * n, 13 * n):
-        out[k] += (inverse[2, 0] * Z[0, k] + inverse[2, 1] * Z[1, k] + inverse[2, 2] * Z[2, k]) / h
+        out[k] += (inverse[2, 0] * stages[0, k] + inverse[2, 1] * stages[1, k]
+                   + inverse[2, 2] * stages[2, k]) / h  # fmt: skip
     out[13 * n] = work.F[2, 13 * n]
     return 0.0
 
 
 @compiled_inside
-def scale_slopes(inverse: Floats, Z: Floats, h: float, metric: Floats, force: Floats) -> None:
+def scale_slopes(inverse: Floats, stages: Floats, h: float, metric: Floats, force: Floats) -> None:
     """The collocation polynomial's accelerations at the end of the step, scaled, into force."""
     n = metric.shape[0] - 1
     for b in range(1, n + 1):
         f, o, k = 7 * n + 6 * (b - 1), 6 * b, metric[b]
         for c in range(6):
-            force[o + c] = (inverse[2, 0] * Z[0, f + c] + inverse[2, 1] * Z[1, f + c]
-                            + inverse[2, 2] * Z[2, f + c]) / h  # fmt: skip
+            force[o + c] = (inverse[2, 0] * stages[0, f + c] + inverse[2, 1] * stages[1, f + c]
+                            + inverse[2, 2] * stages[2, f + c]) / h  # fmt: skip
         for c in range(3):
             force[o + c] /= k[0]
         z2 = force[o + 5] / k[6]
@@ -81,7 +89,7 @@ def scale_slopes(inverse: Floats, Z: Floats, h: float, metric: Floats, force: Fl
 @compiled_inside
 def prepare_dense(h: float, work: RadauWork) -> None:
     """Terms of dense output from t to the trial state, for combination.interpolate."""
-    real, state, terms, Z, c = work.real, work.state, work.terms, work.Z, work.method.c
+    real, state, terms, stages, c = work.real, work.state, work.terms, work.Z, work.method.c
     real[T_DENSE], real[H_DENSE] = real[T], h
     q = work.own[H_ACCEPTED] / h
     first = work.integer[ACCEPTED] == 0
@@ -90,8 +98,8 @@ def prepare_dense(h: float, work: RadauWork) -> None:
         terms[0, k], terms[1, k] = y, rise
         terms[4, k] = terms[5, k] = 0.0
         if first:
-            a = (Z[0, k] / c[0] - rise) / (1.0 - c[0])
-            b = (Z[1, k] / c[1] - rise) / (1.0 - c[1])
+            a = (stages[0, k] / c[0] - rise) / (1.0 - c[0])
+            b = (stages[1, k] / c[1] - rise) / (1.0 - c[1])
             terms[3, k] = (b - a) / (c[1] - c[0])
             terms[2, k] = a - c[0] * terms[3, k]
             continue

@@ -76,7 +76,13 @@ ROUNDINGS, LOOSEST = 10.0, 0.1
 
 @compiled
 def find_tangent(
-    t: float, h: float, work: RadauWork, system: System, loops: Any, tangent: Tangent, matrix: Matrix
+    t: float,
+    h: float,
+    work: RadauWork,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
 ) -> float:
     """The tangent of a step h at t, at its end as predicted; 0, or NaN where it is not finite.
 
@@ -104,7 +110,13 @@ def find_tangent(
 
 @compiled
 def factorise_both(
-    t: float, h: float, work: RadauWork, system: System, loops: Any, tangent: Tangent, matrix: Matrix
+    t: float,
+    h: float,
+    work: RadauWork,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
 ) -> float:
     """Factors of the real and the complex system of a step h; 0, or UNFOUND if one is singular."""
     poles = work.method.poles
@@ -125,10 +137,10 @@ def predict(h: float, work: RadauWork) -> None:
 
     mu is no smooth function: it has the same values at the stages of each step, but for h^3.
     """
-    c, Z, old, now = work.method.c, work.Z, work.Z_old, work.multipliers
+    c, stages, old, now = work.method.c, work.Z, work.Z_old, work.multipliers
     if work.integer[ACCEPTED] == 0:
         for i in range(3):
-            zero(Z[i])
+            zero(stages[i])
             for k in range(now.shape[2]):
                 now[i, 0, k], now[i, 1, k] = 0.0, work.last_multipliers[2, 1, k]
         return
@@ -144,8 +156,8 @@ def predict(h: float, work: RadauWork) -> None:
         w0 = u * (u - c[1]) * (u - 1.0) / (c[0] * (c[0] - c[1]) * (c[0] - 1.0))
         w1 = u * (u - c[0]) * (u - 1.0) / (c[1] * (c[1] - c[0]) * (c[1] - 1.0))
         w2 = u * (u - c[0]) * (u - c[1]) / ((1.0 - c[0]) * (1.0 - c[1])) - 1.0
-        for k in range(Z.shape[1]):
-            Z[i, k] = w0 * old[0, k] + w1 * old[1, k] + w2 * old[2, k]
+        for k in range(stages.shape[1]):
+            stages[i, k] = w0 * old[0, k] + w1 * old[1, k] + w2 * old[2, k]
 
 
 @compiled_inside
@@ -208,16 +220,17 @@ def evaluate_stages(
 ) -> None:
     """Residuals of the three stages: F - A^-1 Z / h into R, those of the rows into G."""
     y, argument, c = work.state[Y], work.state[SCRATCH], work.method.c
-    Z, inverse = work.Z, work.method.inverse
+    stages, inverse = work.Z, work.method.inverse
     for i in range(3):
         for k in range(y.shape[0]):
-            argument[k] = y[k] + Z[i, k]
+            argument[k] = y[k] + stages[i, k]
         evaluate_stage(t + c[i] * h, argument, work.multipliers[i], matrix.held, work.F[i],
                        work.G[i], system, loops)  # fmt: skip
         keep_frames(system.body, work.frames[i])
         a0, a1, a2 = inverse[i, 0] / h, inverse[i, 1] / h, inverse[i, 2] / h
         for k in range(y.shape[0]):
-            work.R[i, k] = work.F[i, k] - (a0 * Z[0, k] + a1 * Z[1, k] + a2 * Z[2, k])
+            rate = a0 * stages[0, k] + a1 * stages[1, k] + a2 * stages[2, k]
+            work.R[i, k] = work.F[i, k] - rate
     work.integer[RHS] += 3
 
 
@@ -273,7 +286,13 @@ def newton_limit(work: RadauWork) -> float:
 
 @compiled
 def find_stages(
-    t: float, h: float, work: RadauWork, system: System, loops: Any, tangent: Tangent, matrix: Matrix
+    t: float,
+    h: float,
+    work: RadauWork,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
 ) -> float:
     """Newton's iteration for the stages of a step h.
 
@@ -319,7 +338,13 @@ def find_stages(
 
 @compiled
 def estimate_error(
-    t: float, h: float, work: RadauWork, system: System, loops: Any, tangent: Tangent, matrix: Matrix
+    t: float,
+    h: float,
+    work: RadauWork,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
 ) -> float:
     """Norm of the error estimate (HW IV.8, (8.19), (8.20)); 1 is just good enough.
 

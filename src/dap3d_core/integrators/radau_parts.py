@@ -34,7 +34,7 @@ from dap3d_core.kernels.lists import (
     number_signature,
 )
 
-_MEMBERS = {
+_MEMBERS: dict[Any, dict[str, Any]] = {
     RadauMethod: {"A": MATRIX, "inverse": MATRIX, "T": MATRIX, "T_inverse": MATRIX},
     Tangent: {"elements": INTEGER_MATRIX, "pairs": INTEGERS, "blocks": INTEGER_MATRIX},
     Matrix: {

@@ -45,7 +45,9 @@ def factor_diagonal(m: int, d: int, first: int, K: Any, pivots: Integers) -> boo
 
 
 @compiled_inside
-def factor_lu(nodes: Integers, columns: Integers, updates: Integers, K: Any, pivots: Integers) -> bool:
+def factor_lu(
+    nodes: Integers, columns: Integers, updates: Integers, K: Any, pivots: Integers
+) -> bool:
     """Factor K in place.
 
     Args:
