@@ -1,7 +1,7 @@
 """The parts of a Radau step as first-class functions, each compiled by itself.
 
 A compiled function that calls another one takes in its code, and optimises it again; calls by
-pointer keep the parts apart, which halves the time to compile them.
+pointer keep the parts apart.
 """
 
 from typing import Any

@@ -186,7 +186,10 @@ class _Maker:
             for method in (name for name in self.methods if name in self.bench.models):
                 for integrator in integrators:
                     every = ladder(method, integrator, rtols, rungs)
-                    self.series.append([_Rung(setting) for setting in every])
+                    if every:
+                        self.series.append([_Rung(setting) for setting in every])
+                    else:
+                        self.notes.append(f"{integrator} does not fit method {method}")
             self._measure(reference)
             self._time()
         except BaseException as error:

@@ -18,6 +18,8 @@ ATOL = 1e-2
 STEPS, QUICK_STEPS = 8, 3
 QUICK_FACTOR = 4.0
 
+#: Pairs that no run takes: radau holds the constraints, which penalty replaces by springs.
+UNFIT = (("penalty", "radau"),)
 #: Formulations that a report may run.
 FORMULATIONS = tuple(name for name in METHODS if name != "auto")
 #: Integrators that choose their step, those of the highest order first.
@@ -80,7 +82,9 @@ def controlled(method: str, integrator: str, rtol: float) -> Setting:
 def ladder(
     method: str, integrator: str, tolerances: Iterable[float], steps: Iterable[float]
 ) -> list[Setting]:
-    """The rungs of a method and an integrator, coarse ones first."""
+    """The rungs of a method and an integrator, coarse ones first; none where they do not fit."""
+    if (method, integrator) in UNFIT:
+        return []
     if integrator in FIXED_STEP:
         return [Setting(method, integrator, step=h) for h in sorted(steps, reverse=True)]
     return [controlled(method, integrator, rtol) for rtol in sorted(tolerances, reverse=True)]
