@@ -317,3 +317,54 @@ def test_a_function_may_only_be_called():
     scene.add_force("hides", P_i="ball.O", function="law")
     with pytest.raises(PluginError, match="may only call f"):
         dap.compile(scene, registry=registry_of(Hides))
+
+
+class TwoLaws(Force):
+    """Two functions of an argument, of which one may be left out."""
+
+    keyword = "two-laws"
+    P_i: Point = point()
+    across: str = function(argument="x, m")
+    along: str = function(argument="z, m")
+
+
+class AlongAlone(TwoLaws, across=False, along=True):
+    """Along z."""
+
+    def wrench(r_P_i, along):
+        return (0.0, 0.0, along(r_P_i[2])), ZERO
+
+
+class Both(TwoLaws, across=True, along=True):
+    """Along both."""
+
+    def wrench(r_P_i, across, along):
+        return (across(r_P_i[0]), 0.0, along(r_P_i[2])), ZERO
+
+
+class AcrossAlone(TwoLaws, across=True, along=False):
+    """A mistake: it calls what is not given."""
+
+    def wrench(r_P_i, across, along):
+        return (across(r_P_i[0]), 0.0, along(r_P_i[2])), ZERO
+
+
+def test_one_of_two_functions_may_be_left_out():
+    """Each variant gets the functions that are given; one that calls another is refused in words.
+
+    x = 3 and z = 4: across = 1 + 2 x = 7, along = 5 z^2 = 80.
+    """
+    laws = {"line": (1.0, 2.0, 0.0), "square": (0.0, 0.0, 5.0)}
+    for given, wanted in (({"along": "square"}, (0.0, 40.0)),
+                          ({"along": "square", "across": "line"}, (3.5, 40.0))):  # fmt: skip
+        scene = scene_of()
+        for name, coeff in laws.items():
+            scene.add_function("a", name, coeff=coeff)
+        scene.add_force("two-laws", "push", P_i="ball.O", **given)
+        machine = dap.compile(scene, registry=registry_of(TwoLaws)).machine
+        a = machine.report(0.0, machine.model.u0)[:3]
+        assert (a[0], a[2]) == pytest.approx(wanted)
+    scene.forces.clear()
+    scene.add_force("two-laws", "push", P_i="ball.O", across="line")
+    with pytest.raises(SceneError, match=r"forces.push.*along is missing, which this type calls"):
+        dap.compile(scene, registry=registry_of(TwoLaws))

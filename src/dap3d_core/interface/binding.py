@@ -14,7 +14,6 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.checks import Examined, PluginError, where_is
-from dap3d_core.interface.fields import specs_of
 from dap3d_core.interface.layout import Layout
 from dap3d_core.interface.namespace import (
     DERIVATIVES,
@@ -26,9 +25,11 @@ from dap3d_core.interface.namespace import (
 )
 
 
-def argument_functions(type_: type) -> tuple[str, ...]:
-    """The function fields of a type that are of an argument, in order."""
-    return tuple(n for n, s in specs_of(type_).items() if s.kind == "function" and s.argument)
+def uncalled(examined: Examined) -> str:
+    """A function that kernels call and that is not known; "" where there is none."""
+    names = {n for kernel in examined.kernels.values() for n in parameters(kernel)}
+    return min((n for n in names if n in examined.names and examined.names[n].derivative >= 0),
+               key=len, default="")  # fmt: skip
 
 
 def bind_functions(examined: Examined, functions: Mapping[str, Examined]) -> Examined:
@@ -45,26 +46,33 @@ def bind_functions(examined: Examined, functions: Mapping[str, Examined]) -> Exa
         PluginError: a kernel does more with a function than to call it, or has no source.
     """
     layout, names = examined.layout, dict(examined.names)
-    kernels = examined.kernels
-    title = []
-    for field, given in functions.items():
+    calls: dict[str, tuple[_Given, int]] = {}
+    for field, of_argument in functions.items():
         prefix = "f" if field == "function" else field
-        behind = _behind(given.layout, layout.par_width)
-        value = given.kernels["value"]
-        own = in_order(namespace(given.type, behind), [n for n in parameters(value) if n != "x"])
-        extra = {q.name: attrs.evolve(q, name=f"{prefix}__{q.name}") for q in own}
-        names |= {q.name: q for q in extra.values() if q.name not in names}
-        wanted = ["x" if n == "x" else extra[n].name for n in parameters(value)]
-        called = {f"{prefix}{suffix}": order for order, suffix in enumerate(DERIVATIVES)}
-        kernels = {
-            name: _with_function(examined, name, kernel, called, value, wanted)
-            for name, kernel in kernels.items()
-        }
+        behind = _behind(of_argument.layout, layout.par_width)
+        value = of_argument.kernels["value"]
+        asked = parameters(value)
+        own = in_order(namespace(of_argument.type, behind), [n for n in asked if n != "x"])
+        names |= {f"{prefix}__{q.name}": attrs.evolve(q, name=f"{prefix}__{q.name}") for q in own}
+        wanted = tuple("x" if n == "x" else f"{prefix}__{n}" for n in asked)
+        given = _Given(f"{prefix}__value", value, wanted)
+        calls |= {f"{prefix}{s}": (given, order) for order, s in enumerate(DERIVATIVES)}
         layout = attrs.evolve(layout, par_width=behind.par_width)
-        title.append(given.type.keyword)
-    return attrs.evolve(
-        examined, layout=layout, names=names, kernels=kernels, given=f"({', '.join(title)})"
-    )
+    kernels = {n: _with_functions(examined, n, k, calls) for n, k in examined.kernels.items()}
+    title = f"({', '.join(g.type.keyword for g in functions.values())})"
+    return attrs.evolve(examined, layout=layout, names=names, kernels=kernels, given=title)
+
+
+@attrs.frozen
+class _Given:
+    """The kernel of a function that is given: its name in the copy, itself, what it is called with.
+
+    That is the argument, ``x``, and the names of its numbers.
+    """
+
+    known_as: str
+    value: Callable[..., Any]
+    wanted: tuple[str, ...]
 
 
 def bind_friction(examined: Examined) -> Examined:
@@ -98,16 +106,15 @@ def _behind(layout: Layout, start: int) -> Layout:
     )
 
 
-def _with_function(
+def _with_functions(
     examined: Examined,
     name: str,
     kernel: Callable[..., Any],
-    called: Mapping[str, int],
-    value: Callable[..., Any],
-    wanted: list[str],
+    calls: Mapping[str, tuple[_Given, int]],
 ) -> Callable[..., Any]:
-    """The kernel with its calls of a function replaced by calls of the function's own kernel."""
-    if not set(called) & set(parameters(kernel)):
+    """The kernel with its calls of functions replaced by calls of the functions' own kernels."""
+    asked = [n for n in parameters(kernel) if n in calls]
+    if not asked:
         return kernel
     who = f"{where_is(examined.type)}.{name}"
     try:
@@ -119,40 +126,40 @@ def _with_function(
     definition = tree.body[0]
     if not isinstance(definition, ast.FunctionDef):
         raise PluginError(f"{who} is to be written with def, for it calls a function")
-    numbers = [n for n in wanted if n != "x"]
-    known_as = f"{min(called, key=len)}__value"
-    replaced = _Calls(called, wanted, known_as)
+    replaced = _Calls({n: calls[n] for n in asked})
     definition.body = [replaced.visit(line) for line in definition.body]
-    kept = [a for a in definition.args.args if a.arg not in called]
-    definition.args.args = [*kept, *(ast.arg(n) for n in numbers)]
-    definition.decorator_list = []
     if replaced.other:
         raise PluginError(f"{who} may only call {', '.join(replaced.other)}, with one argument")
-    plain = {**kernel.__globals__, known_as: value}
+    kept = [a for a in definition.args.args if a.arg not in asked]
+    used = dict.fromkeys(calls[n][0] for n in asked)
+    numbers = [n for given in used for n in given.wanted if n != "x"]
+    definition.args.args = [*kept, *(ast.arg(n) for n in numbers)]
+    definition.decorator_list = []
+    plain = kernel.__globals__ | {given.known_as: given.value for given in used}
     code = compile(ast.fix_missing_locations(tree), kernel.__code__.co_filename, "exec")
     exec(code, plain)  # the plugin's own source, as importing it did
-    pasted: Callable[..., Any] = plain[definition.name]
-    return pasted
+    copied: Callable[..., Any] = plain[definition.name]
+    return copied
 
 
 class _Calls(ast.NodeTransformer):
     """``f(x)`` -> ``f__value(x, numbers...)[0]``."""
 
-    def __init__(self, called: Mapping[str, int], wanted: list[str], known_as: str) -> None:
-        self.called, self.wanted, self.known_as = called, wanted, known_as
+    def __init__(self, calls: Mapping[str, tuple[_Given, int]]) -> None:
+        self.calls = calls
         self.other: list[str] = []
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         name = node.func.id if isinstance(node.func, ast.Name) else ""
-        if name not in self.called or len(node.args) != 1 or node.keywords:
+        if name not in self.calls or len(node.args) != 1 or node.keywords:
             return self.generic_visit(node)
+        given, order = self.calls[name]
         argument = self.visit(node.args[0])
-        arguments = [argument if n == "x" else ast.Name(n, ast.Load()) for n in self.wanted]
-        call = ast.Call(ast.Name(self.known_as, ast.Load()), arguments, [])
-        index = ast.Constant(self.called[name])
-        return ast.copy_location(ast.Subscript(call, index, ast.Load()), node)
+        arguments = [argument if n == "x" else ast.Name(n, ast.Load()) for n in given.wanted]
+        call = ast.Call(ast.Name(given.known_as, ast.Load()), arguments, [])
+        return ast.copy_location(ast.Subscript(call, ast.Constant(order), ast.Load()), node)
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
-        if node.id in self.called:
+        if node.id in self.calls:
             self.other.append(node.id)
         return node

@@ -49,6 +49,8 @@ class Examined:
         outputs: kernel -> expressions of its numbers in the order of their shape.
         kernels: its pure functions.
         variants: types that stand in for it: (values of fields, the type).
+        argument_functions: its function fields of another argument than time.
+        acts_through_joint: whether it is a force that switches on the friction of a joint.
         given: what completes it, for titles: the types of its functions of an argument.
     """
 
@@ -58,6 +60,8 @@ class Examined:
     outputs: dict[str, tuple[str, ...]]
     kernels: dict[str, Callable[..., Any]]
     variants: tuple[tuple[Mapping[str, Any], "Examined"], ...] = ()
+    argument_functions: tuple[str, ...] = ()
+    acts_through_joint: bool = False
     given: str = ""
 
     def chosen(self, values: Mapping[str, Any]) -> "Examined":
@@ -66,6 +70,10 @@ class Examined:
             if all(_holds(self.type, n, wanted, values[n]) for n, wanted in conditions.items()):
                 return examined
         return self
+
+
+def _has_joint(type_: type[TypeBase]) -> bool:
+    return any(spec.kind == "joint" for spec in specs_of(type_).values())
 
 
 def _holds(type_: type[TypeBase], name: str, wanted: Any, value: Any) -> bool:
@@ -104,7 +112,10 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
         _check_names(type_, kernel_name, asked, offered)
         quantities = [offered[n] for n in asked]
         outputs[kernel_name] = _output(type_, kernel_name, kernel, quantities, rng)
-    return Examined(type_, layout, names, outputs, type_.kernels(), variants)
+    specs = specs_of(type_).items()
+    functions = tuple(n for n, s in specs if s.kind == "function" and s.argument)
+    by_joint = _has_joint(type_)
+    return Examined(type_, layout, names, outputs, type_.kernels(), variants, functions, by_joint)
 
 
 def _output(
@@ -237,7 +248,7 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
         example = f'keyword = "{type_.__name__.lower()}"'
         raise PluginError(f"{who} has no keyword; add e.g. {example}")
     needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[kind]
-    by_joint = any(spec.kind == "joint" for spec in specs_of(type_).values())
+    by_joint = _has_joint(type_)
     if (is_abstract and not type_.kernels()) or by_joint:
         needed = []
     elif issubclass(type_, Joint):

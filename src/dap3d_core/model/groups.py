@@ -8,7 +8,11 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.interface.binding import argument_functions, bind_friction, bind_functions
+from dap3d_core.interface.binding import (
+    bind_friction,
+    bind_functions,
+    uncalled,
+)
 from dap3d_core.interface.checks import BodyPose, Examined, prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.layout import shape_of, size
@@ -94,8 +98,8 @@ class Grouping:
         """
         by_type: dict[Any, list[int]] = {}
         for place, instance in enumerate(instances):
-            given = [f.examined.type for f in self._given(instance)]
-            by_type.setdefault((instance.examined.type, *given), []).append(place)
+            given = tuple((n, f.examined.type) for n, f in self._given(instance).items())
+            by_type.setdefault((instance.examined.type, given), []).append(place)
         return tuple(
             self._group([instances[k] for k in places], [members[k] for k in places])
             for places in by_type.values()
@@ -142,10 +146,10 @@ class Grouping:
         return attrs.evolve(group, examined=bound, numbers=numbers, joints=group.members,
                             members=members)  # fmt: skip
 
-    def _given(self, instance: Instance) -> list[Instance]:
-        """The functions of an argument that an instance is given."""
-        names = [instance.values[n] for n in argument_functions(instance.examined.type)]
-        return [self.functions[n] for n in names if n is not None]
+    def _given(self, instance: Instance) -> dict[str, Instance]:
+        """The functions of an argument that an instance is given, by field."""
+        names = {field: instance.values[field] for field in instance.examined.argument_functions}
+        return {field: self.functions[name] for field, name in names.items() if name is not None}
 
     def _group(self, instances: list[Instance], members: list[int]) -> Group:
         examined = instances[0].examined
@@ -161,6 +165,8 @@ class Grouping:
         if functions[0]:
             examined, numbers, more = self._with_functions(examined, functions, numbers, members)
             tables += more
+        if missing := uncalled(examined):
+            raise PrepareError(members[0], f"{missing} is missing, which this type calls")
         bodies = np.array([i.bodies for i in instances], dtype=np.int64).reshape(count, -1)
         others = [(*i.functions, *i.others) for i in instances]
         integers = np.array(others, dtype=np.int64).reshape(count, -1)
@@ -175,17 +181,17 @@ class Grouping:
     def _with_functions(
         self,
         examined: Examined,
-        functions: list[list[Instance]],
+        functions: list[dict[str, Instance]],
         numbers: Floats,
         members: Sequence[int],
     ) -> tuple[Examined, Floats, list[tuple[int, int, Floats]]]:
         """The type with its functions known, their numbers behind its own, their tables."""
-        fields = argument_functions(examined.type)
-        types = {n: f.examined for n, f in zip(fields, functions[0], strict=True)}
+        types = {field: f.examined for field, f in functions[0].items()}
         tables: list[tuple[int, int, Floats]] = []
-        for column in zip(*functions, strict=True):
+        for field, given in types.items():
+            column = [of_instance[field] for of_instance in functions]
             try:
-                more, found = self._numbers(column[0].examined, list(column), range(len(column)))
+                more, found = self._numbers(given, column, range(len(column)))
             except PrepareError as error:
                 k, words = error.args
                 raise PrepareError(members[k], f"function {column[k].name}: {words}") from error

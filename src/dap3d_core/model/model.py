@@ -12,7 +12,6 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.checks import BodyPose, pose
-from dap3d_core.interface.fields import specs_of
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.scene import Checked, Instance
 
@@ -169,7 +168,7 @@ class _Groups:
         self.forces = made("force", direct)
         self.functions = made("function", functions)
         with _named("force", checked.forces):
-            self.friction = by_kind["force"].friction(through, joints)
+            self.friction = by_kind["joint"].friction(through, joints)
         self.notes = [note for grouping in by_kind.values() for note in grouping.notes]
 
 
@@ -183,7 +182,7 @@ def _named(kind: str, instances: Sequence[Instance]) -> Iterator[None]:
 
 
 def _acts_through_joint(force: Instance) -> bool:
-    return any(spec.kind == "joint" for spec in specs_of(force.examined.type).values())
+    return force.examined.acts_through_joint
 
 
 def _rows(joint: Instance) -> int:
