@@ -51,6 +51,7 @@ def test_check_tells_redundant_joints(dap3d, scene_file):
     assert found["reactions"]["shared"]["low"]["unique_rows"] == []
 
 
+@pytest.mark.slow
 def test_check_tells_what_is_redundant_at_this_pose_alone(dap3d):
     """Two four-bars with all links in line: 27 of 35 rows are independent, 29 elsewhere (IFToMM
     A02)."""
@@ -115,6 +116,7 @@ def test_models_and_plugins_are_listed(dap3d):
     assert "weight" in dap3d("plugins").stdout
 
 
+@pytest.mark.slow
 def test_a_model_of_a_group_runs_with_and_without_it(dap3d):
     for name in ("N1", "benchmarks/N1"):
         done = dap3d("run", name, "--t-end", "0.1", "--force")

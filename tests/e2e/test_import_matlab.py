@@ -53,6 +53,7 @@ def test_the_report_as_json(dap3d):
     assert found.keys() >= {"defaulted", "changed", "unused", "notes", "folder"}
 
 
+@pytest.mark.slow
 def test_a_stub_is_written_only_when_asked_for_and_refused_until_it_is_filled_in(dap3d):
     done = dap3d("import-matlab", MODELS / "ball1")
     assert done.returncode == 0, done.stderr

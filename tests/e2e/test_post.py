@@ -113,6 +113,7 @@ def test_picked_quantities_in_a_file(dap3d, result):
         assert data["cone.r"].sel(axis="z").values.tolist() == result.r[:, 0, 2].tolist()
 
 
+@pytest.mark.slow
 def test_what_was_written_as_json(dap3d, result):
     done = dap3d("post", "pen1.nc", "--json")
     found = json.loads(done.stdout)
@@ -131,6 +132,7 @@ def test_what_was_written_as_json(dap3d, result):
     assert headings == list(table_of(dap3d.folder / "pen1-post.csv"))
 
 
+@pytest.mark.slow
 def test_a_scene_without_joints_has_no_rows_and_its_springs_have_quantities(dap3d, result):
     done = dap3d("post", "bodies2.nc", "--jac", "-o", "b.nc")
     assert done.returncode == 0, done.stderr
@@ -159,6 +161,7 @@ def test_types_of_the_model_itself_are_loaded_only_when_allowed(dap3d, result, r
     assert set(column["contact.force.z [N]"]) == {0.0}  # it has not reached the ground
 
 
+@pytest.mark.slow
 def test_reactions_that_cannot_be_had_are_left_out_and_told(dap3d, result):
     """The types of the joints are blocked, as if the package that brought them were gone."""
     done = dap3d("post", "pen1.nc", "-o", "a.nc", DAP3D_BLOCK="dap3d")

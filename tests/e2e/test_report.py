@@ -64,6 +64,7 @@ def test_tables_fit_the_width(dap3d, width):
     assert all(len(row.split()) >= 6 for row in rows)  # no column is folded away
 
 
+@pytest.mark.slow
 def test_a_bar_with_an_estimate_fits_a_narrow_terminal(dap3d):
     from tests.e2e.test_terminal import in_terminal, lines
 

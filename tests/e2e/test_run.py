@@ -81,6 +81,7 @@ def test_strict_makes_changes_a_failure_and_saves_all_the_same(dap3d):
     assert dap.open(dap3d.folder / "rough.nc").status == "done"
 
 
+@pytest.mark.slow
 def test_the_metric_of_the_correction_can_be_chosen(dap3d):
     """The crank of the rough four-bar leaves the vertical by another angle where masses count; the
     choice stands in the result."""
@@ -187,6 +188,7 @@ def test_a_missing_point_and_a_missing_file(dap3d, scene_file):
     assert "no/such.toml" in missing.stderr
 
 
+@pytest.mark.slow
 def test_file_names_of_any_kind(dap3d, scene_file):
     for name in ('it\'s a "stone".toml', "-dash.toml", "päper\nclip.toml"):
         scene_file(name=name)

@@ -95,6 +95,7 @@ def test_a_second_process_compiles_nothing(tmp_path):
     assert first == second
 
 
+@pytest.mark.slow
 def test_two_processes_race_on_an_empty_cache(tmp_path):
     """Both succeed with the same number; what they leave serves a third."""
     cache = tmp_path / "cache"
