@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 from timing import median_seconds
 
-from dap3d_core.interface.binding import argument_functions, bind_friction, bind_functions
+from dap3d_core.interface.binding import bind_friction, bind_functions
 from dap3d_core.interface.samples import random_pose, random_value
 from dap3d_core.interface.writer import LOOP_KINDS, stride, write
 from dap3d_core.kernels import gather
@@ -33,8 +33,8 @@ def types(registry):
         examined = registry.get(row.kind, row.keyword)
         for conditions, e in (({}, examined), *examined.variants):
             words = ", ".join(f"{n} = {v}" for n, v in conditions.items())
-            if any(conditions.get(n) for n in argument_functions(e.type)):
-                e = bind_functions(e, dict.fromkeys(argument_functions(e.type), line))
+            if any(conditions.get(n) for n in e.argument_functions):
+                e = bind_functions(e, dict.fromkeys(e.argument_functions, line))
             if e.kernels:
                 yield f"{row.keyword}{f' ({words})' if words else ''}", e
 

@@ -72,10 +72,11 @@ class Cylindrical(Joint):
 
     def friction(lam, mu, v_tol, radius, a_j, s_P_i, r_P_i, v_P_i, r_j, v_j, w_i, w_j):
         load, arm = mu * magnitude((lam[2], lam[3])), sub(r_P_i, r_j)
-        v = dot(a_j, sub(sub(v_P_i, v_j), cross(w_j, arm)))
-        F = scale(-load * tanh(v / v_tol), a_j)
-        turning = radius * dot(a_j, sub(w_i, w_j))
-        moment = scale(-radius * load * tanh(turning / v_tol), a_j)
+        slow = 1.0 / v_tol
+        v = slow * dot(a_j, sub(sub(v_P_i, v_j), cross(w_j, arm)))
+        turning = slow * radius * dot(a_j, sub(w_i, w_j))
+        F = scale(-load * tanh(v), a_j)
+        moment = scale(-radius * load * tanh(turning), a_j)
         return (F, add(cross(s_P_i, F), moment)), (neg(F), neg(add(cross(arm, F), moment)))
 
 
