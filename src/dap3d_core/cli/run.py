@@ -154,10 +154,11 @@ def _check_settings(scene: "Scene", given: dict[str, Any]) -> None:
     try:
         check_simulation(attrs.evolve(scene.simulation, **said), scene.bodies)
     except SceneError as error:
-        about = said.keys() | ({"dt"} if "t_end" in said else set())
+        options = said.keys() | ({"step"} if "integrator" in said else set())
+        about = options | ({"dt"} if "t_end" in said else set())
         mistakes = [m for m in error.mistakes if m.key in about]
         if mistakes:  # others are found again with the whole scene, with their lines
-            raise in_options(SceneError(mistakes), said) from error
+            raise in_options(SceneError(mistakes), options) from error
 
 
 def in_options(error: "SceneError", said: Collection[str]) -> "SceneError":
