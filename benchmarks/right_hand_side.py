@@ -4,11 +4,14 @@ The mark is a chain written by hand.
 """
 
 import importlib.util
+import sys
+import tempfile
+from functools import cache
 
 import numpy as np
 import plain_chain
 import scenes
-from numba import njit
+from numba import config, njit
 from timing import median_seconds
 
 from dap3d_core.kernels.borrow import borrow
@@ -46,14 +49,24 @@ def plain(n):
     return count, lambda: plain_chain.repeat(count, u, du, *arguments)
 
 
+@cache
+def loaded(path):
+    """The module at a path; what it compiles is not kept, least of all beside it."""
+    spec = importlib.util.spec_from_file_location("prototype", path)
+    module = sys.modules["prototype"] = importlib.util.module_from_spec(spec)
+    before = config.CACHE_DIR
+    with tempfile.TemporaryDirectory() as config.CACHE_DIR:
+        spec.loader.exec_module(module)
+    config.CACHE_DIR = before
+    return module
+
+
 def prototype(path, n):
     """The same for another program with ``build(n)`` and ``rk4(u, h, steps, args)``.
 
     It takes four right-hand sides a step.
     """
-    spec = importlib.util.spec_from_file_location("prototype", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = loaded(path)
     u, arguments = module.build(n)
     steps = max(2, WORK // n // 4)
     return 4 * steps, lambda: module.rk4(u.copy(), 1e-9, steps, arguments)

@@ -7,8 +7,8 @@ bodies; work.
 
 from typing import Any
 
-from dap3d_core.assembly.system import Floats, Integers
-from dap3d_core.kernels.cache import compiled, compiled_inside
+from dap3d_core.assembly.system import VALUE, Floats, Integers
+from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
 
 
 @compiled
@@ -65,6 +65,15 @@ def call_loops(
     for q in range(first, last):
         loop = loops[q]
         loop(t, body, F, idx, par, groups[q, 0], groups[q, 1], groups[q, 2], out1, out2, out3)
+
+
+@compiled_into
+def place(t: float, y: Floats, system: Any, loops: Any) -> None:
+    """Bodies and functions of time as they are at time t in the state y; writes into ``force``."""
+    place_bodies(y, system.body, system.metric)
+    call_loops(system.kinds[VALUE], system.kinds[VALUE + 1], t, system.body, system.F, system.idx,
+               system.par, system.groups, loops, system.force, system.force,
+               system.force)  # fmt: skip
 
 
 @compiled_inside

@@ -5,19 +5,17 @@
 
 from typing import Any
 
-from dap3d_core.assembly.evaluate import call_loops, place_bodies
-from dap3d_core.assembly.system import ANGLE, SWITCH, VALUE, Floats, System
+from dap3d_core.assembly.evaluate import call_loops, place
+from dap3d_core.assembly.system import ANGLE, SCRATCH, SWITCH, Floats, System
 from dap3d_core.kernels.cache import compiled
 
 
 @compiled
 def accepted(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Count turns at a state; out[0] = the lowest switch, negative where the run is to end."""
-    kinds, body, force, value = system.kinds, system.body, system.force, system.settings[2:3]
-    place_bodies(y, body, system.metric)
-    call_loops(kinds[VALUE], kinds[VALUE + 1], t, body, system.F, system.idx,
-               system.par, system.groups, loops, force, force, force)  # fmt: skip
+    kinds, value = system.kinds, system.settings[SCRATCH : SCRATCH + 1]
+    place(t, y, system, loops)
     value[0] = 1.0
-    call_loops(kinds[ANGLE], kinds[SWITCH + 1], t, body, system.F, system.idx,
+    call_loops(kinds[ANGLE], kinds[SWITCH + 1], t, system.body, system.F, system.idx,
                system.par, system.groups, loops, value, value, value)  # fmt: skip
     out[0] = value[0]

@@ -13,6 +13,7 @@ from typing import Any
 from dap3d_core.assembly.evaluate import (
     call_loops,
     largest,
+    place,
     place_bodies,
     scale_forces,
     scale_velocities,
@@ -152,13 +153,11 @@ def project_onto(
     singular one; largest residuals of position and velocity; lengths (rows) that go
     linearly through zero at a singular pose.
     """
-    body, metric, force, kinds = system.body, system.metric, system.force, system.kinds
+    body, metric, force = system.body, system.metric, system.force
     n = body.shape[0] - 1
     out[0] = out[1] = 0.0
     normalise(y, n)
-    place_bodies(y, body, metric)
-    call_loops(kinds[VALUE], kinds[VALUE + 1], t, body, system.F, system.idx,
-               system.par, system.groups, loops, force, force, force)  # fmt: skip
+    place(t, y, system, loops)
     worst = residuals(t, system, loops)
     limit = system.settings[TOLERANCE_C] * size_of(y, 0, n, 7, 3)
     factored, poor = False, False

@@ -8,11 +8,12 @@ equal accelerations, whatever came before. Each pass is accelerated by one secan
 # What a compiled function returns is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+from collections.abc import Callable
 from typing import Any
 
 from dap3d_core.assembly.evaluate import call_loops, zero
 from dap3d_core.assembly.system import FRICTION, UNSETTLED, System
-from dap3d_core.kernels.cache import compiled_inside
+from dap3d_core.kernels.cache import compiled_inside, compiled_into
 
 #: The multipliers have settled where a pass changes them by less than this part of the largest.
 SETTLED = 1e-10
@@ -87,3 +88,21 @@ def settle(system: System, passes: int) -> bool:
         result[k], change[k], guess[k] = x[k], now, mixed
         x[k] = mixed
     return False
+
+
+@compiled_into
+def solve_rubbing(t: float, system: System, loops: Any, solve: Callable[[System], None]) -> float:
+    """``solve`` of a formulation, again until friction and multipliers agree; power of friction.
+
+    solve: scaled accelerations from the scaled forces in ``force``, -lambda into ``x``.
+    """
+    power, passes = 0.0, 0
+    if rubs(system):
+        keep_applied(system)
+    solve(system)
+    if rubs(system):
+        while not settle(system, passes):
+            passes += 1
+            power = rub(t, system, loops)
+            solve(system)
+    return power

@@ -17,12 +17,12 @@ from typing import Any
 from dap3d_core.assembly.evaluate import (
     call_loops,
     global_accelerations,
-    place_bodies,
+    place,
     rates,
     scale_forces,
     zero,
 )
-from dap3d_core.assembly.system import ALPHA, MU, OMEGA, VALUE, WRENCH, Floats, System
+from dap3d_core.assembly.system import ALPHA, MU, OMEGA, WRENCH, Floats, System
 from dap3d_core.formulations.constraints import (
     PART,
     linearise,
@@ -34,7 +34,7 @@ from dap3d_core.formulations.constraints import (
     solve_rows,
     velocity_residuals,
 )
-from dap3d_core.formulations.friction import keep_applied, rub, rubs, settle
+from dap3d_core.formulations.friction import solve_rubbing
 from dap3d_core.kernels.cache import compiled, compiled_inside
 from dap3d_core.linear.blocks import assemble, factor, regularise
 
@@ -48,24 +48,11 @@ def solve(system: System) -> None:
 
 
 @compiled_inside
-def with_friction(t: float, system: System, loops: Any) -> float:
-    """Go on from the multipliers without friction until they settle; power of the friction."""
-    power, passes = 0.0, 0
-    while not settle(system, passes):
-        passes += 1
-        power = rub(t, system, loops)
-        solve(system)
-    return power
-
-
-@compiled_inside
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers."""
     body, metric, force, kinds = system.body, system.metric, system.force, system.kinds
     x, C, settings = system.x, system.C, system.settings
-    place_bodies(y, body, metric)
-    call_loops(kinds[VALUE], kinds[VALUE + 1], t, body, system.F, system.idx,
-               system.par, system.groups, loops, force, force, force)  # fmt: skip
+    place(t, y, system, loops)
     linearise(t, system, loops)
     residuals(t, system, loops)
     stiffness, damping = settings[OMEGA] ** 2, 2.0 * settings[MU] * settings[OMEGA]
@@ -82,11 +69,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     assemble(system.targets, system.contributions, system.D, system.K)
     regularise(system.nodes, x, system.K)
     factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
-    if rubs(system):
-        keep_applied(system)
-    solve(system)
-    if rubs(system):
-        power += with_friction(t, system, loops)
+    power += solve_rubbing(t, system, loops, solve)
     return power + power_of_drivers(system)
 
 

@@ -30,6 +30,7 @@ from dap3d_core.formulations.constraints import (
     velocity_residuals,
 )
 from dap3d_core.formulations.friction import keep_applied, rub, rubs
+from dap3d_core.formulations.moves import add_displacement
 from dap3d_core.formulations.tangent import Tangent, turn_to_body
 from dap3d_core.kernels.cache import compiled_inside
 
@@ -61,37 +62,6 @@ def add_transposed(blocks: Integers, D: Floats, x: Floats, sign: float, g: Float
             for c in range(6):
                 g[b + c] += D[o + c] * s
             o += 6
-
-
-@compiled_inside
-def add_displacement(y: Floats, metric: Floats, force: Floats, out: Floats) -> None:
-    """Add the rates of r and p that belong to a scaled velocity in ``force``."""
-    for b in range(1, metric.shape[0]):
-        c, o, k = 7 * (b - 1), 6 * b, metric[b]
-        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
-        w0 = 0.5 * (k[1] * a0 + k[2] * a1 + k[3] * a2)
-        w1 = 0.5 * (k[4] * a1 + k[5] * a2)
-        w2 = 0.5 * k[6] * a2
-        e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
-        for d in range(3):
-            out[c + d] += k[0] * force[o + d]
-        out[c + 3] += -e1 * w0 - e2 * w1 - e3 * w2
-        out[c + 4] += e0 * w0 - e3 * w1 + e2 * w2
-        out[c + 5] += e3 * w0 + e0 * w1 - e1 * w2
-        out[c + 6] += -e2 * w0 + e1 * w1 + e0 * w2
-
-
-@compiled_inside
-def add_velocity(metric: Floats, force: Floats, out: Floats) -> None:
-    """Add a scaled velocity in ``force`` to the velocities (6 n,)."""
-    for b in range(1, metric.shape[0]):
-        f, o, k = 6 * (b - 1), 6 * b, metric[b]
-        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
-        for d in range(3):
-            out[f + d] += k[0] * force[o + d]
-        out[f + 3] += k[1] * a0 + k[2] * a1 + k[3] * a2
-        out[f + 4] += k[4] * a1 + k[5] * a2
-        out[f + 5] += k[6] * a2
 
 
 @compiled_inside

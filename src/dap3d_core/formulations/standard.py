@@ -25,7 +25,7 @@ from dap3d_core.formulations.constraints import (
     report_multipliers,
     solve_rows,
 )
-from dap3d_core.formulations.friction import keep_applied, rub, rubs, settle
+from dap3d_core.formulations.friction import solve_rubbing
 from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
 
 
@@ -38,27 +38,12 @@ def solve(system: System) -> None:
 
 
 @compiled_inside
-def with_friction(t: float, system: System, loops: Any) -> float:
-    """Go on from the multipliers without friction until they settle; power of the friction."""
-    power, passes = 0.0, 0
-    while not settle(system, passes):
-        passes += 1
-        power = rub(t, system, loops)
-        solve(system)
-    return power
-
-
-@compiled_inside
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers."""
     power = gather_forces(t, y, system, loops)
     linearise(t, system, loops)
     factorise(system, None)
-    if rubs(system):
-        keep_applied(system)
-    solve(system)
-    if rubs(system):
-        power += with_friction(t, system, loops)
+    power += solve_rubbing(t, system, loops, solve)
     return power + power_of_drivers(system)
 
 

@@ -11,14 +11,13 @@ tangent. Norms are the largest scaled component, as in control.py.
 import math
 from typing import Any
 
-from dap3d_core.assembly.evaluate import call_loops, place_bodies, zero
-from dap3d_core.assembly.system import VALUE, Floats, System
+from dap3d_core.assembly.evaluate import place, zero
+from dap3d_core.assembly.system import Floats, System
 from dap3d_core.formulations.constraints import linearise
+from dap3d_core.formulations.moves import add_displacement, add_velocity
 from dap3d_core.formulations.stage import (
     Matrix,
-    add_displacement,
     add_transposed,
-    add_velocity,
     couple_length,
     evaluate_stage,
     fill_matrix,
@@ -91,13 +90,11 @@ def find_tangent(
     the start of the step, three times faster than with that of its middle.
     """
     system = borrow(system)
-    kinds, force, argument = system.kinds, system.force, work.state[SCRATCH]
+    argument = work.state[SCRATCH]
     for k in range(argument.shape[0]):
         argument[k] = work.state[Y, k] + work.Z[2, k]
     at = t + h if work.integer[ACCEPTED] != 0 else t
-    place_bodies(argument, system.body, system.metric)
-    call_loops(kinds[VALUE], kinds[VALUE + 1], at, system.body, system.F, system.idx,
-               system.par, system.groups, loops, force, force, force)  # fmt: skip
+    place(at, argument, system, loops)
     linearise(at, system, loops)
     keep_state(system, matrix, work.own[PART])
     for k in range(system.x.shape[0]):

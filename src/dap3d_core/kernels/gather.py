@@ -1,5 +1,7 @@
 """What a group loop reads an instance's quantities with: vectors, matrices from rows of arrays."""
 
+import numpy as np
+
 from dap3d_core.kernels.inline import inlined
 from dap3d_core.kernels.mathematics import atan2
 from dap3d_core.kernels.vectors import add, cross, dot, rotate, sub
@@ -68,4 +70,4 @@ def angle_about(u, v, k):
 @inlined
 def unwound(angle, last):
     """The angle, whole turns added, that lies within half a turn of the last one."""
-    return angle + TURN * round((last - angle) / TURN)
+    return angle + TURN * np.rint((last - angle) / TURN)

@@ -159,7 +159,6 @@ class _Run:
         self.compiled = compiled
         self.machine = compiled.machine
         self.settings = settings
-        self.machine.set_penalty(settings.alpha, settings.Omega, settings.mu)
         self.times = report_times(settings.t_end, settings.dt)
         self.notes = [*compiled.notes, f"method {compiled.method}: {compiled.reason}"]
         self.rows: list[Floats] = []
