@@ -15,6 +15,7 @@ from dap3d_core.interface.binding import bind_friction, bind_functions
 from dap3d_core.interface.samples import random_pose, random_value
 from dap3d_core.interface.writer import LOOP_KINDS, stride, write
 from dap3d_core.kernels import gather
+from dap3d_core.kernels.lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.loops import build
 from dap3d_core.registry import load_registry
 
@@ -112,12 +113,14 @@ def run(examined, kind, body, rng):
     rows = getattr(examined.type, "rows", 1)
     F = np.array([[random_value((), rng) for _ in range(5)] for _ in range(2)])
     size = INSTANCES * 6 * max(rows, 2) * 3
-    arrays = (body, F, integers(examined), numbers(examined.layout, rng))
+    idx, par = integers(examined), numbers(examined.layout, rng)
+    arrays, loops = LoopArrays(body=body, F=F, idx=idx, par=par), loop_list([loop])
     outputs = (np.zeros(size), np.ones(size), np.zeros(size))
 
     def repeat(count):
+        group = np.array([0, 0, count])
         for _ in range(CALLS):
-            loop(0.3, *arrays, 0, 0, count, *outputs)
+            call_loop(loops, 0, 0.3, arrays, group, *outputs)
 
     return partial(repeat, INSTANCES), partial(repeat, 0)
 

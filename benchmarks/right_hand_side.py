@@ -14,7 +14,6 @@ import scenes
 from numba import config, njit
 from timing import median_seconds
 
-from dap3d_core.kernels.borrow import borrow
 from dap3d_core.simulation import CompiledModel
 
 SIZES = (1, 8, 64, 1000, 100_000)
@@ -26,7 +25,6 @@ WORK = 100_000
 def repeat(functions, count, y, out, system, loops):
     """Call the right-hand side of a formulation count times."""
     rhs = functions[0]
-    system = borrow(system)
     for _ in range(count):
         rhs(0.0, y, out, system, loops)
 

@@ -20,6 +20,7 @@ from dap3d_core.interface import (
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.interface.writer import write
 from dap3d_core.kernels import add, gather
+from dap3d_core.kernels.lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.loops import build
 
 ZERO = (0.0, 0.0, 0.0)
@@ -60,7 +61,8 @@ def test_a_vector_may_be_called_v_i():
     out = np.zeros(12)
     loop = build(write(examined, "wrench"))
     nothing = np.zeros(1)
-    loop(0.0, one, np.zeros((1, 5)), np.array([1]), par, 0, 0, 1, out, nothing, nothing)
+    arrays = LoopArrays(body=one, F=np.zeros((1, 5)), idx=np.array([1]), par=par)
+    call_loop(loop_list([loop]), 0, 0.0, arrays, np.array([0, 0, 1]), out, nothing, nothing)
     assert out[6:9] == pytest.approx(v + np.cross(w, A @ s), abs=1e-14)
     assert out[9:12] == pytest.approx(A @ a + np.cross(w, A @ a), abs=1e-14)
 
@@ -128,6 +130,7 @@ def test_variants_in_one_file_have_loops_of_their_own():
         out, nothing = np.zeros(12), np.zeros(1)
         body_array = np.zeros((2, gather.BODY_WIDTH))
         loop = build(write(one, "wrench"))
-        loop(2.5, body_array, np.zeros((1, 5)), np.array([1]), nothing, 0, 0, 1, out, nothing,
-             nothing)  # fmt: skip
+        arrays = LoopArrays(body=body_array, F=np.zeros((1, 5)), idx=np.array([1]), par=nothing)
+        group = np.array([0, 0, 1])
+        call_loop(loop_list([loop]), 0, 2.5, arrays, group, out, nothing, nothing)
         assert out[9] == sign * 2.5

@@ -11,7 +11,7 @@ from support.motions import Motion
 from support.own_types import registry_of
 
 import dap3d_core as dap
-from dap3d_core.assembly.evaluate import call_loops, place_bodies
+from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 from dap3d_core.assembly.system import ENERGY, VALUE, WRENCH
 from dap3d_core.interface import (
     Body,
@@ -193,8 +193,7 @@ def wrenches(scene, t, u):
     place_bodies(machine.integrated(u), s.body, s.metric)
     s.force[:] = 0.0
     for kind in (VALUE, WRENCH):
-        call_loops(s.kinds[kind], s.kinds[kind + 1], t, s.body, s.F, s.idx, s.par, s.groups,
-                   machine.loops, s.force, s.force, s.force)  # fmt: skip
+        call_kinds(kind, kind, t, s, machine.loops, s.force, s.force, s.force)
     assert np.array_equal(s.force[:6], np.zeros(6)) or scene.points["Q_k"].body == "ground"
     return s.force[6:].reshape(3, 6), machine
 
@@ -314,8 +313,7 @@ def test_an_element_on_each_body_has_its_own_constants():
     assert np.allclose(found[:, :3], wanted, **CLOSE)
     assert np.allclose(found[:, 3:], list(NOW.w.values()), **CLOSE)
     s, energy = machine.system, np.zeros(1)
-    call_loops(s.kinds[ENERGY], s.kinds[ENERGY + 1], T, s.body, s.F, s.idx, s.par, s.groups,
-               machine.loops, energy, energy, energy)  # fmt: skip
+    call_kinds(ENERGY, ENERGY, T, s, machine.loops, energy, energy, energy)
     assert energy[0] == pytest.approx(2.0 * sum(x[2] for x in NOW.r.values()), rel=1e-13)
 
 

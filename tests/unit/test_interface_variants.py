@@ -8,7 +8,7 @@ import pytest
 from support.own_types import registry_of
 
 import dap3d_core as dap
-from dap3d_core.assembly.evaluate import call_loops
+from dap3d_core.assembly.evaluate import call_kinds
 from dap3d_core.assembly.system import ANGLE
 from dap3d_core.interface import (
     Body,
@@ -263,8 +263,7 @@ def test_an_angle_is_unwound_by_the_last_accepted_one(owner):
 
     def keep():
         s = machine.system
-        call_loops(s.kinds[ANGLE], s.kinds[ANGLE + 1], 0.0, s.body, s.F, s.idx, s.par,
-                   s.groups, machine.loops, s.force, s.force, s.force)  # fmt: skip
+        call_kinds(ANGLE, ANGLE, 0.0, s, machine.loops, s.force, s.force, s.force)
 
     for degrees in (170.0, 190.0, 350.0, 370.0, 530.0):
         assert turn_to(degrees) == pytest.approx(3.0 * math.radians(degrees))

@@ -43,12 +43,15 @@ import numpy as np
 from dap3d_core.interface import examine
 from dap3d_core.interface.writer import write
 from dap3d_core.kernels.gather import BODY_WIDTH, MASS
+from dap3d_core.kernels.lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.loops import build, compiled_here
 from plugin import Push
 loop = build(write(examine(Push), "wrench"))
 body = np.zeros((2, BODY_WIDTH)); body[1, MASS] = 2.0
-F, idx, par, force = np.zeros((1, 4)), np.ones(1, dtype=np.int64), np.zeros(1), np.zeros(12)
-loop(0.0, body, F, idx, par, 0, 0, 1, force, force, force)
+arrays = LoopArrays(body=body, F=np.zeros((1, 5)), idx=np.ones(1, dtype=np.int64),
+                    par=np.zeros(1))
+force = np.zeros(12)
+call_loop(loop_list([loop]), 0, 0.0, arrays, np.array([0, 0, 1]), force, force, force)
 print(force[6], len(compiled_here))
 """
 #: Runs a pendulum and prints its last state, and how many functions were compiled on the way.

@@ -7,7 +7,8 @@ bodies; work.
 
 from typing import Any
 
-from dap3d_core.assembly.system import VALUE, Floats, Integers
+from dap3d_core.assembly.system import VALUE, Floats, System
+from dap3d_core.kernels.by_address import pointer
 from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
 
 
@@ -47,33 +48,29 @@ def place_bodies(y: Floats, body: Floats, metric: Floats) -> None:
 
 
 @compiled
-def call_loops(
+def call_kinds(
     first: int,
     last: int,
     t: float,
-    body: Floats,
-    F: Floats,
-    idx: Integers,
-    par: Floats,
-    groups: Integers,
+    system: System,
     loops: Any,
     out1: Floats,
     out2: Floats,
     out3: Floats,
 ) -> None:
-    """Call the group loops from first to last - 1."""
-    for q in range(first, last):
+    """Call the group loops of the kinds (assembly.system.KINDS) from first to last."""
+    groups, kinds = system.groups, system.kinds
+    p1, p2, p3 = pointer(out1), pointer(out2), pointer(out3)
+    for q in range(kinds[first], kinds[last + 1]):
         loop = loops[q]
-        loop(t, body, F, idx, par, groups[q, 0], groups[q, 1], groups[q, 2], out1, out2, out3)
+        loop(t, system, groups[q, 0], groups[q, 1], groups[q, 2], p1, p2, p3)
 
 
 @compiled_into
-def place(t: float, y: Floats, system: Any, loops: Any) -> None:
+def place(t: float, y: Floats, system: System, loops: Any) -> None:
     """Bodies and functions of time as they are at time t in the state y; writes into ``force``."""
     place_bodies(y, system.body, system.metric)
-    call_loops(system.kinds[VALUE], system.kinds[VALUE + 1], t, system.body, system.F, system.idx,
-               system.par, system.groups, loops, system.force, system.force,
-               system.force)  # fmt: skip
+    call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
 
 
 @compiled_inside

@@ -1,26 +1,18 @@
 """The system: every array that the compiled driver works on.
 
-Made from a model and its elimination plan (formulations/build.py). The arrays are one named tuple,
-which costs little to pass; the loops are an argument of their own (docs/decisions/0001).
+Made from a model and its elimination plan (formulations/build.py). The arrays are handed on by one
+address; the loops are an argument of their own (docs/decisions/0001).
 """
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar
 
+import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.kernels.by_address import INTEGER_MATRIX, INTEGERS, MATRIX
 from dap3d_core.kernels.cache import compiled, jit_is_on
-from dap3d_core.kernels.lists import (
-    INTEGER_MATRIX,
-    INTEGERS,
-    MATRIX,
-    VECTOR,
-    List,
-    fill,
-    function_type,
-    named_tuple_type,
-    step_signature,
-)
+from dap3d_core.kernels.lists import List, LoopArrays, fill, function_type, step_signature
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -36,13 +28,20 @@ VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, SWITCH = range(l
 TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SETTINGS = range(8)
 
 
-class System(NamedTuple):
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class System(LoopArrays):
     """Arrays of the driver. n bodies, ground is 0; rows in the order of the plan."""
 
-    body: Floats  # (n+1, BODY_WIDTH) state and constants of each body (kernels/gather.py)
+    types: ClassVar[dict[str, Any]] = LoopArrays.types | {
+        "metric": MATRIX,
+        **dict.fromkeys(("kinds", "row"), INTEGERS),
+        **dict.fromkeys(
+            ("groups", "blocks", "targets", "contributions", "nodes", "columns", "updates", "hubs"),
+            INTEGER_MATRIX,
+        ),
+    }
+
     metric: Floats  # (n+1, 16): 1/sqrt(m); U = L^-T by rows, upper triangle; B = A U by rows
-    F: Floats  # (functions+1, 5) functions of time, at t and (the last column) at 0
-    par: Floats  # numbers of all instances
     force: Floats  # (6 (n+1),) force and moment on each body; then the acceleration
     gamma: Floats  # (rows,)
     nu: Floats  # (rows,)
@@ -53,7 +52,6 @@ class System(NamedTuple):
     smallest: Floats  # (rows,) a pivot not above this is singular
     settings: Floats  # (SETTINGS,) see above
     friction: Floats  # where joints rub: two of the size of ``force``, three of the size of ``x``
-    idx: Integers  # integers of all instances
     groups: Integers  # (loops, 3) i0, p0, count
     kinds: Integers  # (KINDS + 1,) first loop of each kind
     row: Integers  # (model rows,) place of each constraint row in the row vectors
@@ -66,24 +64,7 @@ class System(NamedTuple):
     hubs: Integers
 
 
-_matrices = ("body", "metric", "F")
-_integers = ("idx", "kinds", "row")
-_floats = (
-    "par", "force", "gamma", "nu", "C", "x", "D", "K", "smallest", "settings",
-    "friction",
-)  # fmt: skip
-
-
-def _member_type(name: str) -> Any:
-    if name in _matrices:
-        return MATRIX
-    if name in _floats:
-        return VECTOR
-    return INTEGERS if name in _integers else INTEGER_MATRIX
-
-
-SYSTEM = named_tuple_type(System, [_member_type(name) for name in System._fields])
-STEP = step_signature(SYSTEM)
+STEP = step_signature(System.type_of())
 STEP_TYPE = function_type(STEP)
 
 

@@ -5,7 +5,7 @@
 
 from typing import Any
 
-from dap3d_core.assembly.evaluate import call_loops, place
+from dap3d_core.assembly.evaluate import call_kinds, place
 from dap3d_core.assembly.system import ANGLE, SCRATCH, SWITCH, Floats, System
 from dap3d_core.kernels.cache import compiled
 
@@ -13,9 +13,8 @@ from dap3d_core.kernels.cache import compiled
 @compiled
 def accepted(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Count turns at a state; out[0] = the lowest switch, negative where the run is to end."""
-    kinds, value = system.kinds, system.settings[SCRATCH : SCRATCH + 1]
+    value = system.settings[SCRATCH : SCRATCH + 1]
     place(t, y, system, loops)
     value[0] = 1.0
-    call_loops(kinds[ANGLE], kinds[SWITCH + 1], t, system.body, system.F, system.idx,
-               system.par, system.groups, loops, value, value, value)  # fmt: skip
+    call_kinds(ANGLE, SWITCH, t, system, loops, value, value, value)
     out[0] = value[0]

@@ -11,7 +11,7 @@ As None it is known when the code is compiled, so that ``standard`` has no line 
 from typing import Any
 
 from dap3d_core.assembly.evaluate import (
-    call_loops,
+    call_kinds,
     largest,
     place,
     place_bodies,
@@ -59,9 +59,8 @@ LOST = 1e6
 @compiled_into
 def linearise(t: float, system: System, loops: Any) -> None:
     """D^, gamma and nu of all joints at the bodies as placed."""
-    kinds, D = system.kinds, system.D
-    call_loops(kinds[ACCELERATION], kinds[ACCELERATION + 1], t, system.body, system.F, system.idx,
-               system.par, system.groups, loops, D, system.gamma, system.nu)  # fmt: skip
+    D = system.D
+    call_kinds(ACCELERATION, ACCELERATION, t, system, loops, D, system.gamma, system.nu)
     scale_blocks(system.blocks, D, system.metric)
 
 
@@ -85,11 +84,10 @@ def gather_forces(t: float, y: Floats, system: System, loops: Any) -> float:
 
     Functions of time stand ready after that.
     """
-    body, metric, force, kinds = system.body, system.metric, system.force, system.kinds
+    body, metric, force = system.body, system.metric, system.force
     place_bodies(y, body, metric)
     zero(force)
-    call_loops(kinds[VALUE], kinds[WRENCH + 1], t, body, system.F, system.idx,
-               system.par, system.groups, loops, force, force, force)  # fmt: skip
+    call_kinds(VALUE, WRENCH, t, system, loops, force, force, force)
     return scale_forces(body, metric, force)
 
 
@@ -112,10 +110,9 @@ def power_of_drivers(system: System) -> float:
 @compiled_inside
 def residuals(t: float, system: System, loops: Any) -> float:
     """Position-level residuals (zero where a row has none) into C; returns the largest size."""
-    kinds, C = system.kinds, system.C
+    C = system.C
     zero(C)
-    call_loops(kinds[POSITION], kinds[POSITION + 1], t, system.body, system.F, system.idx,
-               system.par, system.groups, loops, C, C, C)  # fmt: skip
+    call_kinds(POSITION, POSITION, t, system, loops, C, C, C)
     return largest(C)
 
 
@@ -206,7 +203,7 @@ def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
 
     That is the potential energy and the largest residuals of position, velocity and acceleration.
     """
-    kinds, value, C = system.kinds, system.settings[SCRATCH : SCRATCH + 1], system.C
+    value, C = system.settings[SCRATCH : SCRATCH + 1], system.C
     last = out.shape[0] - 4
     for k in range(C.shape[0]):
         C[k] = -system.gamma[k]
@@ -215,8 +212,7 @@ def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
     out[last + 2] = velocity_residuals(system)
     out[last + 1] = residuals(t, system, loops)
     value[0] = 0.0
-    call_loops(kinds[ENERGY], kinds[ENERGY + 1], t, system.body, system.F, system.idx,
-               system.par, system.groups, loops, value, value, value)  # fmt: skip
+    call_kinds(ENERGY, ENERGY, t, system, loops, value, value, value)
     out[last] = value[0]
 
 

@@ -11,7 +11,7 @@ equal accelerations, whatever came before. Each pass is accelerated by one secan
 from collections.abc import Callable
 from typing import Any
 
-from dap3d_core.assembly.evaluate import call_loops, zero
+from dap3d_core.assembly.evaluate import call_kinds, zero
 from dap3d_core.assembly.system import FRICTION, UNSETTLED, System
 from dap3d_core.kernels.cache import compiled_inside, compiled_into
 
@@ -37,12 +37,11 @@ def keep_applied(system: System) -> None:
 @compiled_inside
 def rub(t: float, system: System, loops: Any) -> float:
     """Friction for the multipliers in x, added to the scaled applied forces; returns its power."""
-    kinds, body, metric, force = system.kinds, system.body, system.metric, system.force
+    body, metric, force = system.body, system.metric, system.force
     size = force.shape[0]
     applied, rubbing = system.friction[:size], system.friction[size : 2 * size]
     zero(rubbing)
-    call_loops(kinds[FRICTION], kinds[FRICTION + 1], t, body, system.F, system.idx,
-               system.par, system.groups, loops, rubbing, system.x, system.x)  # fmt: skip
+    call_kinds(FRICTION, FRICTION, t, system, loops, rubbing, system.x, system.x)
     power = 0.0
     for k in range(6):
         force[k] = 0.0

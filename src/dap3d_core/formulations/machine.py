@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dap3d_core.assembly.evaluate import call_loops, place_bodies
+from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 from dap3d_core.assembly.system import (
     ACCELERATION,
     ALPHA,
@@ -214,8 +214,7 @@ class Machine:
 
     def _call(self, kind: int, t: float, out1: Floats, out2: Floats, out3: Floats) -> None:
         s = self.system
-        call_loops(s.kinds[kind], s.kinds[kind + 1], float(t), s.body, s.F, s.idx,
-                   s.par, s.groups, self.loops, out1, out2, out3)  # fmt: skip
+        call_kinds(kind, kind, float(t), s, self.loops, out1, out2, out3)
 
     @cached_property
     def pattern(self) -> tuple[Integers, Integers, Integers]:

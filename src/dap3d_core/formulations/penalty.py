@@ -15,7 +15,7 @@ masses' digits would be lost. Rows may depend on each other. C is zero on rows t
 from typing import Any
 
 from dap3d_core.assembly.evaluate import (
-    call_loops,
+    call_kinds,
     global_accelerations,
     place,
     rates,
@@ -50,7 +50,7 @@ def solve(system: System) -> None:
 @compiled_inside
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers."""
-    body, metric, force, kinds = system.body, system.metric, system.force, system.kinds
+    body, metric, force = system.body, system.metric, system.force
     x, C, settings = system.x, system.C, system.settings
     place(t, y, system, loops)
     linearise(t, system, loops)
@@ -63,8 +63,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
         C[k] = x[k] - damping * C[k]
         x[k] = 1.0 / settings[ALPHA]
     zero(force)
-    call_loops(kinds[WRENCH], kinds[WRENCH + 1], t, body, system.F, system.idx,
-               system.par, system.groups, loops, force, force, force)  # fmt: skip
+    call_kinds(WRENCH, WRENCH, t, system, loops, force, force, force)
     power = scale_forces(body, metric, force)
     assemble(system.targets, system.contributions, system.D, system.K)
     regularise(system.nodes, x, system.K)

@@ -18,7 +18,9 @@ A row without a position level has mu = 0 as its equation.
 # What a compiled function returns is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar
+
+import attrs
 
 from dap3d_core.assembly.evaluate import rates, zero
 from dap3d_core.assembly.system import Floats, Integers, System
@@ -32,11 +34,21 @@ from dap3d_core.formulations.constraints import (
 from dap3d_core.formulations.friction import keep_applied, rub, rubs
 from dap3d_core.formulations.moves import add_displacement
 from dap3d_core.formulations.tangent import Tangent, turn_to_body
+from dap3d_core.kernels.by_address import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays
 from dap3d_core.kernels.cache import compiled_inside
 
 
-class Matrix(NamedTuple):
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class Matrix(Arrays):
     """Where the parts of s - J stand, and what is kept of the state that it belongs to."""
+
+    types: ClassVar[dict[str, Any]] = {
+        **dict.fromkeys(
+            ("nodes", "columns", "updates", "block_place", "joint_place"), INTEGER_MATRIX
+        ),
+        **dict.fromkeys(("body_first", "body_place", "pair_place", "held"), INTEGERS),
+        "spin": MATRIX,
+    }
 
     nodes: Integers  # of linear.lu_plan.LuPlan, as the next two
     columns: Integers

@@ -22,11 +22,15 @@ axes in which its moment acts is in it; the gyroscopic moment is added in closed
 # mypy: disable-error-code="no-any-return"
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, ClassVar
+
+import attrs
 
 from dap3d_core.assembly.evaluate import largest, zero
 from dap3d_core.assembly.system import Floats, Integers, System
+from dap3d_core.kernels.by_address import INTEGER_MATRIX, INTEGERS, Arrays
 from dap3d_core.kernels.cache import compiled_inside
+from dap3d_core.kernels.lists import call_loop
 
 #: Step of the differences: the cube root of a rounding balances its error with that of the formula.
 PART = 6e-6
@@ -41,8 +45,15 @@ SLOTS = 3
 LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY = range(9)
 
 
-class Tangent(NamedTuple):
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class Tangent(Arrays):
     """What the differences need, and what they give."""
+
+    types: ClassVar[dict[str, Any]] = {
+        "elements": INTEGER_MATRIX,
+        "pairs": INTEGERS,
+        "blocks": INTEGER_MATRIX,
+    }
 
     elements: Integers  # (groups, 9): LOOP, KIND, ...; ROW_AT: where in idx the joint's row stands
     pairs: Integers  # places in ``coupling`` for the slots (a, b) of each element, -1 for none
@@ -97,26 +108,6 @@ def rotate_body(s: Floats, saved: Floats, axis: int, angle: float) -> None:
 
 
 @compiled_inside
-def call_one(
-    g: int,
-    t: float,
-    body: Floats,
-    F: Floats,
-    idx: Integers,
-    par: Floats,
-    i0: int,
-    p0: int,
-    loops: Any,
-    out1: Floats,
-    out2: Floats,
-    out3: Floats,
-) -> None:
-    """Call group loop g for the one instance at i0, p0."""
-    loop = loops[g]
-    loop(t, body, F, idx, par, i0, p0, 1, out1, out2, out3)
-
-
-@compiled_inside
 def call_element(
     t: float, e: int, q: int, x: Floats, out: Floats, system: System, loops: Any, tangent: Tangent
 ) -> None:
@@ -129,8 +120,7 @@ def call_element(
         for c in range(6 * idx[i0 + n], 6 * idx[i0 + n] + 6):
             force[c] = 0.0
     if kind == JOINT_ELEMENT:
-        call_one(g, t, body, system.F, idx, system.par, i0, p0, loops, D, tangent.gamma,
-                 tangent.nu)  # fmt: skip
+        call_loop(loops, g, t, system, (i0, p0, 1), D, tangent.gamma, tangent.nu)
         r0, at = idx[i0 + row[ROW_AT]], i0 + row[ROW_AT] + 1
         for r in range(row[ROWS]):
             rate = -tangent.nu[r0 + r]
@@ -142,7 +132,7 @@ def call_element(
                         force[6 * b + c] -= D[d + c] * x[r0 + r]
             out[6 * slots + r] = rate
     else:
-        call_one(g, t, body, system.F, idx, system.par, i0, p0, loops, force, x, x)
+        call_loop(loops, g, t, system, (i0, p0, 1), force, x, x)
     for n in range(slots):
         b = idx[i0 + n]
         for c in range(3):

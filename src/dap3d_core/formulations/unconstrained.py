@@ -6,7 +6,7 @@
 from typing import Any
 
 from dap3d_core.assembly.evaluate import (
-    call_loops,
+    call_kinds,
     global_accelerations,
     place_bodies,
     rates,
@@ -21,11 +21,10 @@ from dap3d_core.kernels.cache import compiled, compiled_inside
 @compiled_inside
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled accelerations into ``force``; returns the power of the forces."""
-    body, metric, force, kinds = system.body, system.metric, system.force, system.kinds
+    body, metric, force = system.body, system.metric, system.force
     place_bodies(y, body, metric)
     zero(force)
-    call_loops(kinds[VALUE], kinds[WRENCH + 1], t, body, system.F, system.idx,
-               system.par, system.groups, loops, force, force, force)  # fmt: skip
+    call_kinds(VALUE, WRENCH, t, system, loops, force, force, force)
     return scale_forces(body, metric, force)
 
 
@@ -47,12 +46,11 @@ def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> Non
 @compiled
 def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """v_dot (6 n, global axes), potential energy, and zeros for the three levels of constraints."""
-    kinds, value = system.kinds, system.settings[2:3]
+    value = system.settings[2:3]
     last = 6 * (system.body.shape[0] - 1)
     accelerate(t, y, system, loops)
     global_accelerations(system.metric, system.force, out)
     value[0] = 0.0
-    call_loops(kinds[ENERGY], kinds[ENERGY + 1], t, system.body, system.F, system.idx,
-               system.par, system.groups, loops, value, value, value)  # fmt: skip
+    call_kinds(ENERGY, ENERGY, t, system, loops, value, value, value)
     out[last] = value[0]
     out[last + 1] = out[last + 2] = out[last + 3] = 0.0

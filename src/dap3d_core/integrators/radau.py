@@ -73,7 +73,6 @@ from dap3d_core.integrators.work import (
     T,
     Y,
 )
-from dap3d_core.kernels.borrow import borrow
 from dap3d_core.kernels.cache import compiled, compiled_inside
 
 #: A step is not longer than this many of the one before, and not shorter than this part of it.
@@ -101,7 +100,6 @@ def advance(
 ) -> None:
     """Go on until more than ``budget`` stages are evaluated, the rows are full, or the run ends."""
     rhs, project, report = functions[0], functions[1], functions[2]
-    system = borrow(system)
     real, integer, times = work.real, work.integer, work.times
     limit = integer[RHS] + budget
     while integer[STATUS] == RUNNING:

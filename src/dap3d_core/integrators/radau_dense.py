@@ -12,7 +12,7 @@ polynomial's, moved onto D v_dot = gamma, since the multipliers of the stages ar
 
 from typing import Any
 
-from dap3d_core.assembly.evaluate import call_loops, place_bodies, rates, zero
+from dap3d_core.assembly.evaluate import call_kinds, place_bodies, rates, zero
 from dap3d_core.assembly.system import VALUE, Floats, System
 from dap3d_core.formulations.constraints import PART, correct, factorise, linearise
 from dap3d_core.formulations.stage import Matrix
@@ -27,7 +27,6 @@ from dap3d_core.integrators.radau_work import (
     RadauWork,
 )
 from dap3d_core.integrators.work import H_DENSE, T_DENSE, TRIAL, T, Y
-from dap3d_core.kernels.borrow import borrow
 from dap3d_core.kernels.cache import compiled, compiled_inside
 from dap3d_core.linear.blocks import add_product
 
@@ -43,15 +42,14 @@ def find_slope(
     matrix: Matrix,
 ) -> float:
     """dy/dt at the trial state, at t + h, into TRIAL_SLOPE."""
-    t1, system = t + h, borrow(system)
+    t1 = t + h
     y, out = work.state[TRIAL], work.state[TRIAL_SLOPE]
     inverse, stages = work.method.inverse, work.Z
-    force, kinds, metric, C = system.force, system.kinds, system.metric, system.C
+    force, metric, C = system.force, system.metric, system.C
     n = metric.shape[0] - 1
     place_bodies(y, system.body, metric)
     if system.row.shape[0] > 0:
-        call_loops(kinds[VALUE], kinds[VALUE + 1], t1, system.body, system.F, system.idx,
-                   system.par, system.groups, loops, force, force, force)  # fmt: skip
+        call_kinds(VALUE, VALUE, t1, system, loops, force, force, force)
         linearise(t1, system, loops)
         scale_slopes(inverse, stages, h, metric, force)
         for k in range(C.shape[0]):

@@ -5,19 +5,24 @@ and their code RADAU5.
 """
 
 from functools import cache
-from typing import NamedTuple
+from typing import Any, ClassVar
 
+import attrs
 import numpy as np
 
 from dap3d_core.integrators.method import Floats
+from dap3d_core.kernels.by_address import MATRIX, Arrays
 
 STAGES = 3
 #: Order of the method, and of its error estimate plus one.
 ORDER, ERROR_ORDER = 5, 4
 
 
-class RadauMethod(NamedTuple):
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class RadauMethod(Arrays):
     """Radau IIA; T^-1 A^-1 T = [[gamma, 0, 0], [0, alpha, -beta], [0, beta, alpha]]."""
+
+    types: ClassVar[dict[str, Any]] = dict.fromkeys(("A", "inverse", "T", "T_inverse"), MATRIX)
 
     c: Floats  # (3,) abscissae
     A: Floats  # (3, 3); its last row holds the weights
@@ -47,4 +52,12 @@ def radau_method() -> RadauMethod:
     poles = np.array([values[real].real, values[pair].real, -values[pair].imag])
     e = np.array([-(13 + 7 * q) / 3, (-13 + 7 * q) / 3, -1 / 3])
     c = np.array([(4 - q) / 10, (4 + q) / 10, 1.0])
-    return RadauMethod(c, A, inverse, np.ascontiguousarray(T), np.linalg.inv(T), e, poles)
+    return RadauMethod(
+        c=c,
+        A=A,
+        inverse=inverse,
+        T=np.ascontiguousarray(T),
+        T_inverse=np.linalg.inv(T),
+        e=e,
+        poles=poles,
+    )

@@ -55,7 +55,6 @@ from dap3d_core.integrators.work import (
     TRIAL,
     Y,
 )
-from dap3d_core.kernels.borrow import borrow
 from dap3d_core.kernels.cache import compiled, compiled_inside
 from dap3d_core.linear.lu import factor_lu, solve_lu
 
@@ -89,7 +88,6 @@ def find_tangent(
     most: on the governor of A05 the iteration converges 20 times faster than with the tangent at
     the start of the step, three times faster than with that of its middle.
     """
-    system = borrow(system)
     argument = work.state[SCRATCH]
     for k in range(argument.shape[0]):
         argument[k] = work.state[Y, k] + work.Z[2, k]
@@ -297,7 +295,6 @@ def find_stages(
         0 where they are found; else the factor on the step that is to be tried; NaN where a number
         is not finite.
     """
-    system = borrow(system)
     own, integer = work.own, work.integer
     limit = newton_limit(work)
     own[FACCON] = max(own[FACCON], ROUNDING) ** 0.8
@@ -349,7 +346,6 @@ def estimate_error(
     are those at the end of the last step: an error of theirs acts along D^T, which the matrix takes
     away only as far as its own D is that of the state.
     """
-    system = borrow(system)
     again = work.integer[ACCEPTED] == 0 or work.integer[LAST_REJECTED] != 0
     real, y, argument, e = work.real, work.state[Y], work.state[SCRATCH], work.method.e
     multipliers, error = work.last_multipliers[2], 0.0

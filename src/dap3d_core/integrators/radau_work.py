@@ -1,10 +1,14 @@
 """The state of an implicit integration: arrays that the compiled core reads and writes."""
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar
+
+import attrs
 
 from dap3d_core.integrators.method import Floats, Integers
 from dap3d_core.integrators.radau_method import RadauMethod
 from dap3d_core.integrators.work import INTEGERS, STATES
+from dap3d_core.kernels.by_address import COMPLEX_VECTOR, MATRIX, TENSOR, Arrays
+from dap3d_core.kernels.by_address import INTEGERS as INTEGER_VECTOR
 
 # Places in ``own``. FACCON and THETA: as in HW II, IV.8, (8.10); length of the last accepted step,
 # and of the one the factors belong to; error of the last accepted step; what regularises the rows
@@ -29,12 +33,22 @@ OLD, SLOPE, OLD_SLOPE, TRIAL_SLOPE, RADAU_STATES = range(STATES, STATES + 5)
 TERMS = 6
 
 
-class RadauWork(NamedTuple):
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class RadauWork(Arrays):
     """All that ``advance`` reads and writes besides system, tangent and matrix.
 
     n = 13 bodies + 1 components, R rows, N unknowns; mu and lambda are the two multipliers of each
     row, C and D v - nu its two residuals.
     """
+
+    types: ClassVar[dict[str, Any]] = {
+        **dict.fromkeys(("integer", "pivots", "pivotsc"), INTEGER_VECTOR),
+        **dict.fromkeys(("state", "k", "terms", "rows", "Z", "Z_old", "F", "R", "x", "along"),
+                        MATRIX),
+        **dict.fromkeys(("multipliers", "last_multipliers", "G", "frames"), TENSOR),
+        **dict.fromkeys(("xc", "alongc", "Kc"), COMPLEX_VECTOR),
+        "method": RadauMethod.type_of(),
+    }  # fmt: skip
 
     real: Floats  # (LENGTHS + m,) as in work.Work
     own: Floats  # (OWN,)

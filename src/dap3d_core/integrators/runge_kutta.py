@@ -80,7 +80,6 @@ from dap3d_core.integrators.work import (
     Work,
     Y,
 )
-from dap3d_core.kernels.borrow import borrow
 from dap3d_core.kernels.cache import compiled, compiled_inside
 
 #: Factor on a step that met a number that is not finite, or whose end could not be projected.
@@ -105,7 +104,6 @@ def advance(
     At least one step is tried in each call, whatever the budget.
     """
     rhs, project, report = functions[0], functions[1], functions[2]
-    system = borrow(system)
     real, integer, times = work.real, work.integer, work.times
     limit = integer[RHS] + budget
     while integer[STATUS] == RUNNING:

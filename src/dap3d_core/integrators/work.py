@@ -2,9 +2,13 @@
 
 from collections.abc import Callable
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, ClassVar
+
+import attrs
 
 from dap3d_core.integrators.method import Floats, Integers
+from dap3d_core.kernels.by_address import INTEGERS as INTEGER_VECTOR
+from dap3d_core.kernels.by_address import MATRIX, Arrays
 
 #: ``f(t, y, out, system, loops)``: rhs, project, report or accepted (runge_kutta.py).
 Function = Callable[..., None]
@@ -44,8 +48,14 @@ STEPS, REJECTED, RHS, PROJECTIONS, REPORTS, POOR, INTEGERS = range(15, 22)
 Y, TRIAL, SCRATCH, OTHER, STATES = range(5)
 
 
-class Work(NamedTuple):
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class Work(Arrays):
     """All that ``advance`` reads and writes; n components, S stages (method.Method)."""
+
+    types: ClassVar[dict[str, Any]] = {
+        "integer": INTEGER_VECTOR,
+        **dict.fromkeys(("state", "k", "terms", "rows", "table", "lengths"), MATRIX),
+    }
 
     real: Floats  # (LENGTHS + m,) m lengths that project gives
     integer: Integers  # (INTEGERS,)

@@ -5,28 +5,33 @@ two cached functions of known signature. Where kernels run as plain Python the l
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
-from numba import complex128, float64, int64, types
+import attrs
+from numba import float64, int64, types
 from numba.typed import List
 
+from dap3d_core.kernels.by_address import INTEGERS, MATRIX, VECTOR, Arrays, pointer
 from dap3d_core.kernels.cache import compiled, jit_is_on
 
-VECTOR, MATRIX = types.Array(float64, 1, "C"), types.Array(float64, 2, "C")
-INTEGERS, INTEGER_MATRIX = types.Array(int64, 1, "C"), types.Array(int64, 2, "C")
-TENSOR, COMPLEX_VECTOR = types.Array(float64, 3, "C"), types.Array(complex128, 1, "C")
 
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class LoopArrays(Arrays):
+    """What every group loop reads; the driver's system begins with it."""
+
+    types: ClassVar[dict[str, Any]] = {"body": MATRIX, "F": MATRIX, "idx": INTEGERS}
+
+    body: Any  # (n+1, BODY_WIDTH) state and constants of each body (gather.py)
+    F: Any  # (functions+1, 5) functions of time, at t and (the last column) at 0
+    idx: Any  # integers of all instances
+    par: Any  # numbers of all instances
+
+
+_OUT = types.CPointer(float64)
 #: Signature of every group loop (loops.py).
-LOOP = types.void(
-    float64, MATRIX, MATRIX, INTEGERS, VECTOR, int64, int64, int64, VECTOR, VECTOR, VECTOR
-)
+LOOP = types.void(float64, LoopArrays.type_of(), int64, int64, int64, _OUT, _OUT, _OUT)
 LOOP_TYPE = types.FunctionType(LOOP)
 LOOP_LIST = types.ListType(LOOP_TYPE)
-
-
-def named_tuple_type(class_: type, members: Sequence[Any]) -> Any:
-    """The compiled code's type of a NamedTuple of arrays; the class must be importable."""
-    return types.NamedTuple(list(members), class_)
 
 
 def step_signature(system: Any) -> Any:
@@ -80,22 +85,26 @@ def loop_list(loops: Sequence[Callable]) -> Any:
     return fill(_empty, _append, LOOP_TYPE, loops)
 
 
+@compiled
+def call_loop(
+    loops: Any, q: int, t: float, arrays: Any, group: Any, out1: Any, out2: Any, out3: Any
+) -> None:
+    """Call one group loop, with arrays and a group (i0, p0, count) of the caller's."""
+    loop = loops[q]
+    loop(t, arrays, group[0], group[1], group[2], pointer(out1), pointer(out2), pointer(out3))
+
+
 __all__ = [
-    "COMPLEX_VECTOR",
-    "INTEGERS",
-    "INTEGER_MATRIX",
     "LOOP",
     "LOOP_LIST",
     "LOOP_TYPE",
-    "MATRIX",
-    "TENSOR",
-    "VECTOR",
     "List",
+    "LoopArrays",
+    "call_loop",
     "fill",
     "function_type",
     "list_type",
     "loop_list",
-    "named_tuple_type",
     "number_signature",
     "step_signature",
 ]

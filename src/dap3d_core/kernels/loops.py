@@ -4,12 +4,11 @@ A loop is written as the source of a small module: gather the named quantities o
 the kernel, store what it returns. All loops have one signature, so that the driver holds them in
 one list and is never recompiled for a new type:
 
-    loop(t, body, F, idx, par, i0, p0, count, out1, out2, out3)
+    loop(t, arrays, i0, p0, count, out1, out2, out3)
 
-    body (n+1, BODY_WIDTH)  state and constants of each body, ground first (columns: gather.py)
-    F    (functions+1, 5)   f, f', f'', f''' of each function at t, f at 0; row 0 is the absent one
-    idx, par                integers and numbers of all instances; this group's begin at i0 and p0
-    out1, out2, out3        what the kernels return
+    arrays            body, F, idx, par (lists.LoopArrays); row 0 of F is the absent function
+    i0, p0            where this group's integers and numbers begin in idx and par
+    out1, out2, out3  what the kernels return, flat (by_address.pointer)
 """
 
 import importlib.util
@@ -46,7 +45,8 @@ def source_of(loop: Loop) -> str:
     head = (
         f'"""Group loop of {loop.name}; written by dap3d, do not edit."""\n\n'
         "from dap3d_core.kernels.gather import *\n\n\n"
-        "def loop(t, body, F, idx, par, i0, p0, count, out1, out2, out3):\n"
+        "def loop(t, arrays, i0, p0, count, out1, out2, out3):\n"
+        "    body, F, idx, par = arrays.body, arrays.F, arrays.idx, arrays.par\n"
         "    for q in range(count):\n"
     )
     return head + "".join(f"        {line}\n" for line in loop.lines)

@@ -130,9 +130,10 @@ class _OwnElement:
 
     def call(self, kind: str, time: float, out: Floats) -> None:
         """Run a loop, where there is one, on the bodies as they stand; it adds to an array."""
-        from dap3d_core.assembly.evaluate import call_loops
+        from dap3d_core.kernels.lists import LoopArrays, call_loop
 
         if self.has(kind):
-            s, q = self._machine.system, self._loops[kind]
-            call_loops(q, q + 1, time, s.body, s.F, s.idx, self._par, self._groups,
-                       self._machine.loops, out, out, out)  # fmt: skip
+            s = self._machine.system
+            arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=self._par)
+            q, loops = self._loops[kind], self._machine.loops
+            call_loop(loops, q, time, arrays, self._groups[q], out, out, out)

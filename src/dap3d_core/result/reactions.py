@@ -113,15 +113,14 @@ def reactions(
 
 def placed(machine: "Machine", t: Floats, u: Floats) -> Iterator[tuple[int, float]]:
     """Put the bodies and functions of a machine to each instant in turn: its place, the time."""
-    from dap3d_core.assembly.evaluate import call_loops, place_bodies
+    from dap3d_core.assembly.evaluate import call_kinds, place_bodies
     from dap3d_core.assembly.system import VALUE
 
     s = machine.system
     for k, y in enumerate(machine.integrated(u) if len(t) else ()):
         time = float(t[k])
         place_bodies(y, s.body, s.metric)
-        call_loops(s.kinds[VALUE], s.kinds[VALUE + 1], time, s.body, s.F, s.idx, s.par, s.groups,
-                   machine.loops, s.force, s.force, s.force)  # fmt: skip
+        call_kinds(VALUE, VALUE, time, s, machine.loops, s.force, s.force, s.force)
         yield k, time
 
 
@@ -175,16 +174,15 @@ class _OwnLoop:
         self._idx = idx.ravel()
         par = s.par[p0 : p0 + group.count * numbers].reshape(group.count, numbers)
         self._par = np.concatenate([s.par, par[places].ravel()])  # tables keep their places
-        self._groups = s.groups.copy()
-        self._groups[q] = 0, len(s.par), count
+        self._group = np.array([0, len(s.par), count])
         self._D = np.zeros((count, slots, rows, 6))
         self._gamma, self._nu = np.zeros(count * rows), np.zeros(count * rows)
 
     def wrenches(self, time: float, Lam: Floats) -> Floats:
         """(joints, slots, 6) D^T lambda where the bodies stand, with multipliers Lam (m,)."""
-        from dap3d_core.assembly.evaluate import call_loops
+        from dap3d_core.kernels.lists import LoopArrays, call_loop
 
         s, D = self.machine.system, self._D.reshape(-1)
-        call_loops(self.q, self.q + 1, time, s.body, s.F, self._idx, self._par,
-                   self._groups, self.machine.loops, D, self._gamma, self._nu)  # fmt: skip
+        arrays = LoopArrays(body=s.body, F=s.F, idx=self._idx, par=self._par)
+        call_loop(self.machine.loops, self.q, time, arrays, self._group, D, self._gamma, self._nu)
         return np.asarray(np.einsum("msrv,mr->msv", self._D, Lam[self._rows]))

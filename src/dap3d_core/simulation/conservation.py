@@ -7,7 +7,7 @@ few states taken at random about the start.
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.assembly.evaluate import call_loops, place_bodies
+from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 from dap3d_core.assembly.system import ENERGY, VALUE, WRENCH
 from dap3d_core.formulations.machine import AS_COMPILED, Machine
 from dap3d_core.model.kinematics import join, split, to_global
@@ -85,5 +85,4 @@ def _energy(machine: Machine, r: Floats, p: Floats, v: Floats, w: Floats, h: flo
 
 def _call(machine: Machine, kind: int, out: Floats) -> None:
     s = machine.system
-    call_loops(s.kinds[kind], s.kinds[kind + 1], 0.0, s.body, s.F, s.idx, s.par, s.groups,
-               machine.loops, out, out, out)  # fmt: skip
+    call_kinds(kind, kind, 0.0, s, machine.loops, out, out, out)

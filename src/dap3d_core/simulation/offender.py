@@ -9,6 +9,7 @@ from dap3d_core.assembly.evaluate import place_bodies
 from dap3d_core.assembly.system import KINDS
 from dap3d_core.formulations.machine import AS_COMPILED, Machine
 from dap3d_core.interface.writer import stride
+from dap3d_core.kernels.lists import call_loop
 from dap3d_core.model import Group
 
 Floats = NDArray[np.float64]
@@ -85,9 +86,8 @@ def _call_one(
     """Call loop q for instance k of its group alone."""
     s = machine.system
     i0, p0, _ = s.groups[q]
-    i1 = int(i0) + k * stride(group.examined)
-    p1 = int(p0) + k * group.examined.layout.par_width
-    machine.loops[q](t, s.body, s.F, s.idx, s.par, i1, p1, 1, *outs)
+    i1, p1 = i0 + k * stride(group.examined), p0 + k * group.examined.layout.par_width
+    call_loop(machine.loops, q, t, s, np.array([i1, p1, 1]), *outs)
 
 
 def _title(kind: str) -> str:
