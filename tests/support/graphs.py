@@ -9,7 +9,8 @@ share). The static order relies on that.
 import numpy as np
 
 from dap3d_core.kernels.cache import compiled_in, jit_is_on
-from dap3d_core.linear.blocks import add_product, assemble, factor, solve_saddle
+from dap3d_core.linear.blocks import assemble, factor
+from dap3d_core.linear.saddle import add_product, solve_saddle
 from dap3d_core.linear.plan import make_plan
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.graphs import GRAPHS, RANDOM, full_case, product_from_python
 
-from dap3d_core.linear.blocks import scale_blocks
+from dap3d_core.linear.saddle import scale_blocks
 
 EPS = np.finfo(float).eps
 all_graphs = pytest.mark.parametrize("name", [*GRAPHS, *RANDOM])

@@ -47,7 +47,7 @@ def place_bodies(y: Floats, body: Floats, metric: Floats) -> None:
         k[13], k[14], k[15] = a20 * u00, a20 * u01 + a21 * u11, a20 * u02 + a21 * u12 + a22 * u22
 
 
-@compiled
+@compiled_into
 def call_kinds(
     first: int,
     last: int,

@@ -33,16 +33,8 @@ from dap3d_core.assembly.system import (
 )
 from dap3d_core.formulations.moves import change_velocity, move, normalise, size_of
 from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
-from dap3d_core.linear.blocks import (
-    add_product,
-    assemble,
-    factor,
-    pivot_lengths,
-    regularise,
-    scale_blocks,
-    solve_saddle,
-    weigh_rows,
-)
+from dap3d_core.linear.blocks import assemble, factor, pivot_lengths, regularise, weigh_rows
+from dap3d_core.linear.saddle import add_product, scale_blocks, solve_saddle
 
 #: Newton passes of one projection; the second already stands at rounding.
 PASSES = 5

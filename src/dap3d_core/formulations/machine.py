@@ -192,7 +192,7 @@ class Machine:
         inverse = np.ones(self.plan.row_size)
         for size, first, diagonal, *_ in self.plan.nodes[:-1]:
             inverse[first : first + size] = s.K[diagonal : diagonal + size * size : size + 1]
-        result: Floats = 1.0 / inverse[s.row] ** 2
+        result: Floats = np.abs(1.0 / inverse[s.row])
         return result
 
     @AS_COMPILED

@@ -28,7 +28,7 @@ from dap3d_core.integrators.radau_work import (
 )
 from dap3d_core.integrators.work import H_DENSE, T_DENSE, TRIAL, T, Y
 from dap3d_core.kernels.cache import compiled, compiled_inside
-from dap3d_core.linear.blocks import add_product
+from dap3d_core.linear.saddle import add_product
 
 
 @compiled

@@ -133,7 +133,8 @@ def _eliminate(
 ) -> tuple[list[int], dict[int, set[int]]]:
     """Minimum degree, weighted by rows; no node is taken before the hubs that it waits for."""
     weight = [sum(size[m] for m in others) for others in neighbours]
-    heap = [(w, k) for k, w in enumerate(weight) if not waits.get(k)]
+    heap = [(w, k, k) for k, w in enumerate(weight) if not waits.get(k)]
+    pushed = len(weight)
     heapq.heapify(heap)
     released: dict[int, list[int]] = {}
     for k, hubs in waits.items():
@@ -143,7 +144,7 @@ def _eliminate(
     order: list[int] = []
     below: dict[int, set[int]] = {}
     while heap:
-        w, k = heapq.heappop(heap)
+        w, _, k = heapq.heappop(heap)
         if gone[k] or w != weight[k]:
             continue
         gone[k] = True
@@ -157,11 +158,13 @@ def _eliminate(
             mine.discard(k)
             weight[m] += sum(size[x] for x in gained) - size[k]
             if not waits.get(m):
-                heapq.heappush(heap, (weight[m], m))
+                heapq.heappush(heap, (weight[m], pushed, m))
+                pushed += 1
         for m in released.get(k, ()):
             waits[m].discard(k)
             if not waits[m]:
-                heapq.heappush(heap, (weight[m], m))
+                heapq.heappush(heap, (weight[m], pushed, m))
+                pushed += 1
     return order, below
 
 
