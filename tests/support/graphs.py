@@ -10,8 +10,8 @@ import numpy as np
 
 from dap3d_core.kernels.cache import compiled_in, jit_is_on
 from dap3d_core.linear.blocks import assemble, factor
-from dap3d_core.linear.saddle import add_product, solve_saddle
 from dap3d_core.linear.plan import make_plan
+from dap3d_core.linear.saddle import add_product, solve_saddle
 
 
 def _solve(blocks, hubs, nodes, columns, D, K, x, g):
