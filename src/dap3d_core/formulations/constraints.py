@@ -131,52 +131,65 @@ def correct(system: System) -> None:
 
 @compiled_inside
 def project_onto(
-    t: float, y: Floats, out: Floats, system: System, loops: Any, part: float | None
+    t: float,
+    y: Floats,
+    out: Floats,
+    system: System,
+    loops: Any,
+    part: float | None,
+    kept: bool,
 ) -> None:
     """Move a state onto its constraints, by the least change in the metric of the masses.
 
     With regularised factors the passes are those of the proximal method as well: each leaves a
     ``part`` of what the one before has left.
 
-    out: 1.0 if y changed beyond rounding; 1.0 if it did not converge, 2.0 if the pose is close to a
-    singular one; largest residuals of position and velocity; lengths (rows) that go
-    linearly through zero at a singular pose.
+    out: on entry 1.0 where rhs was evaluated last at this very t and y: D^ stands as it should,
+    and the factors, too, if rhs leaves those of ``part`` (``kept``). Then: 1.0 if y changed beyond
+    rounding; 1.0 if it did not converge, 2.0 if the pose is close to a singular one; largest
+    residuals of position and velocity; lengths (nodes) that go linearly through zero at a singular
+    pose.
     """
-    body, metric, force = system.body, system.metric, system.force
-    n = body.shape[0] - 1
+    metric = system.metric
+    n = metric.shape[0] - 1
+    linear = out[0] == 1.0
+    factored = linear and kept
     out[0] = out[1] = 0.0
     normalise(y, n)
-    place(t, y, system, loops)
+    if not linear:
+        place(t, y, system, loops)
     worst = residuals(t, system, loops)
     limit = system.settings[TOLERANCE_C] * size_of(y, 0, n, 7, 3)
-    factored, poor = False, False
     if not worst <= limit:
-        linearise(t, system, loops)
-        poor = factorise(system, part) > 0
-        factored = True
+        if not linear:
+            linearise(t, system, loops)
+        if not factored:
+            factorise(system, part)
         for _ in range(PASSES):
             before = worst
             correct(system)
-            move(y, metric, force)
-            place_bodies(y, body, metric)
+            move(y, metric, system.force)
+            place_bodies(y, system.body, metric)
             worst = residuals(t, system, loops)
             if not worst > limit or not worst < 0.5 * before:
                 break
+        linear, factored = False, part is None  # of old factors the null space would be wrong
         out[0] = 1.0
         if not worst <= LOST * limit:
             out[1] = 1.0
     out[2] = worst
-    linearise(t, system, loops)
-    if not factored or part is not None:  # of old factors the null space would be wrong
-        poor = factorise(system, part) > 0
+    if not linear:
+        linearise(t, system, loops)
+    if not factored:
+        factorise(system, part)
     worst = velocity_residuals(system)
     limit = system.settings[TOLERANCE_V] * size_of(y, 7 * n, n, 6, 6)
     if not worst <= limit:
         for _ in range(PASSES):
             before = worst
             correct(system)
-            change_velocity(y, metric, force)
-            add_product(system.blocks, system.D, force, system.C)
+            change_velocity(y, metric, system.force)
+            add_product(system.blocks, system.D, system.force, system.C)
             worst = largest(system.C)
             if not worst > limit or not worst < 0.5 * before:
                 break
@@ -184,8 +197,7 @@ def project_onto(
         if not worst <= LOST * limit:
             out[1] = 1.0
     out[3] = worst
-    pivot_lengths(system.nodes, system.K, system.smallest, out[4:])
-    if poor and out[1] == 0.0:
+    if pivot_lengths(system.nodes, system.K, system.smallest, out[4:]) > 0 and out[1] == 0.0:
         out[1] = 2.0
 
 

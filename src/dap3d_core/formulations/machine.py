@@ -94,7 +94,7 @@ class Machine:
         self.system: System = build_system(model, self.plan, self.what)
         self.start_functions()
         self.report_size = 6 * model.body_count + model.row_count + 4
-        self.length_count = self.plan.row_size
+        self.length_count = len(self.plan.nodes) - 1
 
     @property
     def watched(self) -> bool:

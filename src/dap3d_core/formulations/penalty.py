@@ -83,7 +83,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Move a state onto its constraints; out as in ``project_onto``."""
-    project_onto(t, y, out, system, loops, PART)
+    project_onto(t, y, out, system, loops, PART, False)
 
 
 @compiled

@@ -58,7 +58,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Move a state onto its constraints; out as in ``project_onto``."""
-    project_onto(t, y, out, system, loops, None)
+    project_onto(t, y, out, system, loops, None, True)
 
 
 @compiled

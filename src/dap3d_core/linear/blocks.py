@@ -221,19 +221,26 @@ def factor(
 
 
 @compiled_inside
-def pivot_lengths(nodes: Integers, K: Floats, smallest: Floats, lengths: Floats) -> None:
-    """Square roots of the pivots, from the factors of K; of a pivot that is not positive, 0.
+def pivot_lengths(nodes: Integers, K: Floats, smallest: Floats, lengths: Floats) -> int:
+    """Of each node the square root of its pivots' product, from the factors of K; 0 if none.
 
-    Near a singular pose they go linearly through zero. Rows that nobody watches (``smallest`` is
-    zero) give 1.
+    Near a singular pose it goes linearly through zero. Each pivot is measured by ``smallest``; rows
+    that nobody watches (it is zero) are left out. The single pivots would tell as much, but they
+    change with the axes that rows are written in.
+
+    Returns the number of pivots that are not above ``smallest``.
     """
+    counted = 0
     for k in range(nodes.shape[0] - 1):
         m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        product = 1.0
         for r in range(m):
-            pivot = abs(1.0 / K[d + r * (m + 1)])
-            if not smallest[f + r] > 0.0:
-                pivot = 1.0
-            lengths[f + r] = pivot**0.5 if pivot > 0.0 else 0.0
+            if smallest[f + r] > 0.0:
+                ratio = 1.0 / (abs(K[d + r * (m + 1)]) * smallest[f + r])
+                counted += not ratio > 1.0
+                product *= ratio
+        lengths[k] = product**0.5 if product > 0.0 else 0.0
+    return counted
 
 
 @compiled_into
