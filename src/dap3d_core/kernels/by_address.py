@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 from llvmlite import ir
-from numba import int64, typeof, types
+from numba import int64, types
 from numba.core import cgutils
 from numba.core.imputils import lower_cast, lower_getattr_generic
 from numba.core.typeconv import Conversion
@@ -29,6 +29,7 @@ from numba.extending import (
     register_model,
     unbox,
 )
+from numba.np.numpy_support import as_dtype
 
 VECTOR, MATRIX = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C")
 INTEGERS, INTEGER_MATRIX = types.Array(int64, 1, "C"), types.Array(int64, 2, "C")
@@ -41,6 +42,11 @@ class ByAddress(types.Type):
 
     def __init__(self, name: str, members: tuple[tuple[str, Any], ...]) -> None:
         self.members = members
+        #: Each member's name, type and numpy dtype; None for a class of arrays.
+        self.expected = [
+            (name, type_, None if isinstance(type_, ByAddress) else as_dtype(type_.dtype))
+            for name, type_ in members
+        ]
         super().__init__(f"ByAddress({name})")
 
     @property
@@ -72,14 +78,16 @@ class Arrays:
 
     def __attrs_post_init__(self) -> None:
         words: list[int] = []
-        for name, type_ in self.type_of().members:
+        for name, type_, dtype in self.type_of().expected:
             array = getattr(self, name)
-            if isinstance(type_, ByAddress):
+            if dtype is None:
                 words.append(array.address)
                 continue
-            if not isinstance(array, np.ndarray) or typeof(array) != type_:
+            fits = array.dtype == dtype and array.ndim == type_.ndim
+            if not (fits and array.flags.c_contiguous):
                 raise TypeError(f"{name} is not {type_}")
-            words += [array.__array_interface__["data"][0], *array.shape]
+            words.append(array.ctypes.data)
+            words += array.shape
         table = np.array(words, dtype=np.int64)
         object.__setattr__(self, "_table", table)
         object.__setattr__(self, "address", table.__array_interface__["data"][0])
