@@ -1,4 +1,4 @@
-"""What one right-hand side costs, on chains of spherical and revolute joints and on a star.
+"""What one right-hand side costs: chains of spherical and revolute joints, a star, free bodies.
 
 The mark is a chain written by hand.
 """
@@ -92,6 +92,7 @@ def measure(against=None):
     others = {
         "chain, revolute": [(n, scenes.chain(n, "rev")) for n in SIZES[:-1]],
         "star": [(1001, scenes.star(1000))],
+        "free bodies": [(n, scenes.free(n)) for n in SIZES[:-1]],
     }
     for title, made in others.items():
         for n, scene in made:

@@ -39,6 +39,14 @@ def star(arms):
     return scene
 
 
+def free(n):
+    """n bodies that spin freely, without any force."""
+    scene = dap.Scene(name=f"{n} free bodies")
+    for k in range(n):
+        scene.add_body(f"b{k}", mass=1.0, Jp=(1.0, 2.0, 3.0), w=(1.0, 2.0, 0.5))
+    return scene
+
+
 def planar_chain(n):
     """n uniform rods, 1 m and 1 kg, planar, from rest along +x, gravity along -y.
 
