@@ -31,6 +31,9 @@ class BallContact(Force):
         delta = r_i[2] - R
         return where(delta < 0.0, 0.5 * k * delta * delta, 0.0)
 
+    def switch(r_i, R):
+        return r_i[2] - R  # where it changes its sign the force jumps: no step goes across
+
 
 @hookimpl
 def dap3d_forces():

@@ -19,12 +19,19 @@ if TYPE_CHECKING:
     from dap3d_core.report import report
     from dap3d_core.result import Result
     from dap3d_core.scene import Scene, SceneError, load, shipped_models
-    from dap3d_core.simulation import AssemblyError, RedundantError, SimulationError, simulate
+    from dap3d_core.simulation import (
+        AssemblyError,
+        Event,
+        RedundantError,
+        SimulationError,
+        simulate,
+    )
     from dap3d_core.simulation import compile_scene as compile
     from dap3d_core.simulation import open_result as open
 
 _HOMES = {
     "AssemblyError": ("simulation", "AssemblyError"),
+    "Event": ("simulation", "Event"),
     "PluginError": ("interface", "PluginError"),
     "RedundantError": ("simulation", "RedundantError"),
     "Result": ("result", "Result"),
@@ -44,6 +51,7 @@ _HOMES = {
 
 __all__ = [
     "AssemblyError",
+    "Event",
     "PluginError",
     "RedundantError",
     "Result",

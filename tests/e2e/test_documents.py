@@ -83,6 +83,22 @@ def test_the_page_on_methods(tmp_path):
         assert done.returncode == 0, done.stderr
 
 
+def test_the_page_on_events(tmp_path):
+    """Its script, which holds assertions of its own, and its commands."""
+    text = (REPOSITORY / "docs" / "events.md").read_text()
+    (script,) = blocks(text, "python")
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=tmp_path, env=environment(), capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    for words in commands(text, "dap3d"):
+        done = dap3d(words, tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert "force contact fell" in done.stdout
+        assert "and 19 more" in done.stdout
+
+
 def test_the_first_commands_of_the_readme_are_targets():
     """The two commands at the top exist in the Makefile."""
     text = (REPOSITORY / "README.md").read_text()

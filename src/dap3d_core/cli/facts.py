@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 if TYPE_CHECKING:
-    from dap3d_core.result import Result
+    from dap3d_core.result import Occurrence, Result
 
 
 def facts_of(result: "Result") -> dict[str, Any]:
@@ -29,10 +29,17 @@ def facts_of(result: "Result") -> dict[str, Any]:
         "t_end": float(result.t[-1]) if instants else None,
         **attrs.asdict(result.stats),
         "error_estimate": _error_estimate(result),
+        "events": [_event(event) for event in result.events],
         "ledger": {name: attrs.asdict(entry) for name, entry in result.ledger.items()},
         "notes": result.notes,
         "versions": result.versions,
     }
+
+
+def _event(event: "Occurrence") -> dict[str, Any]:
+    """An occurrence without its state, with its words."""
+    found = attrs.asdict(event, filter=lambda field, _: field.name != "u")
+    return {**found, "text": event.words}
 
 
 def _error_estimate(result: "Result") -> dict[str, Any] | None:

@@ -16,7 +16,7 @@ def info(result: str, *, as_json: bool) -> int:
     from dap3d_core.cli.facts import facts_of
     from dap3d_core.cli.files import open_result
     from dap3d_core.cli.rendering import facts, output, print_json, size, title
-    from dap3d_core.cli.summary import run_pairs, show_ledger, show_remarks
+    from dap3d_core.cli.summary import run_pairs, show_events, show_ledger, show_remarks
 
     opened = open_result(result)
     found = {"file": result, "size_bytes": Path(result).stat().st_size, **facts_of(opened)}
@@ -45,6 +45,7 @@ def info(result: str, *, as_json: bool) -> int:
             ("made with", versions),
         ],
     )
+    show_events(console, found)
     show_ledger(console, found)
     show_remarks(console, found)
     return DONE

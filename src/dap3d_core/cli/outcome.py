@@ -20,7 +20,7 @@ from dap3d_core.cli.rendering import (
     title,
 )
 from dap3d_core.cli.start import show_start, start_facts
-from dap3d_core.cli.summary import run_pairs, show_ledger, show_remarks
+from dap3d_core.cli.summary import run_pairs, show_events, show_ledger, show_remarks
 
 if TYPE_CHECKING:
     from dap3d_core.result import Result
@@ -80,6 +80,7 @@ def _show_all(console: Terminal, outcome: Outcome, found: dict[str, Any], target
         say(console, str(outcome.compiled.scene.description))
     facts(console, run_pairs(found))
     _show_corrected(console, outcome)
+    show_events(console, found)
     show_ledger(console, found)
     show_remarks(console, found)
     say(console, f"{target} written ({size(target.stat().st_size)}). Next:", whole=True)

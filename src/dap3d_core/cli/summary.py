@@ -16,6 +16,9 @@ from dap3d_core.cli.rendering import (
     title,
 )
 
+#: Events that a summary shows.
+MOST_EVENTS = 6
+
 
 def run_pairs(found: dict[str, Any]) -> list[tuple[str, str]]:
     """What was modelled, how it was solved, what it cost: names and words."""
@@ -50,6 +53,16 @@ def show_notes(console: Terminal, notes: list[str]) -> None:
     if notes:
         title(console, "notes")
         items(console, notes)
+
+
+def show_events(console: Terminal, found: dict[str, Any]) -> None:
+    """What happened at instants that were located: the first few, and how many more."""
+    events = [event["text"] for event in found["events"]]
+    if events:
+        title(console, "events")
+        items(console, events[:MOST_EVENTS])
+        if len(events) > MOST_EVENTS:
+            say(console, f"and {len(events) - MOST_EVENTS} more", indent=2)
 
 
 def show_remarks(console: Terminal, found: dict[str, Any]) -> None:

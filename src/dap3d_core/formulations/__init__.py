@@ -18,18 +18,18 @@ LOOPS = {
 }
 
 #: Places of a formulation's functions in the list that an integrator takes.
-RHS, PROJECT, REPORT, ACCEPTED = range(4)
+RHS, PROJECT, REPORT, ACCEPTED, WATCH = range(5)
 
 
-def functions_of(method: str, *, watched: bool) -> Any:
+def functions_of(method: str, *, turns: bool, switches: bool) -> Any:
     """A formulation's compiled functions as the list that an integrator takes.
 
-    They are rhs, project, report, and where something is ``watched`` at accepted steps, accepted.
+    They are rhs, project, report; accepted where ``turns`` are counted; watch for ``switches``.
     """
     module: Any = import_module(f"dap3d_core.formulations.{method}")
     functions = [module.rhs, module.project, module.report]
-    if watched:
-        from dap3d_core.formulations.accepted import accepted
+    if turns or switches:
+        from dap3d_core.formulations.accepted import accepted, watch
 
-        functions.append(accepted)
+        functions += [accepted, watch] if switches else [accepted]
     return step_functions(*functions)

@@ -16,7 +16,6 @@ from dap3d_core.assembly.system import (
     MU,
     OMEGA,
     POSITION,
-    SWITCH,
     UNSETTLED,
     VALUE,
     Floats,
@@ -26,7 +25,7 @@ from dap3d_core.assembly.system import (
 from dap3d_core.formulations import LOOPS, REPORT, RHS, functions_of
 from dap3d_core.formulations.build import build_loops, build_system
 from dap3d_core.linear.plan import Plan, make_plan
-from dap3d_core.model import Model
+from dap3d_core.model import Group, Model
 from dap3d_core.model.kinematics import split, to_global, to_integrated
 
 
@@ -59,6 +58,34 @@ class Rows:
         from scipy.sparse import csr_array
 
         return csr_array((self.value, (self.row, self.column)), shape=self.shape)
+
+
+@attrs.frozen(eq=False)
+class Switch:
+    """One number whose sign an element watches.
+
+    Attributes:
+        group, place: whose it is: an instance of a group.
+        is_one_of_several, part: where the kernel gives a tuple, which of its numbers.
+    """
+
+    group: Group
+    place: int
+    is_one_of_several: bool
+    part: int
+
+    @property
+    def words(self) -> str:
+        """Why the run ends where it becomes negative; "" where it starts anew there."""
+        type_: Any = self.group.examined.type
+        return str(type_.switch_words)
+
+    def name(self, model: Model) -> str:
+        """The element's name; with the number's place, from 1, where there are several."""
+        is_joint = self.group.examined.type.kind == "joint"
+        names = model.joint_names if is_joint else model.force_names
+        name = names[int(self.group.members[self.place])]
+        return f"{name} [{self.part + 1}]" if self.is_one_of_several else name
 
 
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
@@ -97,10 +124,26 @@ class Machine:
         self.length_count = len(self.plan.nodes) - 1
 
     @property
-    def watched(self) -> bool:
-        """Whether angles or switches are looked at, at accepted steps."""
+    def counts_turns(self) -> bool:
+        """Whether there are angles, whose turns are counted at accepted steps."""
         kinds = self.system.kinds
-        return bool(kinds[SWITCH + 1] > kinds[ANGLE])
+        return bool(kinds[ANGLE + 1] > kinds[ANGLE])
+
+    @cached_property
+    def switches(self) -> tuple[Switch, ...]:
+        """The switches of the model's elements, in the order in which ``watch`` gives them."""
+        return tuple(
+            Switch(group, k, len(group.examined.outputs["switch"]) > 1, part)
+            for kind, group in self.what
+            if kind == "switch"
+            for k in range(group.count)
+            for part in range(len(group.examined.outputs["switch"]))
+        )
+
+    @property
+    def ending(self) -> Any:
+        """(switches,) whether each ends the run where it becomes negative."""
+        return np.array([bool(s.words) for s in self.switches], dtype=bool)
 
     @property
     def unsettled(self) -> int:
@@ -133,8 +176,8 @@ class Machine:
 
     @cached_property
     def functions(self) -> Any:
-        """The compiled functions (rhs, project, report) as the list that an integrator takes."""
-        return functions_of(self.method, watched=self.watched)
+        """The compiled functions (rhs, project, report, ...) that an integrator takes."""
+        return functions_of(self.method, turns=self.counts_turns, switches=bool(self.switches))
 
     def integrated(self, u: ArrayLike) -> Floats:
         """The integrated state y (13 n + 1,) of a state u (13 n,)."""

@@ -12,7 +12,12 @@ from dap3d_core.formulations.stage import Matrix
 from dap3d_core.formulations.tangent_tables import coupled_bodies, make_tangent
 from dap3d_core.integrators import radau_work as at
 from dap3d_core.integrators import work
-from dap3d_core.integrators.integration import Integration, _check_control, _check_state_and_times
+from dap3d_core.integrators.integration import (
+    Integration,
+    _check_control,
+    _check_state_and_times,
+    _switches,
+)
 from dap3d_core.integrators.radau import advance
 from dap3d_core.integrators.radau_method import ORDER, radau_method
 from dap3d_core.integrators.radau_parts import radau_parts
@@ -73,7 +78,7 @@ class RadauIntegration(Integration):
     machine
         The model; its formulation is unconstrained, standard or lsq (whose rows may depend on each
         other), not penalty.
-    y0, times, rtol, atol, step, first_step, project_on, error_size, report_size, buffer_rows
+    y0, times, rtol, atol, step, first_step, project_on, error_size, report_size, buffer_rows, ends
         As for ``Integration``.
 
     Raises
@@ -99,6 +104,7 @@ class RadauIntegration(Integration):
         error_size: int | None = None,
         report_size: int = 0,
         buffer_rows: int = 256,
+        ends: ArrayLike = (),
     ) -> None:
         y = np.array(y0, dtype=np.float64)
         instants = np.array(times, dtype=np.float64)
@@ -112,7 +118,7 @@ class RadauIntegration(Integration):
         tangent = make_tangent(machine)
         matrix, lu = make_matrix(machine, tangent)
         self.machine, self.lu_plan, self.tangent, self.matrix = machine, lu, tangent, matrix
-        self._work = _make_work(machine, lu, y, instants, buffer_rows, report_size)
+        self._work = _make_work(machine, lu, y, instants, buffer_rows, report_size, ends)
         self.work = cast(Any, self._work)  # its first arrays are those of Integration
         real, own, integer = self._work.real, self._work.own, self._work.integer
         real[work.RTOL], real[work.ATOL] = estimate_tolerances(rtol, atol)
@@ -122,7 +128,7 @@ class RadauIntegration(Integration):
         own[at.PART] = REGULAR if machine.method == "lsq" else 0.0
         integer[work.ORDER], integer[work.ERROR_SIZE] = ORDER, error_size
         integer[work.DENSE], integer[work.PROJECT_ON] = 1, project_on
-        integer[work.WATCHED] = machine.watched
+        integer[work.WATCHED] = machine.counts_turns
 
     @cached_property
     def _parts(self) -> Any:
@@ -152,9 +158,7 @@ class RadauIntegration(Integration):
         RuntimeError
             If the buffer is full on entry, so that nothing can be done.
         """
-        if int(self.work.integer[work.ROW]) == len(self.work.rows) and (
-            self.status is Status.RUNNING
-        ):
+        if self.rows_are_full and self.status is Status.RUNNING:
             raise RuntimeError("the row buffer is full: take rows() before advancing")
         if jit_is_on():
             self._advance(budget)
@@ -162,6 +166,16 @@ class RadauIntegration(Integration):
             with np.errstate(all="ignore"):  # as in compiled code, which tests what matters
                 self._advance(budget)
         return self.status
+
+    def state_arrays(self) -> list[Any]:
+        """As ``Integration.state_arrays``."""
+        matrix = self.matrix
+        return [*super().state_arrays(), matrix.spin, matrix.D, matrix.compliance]
+
+    @property
+    def slope(self) -> Any:
+        """As ``Integration.slope``."""
+        return self._work.state[at.SLOPE].copy() if self.work.integer[work.FRESH] else None
 
     @property
     def effort(self) -> Effort:
@@ -186,20 +200,25 @@ def estimate_tolerances(rtol: float, atol: float) -> tuple[float, float]:
 
 
 def _make_work(
-    machine: Machine, lu: LuPlan, y: Any, times: Any, buffer_rows: int, report_size: int
+    machine: Machine, lu: LuPlan, y: Any, times: Any, buffer_rows: int, report_size: int, ends: Any
 ) -> RadauWork:
     n, rows, bodies = y.size, machine.plan.row_size, machine.model.body_count + 1
     state = np.zeros((at.RADAU_STATES, n))
     state[work.Y] = y
+    real = np.zeros(work.LENGTHS + machine.length_count)
+    integer = np.zeros(at.RADAU_INTEGERS, dtype=np.int64)
+    switches, crossings = _switches(real, integer, ends)
     return RadauWork(
-        real=np.zeros(work.LENGTHS + machine.length_count),
+        real=real,
         own=np.zeros(at.OWN),
-        integer=np.zeros(at.RADAU_INTEGERS, dtype=np.int64),
+        integer=integer,
         times=times,
         state=state,
         k=np.zeros((2, n)),
         terms=np.zeros((at.TERMS, n)),
         rows=np.empty((buffer_rows, 1 + n + report_size)),
+        switches=switches,
+        crossings=crossings,
         Z=np.zeros((3, n)),
         Z_old=np.zeros((3, n)),
         F=np.zeros((3, n)),

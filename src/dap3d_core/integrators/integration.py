@@ -63,7 +63,10 @@ class Integration:
     length_count
         Number of lengths that ``project`` gives, which vanish at singular states (crossing.py).
     watched
-        Whether there is a fourth function, which is called with each accepted state.
+        Whether the fourth function is called with each accepted state.
+    ends
+        (q,) for each switch that the fifth function gives, whether it ends the run where it becomes
+        negative; else the integration starts anew where it changes its sign (switches.py).
 
     Raises
     ------
@@ -90,6 +93,7 @@ class Integration:
         buffer_rows: int = 256,
         length_count: int = 0,
         watched: bool = False,
+        ends: ArrayLike = (),
     ) -> None:
         self.method = method
         self._arguments = (functions, system, loops)
@@ -98,10 +102,7 @@ class Integration:
         _check_state_and_times(y, instants)
         _check_control(method, rtol, atol, instants, step=step, first_step=first_step)
         error_size = y.size if error_size is None else error_size
-        if not 0 <= error_size <= y.size:
-            raise ValueError(f"error_size is {error_size}, but y has {y.size} components")
-        if buffer_rows < 1:
-            raise ValueError(f"buffer_rows is {buffer_rows}; at least one row must fit")
+        _check_sizes(error_size, y.size, buffer_rows)
 
         real = np.zeros(at.LENGTHS + length_count)
         real[at.RTOL], real[at.ATOL] = rtol, max(atol, _SMALLEST_ATOL)
@@ -110,6 +111,7 @@ class Integration:
         real[at.FACTOR_MIN], real[at.FACTOR_MAX] = method.factor_min, method.factor_max
         real[at.T], real[at.ERROR_OLD], real[at.CALM] = instants[0], 1e-4, method.calm
         integer = np.zeros(at.INTEGERS, dtype=np.int64)
+        switches, crossings = _switches(real, integer, ends)
         integer[at.STAGES], integer[at.ORDER] = method.stages, method.order
         integer[at.ERROR_SIZE], integer[at.ERRORS] = error_size, len(method.e)
         integer[at.ERROR_USES_RESULT] = method.error_uses_result
@@ -128,6 +130,8 @@ class Integration:
             rows=np.empty((buffer_rows, 1 + y.size + report_size)),
             table=combinations(method),
             lengths=np.full((2, length_count), np.nan),
+            switches=switches,
+            crossings=crossings,
         )
 
     def compile(self) -> None:
@@ -148,7 +152,7 @@ class Integration:
             If the buffer is full on entry, so that nothing can be done.
         """
         work = self.work
-        if int(work.integer[at.ROW]) == len(work.rows) and self.status is Status.RUNNING:
+        if self.rows_are_full and self.status is Status.RUNNING:
             raise RuntimeError("the row buffer is full: take rows() before advancing")
         if jit_is_on():
             advance(work, *self._arguments, budget)
@@ -156,6 +160,35 @@ class Integration:
             with np.errstate(all="ignore"):  # as in compiled code, which tests what matters
                 advance(work, *self._arguments, budget)
         return self.status
+
+    def advance_to(self, limit: float) -> Status:
+        """Try one step, or what stands in its place, that ends at time ``limit`` at the latest."""
+        self.work.real[at.LIMIT] = limit
+        status = self.advance(0)
+        self.work.real[at.LIMIT] = np.inf
+        return status
+
+    def state_arrays(self) -> list[Any]:
+        """All arrays that a step changes, but for rows that wait: copied and put back, as before.
+
+        What ``functions`` keep in ``system`` is not among them.
+        """
+        same = ("times", "rows", "table", "crossings")
+        names = [name for name, _ in self.work.type_of().members if name not in same]
+        arrays = [getattr(self.work, name) for name in names]
+        return [array for array in arrays if isinstance(array, np.ndarray)]
+
+    def restart(self) -> None:
+        """Let the next step start anew: what the functions compute has changed."""
+        work = self.work
+        work.real[at.H] = 0.0
+        work.real[at.ERROR_OLD], work.real[at.CUT] = 1e-4, np.inf
+        work.integer[[at.FRESH, at.LOOKED, at.LAST_REJECTED, at.CUTS]] = 0
+        work.switches[at.SIDE] = 0.0
+
+    def end(self) -> None:
+        """End the run where it stands: the next ``advance`` reports this state, and stops."""
+        self.work.integer[at.ENDING] = Status.ENDED
 
     def rows(self) -> Floats:
         """Take the waiting rows out of the buffer: (k, 1 + n + report_size), each t, y, report."""
@@ -188,11 +221,56 @@ class Integration:
         return float(self.work.real[at.T_STOP])
 
     @property
+    def slope(self) -> Floats | None:
+        """(n,) dy/dt at ``t``, a copy; None where it is not known."""
+        if self.work.integer[at.FRESH] == 0:
+            return None
+        slope: Floats = self.work.k[0].copy()
+        return slope
+
+    @property
+    def rows_are_full(self) -> bool:
+        """Whether ``rows`` must be taken before it can go on."""
+        return int(self.work.integer[at.ROW]) == len(self.work.rows)
+
+    @property
+    def culprit(self) -> int:
+        """Which switch ended the run, where one did."""
+        return int(self.work.integer[at.CULPRIT])
+
+    @property
+    def chatter(self) -> tuple[float, int]:
+        """Since when, s, the changes of the culprit are counted, and how many there were."""
+        since, count = self.work.switches[[at.SINCE, at.COUNT], self.culprit]
+        return float(since), int(count)
+
+    @property
+    def crossings(self) -> Floats:
+        """(k, 3) time, which switch, to which side (+1 or -1): the first ``LOGGED`` of them."""
+        found: Floats = self.work.crossings[: self.crossing_count].copy()
+        return found
+
+    @property
+    def crossing_count(self) -> int:
+        """How often a switch has changed its sign."""
+        return int(self.work.integer[at.CROSSINGS])
+
+    @property
     def statistics(self) -> Statistics:
         """What has been done so far."""
         integer = self.work.integer
         names = (at.STEPS, at.REJECTED, at.RHS, at.PROJECTIONS, at.REPORTS)
         return Statistics(*(int(integer[i]) for i in names))
+
+
+def _switches(real: Floats, integer: Any, ends: ArrayLike) -> tuple[Floats, Floats]:
+    """Arrays of the switches, none of which was looked at so far."""
+    given = np.asarray(ends, dtype=np.float64)
+    real[[at.LIMIT, at.CUT]] = np.inf
+    integer[at.SWITCHES] = given.size
+    switches = np.zeros((at.SWITCH_ROWS, given.size))
+    switches[at.ENDS] = given
+    return switches, np.zeros((at.LOGGED if given.size else 0, 3))
 
 
 def _check_state_and_times(y: Floats, times: Floats) -> None:
@@ -202,6 +280,13 @@ def _check_state_and_times(y: Floats, times: Floats) -> None:
         raise ValueError("times must be one vector of finite numbers, t0 first")
     if not np.all(np.diff(times) > 0.0):
         raise ValueError("reporting times must increase")
+
+
+def _check_sizes(error_size: int, size: int, buffer_rows: int) -> None:
+    if not 0 <= error_size <= size:
+        raise ValueError(f"error_size is {error_size}, but y has {size} components")
+    if buffer_rows < 1:
+        raise ValueError(f"buffer_rows is {buffer_rows}; at least one row must fit")
 
 
 def _check_control(

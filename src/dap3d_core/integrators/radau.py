@@ -41,20 +41,24 @@ from dap3d_core.integrators.radau_work import (
     TRIAL_SLOPE,
     RadauWork,
 )
+from dap3d_core.integrators.reporting import project_state, report_end, report_reached
 from dap3d_core.integrators.runge_kutta import (
+    ACROSS_A_SWITCH,
     ELSEWHERE,
     RETREAT,
     is_poor,
-    project_state,
-    report_reached,
 )
+from dap3d_core.integrators.switches import end_is_across, next_length, sample, settle
 from dap3d_core.integrators.work import (
     DENSE,
+    ENDING,
     FRESH,
     GAP_STEP,
     LAST_REJECTED,
+    LIMIT,
     NEXT,
     NOT_FINITE,
+    OUTCOME,
     POOR,
     RHS,
     RUNNING,
@@ -63,8 +67,7 @@ from dap3d_core.integrators.work import (
     STEP,
     STEP_FLOOR,
     STEPS,
-    SWITCH,
-    SWITCHED,
+    SWITCHES,
     T_STOP,
     TRIAL,
     WATCHED,
@@ -101,28 +104,30 @@ def advance(
     """Go on until more than ``budget`` stages are evaluated, the rows are full, or the run ends."""
     rhs, project, report = functions[0], functions[1], functions[2]
     real, integer, times = work.real, work.integer, work.times
+    watch = functions[4] if integer[SWITCHES] != 0 else rhs
     limit = integer[RHS] + budget
     while integer[STATUS] == RUNNING:
         if times[integer[NEXT]] <= real[T]:
             if not report_reached(work, project, report, system, loops):
                 return
-        elif real[SWITCH] < 0.0:
-            real[T_STOP], integer[STATUS] = real[T], SWITCHED
-        elif integer[RHS] > limit:
+        elif integer[ENDING] != 0:
+            if not report_end(work, report, system, loops):
+                return
+        elif integer[RHS] > limit or real[T] >= real[LIMIT]:
             return
         else:
             steps = integer[STEPS]
             if integer[FRESH] == 0:
                 start(work, rhs, project, system, loops)
             else:
-                step(work, parts, project, system, loops, tangent, matrix)
+                step(work, parts, project, watch, system, loops, tangent, matrix)
             if integer[WATCHED] != 0 and integer[STEPS] > steps:
-                functions[3](real[T], work.state[Y], real[SWITCH:], system, loops)
+                functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
 
 
 @compiled_inside
 def start(work: RadauWork, rhs: Function, project: Function, system: System, loops: Any) -> None:
-    """Where the run starts: on the constraints, with multipliers that belong to the state."""
+    """Where a motion starts: on the constraints, with multipliers that belong to the state."""
     real, integer, y = work.real, work.integer, work.state[Y]
     failure = project_state(real, integer, real[T], y, project, system, loops)
     if failure == RUNNING:
@@ -138,6 +143,7 @@ def start(work: RadauWork, rhs: Function, project: Function, system: System, loo
     for k in range(y.shape[0]):
         work.state[SLOPE, k] = work.k[0, k]
     integer[FRESH] = integer[TANGENT_NEEDED] = 1
+    integer[ACCEPTED] = 0
     if real[STEP] == 0.0 and real[H] == 0.0:
         real[H] = first_step(
             real, integer, work.times, y, work.k, work.state[SCRATCH], rhs, system, loops
@@ -149,6 +155,7 @@ def step(
     work: RadauWork,
     parts: Sequence[Any],
     project: Function,
+    watch: Function,
     system: System,
     loops: Any,
     tangent: Tangent,
@@ -157,35 +164,41 @@ def step(
     """Try one step: accept it, reject it, or stop the run."""
     estimate_error, find_slope = parts[3], parts[4]
     real, integer, times, state = work.real, work.integer, work.times, work.state
-    adaptive = real[STEP] == 0.0
-    t = real[T]
-    t1 = end_of_step(real, integer, times)
-    h = t1 - t
+    adaptive, t = real[STEP] == 0.0, real[T]
+    end = t1 = end_of_step(real, integer, times)
+    longest = h = t1 - t
+    if integer[SWITCHES] != 0 or real[LIMIT] < t1:
+        h = next_length(work, t1, state[SLOPE], project, watch, system, loops)
+        if h == 0.0:
+            return
+        t1 = t1 if h == longest else t + h
     predict(h, work)
     shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
-    if shorter > 0.0 and work.own[THETA] < HOPELESS:
-        # from where the iteration came to, the tangent at the end of the step is a better one
+    if shorter > 0.0 and work.own[THETA] < HOPELESS:  # once more, with the tangent at the end
         integer[TANGENT_NEEDED] = 1
         shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
     if shorter != 0.0:
         refuse(work, t1, h, shorter)
         return
+    if integer[SWITCHES] != 0 and stage_is_across(work, t, h, watch, system, loops):
+        return
     for k in range(state.shape[1]):
         state[TRIAL, k] = state[Y, k] + work.Z[2, k]
-    error = 0.0
-    if adaptive:
-        error = estimate_error(t, h, work, system, loops, tangent, matrix)
+    error = estimate_error(t, h, work, system, loops, tangent, matrix) if adaptive else 0.0
     if error < 1.0:
         failure = land(work, t1, h, project, system, loops)
         if failure == RUNNING:
             find_slope(t, h, work, system, loops, tangent, matrix)
-            failure = finish(work, t1, h)
+            failure = finish(work, t1, h, watch, system, loops)
+        if failure == ACROSS_A_SWITCH:
+            return
         if failure == RUNNING and adaptive and is_poor(real, integer, times, t1):
             integer[POOR] += 1
             reject(real, integer, times, t1, h * ELSEWHERE, STEP_FLOOR)
         elif failure == RUNNING:
             integer[POOR] = 0
             accept(work, t1, h, error)
+            settle(work, h, longest, end)
         else:
             reject(real, integer, times, t1, h * RETREAT, failure)
     elif error <= LARGEST:
@@ -197,6 +210,20 @@ def step(
             integer[TANGENT_NEEDED] = 1
     else:
         reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)
+
+
+@compiled_inside
+def stage_is_across(
+    work: RadauWork, t: float, h: float, watch: Function, system: System, loops: Any
+) -> bool:
+    """Whether an inner stage lies beyond a switch; then the step is cut."""
+    x = work.state[SCRATCH]
+    for i in range(2):
+        for k in range(x.shape[0]):
+            x[k] = work.state[Y, k] + work.Z[i, k]
+        if sample(work, t + work.method.c[i] * h, x, watch, system, loops):
+            return True
+    return False
 
 
 @compiled_inside
@@ -256,11 +283,15 @@ def land(
 
 
 @compiled_inside
-def finish(work: RadauWork, t1: float, h: float) -> int:
-    """Prepare dense output where a reporting time lies in the step; RUNNING, or NOT_FINITE."""
-    integer = work.integer
-    if not all_finite(work.state[TRIAL_SLOPE]):
+def finish(
+    work: RadauWork, t1: float, h: float, watch: Function, system: System, loops: Any
+) -> int:
+    """Prepare dense output where a reporting time lies in the step; RUNNING, or why not."""
+    integer, slope = work.integer, work.state[TRIAL_SLOPE]
+    if not all_finite(slope):
         return NOT_FINITE
+    if integer[SWITCHES] != 0 and end_is_across(work, t1, slope, watch, system, loops):
+        return ACROSS_A_SWITCH
     if integer[DENSE] != 0 and work.times[integer[NEXT]] < t1:
         prepare_dense(h, work)
     return RUNNING

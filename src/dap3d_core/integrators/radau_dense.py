@@ -30,6 +30,10 @@ from dap3d_core.integrators.work import H_DENSE, T_DENSE, TRIAL, T, Y
 from dap3d_core.kernels.cache import compiled, compiled_inside
 from dap3d_core.linear.saddle import add_product
 
+#: A step before that was shorter than this part of the present one says nothing: rounding, divided
+#: by the square, would be seen.
+NEGLIGIBLE = 1e-4
+
 
 @compiled
 def find_slope(
@@ -90,7 +94,7 @@ def prepare_dense(h: float, work: RadauWork) -> None:
     real, state, terms, stages, c = work.real, work.state, work.terms, work.Z, work.method.c
     real[T_DENSE], real[H_DENSE] = real[T], h
     q = work.own[H_ACCEPTED] / h
-    first = work.integer[ACCEPTED] == 0
+    first = work.integer[ACCEPTED] == 0 or q < NEGLIGIBLE
     for k in range(state.shape[1]):
         y, rise = state[Y, k], state[TRIAL, k] - state[Y, k]
         terms[0, k], terms[1, k] = y, rise

@@ -43,8 +43,8 @@ class RadauWork(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(("integer", "pivots", "pivotsc"), INTEGER_VECTOR),
-        **dict.fromkeys(("state", "k", "terms", "rows", "Z", "Z_old", "F", "R", "x", "along"),
-                        MATRIX),
+        **dict.fromkeys(("state", "k", "terms", "rows", "switches", "crossings", "Z", "Z_old",
+                         "F", "R", "x", "along"), MATRIX),
         **dict.fromkeys(("multipliers", "last_multipliers", "G", "frames"), TENSOR),
         **dict.fromkeys(("xc", "alongc", "Kc"), COMPLEX_VECTOR),
         "method": RadauMethod.type_of(),
@@ -58,6 +58,8 @@ class RadauWork(Arrays):
     k: Floats  # (2, n) for the first step
     terms: Floats  # (TERMS, n)
     rows: Floats  # (capacity, 1 + n + report_size)
+    switches: Floats  # as in work.Work
+    crossings: Floats
     Z: Floats  # (3, n) stages less the state
     Z_old: Floats  # (3, n) of the last accepted step
     F: Floats  # (3, n) rates at the stages

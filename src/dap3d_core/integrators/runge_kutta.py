@@ -8,8 +8,8 @@ It knows a vector y and first-class functions ``f(t, y, out, system, loops)``:
              failed, 2 where the state is too close to a singular one to go on from; out[4:] =
              lengths that go linearly through zero at a singular state
     report   out = what else is reported at (t, y): accelerations, multipliers, ...
-    accepted (only where something is watched) takes note of an accepted state; out[0] < 0 ends the
-             run there
+    accepted (only where something is watched) takes note of an accepted state
+    watch    (only where there are switches) gives their values (switches.py)
 
 Everything that decides what comes next lies in the arrays of ``Work``: however a run is cut into
 calls of ``advance``, its numbers are the same bit for bit. Source: Hairer, Norsett, Wanner, Solving
@@ -22,7 +22,7 @@ Ordinary Differential Equations I (HNW), II.4 to II.6.
 from collections.abc import Sequence
 from typing import Any
 
-from dap3d_core.integrators.combination import all_finite, combine, interpolate, scaled_largest
+from dap3d_core.integrators.combination import all_finite, combine, scaled_largest
 from dap3d_core.integrators.control import (
     LARGEST,
     SAFETY,
@@ -35,31 +35,30 @@ from dap3d_core.integrators.control import (
 )
 from dap3d_core.integrators.crossing import aim, is_near, look_ahead, look_back, singular_ahead
 from dap3d_core.integrators.method import ABSCISSA, Floats, Integers
+from dap3d_core.integrators.reporting import POOR_PLACE, project_state, report_end, report_reached
+from dap3d_core.integrators.switches import end_is_across, next_length, sample, settle
 from dap3d_core.integrators.work import (
     ACROSS,
     ATOL,
     CALM,
     DENSE,
+    ENDING,
     ERROR_SIZE,
     ERROR_USES_RESULT,
     ERRORS,
     EXPONENT,
     FACTOR_MIN,
-    FINISHED,
     FRESH,
     H_DENSE,
     LENGTHS,
+    LIMIT,
     NEXT,
     NOT_FINITE,
     OTHER,
     OUTCOME,
     POOR,
     PROJECT_ON,
-    PROJECTION_FAILED,
-    PROJECTIONS,
-    REPORTS,
     RHS,
-    ROW,
     RTOL,
     RUNNING,
     SCRATCH,
@@ -68,8 +67,7 @@ from dap3d_core.integrators.work import (
     STEP,
     STEP_FLOOR,
     STEPS,
-    SWITCH,
-    SWITCHED,
+    SWITCHES,
     T_DENSE,
     T_STOP,
     TRIAL,
@@ -84,8 +82,8 @@ from dap3d_core.kernels.cache import compiled, compiled_inside
 
 #: Factor on a step that met a number that is not finite, or whose end could not be projected.
 RETREAT = 0.1
-#: What project says in out[1]: it failed; the state is good, but too close to a singular one.
-FAILED, POOR_PLACE = 1.0, 2.0
+#: What ``land`` says, besides a status: the step was cut.
+ACROSS_A_SWITCH = -1
 #: Factor on a step that should end elsewhere, and how often in a row that is tried.
 ELSEWHERE, ATTEMPTS = 0.6, 4
 
@@ -105,86 +103,28 @@ def advance(
     """
     rhs, project, report = functions[0], functions[1], functions[2]
     real, integer, times = work.real, work.integer, work.times
+    watch = functions[4] if integer[SWITCHES] != 0 else rhs
     limit = integer[RHS] + budget
     while integer[STATUS] == RUNNING:
         if times[integer[NEXT]] <= real[T]:
             if not report_reached(work, project, report, system, loops):
                 return
-        elif real[SWITCH] < 0.0:
-            real[T_STOP], integer[STATUS] = real[T], SWITCHED
-        elif integer[RHS] > limit:
+        elif integer[ENDING] != 0:
+            if not report_end(work, report, system, loops):
+                return
+        elif integer[RHS] > limit or real[T] >= real[LIMIT]:
             return
         else:
             steps = integer[STEPS]
-            step(work, rhs, project, system, loops)
+            step(work, rhs, project, watch, system, loops)
             if integer[WATCHED] != 0 and integer[STEPS] > steps:
-                functions[3](real[T], work.state[Y], real[SWITCH:], system, loops)
+                functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
 
 
 @compiled_inside
-def report_reached(
-    work: Work, project: Function, report: Function, system: Any, loops: Any
-) -> bool:
-    """Write a row for each reporting time up to t; False where the rows are full.
-
-    Sets the status where the last time is reported, or where a row is not finite.
-    """
-    real, integer, times = work.real, work.integer, work.times
-    n = work.state.shape[1]
-    while integer[NEXT] < times.size and times[integer[NEXT]] <= real[T]:
-        if integer[ROW] == work.rows.shape[0]:
-            return False
-        t, y = times[integer[NEXT]], work.state[Y]
-        if t < real[T]:
-            y = work.state[TRIAL]
-            interpolate(y, work.terms, (t - real[T_DENSE]) / real[H_DENSE])
-            failure = project_state(real, integer, t, y, project, system, loops)
-            if failure != RUNNING:
-                real[T_STOP], integer[STATUS] = t, failure
-                return True
-        row = work.rows[integer[ROW]]
-        row[0] = t
-        for i in range(n):
-            row[1 + i] = y[i]
-        integer[REPORTS] += 1
-        report(t, y, row[1 + n :], system, loops)
-        if not all_finite(row):
-            real[T_STOP], integer[STATUS] = t, NOT_FINITE
-            return True
-        integer[ROW] += 1
-        integer[NEXT] += 1
-    if integer[NEXT] == times.size:
-        integer[STATUS] = FINISHED
-    return True
-
-
-@compiled_inside
-def project_state(
-    real: Floats,
-    integer: Integers,
-    t: float,
-    y: Floats,
-    project: Function,
-    system: Any,
-    loops: Any,
-) -> int:
-    """Project y where that is on; why that failed, or RUNNING."""
-    real[OUTCOME] = 0.0
-    if not all_finite(y):
-        return NOT_FINITE
-    if integer[PROJECT_ON] == 0:
-        return RUNNING
-    outcome = real[OUTCOME:]
-    outcome[1] = 0.0
-    integer[PROJECTIONS] += 1
-    project(t, y, outcome, system, loops)
-    if outcome[1] == FAILED or not all_finite(y):
-        return PROJECTION_FAILED
-    return RUNNING
-
-
-@compiled_inside
-def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) -> None:
+def step(
+    work: Work, rhs: Function, project: Function, watch: Function, system: Any, loops: Any
+) -> None:
     """Try one step: accept it, reject it, or stop the run."""
     real, integer, times, k = work.real, work.integer, work.times, work.k
     t, y = real[T], work.state[Y]
@@ -199,13 +139,18 @@ def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) 
     if adaptive and real[H] == 0.0:
         scratch = work.state[SCRATCH]
         real[H] = first_step(real, integer, times, y, k, scratch, rhs, system, loops)
-    t1 = end_of_step(real, integer, times)
+    end = t1 = end_of_step(real, integer, times)
     longest = t1 - t
     h = aim(work.lengths, real[CALM], longest) if adaptive else longest
+    if integer[SWITCHES] != 0 or real[LIMIT] < t1:
+        h = min(h, next_length(work, t1, k[0], project, watch, system, loops))
+        if h == 0.0:
+            return
     if h < longest:
         t1 = t + h
     near = integer[PROJECT_ON] != 0 and is_near(work.lengths, longest)
-    take_stages(work, t1, h, near, rhs, project, system, loops)
+    if not take_stages(work, t1, h, near, rhs, project, watch, system, loops):
+        return
     error = 0.0
     if adaptive and near:
         error = kept_error(work, t1, h, project, system, loops)
@@ -214,7 +159,9 @@ def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) 
     if near and error > 1.0 and is_rounding(real, work.lengths, h, error):
         error = 1.0
     if error <= 1.0:
-        failure = land(work, t1, near, rhs, project, system, loops)
+        failure = land(work, t1, near, rhs, project, watch, system, loops)
+        if failure == ACROSS_A_SWITCH:
+            return
         if failure == RUNNING and adaptive and not near and is_poor(real, integer, times, t1):
             integer[POOR] += 1
             look_ahead(work.lengths, real[LENGTHS:], h)
@@ -226,8 +173,7 @@ def step(work: Work, rhs: Function, project: Function, system: Any, loops: Any) 
                 real[ACROSS] = 0.0
             look_back(work.lengths, real[LENGTHS:], h)
             accept(real, integer, times, work.state, k, t1, error)
-            if h < longest:
-                real[H] = max(real[H], longest)
+            settle(work, h, longest, end)
         else:
             reject(real, integer, times, t1, h * RETREAT, failure)
     elif error <= LARGEST:
@@ -245,12 +191,16 @@ def take_stages(
     near: bool,
     rhs: Function,
     project: Function,
+    watch: Function,
     system: Any,
     loops: Any,
-) -> None:
-    """Stages and trial state of a step to t1; each on the constraints if ``near``."""
+) -> bool:
+    """Stages and trial state of a step to t1; each on the constraints if ``near``.
+
+    False where one of them lies beyond a switch.
+    """
     real, integer, k, table = work.real, work.integer, work.k, work.table
-    stages = integer[STAGES]
+    stages, watched = integer[STAGES], integer[SWITCHES] != 0
     last = stages if integer[ERROR_USES_RESULT] != 0 else stages - 1
     for i in range(1, stages + 1):
         x = work.state[TRIAL] if i == stages else work.state[SCRATCH]
@@ -261,8 +211,11 @@ def take_stages(
             if near:
                 on_constraints(work, t, x, project, system, loops)
                 x = work.state[SCRATCH]
+            if watched and sample(work, t, x, watch, system, loops):
+                return False
+            integer[RHS] += 1
             rhs(t, x, k[i], system, loops)
-    integer[RHS] += last
+    return True
 
 
 @compiled_inside
@@ -327,7 +280,14 @@ def is_poor(real: Floats, integer: Integers, times: Floats, t1: float) -> bool:
 
 @compiled_inside
 def land(
-    work: Work, t1: float, near: bool, rhs: Function, project: Function, system: Any, loops: Any
+    work: Work,
+    t1: float,
+    near: bool,
+    rhs: Function,
+    project: Function,
+    watch: Function,
+    system: Any,
+    loops: Any,
 ) -> int:
     """Prepare dense output, project the trial state, evaluate f; why that failed, or RUNNING.
 
@@ -335,7 +295,7 @@ def land(
     """
     real, integer, times, k = work.real, work.integer, work.times, work.k
     y, trial, result = work.state[Y], work.state[TRIAL], integer[STAGES]
-    known = integer[ERROR_USES_RESULT] != 0
+    known, watched = integer[ERROR_USES_RESULT] != 0, integer[SWITCHES] != 0
     if integer[DENSE] != 0 and times[integer[NEXT]] < t1:
         t, argument, table = real[T], work.state[SCRATCH], work.table
         if not known:
@@ -347,6 +307,8 @@ def land(
             combine(argument, 1.0, y, t1 - t, table, i, k)
             if near:
                 on_constraints(work, at, argument, project, system, loops)
+            if watched and sample(work, at, argument, watch, system, loops):
+                return ACROSS_A_SWITCH
             rhs(at, argument, k[i], system, loops)
         integer[RHS] += k.shape[0] - 1 - result
         prepare_dense(real, integer, work.state, k, work.terms, table, t1)
@@ -354,12 +316,14 @@ def land(
     if failure != RUNNING:
         return failure
     known = known and real[OUTCOME] == 0.0
-    if not known and t1 < times[-1]:
+    if not known and (watched or t1 < times[-1]):
         integer[RHS] += 1
         rhs(t1, trial, k[result], system, loops)
         known = True
     if known and not all_finite(k[result]):
         return NOT_FINITE
+    if watched and end_is_across(work, t1, k[result], watch, system, loops):
+        return ACROSS_A_SWITCH
     integer[FRESH] = 1 if known else 0
     return RUNNING
 

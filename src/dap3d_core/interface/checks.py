@@ -130,7 +130,7 @@ def _output(
     for _ in range(ATTEMPTS):
         try:
             value = kernel(*(random_quantity(q, rng) for q in quantities))
-            found = entries(value, *_expected(type_, kernel_name))
+            found = entries(value, *_expected(type_, kernel_name, value))
         except ShapeError as error:
             raise PluginError(f"{who}: {error}") from None
         except Exception as error:
@@ -301,9 +301,12 @@ def _check_names(
             )
 
 
-def _expected(type_: type[TypeBase], kernel: str) -> tuple[tuple[int, ...], str]:
+def _expected(type_: type[TypeBase], kernel: str, value: Any) -> tuple[tuple[int, ...], str]:
     slots = len(body_slots(type_))
-    if issubclass(type_, Joint) and kernel not in ("friction", "switch"):
+    if kernel == "switch":
+        shape = (len(value),) if isinstance(value, tuple) and value else ()
+        return shape, "one number, or a tuple of numbers"
+    if issubclass(type_, Joint) and kernel != "friction":
         if kernel == "C":
             n = len(type_.position_rows())
             return (n,), f"{n} numbers, one for each row of the position level"

@@ -57,8 +57,9 @@ class Joint(TypeBase):
 
     * ``friction``  the wrench of its Coulomb friction on each body, as a force returns it; takes
       ``lam`` (its multipliers), ``mu``, ``v_tol``, ``radius``; a force ``friction`` switches it on;
-    * ``switch``    a number that is positive as long as the element makes sense; the run ends where
-      it becomes negative, with ``switch_words``.
+    * ``switch``    a number, or a tuple of numbers, smooth in time. With ``switch_words`` the run
+      ends, and says them, where one becomes negative; without, the integration starts anew where
+      one changes its sign: there the element's law takes another branch (docs/events.md).
 
     ``prepare(self, bodies)`` may return constants found once on the poses as given. A subclass that
     names values of fields, ``class NoSlip(Disk, slip="xyz")``, is a variant of the type: it takes

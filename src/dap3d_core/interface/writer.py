@@ -83,7 +83,10 @@ def _store(examined: Examined, kernel: str) -> Iterable[str]:
     elif kernel == "energy":
         yield f"out1[0] += {paths[0]}"
     elif kernel == "switch":
-        yield f"out1[0] = min(out1[0], {paths[0]})"
+        yield "place = int(out2[0]) & NATURAL"  # they stand one behind the other
+        for k, path in enumerate(paths):
+            yield f"out1[place + {k}] = {path}"
+        yield f"out2[0] += {len(paths)}.0"
     else:
         yield "row = idx[b0]"
         for k, path in enumerate(paths):

@@ -5,6 +5,7 @@ from dap3d_core.result.estimate import ErrorEstimate, estimated_error
 from dap3d_core.result.files import check_target
 from dap3d_core.result.ledger import Entry
 from dap3d_core.result.motion import Energy
+from dap3d_core.result.occurrence import Occurrence
 from dap3d_core.result.quantities import Quantity, find
 from dap3d_core.result.reactions import Reaction
 from dap3d_core.result.reading import open_result
@@ -17,6 +18,7 @@ __all__ = [
     "Energy",
     "Entry",
     "ErrorEstimate",
+    "Occurrence",
     "Quantity",
     "Reaction",
     "Record",

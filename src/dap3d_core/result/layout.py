@@ -8,6 +8,7 @@ import numpy as np
 from dap3d_core.result.arrays import COLUMNS, Arrays, column_sizes
 from dap3d_core.result.estimate import U_ERROR
 from dap3d_core.result.kinds import AXES, EULER
+from dap3d_core.result.occurrence import Occurrence
 from dap3d_core.result.record import Record, Statistics, to_json
 
 if TYPE_CHECKING:
@@ -74,6 +75,7 @@ def attributes(subject: "Subject", record: Record) -> dict[str, Any]:
         "notes": to_json(record.notes),
         "settings": to_json(record.settings),
         "statistics": to_json(attrs.asdict(record.stats)),
+        "events": to_json([attrs.asdict(event) for event in record.events]),
         "versions": to_json(record.versions),
         "has_potential": np.int32(subject.has_potential),
         "is_isolated": np.int32(subject.is_isolated),
@@ -91,6 +93,7 @@ def record_of(found: dict[str, Any]) -> Record:
         notes=found["notes"],
         settings=found["settings"],
         stats=Statistics(**found["statistics"]),
+        events=[Occurrence(**event) for event in found["events"]],
         known_versions=found["versions"],
     )
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dap3d_core.model.groups import Floats
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
-_JSON = ("notes", "settings", "statistics", "versions")
+_JSON = ("notes", "settings", "statistics", "versions", "events")
 
 
 def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) -> Result:
@@ -103,6 +103,7 @@ def _check_format(file: Path, dataset: Any) -> None:
 
 def _read(dataset: Any) -> tuple[Subject, Record, Arrays]:
     found = {name: dataset.getncattr(name) for name in dataset.ncattrs()}
+    found.setdefault("events", "[]")  # older files have none
     for name in _JSON:
         found[name] = json.loads(found[name])
     subject = _subject(dataset, found)

@@ -10,6 +10,8 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.result.occurrence import Occurrence
+
 #: How a run can have ended.
 STATUSES = ("done", "interrupted", "stopped")
 #: How a note begins that changes nothing of what was asked for: no warning to ``--strict``.
@@ -57,6 +59,10 @@ def _words(words: Iterable[str]) -> tuple[str, ...]:
     return tuple(words)
 
 
+def _occurrences(found: Iterable[Occurrence]) -> tuple[Occurrence, ...]:
+    return tuple(found)
+
+
 def _plain(value: Any) -> Any:
     """Settings as a file gives them back: lists for tuples, Python's numbers for numpy's."""
     return json.loads(to_json(value))
@@ -78,6 +84,7 @@ class Record:
         notes: what the run chose, changed or noticed, in order.
         settings: rtol, atol, step, project, correct and the like, as they were used.
         stats: what it cost.
+        events: what happened at instants that were located, in their order.
         known_versions: of dap3d, numpy, numba, python; None for those that are installed.
     """
 
@@ -88,6 +95,7 @@ class Record:
     notes: tuple[str, ...] = attrs.field(default=(), converter=_words)
     settings: dict[str, Any] = attrs.field(factory=dict, converter=_plain)
     stats: Statistics = attrs.Factory(Statistics)
+    events: tuple[Occurrence, ...] = attrs.field(default=(), converter=_occurrences)
     known_versions: Mapping[str, str] | None = attrs.field(
         default=None, eq=lambda known: _installed() if known is None else dict(known)
     )

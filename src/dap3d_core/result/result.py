@@ -14,6 +14,7 @@ from dap3d_core.result.estimate import ErrorEstimate, estimate_of
 from dap3d_core.result.kinematics import Kinematics
 from dap3d_core.result.ledger import Entry, ledger_of
 from dap3d_core.result.motion import Energy, kinetic_energy
+from dap3d_core.result.occurrence import Occurrence
 from dap3d_core.result.quantities import find
 from dap3d_core.result.reactions import Reaction, jacobians, reactions
 from dap3d_core.result.record import Record, Statistics
@@ -178,6 +179,11 @@ class Result(Kinematics):
         return list(self.record.notes)
 
     @property
+    def events(self) -> tuple[Occurrence, ...]:
+        """What happened at instants that were located, in order: switches, events of a script."""
+        return self.record.events
+
+    @property
     def stats(self) -> Statistics:
         """What the run cost: steps, rejected, rhs, projections, wall_time_s, compile_time_s."""
         return self.record.stats
@@ -288,10 +294,15 @@ class Result(Kinematics):
 
         Raises:
             UnknownNameError: there is no such force; names the nearest.
-            ResultError: as ``model``.
+            ResultError: as ``model``; or an event changed its numbers on the way.
         """
         if name not in self.force_names:
             raise unknown("force", name, self.force_names)
+        if any(name in event.changes for event in self.events):
+            raise ResultError(
+                f"an event changed numbers of force {name!r} in the course of the run: it cannot "
+                "be evaluated again with those of the scene"
+            )
         if name not in self._applied:
             place = self.model.force_names.index(name)
             self._applied[name] = applied(self.machine, self.t, self.u, self.v_dot, name, place)

@@ -1,13 +1,17 @@
 """The simulation floor: initial conditions, method choice, integration, reporting."""
 
+from dap3d_core.simulation.asked import report_times
 from dap3d_core.simulation.compiled import CompiledModel, compile_scene
 from dap3d_core.simulation.errors import AssemblyError, RedundantError, SimulationError
+from dap3d_core.simulation.event import Event, Instant
 from dap3d_core.simulation.opening import open_result
-from dap3d_core.simulation.simulate import report_times, simulate
+from dap3d_core.simulation.simulate import simulate
 
 __all__ = [
     "AssemblyError",
     "CompiledModel",
+    "Event",
+    "Instant",
     "RedundantError",
     "SimulationError",
     "compile_scene",

@@ -1,7 +1,5 @@
 """Who made a number that is not finite: the first body, force or joint to blame."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,30 +26,6 @@ def find_offender(machine: Machine, t: float, y: Floats, t_stop: float) -> str:
     return ""
 
 
-@AS_COMPILED
-def find_switch(machine: Machine, t: float, y: Floats) -> str:
-    """Which switch is negative at time t with the integrated state y, and what that means."""
-    s = machine.system
-    place_bodies(y, s.body, s.metric)
-    for q, (kind, group) in enumerate(machine.what):
-        if kind != "switch":
-            continue
-        for k in range(group.count):
-            s.force[0] = 1.0
-            _call_one(machine, q, k, group, t, (s.force, s.force, s.force))
-            if s.force[0] < 0.0:
-                type_: Any = group.examined.type
-                words = type_.switch_words or "its switch became negative"
-                return f"{type_.kind} {_element(machine, group, k)} ({group.keyword}): {words}"
-    return ""
-
-
-def _element(machine: Machine, group: Group, k: int) -> str:
-    model = machine.model
-    is_joint = group.examined.type.kind == "joint"
-    return (model.joint_names if is_joint else model.force_names)[int(group.members[k])]
-
-
 def _at(machine: Machine, t: float, y: Floats) -> str:
     n = machine.model.body_count
     for b, name in enumerate(machine.model.body_names):
@@ -75,6 +49,8 @@ def _one_is_finite(machine: Machine, q: int, k: int, kind: str, group: Group, t:
         out[:] = 0.0
     joint_outs = {"acceleration": (s.D, s.gamma, s.nu), "position": (s.C, s.C, s.C),
                   "friction": (s.force, s.x, s.x)}  # fmt: skip
+    if kind == "switch":
+        joint_outs[kind] = np.zeros(len(group.examined.outputs[kind])), np.zeros(1), np.zeros(1)
     outs = joint_outs.get(kind, (s.force, s.force, s.force))
     _call_one(machine, q, k, group, t, outs)
     return all(bool(np.all(np.isfinite(out))) for out in (*outs, s.F[:, :4]))

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import attrs
+import numpy as np
 
 from dap3d_core.result import INFORMATION, Result, estimated_error
 from dap3d_core.scene import SceneError, Simulation
@@ -67,10 +68,22 @@ def add_error(
         _amend(result, output, "the estimate of its error was ended early and left out")
         error.result = result  # type: ignore[attr-defined]
         raise
+    if not _same_instants(result, second):
+        note = f"a second run at {words} ended elsewhere, by its events"
+        _amend(result, output, f"its error was not estimated: {note}")
+        return
     steps = second.stats.steps
     result.arrays = attrs.evolve(result.arrays, u_error=estimated_error(result.u, second.u, steps))
     note = f"{INFORMATION}its error is estimated by a second run at {words} ({steps:,} steps)"
     _amend(result, output, note)
+
+
+def _same_instants(result: Result, second: Result) -> bool:
+    """Whether two runs reported at the same times; those of an event differ by its error."""
+    if len(result.t) != len(second.t):
+        return False
+    spacing = float(np.max(np.diff(result.t))) if len(result.t) > 1 else 0.0
+    return bool(np.all(np.abs(result.t - second.t) <= 1e-3 * spacing))
 
 
 def _first_step(result: Result, settings: Simulation) -> float | None:

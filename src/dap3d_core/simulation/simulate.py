@@ -2,27 +2,29 @@
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import attrs
 import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.friction import PASSES
 from dap3d_core.integrators import METHODS, Integration, Status
 from dap3d_core.kernels.cache import driver_is_cached
-from dap3d_core.result import Record, Result, ResultWriter, Statistics, check_target
-from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, Simulation, check_simulation
+from dap3d_core.result import Occurrence, Record, Result, ResultWriter, Statistics, check_target
+from dap3d_core.scene import Mistake, Scene, SceneError, Simulation
+from dap3d_core.simulation.asked import compiled_for, report_times, settings_of
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.elsewhere import redundancy_elsewhere
+from dap3d_core.simulation.ending import event_notes, occurrences, why_stopped
 from dap3d_core.simulation.errors import RedundantError, SimulationError
+from dap3d_core.simulation.event import Event
 from dap3d_core.simulation.implicit import implicit_integration
 from dap3d_core.simulation.initial import correction_notes, violation
-from dap3d_core.simulation.offender import find_offender, find_switch
 from dap3d_core.simulation.redundancy import Redundancy
 from dap3d_core.simulation.second_run import Again, add_error
+from dap3d_core.simulation.watcher import Watcher
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
@@ -56,23 +58,22 @@ def simulate(
     force: bool = False,
     correct_metric: str | None = None,
     estimate_error: bool = False,
+    events: Sequence[Event] = (),
 ) -> Result:
     """Simulate a scene from t = 0 to t_end.
 
-    What is left out is taken from the scene's [simulation], and there by default method "auto",
-    integrator "dop853", rtol 1e-8, atol 1e-10, correct and project on.
+    What is left out is the scene's [simulation]'s, by default method "auto", integrator "dop853",
+    rtol 1e-8, atol 1e-10, correct and project on.
 
     Args:
         scene: a Scene, what ``load`` takes, or a model that was compiled before.
         t_end: final time, s; 0 solves once at t = 0.
-        dt: reporting step, s; t_end / 100 when nobody gives one. When it does not divide t_end,
-            t_end is reported too.
+        dt: reporting step, s; by default t_end / 100. t_end is reported in any case.
         method: "auto", "unconstrained", "standard", "penalty" or "lsq".
         integrator: "dopri5", "dop853", "radau" (implicit) or "rk4" (which needs ``step``).
         rtol, atol: tolerances of the step's error.
         step: fixed step, s, without error control.
-        correct: bring the initial conditions onto the constraints first.
-        project: bring every accepted step and reported state onto the constraints.
+        correct, project: bring the start, and then every state, onto the constraints.
         progress: called as progress(t, t_end) between chunks of some 0.1 s.
         allow_code, announce: as ``compile`` has them.
         output: result file to write. While a run of more than a second goes on its rows stand in
@@ -80,6 +81,7 @@ def simulate(
         force: whether an existing output is overwritten.
         correct_metric: "unit" or "mass": the least correction in m and rad, or by masses.
         estimate_error: estimate ``result.error`` by a second, finer run (second_run.py).
+        events: what to look out for (``Event``).
 
     Returns:
         the result. Any exception that ends the integration carries what was computed until then as
@@ -90,70 +92,23 @@ def simulate(
         RedundantError, AssemblyError: dependent constraints; positions that cannot be assembled.
         SimulationError: the run stopped; ``.result`` is what was computed.
     """
-    compiled = _compiled(scene, method, allow_code, announce)
-    settings = _settings(compiled, t_end=t_end, dt=dt, method=method, integrator=integrator,
+    compiled = compiled_for(scene, method, allow_code, announce)
+    settings = settings_of(compiled, t_end=t_end, dt=dt, method=method, integrator=integrator,
                          rtol=rtol, atol=atol, step=step, correct=correct, project=project,
                          correct_metric=correct_metric)  # fmt: skip
-    run = _Run(compiled, settings, announce)
+    run = _Run(compiled, settings, announce, events)
     return run.go(progress, output, force=force, estimate_error=estimate_error)
-
-
-def _settings(compiled: CompiledModel, **asked: Any) -> Simulation:
-    """The scene's settings with what is given (not None) in their places.
-
-    Raises:
-        SceneError: they make no sense.
-    """
-    given = {k: v for k, v in asked.items() if v is not None}
-    settings = attrs.evolve(compiled.scene.simulation, **given)
-    check_simulation(settings, compiled.model.body_names)
-    return settings
-
-
-def _compiled(
-    scene: Scene | str | os.PathLike[str] | CompiledModel,
-    method: str | None,
-    allow_code: bool,
-    announce: Callable[[str], None] | None,
-) -> CompiledModel:
-    """The compiled model of a scene; one that was compiled before must have the method asked for.
-
-    Raises:
-        SimulationError: it has another.
-    """
-    if not isinstance(scene, CompiledModel):
-        return CompiledModel(scene, method=method, allow_code=allow_code, announce=announce)
-    if method is not None and scene.choice(method)[0] != scene.method:
-        words = f"the model was compiled for method {scene.method}; compile it for {method}"
-        raise SimulationError(words)
-    return scene
-
-
-def report_times(t_end: float | None, dt: float | None) -> Floats:
-    """Reporting times (nt,): multiples of dt, and t_end where it is none of them.
-
-    Raises:
-        SceneError: no final time.
-    """
-    if t_end is None:
-        remedy = "give t_end in the scene's [simulation], or --t-end"
-        raise SceneError([Mistake("t_end", MISSING, "a run needs a final time", remedy=remedy)])
-    if t_end == 0.0:
-        return np.zeros(1)
-    dt = t_end / 100.0 if dt is None else dt
-    count = int(np.floor(t_end / dt * (1.0 + 1e-12) + 1e-9))
-    times = dt * np.arange(count + 1, dtype=np.float64)
-    if t_end - times[-1] > 1e-9 * dt:
-        return np.append(times, t_end)
-    times[-1] = t_end
-    return times
 
 
 class _Run:
     """One run of a compiled model."""
 
     def __init__(
-        self, compiled: CompiledModel, settings: Any, announce: Callable[[str], None] | None
+        self,
+        compiled: CompiledModel,
+        settings: Any,
+        announce: Callable[[str], None] | None,
+        events: Sequence[Event] = (),
     ) -> None:
         self.announce = announce
         self.compiled = compiled
@@ -168,6 +123,7 @@ class _Run:
         self.started = self.compile_time = 0.0
         self.rank = 0
         self.first_step: float | None = None
+        self.watcher = Watcher(compiled, events) if events else None
 
     def go(
         self,
@@ -193,9 +149,14 @@ class _Run:
             status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
             error.result = self._kept(integration, status)  # type: ignore[attr-defined]
             raise
-        if integration.status is not Status.FINISHED:
+        finally:
+            if self.watcher:
+                self.watcher.numbers.put_back()
+        if integration.status not in (Status.FINISHED, Status.ENDED):
             raise self._stopped(integration)
-        result = self._kept(integration, "done")
+        result = self._kept(
+            integration, "done" if integration.status is Status.FINISHED else "stopped"
+        )
         assert result is not None
         if estimate_error:
             add_error(result, self.settings, self._again(progress), output)
@@ -205,7 +166,8 @@ class _Run:
         """Makes a run with other settings and another first step, in memory."""
 
         def again(settings: Simulation, first_step: float | None) -> Result:
-            run = _Run(self.compiled, settings, self.announce)
+            events = self.watcher.events if self.watcher else ()
+            run = _Run(self.compiled, settings, self.announce, events)
             run.first_step = first_step
             return run.go(progress, None, force=False)
 
@@ -259,6 +221,7 @@ class _Run:
             error_size=len(y0) - 1,  # the work does not steer the step
             report_size=machine.report_size,
             buffer_rows=max(1, min(len(self.times), BUFFER_NUMBERS // width)),
+            ends=machine.ending,
         )
         try:
             if settings.integrator == "radau":
@@ -271,7 +234,7 @@ class _Run:
                 y0,
                 self.times,
                 length_count=machine.length_count,
-                watched=machine.watched,
+                watched=machine.counts_turns,
                 **options,
             )
         except ValueError as error:
@@ -291,7 +254,10 @@ class _Run:
         budget, t_end = 100, float(self.times[-1])
         while integration.status is Status.RUNNING:
             before, clock = integration.statistics.rhs, time.perf_counter()
-            integration.advance(budget)
+            if self.watcher:
+                self.watcher.advance(integration, budget)
+            else:
+                integration.advance(budget)
             self._take_rows(integration)
             done, seconds = integration.statistics.rhs - before, time.perf_counter() - clock
             if progress is not None:
@@ -314,20 +280,7 @@ class _Run:
 
     def _stopped(self, integration: Integration) -> SimulationError:
         """Why the integration ended early, with what was computed."""
-        t = integration.t
-        t_stop = integration.t_stop if integration.t_stop is not None else t
-        culprit = find_offender(self.machine, t, integration.y, t_stop)
-        reason = {
-            Status.STEP_FLOOR: "the step size fell to the resolution of time",
-            Status.NOT_FINITE: "a number became infinite or not a number",
-            Status.PROJECTION_FAILED: "the state could not be projected onto the constraints",
-            Status.SWITCHED: "",
-        }[integration.status]
-        if integration.status is Status.SWITCHED:
-            culprit = find_switch(self.machine, t, integration.y)
-        message = f"the run stopped at t = {t:.9g} s{': ' if reason else ''}{reason}"
-        if culprit:
-            message += f": {culprit}"
+        message = why_stopped(self.machine, integration)
         self.notes.append(message)
         return SimulationError(message, self._kept(integration, "stopped"))
 
@@ -341,6 +294,7 @@ class _Run:
                 f"{integration.statistics.rhs} or more; the last ones were used. Motion there is "
                 "uncertain: a high mu may lock the joint by itself"
             )
+        self.notes += event_notes(integration, self._events(integration))
         record = self._record(integration, status)
         result = Result.of_run(
             self.machine.model, np.concatenate(self.rows), record, lambda: self.machine
@@ -353,8 +307,13 @@ class _Run:
             self.writer.part.unlink(missing_ok=True)
         return result
 
+    def _events(self, integration: Integration) -> list[Occurrence]:
+        found = self.watcher.occurrences if self.watcher else []
+        return occurrences(self.machine, integration, found)
+
     def _record(self, integration: Integration, status: str) -> Record:
-        counts = integration.statistics
+        counts, events = integration.statistics, self._events(integration)
+        changes = any(event.changes for event in events)
         return Record(
             scene_text=self.compiled.scene_text,
             stats=Statistics(
@@ -369,6 +328,7 @@ class _Run:
             method=self.compiled.method,
             integrator=self.settings.integrator,
             notes=self.notes,
+            events=events,
             settings={
                 "t_end": float(self.times[-1]),
                 "dt": self.settings.dt,
@@ -378,7 +338,7 @@ class _Run:
                 "project": bool(self.settings.project),
                 "correct": bool(self.settings.correct),
                 "rank": self.rank,
-                "conservative": self.compiled.is_conservative,
+                "conservative": self.compiled.is_conservative and not changes,
                 "correct_metric": str(self.settings.correct_metric),
             },
         )

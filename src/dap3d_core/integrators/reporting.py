@@ -1,0 +1,119 @@
+"""What is left of a step once it is done: states on the constraints, rows of the result."""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+from dap3d_core.integrators.combination import all_finite, interpolate
+from dap3d_core.integrators.method import Floats, Integers
+from dap3d_core.integrators.work import (
+    ENDING,
+    FINISHED,
+    H_DENSE,
+    NEXT,
+    NOT_FINITE,
+    OUTCOME,
+    PROJECT_ON,
+    PROJECTION_FAILED,
+    PROJECTIONS,
+    REPORTS,
+    ROW,
+    RUNNING,
+    STATUS,
+    T_DENSE,
+    T_STOP,
+    TRIAL,
+    Function,
+    T,
+    Work,
+    Y,
+)
+from dap3d_core.kernels.cache import compiled_inside
+
+#: What project says in out[1]: it failed; the state is good, but too close to a singular one.
+FAILED, POOR_PLACE = 1.0, 2.0
+
+
+@compiled_inside
+def project_state(
+    real: Floats,
+    integer: Integers,
+    t: float,
+    y: Floats,
+    project: Function,
+    system: Any,
+    loops: Any,
+) -> int:
+    """Project y where that is on; why that failed, or RUNNING."""
+    real[OUTCOME] = 0.0
+    if not all_finite(y):
+        return NOT_FINITE
+    if integer[PROJECT_ON] == 0:
+        return RUNNING
+    outcome = real[OUTCOME:]
+    outcome[1] = 0.0
+    integer[PROJECTIONS] += 1
+    project(t, y, outcome, system, loops)
+    if outcome[1] == FAILED or not all_finite(y):
+        return PROJECTION_FAILED
+    return RUNNING
+
+
+@compiled_inside
+def report_reached(
+    work: Work, project: Function, report: Function, system: Any, loops: Any
+) -> bool:
+    """Write a row for each reporting time up to t; False where the rows are full.
+
+    Sets the status where the last time is reported, or where a row is not finite.
+    """
+    real, integer, times = work.real, work.integer, work.times
+    while integer[NEXT] < times.size and times[integer[NEXT]] <= real[T]:
+        if integer[ROW] == work.rows.shape[0]:
+            return False
+        t, y = times[integer[NEXT]], work.state[Y]
+        if t < real[T]:
+            y = work.state[TRIAL]
+            interpolate(y, work.terms, (t - real[T_DENSE]) / real[H_DENSE])
+            failure = project_state(real, integer, t, y, project, system, loops)
+            if failure != RUNNING:
+                real[T_STOP], integer[STATUS] = t, failure
+                return True
+        if not write_row(work, t, y, report, system, loops):
+            return True
+        integer[NEXT] += 1
+    if integer[NEXT] == times.size:
+        integer[STATUS] = FINISHED
+    return True
+
+
+@compiled_inside
+def report_end(work: Work, report: Function, system: Any, loops: Any) -> bool:
+    """End the run where it stands, with a row for this state; False where the rows are full."""
+    real, integer, times = work.real, work.integer, work.times
+    t, last = real[T], integer[NEXT] - 1
+    if last < 0 or times[last] < t:
+        if integer[ROW] == work.rows.shape[0]:
+            return False
+        if not write_row(work, t, work.state[Y], report, system, loops):
+            return True
+    real[T_STOP], integer[STATUS] = t, integer[ENDING]
+    return True
+
+
+@compiled_inside
+def write_row(work: Work, t: float, y: Floats, report: Function, system: Any, loops: Any) -> bool:
+    """One row; False, with the status, where it is not finite."""
+    real, integer, n = work.real, work.integer, y.shape[0]
+    row = work.rows[integer[ROW]]
+    row[0] = t
+    for i in range(n):
+        row[1 + i] = y[i]
+    integer[REPORTS] += 1
+    report(t, y, row[1 + n :], system, loops)
+    if not all_finite(row):
+        real[T_STOP], integer[STATUS] = t, NOT_FINITE
+        return False
+    integer[ROW] += 1
+    return True

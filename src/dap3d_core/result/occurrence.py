@@ -1,0 +1,49 @@
+"""What happened at an instant of a run: a switch changed its sign, an event of the user's came."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+
+#: What an occurrence may be: a switch changed its sign, and the integration started anew; a switch
+#: ended the run; an event stopped it, was noted, or changed numbers of a force.
+KINDS = ("switch", "end", "stop", "record", "change")
+
+
+def _state(u: Any) -> tuple[float, ...] | None:
+    return None if u is None else tuple(map(float, u))
+
+
+@attrs.frozen(kw_only=True)
+class Occurrence:
+    """An instant that was located.
+
+    Attributes:
+        name: of the event; of a switch ``force NAME`` or ``joint NAME``.
+        t: s.
+        direction: +1 where the number that was watched rose through its level, -1 where it fell.
+        kind: one of ``KINDS``.
+        u: (13 n) the state, of events; None for switches.
+        changes: force -> field -> new value, where numbers were changed.
+    """
+
+    name: str
+    t: float
+    direction: int
+    kind: str = attrs.field(validator=attrs.validators.in_(KINDS))
+    u: tuple[float, ...] | None = attrs.field(default=None, converter=_state)
+    changes: Mapping[str, Mapping[str, Any]] = attrs.Factory(dict)
+
+    @property
+    def words(self) -> str:
+        """The occurrence in a line."""
+        what = ", which ended the run" if self.kind in ("end", "stop") else ""
+        if self.kind == "change":
+            of = [f"{force}.{n} = {_short(x)}" for force, new in self.changes.items()
+                  for n, x in new.items()]  # fmt: skip
+            what = f": {', '.join(of)}" if of else ""
+        return f"t = {self.t:.9g} s: {self.name} {'rose' if self.direction > 0 else 'fell'}{what}"
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,66 @@
+"""What a run was asked for: its model, its settings, its reporting times."""
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, Simulation, check_simulation
+from dap3d_core.simulation.compiled import CompiledModel
+from dap3d_core.simulation.errors import SimulationError
+
+Floats = NDArray[np.float64]
+
+
+def settings_of(compiled: CompiledModel, **asked: Any) -> Simulation:
+    """The scene's settings with what is given (not None) in their places.
+
+    Raises:
+        SceneError: they make no sense.
+    """
+    given = {k: v for k, v in asked.items() if v is not None}
+    settings = attrs.evolve(compiled.scene.simulation, **given)
+    check_simulation(settings, compiled.model.body_names)
+    return settings
+
+
+def compiled_for(
+    scene: Scene | str | os.PathLike[str] | CompiledModel,
+    method: str | None,
+    allow_code: bool,
+    announce: Callable[[str], None] | None,
+) -> CompiledModel:
+    """The compiled model of a scene; one that was compiled before must have the method asked for.
+
+    Raises:
+        SimulationError: it has another.
+    """
+    if not isinstance(scene, CompiledModel):
+        return CompiledModel(scene, method=method, allow_code=allow_code, announce=announce)
+    if method is not None and scene.choice(method)[0] != scene.method:
+        words = f"the model was compiled for method {scene.method}; compile it for {method}"
+        raise SimulationError(words)
+    return scene
+
+
+def report_times(t_end: float | None, dt: float | None) -> Floats:
+    """Reporting times (nt,): multiples of dt, and t_end where it is none of them.
+
+    Raises:
+        SceneError: no final time.
+    """
+    if t_end is None:
+        remedy = "give t_end in the scene's [simulation], or --t-end"
+        raise SceneError([Mistake("t_end", MISSING, "a run needs a final time", remedy=remedy)])
+    if t_end == 0.0:
+        return np.zeros(1)
+    dt = t_end / 100.0 if dt is None else dt
+    count = int(np.floor(t_end / dt * (1.0 + 1e-12) + 1e-9))
+    times = dt * np.arange(count + 1, dtype=np.float64)
+    if t_end - times[-1] > 1e-9 * dt:
+        return np.append(times, t_end)
+    times[-1] = t_end
+    return times

@@ -1,0 +1,80 @@
+"""How a run ended, in words, and what happened on the way."""
+
+from collections.abc import Sequence
+
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.integrators import Integration, Status
+from dap3d_core.integrators.switches import CHATTER
+from dap3d_core.integrators.work import LOGGED
+from dap3d_core.result import INFORMATION, Occurrence
+from dap3d_core.simulation.offender import find_offender
+
+REASONS = {
+    Status.STEP_FLOOR: "the step size fell to the resolution of time",
+    Status.NOT_FINITE: "a number became infinite or not a number",
+    Status.PROJECTION_FAILED: "the state could not be projected onto the constraints",
+}
+
+
+def why_stopped(machine: Machine, integration: Integration) -> str:
+    """Why an integration ended before its time, with who is to blame."""
+    t = integration.t
+    head = f"the run stopped at t = {t:.9g} s"
+    if integration.status is Status.SWITCHED:
+        switch = machine.switches[integration.culprit]
+        return f"{head}: {_title(machine, integration.culprit)}: {switch.words}"
+    if integration.status is Status.CHATTERED:
+        return f"{head}: {_chatter(machine, integration)}"
+    t_stop = integration.t_stop if integration.t_stop is not None else t
+    message = f"{head}: {REASONS[integration.status]}"
+    culprit = find_offender(machine, t, integration.y, t_stop)
+    return f"{message}: {culprit}" if culprit else message
+
+
+def occurrences(
+    machine: Machine, integration: Integration, of_script: Sequence[Occurrence]
+) -> list[Occurrence]:
+    """What happened at instants that were located, in their order."""
+    ended = integration.status is Status.SWITCHED
+    found = []
+    for t, which, side in integration.crossings:
+        switch = machine.switches[int(which)]
+        ends = ended and int(which) == integration.culprit and side < 0.0 and bool(switch.words)
+        kind = switch.group.examined.type.kind
+        found.append(
+            Occurrence(
+                name=f"{kind} {switch.name(machine.model)}",
+                t=float(t),
+                direction=int(side),
+                kind="end" if ends else "switch",
+            )
+        )
+    return sorted([*found, *of_script], key=lambda event: event.t)
+
+
+def event_notes(integration: Integration, events: Sequence[Occurrence]) -> list[str]:
+    """Notes on what happened: an event that stopped the run, more crossings than are kept."""
+    notes = [f"{INFORMATION}the run was stopped by an event, {event.words}"
+             for event in events if event.kind == "stop"]  # fmt: skip
+    if (count := integration.crossing_count) > LOGGED:
+        notes.append(
+            f"{INFORMATION}switches changed their sign {count} times; the first {LOGGED} are kept"
+        )
+    return notes
+
+
+def _title(machine: Machine, which: int) -> str:
+    switch = machine.switches[which]
+    group = switch.group
+    return f"{group.examined.type.kind} {switch.name(machine.model)} ({group.keyword})"
+
+
+def _chatter(machine: Machine, integration: Integration) -> str:
+    """What chatters, how long already, and what helps."""
+    since, count = integration.chatter
+    return (
+        f"{_title(machine, integration.culprit)} chatters: its switch changed its sign "
+        f"{count} times within {integration.t - since:.2g} s (more than {CHATTER} in a millionth "
+        "of the run end it). On either side its law drives the motion back to the other; let the "
+        "law change over a small range, as tanh does, or give it a range in which it stays as it is"
+    )

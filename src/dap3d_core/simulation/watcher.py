@@ -1,0 +1,172 @@
+"""Events of a script: looked for after every step, located by steps that end where they are.
+
+There is no interpolation in what is found: a step is taken back and made again to another end until
+the number that is watched passes its level there, to the last digit of time. So what holds of a
+step (its error, the constraints) holds of the state at an event.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.integrators import Integration, Status
+from dap3d_core.result.occurrence import Occurrence
+from dap3d_core.simulation.compiled import CompiledModel
+from dap3d_core.simulation.event import Event, Instant, Numbers
+
+Floats = NDArray[np.float64]
+
+#: Where within a step interpolated states are looked at: an event may come and go.
+INSIDE = (0.25, 0.5, 0.75)
+EPSILON = float(np.finfo(float).eps)
+
+
+class Watcher:
+    """Looks out for events while an integration goes on.
+
+    Attributes:
+        occurrences: what was found.
+        numbers: of the forces, which events may change.
+    """
+
+    def __init__(self, compiled: CompiledModel, events: Sequence[Event]) -> None:
+        self.compiled, self.events = compiled, tuple(events)
+        self.numbers = Numbers(compiled)
+        self.occurrences: list[Occurrence] = []
+        self._values: list[float] = []
+        self._sides: list[float] = []
+
+    def advance(self, integration: Integration, budget: int) -> Status:
+        """As ``Integration.advance``, step by step."""
+        if not self._values:
+            self._values = self._all(self._instant(integration))
+            self._sides = [float(np.sign(value)) for value in self._values]
+        limit = integration.statistics.rhs + budget
+        while integration.status is Status.RUNNING and not integration.rows_are_full:
+            self._step(integration)
+            if integration.statistics.rhs > limit:
+                break
+        return integration.status
+
+    def _step(self, integration: Integration) -> None:
+        arrays = self._arrays(integration)
+        saved = [array.copy() for array in arrays]
+        t, y, slope = integration.t, integration.y, integration.slope
+
+        def go_to(end: float) -> Instant:
+            """Make the step again, to another end."""
+            for array, before in zip(arrays, saved, strict=True):
+                array[...] = before
+            while integration.t < end and integration.status is Status.RUNNING:
+                integration.advance_to(end)
+            return self._instant(integration)
+
+        integration.advance_to(np.inf)
+        if integration.t == t:
+            return
+        here = self._instant(integration)
+        ahead = self._ahead(integration, here, t, y, slope)
+        if ahead:
+            here = go_to(min(self._locate(go_to, t, k, end) for k, end in ahead))
+        self._take_notice(integration, here)
+
+    def _arrays(self, integration: Integration) -> list[Any]:
+        """All that a step changes."""
+        s = self.compiled.machine.system
+        return [*integration.state_arrays(), s.par, s.x, s.friction, s.settings]
+
+    def _instant(self, integration: Integration) -> Instant:
+        return Instant(self.compiled, integration.t, integration.y, self.numbers)
+
+    def _all(self, instant: Instant) -> list[float]:
+        return [event.value(instant) for event in self.events]
+
+    def _is_past(self, k: int, value: float) -> bool:
+        """Whether a number has passed its level since the last step; that it may be zero counts."""
+        return self._sides[k] != 0.0 and value * self._sides[k] <= 0.0
+
+    def _ahead(
+        self, integration: Integration, here: Instant, t: float, y: Floats, slope: Floats | None
+    ) -> list[tuple[int, float]]:
+        """Events within the step from t: (which, a time in the step at which it is past)."""
+        past = [self._is_past(k, value) for k, value in enumerate(self._all(here))]
+        found = [
+            (k, here.t)
+            for k, event in enumerate(self.events)
+            if past[k] and event.sense * self._sides[k] <= 0.0
+        ]
+        last = integration.slope
+        if slope is None or last is None or all(past):
+            return found
+        h = here.t - t
+        for part in INSIDE:
+            middle = hermite(part, h, y, slope, integration.y, last)
+            instant = Instant(self.compiled, t + part * h, middle, self.numbers)
+            for k, event in enumerate(self.events):
+                if not past[k] and self._is_past(k, event.value(instant)):
+                    past[k] = True
+                    found.append((k, instant.t))
+        return found
+
+    def _locate(self, go_to: Callable[[float], Instant], start: float, k: int, end: float) -> float:
+        """The first time after ``start`` at which event k is past, to the last digits."""
+        from scipy.optimize import brentq
+
+        past = end
+
+        def value(t: float) -> float:
+            nonlocal past
+            if t == start:
+                return self._values[k] or self._sides[k] * float(np.finfo(float).tiny)
+            found = self.events[k].value(go_to(t))
+            if self._is_past(k, found):
+                past = min(past, t)
+            return found
+
+        if value(end) * self._sides[k] < 0.0:  # else it was the interpolation's mistake
+            resolution = 2.0 * EPSILON * max(abs(start), abs(end))
+            brentq(value, start, end, xtol=resolution, rtol=4.0 * EPSILON)
+        return past
+
+    def _take_notice(self, integration: Integration, here: Instant) -> None:
+        """Act on the events that are past here."""
+        self._values = self._all(here)
+        changes = False
+        for k, event in enumerate(self.events):
+            side, value = self._sides[k], self._values[k]
+            if not self._is_past(k, value):
+                self._sides[k] = side or float(np.sign(value))
+                continue
+            self._sides[k] = -side
+            if event.sense * side <= 0.0:
+                changes |= self._act(integration, event, int(-side))
+        if changes:  # numbers may jump with them: that is no event
+            integration.restart()
+            self._values = self._all(self._instant(integration))
+            self._sides = [float(np.sign(value)) for value in self._values]
+
+    def _act(self, integration: Integration, event: Event, direction: int) -> bool:
+        """Do what an event asks for; whether numbers of forces were changed."""
+        here, kind = self._instant(integration), "change"
+        if callable(event.action):
+            event.action(here)
+        else:
+            kind = event.action
+        if kind == "stop":
+            integration.end()
+        self.occurrences.append(
+            Occurrence(name=event.title, t=here.t, direction=direction, kind=kind, u=here.u,
+                       changes=here.changes)
+        )  # fmt: skip
+        return bool(here.changes)
+
+
+def hermite(
+    part: float, h: float, y0: Floats, slope0: Floats, y1: Floats, slope1: Floats
+) -> Floats:
+    """The cubic through both ends of a step of length h, a part of the way along."""
+    a, b = part * part * (3.0 - 2.0 * part), part * (1.0 - part)
+    found: Floats = (1.0 - a) * y0 + a * y1 + b * h * ((1.0 - part) * slope0 - part * slope1)
+    return found

@@ -1,0 +1,153 @@
+"""Events of a script: what they find, what they do, what they refuse. Closed forms of free flight.
+
+Where no other reason is given a tolerance of 1e-13 is some roundings of time.
+"""
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+from dap3d_core.result import UnknownNameError
+
+G = 9.81
+
+
+@pytest.fixture(scope="module")
+def compiled():
+    """A stone in flight, tied to ground by a spring without stiffness."""
+    scene = dap.Scene(name="flight")
+    scene.add_body("stone", mass=1.0, Jp=(1.0, 1.0, 1.0), r=(0.0, 0.0, 2.0), r_dot=(1.0, 0.0, 0.0))
+    scene.add_force("weight", "gravity", gravity=G)
+    scene.add_force("ptp", "spring", P_i="stone.O", P_j="ground.O", k=0.0, l0=1.0)
+    return dap.compile(scene)
+
+
+def fall(height):
+    """When the stone has fallen to a height."""
+    return np.sqrt(2.0 * (2.0 - height) / G)
+
+
+@pytest.mark.parametrize(
+    "settings", [{}, {"integrator": "dopri5"}, {"integrator": "rk4", "step": 0.03}]
+)
+def test_a_run_is_stopped_where_a_quantity_passes_a_level(compiled, settings):
+    event = dap.Event("stone.r.z", below=0.5, action="stop")
+    result = dap.simulate(compiled, t_end=2.0, dt=0.1, events=[event], **settings)
+    assert result.status == "stopped"
+    assert result.t[-1] == pytest.approx(fall(0.5), abs=1e-13)
+    assert result.r[-1, 0, 2] == pytest.approx(0.5, abs=1e-14)
+    assert list(result.t[:-1]) == [pytest.approx(0.1 * k) for k in range(6)]
+    (found,) = result.events
+    assert (found.name, found.kind, found.direction) == ("stone.r.z below 0.5", "stop", -1)
+    assert found.u == tuple(result.u[-1])
+    assert "stone.r.z below 0.5" in result.notes[-1]
+
+
+def test_functions_are_watched_too_and_instants_noted(compiled):
+    """Two events in one step, one of them of a function; the direction is the function's."""
+    events = [
+        dap.Event(lambda t, state: np.hypot(state.u[0], state.u[2]) - 1.5, name="near"),
+        dap.Event("t", above=0.3125),
+        dap.Event("energy.kinetic", at=3.0, direction=-1),  # it only grows
+    ]
+    result = dap.simulate(compiled, t_end=0.5, dt=0.5, events=events)
+    assert [e.name for e in result.events] == ["t above 0.3125", "near"]
+    assert result.events[0].t == pytest.approx(0.3125, abs=1e-15)
+    near = result.events[1]
+    assert np.hypot(near.t, 2.0 - 0.5 * G * near.t**2) == pytest.approx(1.5, abs=1e-13)
+    assert result.status == "done"
+    assert result.t[-1] == 0.5
+
+
+def test_a_number_that_comes_and_goes_within_a_step(compiled):
+    """Free fall is one long step; the level is passed twice in it."""
+
+    def bump(t, state):
+        return state.u[0] * (0.6 - state.u[0]) - 0.05
+
+    result = dap.simulate(compiled, t_end=1.0, dt=1.0, events=[dap.Event(bump)])
+    root = np.sqrt(0.09 - 0.05)
+    assert [e.direction for e in result.events] == [1, -1]
+    assert [e.t for e in result.events] == pytest.approx([0.3 - root, 0.3 + root], abs=1e-13)
+
+
+def test_an_event_changes_a_force_for_this_run_alone(compiled):
+    """A stiff spring is switched on at x = 0.4: energy then says how much it did."""
+
+    def tie(state):
+        assert state["stone.r.x"] == pytest.approx(0.4)
+        state.set("spring", k=50.0, l0=0.5)
+
+    event = dap.Event("stone.r.x", above=0.4, action=tie)
+    free = dap.simulate(compiled, t_end=1.0, dt=0.1)
+    tied = dap.simulate(compiled, t_end=1.0, dt=0.1, events=[event], rtol=1e-11, atol=1e-13)
+    assert tied.u[:4] == pytest.approx(free.u[:4], abs=1e-12)
+    assert dict(tied.events[0].changes) == {"spring": {"k": 50.0, "l0": 0.5}}
+    u = np.array(tied.events[0].u)
+
+    def energy(r, v):
+        return 0.5 * v @ v + G * r[2] + 25.0 * (np.linalg.norm(r) - 0.5) ** 2
+
+    start = energy(u[:3], u[7:10])
+    for k in range(5, 11):
+        assert energy(tied.r[k, 0], tied.rd[k, 0]) == pytest.approx(start, abs=1e-9)
+    assert "total energy" not in tied.ledger  # it has a jump
+    assert tied.ledger["energy"].ok
+    with pytest.raises(OSError, match="changed numbers of force 'spring'"):
+        tied.force("spring")
+    np.testing.assert_array_equal(dap.simulate(compiled, t_end=1.0, dt=0.1).u, free.u)
+
+
+def test_what_was_changed_is_put_back_though_the_run_fails(compiled):
+    def fail(state):
+        state.set("spring", k=50.0)
+        raise RuntimeError("mine")
+
+    before = compiled.machine.system.par.copy()
+    with pytest.raises(RuntimeError, match="mine") as caught:
+        dap.simulate(compiled, t_end=1.0, events=[dap.Event("t", at=0.55, action=fail)])
+    np.testing.assert_array_equal(compiled.machine.system.par, before)
+    assert caught.value.result.t[-1] == pytest.approx(0.55, abs=0.011)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: s.set("sprin", k=1.0), "did you mean 'spring'"),
+        (lambda s: s.set("spring", kk=1.0), "did you mean 'k'"),
+        (lambda s: s.set("spring", P_i=1.0), "no numbers under the name 'P_i'"),
+        (lambda s: s.set("spring", k="much"), "k should be a number"),
+        (lambda s: s.set("gravity", wgt=(1.0, 2.0)), "a list of 3 numbers; it has 2"),
+    ],
+)
+def test_changes_that_cannot_be_made(compiled, change, words):
+    with pytest.raises(ValueError, match=words):
+        dap.simulate(compiled, t_end=1.0, events=[dap.Event("t", at=0.5, action=change)])
+
+
+def test_events_that_make_no_sense(compiled):
+    for given, words in (
+        ({"below": 1.0, "above": 2.0}, "one level"),
+        ({"below": 1.0, "direction": 1}, "direction of its own"),
+        ({"direction": 2}, "should be -1, 0 or 1"),
+        ({"action": "halt"}, "'stop', 'record' or a function"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            dap.Event("stone.r.z", **given)
+    with pytest.raises(UnknownNameError, match=r"stone\.r\.z"):
+        dap.simulate(compiled, t_end=1.0, events=[dap.Event("stone.r.zz", below=1.0)])
+    with pytest.raises(ValueError, match="one number"):
+        dap.simulate(compiled, t_end=1.0, events=[dap.Event("stone.r", below=1.0)])
+
+
+def test_a_file_keeps_the_events(compiled, tmp_path):
+    events = [dap.Event("stone.r.z", below=1.5), dap.Event("t", at=0.7)]
+    result = dap.simulate(compiled, t_end=1.0, events=events, output=tmp_path / "a.nc")
+    assert dap.open(tmp_path / "a.nc").events == result.events
+    assert len(result.events) == 2
+
+
+def test_the_error_of_a_run_with_events_is_estimated_where_both_runs_report_alike(compiled):
+    stop = dap.Event("stone.r.z", below=0.5, action="stop")
+    result = dap.simulate(compiled, t_end=1.0, events=[stop], estimate_error=True)
+    assert result.error.largest["r"] < 1e-9
