@@ -22,7 +22,7 @@ PYTHON3 ?= python3 python3.13 python3.12 python3.11 python3.14 python
 CHECK_PYTHON := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 
 .DELETE_ON_ERROR:
-.PHONY: help run install test test-all verify unit-nojit lint format bench clean
+.PHONY: help run install test test-all verify unit-nojit lint format bench bench-peers clean
 
 help:  ## show this list
 	@echo "make TARGET, where TARGET is one of"
@@ -67,6 +67,27 @@ format: $(VENV)/.installed-dev  ## let ruff format and repair what it can
 
 bench: $(VENV)/.installed  ## measure speed against error (benchmarks/run.py)
 	@$(PYTHON) benchmarks/run.py
+
+# Rivals live in an environment of their own: what they need does not touch what is tested.
+PEERS_VENV := build/peers-venv
+PEERS_PYTHON := $(PEERS_VENV)/bin/python
+# More for benchmarks/peers/run.py, such as FLAGS=--quick.
+bench-peers: $(PEERS_VENV)/.installed  ## measure beside Exudyn, MuJoCo, Drake, Pinocchio
+	@$(PEERS_PYTHON) benchmarks/peers/run.py $(FLAGS)
+
+# One that cannot be installed here is skipped; the benchmark says so again.
+$(PEERS_VENV)/.installed: pyproject.toml $(PYTHON)
+	@echo "Installing dap3d and its rivals into $(PEERS_VENV) ..."
+	@$(PYTHON) -m venv --clear $(PEERS_VENV)
+	@$(PEERS_PYTHON) -m pip --disable-pip-version-check install --quiet \
+	    --only-binary=:all: -e ".[peers]" || { \
+	    $(PEERS_PYTHON) -m pip --disable-pip-version-check install --quiet \
+	        --only-binary=:all: -e . && \
+	    for peer in $$(sed -n 's/^peers = \[\(.*\)\]/\1/p' pyproject.toml | tr -d '",'); do \
+	        $(PEERS_PYTHON) -m pip --disable-pip-version-check install --quiet \
+	            --only-binary=:all: "$$peer" || echo "$$peer cannot be installed: skipped"; \
+	    done; }
+	@touch $@
 
 clean:  ## remove caches, builds and coverage (.venv and runs stay)
 	@rm -rf build dist htmlcov .coverage .coverage.*

@@ -9,6 +9,7 @@ import platform
 import sys
 from pathlib import Path
 
+import calls
 import kernels
 import numba
 import numpy
@@ -43,6 +44,7 @@ def main():
     benchmarks = {
         "right_hand_side": lambda: right_hand_side.measure(arguments.against),
         "kernels": kernels.measure,
+        "call": calls.call,
         "dop853_on_a_chain": whole_runs.dop853_on_a_chain,
         "large": whole_runs.large,
         "start_up": whole_runs.start_up,

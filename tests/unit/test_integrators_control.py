@@ -92,12 +92,12 @@ def hairer_times(method, f, y, t_end, tol):
         if p == 8:
             error *= np.sqrt(estimates[0] / (estimates[0] + 0.01 * estimates[1]))
         if error > 1:
-            h /= min(1 / smallest, error**exponent / 0.9)
+            h /= min(1 / smallest, error**exponent / method.safety)
             rejected, again = rejected + 1, True
             continue
         t, y = t + h, y1
         times.append(t)
-        new = h / max(1 / largest, min(1 / smallest, error**exponent / old**beta / 0.9))
+        new = h / max(1 / largest, min(1 / smallest, error**exponent / old**beta / method.safety))
         h, old, again = min(h, new) if again else new, max(error, 1e-4), False
     return times, rejected
 

@@ -38,7 +38,7 @@ _OPTIONS = (
     click.option("--method", metavar="NAME",
                  help="Formulation: auto, unconstrained, standard, penalty, lsq."),
     click.option("--integrator", metavar="NAME",
-                 help="dop853, dopri5, radau for stiff scenes, or rk4 with --step."),
+                 help="dop853, dopri5, adams, radau for stiff scenes, or rk4 with --step."),
     click.option("--rtol", type=float, metavar="X", help="Relative tolerance."),
     click.option("--atol", type=float, metavar="X", help="Absolute tolerance."),
     click.option("--step", type=float, metavar="S",

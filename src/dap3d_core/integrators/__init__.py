@@ -1,4 +1,6 @@
-"""Explicit Runge-Kutta methods, compiled: they know a vector and three functions, no mechanics."""
+"""Explicit methods, compiled: they know a vector and three functions, no mechanics."""
+
+from typing import Any
 
 from dap3d_core.integrators.dop853 import DOP853
 from dap3d_core.integrators.dopri5 import DOPRI5
@@ -10,4 +12,12 @@ from dap3d_core.integrators.work import Status
 #: The methods by name.
 METHODS: dict[str, Method] = {method.name: method for method in (DOP853, DOPRI5, RK4)}
 
-__all__ = ["METHODS", "Integration", "Method", "Statistics", "Status"]
+
+def make_adams(*problem: Any, **options: Any) -> Integration:
+    """An ``AdamsIntegration``, imported and compiled for the runs that ask for it alone."""
+    from dap3d_core.integrators.adams_integration import AdamsIntegration
+
+    return AdamsIntegration(*problem, **options)
+
+
+__all__ = ["METHODS", "Integration", "Method", "Statistics", "Status", "make_adams"]

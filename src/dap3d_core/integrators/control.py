@@ -31,6 +31,7 @@ from dap3d_core.integrators.work import (
     REJECTED,
     RHS,
     RTOL,
+    SAFETY,
     SCRATCH,
     STAGES,
     STATUS,
@@ -48,7 +49,6 @@ from dap3d_core.kernels.cache import compiled_inside
 #: A step is never shorter than this part of the time or of the whole span, sixteen roundings.
 FLOOR = 16.0 * 2.220446049250313e-16
 LARGEST = 1.7976931348623157e308
-SAFETY = 0.9
 #: The last step is stretched by at most this factor, to end at t_end.
 STRETCH = 1.01
 
@@ -164,7 +164,7 @@ def accept(
     if real[STEP] != 0.0:
         integer[GAP_STEP] += 1
         return
-    divisor = error ** real[EXPONENT] / real[ERROR_OLD] ** real[BETA] / SAFETY
+    divisor = error ** real[EXPONENT] / real[ERROR_OLD] ** real[BETA] / real[SAFETY]
     factor = min(real[FACTOR_MAX], max(real[FACTOR_MIN], 1.0 / max(divisor, 1e-30)))
     if integer[LAST_REJECTED] != 0:
         factor = min(factor, 1.0)

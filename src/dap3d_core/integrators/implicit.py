@@ -14,9 +14,9 @@ from dap3d_core.integrators import radau_work as at
 from dap3d_core.integrators import work
 from dap3d_core.integrators.integration import (
     Integration,
-    _check_control,
-    _check_state_and_times,
-    _switches,
+    check_control,
+    check_state_and_times,
+    switches_of,
 )
 from dap3d_core.integrators.radau import advance
 from dap3d_core.integrators.radau_method import ORDER, radau_method
@@ -108,8 +108,8 @@ class RadauIntegration(Integration):
     ) -> None:
         y = np.array(y0, dtype=np.float64)
         instants = np.array(times, dtype=np.float64)
-        _check_state_and_times(y, instants)
-        _check_control(cast(Any, self), rtol, atol, instants, step=step, first_step=first_step)
+        check_state_and_times(y, instants)
+        check_control(cast(Any, self), rtol, atol, instants, step=step, first_step=first_step)
         error_size = y.size - 1 if error_size is None else error_size
         if not 0 <= error_size < y.size:
             raise ValueError(f"error_size is {error_size}, but y has {y.size} components")
@@ -207,7 +207,7 @@ def _make_work(
     state[work.Y] = y
     real = np.zeros(work.LENGTHS + machine.length_count)
     integer = np.zeros(at.RADAU_INTEGERS, dtype=np.int64)
-    switches, crossings = _switches(real, integer, ends)
+    switches, crossings = switches_of(real, integer, ends)
     return RadauWork(
         real=real,
         own=np.zeros(at.OWN),

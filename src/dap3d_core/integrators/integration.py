@@ -1,6 +1,7 @@
 """One integration, seen from Python: set up, advanced in chunks, drained of its rows."""
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,13 +9,13 @@ from numpy.typing import ArrayLike
 
 from dap3d_core.integrators import work as at
 from dap3d_core.integrators.control import FLOOR
-from dap3d_core.integrators.method import Floats, Method, combinations
+from dap3d_core.integrators.method import Floats, Integers, Method, combinations
 from dap3d_core.integrators.runge_kutta import advance
 from dap3d_core.integrators.work import Function, Status, Work
 from dap3d_core.kernels.cache import jit_is_on
 
 #: Least scale of an error: at atol = 0 a component that is exactly zero is not divided by zero.
-_SMALLEST_ATOL = 1e-290
+SMALLEST_ATOL = 1e-290
 
 
 class Statistics(NamedTuple):
@@ -99,24 +100,21 @@ class Integration:
         self._arguments = (functions, system, loops)
         y = np.array(y0, dtype=np.float64)
         instants = np.array(times, dtype=np.float64)
-        _check_state_and_times(y, instants)
-        _check_control(method, rtol, atol, instants, step=step, first_step=first_step)
+        check_state_and_times(y, instants)
+        check_control(method, rtol, atol, instants, step=step, first_step=first_step)
         error_size = y.size if error_size is None else error_size
         _check_sizes(error_size, y.size, buffer_rows)
 
+        of_method, counts = _facts(method)
         real = np.zeros(at.LENGTHS + length_count)
-        real[at.RTOL], real[at.ATOL] = rtol, max(atol, _SMALLEST_ATOL)
+        real[: at.LENGTHS] = of_method
+        real[at.RTOL], real[at.ATOL] = rtol, max(atol, SMALLEST_ATOL)
         real[at.STEP], real[at.H] = step or 0.0, first_step or 0.0
-        real[at.EXPONENT], real[at.BETA] = method.exponent, method.beta
-        real[at.FACTOR_MIN], real[at.FACTOR_MAX] = method.factor_min, method.factor_max
-        real[at.T], real[at.ERROR_OLD], real[at.CALM] = instants[0], 1e-4, method.calm
-        integer = np.zeros(at.INTEGERS, dtype=np.int64)
-        switches, crossings = _switches(real, integer, ends)
-        integer[at.STAGES], integer[at.ORDER] = method.stages, method.order
-        integer[at.ERROR_SIZE], integer[at.ERRORS] = error_size, len(method.e)
-        integer[at.ERROR_USES_RESULT] = method.error_uses_result
-        integer[at.DENSE], integer[at.PROJECT_ON] = method.dense, project_on
-        integer[at.WATCHED] = watched
+        real[at.T] = instants[0]
+        integer = counts.copy()
+        switches, crossings = switches_of(real, integer, ends)
+        integer[at.ERROR_SIZE] = error_size
+        integer[at.PROJECT_ON], integer[at.WATCHED] = project_on, watched
         state = np.zeros((at.STATES, y.size))
         state[at.Y] = y
         #: All the state there is, as arrays: copied and put back, the run goes on from there.
@@ -138,8 +136,11 @@ class Integration:
         """Compile what ``advance`` needs, or load it, without doing a step."""
         status = int(self.work.integer[at.STATUS])
         self.work.integer[at.STATUS] = Status.FINISHED
-        advance(self.work, *self._arguments, 0)
+        self._advance(0)
         self.work.integer[at.STATUS] = status
+
+    def _advance(self, budget: int) -> None:
+        advance(self.work, *self._arguments, budget)
 
     def advance(self, budget: int) -> Status:
         """Go on until more than ``budget`` calls of rhs are spent, the buffer is full, or the end.
@@ -151,14 +152,13 @@ class Integration:
         RuntimeError
             If the buffer is full on entry, so that nothing can be done.
         """
-        work = self.work
         if self.rows_are_full and self.status is Status.RUNNING:
             raise RuntimeError("the row buffer is full: take rows() before advancing")
         if jit_is_on():
-            advance(work, *self._arguments, budget)
+            self._advance(budget)
         else:
             with np.errstate(all="ignore"):  # as in compiled code, which tests what matters
-                advance(work, *self._arguments, budget)
+                self._advance(budget)
         return self.status
 
     def advance_to(self, limit: float) -> Status:
@@ -263,8 +263,8 @@ class Integration:
         return Statistics(*(int(integer[i]) for i in names))
 
 
-def _switches(real: Floats, integer: Any, ends: ArrayLike) -> tuple[Floats, Floats]:
-    """Arrays of the switches, none of which was looked at so far."""
+def switches_of(real: Floats, integer: Any, ends: ArrayLike) -> tuple[Floats, Floats]:
+    """Arrays of the switches (ends: as ``Integration`` has it), none looked at so far."""
     given = np.asarray(ends, dtype=np.float64)
     real[[at.LIMIT, at.CUT]] = np.inf
     integer[at.SWITCHES] = given.size
@@ -273,12 +273,27 @@ def _switches(real: Floats, integer: Any, ends: ArrayLike) -> tuple[Floats, Floa
     return switches, np.zeros((at.LOGGED if given.size else 0, 3))
 
 
-def _check_state_and_times(y: Floats, times: Floats) -> None:
-    if y.ndim != 1 or not np.all(np.isfinite(y)):
+@cache
+def _facts(method: Method) -> tuple[Floats, Integers]:
+    """What ``real`` and ``integer`` hold of a method, found once: small runs take microseconds."""
+    real = np.zeros(at.LENGTHS)
+    real[at.EXPONENT], real[at.BETA] = method.exponent, method.beta
+    real[at.FACTOR_MIN], real[at.FACTOR_MAX] = method.factor_min, method.factor_max
+    real[at.ERROR_OLD], real[at.CALM], real[at.SAFETY] = 1e-4, method.calm, method.safety
+    integer = np.zeros(at.INTEGERS, dtype=np.int64)
+    integer[at.STAGES], integer[at.ORDER] = method.stages, method.order
+    integer[at.ERRORS], integer[at.DENSE] = len(method.e), method.dense
+    integer[at.ERROR_USES_RESULT] = method.error_uses_result
+    return real, integer
+
+
+def check_state_and_times(y: Floats, times: Floats) -> None:
+    """ValueError for states and times that make no sense."""
+    if y.ndim != 1 or not np.isfinite(y).all():
         raise ValueError("y0 must be one vector of finite numbers")
-    if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
+    if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
         raise ValueError("times must be one vector of finite numbers, t0 first")
-    if not np.all(np.diff(times) > 0.0):
+    if not (times[1:] > times[:-1]).all():
         raise ValueError("reporting times must increase")
 
 
@@ -289,7 +304,7 @@ def _check_sizes(error_size: int, size: int, buffer_rows: int) -> None:
         raise ValueError(f"buffer_rows is {buffer_rows}; at least one row must fit")
 
 
-def _check_control(
+def check_control(
     method: Method,
     rtol: float,
     atol: float,
@@ -298,6 +313,7 @@ def _check_control(
     step: float | None,
     first_step: float | None,
 ) -> None:
+    """ValueError for tolerances and steps that make no sense."""
     least = FLOOR * max(abs(times[0]), abs(times[-1]), times[-1] - times[0])
     for name, value in (("step", step), ("first_step", first_step)):
         if value is not None and not least < value < np.inf:

@@ -53,11 +53,12 @@ class Method:
     d: Floats = field(converter=_read_only, repr=False)
     #: Order of dense output, 0 where there is none.
     dense_order: int = 0
-    #: The controller divides h by err^exponent / err_old^beta / 0.9, held between the two factors.
+    #: The controller divides h by err^exponent / err_old^beta / safety, between the two factors.
     exponent: float = 0.0
     beta: float = 0.0
     factor_min: float = 1.0
     factor_max: float = 1.0
+    safety: float = 0.9
 
     @property
     def adaptive(self) -> bool:

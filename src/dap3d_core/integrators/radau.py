@@ -17,7 +17,6 @@ from dap3d_core.formulations.tangent import Tangent
 from dap3d_core.integrators.combination import all_finite
 from dap3d_core.integrators.control import (
     LARGEST,
-    SAFETY,
     end_of_step,
     first_step,
     reject,
@@ -41,7 +40,7 @@ from dap3d_core.integrators.radau_work import (
     TRIAL_SLOPE,
     RadauWork,
 )
-from dap3d_core.integrators.reporting import project_state, report_end, report_reached
+from dap3d_core.integrators.reporting import dense_state, project_state, report_end, report_reached
 from dap3d_core.integrators.runge_kutta import (
     ACROSS_A_SWITCH,
     ELSEWHERE,
@@ -78,6 +77,8 @@ from dap3d_core.integrators.work import (
 )
 from dap3d_core.kernels.cache import compiled, compiled_inside
 
+#: Of the steps of RADAU5.
+SAFETY = 0.9
 #: A step is not longer than this many of the one before, and not shorter than this part of it.
 GROWTH, SHRINKAGE = 8.0, 0.2
 #: The tangent is kept where the iteration converged faster than this; the step, and with it the
@@ -108,7 +109,7 @@ def advance(
     limit = integer[RHS] + budget
     while integer[STATUS] == RUNNING:
         if times[integer[NEXT]] <= real[T]:
-            if not report_reached(work, project, report, system, loops):
+            if not report_reached(work, dense_state, project, report, system, loops):
                 return
         elif integer[ENDING] != 0:
             if not report_end(work, report, system, loops):

@@ -3,6 +3,7 @@
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+from collections.abc import Callable
 from typing import Any
 
 from dap3d_core.integrators.combination import all_finite, interpolate
@@ -29,7 +30,7 @@ from dap3d_core.integrators.work import (
     Work,
     Y,
 )
-from dap3d_core.kernels.cache import compiled_inside
+from dap3d_core.kernels.cache import compiled_inside, compiled_into
 
 #: What project says in out[1]: it failed; the state is good, but too close to a singular one.
 FAILED, POOR_PLACE = 1.0, 2.0
@@ -61,12 +62,25 @@ def project_state(
 
 
 @compiled_inside
+def dense_state(work: Work, t: float, y: Floats) -> None:
+    """The state at an instant of the last step, by the terms of its dense output."""
+    interpolate(y, work.terms, (t - work.real[T_DENSE]) / work.real[H_DENSE])
+
+
+@compiled_into
 def report_reached(
-    work: Work, project: Function, report: Function, system: Any, loops: Any
+    work: Any,
+    state_at: Callable[[Any, float, Floats], None],
+    project: Function,
+    report: Function,
+    system: Any,
+    loops: Any,
 ) -> bool:
     """Write a row for each reporting time up to t; False where the rows are full.
 
     Sets the status where the last time is reported, or where a row is not finite.
+
+    state_at: fills in the state at an instant within the last step.
     """
     real, integer, times = work.real, work.integer, work.times
     while integer[NEXT] < times.size and times[integer[NEXT]] <= real[T]:
@@ -75,7 +89,7 @@ def report_reached(
         t, y = times[integer[NEXT]], work.state[Y]
         if t < real[T]:
             y = work.state[TRIAL]
-            interpolate(y, work.terms, (t - real[T_DENSE]) / real[H_DENSE])
+            state_at(work, t, y)
             failure = project_state(real, integer, t, y, project, system, loops)
             if failure != RUNNING:
                 real[T_STOP], integer[STATUS] = t, failure
@@ -89,7 +103,7 @@ def report_reached(
 
 
 @compiled_inside
-def report_end(work: Work, report: Function, system: Any, loops: Any) -> bool:
+def report_end(work: Any, report: Function, system: Any, loops: Any) -> bool:
     """End the run where it stands, with a row for this state; False where the rows are full."""
     real, integer, times = work.real, work.integer, work.times
     t, last = real[T], integer[NEXT] - 1
@@ -103,7 +117,7 @@ def report_end(work: Work, report: Function, system: Any, loops: Any) -> bool:
 
 
 @compiled_inside
-def write_row(work: Work, t: float, y: Floats, report: Function, system: Any, loops: Any) -> bool:
+def write_row(work: Any, t: float, y: Floats, report: Function, system: Any, loops: Any) -> bool:
     """One row; False, with the status, where it is not finite."""
     real, integer, n = work.real, work.integer, y.shape[0]
     row = work.rows[integer[ROW]]

@@ -25,7 +25,6 @@ from typing import Any
 from dap3d_core.integrators.combination import all_finite, combine, scaled_largest
 from dap3d_core.integrators.control import (
     LARGEST,
-    SAFETY,
     accept,
     end_of_step,
     error_norm,
@@ -35,7 +34,13 @@ from dap3d_core.integrators.control import (
 )
 from dap3d_core.integrators.crossing import aim, is_near, look_ahead, look_back, singular_ahead
 from dap3d_core.integrators.method import ABSCISSA, Floats, Integers
-from dap3d_core.integrators.reporting import POOR_PLACE, project_state, report_end, report_reached
+from dap3d_core.integrators.reporting import (
+    POOR_PLACE,
+    dense_state,
+    project_state,
+    report_end,
+    report_reached,
+)
 from dap3d_core.integrators.switches import end_is_across, next_length, sample, settle
 from dap3d_core.integrators.work import (
     ACROSS,
@@ -61,6 +66,7 @@ from dap3d_core.integrators.work import (
     RHS,
     RTOL,
     RUNNING,
+    SAFETY,
     SCRATCH,
     STAGES,
     STATUS,
@@ -107,7 +113,7 @@ def advance(
     limit = integer[RHS] + budget
     while integer[STATUS] == RUNNING:
         if times[integer[NEXT]] <= real[T]:
-            if not report_reached(work, project, report, system, loops):
+            if not report_reached(work, dense_state, project, report, system, loops):
                 return
         elif integer[ENDING] != 0:
             if not report_end(work, report, system, loops):
@@ -177,7 +183,7 @@ def step(
         else:
             reject(real, integer, times, t1, h * RETREAT, failure)
     elif error <= LARGEST:
-        factor = max(real[FACTOR_MIN], SAFETY / error ** real[EXPONENT])
+        factor = max(real[FACTOR_MIN], real[SAFETY] / error ** real[EXPONENT])
         reject(real, integer, times, t1, h * factor, STEP_FLOOR)
     else:
         reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)

@@ -33,14 +33,14 @@ STEP_FLOOR, NOT_FINITE = int(Status.STEP_FLOOR), int(Status.NOT_FINITE)
 PROJECTION_FAILED, SWITCHED = int(Status.PROJECTION_FAILED), int(Status.SWITCHED)
 CHATTERED = int(Status.CHATTERED)
 
-# Places in ``real``. Settings; a STEP of 0 lets the error choose it. CALM: see Method.calm.
-RTOL, ATOL, STEP, EXPONENT, BETA, FACTOR_MIN, FACTOR_MAX, CALM = range(8)
+# Places in ``real``. Settings; a STEP of 0 lets the error choose it. CALM, SAFETY: see Method.
+RTOL, ATOL, STEP, EXPONENT, BETA, FACTOR_MIN, FACTOR_MAX, CALM, SAFETY = range(9)
 # What changes: time, next step, error of the last accepted step, start and length of the step that
 # the dense output belongs to, start of the present run of equal steps, time of what stopped
 # the run, error of the last step that was to go across a singular state; the instant that the next
 # step may not go beyond, its greatest length since one met the other side of a switch; and what
 # project gives: four numbers, then lengths.
-T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, ACROSS, LIMIT, CUT, OUTCOME = range(8, 19)
+T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, ACROSS, LIMIT, CUT, OUTCOME = range(9, 20)
 LENGTHS = OUTCOME + 4
 # Places in ``integer``. Settings.
 STAGES, ORDER, ERROR_SIZE, ERRORS, ERROR_USES_RESULT, DENSE, PROJECT_ON, WATCHED = range(8)

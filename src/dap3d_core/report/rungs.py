@@ -18,8 +18,8 @@ ATOL = 1e-2
 STEPS, QUICK_STEPS = 8, 3
 QUICK_FACTOR = 4.0
 
-#: Pairs that no run takes: radau holds the constraints, which penalty replaces by springs.
-UNFIT = (("penalty", "radau"),)
+#: Pairs that no run takes: radau and adams need the constraints that penalty replaces by springs.
+UNFIT = (("penalty", "radau"), ("penalty", "adams"))
 #: Formulations that a report may run.
 FORMULATIONS = tuple(name for name in METHODS if name != "auto")
 #: Integrators that choose their step, those of the highest order first.

@@ -10,11 +10,13 @@ from dap3d_core.scene.values import Fault, bounded, number_of, text_of, truth_of
 
 #: What ``method`` and ``integrator`` may say.
 METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq")
-INTEGRATORS = ("dopri5", "dop853", "rk4", "radau")
+INTEGRATORS = ("dopri5", "dop853", "adams", "rk4", "radau")
 #: What ``correct_metric`` may say (simulation/initial.py).
 CORRECT_METRICS = ("unit", "mass")
 #: Integrators without an error estimate, which need a step.
 FIXED_STEP = ("rk4",)
+#: Integrators that take no step.
+NO_STEP = ("adams",)
 #: Relative tolerances below are beyond double precision.
 SMALLEST_RTOL = 1e-14
 #: More reported times are refused before anything is computed.
@@ -76,6 +78,10 @@ def simulation_mistakes(
 def _step_mistakes(
     simulation: Simulation, good: dict[str, Any], key: Key
 ) -> list[tuple[Key, Mistake]]:
+    if good.get("integrator") in NO_STEP and simulation.step is not None:
+        words = f"{simulation.integrator} chooses its step itself, together with its order"
+        fault = Fault(words, "leave step out, or take rk4, dopri5 or dop853")
+        return [_mistake((*key, "step"), simulation.step, fault)]
     if good.get("integrator") not in FIXED_STEP or simulation.step is not None:
         return []
     words = f"{simulation.integrator} does not choose its step"

@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.formulations.machine import Machine
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, Simulation, check_simulation
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
@@ -64,3 +65,22 @@ def report_times(t_end: float | None, dt: float | None) -> Floats:
         return np.append(times, t_end)
     times[-1] = t_end
     return times
+
+
+def refuse_adams(machine: Machine) -> None:
+    """Adams methods look at many past states, which must lie on one smooth motion.
+
+    Raises:
+        SimulationError: with method penalty projected states do not; with switches none are
+            located.
+    """
+    if machine.method == "penalty":
+        raise SimulationError(
+            "integrator adams does not fit method penalty, whose accelerations leave the "
+            "constraints; use method standard, lsq or auto, or integrator dop853"
+        )
+    if len(machine.ending):
+        raise SimulationError(
+            "integrator adams does not locate where forces or joints change their law, and the "
+            "scene has such; use integrator dop853, dopri5 or radau"
+        )

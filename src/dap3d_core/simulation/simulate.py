@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.friction import PASSES
-from dap3d_core.integrators import METHODS, Integration, Status
+from dap3d_core.integrators import METHODS, Integration, Status, make_adams
 from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import Occurrence, Record, Result, ResultWriter, Statistics, check_target
 from dap3d_core.scene import Mistake, Scene, SceneError, Simulation
-from dap3d_core.simulation.asked import compiled_for, report_times, settings_of
+from dap3d_core.simulation.asked import compiled_for, refuse_adams, report_times, settings_of
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.elsewhere import redundancy_elsewhere
 from dap3d_core.simulation.ending import event_notes, occurrences, why_stopped
@@ -70,7 +70,7 @@ def simulate(
         t_end: final time, s; 0 solves once at t = 0.
         dt: reporting step, s; by default t_end / 100. t_end is reported in any case.
         method: "auto", "unconstrained", "standard", "penalty" or "lsq".
-        integrator: "dopri5", "dop853", "radau" (implicit) or "rk4" (which needs ``step``).
+        integrator: "dopri5", "dop853", "adams", "radau" (implicit) or "rk4" (which needs ``step``).
         rtol, atol: tolerances of the step's error.
         step: fixed step, s, without error control.
         correct, project: bring the start, and then every state, onto the constraints.
@@ -226,17 +226,13 @@ class _Run:
         try:
             if settings.integrator == "radau":
                 return implicit_integration(machine, y0, self.times, options)
-            return Integration(
-                METHODS[settings.integrator],
-                machine.functions,
-                machine.system,
-                machine.loops,
-                y0,
-                self.times,
-                length_count=machine.length_count,
-                watched=machine.counts_turns,
-                **options,
-            )
+            options |= {"length_count": machine.length_count, "watched": machine.counts_turns}
+            problem = machine.functions, machine.system, machine.loops, y0, self.times
+            if settings.integrator == "adams":
+                refuse_adams(machine)
+                del options["ends"]
+                return make_adams(*problem, **options)
+            return Integration(METHODS[settings.integrator], *problem, **options)
         except ValueError as error:
             raise SceneError([Mistake("step", settings.step, str(error))]) from error
 

@@ -1,0 +1,39 @@
+"""Fixed cost of one compiled integration: what a run costs that has nothing to integrate."""
+
+import statistics
+import time
+
+import scenes
+
+from dap3d_core.integrators import METHODS, Integration, Status
+from dap3d_core.simulation import CompiledModel
+
+CALLS, REPEATS = 1000, 15
+
+
+def call():
+    """Microseconds to set up an integration, and to enter and leave its compiled loop."""
+    machine = CompiledModel(scenes.chain(1)).machine
+    y0 = machine.integrated(machine.model.u0)
+
+    def make():
+        return Integration(
+            METHODS["dop853"], machine.functions, machine.system, machine.loops, y0, [0.0, 1e-3],
+            report_size=machine.report_size, length_count=machine.length_count, buffer_rows=2,
+        )  # fmt: skip
+
+    done = make()
+    assert done.advance(1000) is Status.FINISHED
+
+    def microseconds(function):
+        """Of a call, in CPU time of the thread: other programs weigh less on it."""
+        start = time.thread_time()
+        for _ in range(CALLS):
+            function()
+        return 1e6 * (time.thread_time() - start) / CALLS
+
+    parts = {"set up": make, "compiled call": lambda: done.advance(0)}
+    times = [[microseconds(function) for function in parts.values()] for _ in range(REPEATS)]
+    found = [{"part": part, "us": statistics.median(column)}
+             for part, column in zip(parts, zip(*times, strict=True), strict=True)]  # fmt: skip
+    return [*found, {"part": "both", "us": sum(row["us"] for row in found)}]
