@@ -1,6 +1,7 @@
 """All benchmarks, as tables and as JSON.
 
-``make bench``, or ``python benchmarks/run.py [--only NAME] [-o FILE]``.
+``make bench``, or ``python benchmarks/run.py [--only NAME] [-o FILE]``. scale_long, some minutes,
+and two_threads are run only when they are named.
 """
 
 import argparse
@@ -14,14 +15,27 @@ import kernels
 import numba
 import numpy
 import right_hand_side
+import scale
+import two_threads
 import whole_runs
 from rich.console import Console
 from rich.table import Table
 
+#: What is run only when it is named.
+NAMED = ("scale_long", "two_threads")
+#: Columns that a table has at most beside its first.
+COLUMNS = 8
 
-def table(console, title, rows):
-    """Print rows of one shape."""
-    keys = list(dict.fromkeys(key for row in rows for key in row))
+
+def tables(console, title, rows):
+    """Print rows of one shape, wide ones as several tables with the same first column."""
+    first, *keys = dict.fromkeys(key for row in rows for key in row)
+    for k in range(0, len(keys), COLUMNS):
+        table(console, title, rows, [first, *keys[k : k + COLUMNS]])
+
+
+def table(console, title, rows, keys):
+    """Print some columns of rows."""
     shown = Table(title=title, title_justify="left")
     for key in keys:
         shown.add_column(key.replace("_", " "), justify="right")
@@ -48,14 +62,17 @@ def main():
         "dop853_on_a_chain": whole_runs.dop853_on_a_chain,
         "large": whole_runs.large,
         "start_up": whole_runs.start_up,
+        "scale": scale.measure,
+        "scale_long": scale.long_chain,
+        "two_threads": two_threads.measure,
     }
     if arguments.only and arguments.only not in benchmarks:
         sys.exit(f"no benchmark {arguments.only}; there are {', '.join(benchmarks)}")
     console, found = Console(), {}
     for name, measure in benchmarks.items():
-        if arguments.only in (None, name):
+        if arguments.only == name or (arguments.only is None and name not in NAMED):
             found[name] = measure()
-            table(console, name.replace("_", " "), found[name])
+            tables(console, name.replace("_", " "), found[name])
     versions = {
         "python": platform.python_version(),
         "numpy": numpy.__version__,

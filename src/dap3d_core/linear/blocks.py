@@ -6,7 +6,8 @@ negative for a joint (its ``sign``). In the place of the pivot's diagonal 1/d is
 (one on its diagonal), and for a block A below the pivot A L^-T.
 
 Nodes of three and five rows (spherical and revolute joints) have their own code: the same lines,
-put there again with the number of rows known, so that no loop remains.
+put there again with the number of rows known, so that no loop remains. Panels have theirs, too
+(linear/panels.py).
 
 With ``regularise`` the matrix is [I D^^T; D^ -E] with a positive diagonal E, the compliance of the
 rows: it can be factored in any order, whatever the rank of D^ (Vanderbei, Symmetric quasidefinite
@@ -21,7 +22,9 @@ from numpy.typing import NDArray
 
 from dap3d_core.kernels.by_address import pointer
 from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
+from dap3d_core.linear.panels import factor_panel, solve_panel_backwards, solve_panel_forwards
 from dap3d_core.linear.plan import COPY, DIAGONAL, PRODUCTS, TRANSPOSE, Integers
+from dap3d_core.linear.supernodes import LEAST_ROWS
 
 Floats = NDArray[np.float64]
 
@@ -215,6 +218,8 @@ def factor(
             counted += eliminate(k, 3, nodes, columns, updates, K, smallest, drop)
         elif m == 5:
             counted += eliminate(k, 5, nodes, columns, updates, K, smallest, drop)
+        elif m >= LEAST_ROWS:
+            counted += factor_panel(k, nodes, columns, updates, K, smallest, drop)
         else:
             counted += eliminate(k, m, nodes, columns, updates, K, smallest, drop)
     return counted
@@ -294,6 +299,8 @@ def solve(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
             solve_forwards(k, 3, nodes, columns, K, x)
         elif m == 5:
             solve_forwards(k, 5, nodes, columns, K, x)
+        elif m >= LEAST_ROWS:
+            solve_panel_forwards(k, nodes, columns, K, x)
         else:
             solve_forwards(k, m, nodes, columns, K, x)
     for k in range(count - 1, -1, -1):
@@ -302,5 +309,7 @@ def solve(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
             solve_backwards(k, 3, nodes, columns, K, x)
         elif m == 5:
             solve_backwards(k, 5, nodes, columns, K, x)
+        elif m >= LEAST_ROWS:
+            solve_panel_backwards(k, nodes, columns, K, x)
         else:
             solve_backwards(k, m, nodes, columns, K, x)

@@ -9,12 +9,13 @@ only when the rows eliminated so far are independent on the bodies eliminated so
 * a joint that closes a loop comes after all bodies of its loop.
 
 Under these rules the cheapest node comes next (minimum degree, weighted by rows). Trees have no
-fill at all. More: docs/decisions/0006.
+fill at all. Where that makes wide fronts, as in nets of loops, separators wait besides
+(dissection.py), if it takes less work. More: docs/decisions/0006 and 0012.
 """
 
 import heapq
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import attrs
 
@@ -23,6 +24,9 @@ HUB_DEGREE = 5
 
 #: Joints between the same bodies share a node as long as their rows fit in one body's six.
 NODE_ROWS = 6
+
+#: Where the elimination of a node updates more rows than this, another order is tried.
+WIDE = 48
 
 
 @attrs.frozen
@@ -53,6 +57,8 @@ class Ordering:
         order: what comes after the early bodies: k is a joint node where k < len(nodes), else hub
             k - len(nodes).
         below: for each entry of ``order`` the places in ``order`` that it updates, ascending.
+        panels: places (first, last + 1) in ``order`` of what is eliminated together, and where the
+            group ends whose part it is.
     """
 
     nodes: tuple[JointNode, ...]
@@ -60,6 +66,36 @@ class Ordering:
     hubs: tuple[int, ...]
     order: tuple[int, ...]
     below: tuple[tuple[int, ...], ...]
+    panels: tuple[tuple[int, int, int], ...] = ()
+
+    def is_hub(self, place: int) -> bool:
+        """Whether a hub, not a joint node, is at a place of ``order``."""
+        return self.order[place] >= len(self.nodes)
+
+    @property
+    def sizes(self) -> list[int]:
+        """Rows at each place of ``order``."""
+        return [6 if k >= len(self.nodes) else self.nodes[k].rows for k in self.order]
+
+    @property
+    def work(self) -> int:
+        """Multiplications of the factorisation, each with an addition."""
+        return sum(_work(m, w) for m, w in self._fronts())
+
+    @property
+    def widest(self) -> int:
+        """Most rows that the elimination of one node updates."""
+        return max((w for _, w in self._fronts()), default=0)
+
+    def _fronts(self) -> Iterator[tuple[int, int]]:
+        sizes = self.sizes
+        for m, below in zip(sizes, self.below, strict=True):
+            yield m, sum(sizes[k] for k in below)
+
+
+def _work(m: int, w: int) -> int:
+    """Of a node of m rows that updates w: factors, division, update."""
+    return m * (m + 1) * (m + 2) // 6 + m * (m + 1) // 2 * w + m * w * (w + 1) // 2
 
 
 def order_nodes(
@@ -79,13 +115,24 @@ def order_nodes(
             of_body[b].append(k)
     hubs = tuple(b for b in range(1, body_count + 1) if len(of_body[b]) >= HUB_DEGREE)
     early = tuple(b for b in range(1, body_count + 1) if len(of_body[b]) < HUB_DEGREE)
-    waits = _waits(nodes, of_body, hubs) if hubs else {}
-    neighbours = _neighbours(nodes, of_body, early, hubs)
     size = [node.rows for node in nodes] + [6] * len(hubs)
-    order, below = _eliminate(neighbours, size, waits)
-    place = {node: k for k, node in enumerate(order)}
-    lists = tuple(tuple(sorted(place[m] for m in below[node])) for node in order)
-    return Ordering(tuple(nodes), early, hubs, tuple(order), lists)
+
+    def eliminated(stage: Sequence[int] | None) -> Ordering:
+        neighbours = _neighbours(nodes, of_body, early, hubs)
+        waits = _waits(nodes, of_body, hubs) if hubs else {}
+        order, below = _eliminate(neighbours, size, waits, stage)
+        place = {node: k for k, node in enumerate(order)}
+        lists = tuple(tuple(sorted(place[m] for m in below[node])) for node in order)
+        return Ordering(tuple(nodes), early, hubs, tuple(order), lists)
+
+    found = eliminated(None)
+    if found.widest > WIDE:
+        from dap3d_core.linear.dissection import dissect
+        from dap3d_core.linear.supernodes import with_panels
+
+        other = eliminated(dissect(_neighbours(nodes, of_body, early, hubs), size))
+        return with_panels(min(found, other, key=lambda ordering: ordering.work))
+    return found
 
 
 def _merge(joint_slots: Sequence[tuple[int, ...]], joint_rows: Sequence[int]) -> list[JointNode]:
@@ -129,10 +176,19 @@ def _neighbours(
 
 
 def _eliminate(
-    neighbours: list[set[int]], size: Sequence[int], waits: dict[int, set[int]]
+    neighbours: list[set[int]],
+    size: Sequence[int],
+    waits: dict[int, set[int]],
+    stage: Sequence[int] | None = None,
 ) -> tuple[list[int], dict[int, set[int]]]:
-    """Minimum degree, weighted by rows; no node is taken before the hubs that it waits for."""
+    """Minimum degree, weighted by rows; no node is taken before the hubs that it waits for.
+
+    With stages what can be taken of the lowest stage goes first.
+    """
     weight = [sum(size[m] for m in others) for others in neighbours]
+    if stage is not None:  # a stage weighs more than all degrees
+        total = 1 + sum(size)
+        weight = [w + total * s for w, s in zip(weight, stage, strict=True)]
     heap = [(w, k, k) for k, w in enumerate(weight) if not waits.get(k)]
     pushed = len(weight)
     heapq.heapify(heap)

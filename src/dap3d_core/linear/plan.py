@@ -1,4 +1,10 @@
-"""The static elimination program of a model: where each block stands, which products are made."""
+"""The static elimination program of a model: where each block stands, which products are made.
+
+K is stored by nodes: below the square block of a node's own rows those of the rows that it updates,
+all of them with as many numbers as the node has rows. A panel (supernodes.py) is one node of many
+rows; what is assembled into it, and what small nodes subtract from it, stands in blocks of its own
+until the panel's turn comes, so that small nodes know nothing of panels.
+"""
 
 from collections.abc import Sequence
 
@@ -6,6 +12,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.linear.matrix import Contents, Matrix, lay_matrix, list_updates
 from dap3d_core.linear.ordering import Ordering, order_nodes
 
 Integers = NDArray[np.int64]
@@ -28,8 +35,11 @@ class Plan:
             first update.
         columns: (k, 3) blocks below the diagonal: place in K, first row, rows.
         updates: (u, 6) place of left and right factor and of the target in K, rows, columns, 1 on
-            the diagonal.
+            the diagonal. A panel's have twice the length of the target's rows added to the last
+            number; before them stand the blocks that it gathers, with minus that number.
         hubs: (h, 2) body and first row of each body that waits.
+        fill: blocks, one for two joint nodes or hubs, that are zero before the factorisation.
+        unfilled_size: numbers of the blocks that are not, and of the diagonal blocks.
     """
 
     ordering: Ordering
@@ -45,12 +55,8 @@ class Plan:
     columns: Integers
     updates: Integers
     hubs: Integers
-
-    @property
-    def fill(self) -> int:
-        """Blocks of K that are zero before the factorisation."""
-        first, last, kind = self.targets[:, 3], self.targets[:, 4], self.targets[:, 5]
-        return int(np.sum((kind == PRODUCTS) & (first == last)))
+    fill: int
+    unfilled_size: int
 
 
 #: Kinds of a target: off-diagonal sum of products, diagonal sum of products, copy of a block of D
@@ -69,8 +75,7 @@ def make_plan(
         joint_rows: rows of each joint.
     """
     found = order_nodes(body_count, joint_slots, joint_rows)
-    node_count = len(found.nodes)
-    sizes = [6 if k >= node_count else found.nodes[k].rows for k in found.order]
+    node_count, sizes = len(found.nodes), found.sizes
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64).tolist()
     place = {node: k for k, node in enumerate(found.order)}
     hubs = {b: node_count + h for h, b in enumerate(found.hubs)}
@@ -78,29 +83,42 @@ def make_plan(
     blocks, block_of, joint_row, joint_block, block_size = _lay_blocks(
         found, joint_slots, joint_rows, place, starts, hubs
     )
-    diagonal, column_of, columns, column_start, matrix_size = _lay_matrix(found, sizes, starts)
-    targets, contributions = _targets(found, sizes, place, diagonal, column_of, block_of)
-    updates, update_start = _updates(found, sizes, diagonal, column_of)
-    signs = [1 if k >= node_count else -1 for k in found.order]
-    begins = zip(starts[:-1], diagonal, signs, column_start[:-1], update_start[:-1], strict=True)
-    nodes = [(size, *begin) for size, begin in zip(sizes, begins, strict=True)]
-    nodes.append((0, starts[-1], matrix_size, 0, column_start[-1], update_start[-1]))
+    made_of = _contents(found, place, block_of)
+    matrix = lay_matrix(found, starts, made_of)
+    targets, contributions = _targets(found, starts, matrix, made_of)
+    updates, update_start = list_updates(found, starts, matrix)
     hub_rows = [(b, starts[place[hubs[b]]]) for b in found.hubs]
+    filled = sum(1 for row, column in made_of if row != column)
     return Plan(
         ordering=found,
         joint_row=np.array(joint_row, dtype=np.int64),
         joint_block=tuple(joint_block),
         row_size=starts[-1],
         block_size=block_size,
-        matrix_size=matrix_size,
+        matrix_size=matrix.size,
         blocks=_table(blocks, 5),
         targets=targets,
         contributions=contributions,
-        nodes=_table(nodes, 6),
-        columns=_table(columns, 3),
+        nodes=_nodes(found, starts, matrix, update_start),
+        columns=_table(matrix.columns, 3),
         updates=updates,
         hubs=_table(hub_rows, 2),
+        fill=sum(map(len, found.below)) - filled,
+        unfilled_size=sum(m * m for m in sizes)
+        + sum(sizes[row] * sizes[column] for row, column in made_of if row != column),
     )
+
+
+def _nodes(
+    found: Ordering, starts: Sequence[int], matrix: Matrix, update_start: Sequence[int]
+) -> Integers:
+    rows = []
+    for k, (first, last, _) in enumerate(matrix.spans):
+        size, sign = starts[last] - starts[first], 1 if found.is_hub(first) else -1
+        begin = matrix.column_start[k], update_start[k]
+        rows.append((size, starts[first], matrix.place[k], sign, *begin))
+    rows.append((0, starts[-1], matrix.size, 0, matrix.column_start[-1], update_start[-1]))
+    return _table(rows, 6)
 
 
 def _table(rows: Sequence[Sequence[int]], width: int) -> Integers:
@@ -138,39 +156,15 @@ def _lay_blocks(
     return blocks, block_of, joint_row, joint_block, size
 
 
-def _lay_matrix(
-    found: Ordering, sizes: Sequence[int], starts: Sequence[int]
-) -> tuple[list[int], list[dict[int, int]], list[tuple[int, ...]], list[int], int]:
-    """Places of the blocks of K: column by column, the diagonal block first."""
-    diagonal: list[int] = []
-    column_of: list[dict[int, int]] = []
-    columns: list[tuple[int, ...]] = []
-    column_start = [0]
-    size = 0
-    for k, below in enumerate(found.below):
-        diagonal.append(size)
-        size += sizes[k] * sizes[k]
-        places = {}
-        for m in below:
-            places[m] = size
-            columns.append((size, starts[m], sizes[m]))
-            size += sizes[m] * sizes[k]
-        column_of.append(places)
-        column_start.append(len(columns))
-    return diagonal, column_of, columns, column_start, size
+def _contents(
+    found: Ordering, place: dict[int, int], block_of: dict[tuple[int, int], int]
+) -> Contents:
+    """What the blocks of K (row, column; places in the order) are made of, where they are not zero.
 
-
-def _targets(
-    found: Ordering,
-    sizes: Sequence[int],
-    place: dict[int, int],
-    diagonal: Sequence[int],
-    column_of: Sequence[dict[int, int]],
-    block_of: dict[tuple[int, int], int],
-) -> tuple[Integers, Integers]:
-    """What each block of K is made of before the factorisation."""
-    node_count = len(found.nodes)
-    products: dict[int, list[tuple[int, int]]] = {}
+    Pairs of blocks of D whose products are summed up, or one block that is copied.
+    """
+    products: Contents = {}
+    hubs = {b: place[len(found.nodes) + h] for h, b in enumerate(found.hubs)}
     of_body: dict[int, list[int]] = {}
     for k, node in enumerate(found.nodes):
         for b in node.bodies:
@@ -178,9 +172,20 @@ def _targets(
     for b in found.early:
         at = sorted((place[k], block_of[k, b]) for k in of_body.get(b, ()))
         for n, (column, right) in enumerate(at):
-            products.setdefault(diagonal[column], []).append((right, right))
+            products.setdefault((column, column), []).append((right, right))
             for row, left in at[n + 1 :]:
-                products.setdefault(column_of[column][row], []).append((left, right))
+                products.setdefault((row, column), []).append((left, right))
+    for b, hub in hubs.items():
+        for k in of_body.get(b, ()):
+            block = block_of[k, b]
+            products[max(place[k], hub), min(place[k], hub)] = [(block, block)]
+    return products
+
+
+def _targets(
+    found: Ordering, starts: Sequence[int], matrix: Matrix, contents: Contents
+) -> tuple[Integers, Integers]:
+    """What each block of K is made of before the factorisation."""
     targets: list[tuple[int, ...]] = []
     contributions: list[tuple[int, int]] = []
 
@@ -191,41 +196,19 @@ def _targets(
         contributions.extend(made_of)
         targets.append((where, rows, cols, first, len(contributions), kind))
 
-    for column, entry in enumerate(found.order):
-        m = sizes[column]
-        is_hub = entry >= node_count
-        kind = IDENTITY if is_hub else DIAGONAL
-        add(diagonal[column], m, m, kind, () if is_hub else products.get(diagonal[column], ()))
-        for row, where in column_of[column].items():
-            other = found.order[row]
-            if is_hub != (other >= node_count):
-                joint, hub = (other, entry) if is_hub else (entry, other)
-                block = block_of.get((joint, found.hubs[hub - node_count]))
-                if block is not None:
-                    add(where, sizes[row], m, COPY if is_hub else TRANSPOSE, [(block, block)])
-                    continue
-            add(where, sizes[row], m, PRODUCTS, products.get(where, ()))
+    sizes = found.sizes
+    for k, (first, last, _) in enumerate(matrix.spans):
+        if last - first > 1:  # a panel: all zero, until it gathers its blocks
+            size = matrix.heights[k]
+            add(matrix.place[k], size, starts[last] - starts[first], PRODUCTS, ())
+        for column in range(first, last):
+            m = sizes[column]
+            is_hub = found.is_hub(column)
+            kind = IDENTITY if is_hub else DIAGONAL
+            add(matrix.diagonal[column], m, m, kind, contents.get((column, column), ()))
+            for row, where in matrix.blocks[column].items():
+                kind = PRODUCTS
+                if is_hub != found.is_hub(row) and (row, column) in contents:
+                    kind = COPY if is_hub else TRANSPOSE
+                add(where, sizes[row], m, kind, contents.get((row, column), ()))
     return _table(targets, 6), _table(contributions, 2)
-
-
-def _updates(
-    found: Ordering,
-    sizes: Sequence[int],
-    diagonal: Sequence[int],
-    column_of: Sequence[dict[int, int]],
-) -> tuple[Integers, list[int]]:
-    """Products that the elimination of each node subtracts from later blocks."""
-    updates: list[tuple[int, ...]] = []
-    starts = [0]
-    for k, below in enumerate(found.below):
-        mine = column_of[k]
-        for n, right in enumerate(below):
-            here = mine[right]
-            updates.append((here, here, diagonal[right], sizes[right], sizes[right], 1))
-            later = column_of[right]
-            updates.extend(
-                (mine[left], here, later[left], sizes[left], sizes[right], 0)
-                for left in below[n + 1 :]
-            )
-        starts.append(len(updates))
-    return _table(updates, 6), starts
