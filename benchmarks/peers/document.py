@@ -74,6 +74,15 @@ def chosen(cells, scenes):
     return lines
 
 
+def stored(cells, scenes, data):
+    """What the stored figures are from."""
+    passes = 1 + max(turn for turn, _, _ in data["done"])
+    versions = ", ".join(f"{name} {number}" for name, number in data["versions"].items())
+    return [
+        f"Stored are {len(cells)} settings of {len(scenes)} scenes, {passes} passes: {versions}."
+    ]
+
+
 PARTS = {"ratios": ratios, "missed": missed, "price": price, "chosen": chosen}
 
 
@@ -81,8 +90,9 @@ def filled(text, data):
     """The page with its generated parts made anew."""
     cells = data["cells"]
     scenes = list(dict.fromkeys(cell["scene"] for cell in cells))
-    for name, make in PARTS.items():
-        lines = "\n".join(make(cells, scenes))
+    made = {name: make(cells, scenes) for name, make in PARTS.items()}
+    for name, rows in (made | {"stored": stored(cells, scenes, data)}).items():
+        lines = "\n".join(rows)
         part = rf"(<!-- {name} -->\n).*?(<!-- end -->)"
         text = re.sub(part, lambda m, t=lines: f"{m[1]}{t}\n{m[2]}", text, flags=re.DOTALL)
     return text

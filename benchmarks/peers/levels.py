@@ -8,6 +8,8 @@ OURS, PEERS = "dap3d", ("exudyn", "mujoco", "drake", "pinocchio")
 PROGRAMS = (OURS, *PEERS)
 #: Methods with this prefix are whole calls of a program's front door; they stand beside the others.
 WHOLE = "simulate: "
+#: An error beyond this, m: another branch of the motion.
+LOST = 0.1
 #: Settings are measured again where they may decide: this near the best method of a program.
 NEAR = 1.6
 
@@ -24,7 +26,13 @@ def ladders_of(cells, scene, program):
         good = cell["scene"] == scene and cell["program"] == program and cell["seconds"]
         if good and cell.get("error") is not None and not cell["method"].startswith(WHOLE):
             found.setdefault(cell["method"], []).append(cell)
-    return {name: sorted(row, key=seconds_of) for name, row in found.items()}
+    return {name: sorted(_sure(row), key=seconds_of) for name, row in found.items()}
+
+
+def _sure(row):
+    """Cells from coarse to fine without those that were right by luck: a finer one is LOST."""
+    last = max((i for i, cell in enumerate(row) if cell["error"] > LOST), default=-1)
+    return [c for i, c in enumerate(row) if i > last or c["error"] > LOST]
 
 
 def reached(ladder, level):

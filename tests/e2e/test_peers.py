@@ -82,6 +82,8 @@ def test_times_are_interpolated_between_settings(beside):
     assert levels.best(cells, "s-1", "dap3d", 1e-6)[0] == pytest.approx(2.0)
     assert levels.best(cells, "s-1", "dap3d", 1e-3) == (1.0, "m")
     assert levels.best(cells, "s-1", "dap3d", 1e-9)[0] == float("inf")
+    lost = common | {"parameter": 3, "error": 1.2, "seconds": [8.0]}
+    assert levels.best([*cells, lost], "s-1", "dap3d", 1e-6)[0] == float("inf")
 
 
 def test_the_page_says_what_is_stored(beside):
