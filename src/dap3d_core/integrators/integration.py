@@ -63,6 +63,8 @@ class Integration:
         Number of rows that wait at most to be taken by ``rows``.
     length_count
         Number of lengths that ``project`` gives, which vanish at singular states (crossing.py).
+    leave_stiff
+        Whether to stop, with status STIFF, where the scene turns out stiff for the method.
     watched
         Whether the fourth function is called with each accepted state.
     ends
@@ -94,6 +96,7 @@ class Integration:
         buffer_rows: int = 256,
         length_count: int = 0,
         watched: bool = False,
+        leave_stiff: bool = False,
         ends: ArrayLike = (),
     ) -> None:
         self.method = method
@@ -115,6 +118,7 @@ class Integration:
         switches, crossings = switches_of(real, integer, ends)
         integer[at.ERROR_SIZE] = error_size
         integer[at.PROJECT_ON], integer[at.WATCHED] = project_on, watched
+        integer[at.LEAVE] = leave_stiff
         state = np.zeros((at.STATES, y.size))
         state[at.Y] = y
         #: All the state there is, as arrays: copied and put back, the run goes on from there.
@@ -229,6 +233,12 @@ class Integration:
         return slope
 
     @property
+    def stiff_at(self) -> float | None:
+        """Since when the scene is stiff for this method, where that was noticed (stiffness.py)."""
+        found = float(self.work.real[at.STIFF_AT])
+        return found if 0.0 < found < np.inf else None
+
+    @property
     def rows_are_full(self) -> bool:
         """Whether ``rows`` must be taken before it can go on."""
         return int(self.work.integer[at.ROW]) == len(self.work.rows)
@@ -280,10 +290,12 @@ def _facts(method: Method) -> tuple[Floats, Integers]:
     real[at.EXPONENT], real[at.BETA] = method.exponent, method.beta
     real[at.FACTOR_MIN], real[at.FACTOR_MAX] = method.factor_min, method.factor_max
     real[at.ERROR_OLD], real[at.CALM], real[at.SAFETY] = 1e-4, method.calm, method.safety
+    real[at.STIFF_AT] = np.inf
     integer = np.zeros(at.INTEGERS, dtype=np.int64)
     integer[at.STAGES], integer[at.ORDER] = method.stages, method.order
     integer[at.ERRORS], integer[at.DENSE] = len(method.e), method.dense
     integer[at.ERROR_USES_RESULT] = method.error_uses_result
+    integer[at.LATE_STAGE] = method.late_stage
     return real, integer
 
 

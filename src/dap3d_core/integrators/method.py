@@ -78,6 +78,11 @@ class Method:
         return float(0.5 * (c[widest] + c[widest + 1]))
 
     @property
+    def late_stage(self) -> int:
+        """The last stage before the result that stands at the end of the step; 0: none."""
+        return max(i for i in range(self.stages) if i == 0 or self.c[i] == 1.0)
+
+    @property
     def error_uses_result(self) -> bool:
         """Whether the error estimate needs f at the result of the step."""
         return self.adaptive and bool(np.any(self.e[:, self.stages] != 0.0))

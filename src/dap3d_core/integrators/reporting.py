@@ -45,15 +45,19 @@ def project_state(
     project: Function,
     system: Any,
     loops: Any,
+    here: bool = False,
 ) -> int:
-    """Project y where that is on; why that failed, or RUNNING."""
+    """Project y where that is on; why that failed, or RUNNING.
+
+    here: whether rhs was the last function called, at this very t and y.
+    """
     real[OUTCOME] = 0.0
     if not all_finite(y):
         return NOT_FINITE
     if integer[PROJECT_ON] == 0:
         return RUNNING
     outcome = real[OUTCOME:]
-    outcome[1] = 0.0
+    outcome[0], outcome[1] = 1.0 if here else 0.0, 0.0
     integer[PROJECTIONS] += 1
     project(t, y, outcome, system, loops)
     if outcome[1] == FAILED or not all_finite(y):

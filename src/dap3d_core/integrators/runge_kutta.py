@@ -41,6 +41,7 @@ from dap3d_core.integrators.reporting import (
     report_end,
     report_reached,
 )
+from dap3d_core.integrators.stiffness import watch_stiffness
 from dap3d_core.integrators.switches import end_is_across, next_length, sample, settle
 from dap3d_core.integrators.work import (
     ACROSS,
@@ -55,6 +56,7 @@ from dap3d_core.integrators.work import (
     FACTOR_MIN,
     FRESH,
     H_DENSE,
+    LEAVE,
     LENGTHS,
     LIMIT,
     NEXT,
@@ -73,6 +75,8 @@ from dap3d_core.integrators.work import (
     STEP,
     STEP_FLOOR,
     STEPS,
+    STIFF,
+    STIFF_AT,
     SWITCHES,
     T_DENSE,
     T_STOP,
@@ -118,6 +122,8 @@ def advance(
         elif integer[ENDING] != 0:
             if not report_end(work, report, system, loops):
                 return
+        elif integer[LEAVE] != 0 and real[STIFF_AT] < real[T]:
+            integer[STATUS] = STIFF
         elif integer[RHS] > limit or real[T] >= real[LIMIT]:
             return
         else:
@@ -295,13 +301,17 @@ def land(
     system: Any,
     loops: Any,
 ) -> int:
-    """Prepare dense output, project the trial state, evaluate f; why that failed, or RUNNING.
+    """Prepare dense output, evaluate f, project the trial state; why that failed, or RUNNING.
 
     Dense output belongs to the step as the method took it; what it gives is projected by itself.
+    f is evaluated before the projection, which then has less to do. Where the error is controlled
+    the next step starts with that value: the projection moves the state by no more than the step's
+    error, and the derivative by as little.
     """
     real, integer, times, k = work.real, work.integer, work.times, work.k
     y, trial, result = work.state[Y], work.state[TRIAL], integer[STAGES]
     known, watched = integer[ERROR_USES_RESULT] != 0, integer[SWITCHES] != 0
+    here, controlled = known and not near, real[STEP] == 0.0 and not near
     if integer[DENSE] != 0 and times[integer[NEXT]] < t1:
         t, argument, table = real[T], work.state[SCRATCH], work.table
         if not known:
@@ -317,11 +327,18 @@ def land(
                 return ACROSS_A_SWITCH
             rhs(at, argument, k[i], system, loops)
         integer[RHS] += k.shape[0] - 1 - result
+        here = here and k.shape[0] == result + 1
         prepare_dense(real, integer, work.state, k, work.terms, table, t1)
-    failure = project_state(real, integer, t1, trial, project, system, loops)
+    if controlled and not known and t1 < times[-1]:
+        integer[RHS] += 1
+        rhs(t1, trial, k[result], system, loops)
+        known = here = True
+    if controlled and known:
+        watch_stiffness(work, t1 - real[T])
+    failure = project_state(real, integer, t1, trial, project, system, loops, here)
     if failure != RUNNING:
         return failure
-    known = known and real[OUTCOME] == 0.0
+    known = known and (controlled or real[OUTCOME] == 0.0)
     if not known and (watched or t1 < times[-1]):
         integer[RHS] += 1
         rhs(t1, trial, k[result], system, loops)

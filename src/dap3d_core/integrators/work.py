@@ -25,22 +25,25 @@ class Status(IntEnum):
     SWITCHED = 5  # a switch of the model that ends the run became negative
     CHATTERED = 6  # a switch changed its sign again and again while time hardly went on
     ENDED = 7  # an event of the user's asked for it
+    STIFF = 8  # the scene has become stiff, and the integration was to leave it then
 
 
 # The same as plain integers, for compiled code.
 RUNNING, FINISHED = int(Status.RUNNING), int(Status.FINISHED)
 STEP_FLOOR, NOT_FINITE = int(Status.STEP_FLOOR), int(Status.NOT_FINITE)
 PROJECTION_FAILED, SWITCHED = int(Status.PROJECTION_FAILED), int(Status.SWITCHED)
-CHATTERED = int(Status.CHATTERED)
+CHATTERED, STIFF = int(Status.CHATTERED), int(Status.STIFF)
 
 # Places in ``real``. Settings; a STEP of 0 lets the error choose it. CALM, SAFETY: see Method.
 RTOL, ATOL, STEP, EXPONENT, BETA, FACTOR_MIN, FACTOR_MAX, CALM, SAFETY = range(9)
 # What changes: time, next step, error of the last accepted step, start and length of the step that
 # the dense output belongs to, start of the present run of equal steps, time of what stopped
 # the run, error of the last step that was to go across a singular state; the instant that the next
-# step may not go beyond, its greatest length since one met the other side of a switch; and what
-# project gives: four numbers, then lengths.
-T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, ACROSS, LIMIT, CUT, OUTCOME = range(9, 20)
+# step may not go beyond, its greatest length since one met the other side of a switch; when the
+# scene was found stiff; and what project gives: four numbers, then lengths.
+(
+    T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, ACROSS, LIMIT, CUT, STIFF_AT, OUTCOME
+) = range(9, 21)  # fmt: skip
 LENGTHS = OUTCOME + 4
 # Places in ``integer``. Settings.
 STAGES, ORDER, ERROR_SIZE, ERRORS, ERROR_USES_RESULT, DENSE, PROJECT_ON, WATCHED = range(8)
@@ -51,7 +54,10 @@ STEPS, REJECTED, RHS, PROJECTIONS, REPORTS, POOR = range(15, 21)
 # Number of switches. LOOKED: their values and rates at t are known; steps in a row that were cut
 # because they met the other side; the status with which the run ends here, and the switch that is
 # to blame; how often a switch has changed its sign.
-SWITCHES, LOOKED, CUTS, ENDING, CULPRIT, CROSSINGS, INTEGERS = range(21, 28)
+SWITCHES, LOOKED, CUTS, ENDING, CULPRIT, CROSSINGS = range(21, 27)
+# LATE_STAGE: see Method; whether the run ends where the scene becomes stiff; steps that looked so,
+# and those in a row that did not since (stiffness.py).
+LATE_STAGE, LEAVE, STIFF_STEPS, CALM_STEPS, INTEGERS = range(27, 32)
 # Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch.
 Y, TRIAL, SCRATCH, OTHER, STATES = range(5)
 # Rows of ``switches``: value, side (the sign that it keeps; 0: none yet), rate and bend (change of

@@ -16,6 +16,7 @@ fill at all. Where that makes wide fronts, as in nets of loops, separators wait 
 import heapq
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import count, repeat
 
 import attrs
 
@@ -120,7 +121,7 @@ def order_nodes(
     def eliminated(stage: Sequence[int] | None) -> Ordering:
         neighbours = _neighbours(nodes, of_body, early, hubs)
         waits = _waits(nodes, of_body, hubs) if hubs else {}
-        order, below = _eliminate(neighbours, size, waits, stage)
+        order, below = _eliminate(neighbours, size, waits, stage, in_turn=True)
         place = {node: k for k, node in enumerate(order)}
         lists = tuple(tuple(sorted(place[m] for m in below[node])) for node in order)
         return Ordering(tuple(nodes), early, hubs, tuple(order), lists)
@@ -180,17 +181,21 @@ def _eliminate(
     size: Sequence[int],
     waits: dict[int, set[int]],
     stage: Sequence[int] | None = None,
+    *,
+    in_turn: bool = False,
 ) -> tuple[list[int], dict[int, set[int]]]:
     """Minimum degree, weighted by rows; no node is taken before the hubs that it waits for.
 
-    With stages what can be taken of the lowest stage goes first.
+    With stages what can be taken of the lowest stage goes first. Among equals the lowest node is
+    taken, or, ``in_turn``, the one that has waited longest: a chain is then eliminated from both
+    ends at once, and no pivot waits for the one just before.
     """
     weight = [sum(size[m] for m in others) for others in neighbours]
     if stage is not None:  # a stage weighs more than all degrees
         total = 1 + sum(size)
         weight = [w + total * s for w, s in zip(weight, stage, strict=True)]
-    heap = [(w, k, k) for k, w in enumerate(weight) if not waits.get(k)]
-    pushed = len(weight)
+    turn = count() if in_turn else repeat(0)
+    heap = [(w, next(turn), k) for k, w in enumerate(weight) if not waits.get(k)]
     heapq.heapify(heap)
     released: dict[int, list[int]] = {}
     for k, hubs in waits.items():
@@ -214,13 +219,11 @@ def _eliminate(
             mine.discard(k)
             weight[m] += sum(size[x] for x in gained) - size[k]
             if not waits.get(m):
-                heapq.heappush(heap, (weight[m], pushed, m))
-                pushed += 1
+                heapq.heappush(heap, (weight[m], next(turn), m))
         for m in released.get(k, ()):
             waits[m].discard(k)
             if not waits[m]:
-                heapq.heappush(heap, (weight[m], pushed, m))
-                pushed += 1
+                heapq.heappush(heap, (weight[m], next(turn), m))
     return order, below
 
 

@@ -18,6 +18,7 @@ from dap3d_core.report.reference import Reference, find_reference
 from dap3d_core.report.rungs import (
     ADAPTIVE,
     FORMULATIONS,
+    MEASURED,
     QUICK_TOLERANCES,
     TOLERANCES,
     Setting,
@@ -28,7 +29,7 @@ from dap3d_core.report.rungs import (
 )
 from dap3d_core.result import Result
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
-from dap3d_core.scene.settings import FIXED_STEP, INTEGRATORS
+from dap3d_core.scene.settings import FIXED_STEP
 from dap3d_core.simulation import report_times
 
 #: Seconds that all timings of one rung may take: longer runs are repeated less.
@@ -99,7 +100,7 @@ def report(
     maker = _Maker(bench, chosen(methods, FORMULATIONS), repeat, progress)
     if given.simulation.step is not None:
         maker.notes.append(_STEP_LEFT_OUT.format(given.simulation.step))
-    return maker.make(chosen(integrators, INTEGRATORS), rtols, steps, target_error, quick=quick)
+    return maker.make(chosen(integrators, MEASURED), rtols, steps, target_error, quick=quick)
 
 
 def _check_positive(**numbers: float | None) -> None:
@@ -211,7 +212,7 @@ class _Maker:
 
     def _fine_steps(self, steps: Sequence[float]) -> list[Setting]:
         """Fixed steps below the ladder, for a reference where no tolerance can be held."""
-        names = [name for name in INTEGRATORS if name in FIXED_STEP]
+        names = [name for name in MEASURED if name in FIXED_STEP]
         return [
             Setting(method, name, step=min(steps) / 2.0)
             for name in names

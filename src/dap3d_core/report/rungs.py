@@ -22,10 +22,12 @@ QUICK_FACTOR = 4.0
 UNFIT = (("penalty", "radau"), ("penalty", "adams"))
 #: Formulations that a report may run.
 FORMULATIONS = tuple(name for name in METHODS if name != "auto")
+#: Integrators that a report may run: auto is one of them, or two.
+MEASURED = tuple(name for name in INTEGRATORS if name != "auto")
 #: Integrators that choose their step, those of the highest order first.
 ADAPTIVE = tuple(
     sorted(
-        (name for name in INTEGRATORS if name not in FIXED_STEP),
+        (name for name in MEASURED if name not in FIXED_STEP),
         key=lambda name: -int(getattr(CODE.get(name), "order", 0)),
     )
 )

@@ -10,7 +10,7 @@ from dap3d_core.scene.values import Fault, bounded, number_of, text_of, truth_of
 
 #: What ``method`` and ``integrator`` may say.
 METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq")
-INTEGRATORS = ("dopri5", "dop853", "adams", "rk4", "radau")
+INTEGRATORS = ("auto", "dopri5", "dop853", "adams", "rk4", "radau")
 #: What ``correct_metric`` may say (simulation/initial.py).
 CORRECT_METRICS = ("unit", "mass")
 #: Integrators without an error estimate, which need a step.

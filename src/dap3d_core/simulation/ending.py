@@ -32,14 +32,15 @@ def why_stopped(machine: Machine, integration: Integration) -> str:
 
 
 def occurrences(
-    machine: Machine, integration: Integration, of_script: Sequence[Occurrence]
+    machine: Machine, runs: Sequence[Integration], of_script: Sequence[Occurrence]
 ) -> list[Occurrence]:
     """What happened at instants that were located, in their order."""
-    ended = integration.status is Status.SWITCHED
+    last = runs[-1]
+    ended = last.status is Status.SWITCHED
     found = []
-    for t, which, side in integration.crossings:
+    for t, which, side in (crossing for run in runs for crossing in run.crossings):
         switch = machine.switches[int(which)]
-        ends = ended and int(which) == integration.culprit and side < 0.0 and bool(switch.words)
+        ends = ended and int(which) == last.culprit and side < 0.0 and bool(switch.words)
         kind = switch.group.examined.type.kind
         found.append(
             Occurrence(
@@ -52,11 +53,11 @@ def occurrences(
     return sorted([*found, *of_script], key=lambda event: event.t)
 
 
-def event_notes(integration: Integration, events: Sequence[Occurrence]) -> list[str]:
+def event_notes(runs: Sequence[Integration], events: Sequence[Occurrence]) -> list[str]:
     """Notes on what happened: an event that stopped the run, more crossings than are kept."""
     notes = [f"{INFORMATION}the run was stopped by an event, {event.words}"
              for event in events if event.kind == "stop"]  # fmt: skip
-    if (count := integration.crossing_count) > LOGGED:
+    if (count := sum(run.crossing_count for run in runs)) > LOGGED:
         notes.append(
             f"{INFORMATION}switches changed their sign {count} times; the first {LOGGED} are kept"
         )

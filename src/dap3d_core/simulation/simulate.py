@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.friction import PASSES
 from dap3d_core.integrators import METHODS, Integration, Status, make_adams
+from dap3d_core.integrators.integration import Statistics as Counts
 from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import Occurrence, Record, Result, ResultWriter, Statistics, check_target
 from dap3d_core.scene import Mistake, Scene, SceneError, Simulation
@@ -20,7 +21,12 @@ from dap3d_core.simulation.elsewhere import redundancy_elsewhere
 from dap3d_core.simulation.ending import event_notes, occurrences, why_stopped
 from dap3d_core.simulation.errors import RedundantError, SimulationError
 from dap3d_core.simulation.event import Event
-from dap3d_core.simulation.implicit import implicit_integration
+from dap3d_core.simulation.implicit import (
+    EXPLICIT,
+    implicit_integration,
+    implicit_rest,
+    stiffness_notes,
+)
 from dap3d_core.simulation.initial import correction_notes, violation
 from dap3d_core.simulation.redundancy import Redundancy
 from dap3d_core.simulation.second_run import Again, add_error
@@ -70,7 +76,8 @@ def simulate(
         t_end: final time, s; 0 solves once at t = 0.
         dt: reporting step, s; by default t_end / 100. t_end is reported in any case.
         method: "auto", "unconstrained", "standard", "penalty" or "lsq".
-        integrator: "dopri5", "dop853", "adams", "radau" (implicit) or "rk4" (which needs ``step``).
+        integrator: "dopri5", "dop853", "adams", "radau" (implicit), "rk4" (which needs ``step``) or
+            "auto": dop853, and radau from where the scene turns out stiff.
         rtol, atol: tolerances of the step's error.
         step: fixed step, s, without error control.
         correct, project: bring the start, and then every state, onto the constraints.
@@ -124,6 +131,9 @@ class _Run:
         self.rank = 0
         self.first_step: float | None = None
         self.watcher = Watcher(compiled, events) if events else None
+        #: The integrations, one after the other: "auto" may take a second one.
+        self.runs: list[Integration] = []
+        self.options: dict[str, Any] = {}
 
     def go(
         self,
@@ -134,29 +144,29 @@ class _Run:
         estimate_error: bool = False,
     ) -> Result:
         self.started = time.perf_counter()
-        u0 = self._start()
-        integration = self._integration(u0)
-        self._compile(integration)
+        self._begin(self._integration(self._start()))
         if output is not None:
             self.output = check_target(output, force)
             self.force = force
         try:
-            self._advance(integration, progress)
+            self._advance(progress)
+            if self.runs[-1].status is Status.STIFF:
+                self._begin(implicit_rest(self.machine, self.runs[-1], self.times, self.options))
+                self._advance(progress)
         except BaseException as error:
             if isinstance(error, OSError):  # the disk: what is there stays as it is
                 raise
-            self._take_rows(integration)
+            self._take_rows()
             status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
-            error.result = self._kept(integration, status)  # type: ignore[attr-defined]
+            error.result = self._kept(status)  # type: ignore[attr-defined]
             raise
         finally:
             if self.watcher:
                 self.watcher.numbers.put_back()
-        if integration.status not in (Status.FINISHED, Status.ENDED):
-            raise self._stopped(integration)
-        result = self._kept(
-            integration, "done" if integration.status is Status.FINISHED else "stopped"
-        )
+        ended = self.runs[-1].status
+        if ended not in (Status.FINISHED, Status.ENDED):
+            raise self._stopped()
+        result = self._kept("done" if ended is Status.FINISHED else "stopped")
         assert result is not None
         if estimate_error:
             add_error(result, self.settings, self._again(progress), output)
@@ -212,7 +222,7 @@ class _Run:
         machine.start(0.0, u0)
         y0 = machine.integrated(u0)
         width = 1 + len(y0) + machine.report_size
-        options: dict[str, Any] = dict(
+        self.options = options = dict(
             rtol=settings.rtol,
             atol=settings.atol,
             step=settings.step,
@@ -226,27 +236,36 @@ class _Run:
         try:
             if settings.integrator == "radau":
                 return implicit_integration(machine, y0, self.times, options)
-            options |= {"length_count": machine.length_count, "watched": machine.counts_turns}
+            options = options | {
+                "length_count": machine.length_count,
+                "watched": machine.counts_turns,
+            }
             problem = machine.functions, machine.system, machine.loops, y0, self.times
             if settings.integrator == "adams":
                 refuse_adams(machine)
                 del options["ends"]
                 return make_adams(*problem, **options)
+            if settings.integrator == "auto":
+                leave = machine.method != "penalty"  # which radau does not solve
+                return Integration(METHODS[EXPLICIT], *problem, leave_stiff=leave, **options)
             return Integration(METHODS[settings.integrator], *problem, **options)
         except ValueError as error:
             raise SceneError([Mistake("step", settings.step, str(error))]) from error
 
-    def _compile(self, integration: Integration) -> None:
-        """Compile the integrator before the clock of the run goes on."""
+    def _begin(self, integration: Integration) -> None:
+        """Compile an integrator before the clock of the run goes on; it is the present one then."""
         if self.announce is not None and not driver_is_cached("integrators"):
             self.announce("the integrator")
         before = time.perf_counter()
         integration.compile()
-        self.compile_time = time.perf_counter() - before
-        self.started += self.compile_time
+        spent = time.perf_counter() - before
+        self.compile_time += spent
+        self.started += spent
+        self.runs.append(integration)
 
-    def _advance(self, integration: Integration, progress: Progress | None) -> None:
+    def _advance(self, progress: Progress | None) -> None:
         """Advance in chunks whose length in right-hand sides follows the clock."""
+        integration = self.runs[-1]
         budget, t_end = 100, float(self.times[-1])
         while integration.status is Status.RUNNING:
             before, clock = integration.statistics.rhs, time.perf_counter()
@@ -254,44 +273,47 @@ class _Run:
                 self.watcher.advance(integration, budget)
             else:
                 integration.advance(budget)
-            self._take_rows(integration)
+            self._take_rows()
             done, seconds = integration.statistics.rhs - before, time.perf_counter() - clock
             if progress is not None:
                 progress(integration.t, t_end)
             if done and seconds > 0.0:
                 budget = int(min(max(1.0, done * CHUNK_SECONDS / seconds), 4.0 * budget, 1e9))
 
-    def _take_rows(self, integration: Integration) -> None:
+    def _take_rows(self) -> None:
         """Take what was reported since the last chunk; in a long run, also onto disk."""
-        rows = integration.rows()
+        if not self.runs:
+            return
+        rows = self.runs[-1].rows()
         if not len(rows):
             return
         self.rows.append(rows)
         if self.writer is not None:
             self.writer.append(rows)
         elif self.output and time.perf_counter() - self.started > SHORT_SECONDS:
-            record, model = self._record(integration, "done"), self.machine.model
+            record, model = self._record("done"), self.machine.model
             self.writer = ResultWriter(self.output, model, record, force=self.force)
             self.writer.append(np.concatenate(self.rows))
 
-    def _stopped(self, integration: Integration) -> SimulationError:
+    def _stopped(self) -> SimulationError:
         """Why the integration ended early, with what was computed."""
-        message = why_stopped(self.machine, integration)
+        message = why_stopped(self.machine, self.runs[-1])
         self.notes.append(message)
-        return SimulationError(message, self._kept(integration, "stopped"))
+        return SimulationError(message, self._kept("stopped"))
 
-    def _kept(self, integration: Integration, status: str) -> Result | None:
+    def _kept(self, status: str) -> Result | None:
         """The result of what was computed, whole on disk if asked for; None where nothing was."""
         if not self.rows:
             return None
         if count := self.machine.unsettled:
             self.notes.append(
                 f"friction: the multipliers did not settle in {PASSES} passes, {count} times of "
-                f"{integration.statistics.rhs} or more; the last ones were used. Motion there is "
+                f"{self._statistics().rhs} or more; the last ones were used. Motion there is "
                 "uncertain: a high mu may lock the joint by itself"
             )
-        self.notes += event_notes(integration, self._events(integration))
-        record = self._record(integration, status)
+        self.notes += event_notes(self.runs, self._events())
+        self.notes += stiffness_notes(self.runs, self.settings.integrator)
+        record = self._record(status)
         result = Result.of_run(
             self.machine.model, np.concatenate(self.rows), record, lambda: self.machine
         )
@@ -303,12 +325,16 @@ class _Run:
             self.writer.part.unlink(missing_ok=True)
         return result
 
-    def _events(self, integration: Integration) -> list[Occurrence]:
+    def _events(self) -> list[Occurrence]:
         found = self.watcher.occurrences if self.watcher else []
-        return occurrences(self.machine, integration, found)
+        return occurrences(self.machine, self.runs, found)
 
-    def _record(self, integration: Integration, status: str) -> Record:
-        counts, events = integration.statistics, self._events(integration)
+    def _statistics(self) -> Counts:
+        """What all integrations have done together."""
+        return Counts(*(sum(n) for n in zip(*(run.statistics for run in self.runs), strict=True)))
+
+    def _record(self, status: str) -> Record:
+        counts, events = self._statistics(), self._events()
         changes = any(event.changes for event in events)
         return Record(
             scene_text=self.compiled.scene_text,
