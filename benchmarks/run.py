@@ -1,7 +1,8 @@
 """All benchmarks, as tables and as JSON.
 
 ``make bench``, or ``python benchmarks/run.py [--only NAME] [-o FILE]``. scale_long, some minutes,
-and two_threads are run only when they are named.
+and two_threads are run only when they are named. With ``--docs`` the figures of hard_cases and
+long_time go to docs/hard-cases.md as well.
 """
 
 import argparse
@@ -10,7 +11,12 @@ import platform
 import sys
 from pathlib import Path
 
+# Scenes and closed equations of the tests serve here, too.
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
+
 import calls
+import hard
+import hard.long_time
 import kernels
 import numba
 import numpy
@@ -25,13 +31,20 @@ from rich.table import Table
 NAMED = ("scale_long", "two_threads")
 #: Columns that a table has at most beside its first.
 COLUMNS = 8
+#: Columns that every table of one title has, and those of sentences, which stand below.
+LEADING, WORDS = ("case", "run"), ("why", "said")
 
 
 def tables(console, title, rows):
-    """Print rows of one shape, wide ones as several tables with the same first column."""
-    first, *keys = dict.fromkeys(key for row in rows for key in row)
+    """Print rows of one shape, wide ones as several tables with the same first columns."""
+    keys = [k for k in dict.fromkeys(k for row in rows for k in row) if k not in WORDS]
+    first = [key for key in keys if key in LEADING] or keys[:1]
+    keys = [key for key in keys if key not in first]
     for k in range(0, len(keys), COLUMNS):
-        table(console, title, rows, [first, *keys[k : k + COLUMNS]])
+        table(console, title, rows, [*first, *keys[k : k + COLUMNS]])
+    for row in rows:
+        if words := [row[key] for key in WORDS if row.get(key)]:
+            console.print(f"{row['case']}, {row['run']}: {' -- '.join(words)}", highlight=False)
 
 
 def table(console, title, rows, keys):
@@ -54,6 +67,7 @@ def main():
     parser.add_argument("--only", help="one benchmark by name")
     parser.add_argument("--against", help="a program to compare the chains with (build, rk4)")
     parser.add_argument("-o", "--output", default="benchmarks/results.json")
+    parser.add_argument("--docs", action="store_true", help="renew the page on hard cases")
     arguments = parser.parse_args()
     benchmarks = {
         "right_hand_side": lambda: right_hand_side.measure(arguments.against),
@@ -65,6 +79,8 @@ def main():
         "scale": scale.measure,
         "scale_long": scale.long_chain,
         "two_threads": two_threads.measure,
+        "hard_cases": hard.measure,
+        "long_time": hard.long_time.measure,
     }
     if arguments.only and arguments.only not in benchmarks:
         sys.exit(f"no benchmark {arguments.only}; there are {', '.join(benchmarks)}")
@@ -73,6 +89,8 @@ def main():
         if arguments.only == name or (arguments.only is None and name not in NAMED):
             found[name] = measure()
             tables(console, name.replace("_", " "), found[name])
+    if arguments.docs:
+        hard.write_page([*found.get("hard_cases", []), *found.get("long_time", [])])
     versions = {
         "python": platform.python_version(),
         "numpy": numpy.__version__,

@@ -60,11 +60,11 @@ def bricard():
     return scene
 
 
-def two_hinge_door():
-    """A door on two coaxial hinges, 10 rows of rank 5, its axis level, let go from level rest."""
-    scene = dap.Scene(name="two-hinge door")
+def hinged_door(hinges=2):
+    """A door on coaxial hinges (5 rows each, rank 5), its axis level, let go from level rest."""
+    scene = dap.Scene(name=f"door on {hinges} hinges")
     scene.add_body("door", mass=12.0, Jp=(4.0, 1.0, 5.0), r=(0.0, -0.5, 0.0))
-    for k, x in enumerate((-0.9, 0.9)):
+    for k, x in enumerate(np.linspace(-0.9, 0.9, hinges)):
         scene.add_point(f"hinge{k}", "door", (x, 0.5, 0.0))
         scene.add_point(f"post{k}", "ground", (x, 0.0, 0.0))
         scene.add_joint("rev", f"H{k}", P_i=f"hinge{k}", P_j=f"post{k}",

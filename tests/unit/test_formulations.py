@@ -168,7 +168,7 @@ def test_the_motion_does_not_depend_on_the_size_of_rows(size):
     the 1e-10 that rounding of rows of 1e6 may come to; and the same start, to rounding."""
     registry, found = registry_of(Sized), {}
     for factor in (1.0, size):
-        scene = redundant.two_hinge_door()
+        scene = redundant.hinged_door()
         hinge = scene.joints.pop("H1").fields
         scene.add_joint("sized", "H1", size=factor, **hinge)
         compiled = dap.compile(scene, method="lsq", registry=registry)

@@ -112,7 +112,7 @@ def test_bricard():
 def test_door_on_two_hinges():
     """10 rows of rank 5: a pendulum, phi'' = (m g l / (J + m l^2)) sin phi with phi from upright,
     let go level: e < 1e-6 over 5 s; the hinges share the load as the least multipliers do."""
-    result = dap.simulate(redundant.two_hinge_door(), t_end=5.0, dt=0.1)
+    result = dap.simulate(redundant.hinged_door(), t_end=5.0, dt=0.1)
     m, length, J = 12.0, 0.5, 4.0
     rate = m * redundant.G * length / (J + m * length**2)
     phi = redundant.swing(rate, result.t, (np.pi / 2, 0.0))[0]

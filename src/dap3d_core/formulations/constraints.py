@@ -43,6 +43,10 @@ PASSES = 5
 #: enough that two passes leave nothing of a row that is a tenth independent of the others.
 PART = 1e-9
 
+#: Where a pass with the factors of another pose leaves more than this part of the residual, the
+#: next has new ones: with very different masses a small turn changes which body gives way.
+SLOW = 0.1
+
 #: A residual that stays above this many times the tolerance means that the projection did not find
 #: the constraints.
 LOST = 1e6
@@ -154,6 +158,7 @@ def project_onto(
     n = metric.shape[0] - 1
     linear = out[0] == 1.0
     factored = linear and kept
+    stale = False
     out[0] = out[1] = 0.0
     normalise(y, n)
     if not linear:
@@ -174,6 +179,7 @@ def project_onto(
             if not worst > limit or not worst < 0.5 * before:
                 break
         linear, factored = False, part is None  # of old factors the null space would be wrong
+        stale = factored
         out[0] = 1.0
         if not worst <= LOST * limit:
             out[1] = 1.0
@@ -182,23 +188,38 @@ def project_onto(
         linearise(t, system, loops)
     if not factored:
         factorise(system, part)
+    project_velocities(y, out, system, part, stale)
+    if pivot_lengths(system.nodes, system.K, system.smallest, out[4:]) > 0 and out[1] == 0.0:
+        out[1] = 2.0
+
+
+@compiled_into
+def project_velocities(
+    y: Floats, out: Floats, system: System, part: float | None, stale: bool
+) -> None:
+    """The velocities' part of ``project_onto``, at D^ of this pose.
+
+    stale: the factors are those of the pose before positions moved.
+    """
+    n = system.metric.shape[0] - 1
     worst = velocity_residuals(system)
     limit = system.settings[TOLERANCE_V] * size_of(y, 7 * n, n, 6, 6)
     if not worst <= limit:
         for _ in range(PASSES):
             before = worst
             correct(system)
-            change_velocity(y, metric, system.force)
+            change_velocity(y, system.metric, system.force)
             add_product(system.blocks, system.D, system.force, system.C)
             worst = largest(system.C)
-            if not worst > limit or not worst < 0.5 * before:
+            if not worst > limit or not (stale or worst < 0.5 * before):
                 break
+            if stale and not worst < SLOW * before:
+                factorise(system, part)
+                stale = False
         out[0] = 1.0
         if not worst <= LOST * limit:
             out[1] = 1.0
     out[3] = worst
-    if pivot_lengths(system.nodes, system.K, system.smallest, out[4:]) > 0 and out[1] == 0.0:
-        out[1] = 2.0
 
 
 @compiled_inside

@@ -24,6 +24,7 @@ from dap3d_core.assembly.system import (
 )
 from dap3d_core.formulations import LOOPS, REPORT, RHS, functions_of
 from dap3d_core.formulations.build import build_loops, build_system
+from dap3d_core.linear.blocks import LESS, POOR
 from dap3d_core.linear.plan import Plan, make_plan
 from dap3d_core.model import Group, Model
 from dap3d_core.model.kinematics import split, to_global, to_integrated
@@ -90,8 +91,6 @@ class Switch:
 
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
 AS_COMPILED = np.errstate(all="ignore")
-#: Pivots are squares of lengths: a hundredth in length of what it was at the start.
-POOR = 1e-4
 #: A row whose pivot is below this many times what regularises it depends on other rows.
 REDUNDANT = 100.0
 
@@ -223,6 +222,18 @@ class Machine:
         if self.method != "standard":
             pivots[pivots < REDUNDANT * s.x[s.row]] = 0.0
         s.smallest[s.row] = POOR * pivots
+
+    def poor_rows(self, t: float) -> Integers:
+        """Rows (model's order) that are nearly singular at the bodies as placed (pivot_lengths)."""
+        s = self.system
+        smallest, pivots = s.smallest[s.row], self.pivots(t)
+        watched = smallest > 0.0
+        ratio = np.ones(self.plan.row_size)
+        ratio[s.row[watched]] = POOR * pivots[watched] / smallest[watched]
+        poor = ~(ratio > POOR)
+        for size, first, *_ in self.plan.nodes[:-1]:
+            poor[first : first + size] &= not np.prod(ratio[first : first + size]) > LESS
+        return np.flatnonzero(poor[s.row])
 
     @AS_COMPILED
     def pivots(self, t: float) -> Floats:

@@ -29,6 +29,12 @@ from dap3d_core.linear.supernodes import LEAST_ROWS
 Floats = NDArray[np.float64]
 
 
+#: Pivots are squares of lengths. Near a singular pose one is a hundredth in length of what it was
+#: at the start, and the product of its node has fallen by as much: to LESS at least, where others
+#: have grown.
+POOR, LESS = 1e-4, 1e-2
+
+
 @compiled_into
 def add_rows_product(
     D: Floats, a: int, b: int, K: Floats, o: int, m: int, n: int, lower: bool, first: bool
@@ -229,21 +235,25 @@ def factor(
 def pivot_lengths(nodes: Integers, K: Floats, smallest: Floats, lengths: Floats) -> int:
     """Of each node the square root of its pivots' product, from the factors of K; 0 if none.
 
-    Near a singular pose it goes linearly through zero. Each pivot is measured by ``smallest``; rows
-    that nobody watches (it is zero) are left out. The single pivots would tell as much, but they
-    change with the axes that rows are written in.
+    Near a singular pose it goes linearly through zero. Each pivot is measured by ``smallest``: POOR
+    of what it was at the start. Rows that nobody watches (it is zero) are left out. The single
+    pivots would tell as much, but they change with the axes that rows are written in: where masses
+    are very different, the small one wanders from row to row as the bodies turn, while the product
+    stays.
 
-    Returns the number of pivots that are not above ``smallest``.
+    Returns the number of nodes with a pivot not above ``smallest`` and a product below LESS.
     """
     counted = 0
     for k in range(nodes.shape[0] - 1):
         m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
-        product = 1.0
+        product, small = 1.0, 0
         for r in range(m):
             if smallest[f + r] > 0.0:
                 ratio = 1.0 / (abs(K[d + r * (m + 1)]) * smallest[f + r])
-                counted += not ratio > 1.0
-                product *= ratio
+                small |= not ratio > 1.0
+                product *= POOR * ratio
+        if not product > LESS:
+            counted += small
         lengths[k] = product**0.5 if product > 0.0 else 0.0
     return counted
 

@@ -83,8 +83,7 @@ def _singular(machine: Machine, t: float) -> str:
     """The joint whose rows (nearly) depend on those before, where the pose is (nearly) singular."""
     if machine.method == "unconstrained" or not machine.model.row_count:
         return ""
-    s = machine.system
-    row = np.flatnonzero(~(machine.pivots(t) > s.smallest[s.row]))
+    row = machine.poor_rows(t)
     if not len(row):
         return ""
     joint = machine.model.row_owner(int(row[0]))
