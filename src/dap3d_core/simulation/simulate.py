@@ -76,18 +76,17 @@ def simulate(
         t_end: final time, s; 0 solves once at t = 0.
         dt: reporting step, s; by default t_end / 100. t_end is reported in any case.
         method: "auto", "unconstrained", "standard", "penalty" or "lsq".
-        integrator: "dopri5", "dop853", "adams", "radau" (implicit), "rk4" (which needs ``step``) or
-            "auto": dop853, and radau from where the scene turns out stiff.
+        integrator: "dopri5", "dop853", "adams", "rk4" (needs ``step``), "radau" (implicit), "auto".
         rtol, atol: tolerances of the step's error.
         step: fixed step, s, without error control.
         correct, project: bring the start, and then every state, onto the constraints.
         progress: called as progress(t, t_end) between chunks of some 0.1 s.
         allow_code, announce: as ``compile`` has them.
-        output: result file to write. While a run of more than a second goes on its rows stand in
+        output: file to write. While a run of more than a second goes on its rows stand in
             ``NAME.part``, synced after every chunk: readable also when the run is killed.
         force: whether an existing output is overwritten.
         correct_metric: "unit" or "mass": the least correction in m and rad, or by masses.
-        estimate_error: estimate ``result.error`` by a second, finer run (second_run.py).
+        estimate_error: estimate ``result.error`` by a second, finer run.
         events: what to look out for (``Event``).
 
     Returns:
