@@ -20,6 +20,7 @@ import hard.long_time
 import kernels
 import numba
 import numpy
+import projection
 import right_hand_side
 import scale
 import two_threads
@@ -73,6 +74,7 @@ def main():
         "right_hand_side": lambda: right_hand_side.measure(arguments.against),
         "kernels": kernels.measure,
         "call": calls.call,
+        "projection": projection.measure,
         "dop853_on_a_chain": whole_runs.dop853_on_a_chain,
         "large": whole_runs.large,
         "start_up": whole_runs.start_up,

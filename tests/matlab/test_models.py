@@ -21,6 +21,8 @@ def plain_law_of_the_ball(text, stub):
         assert f"    {name}: float = number(default={number}" in text
     lines = text[text.index("        delta = r_i[2] - R") : text.index("    def energy")]
     law = lines.replace("- R", "- 0.1").replace("-k *", "-2000.0 *").replace("- c *", "- 5.0 *")
+    switch = text[text.index("    def switch(r_i, R):") : text.index("@hookimpl")]
+    law += switch.replace("r_i, R", "r_i").replace("- R", "- 0.1")
     start = stub.index("        raise NotImplementedError")
     return stub[:start] + law.rstrip() + "\n\n\n" + stub[stub.index("@hookimpl") :]
 

@@ -304,9 +304,8 @@ def land(
     """Prepare dense output, evaluate f, project the trial state; why that failed, or RUNNING.
 
     Dense output belongs to the step as the method took it; what it gives is projected by itself.
-    f is evaluated before the projection, which then has less to do. Where the error is controlled
-    the next step starts with that value: the projection moves the state by no more than the step's
-    error, and the derivative by as little.
+    f is evaluated before the projection, which then has less to do. Where that moves the state by
+    no more than the step's error may be, the next step starts with the value all the same.
     """
     real, integer, times, k = work.real, work.integer, work.times, work.k
     y, trial, result = work.state[Y], work.state[TRIAL], integer[STAGES]
@@ -335,10 +334,14 @@ def land(
         known = here = True
     if controlled and known:
         watch_stiffness(work, t1 - real[T])
+    taken = work.state[OTHER]
+    for i in range(trial.size):
+        taken[i] = trial[i]
     failure = project_state(real, integer, t1, trial, project, system, loops, here)
     if failure != RUNNING:
         return failure
-    known = known and (controlled or real[OUTCOME] == 0.0)
+    if known and real[OUTCOME] != 0.0:
+        known = controlled and is_within_error(work)
     if not known and (watched or t1 < times[-1]):
         integer[RHS] += 1
         rhs(t1, trial, k[result], system, loops)
@@ -349,6 +352,16 @@ def land(
         return ACROSS_A_SWITCH
     integer[FRESH] = 1 if known else 0
     return RUNNING
+
+
+@compiled_inside
+def is_within_error(work: Work) -> bool:
+    """Whether the trial state is as near to the other one as the error of a step may be."""
+    real, y, trial, other = work.real, work.state[Y], work.state[TRIAL], work.state[OTHER]
+    for i in range(other.size):
+        other[i] -= trial[i]
+    size = work.integer[ERROR_SIZE]
+    return scaled_largest(other, y, trial, size, real[RTOL], real[ATOL]) <= 1.0
 
 
 @compiled_inside
