@@ -15,8 +15,8 @@ from dap3d_core.report import Report, Run, Setting
 from dap3d_core.report.bench import Bench
 from dap3d_core.report.measures import final_position_error, first_parting, trajectory_error
 from dap3d_core.report.recommending import front, recommend
-from dap3d_core.report.rungs import ADAPTIVE, ladder, ladder_of_steps
-from dap3d_core.scene.settings import FIXED_STEP, MEASURED
+from dap3d_core.report.rungs import ADAPTIVE, MEASURED, ladder, ladder_of_steps
+from dap3d_core.scene.settings import FIXED_STEP
 
 REQUIRED = {"method", "integrator", "time_s", "error", "energy_error", "constraint_error",
             "steps", "rejected", "rhs", "projections"}  # fmt: skip
