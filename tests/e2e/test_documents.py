@@ -95,7 +95,7 @@ def test_the_page_on_events(tmp_path):
     for words in commands(text, "dap3d"):
         done = dap3d(words, tmp_path)
         assert done.returncode == 0, done.stderr
-        assert "force contact fell" in done.stdout
+        assert "force contact: its switch became negative" in done.stdout
         assert "and 19 more" in done.stdout
 
 

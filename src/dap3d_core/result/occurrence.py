@@ -42,7 +42,11 @@ class Occurrence:
             of = [f"{force}.{n} = {_short(x)}" for force, new in self.changes.items()
                   for n, x in new.items()]  # fmt: skip
             what = f": {', '.join(of)}" if of else ""
-        return f"t = {self.t:.9g} s: {self.name} {'rose' if self.direction > 0 else 'fell'}{what}"
+        if self.kind in ("switch", "end"):
+            way = f": its switch became {'positive' if self.direction > 0 else 'negative'}"
+        else:
+            way = f", {'rising' if self.direction > 0 else 'falling'}"
+        return f"t = {self.t:.9g} s: {self.name}{way}{what}"
 
 
 def _short(value: Any) -> str:
