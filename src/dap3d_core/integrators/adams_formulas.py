@@ -27,8 +27,9 @@ ROWS = HIGHEST + 3
 #: of the coming step in a row.
 ORDER_NOW, ORDER_LAST, EQUAL, STARTING, FAILURES, ADAMS_INTEGERS = range(INTEGERS, INTEGERS + 6)
 #: Rows of ``table``. x_n - x_(n-j) for j = 1, ...; the same of the coming step; beta, g, sigma of
-#: HNW (III.5.9, 5.10) and Shampine, Gordon; scratch; |gamma*_j|, error constants at equal steps.
-PSI, PSI_NEXT, BETA_ROW, G_ROW, SIGMA, LINE, CONSTANT, TABLE_ROWS = range(8)
+#: HNW (III.5.9, 5.10) and Shampine, Gordon; scratch; |gamma*_j|, error constants at equal steps;
+#: g of an interpolation. Its row is its own: among equal steps the next step uses g once more.
+PSI, PSI_NEXT, BETA_ROW, G_ROW, SIGMA, LINE, CONSTANT, WITHIN, TABLE_ROWS = range(9)
 #: Two steps are equal to this part: t + h - t is not quite h.
 EQUAL_TO = 1e-11
 
@@ -183,7 +184,7 @@ def interpolate(work: AdamsWork, back: float, out: Floats) -> None:
     Shampine, Gordon, chapter 5 (their code INTRP); the order is one more than that of the step.
     """
     table, differences, last = work.table, work.differences, work.integer[ORDER_LAST] + 1
-    line, g, psi, y = table[LINE], table[G_ROW], table[PSI], work.state[Y]
+    line, g, psi, y = table[LINE], table[WITHIN], table[PSI], work.state[Y]
     for q in range(last):
         line[q] = 1.0 / (q + 1.0)
     g[0], before = 1.0, 0.0

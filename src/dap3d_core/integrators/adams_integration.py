@@ -106,6 +106,10 @@ class AdamsIntegration(Integration):
     def _advance(self, budget: int) -> None:
         advance_adams(self._work, *self._arguments, budget)
 
+    def state_arrays(self) -> list[Any]:
+        """As ``Integration.state_arrays``; here the table holds where the past rates stand."""
+        return [*super().state_arrays(), self._work.table]
+
     @property
     def slope(self) -> Floats | None:
         """(n,) dy/dt at ``t``, a copy; None where it is not known."""

@@ -31,6 +31,13 @@ def combine(
 
 
 @compiled_inside
+def copy(out: Floats, x: Floats) -> None:
+    """``out = x``; they may be the same row."""
+    for i in range(out.size):
+        out[i] = x[i]
+
+
+@compiled_inside
 def all_finite(x: Floats) -> bool:
     """Whether no component is infinite or not a number."""
     bad = 0

@@ -22,7 +22,7 @@ Ordinary Differential Equations I (HNW), II.4 to II.6.
 from collections.abc import Sequence
 from typing import Any
 
-from dap3d_core.integrators.combination import all_finite, combine, scaled_largest
+from dap3d_core.integrators.combination import all_finite, combine, copy, scaled_largest
 from dap3d_core.integrators.control import (
     LARGEST,
     accept,
@@ -236,8 +236,7 @@ def on_constraints(
 ) -> None:
     """The state x of a stage, projected, into the scratch row (x may be that row)."""
     argument = work.state[SCRATCH]
-    for i in range(x.size):
-        argument[i] = x[i]
+    copy(argument, x)
     project_state(work.real, work.integer, t, argument, project, system, loops)
 
 
@@ -334,9 +333,7 @@ def land(
         known = here = True
     if controlled and known:
         watch_stiffness(work, t1 - real[T])
-    taken = work.state[OTHER]
-    for i in range(trial.size):
-        taken[i] = trial[i]
+    copy(work.state[OTHER], trial)
     failure = project_state(real, integer, t1, trial, project, system, loops, here)
     if failure != RUNNING:
         return failure
