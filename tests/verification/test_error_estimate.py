@@ -47,7 +47,7 @@ SETTINGS = {
     "rk4": dict(integrator="rk4", step=None),
 }
 #: Here the motion is so smooth that all runs agree to rounding.
-ROUNDED = ("pen2", "dop853 1e-8")
+ROUNDED = (("pen2", "dop853 1e-8"), ("fourbar2", "dop853 1e-8"))
 OTHER = {"dop853": "dopri5", "dopri5": "dop853", "rk4": "dopri5"}
 
 
@@ -78,9 +78,10 @@ def pairs():
 def test_the_true_error_is_within_ten_times_the_estimate(name, setting):
     """At 95 % of the instants or more, for every body's position, orientation and velocities.
 
-    And the estimate is no mere exaggeration: wherever the largest true error can be told from the
-    uncertainty of the reference, the largest estimate is no less than a third and no more than 30
-    times of it (past a kink of a driving function the finer run may be the worse one, tenfold).
+    The two references may each be off by as much as they differ. And the estimate is no mere
+    exaggeration: wherever the largest true error can be told from the uncertainty of the reference,
+    the largest estimate is no less than a third and no more than 30 times of it (past a kink of a
+    driving function the finer run may be the worse one, tenfold).
     """
     given = dict(SETTINGS[setting])
     if given.get("step", 0.0) is None:
@@ -91,12 +92,12 @@ def test_the_true_error_is_within_ten_times_the_estimate(name, setting):
     true = norms(difference(result.u, reference))
     told = 0
     for error, estimate, unknown in zip(true, norms(result.error.u), uncertain, strict=True):
-        within = error <= 10.0 * estimate + unknown
+        within = error <= 10.0 * estimate + 2.0 * unknown
         assert within.mean(axis=0).min() >= 0.95
         if error.max() > 10.0 * unknown.max():
             told += 1
             assert error.max() / 3.0 < estimate.max() < 30.0 * error.max()
-    assert told >= 1 or (name, setting) == ROUNDED
+    assert told >= 1 or (name, setting) in ROUNDED
 
 
 DIGITS = [
