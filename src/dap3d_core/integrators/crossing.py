@@ -1,7 +1,7 @@
 """Steps across singular states, where the constraints lose rank for a moment.
 
-``project`` tells lengths (one for each row of the constraints) that go linearly through zero at a
-singular state. A step across has to keep its stages away from it: rounding of positions changes
+``project`` tells lengths (one for each node of joints) that go linearly through zero at a singular
+state. A step across has to keep its stages away from it: rounding of positions changes
 the acceleration at distance d by rounding / d^3. So steps are cut such that the singular state
 falls into the middle of the widest gap between the abscissae of the stages, and stages nearby are
 evaluated on the constraints, where nothing but rounding is left of that error

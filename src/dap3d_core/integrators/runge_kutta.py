@@ -3,10 +3,11 @@
 It knows a vector y and first-class functions ``f(t, y, out, system, loops)``:
 
     rhs      out = dy/dt
-    project  moves y onto its constraints in place; out[0] = 1 where y changed by more than the
-             rounding of a normalisation (so that a stored dy/dt is stale), out[1] = 1 where that
-             failed, 2 where the state is too close to a singular one to go on from; out[4:] =
-             lengths that go linearly through zero at a singular state
+    project  moves y onto its constraints in place; on entry out[0] = 1 tells that rhs was the last
+             one called, at this very t and y. Then out[0] = 1 where y changed by more than the
+             rounding of a normalisation, out[1] = 1 where that failed, 2 where the state is too
+             close to a singular one to go on from; out[4:] = lengths that go linearly through zero
+             at a singular state
     report   out = what else is reported at (t, y): accelerations, multipliers, ...
     accepted (only where something is watched) takes note of an accepted state
     watch    (only where there are switches) gives their values (switches.py)
