@@ -86,7 +86,8 @@ class AdamsIntegration(Integration):
         integer = np.zeros(ADAMS_INTEGERS, dtype=np.int64)
         integer[at.ORDER], integer[at.ERROR_SIZE] = 2, error_size  # a first step of order 1
         integer[at.PROJECT_ON], integer[at.WATCHED] = project_on, watched
-        switches, crossings = switches_of(real, integer, ())
+        real[[at.LIMIT, at.CUT]] = np.inf
+        switches, crossings = switches_of(integer, ())
         state = np.zeros((at.STATES, y.size))
         state[at.Y] = y
         self._work = AdamsWork(

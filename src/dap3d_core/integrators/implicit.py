@@ -207,7 +207,8 @@ def _make_work(
     state[work.Y] = y
     real = np.zeros(work.LENGTHS + machine.length_count)
     integer = np.zeros(at.RADAU_INTEGERS, dtype=np.int64)
-    switches, crossings = switches_of(real, integer, ends)
+    real[[work.LIMIT, work.CUT]] = np.inf
+    switches, crossings = switches_of(integer, ends)
     return RadauWork(
         real=real,
         own=np.zeros(at.OWN),

@@ -115,7 +115,7 @@ class Integration:
         real[at.STEP], real[at.H] = step or 0.0, first_step or 0.0
         real[at.T] = instants[0]
         integer = counts.copy()
-        switches, crossings = switches_of(real, integer, ends)
+        switches, crossings = switches_of(integer, ends)
         integer[at.ERROR_SIZE] = error_size
         integer[at.PROJECT_ON], integer[at.WATCHED] = project_on, watched
         integer[at.LEAVE] = leave_stiff
@@ -273,13 +273,13 @@ class Integration:
         return Statistics(*(int(integer[i]) for i in names))
 
 
-def switches_of(real: Floats, integer: Any, ends: ArrayLike) -> tuple[Floats, Floats]:
+def switches_of(integer: Integers, ends: ArrayLike) -> tuple[Floats, Floats]:
     """Arrays of the switches (ends: as ``Integration`` has it), none looked at so far."""
     given = np.asarray(ends, dtype=np.float64)
-    real[[at.LIMIT, at.CUT]] = np.inf
     integer[at.SWITCHES] = given.size
     switches = np.zeros((at.SWITCH_ROWS, given.size))
-    switches[at.ENDS] = given
+    if given.size:
+        switches[at.ENDS] = given
     return switches, np.zeros((at.LOGGED if given.size else 0, 3))
 
 
@@ -290,7 +290,7 @@ def _facts(method: Method) -> tuple[Floats, Integers]:
     real[at.EXPONENT], real[at.BETA] = method.exponent, method.beta
     real[at.FACTOR_MIN], real[at.FACTOR_MAX] = method.factor_min, method.factor_max
     real[at.ERROR_OLD], real[at.CALM], real[at.SAFETY] = 1e-4, method.calm, method.safety
-    real[at.STIFF_AT] = np.inf
+    real[[at.LIMIT, at.CUT, at.STIFF_AT]] = np.inf
     integer = np.zeros(at.INTEGERS, dtype=np.int64)
     integer[at.STAGES], integer[at.ORDER] = method.stages, method.order
     integer[at.ERRORS], integer[at.DENSE] = len(method.e), method.dense
