@@ -7,6 +7,7 @@ from typing import Any
 
 from dap3d_core.cli import exits
 from dap3d_core.cli.rendering import Terminal, messages, plain, print_json, say
+from dap3d_core.cli.streams import leave_stderr
 
 
 def report(error: BaseException, *, debug: bool, as_json: bool) -> int:
@@ -23,7 +24,7 @@ def report(error: BaseException, *, debug: bool, as_json: bool) -> int:
         found: dict[str, Any] = {"error": words, "exit_code": code}
         with contextlib.suppress(OSError):
             print_json({"mistakes": mistakes, **found} if mistakes else found)
-    with contextlib.suppress(OSError):  # stderr is closed or full: the exit code remains
+    try:
         console = messages()
         if mistakes:
             _tell_mistakes(console, error)
@@ -31,6 +32,8 @@ def report(error: BaseException, *, debug: bool, as_json: bool) -> int:
             say(console, words, "bold red")
         if code == exits.FAILED and not debug and _is_unexpected(error):
             say(console, "run the command again with --debug to see where it happened")
+    except OSError:  # stderr is closed or full: the exit code remains
+        leave_stderr()
     return code
 
 

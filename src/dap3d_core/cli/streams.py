@@ -3,6 +3,7 @@
 import contextlib
 import os
 import sys
+from typing import TextIO
 
 
 def prepare_streams() -> None:
@@ -17,7 +18,16 @@ def prepare_streams() -> None:
 
 def leave_stdout() -> None:
     """Send what is still to come on stdout nowhere, after its reader has gone."""
+    _leave(sys.stdout)
+
+
+def leave_stderr() -> None:
+    """The same for stderr that takes nothing: Python would exit with 120 for what is left in it."""
+    _leave(sys.stderr)
+
+
+def _leave(stream: TextIO) -> None:
     with contextlib.suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
+        os.dup2(nowhere, stream.fileno())
         os.close(nowhere)
