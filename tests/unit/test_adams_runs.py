@@ -5,6 +5,7 @@ import pytest
 from support import problems
 
 import dap3d_core as dap
+from dap3d_core.kernels.cache import jit_is_on
 
 
 def test_a_chain_moves_as_with_another_method():
@@ -40,6 +41,7 @@ def _precession(theta, spin, A=0.02, C=0.005, moment=0.1 * 9.81):
     return (b - np.sqrt(b * b - 4 * a * moment)) / (2 * a)
 
 
+@pytest.mark.skipif(not jit_is_on(), reason="a minute in plain Python")
 def test_errors_follow_the_tolerances():
     """Andrews' mechanism with 100 reports, beside dop853 at 1e-12: no setting errs out of its turn.
 
