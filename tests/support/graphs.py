@@ -228,3 +228,22 @@ def full_case(name, seed=0):
         if case.is_full:
             return case
     raise AssertionError(f"{name}: no case with independent rows")
+
+
+def check_solution(case):
+    """The program solves [I D^T; D 0] (a; -lambda) = (g; gamma) as LU with pivoting does.
+
+    It works on D D^T, whose condition is that of D squared: the relative error is some rounding
+    times that. 1e3 is for growth along the elimination; 3 was the worst of 3000 random graphs.
+    """
+    rng = np.random.default_rng(1)
+    m, columns = case.dense.shape
+    g, gamma = rng.normal(size=columns), rng.normal(size=m)
+    K, counted = case.factors()
+    assert counted == 0
+    a, multipliers = case.solution(K, g, gamma)
+    matrix = np.block([[np.eye(columns), case.dense.T], [case.dense, np.zeros((m, m))]])
+    wanted = np.linalg.solve(matrix, np.concatenate([g, gamma]))
+    condition = np.linalg.cond(case.dense) if m else 1.0
+    error = np.max(np.abs(np.concatenate([a, -multipliers]) - wanted))
+    assert error <= 1e3 * np.finfo(float).eps * condition**2 * np.max(np.abs(wanted))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.graphs import GRAPHS, RANDOM, full_case, product_from_python
+from support.graphs import GRAPHS, RANDOM, check_solution, full_case, product_from_python
 
 from dap3d_core.linear.saddle import scale_blocks
 
@@ -12,23 +12,7 @@ all_graphs = pytest.mark.parametrize("name", [*GRAPHS, *RANDOM])
 
 @all_graphs
 def test_solution_is_that_of_the_dense_saddle_point_matrix(name):
-    """The program solves [I D^T; D 0] (a; -lambda) = (g; gamma) as LU with pivoting does.
-
-    It works on D D^T, whose condition is that of D squared: the relative error is some rounding
-    times that. 1e3 is for growth along the elimination; 3 was the worst of 3000 random graphs.
-    """
-    case = full_case(name)
-    rng = np.random.default_rng(1)
-    m, columns = case.dense.shape
-    g, gamma = rng.normal(size=columns), rng.normal(size=m)
-    K, counted = case.factors()
-    assert counted == 0
-    a, multipliers = case.solution(K, g, gamma)
-    matrix = np.block([[np.eye(columns), case.dense.T], [case.dense, np.zeros((m, m))]])
-    wanted = np.linalg.solve(matrix, np.concatenate([g, gamma]))
-    condition = np.linalg.cond(case.dense) if m else 1.0
-    error = np.max(np.abs(np.concatenate([a, -multipliers]) - wanted))
-    assert error <= 1e3 * EPS * condition**2 * np.max(np.abs(wanted))
+    check_solution(full_case(name))
 
 
 @all_graphs

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.graphs import GRAPHS, RANDOM, Case, chain, star
+from support.graphs import GRAPHS, RANDOM, Case, chain, check_solution, star
 from support.nets import fourbars, ladder, plate_net, rod_net
 
 import dap3d_core as dap
@@ -99,21 +99,6 @@ def test_trees_are_not_dissected(graph, monkeypatch):
 
 
 # ------------------------------------------------------------------ panels
-
-
-def check_solution(case):
-    """The program's solution is that of the dense matrix; tolerance as in test_linear.py."""
-    rng = np.random.default_rng(1)
-    m, columns = case.dense.shape
-    g, gamma = rng.normal(size=columns), rng.normal(size=m)
-    K, counted = case.factors()
-    assert counted == 0
-    a, multipliers = case.solution(K, g, gamma)
-    matrix = np.block([[np.eye(columns), case.dense.T], [case.dense, np.zeros((m, m))]])
-    wanted = np.linalg.solve(matrix, np.concatenate([g, gamma]))
-    condition = np.linalg.cond(case.dense) if m else 1.0
-    error = np.max(np.abs(np.concatenate([a, -multipliers]) - wanted))
-    assert error <= 1e3 * EPS * condition**2 * np.max(np.abs(wanted))
 
 
 @pytest.fixture(params=[0.3, 0.9])

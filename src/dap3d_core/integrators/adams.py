@@ -37,10 +37,9 @@ from dap3d_core.integrators.adams_formulas import (
 from dap3d_core.integrators.combination import all_finite, scaled_largest
 from dap3d_core.integrators.control import LARGEST, STRETCH, first_step, step_floor
 from dap3d_core.integrators.method import Floats
-from dap3d_core.integrators.reporting import project_state, report_end, report_reached
+from dap3d_core.integrators.reporting import may_step, project_state
 from dap3d_core.integrators.work import (
     ATOL,
-    ENDING,
     ERROR_SIZE,
     FRESH,
     LIMIT,
@@ -77,22 +76,13 @@ def advance_adams(
 ) -> None:
     """Go on as ``runge_kutta.advance`` does; functions and budget as there."""
     rhs, project, report = functions[0], functions[1], functions[2]
-    real, integer, times = work.real, work.integer, work.times
+    real, integer = work.real, work.integer
     limit = integer[RHS] + budget
-    while integer[STATUS] == RUNNING:
-        if times[integer[NEXT]] <= real[T]:
-            if not report_reached(work, state_at, project, report, system, loops):
-                return
-        elif integer[ENDING] != 0:
-            if not report_end(work, report, system, loops):
-                return
-        elif integer[RHS] > limit or real[T] >= real[LIMIT]:
-            return
-        else:
-            steps = integer[STEPS]
-            step(work, rhs, project, system, loops)
-            if integer[WATCHED] != 0 and integer[STEPS] > steps:
-                functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
+    while may_step(work, state_at, limit, project, report, system, loops):
+        steps = integer[STEPS]
+        step(work, rhs, project, system, loops)
+        if integer[WATCHED] != 0 and integer[STEPS] > steps:
+            functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
 
 
 @compiled_inside

@@ -19,6 +19,7 @@ from dap3d_core.integrators.integration import (
     SMALLEST_ATOL,
     Integration,
     check_control,
+    check_sizes,
     check_state_and_times,
     switches_of,
 )
@@ -76,10 +77,7 @@ class AdamsIntegration(Integration):
         check_state_and_times(y, instants)
         check_control(cast(Any, self), rtol, atol, instants, step=None, first_step=first_step)
         error_size = y.size if error_size is None else error_size
-        if not 0 <= error_size <= y.size:
-            raise ValueError(f"error_size is {error_size}, but y has {y.size} components")
-        if buffer_rows < 1:
-            raise ValueError(f"buffer_rows is {buffer_rows}; at least one row must fit")
+        check_sizes(error_size, y.size, buffer_rows)
         real = np.zeros(at.LENGTHS + length_count)
         real[at.RTOL], real[at.ATOL] = rtol, max(atol, SMALLEST_ATOL)
         real[at.H], real[at.T] = first_step or 0.0, instants[0]

@@ -15,6 +15,7 @@ from dap3d_core.integrators import work
 from dap3d_core.integrators.integration import (
     Integration,
     check_control,
+    check_sizes,
     check_state_and_times,
     switches_of,
 )
@@ -22,8 +23,6 @@ from dap3d_core.integrators.radau import advance
 from dap3d_core.integrators.radau_method import ORDER, radau_method
 from dap3d_core.integrators.radau_parts import radau_parts
 from dap3d_core.integrators.radau_work import RadauWork
-from dap3d_core.integrators.work import Status
-from dap3d_core.kernels.cache import jit_is_on
 from dap3d_core.linear.lu_plan import LuPlan, make_lu_plan
 
 
@@ -111,10 +110,7 @@ class RadauIntegration(Integration):
         check_state_and_times(y, instants)
         check_control(cast(Any, self), rtol, atol, instants, step=step, first_step=first_step)
         error_size = y.size - 1 if error_size is None else error_size
-        if not 0 <= error_size < y.size:
-            raise ValueError(f"error_size is {error_size}, but y has {y.size} components")
-        if buffer_rows < 1:
-            raise ValueError(f"buffer_rows is {buffer_rows}; at least one row must fit")
+        check_sizes(error_size, y.size - 1, buffer_rows)
         tangent = make_tangent(machine)
         matrix, lu = make_matrix(machine, tangent)
         self.machine, self.lu_plan, self.tangent, self.matrix = machine, lu, tangent, matrix
@@ -140,32 +136,6 @@ class RadauIntegration(Integration):
             self._work, machine.functions, self._parts, machine.system, machine.loops,
             self.tangent, self.matrix, budget,
         )  # fmt: skip
-
-    def compile(self) -> None:
-        """Compile what ``advance`` needs, or load it, without doing a step."""
-        status = int(self.work.integer[work.STATUS])
-        self.work.integer[work.STATUS] = Status.FINISHED
-        self._advance(0)
-        self.work.integer[work.STATUS] = status
-
-    def advance(self, budget: int) -> Status:
-        """Go on until more than ``budget`` stages are evaluated, the buffer is full, or the end.
-
-        How a run is cut into chunks changes no bit of its result. Take the ``rows`` after each.
-
-        Raises
-        ------
-        RuntimeError
-            If the buffer is full on entry, so that nothing can be done.
-        """
-        if self.rows_are_full and self.status is Status.RUNNING:
-            raise RuntimeError("the row buffer is full: take rows() before advancing")
-        if jit_is_on():
-            self._advance(budget)
-        else:
-            with np.errstate(all="ignore"):  # as in compiled code, which tests what matters
-                self._advance(budget)
-        return self.status
 
     def state_arrays(self) -> list[Any]:
         """As ``Integration.state_arrays``."""

@@ -106,7 +106,7 @@ class Integration:
         check_state_and_times(y, instants)
         check_control(method, rtol, atol, instants, step=step, first_step=first_step)
         error_size = y.size if error_size is None else error_size
-        _check_sizes(error_size, y.size, buffer_rows)
+        check_sizes(error_size, y.size, buffer_rows)
 
         of_method, counts = _facts(method)
         real = np.zeros(at.LENGTHS + length_count)
@@ -309,7 +309,8 @@ def check_state_and_times(y: Floats, times: Floats) -> None:
         raise ValueError("reporting times must increase")
 
 
-def _check_sizes(error_size: int, size: int, buffer_rows: int) -> None:
+def check_sizes(error_size: int, size: int, buffer_rows: int) -> None:
+    """ValueError for more components that steer the step than there are, or no room for a row."""
     if not 0 <= error_size <= size:
         raise ValueError(f"error_size is {error_size}, but y has {size} components")
     if buffer_rows < 1:

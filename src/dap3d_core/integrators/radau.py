@@ -40,7 +40,7 @@ from dap3d_core.integrators.radau_work import (
     TRIAL_SLOPE,
     RadauWork,
 )
-from dap3d_core.integrators.reporting import dense_state, project_state, report_end, report_reached
+from dap3d_core.integrators.reporting import dense_state, may_step, project_state
 from dap3d_core.integrators.runge_kutta import (
     ACROSS_A_SWITCH,
     ELSEWHERE,
@@ -50,7 +50,6 @@ from dap3d_core.integrators.runge_kutta import (
 from dap3d_core.integrators.switches import end_is_across, next_length, sample, settle
 from dap3d_core.integrators.work import (
     DENSE,
-    ENDING,
     FRESH,
     GAP_STEP,
     LAST_REJECTED,
@@ -104,26 +103,17 @@ def advance(
 ) -> None:
     """Go on until more than ``budget`` stages are evaluated, the rows are full, or the run ends."""
     rhs, project, report = functions[0], functions[1], functions[2]
-    real, integer, times = work.real, work.integer, work.times
+    real, integer = work.real, work.integer
     watch = functions[4] if integer[SWITCHES] != 0 else rhs
     limit = integer[RHS] + budget
-    while integer[STATUS] == RUNNING:
-        if times[integer[NEXT]] <= real[T]:
-            if not report_reached(work, dense_state, project, report, system, loops):
-                return
-        elif integer[ENDING] != 0:
-            if not report_end(work, report, system, loops):
-                return
-        elif integer[RHS] > limit or real[T] >= real[LIMIT]:
-            return
+    while may_step(work, dense_state, limit, project, report, system, loops):
+        steps = integer[STEPS]
+        if integer[FRESH] == 0:
+            start(work, rhs, project, system, loops)
         else:
-            steps = integer[STEPS]
-            if integer[FRESH] == 0:
-                start(work, rhs, project, system, loops)
-            else:
-                step(work, parts, project, watch, system, loops, tangent, matrix)
-            if integer[WATCHED] != 0 and integer[STEPS] > steps:
-                functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
+            step(work, parts, project, watch, system, loops, tangent, matrix)
+        if integer[WATCHED] != 0 and integer[STEPS] > steps:
+            functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
 
 
 @compiled_inside

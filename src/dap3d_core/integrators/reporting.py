@@ -12,6 +12,8 @@ from dap3d_core.integrators.work import (
     ENDING,
     FINISHED,
     H_DENSE,
+    LEAVE,
+    LIMIT,
     NEXT,
     NOT_FINITE,
     OUTCOME,
@@ -19,9 +21,12 @@ from dap3d_core.integrators.work import (
     PROJECTION_FAILED,
     PROJECTIONS,
     REPORTS,
+    RHS,
     ROW,
     RUNNING,
     STATUS,
+    STIFF,
+    STIFF_AT,
     T_DENSE,
     T_STOP,
     TRIAL,
@@ -69,6 +74,36 @@ def project_state(
 def dense_state(work: Work, t: float, y: Floats) -> None:
     """The state at an instant of the last step, by the terms of its dense output."""
     interpolate(y, work.terms, (t - work.real[T_DENSE]) / work.real[H_DENSE])
+
+
+@compiled_into
+def may_step(
+    work: Any,
+    state_at: Callable[[Any, float, Floats], None],
+    limit: int,
+    project: Function,
+    report: Function,
+    system: Any,
+    loops: Any,
+) -> bool:
+    """Report what is reached and end what is over; whether a step is to be tried now.
+
+    state_at: as for ``report_reached``. limit: right-hand sides after which this call of the
+    integration is left.
+    """
+    real, integer, times = work.real, work.integer, work.times
+    while integer[STATUS] == RUNNING:
+        if times[integer[NEXT]] <= real[T]:
+            if not report_reached(work, state_at, project, report, system, loops):
+                return False
+        elif integer[ENDING] != 0:
+            if not report_end(work, report, system, loops):
+                return False
+        elif integer[LEAVE] != 0 and real[STIFF_AT] < real[T]:
+            integer[STATUS] = STIFF
+        else:
+            return integer[RHS] <= limit and real[T] < real[LIMIT]
+    return False
 
 
 @compiled_into

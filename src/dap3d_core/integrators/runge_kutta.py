@@ -38,9 +38,8 @@ from dap3d_core.integrators.method import ABSCISSA, Floats, Integers
 from dap3d_core.integrators.reporting import (
     POOR_PLACE,
     dense_state,
+    may_step,
     project_state,
-    report_end,
-    report_reached,
 )
 from dap3d_core.integrators.stiffness import watch_stiffness
 from dap3d_core.integrators.switches import end_is_across, next_length, sample, settle
@@ -49,7 +48,6 @@ from dap3d_core.integrators.work import (
     ATOL,
     CALM,
     DENSE,
-    ENDING,
     ERROR_SIZE,
     ERROR_USES_RESULT,
     ERRORS,
@@ -57,7 +55,6 @@ from dap3d_core.integrators.work import (
     FACTOR_MIN,
     FRESH,
     H_DENSE,
-    LEAVE,
     LENGTHS,
     LIMIT,
     NEXT,
@@ -76,8 +73,6 @@ from dap3d_core.integrators.work import (
     STEP,
     STEP_FLOOR,
     STEPS,
-    STIFF,
-    STIFF_AT,
     SWITCHES,
     T_DENSE,
     T_STOP,
@@ -113,25 +108,14 @@ def advance(
     At least one step is tried in each call, whatever the budget.
     """
     rhs, project, report = functions[0], functions[1], functions[2]
-    real, integer, times = work.real, work.integer, work.times
+    real, integer = work.real, work.integer
     watch = functions[4] if integer[SWITCHES] != 0 else rhs
     limit = integer[RHS] + budget
-    while integer[STATUS] == RUNNING:
-        if times[integer[NEXT]] <= real[T]:
-            if not report_reached(work, dense_state, project, report, system, loops):
-                return
-        elif integer[ENDING] != 0:
-            if not report_end(work, report, system, loops):
-                return
-        elif integer[LEAVE] != 0 and real[STIFF_AT] < real[T]:
-            integer[STATUS] = STIFF
-        elif integer[RHS] > limit or real[T] >= real[LIMIT]:
-            return
-        else:
-            steps = integer[STEPS]
-            step(work, rhs, project, watch, system, loops)
-            if integer[WATCHED] != 0 and integer[STEPS] > steps:
-                functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
+    while may_step(work, dense_state, limit, project, report, system, loops):
+        steps = integer[STEPS]
+        step(work, rhs, project, watch, system, loops)
+        if integer[WATCHED] != 0 and integer[STEPS] > steps:
+            functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
 
 
 @compiled_inside
