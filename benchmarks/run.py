@@ -15,6 +15,7 @@ from pathlib import Path
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 
 import calls
+import derived
 import hard
 import hard.long_time
 import kernels
@@ -73,6 +74,7 @@ def main():
     benchmarks = {
         "right_hand_side": lambda: right_hand_side.measure(arguments.against),
         "kernels": kernels.measure,
+        "derived": derived.measure,
         "call": calls.call,
         "projection": projection.measure,
         "dop853_on_a_chain": whole_runs.dop853_on_a_chain,

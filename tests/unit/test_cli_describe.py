@@ -90,3 +90,13 @@ def test_words_and_functions_are_told():
     assert "false, true" in text
     assert "of theta - theta_0" in text
     assert "the bodies of its joint" in described("friction")
+
+
+def test_the_kernels_of_a_type_can_be_read():
+    """As they are written, those of variants, too; in JSON by name."""
+    text = described("disk", "--source")
+    assert "gamma of NoLateralSlip, as written" in text
+    assert "def C(r_i, A_i, radius):\n    return r_i[2] - radius * axis(A_i)[1]" in text
+    (facts,) = json.loads(described("sph", "--json"))["types"]
+    assert facts["derived"] == []
+    assert facts["source"]["C"] == "def C(r_P_i, r_P_j):\n    return sub(r_P_j, r_P_i)"

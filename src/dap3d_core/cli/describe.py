@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 @click.command(cls=Command, short_help="Explain a type: equations, fields, an example.")
 @click.argument("keyword")
 @click.option("--names", is_flag=True, help="Also list the names that its kernels may use.")
+@click.option("--source", is_flag=True, help="Also show its kernels, written or derived.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
-def describe(keyword: str, *, names: bool, as_json: bool) -> int:
+def describe(keyword: str, *, names: bool, source: bool, as_json: bool) -> int:
     """Explain the type with a KEYWORD: equations, fields, units, defaults, an example.
 
     A keyword may belong to a joint, a force and a function; all of them are shown.
@@ -35,6 +36,8 @@ def describe(keyword: str, *, names: bool, as_json: bool) -> int:
         if k:
             console.print()
         _show(console, facts, names=names)
+        if source:
+            _show_source(console, facts)
     return DONE
 
 
@@ -79,7 +82,9 @@ def type_facts(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
         "file": where_is(type_).removesuffix(f": {type_.__name__}"),
         "doc": inspect.cleandoc(type_.__doc__ or ""),
         "bodies": list(slots),
-        "kernels": list(type_.kernels()),
+        "kernels": _kernels(examined),
+        "derived": list(examined.derived),
+        "source": _sources(examined),
         "fields": [_field(name, spec) for name, spec in specs_of(type_).items() if spec.given],
         "names": [
             {
@@ -98,6 +103,25 @@ def type_facts(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
     if kind == "force":
         facts["each_body"] = bool(type_.each_body)
     return facts
+
+
+def _kernels(examined: "Examined") -> list[str]:
+    return [n for n in examined.type.kernel_names if n in examined.kernels]
+
+
+def _sources(examined: "Examined") -> dict[str, str]:
+    """The text of each kernel, as its author wrote it or as it was derived."""
+    import inspect
+    import textwrap
+
+    found = {}
+    for name in _kernels(examined):
+        try:
+            text = inspect.getsource(examined.kernels[name])
+        except (OSError, TypeError):  # typed at a prompt
+            text = "# its source cannot be read"
+        found[name] = textwrap.dedent(text).rstrip()
+    return found
 
 
 def _counts(examined: "Examined") -> dict[str, Any]:
@@ -119,7 +143,9 @@ def _variant(conditions: Mapping[str, Any], examined: "Examined") -> dict[str, A
         "with": dict(conditions),
         "class": type_.__name__,
         "doc": inspect.cleandoc(type_.__doc__ or ""),
-        "kernels": list(type_.kernels()),
+        "kernels": _kernels(examined),
+        "derived": list(examined.derived),
+        "source": _sources(examined),
     }
     return facts | _counts(examined) if type_.kind == "joint" else facts
 
@@ -180,6 +206,17 @@ def _show(console: Any, found: dict[str, Any], *, names: bool) -> None:
         show(console, table(("name", "shape", "level", "meaning"), offered, fixed=(0, 1, 2)))
     title(console, "example")
     say(console, found["example"].rstrip(), indent=2)
+
+
+def _show_source(console: Any, found: dict[str, Any]) -> None:
+    """The kernels of a type and of its variants, to be read and copied: nothing is folded."""
+    from dap3d_core.cli.rendering import title
+
+    for facts in (found, *found["variants"]):
+        for name, text in facts["source"].items():
+            how = "derived" if name in facts["derived"] else "as written"
+            title(console, f"{name} of {facts['class']}, {how}")
+            console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def _acts_on(found: dict[str, Any]) -> str:

@@ -15,6 +15,7 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.interface.derivation import CannotDeriveError, derive, missing
 from dap3d_core.interface.fields import slot_of, specs_of
 from dap3d_core.interface.layout import Layout, body_slots, layout_of, size
 from dap3d_core.interface.namespace import (
@@ -52,6 +53,7 @@ class Examined:
         argument_functions: its function fields of another argument than time.
         acts_through_joint: whether it is a force that switches on the friction of a joint.
         given: what completes it, for titles: the types of its functions of an argument.
+        derived: which of its kernels were derived from others.
     """
 
     type: type[TypeBase]
@@ -63,6 +65,7 @@ class Examined:
     argument_functions: tuple[str, ...] = ()
     acts_through_joint: bool = False
     given: str = ""
+    derived: tuple[str, ...] = ()
 
     def chosen(self, values: Mapping[str, Any]) -> "Examined":
         """The variant for the values of an instance's fields; itself where none fits."""
@@ -104,18 +107,34 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
     names = namespace(type_, layout)
-    outputs = {}
-    for kernel_name, kernel in type_.kernels().items():
-        asked, offered = parameters(kernel), names
+    kernels, outputs = type_.kernels(), {}
+
+    def try_out(kernel_name: str) -> None:
+        kernel, offered = kernels[kernel_name], names
         if kernel_name == "friction" and issubclass(type_, Joint):
             offered = friction_names(type_.rows) | names
-        _check_names(type_, kernel_name, asked, offered)
-        quantities = [offered[n] for n in asked]
+        _check_names(type_, kernel_name, parameters(kernel), offered)
+        quantities = [offered[n] for n in parameters(kernel)]
         outputs[kernel_name] = _output(type_, kernel_name, kernel, quantities, rng)
+
+    for kernel_name in kernels:
+        try_out(kernel_name)
+    lacking = missing(type_, outputs.get("value") == ("out",))
+    if lacking:
+        try:
+            kernels |= derive(type_, layout, names, lacking)
+        except CannotDeriveError as error:
+            raise PluginError(f"{where_is(type_)}: {error}") from error
+        for kernel_name in lacking:
+            if kernel_name in kernels:  # nu is left out where it is zero
+                try_out(kernel_name)
     specs = specs_of(type_).items()
     functions = tuple(n for n, s in specs if s.kind == "function" and s.argument)
+    derived = tuple(n for n in lacking if n in kernels)
     by_joint = _has_joint(type_)
-    return Examined(type_, layout, names, outputs, type_.kernels(), variants, functions, by_joint)
+    return Examined(
+        type_, layout, names, outputs, kernels, variants, functions, by_joint, derived=derived
+    )
 
 
 def _output(
@@ -248,6 +267,9 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
         example = f'keyword = "{type_.__name__.lower()}"'
         raise PluginError(f"{who} has no keyword; add e.g. {example}")
     needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[kind]
+    derivable = missing(type_)
+    if derivable:
+        needed = []
     by_joint = _has_joint(type_)
     if (is_abstract and not type_.kernels()) or by_joint:
         needed = []
@@ -257,7 +279,9 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
             raise PluginError(f"{who} declares rows = {rows!r}; a joint has one row or more")
         if not isinstance(mask, bool) and len(mask) != rows:
             raise PluginError(f"{who}.holonomic needs one truth value for each of its {rows} rows")
-        needed += ["C"] if type_.position_rows() else []
+        if derivable and len(type_.position_rows()) < rows:
+            needed = ["C_dot"]
+        needed = [*(["C"] if type_.position_rows() else []), *needed]
     if kind != "function" and not by_joint and not body_slots(type_):
         raise PluginError(f"{who} acts on no body; declare a field such as P_i: Point = point()")
     if sum(spec.kind == "vector2" for spec in specs_of(type_).values()) > 1:
@@ -307,14 +331,16 @@ def _expected(type_: type[TypeBase], kernel: str, value: Any) -> tuple[tuple[int
         shape = (len(value),) if isinstance(value, tuple) and value else ()
         return shape, "one number, or a tuple of numbers"
     if issubclass(type_, Joint) and kernel != "friction":
-        if kernel == "C":
-            n = len(type_.position_rows())
-            return (n,), f"{n} numbers, one for each row of the position level"
+        if kernel in ("C", "C_dot"):
+            n, level = len(type_.position_rows()), "position"
+            if kernel == "C_dot":
+                n, level = type_.rows - n, "velocity"
+            return (n,), f"{n} numbers, one for each row of the {level} level"
         if kernel == "J":
             return (slots, type_.rows, 6), f"a block of {type_.rows} x 6 for each of {slots} bodies"
         return (type_.rows,), f"{type_.rows} numbers, one for each row"
     if issubclass(type_, Function):
-        return (4,), "(f, f', f'', f''')"
+        return (4,) if isinstance(value, (tuple, list)) else (), "(f, f', f'', f''')"
     if kernel in ("wrench", "friction"):
         return (slots, 2, 3), f"(force, moment) for each of {slots} bodies"
     return (), "one number"

@@ -31,7 +31,7 @@ from dap3d_core.interface.layout import Layout, size
 from dap3d_core.interface.types import TypeBase
 
 #: Kernels that may name quantities of the velocity level; all others see positions and time only.
-VELOCITY_KERNELS = ("gamma", "wrench", "friction", "switch")
+VELOCITY_KERNELS = ("C_dot", "gamma", "wrench", "friction", "switch")
 #: What a force ``friction`` hands to the kernel ``friction`` of its joint.
 FRICTION_NUMBERS = ("mu", "v_tol", "radius")
 #: Suffixes of a function's value and derivatives.
@@ -51,6 +51,10 @@ class Quantity:
         doc: what it is, for ``describe``.
         columns: of a table; 0 for all else.
         derivative: of a function to be called, which derivative; -1 for all else.
+        rate: its rate of change as an expression over ``needs`` and the velocities ``V_i``, ``W_i``
+            of the bodies: what is derived is derived from it. "" for a constant.
+        rate_name: the name that holds its rate; "" where there is none.
+        derivable: whether formulas that use it can be derived.
     """
 
     name: str
@@ -61,6 +65,9 @@ class Quantity:
     doc: str = ""
     columns: int = 0
     derivative: int = -1
+    rate: str = ""
+    rate_name: str = ""
+    derivable: bool = True
 
 
 def namespace(type_: type[TypeBase], layout: Layout) -> dict[str, Quantity]:
@@ -74,12 +81,11 @@ def namespace(type_: type[TypeBase], layout: Layout) -> dict[str, Quantity]:
         needs: Iterable[str] = (),
         velocity: bool = False,
         doc: str = "",
-        columns: int = 0,
-        derivative: int = -1,
+        **more: Any,
     ) -> None:
-        names[name] = Quantity(name, shape, velocity, code, tuple(needs), doc, columns, derivative)
+        names[name] = Quantity(name, shape, velocity, code, tuple(needs), doc, **more)
 
-    offer("t", (), "t", doc="time, s")
+    offer("t", (), "t", doc="time, s", rate="1.0")
     if type_.kind == "function":
         offer("x", (), "t", doc="the argument of the function")
     for s in layout.slots:
@@ -105,9 +111,13 @@ def friction_names(rows: int) -> dict[str, Quantity]:
 
 def _offer_body(offer: Callable[..., None], s: str) -> None:
     b = f"b_{s}"
-    offer(f"r_{s}", (3,), f"vector_at(body, {b}, R)", doc=f"position of body {s}, m")
-    offer(f"A_{s}", (3, 3), f"matrix_at(body, {b}, A)", doc=f"rotation matrix of body {s}")
-    offer(f"p_{s}", (4,), _tuple(f"body[{b}, P + {{}}]", 4), doc=f"Euler parameters of body {s}")
+    place, turn = f"position of body {s}, m", f"rotation matrix of body {s}"
+    moves = {"rate": f"V_{s}", "rate_name": f"v_{s}"}
+    offer(f"r_{s}", (3,), f"vector_at(body, {b}, R)", doc=place, **moves)
+    turned = f"turned(W_{s}, x_A_{s})"
+    offer(f"A_{s}", (3, 3), f"matrix_at(body, {b}, A)", doc=turn, rate=turned)
+    parameters, rate = _tuple(f"body[{b}, P + {{}}]", 4), f"euler_rate(W_{s}, x_p_{s})"
+    offer(f"p_{s}", (4,), parameters, doc=f"Euler parameters of body {s}", rate=rate)
     speed = f"velocity of body {s}, m/s"
     offer(f"v_{s}", (3,), f"vector_at(body, {b}, V)", velocity=True, doc=speed)
     spin = f"angular velocity of body {s}, global, rad/s"
@@ -128,7 +138,9 @@ def _offer_field(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
         for end, slot in (("P_i", "i"), ("P_j", "j")):
             _offer_point(offer, end, slot, layout)
         between, rate = "vector from P_i to P_j, m", f"rate of {name}, m/s"
-        offer(name, (3,), "sub(x_r_P_j, x_r_P_i)", ("r_P_i", "r_P_j"), doc=between)
+        grows = "sub(add(V_j, cross(W_j, x_s_P_j)), add(V_i, cross(W_i, x_s_P_i)))"
+        rates = {"rate": grows, "rate_name": f"{name}_dot"}
+        offer(name, (3,), "sub(x_r_P_j, x_r_P_i)", ("r_P_i", "r_P_j"), doc=between, **rates)
         offer(f"{name}_dot", (3,), "sub(x_v_P_j, x_v_P_i)", ("v_P_i", "v_P_j"), True, rate)
     elif spec.kind in ("number", "vec3", "matrix"):
         doc = f"{spec.doc or name}{f', {spec.unit}' if spec.unit else ''}"
@@ -139,7 +151,8 @@ def _offer_field(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
         offset, columns = layout.tables[name]
         sample = f"({'0.0, ' * columns})"
         code = f"(par, par[p1 + {offset}], par[p1 + {offset + 1}], {sample})"
-        offer(name, (4,), code, doc=f"{spec.doc or name}, by lookup", columns=columns)
+        doc = f"{spec.doc or name}, by lookup"
+        offer(name, (4,), code, doc=doc, columns=columns, derivable=False)
     elif spec.kind == "angle":
         _offer_angle(offer, name, spec, layout)
 
@@ -153,7 +166,10 @@ def _offer_function(offer: Callable[..., None], name: str, spec: FieldSpec, layo
         return
     at = f"idx[b0 + {len(layout.slots) + layout.functions.index(name)}]"
     for order, suffix in enumerate(DERIVATIVES):
-        offer(f"{f}{suffix}", (), f"F[{at}, {order}]", doc=f"function of time, derivative {order}")
+        doc, code = f"function of time, derivative {order}", f"F[{at}, {order}]"
+        higher = f"{f}{DERIVATIVES[order + 1]}" if order < 2 else ""
+        rates = {"rate": f"x_{higher}", "rate_name": higher} if higher else {"derivable": False}
+        offer(f"{f}{suffix}", (), code, doc=doc, **rates)
     offer(f"{f}_0", (), f"F[{at}, 4]", doc="its value at t = 0")
 
 
@@ -161,8 +177,9 @@ def _offer_angle(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
     u, v, k = spec.axes
     at, axes = f"par[p1 + {layout.angles[name]}]", f"x_{u}, x_{v}, x_{k}"
     code = f"unwound(angle_about({axes}), {at})"
-    offer(name, (), code, (u, v, k), doc=f"angle from {u} to {v} about {k}, rad")
     one, other = slot_of(u), slot_of(v)
+    turns = {"rate": f"dot(x_{k}, sub(W_{other}, W_{one}))", "rate_name": f"{name}_dot"}
+    offer(name, (), code, (u, v, k), doc=f"angle from {u} to {v} about {k}, rad", **turns)
     rate = f"dot(x_{k}, sub(x_w_{other}, x_w_{one}))"
     needs = (k, f"w_{one}", f"w_{other}")
     offer(f"{name}_dot", (), rate, needs, True, f"rate of {name}, rad/s")
@@ -171,8 +188,11 @@ def _offer_angle(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
 def _offer_point(offer: Callable[..., None], name: str, s: str, layout: Layout) -> None:
     arm, rate, local = f"s_{name}", f"s_{name}_dot", _stored(layout, name)
     place, speed = f"position of {name}, m", f"velocity of {name}, m/s"
-    offer(arm, (3,), f"rotate(x_A_{s}, {local})", (f"A_{s}",), doc=f"arm of {name}, global, m")
-    offer(f"r_{name}", (3,), f"add(x_r_{s}, x_{arm})", (f"r_{s}", arm), doc=place)
+    turns = {"rate": f"cross(W_{s}, x_{arm})", "rate_name": rate}
+    moves = {"rate": f"add(V_{s}, cross(W_{s}, x_{arm}))", "rate_name": f"v_{name}"}
+    code, doc = f"rotate(x_A_{s}, {local})", f"arm of {name}, global, m"
+    offer(arm, (3,), code, (f"A_{s}",), doc=doc, **turns)
+    offer(f"r_{name}", (3,), f"add(x_r_{s}, x_{arm})", (f"r_{s}", arm), doc=place, **moves)
     offer(rate, (3,), f"cross(x_w_{s}, x_{arm})", (f"w_{s}", arm), True, "rate of the arm, m/s")
     code = f"add(vector_at(body, b_{s}, V), x_{rate})"  # a field may have the name v_i
     offer(f"v_{name}", (3,), code, (rate,), True, speed)
@@ -188,7 +208,9 @@ def _offer_vector(offer: Callable[..., None], name: str, s: str | None, layout: 
     else:
         turned, turning = f"matrix_at(body, b_{s}, A)", f"vector_at(body, b_{s}, W)"
         fixed = "vector fixed in a body of the element, global"
-    offer(name, (3,), f"rotate({turned}, {local})", needs[:1], doc=fixed)
+    turns = {"rate": f"cross(W_{s}, x_{name})", "rate_name": f"{name}_dot"}
+    known = turns if needs else {"derivable": False}
+    offer(name, (3,), f"rotate({turned}, {local})", needs[:1], doc=fixed, **known)
     rate = f"cross({turning}, x_{name})"
     offer(f"{name}_dot", (3,), rate, (*needs[1:], name), True, f"rate of {name}, 1/s")
 

@@ -53,6 +53,11 @@ class Joint(TypeBase):
     * ``gamma``  right-hand side of the acceleration level, J v_dot = gamma;
     * ``nu``     right-hand side of the velocity level, J v = nu; zero where not defined.
 
+    ``J`` and ``gamma`` may be left out: they are derived, with ``nu``, from ``C`` (derivation.py)
+    and, for rows of the velocity level alone, from
+
+    * ``C_dot``  what must vanish there, linear in the velocities: one number a row not in ``C``.
+
     It may define, besides:
 
     * ``friction``  the wrench of its Coulomb friction on each body, as a force returns it; takes
@@ -73,7 +78,7 @@ class Joint(TypeBase):
     """
 
     kind = "joint"
-    kernel_names = ("C", "J", "gamma", "nu", "friction", "switch")
+    kernel_names = ("C", "C_dot", "J", "gamma", "nu", "friction", "switch")
     switch_words: ClassVar[str] = ""
     rows: ClassVar[int] = 0
     holonomic: ClassVar[bool | tuple[bool, ...]] = True
@@ -98,7 +103,8 @@ class Force(TypeBase):
     """A force element: what acts on one, two or more bodies.
 
     Subclasses define ``wrench``, which returns for each body slot a pair (force, moment about the
-    mass centre) in global axes, and where there is one ``energy``, the potential in J. Variants and
+    mass centre) in global axes, and where there is one ``energy``, the potential in J. A force that
+    defines ``energy`` alone has its gradient for ``wrench``, derived (derivation.py). Variants and
     ``switch`` are as for joints. A force with a ``joint`` field defines no ``wrench``: it switches
     on the friction of that joint.
 
@@ -121,7 +127,10 @@ class Force(TypeBase):
 
 
 class Function(TypeBase):
-    """A function of one variable: ``value(x, ...)`` returns (f, f', f'', f''')."""
+    """A function of one variable: ``value(x, ...)`` returns (f, f', f'', f''').
+
+    One that returns f alone has the others derived (derivation.py).
+    """
 
     kind = "function"
     kernel_names = ("value",)

@@ -164,6 +164,12 @@ def sources(*functions) -> list[str | bytes]:
     return [*constants, *modules, *contents]
 
 
+def identities(*functions) -> list[str | bytes]:
+    """Which functions of their files these are: variants of a type stand in one file."""
+    codes = [function.__code__ for function in functions]
+    return [*(f"{c.co_qualname} {c.co_firstlineno}" for c in codes), *(c.co_code for c in codes)]
+
+
 def _named_values(function):
     """Names that a function reads from outside itself, with values; one step through modules."""
     code_objects = [function.__code__]

@@ -11,19 +11,16 @@ one list and is never recompiled for a new type:
     out1, out2, out3  what the kernels return, flat (by_address.pointer)
 """
 
-import importlib.util
-import os
-import sys
-import uuid
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from dap3d_core.kernels import gather
+from dap3d_core.kernels import gather, written
 from dap3d_core.kernels.cache import (
     cache_folder,
     compiled_in,
     digest,
+    identities,
     jit_is_on,
     reached,
     sources,
@@ -66,13 +63,14 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
     """
     text = source_of(loop)
     gathering = (gather.vector_at, gather.matrix_at, gather.unwound)
-    key = digest(text, *_identities(loop), *sources(*loop.kernels.values(), *gathering))
+    kernels = loop.kernels.values()
+    key = digest(text, *identities(*kernels), *sources(*kernels, *gathering))
     if key in _built:
         return _built[key]
     folder = cache_folder()
     name = f"loop-{key}"
-    path = _write(folder, name, text) if folder is not None and jit_is_on() else None
-    namespace = _namespace(path, name, text)
+    path = written.write(name, text) if jit_is_on() else None
+    namespace = written.load(path, name, text)
     namespace.update(loop.kernels)
     for plain in reached(*loop.kernels.values())[0]:  # kernels and the author's own helpers
         inlined(plain)
@@ -90,40 +88,5 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
     return function
 
 
-def _identities(loop: Loop) -> list[str | bytes]:
-    """Which functions of their files the kernels are: variants of a type stand in one file."""
-    codes = [kernel.__code__ for kernel in loop.kernels.values()]
-    places = [f"{c.co_qualname} {c.co_firstlineno}" for c in codes]
-    return [*places, *(c.co_code for c in codes)]
-
-
 def _is_cached(folder: Path | None, name: str) -> bool:
     return folder is not None and any((folder / name).glob("*/*.nbc"))
-
-
-def _write(folder: Path, name: str, text: str) -> Path | None:
-    """Put the module where every process finds it; written aside and renamed, for two may race."""
-    path = folder / name / f"{name.replace('-', '_')}.py"
-    if path.exists():
-        return path
-    try:
-        path.parent.mkdir(exist_ok=True)
-        aside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-        aside.write_text(text)
-        os.replace(aside, path)
-    except OSError:
-        return None
-    return path
-
-
-def _namespace(path: Path | None, name: str, text: str) -> dict:
-    if path is None:
-        namespace = {"__name__": f"dap3d_{name.replace('-', '_')}"}
-        # our own text, as importing the file would do
-        exec(compile(text, f"<{name}>", "exec"), namespace)
-        return namespace
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
-    return vars(module)

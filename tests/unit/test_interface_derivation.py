@@ -1,0 +1,228 @@
+"""Formulas derived from C, C_dot, energy or value are those that are written by hand.
+
+Both are evaluated at random states off the constraints. They differ by rounding alone, 1e-11 of the
+largest term: a few hundred operations, and differences of angles near 1. Where there is none by
+hand, rates along random motions stand for it (see tests/contract for the tolerance).
+"""
+
+import math
+import os
+import sys
+
+import numpy as np
+import pytest
+from support.derived_types import (
+    Anisotropic,
+    Cam,
+    Elastic,
+    Rolling,
+    Screw,
+    Unsteady,
+    Wave,
+    from_C_alone,
+)
+from support.motions import Motion, derivative
+from support.own_types import registry_of
+from support.process import REPOSITORY, run
+from support.scenes import scene_for, variant
+
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.interface import Joint, PluginError, Point, examine, function, point
+from dap3d_core.model import build_model
+from dap3d_core.model.kinematics import rotation, split
+from dap3d_core.registry import load_registry
+from dap3d_core.scene import Scene, check
+
+pytest.importorskip("sympy")
+
+#: Joints whose rows all follow from C, with the variant; the last ones take longer to compile.
+BY_HAND = [
+    ("rev", {}),
+    ("drive-rot", {}),
+    *(
+        pytest.param(keyword, values, marks=pytest.mark.slow)
+        for keyword, values in [
+            ("sph", {}),
+            ("cyl", {}),
+            ("fix", {}),
+            ("tran", {}),
+            ("univ", {}),
+            ("rP", {}),
+            ("sph-sph", {}),
+            ("drive-tran", {}),
+            ("disk", {"slip": "z"}),
+        ]
+    ),
+]
+
+
+def machine_of(type_, seed, values=None, more=()):
+    """A scene with one element of a type, its numbers at random."""
+    registry = registry_of(type_, *more)
+    examined = registry.get(type_.kind, type_.keyword)
+    scene = scene_for(examined, np.random.default_rng(seed), values=values)
+    return Machine(build_model(check(scene, registry)), "standard"), examined
+
+
+def assert_same_rows(one, other, seed):
+    for k in range(3):
+        u = Motion(3, np.random.default_rng(seed + k)).u(0.2)
+        a, b = one.rows(0.2, u), other.rows(0.2, u)
+        for x, y in [(a.dense(), b.dense()), (a.gamma, b.gamma), (a.nu, b.nu), (a.C, b.C)]:
+            assert np.max(np.abs(x - y)) <= 1e-11 * (1.0 + np.max(np.abs(y)))
+
+
+@pytest.mark.parametrize(("keyword", "values"), BY_HAND)
+def test_joints_from_C_alone_are_those_by_hand(keyword, values):
+    by_hand = variant(load_registry(), "joint", keyword, values).type
+    derived = from_C_alone(by_hand, f"derived-{keyword}")
+    one, examined = machine_of(derived, 7)
+    assert {"J", "gamma"} <= set(examined.derived)
+    assert ("nu" in examined.derived) == ("nu" in by_hand.kernels())
+    plain = from_C_alone(by_hand, f"plain-{keyword}")
+    plain.J, plain.gamma = staticmethod(by_hand.J), staticmethod(by_hand.gamma)
+    plain.nu = staticmethod(by_hand.nu) if "nu" in by_hand.kernels() else None
+    other, examined = machine_of(plain, 7)
+    assert examined.derived == ()
+    assert_same_rows(one, other, 20)
+
+
+def test_rows_of_the_velocity_level_are_derived_from_C_dot():
+    """The rolling disk, z at position level, x and y by the speed of the touching point."""
+    registry = registry_of(Rolling)
+    assert registry.get("joint", "rolling").derived == ("J", "gamma")
+    machines = []
+    for keyword in ("rolling", "disk"):
+        scene = Scene()
+        for name in ("b1", "b2", "b3"):
+            scene.add_body(name, mass=1.0, Jp=[0.1, 0.2, 0.3], r=[0.0, 0.0, 1.0])
+        scene.add_joint(keyword, "wheel", body_i="b2", radius=0.7)
+        machines.append(Machine(build_model(check(scene, registry)), "standard"))
+    order = [machines[1].rows(0.0, Motion(3, np.random.default_rng(1)).u(0.2))]
+    assert order[0].C[2] != 0.0
+    assert_same_rows(*machines, 30)
+
+
+@pytest.mark.parametrize(
+    ("type_", "values"), [(Screw, {}), (Unsteady, {}), (Cam, {"function": True})]
+)
+def test_rates_along_a_motion_are_the_derived_ones(type_, values):
+    """d/dt C = D v - nu and d/dt (D v - nu) = D v_dot - gamma."""
+    machine, _ = machine_of(type_, 5, values)
+    motion = Motion(3, np.random.default_rng(40), level=0.5)
+
+    def velocity_form(t):
+        rows = machine.rows(t, motion.u(t))
+        return rows.dense() @ motion.u(t)[-18:] - rows.nu
+
+    t, h = 0.1, 3e-3
+    rows = machine.rows(t, motion.u(t))
+    rate = derivative(lambda t: machine.rows(t, motion.u(t)).C, t, h)
+    assert rate == pytest.approx(velocity_form(t), rel=1e-8, abs=1e-8)
+    rate = derivative(velocity_form, t, h)
+    assert rate == pytest.approx(rows.dense() @ motion.v_dot(t) - rows.gamma, rel=1e-8, abs=1e-8)
+
+
+@pytest.mark.parametrize("type_", [Elastic, Anisotropic])
+def test_a_wrench_is_derived_from_the_energy(type_):
+    """At rest its power along any motion is -dV/dt."""
+    machine, examined = machine_of(type_, 6)
+    assert examined.derived == ("wrench",)
+    motion, t = Motion(3, np.random.default_rng(50), level=0.5), 0.1
+    u = motion.u(t)
+    at_rest = np.concatenate([u[:-18], np.zeros(18)])
+    v_dot, model = machine.report(0.0, at_rest)[:18].reshape(3, 6), machine.model
+    A = rotation(split(u, 3)[1])
+    moment = np.einsum("bij,bj->bi", A @ model.Jp @ A.transpose(0, 2, 1), v_dot[:, 3:])
+    power = np.hstack([model.mass[:, None] * v_dot[:, :3], moment]).ravel() @ u[-18:]
+    rate = derivative(lambda t: machine.report(0.0, motion.u(t))[18:19], t, 3e-3)
+    assert power == pytest.approx(-rate[0], rel=1e-8)
+
+
+def test_a_function_by_its_value_alone_has_its_derivatives():
+    """Of a sin(w x) / sqrt(1 + x^2), against the derivatives of its Taylor series' factors."""
+    value = examine(Wave).kernels["value"]
+    x, a, w, h = 0.4, 1.3, 2.1, 1e-3
+    for order in (1, 2, 3):
+        lower = [value(x + k * h, a, w)[order - 1] for k in (-3, -2, -1, 1, 2, 3)]
+        slope = np.array([-1, 9, -45, 45, -9, 1]) @ lower / (60.0 * h)
+        assert value(x, a, w)[order] == pytest.approx(slope, rel=1e-10)
+    assert value(x, a, w)[0] == pytest.approx(a * np.sin(w * x) / np.sqrt(1.0 + x * x), rel=1e-15)
+
+
+# ------------------------------------------------------------------ what cannot be derived
+
+
+def test_what_cannot_be_derived_is_refused_with_a_remedy():
+    """A branch by if, mathematics from elsewhere, a form that is not linear, a row without C."""
+
+    class Base(Joint):
+        keyword, rows = "wrong", 1
+        P_i: Point = point()
+        P_j: Point = point()
+
+    class Branch(Base):
+        def C(r_P_i):
+            return r_P_i[0] if r_P_i[0] > 0.0 else 0.0
+
+    class Elsewhere(Base):
+        def C(r_P_i):
+            return math.sin(r_P_i[0])
+
+    class Quadratic(Base):
+        holonomic = False
+
+        def C_dot(v_P_i, v_P_j):
+            return v_P_i[0] * v_P_j[0]
+
+    class Nothing(Base):
+        holonomic = False
+
+        def C(r_P_i):
+            return ()
+
+    class Third(Base):
+        function: str = function()
+
+        def C(r_P_i, f_dot):
+            return r_P_i[0] - f_dot
+
+    for type_, words in [
+        (Branch, "branch by where"),
+        (Elsewhere, "from dap3d_core.kernels"),
+        (Quadratic, "row 1 of C_dot is not linear in the velocities"),
+        (Nothing, "does not define C_dot"),
+        (Third, "how f_ddot changes is not known"),
+    ]:
+        with pytest.raises(PluginError, match=words):
+            examine(type_)
+
+
+def test_a_type_that_lacks_all_says_what_it_needs():
+    class Empty(Joint):
+        keyword, rows = "empty", 1
+        P_i: Point = point()
+
+    with pytest.raises(PluginError, match="does not define C"):
+        examine(Empty)
+
+
+# ------------------------------------------------------------------ only where it is needed
+
+SCRIPT = """
+import sys
+from dap3d_core.interface import examine
+from dap3d_core.registry import load_registry
+from support.derived_types import Screw
+load_registry().get("joint", "rev")
+assert "sympy" not in sys.modules
+examine(Screw)
+print("sympy" in sys.modules)
+"""
+
+
+def test_sympy_is_imported_for_the_first_derivation_alone(tmp_path):
+    """Types with their own formulas never need it, derived ones not when they are in the cache."""
+    here = {"PYTHONPATH": os.pathsep.join([str(REPOSITORY / "tests"), *sys.path])}
+    assert run(SCRIPT, tmp_path, **here) == "True"
+    assert run(SCRIPT, tmp_path, **here) == "False"
