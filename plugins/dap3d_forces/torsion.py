@@ -34,6 +34,7 @@ class Torsion(Force):
     """
 
     keyword = "rot_sda"
+    energy_where = "where the bodies turn about the common axis, and without n_a"
     v_i: Vector = vector(doc="direction the angle is measured from, on body i")
     v_j: Vector = vector(doc="direction it is measured to, on body j")
     axis: Vector = vector(doc="common axis, on either body")
@@ -69,6 +70,7 @@ class Curve(Torsion, turns=False, function=True):
 class Turning(Torsion, turns=True, function=False):
     """The spring winds up over whole turns."""
 
+    energy_where = "where the bodies turn about the common axis"
     theta: float = angle("v_i", "v_j", "axis")
 
     def wrench(axis, theta, theta_dot, k, c, theta_0, n_a):

@@ -99,6 +99,31 @@ def test_the_page_on_events(tmp_path):
         assert "and 19 more" in done.stdout
 
 
+@pytest.mark.slow
+def test_the_page_on_checking_types(tmp_path):
+    """Its joint passes, as a file and by its test; with the error it speaks of, it says just that.
+
+    The test runs without compiling, which is the command's part.
+    """
+    text = (REPOSITORY / "docs" / "check-plugin.md").read_text()
+    joint, test = blocks(text, "python")
+    (tmp_path / "plane.py").write_text(joint)
+    (tmp_path / "test_plane.py").write_text(test)
+    ((command, *words),) = commands(text, "dap3d")
+    done = dap3d([command, *words], tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_plane.py"],
+        cwd=tmp_path, env=environment(NUMBA_DISABLE_JIT=1), capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+    (tmp_path / "plane.py").write_text(joint.replace("2.0 * dot(a_j_dot", "dot(a_j_dot"))
+    done = dap3d([command, *words, "--quiet"], tmp_path)
+    assert done.returncode == 1
+    said = re.search(r"row 1 of gamma is wrong.*?\(seed 1, pose 3", text, re.DOTALL).group()
+    assert " ".join(said.split()) in " ".join(done.stdout.split())
+
+
 def test_the_first_commands_of_the_readme_are_targets():
     """The two commands at the top exist in the Makefile."""
     text = (REPOSITORY / "README.md").read_text()

@@ -29,12 +29,6 @@ def case_names(found):
     return [f"{k}{[f'{n}={v}' for n, v in values.items()] or ''}" for k, values in found]
 
 
-def variant(registry, kind, keyword, values):
-    """What stands for a type where its fields have these values."""
-    examined = registry.get(kind, keyword)
-    return next((e for conditions, e in examined.variants if conditions == values), examined)
-
-
 def _own_values(examined):
     """Values of choices for which no variant takes the type's place; None where there are none."""
     specs = specs_of(examined.type)

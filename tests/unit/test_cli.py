@@ -18,7 +18,7 @@ from dap3d_core.cli.run import SETTINGS
 from dap3d_core.cli.signals import Stopping
 from dap3d_core.scene import INTEGRATORS, METHODS, Mistake, SceneError, Simulation
 
-COMMANDS = ("run", "check", "models", "plugins", "describe", "info", "post", "plot",
+COMMANDS = ("run", "check", "models", "plugins", "describe", "check-plugin", "info", "post", "plot",
             "report", "import-matlab")  # fmt: skip
 
 

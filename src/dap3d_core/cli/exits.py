@@ -3,6 +3,7 @@
 #: All went well.
 DONE = 0
 #: The run failed and left nothing to keep, or something unexpected happened; with --strict, notes.
+#: A type whose formulas are wrong.
 FAILED = 1
 #: Usage, or mistakes in the scene.
 REFUSED = 2

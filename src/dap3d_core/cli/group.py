@@ -133,6 +133,7 @@ def _tell_usage(error: click.ClickException) -> None:
 
 def _add_commands() -> None:
     from dap3d_core.cli.check import check
+    from dap3d_core.cli.check_plugin import check_plugin
     from dap3d_core.cli.describe import describe
     from dap3d_core.cli.import_matlab import import_matlab
     from dap3d_core.cli.info import info
@@ -143,7 +144,9 @@ def _add_commands() -> None:
     from dap3d_core.cli.report import report
     from dap3d_core.cli.run import run
 
-    for command in (run, check, models, plugins, describe, info, post, plot, report, import_matlab):
+    commands = (run, check, models, plugins, describe, check_plugin, info, post, plot, report,
+                import_matlab)  # fmt: skip
+    for command in commands:
         dap3d.add_command(command)
 
 

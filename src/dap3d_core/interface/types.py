@@ -22,6 +22,9 @@ class TypeBase:
     keyword: ClassVar[str] = ""
     #: Classes that stand in for this one where fields have certain values: (conditions, class).
     variants: ClassVar[tuple[tuple[Mapping[str, Any], type["TypeBase"]], ...]] = ()
+    #: True for a type of two bodies or more that uses the axes of ground in its formulas: it is
+    #: not asked to be the same wherever its bodies stand together (docs/check-plugin.md).
+    ground_axes: ClassVar[bool] = False
 
     def __init_subclass__(cls, **conditions: Any) -> None:
         super().__init_subclass__()
@@ -111,12 +114,15 @@ class Force(TypeBase):
     Attributes:
         keyword: the word that names the type in a scene.
         each_body: True when the element acts on every body of the scene (slot i in turn).
+        energy_where: where alone the energy is the potential of the wrench, in words that follow
+            "only"; "" where it is so everywhere.
     """
 
     kind = "force"
     kernel_names = ("wrench", "energy", "switch")
     switch_words: ClassVar[str] = ""
     each_body: ClassVar[bool] = False
+    energy_where: ClassVar[str] = ""
 
     def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
         """Constants of this instance.

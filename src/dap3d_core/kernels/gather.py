@@ -70,4 +70,4 @@ def angle_about(u, v, k):
 @inlined
 def unwound(angle, last):
     """The angle, whole turns added, that lies within half a turn of the last one."""
-    return angle + TURN * np.rint((last - angle) / TURN)
+    return angle + TURN * np.rint((last - angle).real / TURN)

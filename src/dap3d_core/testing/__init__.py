@@ -1,0 +1,16 @@
+"""What the authors of types test with: formulas against derivatives, balances and each other.
+
+    from dap3d_core.testing import checks_for
+
+    @pytest.mark.parametrize("check", checks_for(Screw), ids=str)
+    def test_screw(check):
+        check()
+
+``check_type`` does all at once and returns a report; ``dap3d check-plugin`` shows it
+(docs/check-plugin.md).
+"""
+
+from dap3d_core.testing.kit import Check, check_type, checks_for
+from dap3d_core.testing.verdict import Finding, Outcome, Report
+
+__all__ = ["Check", "Finding", "Outcome", "Report", "check_type", "checks_for"]

@@ -1,0 +1,159 @@
+"""All checks of a type: one after the other, or each as a test of its own."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import attrs
+
+from dap3d_core.interface.checks import Examined, examine, where_is
+from dap3d_core.testing import forces, functions, joints, purity
+from dap3d_core.testing.subject import Subject, UndefinedError, subjects
+from dap3d_core.testing.verdict import FAILED, LEFT_OUT, Finding, Outcome, Report
+
+#: How many random poses on and off the manifold each check takes, and the seed of them.
+POSES, SEED = 4, 1
+
+
+@attrs.frozen(eq=False)
+class Check:
+    """One check of a type, or of one of its variants; a test calls it.
+
+    Attributes:
+        name: what is checked, such as gamma.
+        subject: the type or variant, with its random poses.
+        inapplicable: why the check does not apply; "" where it does.
+    """
+
+    name: str
+    subject: Subject
+    inapplicable: str
+    _run: Callable[[Subject], Outcome]
+
+    def run(self) -> Outcome:
+        """Carry it out."""
+        if self.inapplicable:
+            return Outcome(self.name, self.subject.variant, LEFT_OUT, self.inapplicable)
+        try:
+            return attrs.evolve(self._run(self.subject), check=self.name)
+        except Exception as error:  # of a kernel, or of random poses that give no number
+            known = isinstance(error, UndefinedError)
+            words = str(error) if known else f"it could not be carried out: {_reason(error)}"
+            finding = Finding(self.name, self.subject.variant, "", 0, words)
+            return Outcome(self.name, self.subject.variant, FAILED, words, findings=(finding,))
+
+    def __call__(self) -> None:
+        """Carry it out.
+
+        Raises:
+            AssertionError: something is wrong; its words say what, for each row.
+        """
+        outcome = self.run()
+        if not outcome.ok:
+            raise AssertionError(f"{where_is(self.subject.type)}\n{outcome}")
+
+    def __str__(self) -> str:
+        values = ",".join(f"{n}={v}" for n, v in self.subject.choices.items())
+        name = self.name.replace(" ", "-")
+        return f"{name}[{values}]" if values else name
+
+
+def check_type(type_: Any, *, poses: int = POSES, seed: int = SEED) -> Report:
+    """Check the formulas of a joint, force or function type, with all its variants.
+
+    Args:
+        type_: the class, or what ``examine`` made of it.
+        poses: random poses off the manifold, and as many on it.
+        seed: of the random poses.
+
+    Returns:
+        the outcome of each check; ``ok`` where nothing is wrong.
+
+    Raises:
+        PluginError: the type cannot be used at all; says why.
+    """
+    examined = type_ if isinstance(type_, Examined) else examine(type_)
+    outcomes = tuple(check.run() for check in _checks(examined, poses, seed))
+    kind, keyword = examined.type.kind, examined.type.keyword
+    return Report(kind, keyword, where_is(examined.type), seed, poses, outcomes)
+
+
+def checks_for(type_: Any, *, poses: int = POSES, seed: int = SEED) -> list[Check]:
+    """The checks that apply to a type, each to be called, as tests of their own.
+
+        @pytest.mark.parametrize("check", checks_for(Screw), ids=str)
+        def test_screw(check):
+            check()
+
+    Args:
+        type_: the class, or what ``examine`` made of it.
+        poses: random poses off the manifold, and as many on it.
+        seed: of the random poses.
+
+    Raises:
+        PluginError: the type cannot be used at all; says why.
+    """
+    examined = type_ if isinstance(type_, Examined) else examine(type_)
+    return [check for check in _checks(examined, poses, seed) if not check.inapplicable]
+
+
+def _checks(examined: Examined, poses: int, seed: int) -> list[Check]:
+    if poses < 1:
+        raise ValueError(f"poses is {poses}; a check takes one or more")
+    of_kind = {"joint": _of_joint, "force": _of_force, "function": _of_function}
+    found = []
+    for subject in subjects(examined, seed, poses):
+        by_joint = "its formulas are the friction of its joint, which is checked with that"
+        if subject.examined.acts_through_joint:
+            found.append(Check("energy", subject, by_joint, forces.potential))
+            continue
+        found += of_kind[subject.type.kind](subject)
+        found.append(Check("purity", subject, "", purity.purity))
+        found.append(Check("compiled", subject, "", purity.compiled))
+    return found
+
+
+def _of_joint(subject: Subject) -> list[Check]:
+    no_position = "" if subject.type.position_rows() else "it has no row at position level"
+    ground = joints.against_ground(subject)
+    found = [
+        Check("J", subject, no_position, joints.jacobian),
+        Check("nu", subject, no_position, joints.velocity_side),
+        Check("gamma", subject, "", joints.acceleration_side),
+        Check("virtual power", subject, no_position, joints.virtual_power),
+        Check("assembly", subject, no_position, joints.assembly),
+        Check("rank", subject, "", joints.rank),
+        Check("frame", subject, ground, joints.frame),
+        Check("action and reaction", subject, ground, joints.action_and_reaction),
+    ]
+    if "friction" in subject.examined.kernels:
+        found.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))
+        for name, run in (("friction frame", forces.frame), ("friction balance", forces.balance)):
+            found.append(
+                Check(name, subject, ground, _on_friction(partial(run, kernel="friction")))
+            )
+    return found
+
+
+def _on_friction(run: Callable[[Subject], Outcome]) -> Callable[[Subject], Outcome]:
+    return lambda subject: run(subject.friction)
+
+
+def _of_force(subject: Subject) -> list[Check]:
+    ground = joints.against_ground(subject)
+    energy = "" if "energy" in subject.kernels.names() else "it has no energy"
+    if not energy and subject.type.energy_where:
+        energy = f"its energy is declared to be that of the wrench only {subject.type.energy_where}"
+    return [
+        Check("energy", subject, energy, forces.potential),
+        Check("frame", subject, ground, forces.frame),
+        Check("action and reaction", subject, ground, forces.balance),
+    ]
+
+
+def _of_function(subject: Subject) -> list[Check]:
+    return [Check("derivatives", subject, "", functions.derivatives)]
+
+
+def _reason(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
