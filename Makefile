@@ -22,7 +22,7 @@ PYTHON3 ?= python3 python3.13 python3.12 python3.11 python3.14 python
 CHECK_PYTHON := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 
 .DELETE_ON_ERROR:
-.PHONY: help run install test test-all verify unit-nojit lint format bench bench-peers clean
+.PHONY: help run install test test-all verify unit-nojit lint format docs bench bench-peers clean
 
 help:  ## show this list
 	@echo "make TARGET, where TARGET is one of"
@@ -39,10 +39,10 @@ install: $(VENV)/.installed  ## put dap3d into .venv, editable (what run, test a
 test: $(VENV)/.installed-test  ## the quick tests
 	@$(PYTHON) -m pytest -n auto -m "not slow"
 
-test-all: $(VENV)/.installed-test  ## all tests, the slow verification as well
+test-all: $(VENV)/.installed-docs  ## all tests, the slow verification as well
 	@$(PYTHON) -m pytest -n auto
 
-verify: $(VENV)/.installed-test  ## the slow verification alone
+verify: $(VENV)/.installed-docs  ## the slow verification alone
 	@$(PYTHON) -m pytest -n auto -m slow
 
 unit-nojit: $(VENV)/.installed-test  ## unit tests with kernels as plain Python, and their coverage
@@ -64,6 +64,12 @@ lint: $(VENV)/.installed-dev  ## format, lint, types, floors, sizes
 format: $(VENV)/.installed-dev  ## let ruff format and repair what it can
 	@$(PYTHON) -m ruff format .
 	@$(PYTHON) -m ruff check --fix .
+
+# Built anew each time: pages, pictures and references all follow the sources.
+docs: $(VENV)/.installed-docs  ## build the documentation into build/docs; warnings are errors
+	@rm -rf build/docs build/docs-source && mkdir -p build/docs-source
+	@MPLBACKEND=Agg $(PYTHON) -m sphinx -W --keep-going -q -c docs build/docs-source build/docs
+	@echo "build/docs/index.html written"
 
 bench: $(VENV)/.installed  ## measure speed against error (benchmarks/run.py)
 	@$(PYTHON) benchmarks/run.py
@@ -108,7 +114,12 @@ $(VENV)/.installed-test: $(VENV)/.installed
 	@$(INSTALL) -e ".[test]"
 	@touch $@
 
-$(VENV)/.installed-dev: $(VENV)/.installed-test
+$(VENV)/.installed-docs: $(VENV)/.installed-test
+	@echo "Installing what the documentation is built with ..."
+	@$(INSTALL) -e ".[docs]"
+	@touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.installed-docs
 	@echo "Installing what the checks need ..."
 	@$(INSTALL) -e ".[dev]"
 	@touch $@

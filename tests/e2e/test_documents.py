@@ -7,7 +7,18 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.pages import follow, steps
 from support.process import REPOSITORY, environment
+
+#: Pages that are followed from the first step to the last, in an empty folder.
+FOLLOWED = [
+    REPOSITORY / "docs" / "index.md",
+    *(
+        page
+        for folder in ("start", "tutorials", "how-to", "concepts", "reference")
+        for page in sorted((REPOSITORY / "docs" / folder).glob("*.md"))
+    ),
+]
 
 
 def blocks(text, language):
@@ -122,6 +133,29 @@ def test_the_page_on_checking_types(tmp_path):
     assert done.returncode == 1
     said = re.search(r"row 1 of gamma is wrong.*?\(seed 1, pose 3", text, re.DOTALL).group()
     assert " ".join(said.split()) in " ".join(done.stdout.split())
+
+
+def takes_long(page):
+    """Commands are processes of their own, and tutorials simulate more than once."""
+    found = list(steps(page.read_text()))
+    return any(step.kind == "command" for step in found) or len(found) > 3
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(
+            page,
+            marks=[pytest.mark.slow] if takes_long(page) else [],
+            id=page.relative_to(REPOSITORY / "docs").as_posix(),
+        )
+        for page in FOLLOWED
+    ],
+)
+def test_the_steps_of_a_page(page, tmp_path, monkeypatch):
+    """Files, scripts and commands of a page, in their order; scripts hold assertions."""
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    assert follow(page, tmp_path)
 
 
 def test_the_first_commands_of_the_readme_are_targets():

@@ -52,8 +52,8 @@ class Run:
         final_position_error: largest distance of a mass centre from the reference at the last
             instant, m.
         energy_error: imbalance of energy and work, relative, as in the ledger.
-        constraint_error, constraint_velocity_error, constraint_acceleration_error: largest |C|,
-            |D v - nu|, |D v_dot - gamma|.
+        constraint_error, constraint_velocity_error, constraint_acceleration_error: largest ``|C|``,
+            ``|D v - nu|``, ``|D v_dot - gamma|``.
         quaternion_error: largest deviation of Euler parameters from unit length.
         counts: steps, rejected, rhs, projections and whatever else a run counts.
         below_uncertainty: whether the error is below the reference's own uncertainty, so that only

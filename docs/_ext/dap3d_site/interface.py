@@ -1,0 +1,101 @@
+"""Reference of what authors of types import: classes, fields, hooks, words of kernels."""
+
+from collections.abc import Iterator
+
+from dap3d_core import interface, kernels
+from dap3d_core.interface import hooks, namespace
+from dap3d_core.interface.fields import FieldSpec
+from dap3d_site.markdown import code, directive, doc_of, page, table
+
+#: Makers of fields, in the order in which one meets them.
+MAKERS = ("body", "point", "vector", "vector2", "number", "vec3", "matrix", "function", "angle",
+          "table", "choice", "joint")  # fmt: skip
+#: Annotations of fields: the class of what a scene names there is not seen by the author.
+ANNOTATIONS = ("Body", "Point", "Vector", "Vector2")
+CLASSES = ("Joint", "Force", "Function")
+#: Words of kernels by subject.
+WORDS = {
+    "Vectors": ("add", "sub", "neg", "scale", "dot", "cross", "norm2", "rotate"),
+    "Matrices and rows": ("skew", "eye", "row", "hstack"),
+    "Mathematics": ("sqrt", "sin", "cos", "tanh", "atan2"),
+    "Branches and tables": ("where", "lookup"),
+    "For `prepare`": ("normals",),
+}
+
+
+def pages() -> Iterator[tuple[str, str]]:
+    """The pages of the interface of types: (path, text)."""
+    yield "reference/interface.md", page("Joint, Force, Function", *_classes())
+    yield "reference/fields.md", page("Fields and names", *_fields())
+    yield "reference/hooks.md", page("Hooks and entry points", *_hooks())
+    yield "reference/kernel-words.md", page("Words of kernels", *_words())
+
+
+def _classes() -> Iterator[str]:
+    yield (
+        "A type is a class derived from one of these, with fields and kernels. All names here are "
+        "imported from `dap3d_core.interface`; a module of types says `interface_version = "
+        f"{interface.INTERFACE_VERSION}` (`INTERFACE_VERSION`)."
+    )
+    for name in CLASSES:
+        kernel_names = ", ".join(code(kernel) for kernel in getattr(interface, name).kernel_names)
+        yield f"## {name}"
+        yield f"Kernels: {kernel_names}."
+        members = "position_rows, prepare" if name == "Joint" else "prepare"
+        yield directive("autoclass", f"dap3d_core.interface.{name}", f":members: {members}")
+    yield "## What is refused"
+    yield directive("autofunction", "dap3d_core.interface.examine")
+    yield directive("autoexception", "dap3d_core.interface.PluginError", ":no-index:")
+
+
+def _fields() -> Iterator[str]:
+    yield (
+        'A field is one line of a type\'s class, `P_i: Point = point(doc="...")`. Its maker says '
+        "what the scene writes there, the last letter of its name whose it is, and both which "
+        "names the kernels may use. A field without a default is required."
+    )
+    annotations = ", ".join(code(name) for name in ANNOTATIONS)
+    yield f"Annotations are {annotations} for names of parts of a scene, else plain types."
+    yield "## Names that fields offer"
+    yield doc_of(namespace).partition("\n\n")[2]
+    velocity = ", ".join(code(name) for name in namespace.VELOCITY_KERNELS)
+    yield f"Kernels that may ask for names of the velocity level: {velocity}."
+    yield "## Makers"
+    for name in MAKERS:
+        yield f"### {name}"
+        yield directive("autofunction", f"dap3d_core.interface.{name}")
+    yield "## What a field knows"
+    yield directive("autoclass", "dap3d_core.interface.fields.FieldSpec", ":no-index:")
+    assert FieldSpec.__doc__
+
+
+def _hooks() -> Iterator[str]:
+    yield (
+        "A package makes its types known by an entry point, whose name is the keyword and whose "
+        "value is the module; the module answers one hook with its classes. `hookimpl` marks the "
+        "answer. Nothing is loaded before a scene names the keyword."
+    )
+    rows = [(kind, code(group), code(hook)) for kind, (group, hook) in hooks.GROUPS.items()]
+    yield table(("kind", "entry-point group", "hook"), rows)
+    for _, hook in hooks.GROUPS.values():
+        yield f"## {hook}"
+        yield directive("autofunction", f"dap3d_core.interface.hooks.{hook}")
+    yield "## hookimpl"
+    yield (
+        "`@hookimpl` before a function of the name of a hook, without arguments. "
+        "A module may answer several hooks. A file `plugin.py` in the folder of a model answers "
+        "in the same way; it is loaded with `--allow-code` alone."
+    )
+
+
+def _words() -> Iterator[str]:
+    yield (
+        "Kernels take and return numbers and tuples, and are written with these words alone, "
+        "imported from `dap3d_core.kernels`: then the same lines run compiled, in plain Python, "
+        "with complex numbers and with symbols."
+    )
+    for subject, names in WORDS.items():
+        yield f"## {subject}"
+        for name in names:
+            assert name in kernels.__all__, name
+            yield directive("autofunction", f"dap3d_core.kernels.{name}")

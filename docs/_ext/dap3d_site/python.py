@@ -1,0 +1,62 @@
+"""Reference of the Python API: everything public, and what it returns."""
+
+from collections.abc import Iterator
+
+from dap3d_site.markdown import code, directive, page
+
+#: Sections of the page: title, public names of ``dap3d_core``, and classes that they hand out.
+SECTIONS = {
+    "Scenes": (
+        ("load", "shipped_models", "Scene", "import_matlab"),
+        ("scene.Simulation", "scene.Body", "scene.Animation", "scene.Mistake",
+         "matlab.ImportReport"),
+    ),
+    "Runs": (
+        ("simulate", "compile", "Event"),
+        ("simulation.CompiledModel", "simulation.Instant"),
+    ),
+    "Results": (
+        ("Result", "open", "plot"),
+        ("result.Reaction", "result.Energy", "result.Entry", "result.ErrorEstimate",
+         "result.Occurrence", "result.Quantity", "result.Statistics"),
+    ),
+    "Reports": (
+        ("report",),
+        ("report.Report", "report.Run", "report.Setting", "report.Recommendation",
+         "report.Reference"),
+    ),
+    "Types": (("load_registry",), ("registry.Registry", "registry.PluginInfo")),
+    "Errors": (
+        ("SceneError", "PluginError", "SimulationError", "AssemblyError", "RedundantError"),
+        ("registry.UnknownTypeError", "result.UnknownNameError"),
+    ),
+}  # fmt: skip
+
+
+def pages() -> Iterator[tuple[str, str]]:
+    """The page of the Python API: (path, text)."""
+    yield "reference/python.md", page("Python", *_parts())
+
+
+def _parts() -> Iterator[str]:
+    yield "All of these are names of `dap3d_core`, imported as `dap` on the other pages."
+    for title, (public, others) in SECTIONS.items():
+        yield f"## {title}"
+        for name in public:
+            yield _documented(f"dap3d_core.{name}")
+        if others:
+            listed = ", ".join(code(name.rpartition(".")[2]) for name in others)
+            yield f"What they hand out, or take: {listed}."
+        for name in others:
+            yield _documented(f"dap3d_core.{name}")
+
+
+def _documented(path: str) -> str:
+    """The directive that shows something public."""
+    name = path.rpartition(".")[2]
+    if name.endswith("Error"):
+        return directive("autoexception", path, ":show-inheritance:")
+    if name[0].isupper():
+        inherited = "\n:inherited-members:" if name == "Result" else ""  # its arrays of motion
+        return directive("autoclass", path, f":members:{inherited}")
+    return directive("autofunction", path)

@@ -1,0 +1,91 @@
+"""Reference of the settings of a run, the formulations and the integrators."""
+
+import inspect
+from collections.abc import Iterator
+from importlib import import_module
+from typing import Any
+
+import attrs
+
+from dap3d_core.cli.run import SETTINGS
+from dap3d_core.scene import INTEGRATORS, METHODS, Simulation
+from dap3d_core.scene.settings import CORRECT_METRICS
+from dap3d_site.markdown import code, doc_of, page, table
+
+#: What no module of its own says.
+AUTO_INTEGRATOR = (
+    "`dop853` where the scene says nothing; goes over to `radau` where the scene turns out to be "
+    "stiff, and says so."
+)
+AUTO_METHOD = (
+    "`unconstrained`, `standard` or `lsq`, by the rows of the scene; it says which and why."
+)
+#: Environment variables, and what each does.
+VARIABLES = {
+    "DAP3D_CACHE_DIR": "folder that keeps compiled code; by default `dap3d` in the user's cache",
+    "DAP3D_BLOCK": "distributions whose types are left out, separated by commas",
+    "NUMBA_DISABLE_JIT": "1: kernels run as plain Python, to look into them; slowly",
+    "NO_COLOR": "any value: no colours in the terminal",
+    "MPLBACKEND": "how `dap.plot` draws: `Agg` without a screen",
+}
+
+
+def pages() -> Iterator[tuple[str, str]]:
+    """The page of the settings: (path, text)."""
+    yield "reference/settings.md", page("Settings of a run", *_parts())
+
+
+def _parts() -> Iterator[str]:
+    yield (
+        "Written in `[simulation]` of a scene; options of `dap3d run` and arguments of "
+        "`dap.simulate` take their place."
+    )
+    yield table(("setting", "default", "option", "is"), _settings())
+    yield f"`correct_metric` is one of {', '.join(code(word) for word in CORRECT_METRICS)}."
+    yield "## Formulations"
+    yield "Values of `method`."
+    for name in METHODS:
+        yield f"### `{name}`"
+        yield AUTO_METHOD if name == "auto" else _module(f"dap3d_core.formulations.{name}")
+    yield "## Integrators"
+    yield "Values of `integrator`."
+    for name in INTEGRATORS:
+        yield f"### `{name}`"
+        yield AUTO_INTEGRATOR if name == "auto" else _module(f"dap3d_core.integrators.{name}")
+    yield "## Environment variables"
+    yield table(("variable", "is"), [(code(name), text) for name, text in VARIABLES.items()])
+
+
+def _settings() -> Iterator[tuple[str, ...]]:
+    docs = attributes(Simulation)
+    for field in attrs.fields(Simulation):
+        option = code(SETTINGS.get(field.name, ""))
+        yield code(field.name), code(_written(field.default)), option, docs[field.name]
+
+
+def _written(default: Any) -> str:
+    """A default as a scene file has it."""
+    if default is None:
+        return ""
+    if isinstance(default, float):
+        return f"{default:g}"
+    return "[]" if default == () else str(default).lower()
+
+
+def attributes(class_: type) -> dict[str, str]:
+    """What the section Attributes of a docstring says of each name; names may share a line."""
+    section = doc_of(class_).partition("Attributes:\n")[2].partition("\n\n")[0]
+    found: dict[str, str] = {}
+    names: list[str] = []
+    for line in inspect.cleandoc(section).splitlines():
+        if line.startswith(" "):
+            found |= {name: f"{found[name]} {line.strip()}" for name in names}
+        else:
+            head, _, text = line.partition(": ")
+            names = head.split(", ")
+            found |= dict.fromkeys(names, text)
+    return found
+
+
+def _module(name: str) -> str:
+    return doc_of(import_module(name))

@@ -1,0 +1,270 @@
+"""The documentation leaves nothing out: what is generated is read here, without a build."""
+
+import inspect
+import posixpath
+import re
+import sys
+from functools import cached_property
+from html import unescape
+from importlib import import_module
+from types import FunctionType
+
+import attrs
+import click
+import pytest
+from support.process import REPOSITORY
+
+import dap3d_core as dap
+from dap3d_core import interface, kernels
+from dap3d_core.cli.group import dap3d
+from dap3d_core.interface import hooks
+from dap3d_core.interface.fields import specs_of
+from dap3d_core.scene import INTEGRATORS, METHODS, Simulation
+from dap3d_core.scene.description import HEADER_KEYS, NAMED, TABLES, Animation, keys_of
+
+DOCS = REPOSITORY / "docs"
+#: Members of a class that have docstrings of their own.
+DOCUMENTED = (FunctionType, classmethod, staticmethod, property, cached_property)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def site():
+    """The extension of Sphinx that writes pages, importable."""
+    sys.path.insert(0, str(DOCS / "_ext"))
+    yield
+    sys.path.remove(str(DOCS / "_ext"))
+
+
+@pytest.fixture(scope="module")
+def pages(site):
+    """Path and text of every generated page."""
+    from dap3d_site.pages import generated
+
+    return generated()
+
+
+@pytest.fixture(scope="module")
+def source(site):
+    """Path and text of every file that Sphinx reads, pictures left out."""
+    from dap3d_site.staging import everything
+
+    found = everything(REPOSITORY)
+    return {path: text.decode() for path, text in found.items() if not path.endswith("png")}
+
+
+def shown(name, page):
+    """Whether a page has the directive that shows something."""
+    return re.search(rf"^\.\. auto\w+:: {re.escape(name)}$", page, flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize("kind", list(hooks.GROUPS))
+def test_every_type_has_a_page_with_all_its_fields(pages, kind):
+    """Docstring, fields, names for kernels, variants and an example, for each type of dap3d."""
+    registry = dap.load_registry()
+    own = [w for w in registry.keywords(kind)
+           if registry.sources[kind, w][0].distribution == "dap3d"]  # fmt: skip
+    assert own
+    index = pages[f"reference/{kind}s/index.md"]
+    for keyword in own:
+        examined = registry.get(kind, keyword)
+        page = pages[f"reference/{kind}s/{keyword}.md"]
+        assert f"[`{keyword}`]({keyword}.md)" in index
+        assert inspect.cleandoc(examined.type.__doc__) in page
+        for name, spec in specs_of(examined.type).items():
+            if spec.given:
+                assert f"| `{name}` | {spec.kind} |" in page, (keyword, name)
+                assert spec.doc, f"{keyword}.{name} has no doc"
+        for name in examined.names:
+            assert f"| `{name}` |" in page, (keyword, name)
+        for _, variant in examined.variants:
+            assert variant.type.__doc__.partition("\n\n")[0].split()[0] in page
+        assert "```toml\n" in page
+
+
+def test_every_command_and_option_is_there_with_its_help(pages):
+    """Each command has a section, each option a row."""
+    page = pages["reference/command-line.md"]
+    for name, command in dap3d.commands.items():
+        section = page.partition(f"## dap3d {name}\n")[2].partition("\n## ")[0]
+        assert section, name
+        assert inspect.cleandoc(command.help).partition("\n")[0] in section
+        for parameter in command.params:
+            if isinstance(parameter, click.Option):
+                for word in (*parameter.opts, *parameter.secondary_opts):
+                    assert re.search(rf"`{word}[ `]", section), (name, word)
+            else:
+                assert parameter.human_readable_name.upper() in section, (name, parameter.name)
+
+
+def test_every_hook_is_there(pages):
+    """With its entry-point group."""
+    page = pages["reference/hooks.md"]
+    specified = [n for n, f in vars(hooks).items() if hasattr(f, "dap3d_spec")]
+    assert set(specified) == {hook for _, hook in hooks.GROUPS.values()}
+    for group, hook in hooks.GROUPS.values():
+        assert f"`{group}` | `{hook}`" in page
+        assert shown(f"dap3d_core.interface.hooks.{hook}", page)
+
+
+def test_every_name_of_the_interface_is_there(pages):
+    """Makers of fields, classes, annotations, the marker, the version."""
+    found = "".join(pages[f"reference/{name}.md"] for name in ("interface", "fields", "hooks"))
+    for name in interface.__all__:
+        assert shown(f"dap3d_core.interface.{name}", found) or f"`{name}`" in found, name
+        value = getattr(interface, name)
+        if inspect.isfunction(value) or inspect.isclass(value):
+            assert inspect.getdoc(value), name
+            assert shown(f"dap3d_core.interface.{name}", found), name
+
+
+def test_every_word_of_kernels_is_there(pages):
+    """With its docstring."""
+    for name in kernels.__all__:
+        assert shown(f"dap3d_core.kernels.{name}", pages["reference/kernel-words.md"]), name
+        assert inspect.getdoc(getattr(kernels, name)), name
+
+
+def test_every_public_name_is_there(pages):
+    """All of ``dap3d_core``, with docstrings; so have the members of its classes."""
+    for name in dap.__all__:
+        assert shown(f"dap3d_core.{name}", pages["reference/python.md"]), name
+        value = getattr(dap, name)
+        assert inspect.getdoc(value), name
+        if inspect.isclass(value):
+            own = [c for c in value.__mro__ if c.__module__.startswith("dap3d_core")]
+            for member, what in (pair for c in own for pair in vars(c).items()):
+                if not member.startswith("_") and isinstance(what, DOCUMENTED):
+                    assert inspect.getdoc(what), f"{name}.{member}"
+
+
+def test_what_public_names_hand_out_exists(site):
+    """The classes that the page on Python shows besides."""
+    from dap3d_site.python import SECTIONS
+
+    for _, others in SECTIONS.values():
+        for path in others:
+            floor, name = path.split(".")
+            assert inspect.getdoc(getattr(import_module(f"dap3d_core.{floor}"), name)), path
+
+
+def test_every_setting_formulation_and_integrator_is_there(pages):
+    """Each setting with what it is, each method and integrator with its text."""
+    page = pages["reference/settings.md"]
+    for field in attrs.fields(Simulation):
+        row = re.search(rf"^\| `{field.name}` \|.*\| (.*) \|$", page, flags=re.MULTILINE)
+        assert row, field.name
+        assert len(row[1]) > 5, field.name
+    for name in (*METHODS, *INTEGRATORS):
+        section = re.search(rf"^### `{name}`\n\n(.*)$", page, flags=re.MULTILINE)
+        assert section, name
+        assert len(section[1]) > 20, name
+    integrators = (DOCS / "concepts" / "integrators.md").read_text()
+    assert all(f"| `{name}` |" in integrators for name in INTEGRATORS)
+    formulations = (DOCS / "concepts" / "formulations.md").read_text()
+    assert all(f"**`{name}`**" in formulations for name in METHODS)
+
+
+def test_every_environment_variable_is_there(pages):
+    """Those that the sources read and that have our name."""
+    text = "".join(f.read_text() for f in (REPOSITORY / "src").rglob("*.py"))
+    variables = set(re.findall(r"\bDAP3D_[A-Z]+(?:_[A-Z]+)*\b", text))
+    assert variables >= {"DAP3D_CACHE_DIR"}
+    for name in variables:
+        assert f"| `{name}` |" in pages["reference/settings.md"], name
+
+
+def test_every_key_of_the_scene_file_is_there():
+    """Tables and their keys; fields of types have pages of their own."""
+    page = (DOCS / "reference" / "scene-file.md").read_text()
+    for table in TABLES:
+        assert re.search(rf"^## .*\[{table}[\].]", page, flags=re.MULTILINE), table
+    keys = set(HEADER_KEYS) | keys_of(Animation) | keys_of(Simulation)
+    for class_ in NAMED.values():
+        keys |= keys_of(class_) - {"fields"}
+    for key in keys:
+        assert f"`{key}`" in page, key
+
+
+def test_every_page_is_reached(source):
+    """From the index, by lists of pages; models are listed by sphinx-gallery."""
+    lists = {page: toctrees(page, text, source) for page, text in source.items()}
+    reached, todo = set(), ["index.md"]
+    while todo:
+        page = todo.pop()
+        if page not in reached:
+            reached.add(page)
+            todo += lists[page]
+    pages = {path for path in source if path.endswith(".md") and not path.startswith("_")}
+    assert pages == reached
+
+
+def toctrees(page, text, source):
+    """The pages that the lists of a page name; those of the gallery are not made yet."""
+    folder = page.rpartition("/")[0]
+    found = []
+    for body in re.findall(r"^```\{toctree\}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL):
+        for line in body.splitlines():
+            entry = re.sub(r".*<(.*)>$", r"\1", line.strip())
+            if not entry or entry.startswith((":", "models/")):
+                continue
+            path = "/".join(part for part in (folder, f"{entry}.md") if part)
+            if "*" in entry:
+                pattern = re.escape(path).replace(r"\*", "[^/]*")
+                matching = [other for other in source if re.fullmatch(pattern, other)]
+                assert matching, entry
+                found += matching
+            else:
+                assert path in source, f"{page} lists {entry}"
+                found.append(path)
+    return found
+
+
+def test_every_model_is_in_the_gallery(source):
+    """With what its page says and the quantities that it draws."""
+    from dap3d_site.gallery import models
+
+    found = models(REPOSITORY)
+    scenes = list((REPOSITORY / "models").rglob("scene.toml"))
+    assert {m.name for m in found} == {s.parent.name for s in scenes} == set(dap_models())
+    for model in found:
+        script = source[f"{model.document.replace('models', '_scripts', 1)}.py"]
+        compile(script, model.name, "exec")
+        assert f"dap.simulate({model.name!r}" in script
+        assert source[f"_models/{model.name}-page.md"].strip()
+    assert "'frame.r.x', 'frame.r.y'" in source["_scripts/tri.py"]
+    assert "allow_code=True" in source["_scripts/ball1.py"]
+
+
+def dap_models():
+    """Names of the shipped models, without those given by their group."""
+    return [name.rpartition("/")[2] for name in dap.shipped_models()]
+
+
+def test_links_lead_to_pages_of_the_site(source):
+    """Also those that lead out of docs, and those between models, which are included elsewhere."""
+    from dap3d_site.gallery import models
+
+    made = {f"{model.document}.rst" for model in models(REPOSITORY)}
+    for path, text in source.items():
+        if path.startswith("_models/") and path.endswith("-page.md"):
+            folder = next(m for m in made if m.endswith(f"/{path[8:-8]}.rst")).rpartition("/")[0]
+        elif path.endswith(".md") and not path.startswith("_"):
+            folder = path.rpartition("/")[0]
+        else:
+            continue
+        for link in re.findall(r"(?<!!)\]\((?![a-z]+:|#)([^)#\s]+)", text):
+            target = posixpath.normpath(f"{folder}/{link}").lstrip("/")
+            assert target in source or target in made or link.endswith(".png"), (path, link)
+
+
+def test_formulas():
+    """Letters are those that browsers draw; what is not understood is an error."""
+    pytest.importorskip("latex2mathml", reason="the extra docs is not installed")
+    from dap3d_site.formulas import mathml
+
+    found = unescape(mathml(r"\tfrac12 \mathbf{G}^T \boldsymbol\omega", "inline"))
+    assert "\N{MATHEMATICAL BOLD CAPITAL G}" in found
+    assert "\N{MATHEMATICAL BOLD ITALIC SMALL OMEGA}" in found
+    assert "mathvariant" not in found
+    with pytest.raises(ValueError, match="not understood"):
+        mathml(r"a \unheardof b", "inline")
