@@ -1,6 +1,7 @@
 """Types that leave formulas to be derived, beside types that have them written by hand."""
 
 from dap3d_core.interface import (
+    REQUIRED,
     Body,
     Force,
     Function,
@@ -63,21 +64,22 @@ class Screw(Joint):
 
 
 class Cam(Joint):
-    """P_j keeps a distance from P_i along a_i that a function of its height gives."""
+    """P_j keeps a height over P_i along a_i that a function of the way along b_i gives."""
 
     keyword, rows = "cam", 1
     P_i: Point = point()
     P_j: Point = point()
     a_i: Vector = vector()
-    function: str = function(argument="height")
+    b_i: Vector = vector()
+    function: str = function(REQUIRED, argument="way")
 
 
 class WithProfile(Cam, function=True):
     """With the function given."""
 
-    def C(r_P_i, r_P_j, a_i, f):
+    def C(r_P_i, r_P_j, a_i, b_i, f):
         d = sub(r_P_j, r_P_i)
-        return dot(d, a_i) - f(d[2])
+        return dot(d, a_i) - f(dot(d, b_i))
 
 
 class Unsteady(Joint):

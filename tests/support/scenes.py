@@ -34,7 +34,7 @@ def _own_values(examined):
     specs = specs_of(examined.type)
     asked = {n for conditions, _ in examined.variants for n in conditions}
     ways = [
-        [(n, w) for w in (specs[n].choices if specs[n].kind == "choice" else (False,))]
+        [(n, w) for w in specs[n].choices or (False,) * (not specs[n].required)]
         for n in specs
         if n in asked
     ]

@@ -41,7 +41,7 @@ def _classes() -> Iterator[str]:
         kernel_names = ", ".join(code(kernel) for kernel in getattr(interface, name).kernel_names)
         yield f"## {name}"
         yield f"Kernels: {kernel_names}."
-        members = "position_rows, prepare" if name == "Joint" else "prepare"
+        members = "position_rows, velocity_rows, prepare" if name == "Joint" else "prepare"
         yield directive("autoclass", f"dap3d_core.interface.{name}", f":members: {members}")
     yield "## What is refused"
     yield directive("autofunction", "dap3d_core.interface.examine")
@@ -52,7 +52,8 @@ def _fields() -> Iterator[str]:
     yield (
         'A field is one line of a type\'s class, `P_i: Point = point(doc="...")`. Its maker says '
         "what the scene writes there, the last letter of its name whose it is, and both which "
-        "names the kernels may use. A field without a default is required."
+        "names the kernels may use. A field without a default is required; `REQUIRED` as the default "
+        "says so where a maker has one of its own."
     )
     annotations = ", ".join(code(name) for name in ANNOTATIONS)
     yield f"Annotations are {annotations} for names of parts of a scene, else plain types."

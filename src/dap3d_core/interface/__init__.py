@@ -2,6 +2,7 @@
 
 from dap3d_core.interface.checks import PluginError, examine
 from dap3d_core.interface.fields import (
+    REQUIRED,
     Body,
     Point,
     Vector,
@@ -24,6 +25,7 @@ from dap3d_core.interface.types import INTERFACE_VERSION, Force, Function, Joint
 
 __all__ = [
     "INTERFACE_VERSION",
+    "REQUIRED",
     "Body",
     "Force",
     "Function",

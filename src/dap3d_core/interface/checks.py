@@ -279,7 +279,7 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
             raise PluginError(f"{who} declares rows = {rows!r}; a joint has one row or more")
         if not isinstance(mask, bool) and len(mask) != rows:
             raise PluginError(f"{who}.holonomic needs one truth value for each of its {rows} rows")
-        if derivable and len(type_.position_rows()) < rows:
+        if derivable and type_.velocity_rows():
             needed = ["C_dot"]
         needed = [*(["C"] if type_.position_rows() else []), *needed]
     if kind != "function" and not by_joint and not body_slots(type_):
@@ -334,7 +334,7 @@ def _expected(type_: type[TypeBase], kernel: str, value: Any) -> tuple[tuple[int
         if kernel in ("C", "C_dot"):
             n, level = len(type_.position_rows()), "position"
             if kernel == "C_dot":
-                n, level = type_.rows - n, "velocity"
+                n, level = len(type_.velocity_rows()), "velocity"
             return (n,), f"{n} numbers, one for each row of the {level} level"
         if kernel == "J":
             return (slots, type_.rows, 6), f"a block of {type_.rows} x 6 for each of {slots} bodies"

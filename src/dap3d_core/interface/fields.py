@@ -127,7 +127,7 @@ def table(*, columns: int = 1, given: bool = True, unit: str = "", doc: str = ""
 
 
 def function(default: Any = None, *, argument: str = "", doc: str = "") -> Any:
-    """A function by name; absent, it is zero.
+    """A function by name; absent, it is zero. With ``REQUIRED`` the scene must give it.
 
     Of time it offers its value and derivatives ``f``, ``f_dot``, ``f_ddot``, and ``f_0``, its value
     at t = 0. With ``argument`` (what it is a function of, in words) kernels call ``f(x)``,

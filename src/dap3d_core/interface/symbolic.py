@@ -311,8 +311,8 @@ def derive_joint(
     J: list[Any] = [[None] * rows for _ in range(len(symbols.basic) // 6)]
     gamma, nu = [sympy.Integer(0)] * rows, [sympy.Integer(0)] * rows
     steps: Steps = {}
-    others = [k for k in range(rows) if k not in position_rows]
-    for kernel, which, what in ((C, position_rows, "C"), (C_dot, others, "C_dot")):
+    velocity_rows = [k for k in range(rows) if k not in position_rows]
+    for kernel, which, what in ((C, position_rows, "C"), (C_dot, velocity_rows, "C_dot")):
         if kernel is None:
             continue
         program = Program.of(traced(kernel, symbols, what))

@@ -94,6 +94,11 @@ class Joint(TypeBase):
             mask = (mask,) * cls.rows
         return tuple(k for k, there in enumerate(mask) if there)
 
+    @classmethod
+    def velocity_rows(cls) -> tuple[int, ...]:
+        """Indices of the rows of the velocity level alone."""
+        return tuple(k for k in range(cls.rows) if k not in cls.position_rows())
+
     def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
         """Constants of this instance.
 

@@ -16,6 +16,7 @@ from dap3d_core.kernels.loops import Loop
 LOOP_KINDS = {
     "acceleration": ("J", "gamma", "nu"),
     "position": ("C",),
+    "velocity": ("C_dot",),
     "wrench": ("wrench",),
     "energy": ("energy",),
     "value": ("value",),
@@ -71,6 +72,10 @@ def _store(examined: Examined, kernel: str) -> Iterable[str]:
     elif kernel == "C":
         assert issubclass(type_, Joint)
         for path, k in zip(paths, type_.position_rows(), strict=True):
+            yield f"out1[row + {k}] = {path}"
+    elif kernel == "C_dot":
+        assert issubclass(type_, Joint)
+        for path, k in zip(paths, type_.velocity_rows(), strict=True):
             yield f"out1[row + {k}] = {path}"
     elif kernel in ("gamma", "nu"):
         for k, path in enumerate(paths):

@@ -71,8 +71,8 @@ class Kernels:
     def value(self, name: str, element: Element, state: State) -> Floats:
         """What a kernel returns, as an array of its rows.
 
-        C (position rows,), J (slots, rows, 6), gamma and nu (rows,), wrench and friction
-        (slots, 2, 3), energy (1,), switch (n,), value (4,).
+        C (position rows,), C_dot (velocity rows,), J (slots, rows, 6), gamma and nu (rows,), wrench
+        and friction (slots, 2, 3), energy (1,), switch (n,), value (4,).
         """
         body, table = state.body().astype(object), state.table().astype(object)
         return self._run(name, element, float(state.t), body, table).astype(float)
@@ -136,6 +136,8 @@ class Kernels:
             return outs[0][: 6 * type_.rows * slots].reshape(slots, type_.rows, 6)
         if name == "C":
             return outs[0][list(type_.position_rows())]
+        if name == "C_dot":
+            return outs[0][list(type_.velocity_rows())]
         if name in ("gamma", "nu"):
             return outs[1 if name == "gamma" else 2][: type_.rows]
         if name in ("wrench", "friction"):

@@ -71,6 +71,29 @@ def _about_nu(way: str, there: bool) -> Callable[[Wrong], str]:
     return says
 
 
+def velocity_form(subject: Subject) -> Outcome:
+    """The form C_dot that a type gives for its velocity rows is J v - nu."""
+    c = Comparison("velocity form", subject, "C_dot", "C_dot against J v - nu")
+    rows = subject.type.velocity_rows()
+    for sample in poses(subject):
+        J, v = sample.value("J")[:, rows], _velocities(sample)
+        form = np.einsum("srk,sk->r", J, v)
+        if "nu" in subject.kernels.names():
+            form = form - sample.value("nu")[list(rows)]
+        size = float(np.max(np.abs(J)) * np.max(np.abs(v)))
+        c.compare(sample, sample.value("C_dot"), form, _about_form,
+                  tolerance=1e-12, scale=size, rows=rows)  # fmt: skip
+    return c.outcome()
+
+
+def _about_form(x: Wrong) -> str:
+    n = x.row + 1
+    return (
+        f"row {n} of J and nu is not the form C_dot: C_dot is {x.is_:.6g} at this pose, "
+        f"J v - nu is {x.should:.6g}"
+    )
+
+
 def acceleration_side(subject: Subject) -> Outcome:
     """The side gamma is what d/dt (J v - nu) = 0 leaves on the right of J v_dot = gamma."""
     c = Comparison("gamma", subject, "gamma", "gamma against the time derivative of nu - J v")

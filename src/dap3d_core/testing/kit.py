@@ -115,10 +115,12 @@ def _checks(examined: Examined, poses: int, seed: int) -> list[Check]:
 
 def _of_joint(subject: Subject) -> list[Check]:
     no_position = "" if subject.type.position_rows() else "it has no row at position level"
+    no_form = "" if "C_dot" in subject.kernels.names() else "it defines no C_dot"
     ground = joints.against_ground(subject)
     found = [
         Check("J", subject, no_position, joints.jacobian),
         Check("nu", subject, no_position, joints.velocity_side),
+        Check("velocity form", subject, no_form, joints.velocity_form),
         Check("gamma", subject, "", joints.acceleration_side),
         Check("virtual power", subject, no_position, joints.virtual_power),
         Check("assembly", subject, no_position, joints.assembly),

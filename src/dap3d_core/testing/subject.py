@@ -218,7 +218,8 @@ def _own_values(examined: Examined) -> dict[str, Any] | None:
     """Values of choices for which no variant takes the type's place; None where there are none."""
     specs = specs_of(examined.type)
     asked = [n for n in specs if any(n in conditions for conditions, _ in examined.variants)]
-    ways = [specs[n].choices if specs[n].kind == "choice" else (False,) for n in asked]
+    without = [(False,) * (not specs[n].required) for n in asked]
+    ways = [specs[n].choices or way for n, way in zip(asked, without, strict=True)]
     for values in (dict(zip(asked, way, strict=True)) for way in product(*ways)):
         given = {n: v or None if specs[n].kind == "function" else v for n, v in values.items()}
         if examined.chosen(given) is examined:
