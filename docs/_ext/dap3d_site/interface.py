@@ -52,8 +52,8 @@ def _fields() -> Iterator[str]:
     yield (
         'A field is one line of a type\'s class, `P_i: Point = point(doc="...")`. Its maker says '
         "what the scene writes there, the last letter of its name whose it is, and both which "
-        "names the kernels may use. A field without a default is required; `REQUIRED` as the default "
-        "says so where a maker has one of its own."
+        "names the kernels may use. A field without a default is required; where a maker has a "
+        "default of its own, `REQUIRED` in its place says so."
     )
     annotations = ", ".join(code(name) for name in ANNOTATIONS)
     yield f"Annotations are {annotations} for names of parts of a scene, else plain types."
