@@ -51,7 +51,10 @@ def test_the_readme(tmp_path):
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "cone.png").stat().st_size > 1000
     (tmp_path / "cone.nc").unlink()
-    (script,) = blocks(text, "python")
+    script, joint = blocks(text, "python")
+    (tmp_path / "plugin.py").write_text(joint)
+    done = dap3d(["check-plugin", "plugin.py", "--allow-code"], tmp_path)
+    assert done.returncode == 0, done.stdout
     done = subprocess.run(
         [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True
     )
