@@ -12,11 +12,11 @@ from dap3d_core.kernels.by_address import pointer
 from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
 
 
-@compiled
-def place_bodies(y: Floats, body: Floats, metric: Floats) -> None:
-    """Poses and velocities of the bodies of a state: fills body (r, A, v, w, p) and B of metric."""
+@compiled_into
+def place_some(first: int, last: int, y: Floats, body: Floats, metric: Floats) -> None:
+    """``place_bodies`` for the bodies from first to before last."""
     n = body.shape[0] - 1
-    for b in range(1, n + 1):
+    for b in range(first, last):
         c, f = 7 * (b - 1), 7 * n + 6 * (b - 1)
         s, k = body[b], metric[b]
         e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
@@ -45,6 +45,12 @@ def place_bodies(y: Floats, body: Floats, metric: Floats) -> None:
         k[7], k[8], k[9] = a00 * u00, a00 * u01 + a01 * u11, a00 * u02 + a01 * u12 + a02 * u22
         k[10], k[11], k[12] = a10 * u00, a10 * u01 + a11 * u11, a10 * u02 + a11 * u12 + a12 * u22
         k[13], k[14], k[15] = a20 * u00, a20 * u01 + a21 * u11, a20 * u02 + a21 * u12 + a22 * u22
+
+
+@compiled
+def place_bodies(y: Floats, body: Floats, metric: Floats) -> None:
+    """Poses and velocities of the bodies of a state: fills body (r, A, v, w, p) and B of metric."""
+    place_some(1, body.shape[0], y, body, metric)
 
 
 @compiled_into
@@ -120,11 +126,13 @@ def scale_velocities(body: Floats, metric: Floats, force: Floats) -> None:
         force[o + 3], force[o + 4], force[o + 5] = (w0 - k[2] * z1 - k[3] * z2) / k[1], z1, z2
 
 
-@compiled_inside
-def rates(y: Floats, metric: Floats, force: Floats, out: Floats) -> None:
-    """dy/dt of coordinates from y and of velocities from the scaled accelerations in ``force``."""
+@compiled_into
+def some_rates(
+    first: int, last: int, y: Floats, metric: Floats, force: Floats, out: Floats
+) -> None:
+    """``rates`` of the bodies from first to before last."""
     n = metric.shape[0] - 1
-    for b in range(1, n + 1):
+    for b in range(first, last):
         c, f, o, k = 7 * (b - 1), 7 * n + 6 * (b - 1), 6 * b, metric[b]
         e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
         w0, w1, w2 = 0.5 * y[f + 3], 0.5 * y[f + 4], 0.5 * y[f + 5]
@@ -138,6 +146,12 @@ def rates(y: Floats, metric: Floats, force: Floats, out: Floats) -> None:
         out[f + 3] = k[1] * a0 + k[2] * a1 + k[3] * a2
         out[f + 4] = k[4] * a1 + k[5] * a2
         out[f + 5] = k[6] * a2
+
+
+@compiled_inside
+def rates(y: Floats, metric: Floats, force: Floats, out: Floats) -> None:
+    """dy/dt of coordinates from y and of velocities from the scaled accelerations in ``force``."""
+    some_rates(1, metric.shape[0], y, metric, force, out)
 
 
 @compiled_inside

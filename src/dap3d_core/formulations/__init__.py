@@ -21,12 +21,18 @@ LOOPS = {
 RHS, PROJECT, REPORT, ACCEPTED, WATCH = range(5)
 
 
-def functions_of(method: str, *, turns: bool, switches: bool) -> Any:
+#: Formulations that do large scenes in two halves: module and least number of bodies.
+IN_HALVES = {"standard": ("standard_in_halves", 500)}
+
+
+def functions_of(method: str, *, turns: bool, switches: bool, halved: bool = False) -> Any:
     """A formulation's compiled functions as the list that an integrator takes.
 
     They are rhs, project, report; accepted where ``turns`` are counted; watch for ``switches``.
+    ``halved``: whether the scene's plan is cut in two halves.
     """
-    module: Any = import_module(f"dap3d_core.formulations.{method}")
+    name = IN_HALVES[method][0] if halved and method in IN_HALVES else method
+    module: Any = import_module(f"dap3d_core.formulations.{name}")
     functions = [module.rhs, module.project, module.report]
     if turns or switches:
         from dap3d_core.formulations.accepted import accepted, watch

@@ -22,7 +22,7 @@ from dap3d_core.assembly.system import (
     Integers,
     System,
 )
-from dap3d_core.formulations import LOOPS, REPORT, RHS, functions_of
+from dap3d_core.formulations import IN_HALVES, LOOPS, REPORT, RHS, functions_of
 from dap3d_core.formulations.build import build_loops, build_system
 from dap3d_core.linear.blocks import LESS, POOR
 from dap3d_core.linear.plan import Plan, make_plan
@@ -115,7 +115,10 @@ class Machine:
         """
         self.model = model
         self.method = method
-        self.plan: Plan = make_plan(model.body_count, model.joint_slots, model.joint_rows.tolist())
+        halved = method in IN_HALVES and model.body_count >= IN_HALVES[method][1]
+        self.plan: Plan = make_plan(
+            model.body_count, model.joint_slots, model.joint_rows.tolist(), halved=halved
+        )
         self.loops, self.what = build_loops(model, LOOPS[method], announce)
         self.system: System = build_system(model, self.plan, self.what)
         self.start_functions()
@@ -176,7 +179,22 @@ class Machine:
     @cached_property
     def functions(self) -> Any:
         """The compiled functions (rhs, project, report, ...) that an integrator takes."""
-        return functions_of(self.method, turns=self.counts_turns, switches=bool(self.switches))
+        turns, switches = self.counts_turns, bool(self.switches)
+        return functions_of(self.method, turns=turns, switches=switches, halved=self.halved)
+
+    @property
+    def halved(self) -> bool:
+        """Whether right-hand sides are evaluated in two halves (formulations/halves.py)."""
+        return self.system.halves is not None and self.method in IN_HALVES
+
+    @cached_property
+    def second_thread(self) -> Any:
+        """A context in which a second thread does one half; None where none helps."""
+        if not self.halved:
+            return None
+        from dap3d_core.formulations.second_thread import SecondThread, threads_allowed
+
+        return SecondThread(self.system, self.loops) if threads_allowed() > 1 else None
 
     def integrated(self, u: ArrayLike) -> Floats:
         """The integrated state y (13 n + 1,) of a state u (13 n,)."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,9 @@ from dap3d_core.integrators.method import Floats, Integers, Method, combinations
 from dap3d_core.integrators.runge_kutta import advance
 from dap3d_core.integrators.work import Function, Status, Work
 from dap3d_core.kernels.cache import jit_is_on
+
+if TYPE_CHECKING:
+    from dap3d_core.formulations.second_thread import SecondThread
 
 #: Least scale of an error: at atol = 0 a component that is exactly zero is not divided by zero.
 SMALLEST_ATOL = 1e-290
@@ -76,6 +79,9 @@ class Integration:
     ValueError
         For times, sizes, tolerances or steps that make no sense.
     """
+
+    #: Of a large scene a second thread, which takes part in its right-hand sides.
+    beside: "SecondThread | None" = None
 
     def __init__(
         self,
@@ -158,7 +164,9 @@ class Integration:
         """
         if self.rows_are_full and self.status is Status.RUNNING:
             raise RuntimeError("the row buffer is full: take rows() before advancing")
-        if jit_is_on():
+        if self.beside is not None:
+            self.beside.call(lambda: self._advance(budget), lambda: self.statistics.rhs)
+        elif jit_is_on():
             self._advance(budget)
         else:
             with np.errstate(all="ignore"):  # as in compiled code, which tests what matters

@@ -79,7 +79,8 @@ def _place_of(array: Any) -> int:
 class Arrays:
     """Base of classes whose members are C-contiguous arrays, or further such classes.
 
-    ``types`` gives the type of each member that is not a vector of float64.
+    ``types`` gives the type of each member that is not a vector of float64. A member that is a
+    class of arrays may be None where nothing reads it.
     """
 
     types: ClassVar[dict[str, Any]] = {}
@@ -92,7 +93,7 @@ class Arrays:
         for name, type_, dtype in self.type_of().expected:
             array = getattr(self, name)
             if dtype is None:
-                words.append(array.address)
+                words.append(0 if array is None else array.address)
                 continue
             fits = array.dtype == dtype and array.ndim == type_.ndim
             if not (fits and array.flags.c_contiguous):

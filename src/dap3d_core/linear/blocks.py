@@ -298,12 +298,10 @@ def solve_backwards(
         x[f + c] = s
 
 
-@compiled_inside
-def solve(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
-    """Solve K z = x in place, with the factors of K."""
-    K, x = pointer(K), pointer(x)
-    count = nodes.shape[0] - 1
-    for k in range(count):
+@compiled_into
+def solve_down(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
+    """What all nodes do on the way down; K, x: pointers."""
+    for k in range(nodes.shape[0] - 1):
         m = nodes[k, 0]
         if m == 3:
             solve_forwards(k, 3, nodes, columns, K, x)
@@ -313,7 +311,12 @@ def solve(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
             solve_panel_forwards(k, nodes, columns, K, x)
         else:
             solve_forwards(k, m, nodes, columns, K, x)
-    for k in range(count - 1, -1, -1):
+
+
+@compiled_into
+def solve_up(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
+    """What all nodes do on the way up; K, x: pointers."""
+    for k in range(nodes.shape[0] - 2, -1, -1):
         m = nodes[k, 0]
         if m == 3:
             solve_backwards(k, 3, nodes, columns, K, x)
@@ -323,3 +326,10 @@ def solve(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
             solve_panel_backwards(k, nodes, columns, K, x)
         else:
             solve_backwards(k, m, nodes, columns, K, x)
+
+
+@compiled_inside
+def solve(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
+    """Solve K z = x in place, with the factors of K."""
+    solve_down(nodes, columns, pointer(K), pointer(x))
+    solve_up(nodes, columns, pointer(K), pointer(x))

@@ -60,6 +60,7 @@ class Ordering:
         below: for each entry of ``order`` the places in ``order`` that it updates, ascending.
         panels: places (first, last + 1) in ``order`` of what is eliminated together, and where the
             group ends whose part it is.
+        parts: places where the second half and the top begin (halving.py); none where it is whole.
     """
 
     nodes: tuple[JointNode, ...]
@@ -68,6 +69,7 @@ class Ordering:
     order: tuple[int, ...]
     below: tuple[tuple[int, ...], ...]
     panels: tuple[tuple[int, int, int], ...] = ()
+    parts: tuple[int, ...] = ()
 
     def is_hub(self, place: int) -> bool:
         """Whether a hub, not a joint node, is at a place of ``order``."""
@@ -81,7 +83,7 @@ class Ordering:
     @property
     def work(self) -> int:
         """Multiplications of the factorisation, each with an addition."""
-        return sum(_work(m, w) for m, w in self._fronts())
+        return sum(work_of(m, w) for m, w in self._fronts())
 
     @property
     def widest(self) -> int:
@@ -94,13 +96,17 @@ class Ordering:
             yield m, sum(sizes[k] for k in below)
 
 
-def _work(m: int, w: int) -> int:
+def work_of(m: int, w: int) -> int:
     """Of a node of m rows that updates w: factors, division, update."""
     return m * (m + 1) * (m + 2) // 6 + m * (m + 1) // 2 * w + m * w * (w + 1) // 2
 
 
 def order_nodes(
-    body_count: int, joint_slots: Sequence[tuple[int, ...]], joint_rows: Sequence[int]
+    body_count: int,
+    joint_slots: Sequence[tuple[int, ...]],
+    joint_rows: Sequence[int],
+    *,
+    halved: bool = False,
 ) -> Ordering:
     """Find the order of elimination.
 
@@ -108,6 +114,7 @@ def order_nodes(
         body_count: bodies without ground; they are numbered from 1.
         joint_slots: bodies of each joint, ground 0.
         joint_rows: rows of each joint.
+        halved: whether it is cut in two halves (halving.py), if the scene lets them share the work.
     """
     nodes = _merge(joint_slots, joint_rows)
     of_body: list[list[int]] = [[] for _ in range(body_count + 1)]
@@ -132,8 +139,18 @@ def order_nodes(
         from dap3d_core.linear.supernodes import with_panels
 
         other = eliminated(dissect(_neighbours(nodes, of_body, early, hubs), size))
-        return with_panels(min(found, other, key=lambda ordering: ordering.work))
-    return found
+        found = with_panels(min(found, other, key=lambda ordering: ordering.work))
+    if not halved:
+        return found
+    from dap3d_core.linear.halving import MORE_WORK, in_halves
+
+    cut = in_halves(found)
+    if not cut.parts and not found.panels:  # minimum degree may go from one end to the other
+        from dap3d_core.linear.dissection import dissect
+
+        other = eliminated(dissect(_neighbours(nodes, of_body, early, hubs), size, levels=1))
+        cut = in_halves(other) if other.work <= MORE_WORK * found.work else found
+    return cut if cut.parts else found
 
 
 def _merge(joint_slots: Sequence[tuple[int, ...]], joint_rows: Sequence[int]) -> list[JointNode]:

@@ -75,7 +75,8 @@ class CompiledModel:
         self.machine.set_penalty(settings.alpha, settings.Omega, settings.mu)
         if announce is not None and not driver_is_cached("formulations"):
             announce(f"the solver ({self.method})")
-        _ = self.machine.functions  # compiled here, and not on the clock of the first run
+        # compiled here, and not on the clock of the first run
+        _ = self.machine.functions, self.machine.second_thread
         self.notes: list[str] = [*self.checked.notes, *self.model.notes]
         self._redundancy: Redundancy | None = None
         self.compile_time = time.perf_counter() - started

@@ -143,7 +143,10 @@ class _Run:
         estimate_error: bool = False,
     ) -> Result:
         self.started = time.perf_counter()
-        self._begin(self._integration(self._start()))
+        integration = self._integration(self._start())
+        if self.settings.integrator != "radau":  # which evaluates its stages otherwise
+            integration.beside = self.machine.second_thread
+        self._begin(integration)
         if output is not None:
             self.output = check_target(output, force)
             self.force = force
