@@ -164,6 +164,7 @@ def within(values, ranges):
     return all(any(a <= v < b for a, b in ranges) for v in values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_halves_give_what_the_whole_gives(monkeypatch, name):
     """Accelerations and multipliers, to rounding: sums of the top alone have another order.
@@ -178,6 +179,7 @@ def test_halves_give_what_the_whole_gives(monkeypatch, name):
 
 
 @compiled_code
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_a_second_thread_changes_no_bit(monkeypatch, name):
     """dy/dt with and without a second thread, which did take part."""
@@ -212,6 +214,7 @@ def always(monkeypatch, compiled):
 
 
 @compiled_code
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["dop853", "adams"])
 def test_a_run_with_a_second_thread_is_the_same_run(monkeypatch, large, integrator):
     """All reported numbers, bit for bit."""
@@ -226,6 +229,7 @@ def test_a_run_with_a_second_thread_is_the_same_run(monkeypatch, large, integrat
 
 
 @compiled_code
+@pytest.mark.slow
 def test_an_interrupted_run_leaves_no_thread(monkeypatch, large):
     """Ctrl-C between two chunks: the second thread is gone, and the model runs again."""
     always(monkeypatch, large)
@@ -240,6 +244,7 @@ def test_an_interrupted_run_leaves_no_thread(monkeypatch, large):
 
 
 @compiled_code
+@pytest.mark.slow
 def test_what_the_second_thread_raises_comes_out(large):
     """An exception in its half ends the call with that exception; nobody waits for ever."""
     machine = large.machine
@@ -277,6 +282,7 @@ def test_one_thread_can_be_asked_for(monkeypatch):
     assert threads_allowed() == 1
 
 
+@pytest.mark.slow
 def test_the_faster_way_is_taken(monkeypatch):
     """Both ways are measured; where a second thread makes calls slower, one thread goes on."""
     _, machine, _ = machines(monkeypatch, chain(4))
