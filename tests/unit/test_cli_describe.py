@@ -5,6 +5,8 @@ import tomllib
 
 import pytest
 from click.testing import CliRunner
+from support.derived_types import Cam
+from support.own_types import registry_of
 
 import dap3d_core as dap
 from dap3d_core.cli.example import example_of
@@ -100,3 +102,14 @@ def test_the_kernels_of_a_type_can_be_read():
     (facts,) = json.loads(described("sph", "--json"))["types"]
     assert facts["derived"] == []
     assert facts["source"]["C"] == "def C(r_P_i, r_P_j):\n    return sub(r_P_j, r_P_i)"
+
+
+def test_a_required_function_is_in_the_example():
+    """Of an argument as well; it is left out only where other fields can take its place."""
+    registry = registry_of(Cam)
+    text = example_of(registry.get("joint", "cam"), registry)
+    scene = tomllib.loads(text)
+    assert scene["joints"]["J1"]["function"] in scene["functions"]
+    registry = load_registry()
+    text = example_of(registry.get("force", "ptp"), registry)
+    assert "function" not in next(iter(tomllib.loads(text)["forces"].values()))

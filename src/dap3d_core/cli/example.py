@@ -115,7 +115,7 @@ class _Example:
         elif spec.kind == "body":
             yield name, f'"{self._on(owner)}"'
         elif spec.kind == "function":
-            if not spec.argument:  # it would take the place of other fields
+            if spec.required or not spec.argument:  # it would take the place of other fields
                 yield name, f'"{self._motor(motor)}"'
         elif spec.kind == "joint":
             self.element(self.first("joint", _rubs), "J1")
