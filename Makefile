@@ -46,8 +46,7 @@ verify: $(VENV)/.installed-docs  ## the slow verification alone
 	@$(PYTHON) -m pytest -n auto -m slow
 
 unit-nojit: $(VENV)/.installed-test  ## unit tests with kernels as plain Python, and their coverage
-	@NUMBA_DISABLE_JIT=1 $(PYTHON) -m coverage run -m pytest tests/unit
-	@$(PYTHON) -m coverage report
+	@NUMBA_DISABLE_JIT=1 $(PYTHON) -m pytest -n auto --cov --cov-report=term tests/unit
 
 # All checks run, also after one has failed; the last line says which.
 lint: $(VENV)/.installed-dev  ## format, lint, types, floors, sizes
