@@ -108,9 +108,10 @@ $(VENV)/.installed: pyproject.toml $(PYTHON)
 	@$(INSTALL) -e .
 	@touch $@
 
-$(VENV)/.installed-test: $(VENV)/.installed
+$(VENV)/.installed-test: $(VENV)/.installed plugins/dap3d-example/pyproject.toml
 	@echo "Installing what the tests need ..."
 	@$(INSTALL) -e ".[test]"
+	@$(INSTALL) --no-deps -e plugins/dap3d-example
 	@touch $@
 
 $(VENV)/.installed-docs: $(VENV)/.installed-test

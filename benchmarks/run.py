@@ -16,6 +16,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 
 import calls
 import derived
+import extension
 import hard
 import hard.long_time
 import kernels
@@ -75,6 +76,7 @@ def main():
         "right_hand_side": lambda: right_hand_side.measure(arguments.against),
         "kernels": kernels.measure,
         "derived": derived.measure,
+        "extension": extension.measure,
         "call": calls.call,
         "projection": projection.measure,
         "dop853_on_a_chain": whole_runs.dop853_on_a_chain,

@@ -4,6 +4,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -111,6 +112,37 @@ def test_the_page_on_events(tmp_path):
         assert done.returncode == 0, done.stderr
         assert "force contact: its switch became negative" in done.stdout
         assert "and 19 more" in done.stdout
+
+
+def test_the_page_on_new_plugins(tmp_path):
+    """Its commands, in an empty folder; what the command says comes next is what the page says."""
+    text = (REPOSITORY / "docs" / "new-plugin.md").read_text()
+    first, *others = commands(text, "dap3d")
+    done = dap3d(first, tmp_path)
+    assert done.returncode == 0, done.stderr
+    (next_steps,) = blocks(text, "sh")
+    assert [line for line in next_steps.splitlines() if line not in done.stdout] == []
+    folder = tmp_path / "dap3d-on-cylinder"
+    for file in re.findall(r"^\| `([^`]+)` \|", text, flags=re.MULTILINE):
+        assert (folder / file).is_file(), file
+    readme = (folder / "README.md").read_text()
+    assert all(line in readme for line in next_steps.splitlines())
+    for words in others:
+        assert dap3d(words, tmp_path).returncode == 0
+
+
+def test_the_pages_of_the_example_package():
+    """Each type has its page, its scene and a line in the README; their commands name the scene."""
+    package = REPOSITORY / "plugins" / "dap3d-example"
+    groups = tomllib.loads((package / "pyproject.toml").read_text())["project"]["entry-points"]
+    for keyword in (k for group in groups.values() for k in group):
+        page = (package / "docs" / f"{keyword}.md").read_text()
+        assert page.startswith(f"# {keyword}\n")
+        assert f"(docs/{keyword}.md)" in (package / "README.md").read_text()
+        run, plot = commands(page, "dap3d")
+        assert run == ["run", f"scenes/{keyword}.toml"]
+        assert plot[:2] == ["plot", f"{keyword}.nc"]
+        assert (package / "scenes" / f"{keyword}.toml").is_file()
 
 
 @pytest.mark.slow

@@ -94,7 +94,8 @@ def _field(scene, name, spec, owner, rng, wanted):
     if spec.kind == "number":
         low = max(spec.minimum if spec.minimum is not None else 0.0, 0.0)
         value = low + rng.uniform(0.5, 1.5)
-        return min(value, spec.maximum) if spec.maximum is not None else value
+        value = min(value, spec.maximum) if spec.maximum is not None else value
+        return float(np.ceil(value)) if spec.whole else value
     if spec.kind == "vec3":
         return rng.uniform(-1, 1, 3)
     if spec.kind == "matrix":

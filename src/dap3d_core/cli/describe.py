@@ -174,6 +174,8 @@ def _allowed(spec: Any) -> str:
         words.append(f">= {spec.minimum:g}")
     if spec.maximum is not None:
         words.append(f"<= {spec.maximum:g}")
+    if spec.whole:
+        words.append("a whole number")
     return ", ".join(words)
 
 

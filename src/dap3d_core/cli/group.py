@@ -138,14 +138,15 @@ def _add_commands() -> None:
     from dap3d_core.cli.import_matlab import import_matlab
     from dap3d_core.cli.info import info
     from dap3d_core.cli.models import models
+    from dap3d_core.cli.new_plugin import new_plugin
     from dap3d_core.cli.plot import plot
     from dap3d_core.cli.plugins import plugins
     from dap3d_core.cli.post import post
     from dap3d_core.cli.report import report
     from dap3d_core.cli.run import run
 
-    commands = (run, check, models, plugins, describe, check_plugin, info, post, plot, report,
-                import_matlab)  # fmt: skip
+    commands = (run, check, models, plugins, describe, new_plugin, check_plugin, info, post,
+                plot, report, import_matlab)  # fmt: skip
     for command in commands:
         dap3d.add_command(command)
 

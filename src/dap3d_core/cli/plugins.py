@@ -7,12 +7,15 @@ from dap3d_core.cli.group import Command
 
 
 @click.command(cls=Command, short_help="List the installed types.")
+@click.option("--no-compile", is_flag=True, help="Do not try whether kernels compile.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
-def plugins(*, as_json: bool) -> int:
+def plugins(*, no_compile: bool, as_json: bool) -> int:
     """List the types of joints, forces and functions that are installed.
 
-    A type that cannot be loaded is listed with the reason. DAP3D_BLOCK=NAME leaves out the types of
-    a distribution.
+    A type that cannot be loaded, or whose kernels cannot be compiled, is listed with the reason.
+    The kernels of other packages are compiled for that: the first time a second or so a type.
+
+    DAP3D_BLOCK=NAME leaves out the types of a distribution.
     """
     import attrs
 
@@ -20,7 +23,7 @@ def plugins(*, as_json: bool) -> int:
     from dap3d_core.cli.rendering import items, output, print_json, show, table, title
 
     registry = dap.load_registry()
-    found = registry.listing()
+    found = registry.listing(compiling=not no_compile)
     if as_json:
         print_json({"types": [attrs.asdict(t) for t in found], "notes": registry.notes})
         return DONE

@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.system import KINDS, Floats, Integers, System
-from dap3d_core.interface.checks import PluginError, where_is
-from dap3d_core.interface.writer import stride, write
+from dap3d_core.interface.compiling import compiled_loop
+from dap3d_core.interface.writer import stride
 from dap3d_core.kernels.gather import BODY_WIDTH, JP, MASS, A, P
 from dap3d_core.kernels.lists import loop_list
-from dap3d_core.kernels.loops import Loop, build
 from dap3d_core.linear.plan import Plan
 from dap3d_core.model import Group, Model
 
@@ -25,15 +24,18 @@ def build_loops(
 
     Returns:
         (typed list of loops, [(kind, group)] in the order of the list).
+
+    Raises:
+        PluginError: numba cannot compile the kernels of a type.
     """
     loops, what = [], []
     for kind in KINDS:
         if kind not in kinds:
             continue
         for group in _groups_for(model, kind):
-            loop = write(group.examined, kind)
+            loop = compiled_loop(group.examined, kind, announce)
             if loop is not None:
-                loops.append(_compiled(loop, group, announce))
+                loops.append(loop)
                 what.append((kind, group))
     return loop_list(loops), what
 
@@ -42,19 +44,6 @@ def _groups_for(model: Model, kind: str) -> tuple[Group, ...]:
     if kind == "friction":
         return model.friction
     return (*model.functions, *model.forces, *model.joints)
-
-
-def _compiled(loop: Loop, group: Group, announce: Callable[[str], None] | None) -> Any:
-    try:
-        return build(loop, announce)
-    except Exception as error:
-        said = [line for line in str(error).splitlines() if line.strip()]
-        reason = said[0] if said else type(error).__name__
-        raise PluginError(
-            f"{where_is(group.examined.type)}: numba cannot compile its kernels ({loop.name}): "
-            f"{reason}. A kernel is plain: tuples of numbers, the words of dap3d_core.kernels, "
-            "where() for branches"
-        ) from error
 
 
 def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> System:

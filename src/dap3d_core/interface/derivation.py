@@ -13,8 +13,6 @@ from typing import Any
 from dap3d_core.interface.layout import Layout
 from dap3d_core.interface.namespace import Quantity
 from dap3d_core.interface.types import Joint, TypeBase
-from dap3d_core.kernels import written
-from dap3d_core.kernels.cache import cache_folder, digest, identities, sources
 
 Kernel = Callable[..., Any]
 
@@ -52,6 +50,10 @@ def derive(
     Raises:
         CannotDeriveError: says why, and what to do.
     """
+    # here, for with the first of them comes numba, which finding types by keyword does not need
+    from dap3d_core.kernels import written
+    from dap3d_core.kernels.cache import cache_folder, digest, identities, sources
+
     given = {n: k for n, k in type_.kernels().items() if n in FORMULAS[type_.kind][0]}
     offered, here = [repr(q) for q in names.values()], Path(__file__)
     how = [here.with_name(f"{n}.py").read_bytes() for n in ("derivation", "symbolic", "printing")]

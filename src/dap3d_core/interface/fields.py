@@ -30,6 +30,7 @@ class FieldSpec:
         unit: SI unit of a number, "" for none.
         doc: what it means, one short sentence.
         positive, minimum, maximum: what a number must satisfy beyond being finite.
+        whole: whether a number must be a whole one.
         choices: allowed words of a choice (or False and True).
         aliases: other words for some of them.
         unit_length: whether a vector is normalised (with a warning where its length was not 1).
@@ -47,6 +48,7 @@ class FieldSpec:
     positive: bool = False
     minimum: float | None = None
     maximum: float | None = None
+    whole: bool = False
     choices: tuple[Any, ...] = ()
     aliases: Mapping[str, str] = attrs.field(factory=dict)
     unit_length: bool = False
@@ -99,9 +101,13 @@ def number(
     positive: bool = False,
     minimum: float | None = None,
     maximum: float | None = None,
+    whole: bool = False,
 ) -> Any:
-    """A finite number. ``default=None`` lets the scene leave it out: ``prepare`` then finds it."""
-    spec = FieldSpec("number", default, unit, doc, positive, minimum, maximum)
+    """A finite number; a whole one (of teeth, say) with ``whole``.
+
+    ``default=None`` lets the scene leave it out: ``prepare`` then finds it.
+    """
+    spec = FieldSpec("number", default, unit, doc, positive, minimum, maximum, whole)
     return _field(spec)
 
 

@@ -64,7 +64,8 @@ def random_field(spec: FieldSpec, rng: random.Random) -> Any:
     if spec.kind == "number":
         low = 0.5 if spec.minimum is None else spec.minimum + 0.5
         value = rng.uniform(low, low + 1.0)
-        return value if spec.maximum is None else min(value, spec.maximum)
+        value = value if spec.maximum is None else min(value, spec.maximum)
+        return float(math.ceil(low)) if spec.whole else value
     if spec.kind == "choice":
         return spec.choices[0]
     return None if spec.kind == "function" else spec.kind

@@ -56,7 +56,7 @@ def _value(force: str, specs: Mapping[str, FieldSpec], name: str, value: Any) ->
     spec = specs[name]
     found: Any
     if spec.kind == "number":
-        limits = {n: getattr(spec, n) for n in ("positive", "minimum", "maximum")}
+        limits = {n: getattr(spec, n) for n in ("positive", "minimum", "maximum", "whole")}
         found = bounded(number_of(value), **limits)
     else:
         found = numbers_of(value, 3) if spec.kind == "vec3" else matrix_of(value)

@@ -48,6 +48,19 @@ def load(source: Source, notes: list[str]) -> Examined:
         return examine(type_)
 
 
+def compile_kernels(source: Source, examined: Examined, notes: list[str]) -> None:
+    """Compile all kernels of a type that was loaded, as a run would those that its scene needs.
+
+    Raises:
+        PluginError: numba cannot compile one; names distribution, module, reason and remedy.
+    """
+    # here, for with it comes numba, which finding types by keyword does not need
+    from dap3d_core.interface.compiling import compile_all
+
+    with _guard(source, notes):
+        compile_all(examined)
+
+
 def load_file(path: Path, notes: list[str]) -> list[Source]:
     """Import a model's own Python file and return the types it brings, one source each.
 

@@ -9,8 +9,11 @@ from dap3d_core.interface import PluginError
 from dap3d_core.interface.checks import Examined
 from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover
-from dap3d_core.registry.loading import load, load_file
+from dap3d_core.registry.loading import compile_kernels, load, load_file
 from dap3d_core.registry.spelling import nearest
+
+#: The distribution whose types are compiled and run by the tests of dap3d.
+OWN = "dap3d"
 
 
 class UnknownTypeError(PluginError, LookupError):
@@ -87,9 +90,17 @@ class Registry:
             )
         )
 
-    def listing(self) -> list[PluginInfo]:
-        """Every type with its state; loads each in its own guard and raises nothing."""
-        return [self._info(s, found) for found in self.sources.values() for s in found]
+    def listing(self, *, compiling: bool = False) -> list[PluginInfo]:
+        """Every type with its state; loads each in its own guard and raises nothing.
+
+        Args:
+            compiling: whether the kernels of types from other packages are compiled as well, which
+                takes a second a type the first time.
+        """
+        infos = [(s, self._info(s, found)) for found in self.sources.values() for s in found]
+        if not compiling:
+            return [info for _, info in infos]
+        return [self._compiled(s, info) for s, info in infos]
 
     def with_file(self, path: str | Path) -> "Registry":
         """A registry that has the types of a model's own Python file as well. Runs that file.
@@ -142,6 +153,17 @@ class Registry:
             state,
             reason,
         )
+
+    def _compiled(self, source: Source, info: PluginInfo) -> PluginInfo:
+        """What is to be said of a type after its kernels were compiled; dap3d's own are tested."""
+        found = self._loaded.get(source)
+        if info.state != "ok" or info.distribution == OWN or not isinstance(found, Examined):
+            return info
+        try:
+            compile_kernels(source, found, self.notes)
+        except PluginError as error:
+            return attrs.evolve(info, state="broken", reason=str(error))
+        return info
 
     def _unknown(self, kind: str, keyword: str) -> UnknownTypeError:
         known = self.keywords(kind)

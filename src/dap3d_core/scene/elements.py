@@ -246,6 +246,7 @@ class Reader:
                 positive=spec.positive,
                 minimum=spec.minimum,
                 maximum=spec.maximum,
+                whole=spec.whole,
             )
             if spec.unit == "rad" and not isinstance(found, Fault) and abs(found) > TURN:
                 key = f"{self.table}.{work.element.name}.{field.name}"

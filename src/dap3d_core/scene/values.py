@@ -133,6 +133,7 @@ def bounded(
     positive: bool = False,
     minimum: float | None = None,
     maximum: float | None = None,
+    whole: bool = False,
 ) -> float | Fault:
     """A number within its limits, or what is wrong."""
     if isinstance(number, Fault):
@@ -143,6 +144,8 @@ def bounded(
         return Fault(f"should be at least {minimum:g}")
     if maximum is not None and number > maximum:
         return Fault(f"should be at most {maximum:g}")
+    if whole and number != round(number):
+        return Fault("should be a whole number")
     return number
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from dap3d_core.interface.writer import LOOP_KINDS
 from dap3d_core.kernels.cache import jit_is_on, reached
+from dap3d_core.kernels.reasons import why_not_compiled
 from dap3d_core.testing.comparing import Comparison, Wrong, left_out
 from dap3d_core.testing.subject import Subject, UndefinedError
 from dap3d_core.testing.verdict import Outcome
@@ -74,12 +75,10 @@ def _compare_compiled(c: Comparison, subject: Subject, kind: str) -> None:
         try:
             found = subject.kernels.compiled_values(kind, sample.element, sample.state)
         except Exception as error:
-            said = [line for line in str(error).splitlines() if line.strip()] or [
-                type(error).__name__
-            ]
+            reason = why_not_compiled(error, subject.examined.kernels.values())
             c.kernel = kind
             c.fail(
-                f"numba cannot compile the kernels of its loop ({kind}): {said[0]}; a kernel is "
+                f"numba cannot compile the kernels of its loop ({kind}): {reason}; a kernel is "
                 "plain: tuples of numbers, the words of dap3d_core.kernels, where() for branches"
             )
             return

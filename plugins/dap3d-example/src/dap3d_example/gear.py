@@ -1,0 +1,47 @@
+"""Gear pair: two wheels with teeth, and the carrier that their bearings are fixed to."""
+
+from dap3d_core.interface import Body, Joint, Vector, body, choice, hookimpl, number, vector
+from dap3d_example.turning import references, turned_by, wrapped
+
+interface_version = 1
+
+
+class Gear(Joint):
+    """Gears i and j, which turn against the carrier k about their axes, stay in mesh.
+
+    theta_i and theta_j are the angles of the gears against the carrier about a_i and a_j, zero in
+    the poses as given, z_i and z_j their numbers of teeth. One row, the angle of gear i:
+
+        C = wrapped(z_i theta_i + s z_j theta_j) / z_i
+
+    with s = 1 for teeth outside on both gears, s = -1 where one gear is a ring with its teeth
+    inside. Whole turns of a gear are whole numbers of teeth, so no turns need be counted: what is
+    wrapped into (-pi, pi], half a tooth, is the error alone. J and gamma are derived from C.
+
+    The bearings are joints of their own. With bevel gears a_i and a_j differ in direction; with
+    a_i and a_j both pointing away from the meeting point of the axes s = 1 is right.
+    """
+
+    keyword, rows = "gear", 1
+    a_i: Vector = vector(doc="axis of gear i, on that gear")
+    a_j: Vector = vector(doc="axis of gear j, on that gear, or on ground for a fixed ring")
+    body_k: Body = body(default="ground", doc="carrier, which holds the bearings of both")
+    teeth_i: float = number(minimum=1.0, whole=True, doc="number of teeth of gear i")
+    teeth_j: float = number(minimum=1.0, whole=True, doc="number of teeth of gear j")
+    mesh: str = choice(("external", "internal"), "external", doc="internal: one gear is a ring")
+
+    def prepare(self, bodies):
+        e, f, u = references(self.a_i, bodies["i"], bodies["k"])
+        n, m, v = references(self.a_j, bodies["j"], bodies["k"])
+        sense = 1.0 if self.mesh == "external" else -1.0
+        return {"e_i": e, "f_i": f, "u_k": u, "n_j": n, "m_j": m, "v_k": v, "sense": sense}
+
+    def C(e_i, f_i, u_k, n_j, m_j, v_k, teeth_i, teeth_j, sense):
+        theta_i, theta_j = turned_by(e_i, f_i, u_k), turned_by(n_j, m_j, v_k)
+        return wrapped(teeth_i * theta_i + sense * teeth_j * theta_j) / teeth_i
+
+
+@hookimpl
+def dap3d_joints():
+    """The joint types of this module."""
+    return [Gear]

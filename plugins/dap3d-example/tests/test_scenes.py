@@ -1,0 +1,143 @@
+"""Each scene against its closed form (docs/ derives them).
+
+Tolerances follow from the run's own, rtol 1e-10, but where the closed form itself is one of small
+motions: that is said there.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+
+SCENES = Path(__file__).parents[1] / "scenes"
+
+
+def run(name, **changes):
+    """The result of a scene of this package, run precisely."""
+    scene = dap.load(SCENES / f"{name}.toml")
+    return dap.simulate(scene, **({"rtol": 1e-10, "atol": 1e-12} | changes))
+
+
+def test_a_nut_sinks_slowly():
+    """m a + J (2 pi / pitch)^2 a = m g, and the nut turns 2 pi x / pitch, 77 times."""
+    result = run("screw")
+    a = 9.81 / (1.0 + 2e-4 * (2.0 * np.pi / 0.01) ** 2 / 0.5)
+    x = -0.5 * a * result.t**2
+    np.testing.assert_allclose(result.r[:, 0, 2], x, atol=1e-9)
+    np.testing.assert_allclose(result.w[:, 0, 2], -2.0 * np.pi / 0.01 * a * result.t, rtol=1e-8)
+    turned = 2.0 * np.pi * x / 0.01
+    np.testing.assert_allclose(np.abs(result.p[:, 0, 0]), np.abs(np.cos(turned / 2)), atol=1e-6)
+
+
+def test_a_planetary_gear_divides_speed_and_adds_up_inertia():
+    """Willis: w_c = w_s z_s / (z_s + z_r); the inertia at the sun sums ratio^2 J."""
+    result = run("gear")
+    sun, carrier, planet = (result.w[:, k, 2] for k in range(3))
+    of_carrier = 20 / (20 + 100)
+    of_planet = of_carrier - 20 / 40 * (1.0 - of_carrier)
+    inertia = 2e-3 + of_carrier**2 * (2e-2 + 0.4 * 0.06**2) + of_planet**2 * 5e-4
+    np.testing.assert_allclose(sun, 0.05 / inertia * result.t, rtol=1e-9)
+    np.testing.assert_allclose(carrier, of_carrier * sun, rtol=1e-9)
+    np.testing.assert_allclose(planet, of_planet * sun, rtol=1e-9)
+    assert 0.5 * sun[-1] * result.t[-1] > 10.0 * 2.0 * np.pi, "many turns"
+
+
+def test_a_block_on_a_wedge():
+    """Newton's law for both, along and across the slope: all accelerations are constant."""
+    result = run("point-on-plane")
+    m, M, sine, cosine, g = 1.0, 3.0, 0.6, 0.8, 9.81
+    of_wedge = -m * g * sine * cosine / (M + m * sine**2)
+    along = (M + m) * g * sine / (M + m * sine**2)
+    half = 0.5 * result.t**2
+    np.testing.assert_allclose(result.r[:, 0, 0], of_wedge * half, atol=1e-9)
+    np.testing.assert_allclose(result.r[:, 1, 0], (of_wedge + along * cosine) * half, atol=1e-9)
+    np.testing.assert_allclose(result.r[:, 1, 2], -along * sine * half, atol=1e-9)
+
+
+def test_a_bead_in_a_bowl():
+    """The bottom rises by c x^2 / (2 a^2) + c y^2 / (2 b^2): omega = sqrt(g c) / a and / b.
+
+    The next terms are (amplitude / a)^2, 1e-7 here, times the phase of some 10 rad.
+    """
+    result = run("point-on-surface")
+    for k, semi_axis in enumerate((0.3, 0.2)):
+        omega = np.sqrt(9.81 * 0.15) / semi_axis
+        swing = 1e-3 / omega
+        wanted = swing * np.sin(omega * result.t)
+        np.testing.assert_allclose(result.r[:, 0, k], wanted, atol=1e-5 * swing)
+
+
+def test_a_free_bead_runs_along_a_geodesic():
+    """Joachimsthal: sum(x_k^2 / a_k^4) sum(v_k^2 / a_k^2) is constant along a geodesic, as is |v|.
+
+    On an ellipsoid with three different axes, some 14 times around; to the tolerance of the run
+    1e-11 a step, over some 1e3 steps. A sphere's geodesic is a great circle.
+    """
+    for semi_axes in ((0.3, 0.2, 0.15), (0.2, 0.2, 0.2)):
+        scene = dap.Scene(name="geodesic")
+        scene.add_body("bead", mass=0.1, Jp=(1e-5,) * 3, r=(semi_axes[0], 0.0, 0.0),
+                       r_dot=(0.0, 0.6, 0.8))  # fmt: skip
+        a, b, c = semi_axes
+        pole = scene.add_point("pole", "ground", (0.0, 0.0, -c))  # the centre is the origin
+        scene.add_joint("point-on-surface", P_i="bead.O", P_j=pole, a=a, b=b, c=c)
+        result = dap.simulate(scene, t_end=20.0, dt=0.1, rtol=1e-11, atol=1e-13)
+        x, v, s = result.r[:, 0], result.rd[:, 0], np.array(semi_axes)
+        np.testing.assert_allclose(np.sum((x / s) ** 2, axis=1), 1.0, atol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(v, axis=1), 1.0, atol=1e-8)
+        invariant = np.sum(x**2 / s**4, axis=1) * np.sum(v**2 / s**2, axis=1)
+        np.testing.assert_allclose(invariant, invariant[0], rtol=1e-7)
+    angle = result.t / 0.2
+    circle = 0.2 * np.column_stack([np.cos(angle), 0.6 * np.sin(angle), 0.8 * np.sin(angle)])
+    np.testing.assert_allclose(x, circle, atol=1e-7)
+
+
+MASS, INERTIA = 120.0, (4.0, 8.0, 9.0)
+STIFF_T, STIFF_R = (2e5, 2e5, 6e5), (1500.0, 1500.0, 900.0)
+DAMP_T, DAMP_R = (400.0, 400.0, 900.0), (8.0, 8.0, 6.0)
+
+
+def damped(t, mass, c, k, speed):
+    """Displacement of m x'' + c x' + k x = 0 from x = 0 with a speed."""
+    decay = c / (2.0 * mass)
+    omega = np.sqrt(k / mass - decay**2)
+    return speed / omega * np.exp(-decay * t) * np.sin(omega * t)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_bushing_swings_in_each_of_six_directions(axis):
+    """A shift along an axis and a turn about it are two damped oscillators, for any angle."""
+    scene = dap.load(SCENES / "bushing.toml")
+    along = np.eye(3)[axis]
+    scene.bodies["engine"].r_dot, scene.bodies["engine"].w = 0.5 * along, 12.0 * along
+    result = dap.simulate(scene, rtol=1e-10, atol=1e-12)
+    x = damped(result.t, MASS, DAMP_T[axis], STIFF_T[axis], 0.5)
+    angle = damped(result.t, INERTIA[axis], DAMP_R[axis], STIFF_R[axis], 12.0)
+    assert np.max(np.abs(angle)) > 0.5, "not a small one"
+    np.testing.assert_allclose(result.r[:, 0, axis], x, atol=1e-9)
+    np.testing.assert_allclose(result.p[:, 0, 1 + axis], np.sin(angle / 2), atol=1e-8)
+
+
+def test_a_motor_at_its_limit():
+    """J e' = -T tanh(k e / T) for the error e of the speed: sinh(k e / T) ~ exp(-k t / J)."""
+    result = run("motor")
+    start = np.sinh(0.5 * 20.0 / 2.0)
+    error = 2.0 / 0.5 * np.arcsinh(start * np.exp(-0.5 / 0.1 * result.t))
+    np.testing.assert_allclose(result.w[:, 0, 2], 20.0 - error, atol=1e-7)
+
+
+def test_a_controller_with_integral_part():
+    """J e'' + gain e' + integral e = 0 for the error e of the angle, e' = 20 at the start.
+
+    The limit is 5e4 times the torque needed: it changes the torque by 1e-10 of it.
+    """
+    result = run("motor")
+    gain, integral, inertia = 0.1, 0.5, 0.02
+    decay = gain / (2.0 * inertia)
+    omega = np.sqrt(integral / inertia - decay**2)
+    t = result.t
+    wave = np.cos(omega * t) - decay / omega * np.sin(omega * t)
+    np.testing.assert_allclose(
+        result.w[:, 1, 2], 20.0 - 20.0 * np.exp(-decay * t) * wave, atol=1e-7
+    )

@@ -1,0 +1,261 @@
+"""Proof from outside: wheels in a fresh environment, with good and with broken packages.
+
+dap3d and every plugin are truly installed from wheels. What they depend on is lent from the
+environment of the tests, package by package, without anything of dap3d: to download numba, scipy
+and the rest again would take minutes and prove nothing. Nothing of the working tree can be reached.
+"""
+
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import venv
+import zipfile
+from math import exp, sin
+from pathlib import Path
+
+import pytest
+from support.process import REPOSITORY
+
+pytestmark = pytest.mark.slow
+
+#: What pip says where it can reach no index.
+NO_INDEX = ("Could not find a version", "No matching distribution", "Could not install")
+
+
+def shell(**variables):
+    """The environment of a shell that knows nothing of the tests."""
+    ours = ("DAP3D_", "NUMBA_", "COVERAGE_", "PYTHON", "COLUMNS")
+    return {k: v for k, v in os.environ.items() if not k.startswith(ours)} | variables
+
+
+def pip(*arguments):
+    """Run the pip of the tests; skip where it would need an index that is not there."""
+    done = subprocess.run(
+        [sys.executable, "-m", "pip", "--disable-pip-version-check", *map(str, arguments)],
+        env=shell(), capture_output=True, text=True,
+    )  # fmt: skip
+    if done.returncode and any(words in done.stderr for words in NO_INDEX):
+        pytest.skip("no package index is in reach, and hatchling is not installed here")
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def build(source, wheels):
+    """Make a wheel of a source folder."""
+    isolated = ["--no-build-isolation"] if importlib.util.find_spec("hatchling") else []
+    pip("wheel", "--quiet", "--no-deps", *isolated, "--wheel-dir", wheels, source)
+
+
+class Outside:
+    """A virtual environment and a folder to work in."""
+
+    def __init__(self, folder):
+        self.folder, self.wheels = folder / "work", folder / "wheels"
+        self.folder.mkdir()
+        self.cache = folder / "cache"
+        venv.create(folder / "venv", symlinks=True)
+        scripts = "Scripts" if os.name == "nt" else "bin"
+        self.bin = folder / "venv" / scripts
+        self.python = self.bin / Path(sys.executable).name
+        if not self.python.exists():
+            self.python = self.bin / "python"
+        self._lend_dependencies(folder / "dependencies")
+
+    def _lend_dependencies(self, folder):
+        folder.mkdir()
+        for entry in Path(sysconfig.get_path("purelib")).iterdir():
+            if "dap3d" not in entry.name.lower() and entry.suffix != ".pth":
+                (folder / entry.name).symlink_to(entry)
+        site = self.run(self.python, "-c", "import site; print(site.getsitepackages()[0])").stdout
+        Path(site.strip(), "lent.pth").write_text(f"{folder}\n")
+
+    def run(self, *words, code=0, cwd=None):
+        """Run a program there; it ends with this code and never with a traceback."""
+        env = shell(DAP3D_CACHE_DIR=str(self.cache), MPLBACKEND="Agg")
+        done = subprocess.run(
+            list(map(str, words)), cwd=cwd or self.folder, env=env, capture_output=True, text=True,
+            timeout=300,
+        )  # fmt: skip
+        assert "Traceback" not in done.stderr, done.stderr
+        assert done.returncode == code, done.stdout + done.stderr
+        return done
+
+    def dap3d(self, *words, **options):
+        """Run its dap3d."""
+        return self.run(self.bin / "dap3d", *words, **options)
+
+    def install(self, *wheels):
+        """Install wheels there, as they are."""
+        pip("--python", self.python, "install", "--quiet", "--no-deps", "--no-index", *wheels)
+
+    def plugins(self):
+        """What ``dap3d plugins`` says, by keyword and distribution."""
+        found = json.loads(self.dap3d("plugins", "--json").stdout)["types"]
+        return {(t["keyword"], t["distribution"]): t for t in found}
+
+
+def environment_of_a_user(folder):
+    """An environment with dap3d and dap3d-example from their wheels, and a plugin of a user."""
+    there = Outside(folder)
+    build(REPOSITORY, there.wheels)
+    build(REPOSITORY / "plugins" / "dap3d-example", there.wheels)
+    there.install(*there.wheels.iterdir())
+    # a user writes one more
+    there.dap3d("new-plugin", "rope", "--kind", "force")
+    build(there.folder / "dap3d-rope", there.wheels)
+    there.install(*there.wheels.glob("dap3d_rope-*"))
+    return there
+
+
+def the_wheels_hold_what_they_should_and_no_more(outside):
+    names = {}
+    for wheel in outside.wheels.iterdir():
+        with zipfile.ZipFile(wheel) as archive:
+            names[wheel.name.partition("-")[0]] = {n.partition("/")[0] for n in archive.namelist()}
+            if wheel.name.startswith("dap3d-"):
+                assert "dap3d_core/cli/templates/joint/type.txt" in archive.namelist()
+    own = {"dap3d_core", "dap3d_joints", "dap3d_forces", "dap3d_functions"}
+    assert {n for n in names["dap3d"] if "dist-info" not in n} == own
+    assert {n for n in names["dap3d_example"] if "dist-info" not in n} == {"dap3d_example"}
+
+
+def nothing_of_the_working_tree_is_reached(outside):
+    script = "import dap3d_core, dap3d_joints, dap3d_example, sys; print(dap3d_core.__file__)"
+    script += "; print(dap3d_joints.__file__); print(dap3d_example.__file__); print(sys.path)"
+    said = outside.run(outside.python, "-c", script).stdout
+    assert str(REPOSITORY) not in said
+    assert said.count(str(outside.folder.parent)) >= 3
+
+
+def a_plugin_that_was_written_there_is_checked_and_its_scene_runs(outside):
+    package = outside.folder / "dap3d-rope"
+    said = outside.dap3d("check-plugin", "rope", "screw").stdout
+    assert "2 types checked: nothing is wrong" in said
+    outside.dap3d("run", "scene.toml", "-o", "rope.nc", cwd=package)
+    script = "import dap3d_core as dap; r = dap.open('rope.nc'); print(r.r[-1, 0, 2])"
+    z = float(outside.run(outside.python, "-c", script, cwd=package).stdout)
+    # m z'' + c z' + k z = 0 about the place of rest, after 2 s; rtol of a run is 1e-8
+    decay, t = 4.0 / (2.0 * 2.0), 2.0
+    omega = (200.0 / 2.0 - decay**2) ** 0.5
+    assert z == pytest.approx(-1.0981 + 0.5 / omega * exp(-decay * t) * sin(omega * t), abs=1e-5)
+
+
+FORCE = """
+from dap3d_core.interface import Body, Force, body, hookimpl, number
+import {imported}
+
+interface_version = {version}
+
+
+class Push(Force):
+    \"\"\"A constant push along x.\"\"\"
+
+    keyword = "{keyword}"
+    body_i: Body = body()
+    k: float = number(default=1.0)
+
+    def wrench(k):
+        f = {formula}
+        return (((f, 0.0, 0.0), (0.0, 0.0, 0.0)),)
+
+
+@hookimpl
+def {hook}():
+    return [Push]
+"""
+
+#: What is broken -> what stands in the module, and what ``dap3d plugins`` says of it.
+BROKEN = {
+    "import-error": (
+        {"imported": "no_such_package"},
+        "broken",
+        "No module named 'no_such",
+    ),
+    "wrong-hook": ({"hook": "dap3d_force"}, "broken", "unknown hook 'dap3d_force'"),
+    "weight": ({}, "duplicate", "distribution dap3d 0.1.0"),
+    "old-version": ({"version": "0"}, "broken", "written for interface version 0"),
+    "not-compiled": ({"formula": "float('{}'.format(k))"}, "broken", "numba cannot compile"),
+}
+
+
+def wheel_of(folder, keyword, changes):
+    """A wheel with one module that brings a force."""
+    values = {"imported": "math", "version": "1", "formula": "k", "hook": "dap3d_forces"}
+    module = f"broken_{keyword}".replace("-", "_")
+    info = f"{module}-1.0.dist-info"
+    members = {
+        f"{module}.py": FORCE.format(keyword=keyword, **(values | changes)),
+        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: broken-{keyword}\nVersion: 1.0\n",
+        f"{info}/WHEEL": "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+        f"{info}/entry_points.txt": f"[dap3d.forces]\n{keyword} = {module}\n",
+    }
+    members[f"{info}/RECORD"] = "".join(f"{m},,\n" for m in (*members, f"{info}/RECORD"))
+    path = folder / f"{module}-1.0-py3-none-any.whl"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in members.items():
+            archive.writestr(name, text)
+    return path
+
+
+SCENE = """
+[bodies.stone]
+mass = 1.0
+Jp = [1.0, 1.0, 1.0]
+
+[forces.push]
+type = "{}"
+body_i = "stone"
+
+[simulation]
+t_end = 0.1
+dt = 0.1
+"""
+
+
+def broken_packages_break_nothing_else_and_are_explained(outside, folder):
+    before = outside.plugins()
+    assert {t["state"] for t in before.values()} == {"ok"}
+    outside.install(*(wheel_of(folder, keyword, c) for keyword, (c, _, _) in BROKEN.items()))
+    after = outside.plugins()
+    for keyword, (_, state, reason) in BROKEN.items():
+        found = after[keyword, f"broken-{keyword}"]
+        assert found["state"] == state
+        assert reason in found["reason"]
+        assert f"broken-{keyword}" in found["reason"]
+        assert "\n" not in found["reason"]
+    for key in before:
+        assert after[key]["state"] == ("duplicate" if key[0] == "weight" else "ok")
+    assert "not usable" in outside.dap3d("plugins").stdout
+
+    outside.dap3d("check-plugin", "rope", "-q")
+    package = shutil.copytree(outside.folder / "dap3d-rope", folder / "rope")
+    scene = (package / "scene.toml").read_text()
+    said = outside.dap3d("run", "scene.toml", code=2, cwd=package).stderr
+    assert "DAP3D_BLOCK=broken-weight" in said, "two packages bring weight; says what to do"
+    (package / "scene.toml").write_text(
+        scene.replace('type = "weight"', 'type = "f"').replace(
+            "gravity = 9.81\nwgt = [0.0, 0.0, -1.0]", 'body_i = "weight"\nf = [0.0, 0.0, -19.62]'
+        )
+    )
+    outside.dap3d("run", "scene.toml", cwd=package)
+
+
+def a_kernel_that_numba_cannot_compile_ends_a_run_with_one_message(outside, folder):
+    (folder / "scene.toml").write_text(SCENE.format("not-compiled"))
+    said = outside.dap3d("run", "scene.toml", code=2, cwd=folder).stderr
+    assert "numba cannot compile its kernels (not-compiled: wrench)" in said
+    assert "broken_not_compiled.py:" in said, "the line"
+
+
+def test_from_outside(tmp_path):
+    """All of the above, in one environment: what is compiled there takes most of the time."""
+    outside, folder = environment_of_a_user(tmp_path), tmp_path / "more"
+    folder.mkdir()
+    the_wheels_hold_what_they_should_and_no_more(outside)
+    nothing_of_the_working_tree_is_reached(outside)
+    a_plugin_that_was_written_there_is_checked_and_its_scene_runs(outside)
+    broken_packages_break_nothing_else_and_are_explained(outside, folder)
+    a_kernel_that_numba_cannot_compile_ends_a_run_with_one_message(outside, folder)

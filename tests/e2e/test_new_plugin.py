@@ -1,0 +1,142 @@
+"""``dap3d new-plugin``: what it writes works, and what it cannot write is refused with a reason."""
+
+import json
+import shutil
+import subprocess
+import sys
+import tomllib
+
+import pytest
+from click.testing import CliRunner
+from support.process import environment
+
+from dap3d_core.cli.group import dap3d as group
+from dap3d_core.registry import load_registry
+
+KINDS = ("joint", "force", "function")
+
+
+def new_plugin(folder, *words):
+    """Run the command, not in a process of its own, which would take longer; what it says."""
+    done = CliRunner().invoke(group, ["new-plugin", *map(str, words), "-o", str(folder)])
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_package_is_complete(kind, tmp_path):
+    """An entry point that names a module with a type of this keyword, a scene, a README, tests."""
+    folder = tmp_path / "here"
+    words = ("My.own-Type", "--kind", kind, "--author", 'A "B" Ç')
+    said = new_plugin(folder, *words)
+    files = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
+    module = "dap3d_my_own_type"
+    assert files == {"pyproject.toml", "README.md", "scene.toml", f"src/{module}/__init__.py",
+                     "tests/test_my_own_type.py"}  # fmt: skip
+    assert all(name in said for name in files)
+    project = tomllib.loads((folder / "pyproject.toml").read_text())
+    assert project["project"]["name"] == "dap3d-my-own-type"
+    assert project["project"]["authors"] == [{"name": 'A "B" Ç'}]
+    assert project["project"]["entry-points"] == {f"dap3d.{kind}s": {"My.own-Type": module}}
+    (dependency,) = project["project"]["dependencies"]
+    registry = load_registry().with_file(folder / "src" / module / "__init__.py")
+    examined = registry.get(kind, "My.own-Type")
+    assert bool(examined.derived) == dependency.startswith("dap3d[derive]>=")
+    assert examined.type.__name__ == "MyOwnType"
+    assert "My.own-Type" in (folder / "scene.toml").read_text()
+    for name in files:
+        assert "$" not in (folder / name).read_text(), name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_tests_of_the_package_pass(kind, tmp_path):
+    """Those that it brings: the kit, and the scene against its closed form.
+
+    The type is found as plugin.py of the scene's folder: nothing is installed here.
+    """
+    folder = tmp_path / "package"
+    new_plugin(folder, "mine", "--kind", kind)
+    shutil.copy(folder / "src" / "dap3d_mine" / "__init__.py", folder / "plugin.py")
+    test = folder / "tests" / "test_mine.py"
+    text = test.read_text()
+    assert "dap.simulate(scene, rtol" in text
+    test.write_text(text.replace("dap.simulate(scene, ", "dap.simulate(scene, allow_code=True, "))
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests"],
+        cwd=folder, env=environment(PYTHONPATH=_path(folder / "src")), capture_output=True,
+        text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def _path(folder):
+    import os
+
+    before = os.environ.get("PYTHONPATH")
+    return os.pathsep.join([str(folder), *([before] if before else [])])
+
+
+@pytest.mark.parametrize(
+    ("name", "class_name"),
+    [("3bar", "Joint3bar"), ("joint", "JointJoint"), ("none", "NoneJoint"), ("a", "A"),
+     ("sphere_2", "Sphere2")],
+)  # fmt: skip
+def test_every_keyword_makes_a_class(name, class_name, tmp_path):
+    """Also those that start with a digit, or whose class would hide a name."""
+    new_plugin(tmp_path / "p", name)
+    file = tmp_path / "p" / "src" / f"dap3d_{name}" / "__init__.py"
+    assert load_registry().with_file(file).get("joint", name).type.__name__ == class_name
+
+
+@pytest.mark.parametrize("name", ["", "-a", "a-", "a b", "a/b", "..", "ä", "a=b", "a" * 61, "a\nb"])
+def test_a_name_that_is_no_keyword_is_refused(refuse, dap3d, name):
+    said = refuse("new-plugin", "--", name)
+    assert "letters, digits" in said
+    assert list(dap3d.folder.iterdir()) == []
+
+
+def test_a_keyword_that_is_taken_is_refused_and_may_be_forced(refuse, dap3d):
+    said = refuse("new-plugin", "sph")
+    for words in ("joint type 'sph'", "distribution dap3d", "--force"):
+        assert words in said
+    new_plugin(dap3d.folder / "forced", "sph", "--force")
+    new_plugin(dap3d.folder / "other", "sph", "--kind", "force")  # scenes tell them apart
+
+
+def test_modules_of_dap3d_are_never_replaced(refuse):
+    for name in ("core", "joints"):
+        assert "in the way of dap3d's own" in refuse("new-plugin", name, "--force")
+
+
+def test_a_folder_that_holds_files_is_refused_and_kept(refuse, dap3d):
+    folder = dap3d.folder / "dap3d-mine"
+    folder.mkdir()
+    (folder / "notes.txt").write_text("mine")
+    assert "--force" in refuse("new-plugin", "mine")
+    assert "-o" in refuse("new-plugin", "mine", "-o", folder / "notes.txt")
+    new_plugin(folder, "mine", "--force")
+    assert (folder / "notes.txt").read_text() == "mine"
+    new_plugin(dap3d.folder / "a" / "b", "mine")
+
+
+def test_an_author_of_two_lines_is_refused(refuse):
+    assert "one line" in refuse("new-plugin", "mine", "--author", "a\nb")
+
+
+def test_json(tmp_path):
+    found = json.loads(new_plugin(tmp_path / "p", "mine", "--kind", "function", "--json"))
+    assert found["keyword"] == "mine"
+    assert found["kind"] == "function"
+    assert found["folder"] == str(tmp_path / "p")
+    assert found["module"] == "dap3d_mine"
+    assert set(found["files"]) >= {"pyproject.toml", "scene.toml"}
+    assert found["next"][2] == "dap3d check-plugin mine"
+
+
+def test_what_it_says_fits_60_columns(tmp_path, monkeypatch):
+    """But for the folder, which has a line of its own."""
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(group, ["new-plugin", "mine"], env={"COLUMNS": "60"})
+    assert done.exit_code == 0, done.output
+    assert max(map(len, done.output.splitlines())) <= 60
