@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     )
     from dap3d_core.simulation import compile_scene as compile
     from dap3d_core.simulation import open_result as open
+    from dap3d_core.view import view
 
 _HOMES = {
     "AssemblyError": ("simulation", "AssemblyError"),
@@ -47,6 +48,7 @@ _HOMES = {
     "report": ("report", "report"),
     "shipped_models": ("scene", "shipped_models"),
     "simulate": ("simulation", "simulate"),
+    "view": ("view", "view"),
 }
 
 __all__ = [
@@ -67,6 +69,7 @@ __all__ = [
     "report",
     "shipped_models",
     "simulate",
+    "view",
 ]
 
 
@@ -75,7 +78,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     floor, attribute = _HOMES[name]
     value = getattr(import_module(f"dap3d_core.{floor}"), attribute)
-    if name not in ("plot", "report"):  # modules of these names stand beside them
+    if name not in ("plot", "report", "view"):  # modules of these names stand beside them
         globals()[name] = value
     return value
 

@@ -193,6 +193,30 @@ def test_the_steps_of_a_page(page, tmp_path, monkeypatch):
     assert follow(page, tmp_path)
 
 
+@pytest.mark.slow
+def test_the_page_on_looking_at_results(tmp_path):
+    """Its commands in their order, its script, and its scene with shapes."""
+    text = (REPOSITORY / "docs" / "view.md").read_text()
+    found = commands(text, "dap3d")
+    assert [words[0] for words in found] == ["run", "view", "view", "run", "view"]
+    (scene,) = blocks(text, "toml")
+    (tmp_path / "pendulum.toml").write_text(scene)
+    found += [["run", "pendulum.toml", "-o", "pendulum.nc"], ["view", "pendulum.nc"]]
+    for words in found:
+        done = dap3d(words, tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert "not drawn" not in done.stderr
+    (script,) = blocks(text, "python")
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=tmp_path, env=environment(), capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    pages = sorted(page.name for page in tmp_path.glob("*.html"))
+    assert pages == ["ball1.html", "crank.html", "fourbar3-again.html", "fourbar3.html",
+                     "pendulum.html"]  # fmt: skip
+
+
 def test_the_first_commands_of_the_readme_are_targets():
     """The two commands at the top exist in the Makefile."""
     text = (REPOSITORY / "README.md").read_text()

@@ -58,3 +58,13 @@ def test_a_model_loads_only_its_own_types(model, present, absent):
     if model == "bodies2":
         assert not {"acceleration", "position"} & set(lines[-2].split())
         assert "dap3d_core.formulations.standard" not in found
+
+
+def test_a_page_needs_neither_matplotlib_nor_a_reader_of_meshes():
+    """``dap.view`` of a scene without meshes imports nothing for plots in files, or for meshes."""
+    script = (
+        "import dap3d_core as dap\n"
+        "result = dap.simulate('bodies2', t_end=0.04, dt=0.02)\n"
+        "assert dap.view(result).html\n"
+    )
+    assert not imported(script) & {"matplotlib", "trimesh", "netCDF4", "xarray", "rich", "click"}

@@ -87,6 +87,7 @@ def dap3d(debug: bool) -> None:
     dap3d models                  what there is to try
     dap3d run pen1                simulate, write pen1.nc
     dap3d plot pen1.nc cone.r.z   draw a curve of it
+    dap3d view pen1.nc --open     look at the moving scene
 
     MODEL is the name of a shipped model, a folder with a scene.toml, or a TOML file. RESULT is a
     file that run wrote.
@@ -144,10 +145,11 @@ def _add_commands() -> None:
     from dap3d_core.cli.post import post
     from dap3d_core.cli.report import report
     from dap3d_core.cli.run import run
+    from dap3d_core.cli.view import view
 
-    commands = (run, check, models, plugins, describe, new_plugin, check_plugin, info, post,
-                plot, report, import_matlab)  # fmt: skip
-    for command in commands:
+    analysis = (info, post, plot, view, report)
+    authors = (describe, new_plugin, check_plugin)
+    for command in (run, check, models, plugins, *authors, *analysis, import_matlab):
         dap3d.add_command(command)
 
 

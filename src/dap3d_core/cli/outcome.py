@@ -87,7 +87,8 @@ def _show_all(console: Terminal, outcome: Outcome, found: dict[str, Any], target
     name = shlex.quote(str(target))
     body = outcome.result.subject.body_names[0]
     quantity = shlex.quote(f"{body}.r")
-    for line in (f"dap3d plot {name} {quantity}", f"dap3d info {name}"):
+    plot, view = f"dap3d plot {name} {quantity}", f"dap3d view {name} --open"
+    for line in (plot, view, f"dap3d info {name}"):
         say(console, line, "green", indent=2, whole=True)
 
 

@@ -42,6 +42,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Chec
     forces = read_elements(report, geometry, "forces", types.of("forces"))
     report_twins(report, "joints", joints)
     report_twins(report, "forces", forces)
+    _check_shapes(report, bodies)
     report.extend(header_mistakes(scene))
     report.extend(simulation_mistakes(scene.simulation, bodies.names, ("simulation",)))
     report.raise_mistakes()
@@ -81,6 +82,13 @@ def _check_names(report: Collector) -> None:
             if fault := fault_of_name(name):
                 key = (table, str(name))
                 report.add(key, name, f"not a name for one of the {table}: {fault}")
+
+
+def _check_shapes(report: Collector, bodies: "Bodies") -> None:
+    if report.scene.shapes:
+        from dap3d_core.scene.shapes import read_shapes
+
+        read_shapes(report, bodies.index)
 
 
 def _note_loose_bodies(report: Collector, bodies: "Bodies", elements: list[Instance]) -> None:

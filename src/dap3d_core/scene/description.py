@@ -11,6 +11,7 @@ import attrs
 
 from dap3d_core.registry.spelling import nearest
 from dap3d_core.scene.mistakes import Key, Mistake, SceneError
+from dap3d_core.scene.plain import plain
 
 #: The newest version of the scene file that this program reads.
 SCHEMA = 1
@@ -19,43 +20,6 @@ GROUND = "ground"
 
 ZERO = (0.0, 0.0, 0.0)
 NO_TURN = (1.0, 0.0, 0.0, 0.0)
-
-_PLAIN = frozenset({float, int, str, bool, type(None)})
-
-
-def plain(value: Any) -> Any:
-    """A value as plain Python: arrays and lists become tuples, numpy's numbers Python's.
-
-    Arrays of objects are left as they are, for ``check`` to refuse.
-    """
-    kind = type(value)
-    if kind in _PLAIN:
-        return value
-    if kind is tuple:
-        for v in value:
-            if type(v) not in _PLAIN:
-                break
-        else:
-            return value
-    if kind is list or kind is tuple:
-        return tuple([v if type(v) in _PLAIN else plain(v) for v in value])
-    if kind is dict:
-        return {k: plain(v) for k, v in value.items()}
-    if hasattr(value, "tolist"):
-        return _of_array(value)
-    for base in (str, float, int):
-        if isinstance(value, base):
-            return base.__str__(value) if base is str else base(value)
-    return plain(list(value)) if isinstance(value, (list, tuple)) else value
-
-
-def _of_array(value: Any) -> Any:
-    """An array or a number of numpy as plain Python; arrays of objects as they are."""
-    sort = getattr(getattr(value, "dtype", None), "kind", "")
-    listed = value if sort == "O" else value.tolist()
-    if type(listed) is not type(value):
-        return plain(listed)
-    return float(listed) if sort == "f" else listed  # long doubles stay what they are
 
 
 @attrs.define
@@ -112,7 +76,7 @@ class Vector2:
 
 @attrs.define
 class Element:
-    """A joint, a force or a function: its name, the keyword of its type, its fields as written."""
+    """A joint, force, function or shape: its name, the keyword of its type, its fields."""
 
     name: str
     type: Any = None
@@ -185,6 +149,7 @@ NAMED: dict[str, type] = {
     "joints": Element,
     "forces": Element,
     "functions": Element,
+    "shapes": Element,
 }
 TABLES = ("scene", *NAMED, "animation", "simulation")
 
@@ -196,7 +161,8 @@ class Scene:
     Attributes:
         name, description: for people.
         schema: version of the file format.
-        bodies, points, vectors, vectors2, joints, forces, functions: by name, in file order.
+        bodies, points, vectors, vectors2, joints, forces, functions, shapes: by name, in file
+            order.
         animation, simulation: what is drawn; settings of a run.
         path: the file this was read from, or None.
         faults: what reading could not place (unknown keys, wrong tables); ``check`` reports it.
@@ -213,6 +179,7 @@ class Scene:
     joints: dict[str, Element] = attrs.Factory(dict)
     forces: dict[str, Element] = attrs.Factory(dict)
     functions: dict[str, Element] = attrs.Factory(dict)
+    shapes: dict[str, Element] = attrs.Factory(dict)
     animation: Animation = attrs.Factory(Animation)
     simulation: Simulation = attrs.Factory(Simulation)
     path: Path | None = attrs.field(default=None, eq=False)
@@ -304,6 +271,14 @@ class Scene:
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
         return self._add_element("functions", self.functions, type, name, fields)
+
+    def add_shape(self, type: str, name: str | None = None, **fields: Any) -> str:
+        """Add a shape that is drawn (box, sphere, cylinder, cone, disk, line, mesh); its name.
+
+        Raises:
+            SceneError: the name is taken or illegal. Fields are checked with the whole scene.
+        """
+        return self._add_element("shapes", self.shapes, type, name, fields)
 
     def add_animation_point(self, body: str, sPp: Any) -> None:
         """Add a point that is only drawn, at ``sPp`` (3 numbers in the axes of a body, m)."""

@@ -18,10 +18,10 @@ from dap3d_core.scene.description import (
     Scene,
     Simulation,
     keys_of,
-    plain,
     unknown_key,
 )
 from dap3d_core.scene.mistakes import MISSING, Key, Mistake, SceneError, dotted
+from dap3d_core.scene.plain import plain
 
 #: Larger files are refused before they are read.
 LARGEST_FILE = 64 * 2**20

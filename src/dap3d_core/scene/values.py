@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 from dap3d_core.registry.spelling import nearest
-from dap3d_core.scene.description import plain
+from dap3d_core.scene.plain import plain
 
 #: Beyond this size products of two numbers leave double precision.
 LARGEST = 1e100

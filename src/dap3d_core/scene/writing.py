@@ -9,8 +9,9 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.scene.description import NAMED, Element, Scene, plain
+from dap3d_core.scene.description import NAMED, Element, Scene
 from dap3d_core.scene.mistakes import MISSING, Mistake, SceneError
+from dap3d_core.scene.plain import plain
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t", "\r": "\\r"}

@@ -1,0 +1,172 @@
+// Curves over time beside the scene, one panel a unit, with a cursor at the present instant.
+
+const LEFT = 46, RIGHT = 6, TOP = 6, BOTTOM = 18;
+
+class Plots {
+  constructor(box, choice, catalogue, motion, seek) {
+    Object.assign(this, { box, choice, catalogue, motion, seek, panels: [] });
+    const groups = new Map();
+    for (const one of catalogue.values()) {
+      if (!groups.has(one.group)) groups.set(one.group, make("optgroup", "", { label: one.group }));
+      groups.get(one.group).append(make("option", one.name, { value: one.name }));
+    }
+    choice.append(make("option", "Add a curve \u2026", { value: "" }), ...groups.values());
+    choice.addEventListener("change", () => { this.add(choice.value); choice.value = ""; });
+  }
+
+  add(name) {
+    const quantity = this.catalogue.get(name);
+    if (!quantity) return;
+    let panel = this.panels.find((p) => p.unit === quantity.unit);
+    if (!panel) this.panels.push((panel = this.#panel(quantity.unit)));
+    if (panel.quantities.includes(quantity)) return;
+    panel.quantities.push(quantity);
+    this.#keys(panel);
+    this.draw(panel);
+  }
+
+  remove(panel, quantity) {
+    panel.quantities = panel.quantities.filter((q) => q !== quantity);
+    if (!panel.quantities.length) {
+      panel.element.remove();
+      this.panels = this.panels.filter((p) => p !== panel);
+    } else {
+      this.#keys(panel);
+      this.draw(panel);
+    }
+  }
+
+  #panel(unit) {
+    const canvas = make("canvas"), cursor = make("div", "", { class: "cursor" });
+    const frame = make("div", "", { class: "frame" }, canvas, cursor);
+    const keys = make("div", "", { class: "keys" }), top = make("div", "", { class: "top" });
+    const panel = { unit, canvas, cursor, frame, keys, top, quantities: [], curves: [], element: make("div", "", { class: "plot" }, top, frame, keys) };
+    const scrub = (event) => {
+      const share = (event.offsetX - LEFT) / (frame.clientWidth - LEFT - RIGHT);
+      this.seek(this.motion.start + Math.min(Math.max(share, 0), 1) * (this.motion.end - this.motion.start));
+    };
+    frame.addEventListener("pointerdown", (event) => { frame.setPointerCapture(event.pointerId); scrub(event); });
+    frame.addEventListener("pointermove", (event) => { if (event.buttons) scrub(event); });
+    this.box.append(panel.element);
+    return panel;
+  }
+
+  #keys(panel) {
+    panel.curves = panel.quantities.flatMap((q) => q.values().map((values, k) => ({ q, values, name: q.parts.length ? `${q.name}.${q.parts[k]}` : q.name })));
+    panel.keys.replaceChildren(...panel.curves.map((curve, k) => {
+      curve.color = PALETTE[k % PALETTE.length];
+      curve.dash = [[], [6, 3], [2, 2]][Math.floor(k / PALETTE.length) % 3];
+      curve.now = make("b");
+      return make("div", "", { title: curve.q.label }, make("i", "", { style: `background:${curve.color}` }), make("em", curve.name), curve.now);
+    }));
+    const drop = make("button", "\u00d7", { title: "Remove the last curve", "aria-label": "Remove the last curve" });
+    drop.addEventListener("click", () => this.remove(panel, panel.quantities.at(-1)));
+    panel.top.replaceChildren(make("span", panel.unit === "1" ? "" : `[${unitText(panel.unit)}]`), drop);
+  }
+
+  draw(panel) {
+    const { canvas, frame, curves } = panel, ratio = window.devicePixelRatio || 1;
+    const width = frame.clientWidth, height = frame.clientHeight;
+    if (!width) return; // its tab is closed
+    canvas.width = width * ratio;
+    canvas.height = height * ratio;
+    const g = canvas.getContext("2d"), style = getComputedStyle(document.documentElement);
+    g.scale(ratio, ratio);
+    g.font = "11px system-ui, sans-serif";
+    const [low, high] = limits(curves);
+    panel.smallest = 1e-9 * Math.max(Math.abs(low), Math.abs(high)); // less is the rounding of zero
+    const { start, end } = this.motion, span = end - start || 1;
+    const x = (t) => LEFT + ((t - start) / span) * (width - LEFT - RIGHT);
+    const y = (v) => TOP + ((high - v) / (high - low)) * (height - TOP - BOTTOM);
+    g.strokeStyle = style.getPropertyValue("--line");
+    g.fillStyle = style.getPropertyValue("--soft");
+    g.lineWidth = 1;
+    g.textAlign = "right";
+    g.textBaseline = "middle";
+    for (const v of ticks(low, high, 5)) { rule(g, LEFT, y(v), width - RIGHT, y(v)); g.fillText(short(v), LEFT - 5, y(v)); }
+    g.textBaseline = "alphabetic";
+    g.textAlign = "center";
+    for (const t of ticks(start, end, 5)) { rule(g, x(t), TOP, x(t), height - BOTTOM); g.fillText(short(t), Math.min(x(t), width - 12), height - 4); }
+    g.lineWidth = 1.4;
+    g.lineJoin = "round";
+    g.save();
+    g.beginPath();
+    g.rect(LEFT, TOP - 2, width - LEFT - RIGHT, height - TOP - BOTTOM + 4);
+    g.clip();
+    for (const curve of curves) stroke(g, curve, this.motion.t, x, y, width);
+    g.restore();
+    panel.drawn = width;
+    this.update(this.t ?? start);
+  }
+
+  drawAll() {
+    for (const panel of this.panels) this.draw(panel);
+  }
+
+  update(t) {
+    this.t = t;
+    const { start, end } = this.motion, { frame, part } = this.motion.locate(t);
+    const share = (t - start) / (end - start || 1);
+    for (const panel of this.panels) {
+      if (!panel.drawn) continue;
+      panel.cursor.style.left = `${LEFT + share * (panel.drawn - LEFT - RIGHT)}px`;
+      for (const curve of panel.curves) {
+        const next = part > 0 ? curve.values[frame + 1] : 0;
+        const value = curve.values[frame] * (1 - part) + next * part;
+        curve.now.textContent = short(Math.abs(value) < panel.smallest ? 0 : value);
+      }
+    }
+  }
+}
+
+function limits(curves) {
+  let low = Infinity, high = -Infinity;
+  for (const { values } of curves) {
+    for (const v of values) if (Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); }
+  }
+  if (!(high >= low)) return [0, 1];
+  const size = Math.max(Math.abs(low), Math.abs(high));
+  const room = Math.max(0.06 * (high - low), 1e-6 * size) || 1; // rounding alone is no curve
+  return [low - room, high + room];
+}
+
+function ticks(low, high, most) {
+  if (!(high > low)) return [low];
+  const raw = (high - low) / most, power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((f) => f * power).find((s) => s >= raw * (1 - 1e-9));
+  const found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(Number((k * step).toPrecision(12)));
+  return found;
+}
+
+function rule(g, x0, y0, x1, y1) {
+  g.beginPath();
+  g.moveTo(Math.round(x0) + 0.5, Math.round(y0) + 0.5);
+  g.lineTo(Math.round(x1) + 0.5, Math.round(y1) + 0.5);
+  g.stroke();
+}
+
+// Many instants in one column of pixels: its least and its largest value say all that is seen.
+function stroke(g, { values, color, dash }, t, x, y, width) {
+  g.strokeStyle = color;
+  g.setLineDash(dash);
+  g.beginPath();
+  const thin = values.length > 3 * width;
+  let column = null, low = 0, high = 0, pen = false;
+  const line = (px, py) => { if (pen) g.lineTo(px, py); else g.moveTo(px, py); pen = true; };
+  for (let n = 0; n < values.length; n++) {
+    if (!Number.isFinite(values[n])) { pen = false; continue; }
+    const px = x(t[n]), py = y(values[n]);
+    if (!thin) { line(px, py); continue; }
+    const now = Math.floor(px);
+    if (now !== column) {
+      if (column !== null) { line(column, low); line(column, high); }
+      column = now; low = high = py;
+    }
+    low = Math.min(low, py); high = Math.max(high, py);
+  }
+  if (thin && column !== null) { line(column, low); line(column, high); }
+  g.stroke();
+  if (values.length === 1) { g.fillStyle = color; g.fillRect(x(t[0]) - 2, y(values[0]) - 2, 4, 4); }
+  g.setLineDash([]);
+}

@@ -1,0 +1,152 @@
+"""The page: one file of HTML that holds its data, its program and three.js, and loads nothing."""
+
+import html
+import json
+import os
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from dap3d_core.result import Result
+from dap3d_core.result.files import whole_file
+from dap3d_core.scene import SceneError, load, parse
+from dap3d_core.scene.description import Scene
+from dap3d_core.view.data import page_data
+
+#: The program of the page, in the order in which its parts build on one another.
+PROGRAM = (
+    "data",
+    "motion",
+    "stage",
+    "marks",
+    "arrows",
+    "traces",
+    "labels",
+    "quantities",
+    "plots",
+    "transport",
+    "panel",
+    "keyboard",
+    "main",
+)
+#: Height of the frame in a notebook, pixels.
+NOTEBOOK_HEIGHT = 620
+
+
+@attrs.frozen(eq=False)
+class View:
+    """A result as a page; a notebook shows it where it stands last in a cell.
+
+    Attributes:
+        data: what the page holds, as plain data.
+    """
+
+    data: dict[str, Any] = attrs.field(repr=False)
+
+    @property
+    def title(self) -> str:
+        """Name of the scene."""
+        return str(self.data["about"]["title"])
+
+    @property
+    def instants(self) -> int:
+        """Number of instants that the page holds."""
+        return int(self.data["instants"])
+
+    @property
+    def html(self) -> str:
+        """The page."""
+        return _page(self.data)
+
+    def save(self, path: str | os.PathLike[str], force: bool = False) -> Path:
+        """Write the page to a file, whole or not at all; returns the path.
+
+        Args:
+            path: the file.
+            force: whether an existing file is overwritten.
+
+        Raises:
+            ResultError: the file cannot be written, or exists and ``force`` is off.
+        """
+        target = Path(path)
+        with whole_file(target, force) as part:
+            part.write_text(self.html, encoding="utf-8")
+        return target
+
+    def _repr_html_(self) -> str:
+        """The page in a frame, for notebooks."""
+        return (
+            f'<iframe srcdoc="{html.escape(self.html)}" title="{html.escape(self.title)}" '
+            f'style="width: 100%; height: {NOTEBOOK_HEIGHT}px; border: 0" allowfullscreen></iframe>'
+        )
+
+
+def view(
+    result: Result,
+    *quantities: str,
+    fps: float | None = None,
+    model: str | os.PathLike[str] | None = None,
+) -> View:
+    """A result as a page: the moving scene, plots, the ledger, settings.
+
+    Args:
+        result: what to show.
+        quantities: curves that are drawn at once, such as ``crank.r.z``; more can be chosen in the
+            page. Without any: energies, and motion of the first body.
+        fps: frames a second of the page, nearest reported instants; by default every instant.
+        model: the model (a name, a folder, a file) in whose folder meshes of shapes lie.
+
+    Returns:
+        A view: shown by notebooks, written by ``.save("page.html")``.
+
+    Raises:
+        UnknownNameError: there is no such quantity; names the nearest.
+        ValueError: the result has no instants, or fps cannot be.
+        SceneError: there is no such model.
+    """
+    return View(page_data(result, _scene(result, model), quantities, fps))
+
+
+def _scene(result: Result, model: str | os.PathLike[str] | None) -> Scene:
+    """The scene that was run; its folder is that of the model, where one is named."""
+    try:
+        scene = parse(result.scene_text)
+    except SceneError:  # a result made by a script, without the text of a scene
+        scene = Scene()
+    if model is not None:
+        scene.path = load(model).path
+    for name in result.subject.body_names:
+        if name not in scene.bodies:
+            scene.add_body(name)
+    return scene
+
+
+def _page(data: dict[str, Any]) -> str:
+    """The template with everything put in."""
+    assets = files("dap3d_core.view") / "assets"
+    vendor = files("dap3d_core.view") / "vendor"
+    program = "\n".join(_text(assets / "js" / f"{part}.js") for part in PROGRAM)
+    parts = {
+        "title": html.escape(str(data["about"]["title"])),
+        "style": _text(assets / "view.css"),
+        "licence": html.escape(_text(vendor / "LICENSE").strip()),
+        "three": _text(vendor / "three.min.js"),
+        "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
+        "program": program,
+    }
+    return _filled(_text(assets / "page.html"), parts)
+
+
+def _filled(template: str, parts: dict[str, str]) -> str:
+    """A template whose ``{{name}}`` are replaced, each once, none within what was put in."""
+    pieces: list[str] = []
+    for piece in template.split("{{"):
+        name, closed, rest = piece.partition("}}")
+        pieces.append(parts[name] + rest if closed else piece)
+    return "".join(pieces)
+
+
+def _text(file: Any) -> str:
+    return str(file.read_text(encoding="utf-8"))

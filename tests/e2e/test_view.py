@@ -1,0 +1,346 @@
+"""``dap3d view`` writes a page; a real browser opens it from disk, without a network."""
+
+import json
+
+import numpy as np
+import pytest
+from support.browser import Opened, browser
+
+import dap3d_core as dap
+from dap3d_core.model.kinematics import to_global
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def four():
+    """The four-bar, reported at 100 instants a second."""
+    return dap.simulate("fourbar3", t_end=1.0, dt=0.01)
+
+
+@pytest.fixture(scope="module")
+def four_page(four, tmp_path_factory):
+    return dap.view(four).save(tmp_path_factory.mktemp("view") / "four bar #1.html")
+
+
+@pytest.fixture
+def opened(chromium, four_page):
+    page = Opened(chromium, four_page)
+    yield page
+    page.close()
+    assert page.complaints == []
+
+
+def chain(count):
+    """A chain of bodies on spherical joints, stretched out and let go."""
+    scene = dap.Scene(name=f"chain of {count}")
+    turned = (0.5**0.5, 0.0, 0.5**0.5, 0.0)  # z of the links along x
+    hook = "ground.O"
+    for k in range(count):
+        link = scene.add_body(f"b{k}", Jp=(0.01, 0.01, 0.001), r=(0.1 + 0.2 * k, 0, 0), p=turned)
+        top = scene.add_point(f"A{k}", link, (0.0, 0.0, -0.1))
+        scene.add_joint("sph", P_i=top, P_j=hook)
+        hook = scene.add_point(f"B{k}", link, (0.0, 0.0, 0.1))
+    scene.add_force("weight")
+    return scene
+
+
+# ---------------------------------------------------------------- the command
+
+
+@pytest.fixture
+def pen1(dap3d):
+    """A result in the folder of the command line."""
+    dap.simulate("pen1", t_end=0.1, dt=0.02).save(dap3d.folder / "pen1.nc")
+
+
+@pytest.mark.slow
+def test_the_command_writes_a_page(dap3d, refuse, pen1):
+    done = dap3d("view", "pen1.nc")
+    assert done.returncode == 0, done.stderr
+    assert "pen1.html written" in done.stdout
+    assert (dap3d.folder / "pen1.html").read_text().startswith("<!DOCTYPE html>")
+    assert "pen1.html exists" in refuse("view", "pen1.nc")
+    asked = ("--quantity", "cone.r.z", "--quantity", "J1.force.norm", "--fps", "20")
+    told = dap3d("view", "pen1.nc", "-o", "a.html", *asked, "--json", "--no-open")
+    found = json.loads(told.stdout)
+    assert found["file"] == "a.html"
+    assert found["size_bytes"] == (dap3d.folder / "a.html").stat().st_size
+    assert found["quantities"] == ["cone.r.z", "J1.force.norm"]
+    assert (found["instants"], len(found["notes"])) == (3, 1)
+
+
+def test_what_cannot_be_shown_is_refused(refuse, dap3d, pen1):
+    near = refuse("view", "pen1.nc", "--quantity", "cone.rr.z", "-o", "b.html")
+    assert "did you mean 'cone.r.z'" in near
+    assert "fps = 0" in refuse("view", "pen1.nc", "--fps", "0", "-o", "b.html")
+    assert "is a .html file" in refuse("view", "pen1.nc", "-o", "pen1.nc")
+    assert "cannot read" in refuse("view", "gone.nc", "-o", "b.html")
+    assert "no folder" in refuse("view", "pen1.nc", "-o", "no/b.html")
+    assert "shipped model" in refuse("view", "pen1.nc", "-o", "b.html", "--model", "nothing")
+    (dap3d.folder / "there.html").write_text("mine")
+    assert "--force overwrites" in refuse("view", "pen1.nc", "-o", "there.html")
+    assert (dap3d.folder / "there.html").read_text() == "mine"
+    assert sorted(p.name for p in dap3d.folder.iterdir()) == ["pen1.nc", "there.html"]
+
+
+# ---------------------------------------------------------------- the browser
+
+
+def test_the_page_opens_from_disk_and_asks_for_nothing(opened):
+    assert opened.page.title() == "fourbar3"
+    assert opened.run("document.querySelector('#fault').hidden")
+    assert opened.run("performance.getEntriesByType('resource').length") == 0
+    opened.page.click("[data-tab=run]")
+    shown = opened.page.inner_text("#tab-run").lower()
+    for words in ("ledger", "energy", "dop853", "rtol", "numba", "three.js"):
+        assert words in shown
+    opened.page.click("[data-tab=source]")
+    assert "[joints.J1]" in opened.page.inner_text("#tab-source")
+
+
+def test_what_is_drawn_is_the_pose_of_the_result(opened, four):
+    """At reported instants exactly, up to single precision; between two near a finer run."""
+    s = (0.1, -0.2, 3.0)
+    for k in (0, 1, 37, 100):
+        opened.run("t => dap3d.seek(t)", float(four.t[k]))
+        assert opened.run("dap3d.time") == four.t[k]
+        for b, name in enumerate(four.subject.body_names):
+            expected = four.r[k, b] + to_global(four.p[k, b], np.array(s))
+            drawn = opened.run("([n, s]) => dap3d.drawnAt(n, s)", [name, list(s)])
+            np.testing.assert_allclose(drawn, expected, atol=3e-6)
+    fine = dap.simulate("fourbar3", t_end=0.405, dt=0.405)
+    opened.run("t => dap3d.seek(t)", 0.405)
+    drawn = [opened.run("n => dap3d.drawnAt(n)", n) for n in four.subject.body_names]
+    np.testing.assert_allclose(drawn, fine.r[-1], atol=2e-3)
+
+
+def test_the_slider_and_the_field_scrub_to_the_instant_asked(opened, four):
+    opened.page.fill("#time", "0.37")
+    opened.page.press("#time", "Enter")
+    assert opened.run("dap3d.time") == 0.37
+    opened.run("""() => { const s = document.querySelector('#slider');
+        s.value = 0.62; s.dispatchEvent(new Event('input')); }""")
+    assert opened.run("dap3d.time") == pytest.approx(0.62)
+    opened.page.wait_for_timeout(100)
+    drawn = opened.run("dap3d.drawnAt('crank')")
+    np.testing.assert_allclose(drawn, four.r[62, 0], atol=3e-6)
+    opened.page.fill("#time", "99")
+    opened.page.press("#time", "Enter")
+    assert opened.run("dap3d.time") == 1.0
+
+
+def test_it_plays_pauses_and_steps_by_keys(opened, four):
+    opened.page.press("#canvas", "Home")
+    opened.page.press("#canvas", "ArrowRight")
+    assert opened.run("dap3d.time") == four.t[1]
+    opened.page.press("#canvas", "Shift+ArrowRight")
+    assert opened.run("dap3d.time") == four.t[11]
+    opened.page.press("#canvas", "ArrowLeft")
+    assert opened.run("dap3d.time") == four.t[10]
+    before = opened.run("dap3d.pictures")
+    opened.page.press("#canvas", "Space")
+    assert opened.run("dap3d.playing")
+    while opened.run("dap3d.pictures") < before + 4:
+        opened.page.wait_for_timeout(20)
+    opened.page.press("#canvas", "Space")
+    paused = opened.run("dap3d.time")
+    assert paused > four.t[10]
+    opened.page.wait_for_timeout(120)
+    assert opened.run("[dap3d.time, dap3d.playing]") == [paused, False]
+    opened.page.press("#canvas", "End")
+    assert opened.run("dap3d.time") == four.t[-1]
+
+
+@pytest.mark.slow
+def test_switches_change_the_picture_and_back(opened):
+    opened.run("dap3d.seek(0.3)")
+    opened.page.wait_for_timeout(200)
+    labelled = opened.picture()
+    opened.page.keyboard.press("n")
+    opened.page.wait_for_timeout(200)
+    whole = opened.picture()
+    assert np.any(labelled != whole)
+    for key in ("1", "3", "4", "5", "6", "t", "g"):
+        opened.page.keyboard.press(key)
+        opened.page.wait_for_timeout(120)
+        assert np.any(opened.picture() != whole), key
+        opened.page.keyboard.press(key)
+    opened.page.wait_for_timeout(200)
+    assert np.mean(opened.picture() != whole) < 1e-4
+    opened.page.keyboard.press("d")
+    opened.page.wait_for_timeout(200)
+    assert opened.picture()[350, 5].max() < 60
+    opened.page.keyboard.press("?")
+    assert "play, pause" in opened.page.inner_text("#help")
+
+
+def test_the_camera_follows_a_body(opened):
+    opened.page.keyboard.press("f")
+    places = []
+    for t in (0.1, 0.4, 0.8):
+        opened.run("t => dap3d.seek(t)", t)
+        places.append(
+            opened.run("(() => { const p = dap3d.onScreen('crank'); return [p.x, p.y]; })()")
+        )
+    np.testing.assert_allclose(places, np.tile(places[0], (3, 1)), atol=1.0)
+
+
+def test_the_mouse_orbits_and_zooms_and_r_brings_back(opened):
+    def seen():
+        return opened.run("(() => { const p = dap3d.onScreen('crank'); return [p.x, p.y]; })()")
+
+    def distance():
+        return opened.run("app => dap3d.app.stage.camera.position.distanceTo("
+                          "dap3d.app.stage.controls.target)")  # fmt: skip
+
+    first, near = seen(), distance()
+    mouse = opened.page.mouse
+    mouse.move(300, 300)
+    mouse.down()
+    mouse.move(420, 330, steps=4)
+    mouse.up()
+    turned = seen()
+    assert np.hypot(*np.subtract(turned, first)) > 10.0
+    assert distance() == pytest.approx(near)
+    mouse.wheel(0, 400)
+    opened.page.wait_for_timeout(200)
+    assert distance() > 1.1 * near
+    opened.page.keyboard.press("r")
+    opened.page.wait_for_timeout(200)
+    np.testing.assert_allclose(seen(), first, atol=0.5)
+
+
+def test_the_speed_says_how_fast_time_goes(opened):
+    """Time moves on by what has passed on the clock, up to a quarter of a second a picture."""
+    opened.page.select_option("#speed", "0.01")
+    start = opened.run("dap3d.play(), performance.now()")
+    while opened.run("dap3d.pictures") < 12:
+        opened.page.wait_for_timeout(20)
+    opened.page.wait_for_timeout(300)
+    passed, end = opened.run("[dap3d.time, performance.now()]")
+    assert 0.0 < passed <= 0.01 * (end - start) / 1000.0
+
+
+def test_pixels_are_where_the_body_is(chromium, tmp_path):
+    """A red ball falls; where the page says it is, the picture is red, and elsewhere not."""
+    scene = dap.Scene(name="ball")
+    scene.add_body("ball", Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 2.0), color="#ff0000")
+    scene.add_shape("sphere", body="ball", radius=0.2)
+    scene.add_force("weight")
+    result = dap.simulate(scene, t_end=0.6, dt=0.1)
+    page = Opened(chromium, dap.view(result).save(tmp_path / "ball.html"))
+    for key in ("t", "n", "g"):  # without traces, labels, ground
+        page.page.keyboard.press(key)
+    seen = {}
+    for t in (0.0, 0.6):
+        page.run("t => dap3d.seek(t)", t)
+        page.page.wait_for_timeout(150)
+        at = page.run("(() => { const p = dap3d.onScreen('ball'); return [p.x, p.y]; })()")
+        picture = page.picture()
+        red = (picture[..., 0] > 90) & (picture[..., 1] < 60) & (picture[..., 2] < 60)
+        red[:, 660:] = False  # the panel has curves
+        rows, columns = np.nonzero(red)
+        np.testing.assert_allclose([columns.mean(), rows.mean()], at, atol=4.0)
+        seen[t] = rows.mean()
+    assert seen[0.6] > seen[0.0] + 100
+    page.page.mouse.click(*at)
+    assert page.page.inner_text("#picked") == "sphere1"
+    page.close()
+    assert page.complaints == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [(1280, 800), (800, 600), (390, 844)])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_the_whole_motion_is_in_the_frame(chromium, four_page, four, size, theme):
+    page = Opened(chromium, four_page, width=size[0], height=size[1], theme=theme)
+    width, height = page.run("[dap3d.app.stage.width, dap3d.app.stage.height]")
+    for k in range(0, 101, 10):
+        page.run("t => dap3d.seek(t)", float(four.t[k]))
+        for name, half in (("crank", 1.0), ("coupler", 3.2), ("follower", 3.5)):
+            for end in (-half, half):
+                p = page.run("([n, s]) => dap3d.onScreen(n, s)", [name, [0.0, 0.0, end]])
+                assert 0 < p["x"] < width
+                assert 0 < p["y"] < height
+    assert page.run("document.documentElement.scrollWidth") <= size[0]
+    page.close()
+    assert page.complaints == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["pen1", "bodies2", "tri", "A05", "N1", "ball1"])
+def test_shipped_models_are_shown_without_complaint(chromium, tmp_path, model):
+    result = dap.simulate(model, t_end=0.2, dt=0.02, allow_code=True)
+    page = Opened(chromium, dap.view(result).save(tmp_path / "page.html"))
+    page.run("dap3d.seek(0.1)")
+    for tab in ("display", "run", "source", "plots"):
+        page.page.click(f"[data-tab={tab}]")
+    page.close()
+    assert page.complaints == []
+
+
+@pytest.mark.slow
+def test_ten_seconds_of_five_bodies_are_under_three_megabytes(tmp_path):
+    result = dap.simulate(chain(5), t_end=10.0, dt=0.01)
+    assert dap.view(result).save(tmp_path / "page.html").stat().st_size < 3e6
+
+
+@pytest.mark.slow
+def test_two_hundred_bodies_take_little_of_each_picture(chromium, tmp_path):
+    """What the page computes for a picture; a graphics card draws its 10 calls meanwhile.
+
+    16 ms are there at 60 pictures a second. Drawing by software, as here, is not measured.
+    """
+    result = dap.simulate(chain(200), t_end=1.0, dt=0.02, rtol=1e-5, atol=1e-6)
+    page = Opened(chromium, dap.view(result).save(tmp_path / "page.html"))
+    each = page.run("""() => { const a = dap3d.app; a.stage.render = () => {};
+        for (let k = 0; k < 50; k++) { a.transport.t = k / 50; a.draw(); }
+        const start = performance.now();
+        for (let k = 0; k < 100; k++) { a.transport.t = k / 100; a.draw(); }
+        return (performance.now() - start) / 100; }""")
+    calls = page.run("dap3d.app.stage.renderer.info.render.calls")
+    page.close()
+    assert page.complaints == []
+    assert each < 8.0
+    assert calls < 30
+
+
+def test_a_notebook_shows_the_page_in_a_frame(chromium, four, tmp_path):
+    (tmp_path / "cell.html").write_text(f"<!DOCTYPE html>{dap.view(four)._repr_html_()}")
+    context = chromium.new_context(offline=True)
+    page = context.new_page()
+    page.goto((tmp_path / "cell.html").as_uri())
+    frame = page.frame_locator("iframe")
+    frame.locator("html[data-ready]").wait_for(state="attached")
+    assert frame.locator("#title").inner_text() == "fourbar3"
+    context.close()
+
+
+def test_a_single_instant_is_shown(chromium, tmp_path):
+    result = dap.simulate("fourbar3", t_end=0.0)
+    page = Opened(chromium, dap.view(result).save(tmp_path / "page.html"))
+    page.page.press("#canvas", "Space")
+    assert page.run("[dap3d.time, dap3d.playing]") == [0.0, False]
+    np.testing.assert_allclose(page.run("dap3d.drawnAt('crank')"), result.r[0, 0], atol=1e-6)
+    page.close()
+    assert page.complaints == []
+
+
+def test_without_webgl_plots_and_tables_still_work(chromium, four_page):
+    context = chromium.new_context(offline=True)
+    page = context.new_page()
+    page.add_init_script(
+        "{ const get = HTMLCanvasElement.prototype.getContext;"
+        "HTMLCanvasElement.prototype.getContext = function (kind, ...more) {"
+        "return kind.startsWith('webgl') ? null : get.call(this, kind, ...more); }; }"
+    )
+    page.goto(four_page.resolve().as_uri())
+    page.wait_for_selector("html[data-ready]", state="attached")
+    assert "no WebGL" in page.inner_text("#fault")
+    assert page.evaluate("document.querySelectorAll('.plot').length") >= 1
+    context.close()

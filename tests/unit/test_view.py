@@ -1,0 +1,403 @@
+"""What a page holds equals the result; what it draws follows the scene; it loads nothing."""
+
+import base64
+import html
+import json
+import re
+from importlib.resources import files
+
+import numpy as np
+import pytest
+from support.own_types import registry_of
+from support.scenes import scene_for
+from unit.test_result import model_of, result_of, rows_of
+
+import dap3d_core as dap
+from dap3d_core.interface import Joint, Point, Vector, point, vector
+from dap3d_core.interface.fields import specs_of
+from dap3d_core.kernels import dot, sub
+from dap3d_core.model.kinematics import to_global
+from dap3d_core.registry import load_registry
+from dap3d_core.result import ResultError, UnknownNameError
+from dap3d_core.view.bodies import inertia_ellipsoid
+from dap3d_core.view.camera import stage
+from dap3d_core.view.colors import CYCLE, colors
+from dap3d_core.view.gallery import model_page
+from dap3d_core.view.geometry import elements_of, geometry_of
+from dap3d_core.view.marks import turned_to
+from dap3d_core.view.motion import Extent, chosen
+from dap3d_core.view.page import PROGRAM
+
+TYPES = [
+    (row.kind, row.keyword)
+    for row in load_registry().listing()
+    if row.kind in ("joint", "force") and row.state == "ok"
+]
+
+
+def numbers(text, kind="<f4"):
+    return np.frombuffer(base64.b64decode(text), dtype=kind)
+
+
+def quaternion_axis(q):
+    """Where Euler parameters turn z."""
+    return to_global(q, [0.0, 0.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def four():
+    return dap.simulate("fourbar3", t_end=0.1, dt=0.01)
+
+
+@pytest.fixture(scope="module")
+def page(four):
+    return dap.view(four, "crank.r.z", "J1.force.norm")
+
+
+def marks_of(page, owner, layer="joints"):
+    keys = ("layer", "kind", "body", "at", "size", "q", "color", "owner")
+    rows = [dict(zip(keys, row, strict=True)) for row in page.data["marks"]]
+    return [row for row in rows if row["owner"] == owner and row["layer"] == layer]
+
+
+# ---------------------------------------------------------------- numbers
+
+
+def test_instants_and_poses_are_those_of_the_result(four, page):
+    np.testing.assert_array_equal(numbers(page.data["t"], "<f8"), four.t)
+    poses = numbers(page.data["poses"]).reshape(len(four.t), 3, 7)
+    np.testing.assert_array_equal(poses[..., :3], four.r.astype(np.float32))
+    np.testing.assert_array_equal(poses[..., 3:], four.p.astype(np.float32))
+
+
+def test_arrows_are_reactions_and_forces_of_the_result(four, page):
+    found = {(a["layer"], a["what"], a["name"], a["body"]): a for a in page.data["arrows"]}
+    force = numbers(found["reactions", "force", "J1", 1]["values"]).reshape(-1, 3)
+    np.testing.assert_allclose(force, four.reaction("J1")["i"].force, rtol=1e-6)
+    assert found["reactions", "force", "J1", 1]["at"] == (0.0, 0.0, -1.0)
+    moment = numbers(found["reactions", "moment", "J1", 1]["values"]).reshape(-1, 3)
+    expected = four.reaction("J1")["i"].moment_at_point
+    np.testing.assert_allclose(moment, expected, rtol=1e-6, atol=1e-6)
+    spring = numbers(found["forces", "force", "spring1", 2]["values"]).reshape(-1, 3)
+    np.testing.assert_allclose(spring, four.force("spring1").on["i"].force, rtol=1e-6)
+    assert ("reactions", "moment", "J2", 1) not in found  # a ball joint passes none but rounding
+    assert not any(body == 0 for *_, body in found)
+
+
+def test_curves_are_quantities_of_the_result(four, page):
+    series = {s["name"]: s for s in page.data["series"]}
+    assert page.data["asked"] == ["crank.r.z", "J1.force.norm"]
+    for name in ("energy.total", "crank.r.z", "J1.force.norm"):
+        values = numbers(series[name]["values"], "<f8")
+        np.testing.assert_array_equal(values, four.quantity(name).values)
+    assert series["J1.force.norm"]["unit"] == "N"
+
+
+@pytest.mark.parametrize("fps", [1.0, 30.0, 77.0, 1e6])
+def test_frames_are_the_nearest_reported_instants(fps):
+    t = np.cumsum(np.random.default_rng(0).uniform(0.001, 0.02, 400))
+    places = chosen(t, 3, fps)
+    assert places[0] == 0
+    assert places[-1] == len(t) - 1
+    assert np.all(np.diff(places) > 0)
+    wanted = np.arange(t[0], t[-1], 1.0 / fps) if fps < 1e3 else t
+    off = np.abs(t[places][None] - wanted[:, None]).min(axis=1)
+    np.testing.assert_allclose(off, np.abs(t[None] - wanted[:, None]).min(axis=1), atol=1e-15)
+
+
+def test_without_fps_all_instants_are_there_as_far_as_they_fit():
+    t = np.linspace(0.0, 1.0, 5001)
+    np.testing.assert_array_equal(chosen(t, 4, None), np.arange(5001))
+    thinned = chosen(t, 1000, None)
+    assert 500 < len(thinned) < 600
+    assert (thinned[0], thinned[-1]) == (0, 5000)
+    assert list(chosen(t[:1], 4, 10.0)) == [0]
+
+
+def test_a_thinned_page_says_so_and_keeps_exact_poses(four):
+    page = dap.view(four, fps=50.0)
+    assert page.instants == 6
+    assert "6 of 11 reported instants are on this page" in page.data["about"]["view_notes"]
+    poses = numbers(page.data["poses"]).reshape(6, 3, 7)
+    np.testing.assert_array_equal(poses[1, :, :3], four.r[2].astype(np.float32))
+
+
+def test_what_cannot_be_shown_is_refused(four):
+    with pytest.raises(UnknownNameError, match=r"crank\.r"):
+        dap.view(four, "crnk.r")
+    for fps in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="fps"):
+            dap.view(four, fps=fps)
+
+
+# ---------------------------------------------------------------- what is drawn
+
+
+def test_joints_look_like_their_kind(page):
+    pin, collar = marks_of(page, "J1")
+    assert {pin["kind"], collar["kind"]} == {"cylinder"}
+    assert (pin["body"], pin["at"]) == (1, [0.0, 0.0, -1.0])
+    np.testing.assert_allclose(quaternion_axis(pin["q"]), [1, 0, 0], atol=1e-6)
+    assert pin["size"][2] > 4 * pin["size"][0]
+    (ball,) = marks_of(page, "J2")
+    assert (ball["kind"], ball["body"], ball["at"]) == ("sphere", 1, [0.0, 0.0, 1.0])
+    (ring,) = marks_of(page, "J5")  # the motor stands at the hinge it turns, about its axis
+    assert (ring["kind"], ring["body"]) == ("ring", 0)
+    np.testing.assert_allclose(ring["at"], [0, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(quaternion_axis(ring["q"]), [1, 0, 0], atol=1e-6)
+
+
+def test_bodies_without_shapes_are_links_between_their_points(page):
+    rods = [m for m in marks_of(page, "coupler", "bodies") if m["kind"] == "cylinder"]
+    ends = sorted(m["at"][2] for m in rods)
+    np.testing.assert_allclose(ends, [-1.6, 1.6])
+    assert all(m["size"][2] == pytest.approx(3.2) for m in rods)
+    assert {m["color"] for m in rods} == {"#ff7f0e"}
+
+
+def test_springs_run_between_their_ends(page):
+    (spring,) = page.data["spans"]
+    assert (spring["kind"], spring["layer"], spring["owner"]) == ("spring", "forces", "spring1")
+    assert spring["start"] == (2, (0.0, 0.0, 3.2))
+    assert spring["end"] == (0, (0.0, 0.0, 0.0))
+
+
+def sliding():
+    scene = dap.Scene(name="sliding")
+    scene.add_body("block", r=(0.5, 0.0, 0.0))
+    scene.add_joint("tran", "rail", P_i="block.O", P_j="ground.O", a_j="ground.x")
+    scene.add_force("f", "push", body_i="block", f=(1.0, 0.0, 0.0))
+    return dap.simulate(scene, t_end=2.0, dt=0.5)
+
+
+def test_a_rail_is_as_long_as_the_motion():
+    result = sliding()
+    rail, sleeve = marks_of(dap.view(result), "rail")
+    low, high = rail["at"][0] - 0.5 * rail["size"][2], rail["at"][0] + 0.5 * rail["size"][2]
+    assert low < 0.0 < 0.5 + 2.0 < high
+    assert (sleeve["kind"], sleeve["body"]) == ("box", 1)
+
+
+class Hook(Joint):
+    """A type of somebody's own: a point stays in a plane."""
+
+    keyword, rows = "test-hook", 1
+    P_i: Point = point()
+    Q_j: Point = point()
+    n_j: Vector = vector()
+
+    def C(r_P_i, r_Q_j, n_j):
+        return (dot(sub(r_P_i, r_Q_j), n_j),)
+
+
+@pytest.mark.parametrize("ground", [None, "j"])
+@pytest.mark.parametrize(("kind", "keyword"), TYPES)
+def test_every_installed_type_is_drawn_with_finite_sizes(kind, keyword, ground):
+    """In any pose, free or tied to ground: numbers are finite, axes of unit length."""
+    registry = load_registry()
+    examined = registry.get(kind, keyword)
+    if any(spec.kind == "joint" for spec in specs_of(examined.type).values()):
+        pytest.skip("it acts in a joint, which is drawn itself")
+    scene = scene_for(examined, np.random.default_rng(5), ground=ground)
+    model = model_of(scene)
+    t = np.array([0.0, 1.0])
+    v_dot, Lam = np.zeros((2, 18)), np.zeros((2, model.row_count))
+    result = result_of(scene, rows_of(model, t, np.stack([model.u0, model.u0]), v_dot, Lam), model)
+    found = geometry_of(result, scene, elements_of(result))
+    assert [one["type"] for one in (*found["joints"], *found["forces"])] in ([keyword], [])
+    for row in found["marks"]:
+        values = np.array([*row[3], *row[4], *row[5]], dtype=float)
+        assert np.all(np.isfinite(values))
+        assert np.all(np.array(row[4]) > 0.0)
+        assert np.linalg.norm(row[5]) == pytest.approx(1.0, abs=1e-6)
+    drawn = [row for row in found["marks"] if row[-1] == "element"]
+    drawn += [span for span in found["spans"] if span["owner"] == "element"]
+    loads = {"f", "fp", "n", "np"}  # these are arrows alone
+    assert drawn or keyword in loads or getattr(examined.type, "each_body", False)
+
+
+def test_types_of_third_parties_are_drawn_by_what_they_declare():
+    from dap3d_core.model import build_model
+    from dap3d_core.scene import check
+    from dap3d_core.view.elements import joints_of
+
+    scene = dap.Scene()
+    scene.add_body("b")
+    scene.add_point("P", "b", (0.1, 0.2, 0.3))
+    scene.add_joint("test-hook", "hook", P_i="P", Q_j="ground.O", n_j="ground.z")
+    (hook,) = joints_of(build_model(check(scene, registry_of(Hook))))
+    assert hook.bodies == {"i": 1, "j": 0}
+    assert hook.points == {"i": (1, (0.1, 0.2, 0.3)), "j": (0, (0.0, 0.0, 0.0))}
+    assert hook.vectors == {"n_j": (0, (0.0, 0.0, 1.0))}
+
+
+def test_a_bare_body_is_the_ellipsoid_of_its_inertia():
+    """A solid ellipsoid with semi-axes a, b, c has J = m/5 (b^2+c^2, ...)."""
+    a, b, c, mass = 0.3, 0.2, 0.1, 5.0
+    J = np.diag([b * b + c * c, a * a + c * c, a * a + b * b]) * mass / 5.0
+    p = np.array([0.5, 0.1, -0.7, 0.4])
+    A = to_global(p / np.linalg.norm(p), np.eye(3)).T
+    mark = inertia_ellipsoid(1, mass, A @ J @ A.T, np.inf, "red", "b")
+    assert sorted(mark.size) == pytest.approx([c, b, a])
+    axis = to_global(mark.q, np.eye(3)[int(np.argmax(mark.size))])
+    assert abs(axis @ A[:, 0]) == pytest.approx(1.0)
+    assert max(inertia_ellipsoid(1, mass, J, 0.06, "red", "b").size) == pytest.approx(0.06)
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 1), (0, 0, -2), (1, 0, 0), (0.3, -4.0, 0.5)])
+def test_marks_turn_to_their_axes(axis):
+    found = quaternion_axis(turned_to(axis))
+    np.testing.assert_allclose(found, np.array(axis) / np.linalg.norm(axis), atol=1e-12)
+
+
+def test_colours_are_those_of_the_scene_or_differ():
+    found = colors(["tab:blue", "", "#123456", "", "javascript:alert(1)", "rot{}"])
+    assert found[0] == "#1f77b4"
+    assert found[2] == "#123456"
+    assert [found[k] for k in (1, 3, 4, 5)] == list(CYCLE[:4])
+
+
+def test_up_is_against_gravity_and_planar_motion_is_seen_squarely():
+    low, high = np.array([-1.0, -1.0, 0.0]), np.array([1.0, 1.0, 0.01])
+    found = stage(Extent(low, high, np.zeros((1, 3))), (0.0, -9.81, 0.0))
+    assert found["up"] == (0.0, 1.0, 0.0)
+    assert found["eye"][2] > 0.9
+    assert found["ground"] < -1.0
+    rising = stage(Extent(np.zeros(3), np.array([1.0, 1.0, 1.0]), np.zeros((1, 3))), None)
+    assert (rising["up"], rising["ground"]) == ((0.0, 0.0, 1.0), 0.0)
+
+
+# ---------------------------------------------------------------- shapes
+
+CUBE = """\
+solid cube
+facet normal 0 0 0
+outer loop
+vertex 0 0 0
+vertex 1 0 0
+vertex 0 1 0
+endloop
+endfacet
+endsolid
+"""
+
+
+def shaped(tmp_path):
+    scene = dap.Scene(name="shaped </script><!--")
+    scene.add_body("b", mass=1.0, Jp=(0.1, 0.1, 0.1), color="tab:red")
+    scene.add_shape("box", "case", body="b", size=(0.1, 0.2, 0.3), at=(0.0, 0.0, 0.5))
+    scene.add_shape("line", "edge", body="b", points=((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+    scene.add_shape("mesh", "part", body="b", file="cube.stl", scale=0.5)
+    scene.add_force("weight")
+    (tmp_path / "cube.stl").write_text(CUBE)
+    scene.save(tmp_path / "scene.toml")
+    return dap.load(tmp_path)
+
+
+def test_shapes_take_the_place_of_links(tmp_path):
+    pytest.importorskip("trimesh")
+    result = dap.simulate(shaped(tmp_path), t_end=0.1, dt=0.05)
+    data = dap.view(result, model=tmp_path).data
+    ((layer, kind, body, at, size, *_, color, owner),) = data["marks"]
+    assert (layer, kind, body, at, owner) == ("shapes", "box", 1, [0.0, 0.0, 0.5], "case")
+    assert (size, color) == ([0.1, 0.2, 0.3], "#d62728")
+    assert data["lines"][0]["points"] == ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    (mesh,) = data["meshes"]
+    assert len(numbers(mesh["vertices"])) == 9
+    assert sorted(numbers(mesh["triangles"], "<u4")) == [0, 1, 2]
+    assert data["about"]["view_notes"] == []
+
+
+def test_the_camera_sees_shapes_as_large_as_they_are():
+    """A flat plate on the ground at height 0: the grid stays there, and the plate is in view."""
+    scene = dap.Scene(name="plate")
+    scene.add_body("b", Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1.0))
+    scene.add_shape("disk", body="ground", radius=2.0)
+    scene.add_shape("cone", body="b", radius=0.1, length=0.5, axis=(0.0, 0.0, 1.0))
+    found = dap.view(dap.simulate(scene, t_end=0.0)).data["stage"]
+    assert found["ground"] == 0.0
+    low = np.subtract(found["center"], np.multiply(0.5, found["extent"]))
+    high = np.add(found["center"], np.multiply(0.5, found["extent"]))
+    np.testing.assert_allclose(high, [2.0, 2.0, 1.5], atol=0.15)
+    np.testing.assert_allclose(low, [-2.0, -2.0, 0.0], atol=0.15)
+
+
+def test_a_result_does_not_know_where_meshes_lie_and_says_so(tmp_path):
+    result = dap.simulate(shaped(tmp_path), t_end=0.1, dt=0.05)
+    page = dap.view(result)
+    assert page.data["meshes"] == []
+    (note,) = page.data["about"]["view_notes"]
+    assert "shape part is not drawn" in note
+    assert "--model" in note
+    (tmp_path / "cube.stl").write_bytes(b"\x00\x01nonsense")
+    (note,) = dap.view(result, model=tmp_path).data["about"]["view_notes"]
+    assert "shape part is not drawn" in note
+
+
+# ---------------------------------------------------------------- the page
+
+
+def test_the_page_is_one_file_that_loads_nothing(page, tmp_path):
+    text = page.html
+    assert "connect-src" not in text  # nothing but what is inline: default-src 'none'
+    assert "default-src 'none'" in text
+    head, _, rest = text.partition('<script id="data"')
+    assert not re.search(r"(?:src|href)=[\"'](?!data:)", head + rest.partition("<script>")[0])
+    assert "@import" not in text.split("</style>")[0]
+    target = page.save(tmp_path / "page.html")
+    assert target.read_text(encoding="utf-8") == text
+    with pytest.raises(ResultError, match="exists"):
+        page.save(target)
+
+
+def test_three_js_has_what_the_page_uses_and_nothing_else():
+    folder = files("dap3d_core.view")
+    program = "".join((folder / "assets" / "js" / f"{part}.js").read_text() for part in PROGRAM)
+    assert len(list((folder / "assets" / "js").iterdir())) == len(PROGRAM)
+    used = set(re.findall(r"\bTHREE\.(\w+)", program))
+    bundle = (folder / "vendor" / "three.min.js").read_text()
+    exported = set(re.findall(r"(\w+):\(\)=>\w+[,}]", bundle[:4000]))
+    assert used == exported
+    assert (folder / "vendor" / "VERSION").read_text().split()[1] in bundle[:60]
+    assert "MIT" in (folder / "vendor" / "LICENSE").read_text()
+
+
+def test_text_of_a_scene_cannot_leave_its_place(tmp_path):
+    result = dap.simulate(shaped(tmp_path), t_end=0.1, dt=0.05)
+    text = dap.view(result).html
+    assert text.count("</script>") == 3
+    stored = text.partition('type="application/json">')[2].partition("</script>")[0]
+    assert "<" not in stored
+    found = json.loads(stored)
+    assert found["about"]["scene"] == result.scene_text
+    assert found["about"]["title"] == "shaped </script><!--"
+
+
+def test_numbers_that_json_does_not_have_become_words(page):
+    json.loads(json.dumps(page.data, allow_nan=False))
+    assert page.data["about"]["ledger"]["energy"]["ok"] in (True, False, None)
+    assert page.data["about"]["versions"]["dap3d"]
+
+
+def test_a_model_becomes_a_page_in_one_call(tmp_path):
+    path = model_page("bodies2", tmp_path / "bodies2.html", "spring1.length", fps=10.0)
+    text = path.read_text(encoding="utf-8")
+    assert "<title>bodies2</title>" in text
+    assert '"asked":["spring1.length"]' in text
+
+
+def test_a_notebook_shows_the_same_page(page):
+    frame = page._repr_html_()
+    inside = re.fullmatch(r'<iframe srcdoc="([^"]*)".*</iframe>', frame, flags=re.DOTALL)[1]
+    assert html.unescape(inside) == page.html
+
+
+def test_a_result_whose_types_are_gone_is_still_shown(tmp_path):
+    run = dap.simulate("ball1", t_end=0.1, dt=0.05, allow_code=True)
+    run.save(tmp_path / "ball1.nc")
+    data = dap.view(dap.open(tmp_path / "ball1.nc")).data
+    assert "joints and forces are not drawn" in data["about"]["view_notes"][0]
+    assert data["marks"]
+    whole = dap.view(dap.open(tmp_path / "ball1.nc", model="ball1", allow_code=True)).data
+    assert whole["about"]["view_notes"] == []
+    assert whole["stage"]["gravity"] == (0.0, 0.0, -9.81)
