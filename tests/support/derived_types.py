@@ -42,10 +42,10 @@ class Rolling(Joint):
         return v[0], v[1]
 
 
-class Screw(Joint):
+class Spindle(Joint):
     """Two bodies share an axis; they turn about it as they slide along it."""
 
-    keyword, rows = "screw", 5
+    keyword, rows = "spindle", 5
     P_i: Point = point()
     P_j: Point = point()
     a_i: Vector = vector()

@@ -16,7 +16,7 @@ from support.derived_types import (
     Cam,
     Elastic,
     Rolling,
-    Screw,
+    Spindle,
     Unsteady,
     Wave,
     from_C_alone,
@@ -105,7 +105,7 @@ def test_rows_of_the_velocity_level_are_derived_from_C_dot():
 
 
 @pytest.mark.parametrize(
-    ("type_", "values"), [(Screw, {}), (Unsteady, {}), (Cam, {"function": True})]
+    ("type_", "values"), [(Spindle, {}), (Unsteady, {}), (Cam, {"function": True})]
 )
 def test_rates_along_a_motion_are_the_derived_ones(type_, values):
     """d/dt C = D v - nu and d/dt (D v - nu) = D v_dot - gamma."""
@@ -214,10 +214,10 @@ SCRIPT = """
 import sys
 from dap3d_core.interface import examine
 from dap3d_core.registry import load_registry
-from support.derived_types import Screw
+from support.derived_types import Spindle
 load_registry().get("joint", "rev")
 assert "sympy" not in sys.modules
-examine(Screw)
+examine(Spindle)
 print("sympy" in sys.modules)
 """
 

@@ -16,7 +16,7 @@ SECTIONS = {
         ("simulation.CompiledModel", "simulation.Instant"),
     ),
     "Results": (
-        ("Result", "open", "plot"),
+        ("Result", "open", "plot", "view"),
         ("result.Reaction", "result.Energy", "result.Entry", "result.ErrorEstimate",
          "result.Occurrence", "result.Quantity", "result.Statistics"),
     ),
