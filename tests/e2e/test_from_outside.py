@@ -8,6 +8,7 @@ and the rest again would take minutes and prove nothing. Nothing of the working 
 import importlib.util
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from math import exp, sin
 from pathlib import Path
 
 import pytest
+from support.pages import steps, write
 from support.process import REPOSITORY
 
 pytestmark = pytest.mark.slow
@@ -32,11 +34,16 @@ def shell(**variables):
     return {k: v for k, v in os.environ.items() if not k.startswith(ours)} | variables
 
 
-def pip(*arguments):
+def isolated():
+    """How pip builds: with what is installed here, where that is enough."""
+    return ["--no-build-isolation"] if importlib.util.find_spec("hatchling") else []
+
+
+def pip(*arguments, cwd=None):
     """Run the pip of the tests; skip where it would need an index that is not there."""
     done = subprocess.run(
         [sys.executable, "-m", "pip", "--disable-pip-version-check", *map(str, arguments)],
-        env=shell(), capture_output=True, text=True,
+        env=shell(), cwd=cwd, capture_output=True, text=True,
     )  # fmt: skip
     if done.returncode and any(words in done.stderr for words in NO_INDEX):
         pytest.skip("no package index is in reach, and hatchling is not installed here")
@@ -45,8 +52,7 @@ def pip(*arguments):
 
 def build(source, wheels):
     """Make a wheel of a source folder."""
-    isolated = ["--no-build-isolation"] if importlib.util.find_spec("hatchling") else []
-    pip("wheel", "--quiet", "--no-deps", *isolated, "--wheel-dir", wheels, source)
+    pip("wheel", "--quiet", "--no-deps", *isolated(), "--wheel-dir", wheels, source)
 
 
 class Outside:
@@ -104,9 +110,9 @@ def environment_of_a_user(folder):
     build(REPOSITORY / "plugins" / "dap3d-example", there.wheels)
     there.install(*there.wheels.iterdir())
     # a user writes one more
-    there.dap3d("new-plugin", "rope", "--kind", "force")
-    build(there.folder / "dap3d-rope", there.wheels)
-    there.install(*there.wheels.glob("dap3d_rope-*"))
+    there.dap3d("new-plugin", "cord", "--kind", "force")
+    build(there.folder / "dap3d-cord", there.wheels)
+    there.install(*there.wheels.glob("dap3d_cord-*"))
     return there
 
 
@@ -131,11 +137,11 @@ def nothing_of_the_working_tree_is_reached(outside):
 
 
 def a_plugin_that_was_written_there_is_checked_and_its_scene_runs(outside):
-    package = outside.folder / "dap3d-rope"
-    said = outside.dap3d("check-plugin", "rope", "screw").stdout
+    package = outside.folder / "dap3d-cord"
+    said = outside.dap3d("check-plugin", "cord", "screw").stdout
     assert "2 types checked: nothing is wrong" in said
-    outside.dap3d("run", "scene.toml", "-o", "rope.nc", cwd=package)
-    script = "import dap3d_core as dap; r = dap.open('rope.nc'); print(r.r[-1, 0, 2])"
+    outside.dap3d("run", "scene.toml", "-o", "cord.nc", cwd=package)
+    script = "import dap3d_core as dap; r = dap.open('cord.nc'); print(r.r[-1, 0, 2])"
     z = float(outside.run(outside.python, "-c", script, cwd=package).stdout)
     # m z'' + c z' + k z = 0 about the place of rest, after 2 s; rtol of a run is 1e-8
     decay, t = 4.0 / (2.0 * 2.0), 2.0
@@ -230,8 +236,8 @@ def broken_packages_break_nothing_else_and_are_explained(outside, folder):
         assert after[key]["state"] == ("duplicate" if key[0] == "weight" else "ok")
     assert "not usable" in outside.dap3d("plugins").stdout
 
-    outside.dap3d("check-plugin", "rope", "-q")
-    package = shutil.copytree(outside.folder / "dap3d-rope", folder / "rope")
+    outside.dap3d("check-plugin", "cord", "-q")
+    package = shutil.copytree(outside.folder / "dap3d-cord", folder / "cord")
     scene = (package / "scene.toml").read_text()
     said = outside.dap3d("run", "scene.toml", code=2, cwd=package).stderr
     assert "DAP3D_BLOCK=broken-weight" in said, "two packages bring weight; says what to do"
@@ -250,6 +256,36 @@ def a_kernel_that_numba_cannot_compile_ends_a_run_with_one_message(outside, fold
     assert "broken_not_compiled.py:" in said, "the line"
 
 
+def the_tutorial_can_be_followed(outside):
+    """Every file, script and command of it, in its order; scripts go on where the last one ended.
+
+    Its pip takes what is needed to build a package from here.
+    """
+    folder = outside.folder / "tutorial"
+    folder.mkdir()
+    page = (REPOSITORY / "docs" / "tutorials" / "your-own-joint.md").read_text()
+    script, commands = "", []
+    for step in steps(page, ("dap3d", "cp", "pip", "pytest")):
+        if step.kind == "file":
+            write(step.text, folder)
+        elif step.kind == "python":
+            script += step.text
+            outside.run(outside.python, "-c", script, cwd=folder)
+        else:
+            program, *words = shlex.split(step.text)
+            commands.append(program)
+            if program == "pip":
+                assert words[0] == "install"
+                pip("--python", outside.python, "install", *isolated(), *words[1:], cwd=folder)
+            elif program == "pytest":
+                outside.run(outside.python, "-m", "pytest", *words, cwd=folder)
+            else:
+                outside.run(outside.bin / "dap3d" if program == "dap3d" else program, *words,
+                            cwd=folder)  # fmt: skip
+    assert set(commands) == {"dap3d", "cp", "pip", "pytest"}
+    assert outside.plugins()["rope", "dap3d-rope"]["state"] == "ok"
+
+
 def test_from_outside(tmp_path):
     """All of the above, in one environment: what is compiled there takes most of the time."""
     outside, folder = environment_of_a_user(tmp_path), tmp_path / "more"
@@ -257,5 +293,6 @@ def test_from_outside(tmp_path):
     the_wheels_hold_what_they_should_and_no_more(outside)
     nothing_of_the_working_tree_is_reached(outside)
     a_plugin_that_was_written_there_is_checked_and_its_scene_runs(outside)
+    the_tutorial_can_be_followed(outside)
     broken_packages_break_nothing_else_and_are_explained(outside, folder)
     a_kernel_that_numba_cannot_compile_ends_a_run_with_one_message(outside, folder)

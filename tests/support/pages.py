@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 from support.process import environment
 
-STEP = re.compile(r"^```[a-z]+\n.*?^```|^    dap3d [^\n]*", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"# (?P<name>\S+\.\w+)\n")
 
 
@@ -27,13 +26,15 @@ class Step(NamedTuple):
     line: int
 
 
-def steps(text):
-    """The steps of a page, in order: files to write, Python to run, commands."""
-    for match in STEP.finditer(text):
+def steps(text, programs=("dap3d",)):
+    """The steps of a page, in order: files to write, Python to run, commands of these programs."""
+    names = "|".join(programs)
+    step = re.compile(rf"^```[a-z]+\n.*?^```|^    (?:{names}) [^\n]*", re.MULTILINE | re.DOTALL)
+    for match in step.finditer(text):
         line = text.count("\n", 0, match.start()) + 1
         fence, _, block = match[0].partition("\n")
         if not fence.startswith("```"):
-            yield Step("command", match[0].strip().removeprefix("dap3d "), line)
+            yield Step("command", match[0].strip(), line)
             continue
         block = block.removesuffix("```")
         if FILE.match(block):
@@ -78,8 +79,9 @@ def write(block, folder):
 
 def command(step, page, folder):
     """Run a command as a user does."""
-    words = [sys.executable, "-m", "dap3d_core.cli", *shlex.split(step.text, comments=True)]
+    words = shlex.split(step.text, comments=True)[1:]
+    words = [sys.executable, "-m", "dap3d_core.cli", *words]
     done = subprocess.run(
         words, cwd=folder, env=environment(), capture_output=True, text=True, timeout=300
     )
-    assert done.returncode == 0, f"{page}:{step.line}: dap3d {step.text}\n{done.stderr}"
+    assert done.returncode == 0, f"{page}:{step.line}: {step.text}\n{done.stderr}"
