@@ -100,7 +100,7 @@ def scene(n: int) -> str:
     for k in range(1, n + 1):
         text += joint(f"L{k}", f"coupler{k}", f"L{k}", f"crank{k - 1}", f"B{k - 1}")
         text += joint(f"R{k}", f"coupler{k}", f"R{k}", f"crank{k}", f"B{k}")
-    return text + TAIL.format(right=f"{n}.5")
+    return text + TAIL.format(right=f"{n + 1}.5")
 
 
 def main(arguments: list[str]) -> int:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from dap3d_core.interface import PluginError
     from dap3d_core.matlab import import_matlab
-    from dap3d_core.plot import plot
+    from dap3d_core.plot import animate, plot
     from dap3d_core.registry import load_registry
     from dap3d_core.report import report
     from dap3d_core.result import Result
@@ -39,6 +39,7 @@ _HOMES = {
     "Scene": ("scene", "Scene"),
     "SceneError": ("scene", "SceneError"),
     "SimulationError": ("simulation", "SimulationError"),
+    "animate": ("plot", "animate"),
     "compile": ("simulation", "compile_scene"),
     "import_matlab": ("matlab", "import_matlab"),
     "load": ("scene", "load"),
@@ -60,6 +61,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "SimulationError",
+    "animate",
     "compile",
     "import_matlab",
     "load",

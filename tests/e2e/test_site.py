@@ -41,6 +41,7 @@ def test_every_model_has_its_picture(site):
         text = page.read_text()
         assert f"sphx_glr_{name}_001.png" in text
         assert f"dap3d run {name}" in text
+        assert '<img src="data:image/gif;base64,' in text  # and its motion
 
 
 def test_what_the_sources_say_is_shown(site):

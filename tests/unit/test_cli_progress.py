@@ -1,9 +1,10 @@
-"""Progress where nobody looks at a terminal: a line now and then, on stderr."""
+"""What a run shows while it works: one line on a terminal, now and then a line elsewhere."""
 
 import pytest
 
 from dap3d_core.cli import progress
-from dap3d_core.cli.progress import ONCE, RunProgress
+from dap3d_core.cli.progress import ONCE, RunProgress, live_line, plain_line
+from dap3d_core.simulation import Standing
 
 
 @pytest.fixture
@@ -14,15 +15,23 @@ def clock(monkeypatch):
     return now
 
 
+def standing(t, t_end=100.0):
+    return Standing(t=t, t_end=t_end, steps=int(10 * t), step=0.1, drift=2e-9)
+
+
 def test_lines_come_ever_more_rarely_and_estimate_what_is_left(clock, capsys):
     with RunProgress(quiet=False) as shown:
         for k in range(101):
             clock[0] = float(k)
-            shown.advance(0.5 * k, 100.0)
+            shown.advance(standing(0.5 * k))
     lines = capsys.readouterr().err.splitlines()
-    assert lines[0] == "t = 0.5 of 100 s (0%), about 3 min 19 s left"
+    assert lines[0] == (
+        "t = 0.5 of 100 s (0%), step 0.1 s, 0.5 x real time, energy drift 2e-09, "
+        "about 3 min 19 s left"
+    )
     assert len(lines) == 7  # after 1, 2, 4, 8, ... s
-    assert lines[-1] == "t = 32 of 100 s (32%), about 2 min 16 s left"
+    assert lines[-1].startswith("t = 32 of 100 s (32%), ")
+    assert lines[-1].endswith(", about 2 min 16 s left")
 
 
 def test_compilation_is_announced_once_with_its_names(capsys):
@@ -38,5 +47,40 @@ def test_quiet_is_quiet(clock, capsys):
         shown.start()
         for k in range(100):
             clock[0] = float(k)
-            shown.advance(float(k), 100.0)
+            shown.advance(standing(float(k)))
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("width", [58, 78, 108])
+@pytest.mark.parametrize("t_end", [0.05, 1.0, 20.0, 100.0])
+@pytest.mark.parametrize("rate", [0.00123, 0.5, 12.0, 345.0])
+def test_the_live_line_says_everything_from_60_columns_on(width, t_end, rate):
+    """Time, step, pace, drift and what is left, whenever that is less than an hour."""
+    run = standing(0.37 * t_end, t_end)
+    line = live_line(run, rate, width)
+    assert len(line) <= width
+    left = 0.63 * t_end / rate
+    if left < 3599.0:
+        for words in (f"{t_end:g} s", "1.0e-01", f"{rate:.3g}x", "drift 2e-09", " left"):
+            assert words in line, (words, line)
+
+
+def test_the_live_line_keeps_its_width_in_the_course_of_a_run():
+    lines = [live_line(standing(t, 20.0), 5.0 + 0.01 * t, 77) for t in (0.1, 3.0, 9.99, 15.0, 19.9)]
+    assert len({len(line) for line in lines}) == 1
+
+
+@pytest.mark.parametrize("width", range(4, 60))
+def test_the_live_line_fits_any_terminal(width):
+    assert len(live_line(standing(37.0), 0.01, width)) <= width
+
+
+@pytest.mark.parametrize(
+    ("rate", "words"), [(0.0, "-:-- left"), (1.0, "1:03 left"), (0.01, "1:45:00 left")]
+)
+def test_what_is_left_is_shown_as_by_a_clock(rate, words):
+    assert live_line(standing(37.0), rate, 107).endswith(words)
+
+
+def test_before_the_pace_is_known():
+    assert "about ? left" in plain_line(standing(0.1), 0.0)

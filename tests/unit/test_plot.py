@@ -1,16 +1,22 @@
 """Plots show the named quantities, in files of each kind, and refuse what they cannot show."""
 
+import itertools
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import matplotlib
+import matplotlib.figure
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from unit.test_result import circling, drifting, model_of, result_of
 
-from dap3d_core.plot import FORMATS, plot, save_plot
+from dap3d_core.plot import FORMATS, plot, save_plot, show_plot
+from dap3d_core.plot.drawing import draw, gather, height_of
 from dap3d_core.result import ResultError, UnknownNameError
 from dap3d_core.scene import Scene
 
@@ -63,7 +69,7 @@ def test_units_share_a_figure_in_panels_below_one_another(result):
     assert [ax.get_ylabel().replace("\n", " ") for ax in axes] == [
         "position [m]",
         "total energy, work of forces and drivers [J]",
-        "Euler parameters of bob, e0",
+        "Euler parameters of bob, e0 [1]",
     ]
     assert axes[-1].get_xlabel() == "time [s]"
 
@@ -72,6 +78,107 @@ def test_one_quantity_over_another(result):
     ax = plot(result, "bob.r.y", x="bob.r.x")
     np.testing.assert_array_equal(lines(ax)["bob.r.y"], result.r[:, 0, :2])
     assert ax.get_xlabel() == "position of bob, x [m]"
+
+
+def test_a_path_has_one_scale_and_shows_where_it_begins(result):
+    ax = plot(result, "bob.r.y", x="bob.r.x")
+    ax.figure.draw_without_rendering()
+    box = ax.get_window_extent()
+    across, up = box.width / np.ptp(ax.get_xlim()), box.height / np.ptp(ax.get_ylim())
+    assert across == pytest.approx(up)
+    (line,) = ax.get_lines()
+    assert (line.get_marker(), line.get_markevery()) == ("o", [0])
+    assert plot(result, "bob.rd.y", x="bob.r.x").get_aspect() == "auto"
+
+
+@pytest.mark.parametrize("x", [None, "bob.p.e0", "bob.r.x"])
+def test_every_axis_has_a_unit(result, x):
+    first = plot(result, "bob.r", "bob.p.e3", "constraint.position", "J1.force.norm", x=x)
+    axes = first.figure.axes
+    assert len(axes) == 4
+    for label in (axes[-1].get_xlabel(), *(ax.get_ylabel() for ax in axes)):
+        assert re.search(r"\[[^]]+\]$", label), label
+
+
+def test_several_runs_in_one_figure(result):
+    """One quantity is named by its run; several by both. Each run over its own instants."""
+    other = circling(nt=5)[0]
+    ax = plot({"fine": result, "coarse": other}, "bob.r.x")
+    assert {name: len(data) for name, data in lines(ax).items()} == {"fine": 21, "coarse": 5}
+    assert ax.get_ylabel() == "position of bob, x [m]"
+    assert ax.figure.get_suptitle() == "circling"
+    both = plot({"fine": result, "coarse": other}, "bob.r", "work")
+    assert list(lines(both)) == [f"bob.r.{c}, {run}" for run in ("fine", "coarse") for c in "xyz"]
+    looks = {(line.get_color(), line.get_linestyle()) for line in both.get_lines()}
+    assert len(looks) == 6
+    assert len({line.get_linestyle() for line in both.get_lines()}) == 2  # one for each run
+    assert list(lines(both.figure.axes[1])) == ["fine", "coarse"]
+
+
+def test_a_run_that_lacks_a_quantity_is_named():
+    with pytest.raises(UnknownNameError, match=r"^second: .*'bob'"):
+        plot({"first": circling()[0], "second": drifting()}, "bob.r")
+    with pytest.raises(ValueError, match="no runs"):
+        plot({}, "bob.r")
+
+
+def letters(figure):
+    """Sizes of all text that is shown, points."""
+    from matplotlib.text import Text
+
+    return [t.get_fontsize() for t in figure.findobj(Text) if t.get_visible() and t.get_text()]
+
+
+def boxes(axis, figure):
+    """Where the labels of the ticks of an axis stand."""
+    shown = [t for t in axis.get_ticklabels() if t.get_text()]
+    return [t.get_window_extent(figure.canvas.get_renderer()) for t in shown]
+
+
+@pytest.mark.parametrize("names", [["bob.r.x"], ["bob.r", "bob.w"], ["J1.force", "bob.p"]])
+def test_it_can_be_read_at_60_mm(result, names):
+    """The usual picture set 60 mm wide has letters of 5 points; one made so wide has 8."""
+    usual = plot(result, *names).figure
+    assert min(letters(usual)) * 60.0 / 25.4 / usual.get_figwidth() >= 4.9
+    drawing = gather(result, names, None)
+    small = matplotlib.figure.Figure(figsize=(60 / 25.4, height_of(drawing)), layout="constrained")
+    FigureCanvasAgg(small)
+    draw(small, drawing)
+    small.canvas.draw()
+    assert min(letters(small)) >= 8.0
+    for ax in small.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            found = boxes(axis, small)
+            assert not any(a.overlaps(b) for a, b in itertools.combinations(found, 2))
+        assert ax.get_window_extent().width > 0.45 * small.bbox.width
+
+
+def test_without_a_display_there_is_no_window(result):
+    with pytest.raises(ResultError, match=r"cannot open a window.*-o writes a file"):
+        show_plot(result, "bob.r")
+
+
+def test_a_window_shows_the_figure(tmp_path):
+    """With a way to show windows that only says what it would show."""
+    (tmp_path / "says.py").write_text(
+        "from matplotlib.backends.backend_agg import FigureCanvasAgg as FigureCanvas\n"
+        "from matplotlib.backend_bases import FigureManagerBase as FigureManager\n"
+        "def show(*args, **options):\n"
+        "    from matplotlib import pyplot\n"
+        "    print(pyplot.gcf().axes[0].get_ylabel())\n"
+    )
+    tests = Path(__file__).parents[1]
+    code = (
+        "import sys; sys.path[:0] = sys.argv[1:]\n"
+        "from unit.test_result import circling\n"
+        "from dap3d_core.plot import show_plot\n"
+        "show_plot(circling()[0], 'bob.r.x')\n"
+    )
+    out = subprocess.run(
+        [sys.executable, "-c", code, str(tests), str(tmp_path)], capture_output=True, text=True,
+        env=os.environ | {"MPLBACKEND": "module://says"}, check=True,
+    )  # fmt: skip
+    assert out.stdout.strip() == "position of bob, x [m]"
 
 
 def test_on_axes_that_are_given(result):

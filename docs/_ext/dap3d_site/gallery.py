@@ -92,9 +92,14 @@ def curves(model: Model) -> str:
     )
 
 
+def motion(model: Model) -> str:
+    """The motion as a stick figure, as `dap3d animate` draws it."""
+    return f'dap.animate(result, "{model.name}.gif", fps=12.5, size=(480, 0), force=True)'
+
+
 #: How a model is shown: functions that return the code of a cell; their docstring stands above it.
 #: Below it stand the figures that it drew and, where its last line has one, that value's HTML.
-VIEWS: tuple[Callable[[Model], str], ...] = (curves,)
+VIEWS: tuple[Callable[[Model], str], ...] = (curves, motion)
 
 
 def _command(model: Model, name: str) -> list[str]:

@@ -13,12 +13,12 @@ SECTIONS = {
     ),
     "Runs": (
         ("simulate", "compile", "Event"),
-        ("simulation.CompiledModel", "simulation.Instant"),
+        ("simulation.CompiledModel", "simulation.Instant", "simulation.Standing"),
     ),
     "Results": (
-        ("Result", "open", "plot", "view"),
+        ("Result", "open", "plot", "view", "animate"),
         ("result.Reaction", "result.Energy", "result.Entry", "result.ErrorEstimate",
-         "result.Occurrence", "result.Quantity", "result.Statistics"),
+         "result.Occurrence", "result.Quantity", "result.Statistics", "plot.Film"),
     ),
     "Reports": (
         ("report",),

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dap3d_core.cli.completion import models as complete_models
 from dap3d_core.cli.exits import DONE, REFUSED, Refused
 from dap3d_core.cli.group import Command
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=Command, short_help="Validate a model, count its degrees of freedom.")
-@click.argument("model")
+@click.argument("model", shell_complete=complete_models)
 @click.option("--method", metavar="NAME", help="Formulation, in place of the scene's.")
 @click.option(
     "--correct-metric",

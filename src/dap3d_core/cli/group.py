@@ -14,6 +14,19 @@ from dap3d_core.cli.signals import Stopping
 from dap3d_core.cli.streams import leave_stdout, prepare_streams
 
 
+def _drop_colors(ctx: click.Context, option: click.Parameter, asked: bool) -> None:
+    """From now on, also for the commands of this context: no colour."""
+    if asked:
+        ctx.find_root().color = ctx.color = False
+
+
+def _no_color() -> click.Option:
+    return click.Option(
+        ["--no-color"], is_flag=True, is_eager=True, expose_value=False, callback=_drop_colors,
+        help="Print without colours, as with NO_COLOR=1 in the environment.",
+    )  # fmt: skip
+
+
 class Command(click.Command):
     """A command with ``--debug``; its failures become messages and exit codes.
 
@@ -25,6 +38,7 @@ class Command(click.Command):
         self.params.append(
             click.Option(["--debug"], is_flag=True, help="Show the traceback of a failure.")
         )
+        self.params.append(_no_color())
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse, and refuse options that are given twice."""
@@ -97,6 +111,9 @@ def dap3d(debug: bool) -> None:
     """
 
 
+dap3d.params.append(_no_color())
+
+
 def run_line(argv: Sequence[str] | None) -> int:
     """Run the words of a command line, by default those of the process; returns the exit code."""
     prepare_streams()
@@ -133,6 +150,7 @@ def _tell_usage(error: click.ClickException) -> None:
 
 
 def _add_commands() -> None:
+    from dap3d_core.cli.animate import animate
     from dap3d_core.cli.check import check
     from dap3d_core.cli.check_plugin import check_plugin
     from dap3d_core.cli.describe import describe
@@ -147,7 +165,7 @@ def _add_commands() -> None:
     from dap3d_core.cli.run import run
     from dap3d_core.cli.view import view
 
-    analysis = (info, post, plot, view, report)
+    analysis = (info, post, plot, animate, view, report)
     authors = (describe, new_plugin, check_plugin)
     for command in (run, check, models, plugins, *authors, *analysis, import_matlab):
         dap3d.add_command(command)

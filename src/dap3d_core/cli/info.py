@@ -4,12 +4,13 @@ from pathlib import Path
 
 import click
 
+from dap3d_core.cli.completion import results as complete_results
 from dap3d_core.cli.exits import DONE
 from dap3d_core.cli.group import Command
 
 
 @click.command(cls=Command, short_help="Say what a result file holds.")
-@click.argument("result")
+@click.argument("result", shell_complete=complete_results)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 def info(result: str, *, as_json: bool) -> int:
     """Say what a RESULT file holds and how its run went."""

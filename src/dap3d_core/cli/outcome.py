@@ -87,9 +87,9 @@ def _show_all(console: Terminal, outcome: Outcome, found: dict[str, Any], target
     name = shlex.quote(str(target))
     body = outcome.result.subject.body_names[0]
     quantity = shlex.quote(f"{body}.r")
-    plot, view = f"dap3d plot {name} {quantity}", f"dap3d view {name} --open"
-    for line in (plot, view, f"dap3d info {name}"):
-        say(console, line, "green", indent=2, whole=True)
+    commands = (f"plot {name} {quantity}", f"view {name} --open", f"animate {name}", f"info {name}")
+    for line in commands:
+        say(console, f"dap3d {line}", "green", indent=2, whole=True)
 
 
 def _show_faults(console: Terminal, outcome: Outcome, faults: list[str], target: Path) -> None:

@@ -1,10 +1,13 @@
-"""``dap3d plot``: quantities of a result as curves in a file."""
+"""``dap3d plot``: quantities of results as curves, in a file or a window."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from dap3d_core.cli.completion import quantities as complete_quantities
+from dap3d_core.cli.completion import results as complete_results
 from dap3d_core.cli.exits import DONE, Refused
 from dap3d_core.cli.group import Command
 
@@ -12,17 +15,50 @@ if TYPE_CHECKING:
     from dap3d_core.result import Result
 
 ENERGIES = ("energy.kinetic", "energy.potential", "energy.total")
+MM_PER_INCH = 25.4
+#: Ending of result files, by which a word is told from a quantity.
+ENDING = ".nc"
 
 
-@click.command(cls=Command, short_help="Draw curves of a result.")
-@click.argument("result")
-@click.argument("quantities", metavar="[QUANTITY]...", nargs=-1)
-@click.option("-o", "--output", type=click.Path(), metavar="FILE",
-              help="Picture: .png, .svg or .pdf; RESULT.png by default.")  # fmt: skip
-@click.option("--x", metavar="QUANTITY", help="What the curves are drawn over; time by default.")
+@click.command(cls=Command, short_help="Draw curves of results.")
+@click.argument("result", shell_complete=complete_results)
+@click.argument(
+    "quantities", metavar="[RESULT | QUANTITY]...", nargs=-1, shell_complete=complete_quantities
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(),
+    metavar="FILE",
+    help="Picture: .png, .svg or .pdf; RESULT.png by default.",
+)
+@click.option(
+    "--x",
+    metavar="QUANTITY",
+    shell_complete=complete_quantities,
+    help="What the curves are drawn over; time by default.",
+)
+@click.option("--show", is_flag=True, help="Open a window; writes a file only with -o.")
+@click.option(
+    "--width",
+    type=float,
+    metavar="MM",
+    help="Width of the picture in mm; 97 by default, good down to 60.",
+)
+@click.option("--height", type=float, metavar="MM", help="Height in mm; what fits by default.")
 @click.option("--force", is_flag=True, help="Overwrite an existing picture.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 def plot(
-    result: str, quantities: tuple[str, ...], *, output: str | None, x: str | None, force: bool
+    result: str,
+    quantities: tuple[str, ...],
+    *,
+    output: str | None,
+    x: str | None,
+    show: bool,
+    width: float | None,
+    height: float | None,
+    force: bool,
+    as_json: bool,
 ) -> int:
     """Draw quantities of a RESULT; without any, its energies.
 
@@ -39,26 +75,67 @@ def plot(
 
     A component follows with another dot, crank.r.z; .norm is the length of a vector. Quantities of
     different units get panels of their own.
+
+    \b
+    dap3d plot pen1.nc cone.r.z J1.force.norm
+    dap3d plot pen1.nc cone.r.y --x cone.r.x    a path
+    dap3d plot a.nc b.nc cone.r.z               two runs
+
+    Words that end in .nc are further results, drawn in the same figure.
     """
     from dap3d_core.cli.files import open_result, writable
     from dap3d_core.cli.rendering import output as output_console
-    from dap3d_core.cli.rendering import say
+    from dap3d_core.cli.rendering import print_json, say
 
-    target = Path(output) if output is not None else Path(Path(result).stem + ".png")
-    opened = open_result(result)
-    writable(target, force=force, sources=(Path(result),))
-    _draw(opened, quantities or ENERGIES, target, x, force)
-    say(output_console(), f"{target} written", whole=True)
+    files = [result, *(word for word in quantities if word.endswith(ENDING))]
+    names = tuple(w for w in quantities if not w.endswith(ENDING)) or ENERGIES
+    runs = dict(zip(_told_apart(files), map(open_result, files), strict=True))
+    target = None
+    if output is not None or not show:
+        target = Path(output or Path(result).stem + ".png")
+        writable(target, force=force, sources=tuple(map(Path, files)))
+    shown: Mapping[str, Result] | Result = runs if len(runs) > 1 else runs.popitem()[1]
+    _draw(shown, names, target, x, show, (width, height), force)
+    if target is not None and as_json:
+        print_json({"file": str(target), "results": files, "quantities": names, "x": x or "t"})
+    elif target is not None:
+        say(output_console(), f"{target} written", whole=True)
     return DONE
 
 
-def _draw(
-    result: "Result", names: tuple[str, ...], target: Path, x: str | None, force: bool
-) -> None:
-    from dap3d_core.plot import save_plot
-    from dap3d_core.result import UnknownNameError
+def _told_apart(files: Sequence[str]) -> list[str]:
+    """Names of runs for the legend: their files without what all have in common.
 
+    Raises:
+        Refused: a file is named twice.
+    """
+    if len({Path(f).absolute() for f in files}) < len(files):
+        raise Refused("a result is named twice; each run is drawn once")
+    parts = [Path(f).absolute().with_suffix("").parts for f in files]
+    for size in range(1, max(map(len, parts)) + 1):
+        names = ["/".join(p[-size:]) for p in parts]
+        if len(set(names)) == len(files):
+            return names
+    return [str(f) for f in files]
+
+
+def _draw(
+    runs: "Mapping[str, Result] | Result",
+    names: tuple[str, ...],
+    target: Path | None,
+    x: str | None,
+    show: bool,
+    size: tuple[float | None, float | None],
+    force: bool,
+) -> None:
+    from dap3d_core.plot import WIDTH, save_plot, show_plot
+    from dap3d_core.result import ResultError, UnknownNameError
+
+    width, height = (None if s is None else s / MM_PER_INCH for s in size)
     try:
-        save_plot(result, names, target, x=x, force=force)
-    except (UnknownNameError, ValueError) as error:
+        if target is not None:
+            save_plot(runs, names, target, x=x, width=width or WIDTH, height=height, force=force)
+        if show:
+            show_plot(runs, names, x=x, width=width or WIDTH, height=height)
+    except (UnknownNameError, ResultError, ValueError) as error:
         raise Refused(str(error)) from error

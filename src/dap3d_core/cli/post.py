@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dap3d_core.cli.completion import quantities as complete_quantities
+from dap3d_core.cli.completion import results as complete_results
 from dap3d_core.cli.exits import DONE, Refused
 from dap3d_core.cli.group import Command
 
@@ -17,13 +19,15 @@ FORMATS = {".nc": "nc", ".csv": "csv"}
 
 
 @click.command(cls=Command, short_help="Compute all arrays of a result.")
-@click.argument("result")
-@click.argument("quantities", metavar="[QUANTITY]...", nargs=-1)
+@click.argument("result", shell_complete=complete_results)
+@click.argument("quantities", metavar="[QUANTITY]...", nargs=-1,
+                shell_complete=complete_quantities)  # fmt: skip
 @click.option("-o", "--output", type=click.Path(), metavar="FILE",
               help="What is written: a .nc or a .csv file; RESULT-post.nc by default.")  # fmt: skip
 @click.option("--format", "kind", type=click.Choice(tuple(FORMATS.values())),
               help="Form of the file, where its name does not say it.")  # fmt: skip
 @click.option("--select", "selected", metavar="QUANTITY...", multiple=True,
+              shell_complete=complete_quantities,
               help="These quantities alone.")  # fmt: skip
 @click.option("--jacobian", "--jac", "jacobian", is_flag=True,
               help="The constraint Jacobian as well.")  # fmt: skip

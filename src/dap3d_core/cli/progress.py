@@ -1,17 +1,25 @@
 """What a run shows while it works: a bar on a terminal, now and then a line elsewhere."""
 
+import math
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from rich.progress import BarColumn, Progress, SpinnerColumn, Task, TaskProgressColumn, TextColumn
 from rich.text import Text
 
 from dap3d_core.cli.rendering import Terminal, clean, messages, say, seconds
 
+if TYPE_CHECKING:
+    from dap3d_core.simulation import Standing
+
 ONCE = "compiling for the first time; this happens once"
 #: Lines of progress come after this time, then ever more rarely, s.
 FIRST_LINE, LONGEST_PAUSE = 1.0, 60.0
+#: Columns beside the live line: the spinner and a gap.
+BESIDE = 2
 
 
 class RunProgress:
@@ -27,12 +35,17 @@ class RunProgress:
         self._bar: Progress | None = None
         self._task: Any = None
         self._told_once = False
-        self._begun: float | None = None
+        self._begun: tuple[float, float] | None = None
         self._reached = 0.0
         self._next_line = FIRST_LINE
         live = self._console.file.isatty() and not self._console.is_dumb_terminal
         if live and not quiet:
-            self._bar = _bar(self._console)
+            self._bar = self._display()
+
+    def _display(self) -> Progress:
+        """What stands on a terminal: a line that says all in words."""
+        columns = SpinnerColumn("line"), TextColumn("{task.description}", markup=False)
+        return _transient(*columns, console=self._console)
 
     def __enter__(self) -> Self:
         if self._bar is not None:
@@ -58,24 +71,20 @@ class RunProgress:
         """The model is ready; its initial conditions are next."""
         self._describe("starting")
 
-    def advance(self, t: float, t_end: float) -> None:
-        """The run has come to simulated time t of t_end, s."""
-        if self._begun is None or t < self._reached:  # a second run begins
-            self._begun, self._next_line = time.monotonic(), FIRST_LINE
-        self._reached = t
+    def advance(self, run: "Standing") -> None:
+        """The run stands so."""
+        now = time.monotonic()
+        if self._begun is None or run.t < self._reached:  # a second run begins
+            self._begun, self._next_line = (now, run.t), FIRST_LINE
+        self._reached = run.t
+        elapsed, done = now - self._begun[0], run.t - self._begun[1]
+        rate = done / elapsed if elapsed > 0.0 else 0.0
         if self._bar is not None:
-            words = f"t = {t:.4g} of {t_end:.4g} s"
-            self._bar.update(self._task, total=t_end, completed=t, description=words)
-        elif not self._quiet:
-            self._line(t, t_end, time.monotonic() - self._begun)
-
-    def _line(self, t: float, t_end: float, elapsed: float) -> None:
-        if elapsed < self._next_line or t <= 0.0 or t >= t_end:
-            return
-        left = seconds(elapsed * (t_end - t) / t)
-        words = f"t = {t:.4g} of {t_end:.4g} s ({t / t_end:.0%}), about {left} left"
-        self._print(words)
-        self._next_line = elapsed + min(max(elapsed, FIRST_LINE), LONGEST_PAUSE)
+            words = live_line(run, rate, self._console.width - BESIDE)
+            self._bar.update(self._task, description=words)
+        elif not self._quiet and elapsed >= self._next_line and 0.0 < run.t < run.t_end:
+            self._print(plain_line(run, rate))
+            self._next_line = elapsed + min(max(elapsed, FIRST_LINE), LONGEST_PAUSE)
 
     def _tell_once(self) -> None:
         if not self._told_once:
@@ -93,6 +102,73 @@ class RunProgress:
             say(self._console, words)
 
 
+def live_line(run: "Standing", rate: float, width: int) -> str:
+    """How a run stands on one line: the fullest of several forms that fits.
+
+    Simulated time, step, simulated time in a second of ours, drift of the energy, time left.
+    Numbers keep their widths, so that the line does not jump.
+
+    Args:
+        run: how it stands.
+        rate: simulated time over time, 0 where it is not known yet.
+        width: columns there are.
+    """
+    part, end = f"{run.t / run.t_end if run.t_end else 1.0:4.0%}", f"{run.t_end:.4g}"
+    digits = max(0, 3 - math.floor(math.log10(run.t_end or 1.0)))
+    now = f"{run.t:{len(f'{run.t_end:.{digits}f}')}.{digits}f}"
+    pace = f"{rate:.3g}" if rate else "-"
+    step, drift, left = f"{run.step:.1e}", f"drift {run.drift:.0e}", f"{_left(run, rate)} left"
+    forms = [
+        f"{part}  t = {now} of {end} s  step {run.steps:,}: {step} s  {pace:>5}x real time  "
+        f"{drift}  {left}",
+        f"{part} {now} of {end} s, step {step} s, {pace:>5}x real time, {drift}, {left}",
+        f"{now}/{end} s step {step} {pace:>5}x {drift} {left}",
+        f"{part} {now}/{end} s {pace}x {drift} {left}",
+        f"{part} {left}",
+    ]
+    return next((words for words in forms if len(words) <= width), part[:width])
+
+
+def plain_line(run: "Standing", rate: float) -> str:
+    """The same for a file or another program."""
+    left = seconds((run.t_end - run.t) / rate) if rate else "?"
+    return (
+        f"t = {run.t:.4g} of {run.t_end:.4g} s ({run.t / run.t_end:.0%}), step {run.step:.2g} s, "
+        f"{rate:.3g} x real time, energy drift {run.drift:.0e}, about {left} left"
+    )
+
+
+def _left(run: "Standing", rate: float) -> str:
+    """The time that is left at this rate, as a clock shows it."""
+    if not rate:
+        return "-:--"
+    minutes, rest = divmod(math.ceil((run.t_end - run.t) / rate), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
+@contextmanager
+def counting(word: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
+    """Progress by numbers: a bar on a terminal, nothing elsewhere.
+
+    Args:
+        word: what is counted.
+        quiet: whether nothing is shown on a terminal either.
+
+    Yields:
+        what is to be called with what is done and how much there is in all.
+    """
+    console = messages()
+    if quiet or not console.file.isatty() or console.is_dumb_terminal:
+        yield lambda done, total: None
+        return
+    with bar_of(console) as bar:
+        task = bar.add_task("preparing", total=None)
+        yield lambda done, total: bar.update(
+            task, total=total, completed=done, description=f"{word} {done:,} of {total:,}"
+        )
+
+
 class _Left(TextColumn):
     """The estimate of the time that is left, empty as long as there is none."""
 
@@ -105,11 +181,15 @@ class _Left(TextColumn):
         return Text(f"{seconds(left or 0.0)} left" if known else "")
 
 
-def _bar(console: Terminal) -> Progress:
+def bar_of(console: Terminal) -> Progress:
     """Spinner, what is done, bar, percentage, estimate: 60 columns hold it."""
     narrow = console.width < 50
     columns: list[Any] = [SpinnerColumn("line"), TextColumn("{task.description}", markup=False)]
     if not narrow:
         columns.append(BarColumn(bar_width=14 if console.width < 72 else 24))
-    columns += [TaskProgressColumn(), _Left()]
+    return _transient(*columns, TaskProgressColumn(), _Left(), console=console)
+
+
+def _transient(*columns: Any, console: Terminal) -> Progress:
+    """Progress that leaves nothing behind on the screen."""
     return Progress(*columns, console=console, transient=True, refresh_per_second=8)

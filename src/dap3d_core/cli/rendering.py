@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import click
 from rich.console import Console, RenderableType
 from rich.padding import Padding
 from rich.table import Table
@@ -23,7 +24,9 @@ class Terminal(Console):
     """A console without markup, which goes quiet when its reader has gone."""
 
     def __init__(self, *, stderr: bool = False) -> None:
-        super().__init__(stderr=stderr, markup=False, highlight=False, emoji=False)
+        super().__init__(
+            stderr=stderr, markup=False, highlight=False, emoji=False, no_color=_without_colors()
+        )
 
     def on_broken_pipe(self) -> None:
         """Write nothing any more; the command goes on to its end."""
@@ -40,6 +43,12 @@ class Terminal(Console):
     def has_width(self) -> bool:
         """Whether there is a width to keep: on a terminal, or where one is given."""
         return self.is_terminal or "COLUMNS" in os.environ
+
+
+def _without_colors() -> bool | None:
+    """True where ``--no-color`` was given; None leaves it to the environment (NO_COLOR)."""
+    ctx = click.get_current_context(silent=True)
+    return True if ctx is not None and ctx.color is False else None
 
 
 def output() -> Terminal:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dap3d_core.cli import exits
+from dap3d_core.cli.completion import models as complete_models
 from dap3d_core.cli.exits import Refused, Terminated
 from dap3d_core.cli.group import Command
 
@@ -67,7 +68,7 @@ def _with_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @click.command(cls=Command, short_help="Measure speed against error on a model.")
-@click.argument("model")
+@click.argument("model", shell_complete=complete_models)
 @_with_options
 @click.pass_context
 def report(

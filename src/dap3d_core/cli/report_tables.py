@@ -3,9 +3,10 @@
 import time
 from typing import TYPE_CHECKING
 
+from rich.progress import Progress
 from rich.text import Text
 
-from dap3d_core.cli.progress import LONGEST_PAUSE, RunProgress
+from dap3d_core.cli.progress import LONGEST_PAUSE, RunProgress, bar_of
 from dap3d_core.cli.rendering import (
     Terminal,
     clean,
@@ -37,6 +38,9 @@ class ReportProgress(RunProgress):
         super().__init__(quiet=quiet)
         self._told = time.monotonic()
         self._pause = PAUSE
+
+    def _display(self) -> Progress:
+        return bar_of(self._console)
 
     def work(self, done: float, total: float, words: str) -> None:
         """Of ``total`` seconds of work, ``done`` are over; what is going on."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dap3d_core.cli import exits
+from dap3d_core.cli.completion import models as complete_models
 from dap3d_core.cli.exits import Refused, Terminated
 from dap3d_core.cli.group import Command
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from dap3d_core.cli.outcome import Outcome
     from dap3d_core.cli.signals import Stopping
     from dap3d_core.scene import Scene, SceneError
+    from dap3d_core.simulation import Standing
 
 #: Settings of a run that the command line overrides, with the options that do.
 SETTINGS = {
@@ -70,7 +72,7 @@ def _with_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @click.command(cls=Command, short_help="Simulate a model, write its result.")
-@click.argument("model", required=False)
+@click.argument("model", required=False, shell_complete=complete_models)
 @_with_options
 @click.pass_context
 def run(
@@ -194,8 +196,8 @@ def _simulate(
 
     with RunProgress(quiet=quiet) as progress:
 
-        def on_progress(t: float, t_end: float) -> None:
-            progress.advance(t, t_end)
+        def watch(standing: "Standing") -> None:
+            progress.advance(standing)
             stopping.between_chunks()
 
         try:
@@ -211,7 +213,7 @@ def _simulate(
         try:
             result = dap.simulate(
                 compiled,
-                progress=on_progress,
+                watch=watch,
                 announce=progress.announce,
                 output=target,
                 force=force,

@@ -1,13 +1,14 @@
-"""The plot floor: quantities of a result as curves, in a window or in a file."""
+"""The plot floor: quantities of a result as curves, in a window or a file; its motion as a film."""
 
 import sys
 from types import ModuleType
 from typing import Any
 
-from dap3d_core.plot.drawing import plot
-from dap3d_core.plot.saving import FORMATS, save_plot
+from dap3d_core.plot.animation import Film, animate
+from dap3d_core.plot.drawing import WIDTH, plot
+from dap3d_core.plot.saving import FORMATS, save_plot, show_plot
 
-__all__ = ["FORMATS", "plot", "save_plot"]
+__all__ = ["FORMATS", "WIDTH", "Film", "animate", "plot", "save_plot", "show_plot"]
 
 
 class _CallableModule(ModuleType):

@@ -1,14 +1,14 @@
-"""Curves over time, or over one another: one panel for each unit."""
+"""Curves over time, or over one another, of one run or several: one panel for each unit."""
 
 import textwrap
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.result import Quantity, Result, find
+from dap3d_core.result import Quantity, Result, UnknownNameError, find
 
 #: Colours that colour-blind readers can tell apart, on white (Okabe and Ito 2008, without yellow).
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -16,17 +16,19 @@ PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 DASHES = ("-", "--", "-.", ":")
 #: A single instant is drawn as markers, which may lie over one another.
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-#: Legends stand outside the axes: above them in figures narrower than this (inches), else beside.
-NARROW = 5.5
-WIDTH, HEIGHT, PANEL_HEIGHT = 6.4, 3.8, 2.4
+#: Inches. Letters of 8 points are still 5 points high where the picture is set 60 mm wide.
+WIDTH, HEIGHT, PANEL_HEIGHT = 3.8, 2.9, 2.1
+LETTERS = 8.0
 
 
 class Curve(NamedTuple):
-    """One line: its name in the legend, its values (nt,), and the quantity it belongs to."""
+    """One line: its name in the legend, its place (nt,), (nt,), whose it is."""
 
     name: str
+    x: Floats
     values: Floats
     quantity: Quantity
+    run: int
 
 
 class Panel(NamedTuple):
@@ -37,19 +39,31 @@ class Panel(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """What a figure shows: panels over the values (nt,) of one quantity."""
+    """What a figure shows: panels over one quantity, and words above them."""
 
     x: Quantity
     panels: list[Panel]
+    title: str
+
+    @property
+    def is_path(self) -> bool:
+        """Whether a point's path is shown, whose two axes have one scale."""
+        return self.x.name != "t" and [p.unit for p in self.panels] == [self.x.unit]
 
 
-def plot(result: Result, *quantities: str, x: str | None = None, ax: Axes | None = None) -> Axes:
+def plot(
+    result: Result | Mapping[str, Result],
+    *quantities: str,
+    x: str | None = None,
+    ax: Axes | None = None,
+) -> Axes:
     """Draw quantities of a result, those of different units in panels below one another.
 
     Args:
-        result: what to draw from.
+        result: what to draw from; several runs as names and results, {"rtol 1e-6": result, ...}.
         quantities: names such as ``crank.r.z``, ``crank.w`` (all components), ``energy.total``.
-        x: the quantity they are drawn over, one number an instant; time when left out.
+        x: the quantity they are drawn over, one number an instant; time when left out. A path, a
+            length over a length, has one scale on both axes; a circle marks its start.
         ax: where to draw; a new pyplot figure when left out.
 
     Returns:
@@ -58,7 +72,7 @@ def plot(result: Result, *quantities: str, x: str | None = None, ax: Axes | None
 
     Raises:
         UnknownNameError: there is no such quantity; names the nearest.
-        ValueError: no quantities, no instants, ``x`` has components, or ``ax`` is to take
+        ValueError: no runs, no quantities, no instants, ``x`` has components, or ``ax`` is to take
             several units.
     """
     drawing = gather(result, quantities, x)
@@ -66,7 +80,7 @@ def plot(result: Result, *quantities: str, x: str | None = None, ax: Axes | None
         from matplotlib import pyplot
 
         size = (WIDTH, height_of(drawing))
-        return draw(pyplot.figure(figsize=size, layout="constrained"), drawing, result)[0]
+        return draw(pyplot.figure(figsize=size, layout="constrained", dpi=150), drawing)[0]
     if len(drawing.panels) > 1:
         units = ", ".join(p.unit for p in drawing.panels)
         raise ValueError(f"one axes takes one unit; these quantities have {units}: leave ax out")
@@ -77,29 +91,61 @@ def plot(result: Result, *quantities: str, x: str | None = None, ax: Axes | None
     return ax
 
 
-def gather(result: Result, quantities: Sequence[str], x: str | None) -> Drawing:
+def gather(
+    result: Result | Mapping[str, Result], quantities: Sequence[str], x: str | None
+) -> Drawing:
     """What a figure of these quantities shows; errors as ``plot``."""
+    runs = result if isinstance(result, Mapping) else {"": result}
+    if not runs:
+        raise ValueError("there are no runs to draw")
     if not quantities:
         raise ValueError("name at least one quantity, such as energy.total or BODY.r")
+    panels: dict[str, Panel] = {}
+    found = {name: _of_run(run, quantities, x, name) for name, run in runs.items()}
+    over = next(iter(found.values()))[0]
+    for k in range(len(set(quantities))):
+        for number, (name, (along, there)) in enumerate(found.items()):
+            unit = there[k].unit
+            alone = there[k].values.ndim == 1 and [q.unit for q in there].count(unit) == 1
+            curves = panels.setdefault(unit, Panel(unit, [])).curves
+            curves.extend(_curves(there[k], along.values, number, name, alone=alone))
+    titles = list(dict.fromkeys(_title_of(run) for run in runs.values()))
+    return Drawing(over, list(panels.values()), titles[0] if len(titles) == 1 else "")
+
+
+def _of_run(
+    result: Result, names: Sequence[str], x: str | None, run: str
+) -> tuple[Quantity, list[Quantity]]:
+    """What the curves of a run are drawn over, and they themselves."""
     if not len(result.t):
-        raise ValueError("the result has no instants: there is nothing to draw")
-    over = find(result, x or "t")
+        raise ValueError(f"the result {run} has no instants: there is nothing to draw")
+    try:
+        over = find(result, x or "t")
+        found = [find(result, name) for name in dict.fromkeys(names)]
+    except UnknownNameError as error:
+        if not run:
+            raise
+        raise UnknownNameError(f"{run}: {error}") from error
     if over.values.ndim > 1:
         choices = ", ".join(f"{over.name}.{c}" for c in over.components)
         raise ValueError(f"x = {over.name} has components; name one of {choices}")
-    panels: dict[str, Panel] = {}
-    for quantity in (find(result, name) for name in dict.fromkeys(quantities)):
-        panels.setdefault(quantity.unit, Panel(quantity.unit, [])).curves.extend(_curves(quantity))
-    return Drawing(over, list(panels.values()))
+    return over, found
 
 
-def _curves(quantity: Quantity) -> Iterable[Curve]:
-    if quantity.values.ndim == 1:
-        return [Curve(quantity.name, quantity.values, quantity)]
-    return [
-        Curve(f"{quantity.name}.{part}", quantity.values[:, k], quantity)
-        for k, part in enumerate(quantity.components)
-    ]
+def _title_of(result: Result) -> str:
+    title = result.record.title
+    return f"{title} ({result.status})" if title and result.status != "done" else title
+
+
+def _curves(
+    quantity: Quantity, x: Floats, number: int, run: str, *, alone: bool
+) -> Iterable[Curve]:
+    """The curves of a quantity of a run; ``alone`` in its panel, it is named by its run."""
+    names = [f"{quantity.name}.{c}" for c in quantity.components] or [quantity.name]
+    columns = quantity.values.reshape(len(x), -1).T
+    for name, values in zip(names, columns, strict=True):
+        words = run if alone and run else ", ".join(word for word in (name, run) if word)
+        yield Curve(words, x, values, quantity, number)
 
 
 def height_of(drawing: Drawing) -> float:
@@ -108,27 +154,34 @@ def height_of(drawing: Drawing) -> float:
     return HEIGHT if count == 1 else PANEL_HEIGHT * count
 
 
-def draw(figure: Figure, drawing: Drawing, result: Result) -> list[Axes]:
+def draw(figure: Figure, drawing: Drawing) -> list[Axes]:
     """Draw all panels on an empty figure; returns their axes."""
     axes = figure.subplots(len(drawing.panels), 1, sharex=True, squeeze=False)[:, 0]
-    height = figure.get_figheight() / len(axes)
+    width, height = figure.get_figwidth(), figure.get_figheight() / len(axes)
     for ax, panel in zip(axes, drawing.panels, strict=True):
         draw_panel(ax, drawing, panel, height)
         if len(panel.curves) > 1:
-            _add_legend(ax)
+            _add_legend(ax, panel, width)
         ax.grid(True, alpha=0.3, linewidth=0.6)
         ax.spines[["top", "right"]].set_visible(False)
-    axes[-1].set_xlabel(_with_unit(drawing.x.label, drawing.x.unit))
-    if result.record.title:
-        words = result.record.title
-        if result.status != "done":
-            words += f" ({result.status})"
-        figure.suptitle(_text(words), fontsize="medium")
+        ax.tick_params(labelsize=LETTERS)
+        for offset in (ax.xaxis.get_offset_text(), ax.yaxis.get_offset_text()):
+            offset.set_fontsize(LETTERS)
+    axes[-1].set_xlabel(
+        _wrapped(_with_unit(drawing.x.label, drawing.x.unit), 17 * width), fontsize=LETTERS
+    )
+    if drawing.is_path:
+        axes[0].set_aspect("equal", adjustable="datalim")
+    if drawing.title:
+        figure.suptitle(shown_text(drawing.title), fontsize=LETTERS + 1)
     return list(axes)
 
 
 def draw_panel(ax: Axes, drawing: Drawing, panel: Panel, height: float) -> None:
-    """Draw the curves of one unit, with and their axis label.
+    """Draw the curves of one unit, with their axis label.
+
+    Colours differ from curve to curve, dashes from run to run: curves that lie on one another
+    are still seen.
 
     Args:
         ax: where.
@@ -136,20 +189,28 @@ def draw_panel(ax: Axes, drawing: Drawing, panel: Panel, height: float) -> None:
         panel: the curves.
         height: of the panel, inches.
     """
-    single = len(drawing.x.values) == 1
+    several = len({curve.run for curve in panel.curves}) > 1
     for k, curve in enumerate(panel.curves):
+        single = len(curve.x) == 1
+        dash = curve.run if several else k // len(PALETTE)
         ax.plot(
-            drawing.x.values,
+            curve.x,
             curve.values,
             color=PALETTE[k % len(PALETTE)],
-            linestyle="none" if single else DASHES[k // len(PALETTE) % len(DASHES)],
-            marker=MARKERS[k % len(MARKERS)] if single else "",
+            linestyle="none" if single else DASHES[dash % len(DASHES)],
+            marker=MARKERS[k % len(MARKERS)] if single else "o" if drawing.x.name != "t" else "",
+            markevery=[0],
+            markersize=4.5,
             markerfacecolor="none",
             linewidth=1.4,
-            label=_text(curve.name),
+            label=shown_text(curve.name),
         )
-    room = max(14, int(13 * height))  # characters beside the axis
-    ax.set_ylabel("\n".join(textwrap.wrap(_y_label(panel), room)))
+    ax.set_ylabel(_wrapped(_y_label(panel), 15 * height), fontsize=LETTERS)
+
+
+def _wrapped(words: str, room: float) -> str:
+    """Words on lines of so many characters beside an axis."""
+    return "\n".join(textwrap.wrap(words, max(14, int(room))))
 
 
 def _y_label(panel: Panel) -> str:
@@ -162,20 +223,28 @@ def _y_label(panel: Panel) -> str:
 
 
 def _with_unit(words: str, unit: str) -> str:
-    shown = unit.replace("^2", "²")
-    return _text(words if unit == "1" else f"{words} [{shown}]".strip())
+    """Words and the unit, [1] for numbers without one."""
+    return shown_text(f"{words} [{unit.replace('^2', '²')}]".strip())
 
 
-def _text(words: str) -> str:
+def shown_text(words: str) -> str:
     """Words as matplotlib shows them: a $ begins no formula, a _ hides no curve."""
     words = words.replace("$", r"\$")
     return f" {words}" if words.startswith("_") else words
 
 
-def _add_legend(ax: Axes) -> None:
-    if ax.figure.bbox.width / ax.figure.dpi < NARROW:
-        ax.legend(fontsize="x-small", loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3,
-                  frameon=False, borderaxespad=0.2)  # fmt: skip
-    else:
-        ax.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0),
-                  frameon=False, borderaxespad=0.0)  # fmt: skip
+def columns_of(labels: Sequence[str], width: float) -> int:
+    """How many columns of a legend fit a width, inches: letters, the line before them, a gap."""
+    longest = max(map(len, labels))
+    column = (0.56 * longest + 4.0) * LETTERS / 72.0
+    rows = -(-len(labels) // max(1, int(width / column)))
+    return -(-len(labels) // rows)
+
+
+def _add_legend(ax: Axes, panel: Panel, width: float) -> None:
+    """The legend above the axes, in as many columns as fit."""
+    look: dict[str, Any] = dict(handlelength=1.8, columnspacing=1.0, handletextpad=0.5)
+    labels = [curve.name for curve in panel.curves]
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns_of(labels, width - 0.6),
+              fontsize=LETTERS, labelspacing=0.25, frameon=False, borderaxespad=0.2,
+              **look)  # fmt: skip

@@ -1,7 +1,8 @@
 """Figures as files, without a window."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,23 +20,31 @@ FORMATS: dict[str, dict[str, Any]] = {
     ".svg": {"Date": None},
     ".pdf": {"CreationDate": None},
 }
+#: What matplotlib falls back on where it cannot open windows.
+FILES_ALONE = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
+#: A window shows a figure larger than paper does.
+WINDOW_DPI = 170.0
+NO_WINDOW = (
+    "cannot open a window: there is no display, or no package that opens windows (pip install "
+    "PyQt6); -o writes a file instead"
+)
 
 
 def save_plot(
-    result: Result,
+    result: Result | Mapping[str, Result],
     quantities: str | Sequence[str],
     path: str | os.PathLike[str],
     *,
     x: str | None = None,
     width: float = WIDTH,
     height: float | None = None,
-    dpi: float = 150.0,
+    dpi: float = 200.0,
     force: bool = False,
 ) -> Path:
     """Draw quantities of a result as ``plot`` does, into a file; needs no display.
 
     Args:
-        result: what to draw from.
+        result: what to draw from; several runs as names and results.
         quantities: one name or several.
         path: the file; its suffix says what it is, .png, .svg or .pdf.
         x: the quantity they are drawn over; time when left out.
@@ -55,7 +64,7 @@ def save_plot(
     names = [quantities] if isinstance(quantities, str) else list(quantities)
     drawing = gather(result, names, x)
     size = (width, height_of(drawing) if height is None else height)
-    return save_figure(lambda figure: draw(figure, drawing, result), target, size, dpi, force=force)
+    return save_figure(lambda figure: draw(figure, drawing), target, size, dpi, force=force)
 
 
 def check_suffix(target: Path) -> str:
@@ -87,8 +96,7 @@ def save_figure(
     suffix = check_suffix(target)
     if not all(0.5 <= s <= 100.0 for s in size) or not 10.0 <= dpi <= 1200.0:
         raise ValueError(f"a figure of {size[0]:g} x {size[1]:g} inches at {dpi:g} dpi cannot be")
-    # Text in an SVG stays text; its identifiers do not change from run to run.
-    with matplotlib.rc_context({"svg.hashsalt": "dap3d", "svg.fonttype": "none"}):
+    with fixed_files():
         figure = Figure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)
         paint(figure)
@@ -100,3 +108,44 @@ def save_figure(
             except OSError as error:
                 raise cannot("write", target, error) from error
     return target
+
+
+@contextmanager
+def fixed_files() -> Iterator[None]:
+    """Text in an SVG stays text; its identifiers do not change from run to run."""
+    with matplotlib.rc_context({"svg.hashsalt": "dap3d", "svg.fonttype": "none"}):
+        yield
+
+
+def show_plot(
+    result: Result | Mapping[str, Result],
+    quantities: str | Sequence[str],
+    *,
+    x: str | None = None,
+    width: float = WIDTH,
+    height: float | None = None,
+) -> None:
+    """Draw quantities of a result as ``plot`` does, in a window; returns when it is closed.
+
+    Args:
+        result, quantities, x, width, height: as ``save_plot`` has them.
+
+    Raises:
+        UnknownNameError, ValueError: as ``plot``.
+        ResultError: there is no display, or nothing to open windows with.
+    """
+    names = [quantities] if isinstance(quantities, str) else list(quantities)
+    drawing = gather(result, names, x)
+    from matplotlib import pyplot
+
+    size = (width, height_of(drawing) if height is None else height)
+    try:
+        figure = pyplot.figure(figsize=size, layout="constrained", dpi=WINDOW_DPI)
+    except ImportError as error:  # the environment names a way that does not work here
+        raise ResultError(NO_WINDOW) from error
+    if matplotlib.get_backend().lower() in FILES_ALONE:
+        pyplot.close(figure)
+        raise ResultError(NO_WINDOW)
+    draw(figure, drawing)
+    pyplot.show()
+    pyplot.close(figure)

@@ -6,7 +6,7 @@ from dap3d_core.result.files import check_target
 from dap3d_core.result.ledger import Entry
 from dap3d_core.result.motion import Energy
 from dap3d_core.result.occurrence import Occurrence
-from dap3d_core.result.quantities import Quantity, find
+from dap3d_core.result.quantities import Quantity, find, names_of
 from dap3d_core.result.reactions import Reaction
 from dap3d_core.result.reading import open_result
 from dap3d_core.result.record import INFORMATION, Record, Statistics, current_versions
@@ -31,5 +31,6 @@ __all__ = [
     "current_versions",
     "estimated_error",
     "find",
+    "names_of",
     "open_result",
 ]

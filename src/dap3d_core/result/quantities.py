@@ -189,3 +189,29 @@ def _parts(result: "Result", owner: Owner, attribute: str) -> tuple[str, ...]:
     """What may stand after an attribute."""
     columns = _components(result, owner, attribute)
     return (*columns, NORM) if KINDS[owner.kind][attribute].components is AXES else columns
+
+
+def names_of(result: "Result", begin: str = "") -> list[str]:
+    """Names of quantities that go on from a beginning, one part further, in the scene's order.
+
+    Args:
+        result: whose quantities.
+        begin: what there is of a name: "" gives all owners, "crank." what a body has, "crank.r."
+            the components, "J1.j." what a joint does to its second body.
+
+    Returns:
+        Whole names, and names of owners, which end in a dot.
+    """
+    owners = [name for places in _places(result).values() for name in places]
+    found = [*(f"{name}." for name in owners), *WHOLE]
+    head = begin.rpartition(".")[0]
+    shown, _, attribute = head.rpartition(".")
+    for owner in _owners(result, head):
+        found += [f"{head}.{one}" for one in _attributes(owner)]
+    for owner in _owners(result, shown):
+        if attribute in _attributes(owner):
+            found += [f"{head}.{part}" for part in _parts(result, owner, attribute)]
+    found = [name for name in dict.fromkeys(found) if name.startswith(begin) and name != begin]
+    if len(found) == 1 and found[0].endswith("."):
+        return names_of(result, found[0])
+    return found

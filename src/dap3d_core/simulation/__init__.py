@@ -6,6 +6,7 @@ from dap3d_core.simulation.errors import AssemblyError, RedundantError, Simulati
 from dap3d_core.simulation.event import Event, Instant
 from dap3d_core.simulation.opening import open_result
 from dap3d_core.simulation.simulate import simulate
+from dap3d_core.simulation.standing import Standing
 
 __all__ = [
     "AssemblyError",
@@ -14,6 +15,7 @@ __all__ = [
     "Instant",
     "RedundantError",
     "SimulationError",
+    "Standing",
     "compile_scene",
     "open_result",
     "report_times",

@@ -30,6 +30,7 @@ from dap3d_core.simulation.implicit import (
 from dap3d_core.simulation.initial import correction_notes, violation
 from dap3d_core.simulation.redundancy import Redundancy
 from dap3d_core.simulation.second_run import Again, add_error
+from dap3d_core.simulation.standing import Observer, Standing
 from dap3d_core.simulation.watcher import Watcher
 
 Floats = NDArray[np.float64]
@@ -65,6 +66,7 @@ def simulate(
     correct_metric: str | None = None,
     estimate_error: bool = False,
     events: Sequence[Event] = (),
+    watch: Callable[[Standing], None] | None = None,
 ) -> Result:
     """Simulate a scene from t = 0 to t_end.
 
@@ -77,21 +79,20 @@ def simulate(
         dt: reporting step, s; by default t_end / 100. t_end is reported in any case.
         method: "auto", "unconstrained", "standard", "penalty" or "lsq".
         integrator: "dopri5", "dop853", "adams", "rk4" (needs ``step``), "radau" (implicit), "auto".
-        rtol, atol: tolerances of the step's error.
-        step: fixed step, s, without error control.
+        rtol, atol, step: tolerances of the step's error; a fixed step, s, without error control.
         correct, project: bring the start, and then every state, onto the constraints.
         progress: called as progress(t, t_end) between chunks of some 0.1 s.
         allow_code, announce: as ``compile`` has them.
-        output: file to write. While a run of more than a second goes on its rows stand in
-            ``NAME.part``, synced after every chunk: readable also when the run is killed.
-        force: whether an existing output is overwritten.
+        output, force: file to write, and whether over an existing one. While a run of more than a
+            second goes on its rows stand in ``NAME.part``, synced: readable also when it is killed.
         correct_metric: "unit" or "mass": the least correction in m and rad, or by masses.
         estimate_error: estimate ``result.error`` by a second, finer run.
         events: what to look out for (``Event``).
+        watch: called between chunks with how the run stands: t, t_end, steps, step, energy drift.
 
     Returns:
         the result. Any exception that ends the integration carries what was computed until then as
-        ``.result``; KeyboardInterrupt and exceptions of ``progress`` come out as they are.
+        ``.result``; KeyboardInterrupt and those of ``progress``, ``watch`` come out as they are.
 
     Raises:
         SceneError, PluginError, ResultError: as ``compile``; settings or an output that won't do.
@@ -102,7 +103,7 @@ def simulate(
     settings = settings_of(compiled, t_end=t_end, dt=dt, method=method, integrator=integrator,
                          rtol=rtol, atol=atol, step=step, correct=correct, project=project,
                          correct_metric=correct_metric)  # fmt: skip
-    run = _Run(compiled, settings, announce, events)
+    run = _Run(compiled, settings, announce, events, watch)
     return run.go(progress, output, force=force, estimate_error=estimate_error)
 
 
@@ -115,6 +116,7 @@ class _Run:
         settings: Any,
         announce: Callable[[str], None] | None,
         events: Sequence[Event] = (),
+        watch: Callable[[Standing], None] | None = None,
     ) -> None:
         self.announce = announce
         self.compiled = compiled
@@ -130,6 +132,8 @@ class _Run:
         self.rank = 0
         self.first_step: float | None = None
         self.watcher = Watcher(compiled, events) if events else None
+        self.watch, end = watch, float(self.times[-1])
+        self.observer = None if watch is None else Observer(self.machine.model, end, watch)
         #: The integrations, one after the other: "auto" may take a second one.
         self.runs: list[Integration] = []
         self.options: dict[str, Any] = {}
@@ -179,7 +183,7 @@ class _Run:
 
         def again(settings: Simulation, first_step: float | None) -> Result:
             events = self.watcher.events if self.watcher else ()
-            run = _Run(self.compiled, settings, self.announce, events)
+            run = _Run(self.compiled, settings, self.announce, events, self.watch)
             run.first_step = first_step
             return run.go(progress, None, force=False)
 
@@ -264,6 +268,8 @@ class _Run:
         self.compile_time += spent
         self.started += spent
         self.runs.append(integration)
+        if self.observer is not None:
+            self.observer.begin(integration)
 
     def _advance(self, progress: Progress | None) -> None:
         """Advance in chunks whose length in right-hand sides follows the clock."""
@@ -279,6 +285,8 @@ class _Run:
             done, seconds = integration.statistics.rhs - before, time.perf_counter() - clock
             if progress is not None:
                 progress(integration.t, t_end)
+            if self.observer is not None:
+                self.observer.look()
             if done and seconds > 0.0:
                 budget = int(min(max(1.0, done * CHUNK_SECONDS / seconds), 4.0 * budget, 1e9))
 

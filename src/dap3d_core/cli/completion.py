@@ -1,0 +1,39 @@
+"""What a shell offers when the tab key is pressed: models, results, quantities of a result.
+
+Nothing is printed here, and nothing fails: where there is nothing to offer, nothing is.
+"""
+
+from contextlib import suppress
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+
+
+def _path(incomplete: str) -> list[CompletionItem]:
+    """A path, which the shell completes by itself."""
+    return [CompletionItem(incomplete, type="file")]
+
+
+def results(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
+    """Result files."""
+    return _path(incomplete)
+
+
+def models(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
+    """The shipped models, or a path where none begins so."""
+    from dap3d_core.scene import shipped_models
+
+    return [name for name in shipped_models() if name.startswith(incomplete)] or _path(incomplete)
+
+
+def quantities(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
+    """Quantities of the result that was named before, part by part, or a path."""
+    found: list[Any] = []
+    with suppress(Exception):
+        from dap3d_core.result import names_of, open_result
+
+        # Behind an option without its value click leaves all words in ctx.args.
+        result = ctx.params["result"] or ctx.args[0]
+        found += names_of(open_result(result), incomplete)
+    return found or _path(incomplete)

@@ -1,0 +1,178 @@
+"""The stick figure of a result: lines from the mass centre of each body to its points."""
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+from matplotlib.colors import is_color_like
+
+from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.model.kinematics import split, to_global
+from dap3d_core.plot.drawing import MARKERS, PALETTE
+from dap3d_core.result import Result
+
+#: Usual names of colours -> the shade of that hue in which colour-blind readers can tell it apart.
+SHADES = {
+    "blue": "#0072B2", "orange": "#E69F00", "green": "#009E73", "red": "#D55E00",
+    "purple": "#4B0082", "magenta": "#CC79A7", "pink": "#CC79A7", "cyan": "#56B4E9",
+    "gray": "#606060", "grey": "#606060", "brown": "#6B4423", "olive": "#C2C25A",
+    "yellow": "#E69F00", "black": "#000000",
+    "b": "#0072B2", "g": "#009E73", "r": "#D55E00", "c": "#56B4E9", "m": "#CC79A7",
+    "y": "#E69F00", "k": "#000000",
+}  # fmt: skip
+#: Numbers of coordinates that are computed at once.
+BLOCK = 1_000_000
+
+
+@attrs.frozen(eq=False)
+class Sticks:
+    """What is drawn of a result, as places on bodies: first the n mass centres.
+
+    Attributes:
+        names, colors, markers: of the bodies; what tells one from the others twice over.
+        body: (k,) body of each place, 1 to n, 0 for ground.
+        local: (k, 3) its coordinates there, m.
+        points: places of the points that belong to bodies.
+        anchors: places of points of the ground.
+        springs, links: (q, 2) pairs of places: ends of force elements; points that joints couple.
+        limits: (3, 2) of the axes as the scene gives them, m, or None.
+    """
+
+    names: tuple[str, ...]
+    colors: tuple[str, ...]
+    markers: tuple[str, ...]
+    body: Integers
+    local: Floats
+    points: Integers
+    anchors: Integers
+    springs: Integers
+    links: Integers
+    limits: Floats | None
+
+    @property
+    def lines(self) -> Integers:
+        """(q, 2) pairs of places: from mass centres to the points of their bodies."""
+        return np.stack([self.body[self.points] - 1, self.points], axis=1)
+
+    def positions(self, r: Floats, p: Floats) -> Floats:
+        """Positions (..., k, 3), m, of all places at poses r (..., n, 3), p (..., n, 4)."""
+        out = np.empty((*r.shape[:-2], len(self.body), 3))
+        moving = self.body > 0
+        b = self.body[moving] - 1
+        out[..., ~moving, :] = self.local[~moving]
+        out[..., moving, :] = r[..., b, :] + to_global(p[..., b, :], self.local[moving])
+        return out
+
+    def extent(self, result: Result, directions: Floats) -> Floats:
+        """(d, 2) least and largest of all places over the reported instants, m.
+
+        Args:
+            result: whose motion.
+            directions: (3, d) unit vectors along which they are measured.
+        """
+        n, found = result.subject.body_count, []
+        count = max(1, BLOCK // (3 * len(self.body)))
+        for start in range(0, len(result.t), count):
+            r, p, _, _ = split(result.u[start : start + count], n)
+            all_of_them = self.positions(r, p).reshape(-1, 3) @ directions
+            found.append([all_of_them.min(axis=0), all_of_them.max(axis=0)])
+        return np.stack([np.min(found, axis=(0, 1)), np.max(found, axis=(0, 1))], axis=1)
+
+
+def sticks_of(result: Result) -> Sticks:
+    """The stick figure of a result, from its points and from the scene in it."""
+    subject = result.subject
+    scene = _tables(result.scene_text)
+    n = subject.body_count
+    body = [*range(1, n + 1), *(int(b) for b in subject.point_body)]
+    local = [*np.zeros((n, 3)), *subject.point_local]
+    place = {f"{name}.O": k for k, name in enumerate(subject.body_names)}
+    place |= {name: n + k for k, name in enumerate(subject.point_names)}
+    pairs = {kind: list(_ends(scene, kind)) for kind in ("forces", "joints")}
+    for name in {end for found in pairs.values() for pair in found for end in pair} - set(place):
+        if name == "ground.O":
+            place[name] = len(body)
+            body.append(0)
+            local.append(np.zeros(3))
+    springs, links = (_places(pairs[kind], place) for kind in ("forces", "joints"))
+    found = np.array(body)
+    colors = _colors(scene.get("bodies", {}), subject.body_names)
+    limits = scene.get("animation", {}).get("limits")
+    return Sticks(
+        names=subject.body_names,
+        colors=colors,
+        markers=tuple(MARKERS[k % len(MARKERS)] for k in range(n)),
+        body=found,
+        local=np.array(local, dtype=float).reshape(-1, 3),
+        points=np.flatnonzero((found > 0) & (np.arange(len(found)) >= n)),
+        anchors=np.flatnonzero(found == 0),
+        springs=springs,
+        links=links,
+        limits=None if limits is None else np.array(limits, dtype=float),
+    )
+
+
+def _tables(scene_text: str) -> dict[str, Any]:
+    """The scene as plain tables; nothing where a result has no scene that can be read."""
+    try:
+        return tomllib.loads(scene_text)
+    except tomllib.TOMLDecodeError:
+        return {}
+
+
+def _ends(scene: Mapping[str, Any], kind: str) -> Iterator[tuple[str, str]]:
+    """Names of the two points of each element that has two, given as such or by a vector."""
+    vectors = scene.get("vectors2", {})
+    for fields in scene.get(kind, {}).values():
+        of = vectors.get(fields.get("d"), fields) if isinstance(fields.get("d"), str) else fields
+        if isinstance(of.get("P_i"), str) and isinstance(of.get("P_j"), str):
+            yield of["P_i"], of["P_j"]
+
+
+def _places(pairs: Sequence[tuple[str, str]], place: Mapping[str, int]) -> Integers:
+    found = [(place[a], place[b]) for a, b in pairs if a in place and b in place]
+    return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+
+def _colors(bodies: Mapping[str, Any], names: Sequence[str]) -> tuple[str, ...]:
+    """The scene's colours, usual names in shades of the palette; the palette in turn elsewhere."""
+    found = []
+    for k, name in enumerate(names):
+        given = bodies.get(name, {}).get("color")
+        shade = SHADES.get(str(given).removeprefix("tab:"), given)
+        found.append(shade if is_color_like(shade) else PALETTE[k % len(PALETTE)])
+    return tuple(found)
+
+
+def pose_at(result: Result, t: float) -> tuple[Floats, Floats]:
+    """Poses r (n, 3), p (n, 4) of all bodies at a time, s, between reported instants as well.
+
+    There they are interpolated by cubics from positions and velocities at both instants; bodies
+    stay rigid.
+    """
+    n, times = result.subject.body_count, result.t
+    k = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, max(0, len(times) - 2)))
+    r, p, rd, w = split(result.u[k : k + 2], n)
+    if len(times) < 2:
+        return r[0], p[0]
+    h = float(times[k + 1] - times[k])
+    a = min(max((t - float(times[k])) / h, 0.0), 1.0)
+    turned = _cubic(a, h, p, _rate(p, w))
+    return _cubic(a, h, r, rd), turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+
+
+def _cubic(a: float, h: float, x: Floats, x_dot: Floats) -> Floats:
+    """The cubic through both ends, a part of the way along: x, x_dot (2, ...)."""
+    s, b = a * a * (3.0 - 2.0 * a), a * (1.0 - a)
+    found: Floats = (1.0 - s) * x[0] + s * x[1] + b * h * ((1.0 - a) * x_dot[0] - a * x_dot[1])
+    return found
+
+
+def _rate(p: Floats, w: Floats) -> Floats:
+    """p_dot (..., 4) of p (..., 4) and global angular velocities (..., 3): half (0, w) times p."""
+    scalar = -np.sum(w * p[..., 1:], axis=-1, keepdims=True)
+    vector = p[..., :1] * w + np.cross(w, p[..., 1:])
+    rate: Floats = 0.5 * np.concatenate([scalar, vector], axis=-1)
+    return rate

@@ -1,0 +1,142 @@
+"""``dap3d animate`` and ``dap3d plot`` as a user has them: files, messages, windows, interrupts."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from PIL import Image
+from tests.e2e.test_terminal import in_terminal, lines
+
+import dap3d_core as dap
+
+
+@pytest.fixture
+def runs(dap3d):
+    """Two runs of one model, pen1.nc and sub/pen1.nc."""
+    (dap3d.folder / "sub").mkdir()
+    result = dap.simulate("pen1", t_end=1.0, dt=0.05)
+    result.save(dap3d.folder / "pen1.nc")
+    dap.simulate("pen1", t_end=1.0, dt=0.1, rtol=1e-4).save(dap3d.folder / "sub" / "pen1.nc")
+    return result
+
+
+def test_a_film(dap3d, runs):
+    done = dap3d("animate", "pen1.nc", "--speed", "0.5", "--fps", "10", "--size", "200")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""  # no bar where nobody looks at a terminal
+    assert done.stdout.startswith("pen1.gif written (")
+    assert "21 frames at 10 a second, 0.5 x real time" in done.stdout
+    with Image.open(dap3d.folder / "pen1.gif") as image:
+        assert (image.n_frames, image.size[0]) == (21, 200)
+    told = dap3d("animate", "pen1.nc", "-o", "a.png", "--at", "0.5", "--view", "x", "--json")
+    found = json.loads(told.stdout)
+    assert (found["file"], found["frames"], found["width"]) == ("a.png", 1, 640)
+
+
+def test_a_run_at_t_0_alone_gives_a_snapshot(dap3d):
+    dap.simulate("fourbar3", t_end=0.0).save(dap3d.folder / "a.nc")
+    done = dap3d("animate", "a.nc")
+    assert done.returncode == 0, done.stderr
+    assert "a.png written" in done.stdout
+    assert (dap3d.folder / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_cannot_be_animated_is_refused(refuse, dap3d, runs, monkeypatch):
+    (dap3d.folder / "there.gif").write_text("mine")
+    assert "--force overwrites" in refuse("animate", "pen1.nc", "-o", "there.gif")
+    assert "640x480" in refuse("animate", "pen1.nc", "--size", "big")
+    assert "a view is x, y or z" in refuse("animate", "pen1.nc", "--view", "top")
+    assert "from 1 to 50" in refuse("animate", "pen1.nc", "--fps", "1000")
+    assert "above 0" in refuse("animate", "pen1.nc", "--speed", "-1")
+    assert "no single time" in refuse("animate", "pen1.nc", "--at", "0.5")
+    assert "from 0 s to 1 s" in refuse("animate", "pen1.nc", "-o", "a.png", "--at", "7")
+    assert "an animation is one of" in refuse("animate", "pen1.nc", "-o", "a.avi")
+    assert "is what is read" in refuse("animate", "pen1.nc", "-o", "pen1.nc", "--force")
+    assert "cannot read" in refuse("animate", "gone.nc")
+    monkeypatch.setenv("PATH", str(dap3d.folder))
+    assert "ffmpeg" in refuse("animate", "pen1.nc", "-o", "a.mp4")
+    assert sorted(os.listdir(dap3d.folder)) == ["pen1.nc", "sub", "there.gif"]
+    assert (dap3d.folder / "there.gif").read_text() == "mine"
+
+
+def test_ctrl_c_leaves_no_file(dap3d, runs):
+    process = dap3d.start("animate", "pen1.nc", "--speed", "0.005", "--fps", "50", "-o", "a.gif")
+    part = dap3d.folder / "a.gif.part"
+    end = time.monotonic() + 60
+    while not part.exists() and time.monotonic() < end:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert "interrupted; a.gif was not written" in err
+    assert "Traceback" not in err
+    assert out == ""
+    assert not list(dap3d.folder.glob("a.gif*"))
+
+
+@pytest.mark.slow
+def test_a_film_shows_its_progress_in_a_narrow_terminal(dap3d, runs):
+    code, shown = in_terminal(dap3d, 60, "animate", "pen1.nc", "--speed", "0.05", "--size", "300")
+    assert code == 0, shown
+    assert max(map(len, lines(shown))) <= 60
+    assert "frame" in shown
+    assert "of 501" in shown
+
+
+def test_several_runs_are_told_apart_by_their_folders(dap3d, runs):
+    """In an SVG, whose text stays text; a result that is named twice is a mistake."""
+    done = dap3d("plot", "pen1.nc", "sub/pen1.nc", "cone.r.z", "-o", "a.svg", "--width", "60")
+    assert done.returncode == 0, done.stderr
+    text = (dap3d.folder / "a.svg").read_text()
+    assert ">sub/pen1<" in text
+    assert f">{dap3d.folder.name}/pen1<" in text
+    assert 'width="170' in text  # points: 60 mm
+    again = dap3d("plot", "pen1.nc", "./pen1.nc", "cone.r.z", "-o", "b.svg")
+    assert again.returncode == 2
+    assert "named twice" in again.stderr
+
+
+def test_a_window_that_cannot_be_opened_is_told(refuse, dap3d, runs, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    assert "cannot open a window" in refuse("plot", "pen1.nc", "cone.r.z", "--show")
+
+
+@pytest.mark.slow
+def test_the_live_line_of_a_run(dap3d):
+    """Step, pace, drift and what is left, within 60 columns; nothing of it stays."""
+    arguments = ("run", "A02-40", "--t-end", "20", "--rtol", "1e-12", "-o", "a.nc")
+    code, shown = in_terminal(dap3d, 60, *arguments)
+    assert code == 0, shown
+    found = lines(shown)
+    assert max(map(len, found)) <= 60
+    live = [line for line in found if " drift " in line]
+    assert live
+    for line in live:
+        for words in ("/20 s", "step ", "x drift ", " left"):
+            assert words in line
+
+
+@pytest.mark.parametrize("place", ["before", "behind"])
+def test_no_colour_when_asked(dap3d, place):
+    words = ["--no-color", "models"] if place == "before" else ["models", "--no-color"]
+    _, shown = in_terminal(dap3d, 80, *words)
+    assert "\x1b[3" not in shown
+    assert "pen1" in shown
+    _, coloured = in_terminal(dap3d, 80, "models")
+    assert "\x1b[3" in coloured
+
+
+def test_the_command_needs_no_display_and_no_window_package(dap3d, runs):
+    """pyplot, which opens windows, stays out; so do the solver's kernels."""
+    script = (
+        "import sys; from dap3d_core.cli import main; code = main(['animate', 'pen1.nc']);"
+        "print(code, 'matplotlib.pyplot' in sys.modules, 'dap3d_joints' in sys.modules)"
+    )
+    variables = {k: v for k, v in os.environ.items() if k != "DISPLAY"}
+    done = subprocess.run([sys.executable, "-c", script], cwd=dap3d.folder, capture_output=True,
+                          text=True, env=variables)  # fmt: skip
+    assert done.stdout.splitlines()[-1] == "0 False False", done.stderr

@@ -1,0 +1,358 @@
+"""Films and snapshots show the motion as it was: places, times, sizes."""
+
+import itertools
+import re
+import stat
+
+import matplotlib.image
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from PIL import Image
+from unit.test_result import (
+    ARM,
+    PIVOT,
+    RATE,
+    circling,
+    circling_scene,
+    drifting,
+    model_of,
+    result_of,
+)
+
+from dap3d_core.plot import animate
+from dap3d_core.plot.animation import frame_times, usual_speed
+from dap3d_core.plot.camera import camera_of, shown, with_margin
+from dap3d_core.plot.stage import Stage
+from dap3d_core.plot.sticks import SHADES, pose_at, sticks_of
+from dap3d_core.result import ResultError
+from dap3d_core.scene import Scene
+from dap3d_core.scene.description import AnimationPoint
+
+SPACE = np.array([[0.0, 1.0], [0.0, 2.0], [0.0, 3.0]])
+
+
+@pytest.fixture(scope="module")
+def result():
+    return circling()[0]
+
+
+def hung():
+    """A body on a spring, with an animation point and limits: poses at one instant."""
+    scene = Scene(name="hung")
+    scene.add_body("bob", mass=1.0, Jp=[1, 1, 1], color="tab:green")
+    scene.add_body("other", mass=1.0, Jp=[1, 1, 1], r=[1, 0, 0])
+    scene.add_point("hook", body="ground", sPp=[0, 0, 2])
+    scene.add_vector2("d", P_i="bob.O", P_j="hook")
+    scene.add_force("ptp", "spring", d="d", k=1.0, l0=2.0)
+    scene.add_joint("sph-sph", "rod", P_i="other.O", P_j="ground.O", length=1.0)
+    scene.animation.points.append(AnimationPoint(body="bob", sPp=[0, 0.5, 0]))
+    scene.animation.limits = [[-1, 2], [-1, 1], [-1, 3]]
+    return scene
+
+
+def at_rest(scene):
+    """A result of one instant: the poses of the scene."""
+    model = model_of(scene)
+    rows = np.zeros((1, 1 + 13 * model.body_count + 1 + 6 * model.body_count + model.row_count + 4))
+    rows[0, 1 : 1 + 13 * model.body_count] = model.u0
+    return result_of(scene, rows, model)
+
+
+# ---------------------------------------------------------------------------- what is drawn
+
+
+def test_lines_run_from_mass_centres_to_points():
+    sticks = sticks_of(at_rest(hung()))
+    r, p = pose_at(at_rest(hung()), 0.0)
+    places = sticks.positions(r, p)
+    (line,) = places[sticks.lines]
+    np.testing.assert_allclose(line, [[0, 0, 0], [0, 0.5, 0]])
+    (spring,), (link,) = places[sticks.springs], places[sticks.links]
+    np.testing.assert_allclose(spring, [[0, 0, 0], [0, 0, 2]])
+    np.testing.assert_allclose(link, [[1, 0, 0], [0, 0, 0]])
+    assert {tuple(place) for place in places[sticks.anchors]} == {(0, 0, 2), (0, 0, 0)}
+    assert sticks.names == ("bob", "other")
+    assert sticks.colors[0] == SHADES["green"]
+    np.testing.assert_array_equal(sticks.limits, [[-1, 2], [-1, 1], [-1, 3]])
+
+
+def test_every_body_has_a_colour_and_a_marker_of_its_own():
+    scene = Scene()
+    for k in range(7):
+        scene.add_body(f"b{k}", mass=1.0, Jp=[1, 1, 1])
+    sticks = sticks_of(at_rest(scene))
+    assert len(set(sticks.colors)) == len(set(sticks.markers)) == 7
+
+
+#: Linear RGB as seen without one kind of cones (Machado, Oliveira, Fernandes 2009, severity 1).
+SEEN = {
+    "all": np.eye(3),
+    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+                     [-0.011820, 0.042940, 0.968881]],
+    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+                   [-0.003882, -0.048116, 1.051998]],
+    "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602],
+                   [0.004733, 0.691367, 0.303900]],
+}  # fmt: skip
+
+
+def lab(linear):
+    """CIELAB of a colour in linear sRGB, white of D65."""
+    to_xyz = np.array(
+        [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    )
+    x = to_xyz @ np.clip(linear, 0, 1) / np.array([0.9505, 1.0, 1.089])
+    f = np.where(x > 0.008856, np.cbrt(x), 7.787 * x + 16 / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+@pytest.mark.parametrize("eyes", SEEN)
+def test_shades_of_usual_colours_can_be_told_apart(eyes):
+    """The names of matplotlib's cycle, and black, differ by 15 or more; 2.3 is just noticeable."""
+    names = [
+        "blue",
+        "orange",
+        "green",
+        "red",
+        "purple",
+        "brown",
+        "pink",
+        "gray",
+        "olive",
+        "cyan",
+        "black",
+    ]
+    found = {}
+    for name in names:
+        value = np.array(to_rgb(SHADES[name]))
+        linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+        found[name] = lab(np.asarray(SEEN[eyes]) @ linear)
+    for a, b in itertools.combinations(names, 2):
+        assert np.linalg.norm(found[a] - found[b]) > 15.0, (eyes, a, b)
+
+
+# ---------------------------------------------------------------------------- when
+
+
+def test_poses_between_instants_are_those_of_the_motion():
+    """Uniform rotation, 21 instants 0.21 rad apart: cubics are off by less than 0.21^4 / 384."""
+    result, _, _ = circling()
+    for t in np.linspace(0.0, 1.7, 57):
+        r, p = pose_at(result, t)
+        angle = RATE * t
+        np.testing.assert_allclose(
+            r[0], PIVOT + ARM * np.array([np.cos(angle), np.sin(angle), 0]), atol=3e-6
+        )
+        np.testing.assert_allclose(np.abs(p[0] @ [np.cos(angle / 2), 0, 0, np.sin(angle / 2)]), 1.0)
+        assert np.linalg.norm(p[0]) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_poses_outside_are_those_at_the_ends(result):
+    for t, k in ((-1.0, 0), (99.0, -1)):
+        np.testing.assert_allclose(pose_at(result, t)[0], result.r[k], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("duration", "speed"), [(0.0, 1), (2.0, 1), (10.0, 1), (0.05, 0.01), (1.0, 0.2), (100.0, 20)]
+)
+def test_usual_speeds_make_films_of_some_seconds(duration, speed):
+    assert usual_speed(duration) == speed
+    assert duration == 0.0 or 2.0 <= duration / speed <= 10.0
+
+
+def test_frames_are_equally_far_apart():
+    np.testing.assert_allclose(
+        frame_times(np.array([0.0, 1.0]), 10.0, 0.5), np.linspace(0.0, 1.0, 21), atol=1e-15
+    )
+    assert len(frame_times(np.array([0.0, 1.04]), 10.0, 1.0)) == 11
+    with pytest.raises(ValueError, match="100,001 frames are more than"):
+        frame_times(np.array([0.0, 1.0]), 50.0, 0.0005)
+
+
+# ---------------------------------------------------------------------------- from where
+
+
+@pytest.mark.parametrize(("view", "seen"), [("x", [2, 3]), ("y", [1, 3]), ("z", [1, 2])])
+def test_views_along_axes(view, seen):
+    camera = camera_of(view, SPACE)
+    np.testing.assert_array_equal(camera.project(np.array([1.0, 2.0, 3.0])), seen)
+
+
+@pytest.mark.parametrize("view", ["30,40", "-60, 22", "0,90", "123.5,-90"])
+def test_any_view_is_a_projection_along_the_line_of_sight(view):
+    camera = camera_of(view, SPACE)
+    axes = np.stack([camera.right, camera.up, camera.towards])
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    a, e = np.radians([float(part) for part in view.split(",")])
+    sight = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
+    np.testing.assert_allclose(camera.towards, sight, atol=1e-15)
+
+
+@pytest.mark.parametrize("axis", "xyz")
+def test_a_plane_motion_is_looked_at_across_its_plane(axis):
+    extent = SPACE.copy()
+    extent["xyz".index(axis)] = 0.3
+    assert camera_of(None, extent).plane == axis
+    assert camera_of(None, SPACE).plane == ""
+
+
+@pytest.mark.parametrize("view", ["w", "1,2,3", "10,91", "nan,0", "x,y"])
+def test_other_views_are_refused(view):
+    with pytest.raises(ValueError, match="a view is x, y or z"):
+        camera_of(view, SPACE)
+
+
+@pytest.mark.parametrize("view", [None, "x", "y", "z", "10,70"])
+@pytest.mark.parametrize("size", [(300, 0), (300, 500), (500, 120)])
+def test_all_of_the_motion_is_inside_at_one_scale(result, view, size):
+    """Every place at every instant lies within the axes, whose units are equally long."""
+    sticks = sticks_of(result)
+    extent = sticks.extent(result, np.eye(3))
+    camera = camera_of(view, extent)
+    limits = with_margin(extent)
+    seen = shown(camera, limits, sticks.extent(result, camera.axes))
+    stage = Stage(sticks, camera, limits, seen, size, "")
+    for t in result.t:
+        flat = camera.project(sticks.positions(*pose_at(result, t)))
+        assert (flat >= [stage.ax.get_xlim()[0], stage.ax.get_ylim()[0]]).all()
+        assert (flat <= [stage.ax.get_xlim()[1], stage.ax.get_ylim()[1]]).all()
+    box = stage.ax.get_window_extent()
+    scales = box.width / np.diff(stage.ax.get_xlim()), box.height / np.diff(stage.ax.get_ylim())
+    assert scales[0] == pytest.approx(scales[1])
+
+
+# ---------------------------------------------------------------------------- files
+
+
+def test_a_gif_has_a_frame_for_every_instant_of_the_film(result, tmp_path):
+    """1.7 s in real time at 10 a second: 18 pictures of 100 ms; the bob moves."""
+    seen = []
+    film = animate(result, tmp_path / "a.gif", fps=10, speed=1.0, size=(200, 160),
+                   progress=lambda *a: seen.append(a))  # fmt: skip
+    assert seen == [(k + 1, 18) for k in range(18)]
+    assert (film.frames, film.fps, film.speed, film.size) == (18, 10.0, 1.0, (200, 160))
+    with Image.open(film.path) as image:
+        assert (image.n_frames, image.size, image.info["loop"]) == (18, (200, 160), 0)
+        pictures = []
+        for k in range(image.n_frames):
+            image.seek(k)
+            assert image.info["duration"] == 100
+            pictures.append(np.asarray(image.convert("RGB")).copy())
+    assert all((a != b).any() for a, b in itertools.pairwise(pictures))
+    assert all((picture[0, 0] == 255).all() for picture in pictures)  # white is white
+    again = animate(result, tmp_path / "b.gif", fps=10, speed=1.0, size=(200, 160))
+    assert again.path.read_bytes() == film.path.read_bytes()
+    assert film._repr_html_().startswith('<img src="data:image/gif;base64,R0lGOD')
+
+
+def test_what_is_drawn_is_where_the_body_is(result, tmp_path):
+    """Pixels of the body's colour fill the box that its line spans, to within the marker."""
+    for t in (0.0, 0.6, 1.3):
+        film = animate(result, tmp_path / "a.png", at=t, view="z", size=(600, 600), force=True)
+        pixels = matplotlib.image.imread(film.path)[:520, :, :3]  # the legend left out
+        rows, columns = np.nonzero(np.all(np.abs(pixels - to_rgb("#0072B2")) < 0.02, axis=-1))
+        drawn = np.array([np.ptp(columns), np.ptp(rows)])
+        places = sticks_of(result).positions(*pose_at(result, t))[[0, 2, 3], :2]
+        extent = np.ptp(places, axis=0)  # from H, on the axis, to P
+        scale = drawn.max() / extent.max()
+        np.testing.assert_allclose(drawn, extent * scale, atol=22)  # the marker's size in pixels
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_snapshots(result, tmp_path, suffix):
+    film = animate(result, tmp_path / f"a{suffix}", at=0.5)
+    assert film.frames == 1
+    begin = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}[suffix]
+    assert film.path.read_bytes().startswith(begin)
+    if suffix == ".svg":
+        assert "t = 0.50 s" in film.path.read_text()
+        assert ">bob<" in film.path.read_text()
+
+
+def test_a_run_at_t_0_alone_gives_one_picture(tmp_path):
+    single = circling(nt=1)[0]
+    assert animate(single, tmp_path / "a.gif").frames == 1
+    assert animate(single, tmp_path / "a.png").frames == 1
+
+
+def test_the_film_says_its_speed(result, tmp_path):
+    animate(result, tmp_path / "a.gif", size=(200, 200))
+    film = animate(drifting(), tmp_path / "b.gif", speed=3.0, fps=2, size=(200, 200))
+    assert film.frames == 3
+    assert film.fps == 2.0
+
+
+def test_limits_of_the_scene_that_the_motion_leaves_are_told(tmp_path):
+    scene = circling_scene()
+    scene.animation.limits = [[0, 0.1], [0, 0.1], [0, 0.1]]
+    moving = circling()[0]
+    told = result_of(scene, np.hstack([moving.t[:, None], *parts_of(moving)]), model_of(scene))
+    assert re.search("leaves the limits", animate(told, tmp_path / "a.png").notes[0])
+    assert animate(told, tmp_path / "b.png", fit=True).notes == ()
+
+
+def parts_of(result):
+    """Everything of a row but the time."""
+    from dap3d_core.model.kinematics import to_integrated
+
+    y = to_integrated(result.u, result.subject.body_count)
+    return y, result.v_dot, result.Lam, np.zeros((len(result.t), 4))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (dict(path="a.bmp"), r"an animation is one of \.gif, \.mp4, \.png"),
+        (dict(fps=51), "fps of a .gif file is a number from 1 to 50"),
+        (dict(fps=0), "fps"),
+        (dict(speed=0.0), "above 0"),
+        (dict(speed=float("nan")), "above 0"),
+        (dict(size=(10, 10)), "from 100 to 4096"),
+        (dict(view="front"), "a view is"),
+        (dict(at=0.5), "no single time"),
+        (dict(at=9.0, path="a.png"), "from 0 s to 1.7 s"),
+    ],
+)
+def test_what_cannot_be_is_refused(result, tmp_path, options, words):
+    given = dict(path="a.gif") | options
+    with pytest.raises(ValueError, match=words):
+        animate(result, tmp_path / given.pop("path"), **given)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupted_film_leaves_no_file(result, tmp_path):
+    def interrupt(done, total):
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        animate(result, tmp_path / "a.gif", size=(100, 100), progress=interrupt)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_existing_file_is_kept(result, tmp_path):
+    (tmp_path / "a.gif").write_text("mine")
+    with pytest.raises(ResultError, match="the file exists"):
+        animate(result, tmp_path / "a.gif")
+    assert (tmp_path / "a.gif").read_text() == "mine"
+
+
+def test_without_ffmpeg_there_is_no_mp4(result, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ResultError, match=r"needs the program ffmpeg.*or name a \.gif file"):
+        animate(result, tmp_path / "a.mp4")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_encoder_that_fails_is_quoted(result, tmp_path, monkeypatch):
+    """It reads nothing and ends: what it said is told, no file is left."""
+    program = tmp_path / "bin" / "ffmpeg"
+    program.parent.mkdir()
+    program.write_text("#!/bin/sh\necho 'Unknown encoder' >&2\nexit 3\n")
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("PATH", f"{program.parent}:/bin:/usr/bin")
+    with pytest.raises(ResultError, match="ffmpeg failed with exit code 3: Unknown encoder"):
+        animate(result, tmp_path / "a.mp4")
+    assert [p.name for p in tmp_path.iterdir()] == ["bin"]

@@ -1,0 +1,92 @@
+"""What the tab key offers: quantities of the result that was named, part by part, and models."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from unit.test_result import circling
+
+from dap3d_core.result import UnknownNameError, find, names_of
+
+
+@pytest.fixture(scope="module")
+def result():
+    return circling()[0]
+
+
+@pytest.fixture(scope="module")
+def folder(result, tmp_path_factory):
+    """A folder with a result."""
+    folder = tmp_path_factory.mktemp("results")
+    result.save(folder / "a.nc")
+    return folder
+
+
+def test_owners_come_first(result):
+    found = names_of(result)
+    assert [name for name in found if name.endswith(".")] == ["bob.", "Q.", "H.", "P.", "J1."]
+    assert {"t", "work", "energy.total", "constraint.position"} <= set(found)
+
+
+@pytest.mark.parametrize(
+    ("begin", "expected"),
+    [
+        ("bob.w", ["bob.w", "bob.wp", "bob.wd", "bob.wpd"][1:]),
+        ("bob.r.", ["bob.r.x", "bob.r.y", "bob.r.z", "bob.r.norm"]),
+        ("bob.p.", ["bob.p.e0", "bob.p.e1", "bob.p.e2", "bob.p.e3"]),
+        ("P.", ["P.r", "P.v", "P.a"]),
+        ("J1.mom", ["J1.moment", "J1.moment_body", "J1.moment_at_point"]),
+        ("J1.j.f", ["J1.j.force", "J1.j.force_body"]),
+        ("J1.lambda.", ["J1.lambda.1", "J1.lambda.2", "J1.lambda.3"]),
+        ("energy.", ["energy.kinetic", "energy.potential", "energy.total"]),
+        ("con", ["constraint.position", "constraint.velocity", "constraint.acceleration"]),
+        ("nothing", []),
+        ("bob.none.", []),
+    ],
+)
+def test_names_go_on_by_one_part(result, begin, expected):
+    assert names_of(result, begin) == expected
+
+
+def test_a_single_owner_is_opened_at_once(result):
+    assert names_of(result, "bo") == [f"bob.{a}" for a in
+                                      ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd")]  # fmt: skip
+
+
+def test_what_is_offered_exists(result):
+    """Every offered name that does not end in a dot is a quantity; so are its components."""
+    todo, count = names_of(result), 0
+    while todo:
+        name = todo.pop()
+        if not name.endswith("."):
+            find(result, name)
+            count += 1
+            name += "."
+        todo += names_of(result, name) if name.count(".") < 4 else []
+    assert count > 60
+    with pytest.raises(UnknownNameError):
+        find(result, "bob.rr")
+
+
+def offered(folder, *words):
+    """What a shell is told for a command line whose last word is incomplete."""
+    line = " ".join(["dap3d", *words])
+    variables = {"COMP_WORDS": line, "COMP_CWORD": str(len(words)),
+                 "_DAP3D_COMPLETE": "bash_complete"}  # fmt: skip
+    script = "from dap3d_core.cli import main; main()"
+    done = subprocess.run([sys.executable, "-c", script], cwd=folder, env=os.environ | variables,
+                          capture_output=True, text=True)  # fmt: skip
+    assert done.stderr == ""
+    return [tuple(item.split(",", 1)) for item in done.stdout.splitlines()]
+
+
+def test_a_shell_is_told(folder):
+    assert offered(folder, "plot", "a.nc", "bob.r.") == [
+        ("plain", f"bob.r.{part}") for part in ("x", "y", "z", "norm")
+    ]
+    assert ("plain", "energy.total") in offered(folder, "plot", "a.nc", "bob.r", "--x", "en")
+    assert offered(folder, "plot", "a.") == [("file", "a.")]
+    assert offered(folder, "plot", "gone.nc", "bob") == [("file", "bob")]
+    assert ("plain", "fourbar3") in offered(folder, "run", "four")
+    assert ("plain", "animate") in offered(folder, "an")

@@ -1,0 +1,42 @@
+"""Who watches a run is told how it stands, as the result tells it in the end."""
+
+import numpy as np
+import pytest
+from support import problems
+
+import dap3d_core as dap
+
+
+@pytest.mark.parametrize("options", [{}, {"integrator": "rk4", "step": 0.002}])
+def test_the_last_word_is_that_of_the_result(options):
+    """Steps and drift at the end are those of statistics and ledger."""
+    seen = []
+    result = dap.simulate("pen1", t_end=1.0, dt=1.0, watch=seen.append, **options)
+    last = seen[-1]
+    assert (last.t, last.t_end, last.steps) == (1.0, 1.0, result.stats.steps)
+    kinetic, work = result.energy.kinetic, result.work
+    imbalance = abs((kinetic[-1] - kinetic[0]) - (work[-1] - work[0]))
+    assert last.drift == pytest.approx(
+        imbalance / max(kinetic.max(), abs(work - work[0]).max()), rel=1e-6, abs=1e-15
+    )
+    assert last.drift == pytest.approx(result.ledger["energy"].value, rel=0.1)
+
+
+def test_it_goes_on_from_chunk_to_chunk():
+    seen = []
+    dap.simulate(problems.pendulum(), t_end=3.0, rtol=1e-12, watch=seen.append)
+    times = [run.t for run in seen]
+    assert times == sorted(times)
+    assert all(0.0 <= run.t <= run.t_end == 3.0 for run in seen)
+    steps = np.diff([0, *(run.steps for run in seen)])
+    spans = np.diff([0.0, *times])
+    np.testing.assert_allclose([run.step for run in seen], spans / steps, rtol=1e-12)
+
+
+def test_an_exception_of_the_watcher_ends_the_run_with_what_was_computed():
+    def stop(run):
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough") as caught:
+        dap.simulate(problems.pendulum(), t_end=1.0, watch=stop)
+    assert caught.value.result.status == "stopped"
