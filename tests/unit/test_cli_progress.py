@@ -19,7 +19,8 @@ def standing(t, t_end=100.0):
     return Standing(t=t, t_end=t_end, steps=int(10 * t), step=0.1, drift=2e-9)
 
 
-def test_lines_come_ever_more_rarely_and_estimate_what_is_left(clock, capsys):
+def test_lines_come_ever_more_rarely_and_estimate_what_is_left(clock, capsys, monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)  # lines are as long as they are
     with RunProgress(quiet=False) as shown:
         for k in range(101):
             clock[0] = float(k)
