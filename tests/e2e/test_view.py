@@ -126,7 +126,7 @@ def test_the_slider_and_the_field_scrub_to_the_instant_asked(opened, four):
     opened.run("""() => { const s = document.querySelector('#slider');
         s.value = 0.62; s.dispatchEvent(new Event('input')); }""")
     assert opened.run("dap3d.time") == pytest.approx(0.62)
-    opened.page.wait_for_timeout(100)
+    opened.drawn()
     drawn = opened.run("dap3d.drawnAt('crank')")
     np.testing.assert_allclose(drawn, four.r[62, 0], atol=3e-6)
     opened.page.fill("#time", "99")
@@ -159,21 +159,21 @@ def test_it_plays_pauses_and_steps_by_keys(opened, four):
 @pytest.mark.slow
 def test_switches_change_the_picture_and_back(opened):
     opened.run("dap3d.seek(0.3)")
-    opened.page.wait_for_timeout(200)
+    opened.drawn()
     labelled = opened.picture()
     opened.page.keyboard.press("n")
-    opened.page.wait_for_timeout(200)
+    opened.drawn()
     whole = opened.picture()
     assert np.any(labelled != whole)
     for key in ("1", "3", "4", "5", "6", "t", "g"):
         opened.page.keyboard.press(key)
-        opened.page.wait_for_timeout(120)
+        opened.drawn()
         assert np.any(opened.picture() != whole), key
         opened.page.keyboard.press(key)
-    opened.page.wait_for_timeout(200)
+    opened.drawn()
     assert np.mean(opened.picture() != whole) < 1e-4
     opened.page.keyboard.press("d")
-    opened.page.wait_for_timeout(200)
+    opened.drawn()
     assert opened.picture()[350, 5].max() < 60
     opened.page.keyboard.press("?")
     assert "play, pause" in opened.page.inner_text("#help")
@@ -208,10 +208,10 @@ def test_the_mouse_orbits_and_zooms_and_r_brings_back(opened):
     assert np.hypot(*np.subtract(turned, first)) > 10.0
     assert distance() == pytest.approx(near)
     mouse.wheel(0, 400)
-    opened.page.wait_for_timeout(200)
+    opened.drawn()
     assert distance() > 1.1 * near
     opened.page.keyboard.press("r")
-    opened.page.wait_for_timeout(200)
+    opened.drawn()
     np.testing.assert_allclose(seen(), first, atol=0.5)
 
 
@@ -239,7 +239,7 @@ def test_pixels_are_where_the_body_is(chromium, tmp_path):
     seen = {}
     for t in (0.0, 0.6):
         page.run("t => dap3d.seek(t)", t)
-        page.page.wait_for_timeout(150)
+        page.drawn()
         at = page.run("(() => { const p = dap3d.onScreen('ball'); return [p.x, p.y]; })()")
         picture = page.picture()
         red = (picture[..., 0] > 90) & (picture[..., 1] < 60) & (picture[..., 2] < 60)

@@ -69,6 +69,11 @@ class Opened:
         """What a script of the page gives, with one argument at most."""
         return self.page.evaluate(script, *arguments)
 
+    def drawn(self):
+        """Wait until what was changed before is in the picture: some frames of the browser."""
+        frame = "new Promise(requestAnimationFrame)"
+        self.page.evaluate(f"async () => {{ for (let k = 0; k < 4; k++) await {frame}; }}")
+
     def picture(self):
         """The page as it is, (height, width, 3) bytes."""
         import io
