@@ -22,7 +22,6 @@ from dap3d_core.result import ResultError, UnknownNameError
 from dap3d_core.view.bodies import inertia_ellipsoid
 from dap3d_core.view.camera import stage
 from dap3d_core.view.colors import CYCLE, colors
-from dap3d_core.view.gallery import model_page
 from dap3d_core.view.geometry import elements_of, geometry_of
 from dap3d_core.view.marks import turned_to
 from dap3d_core.view.motion import Extent, chosen
@@ -377,13 +376,6 @@ def test_numbers_that_json_does_not_have_become_words(page):
     json.loads(json.dumps(page.data, allow_nan=False))
     assert page.data["about"]["ledger"]["energy"]["ok"] in (True, False, None)
     assert page.data["about"]["versions"]["dap3d"]
-
-
-def test_a_model_becomes_a_page_in_one_call(tmp_path):
-    path = model_page("bodies2", tmp_path / "bodies2.html", "spring1.length", fps=10.0)
-    text = path.read_text(encoding="utf-8")
-    assert "<title>bodies2</title>" in text
-    assert '"asked":["spring1.length"]' in text
 
 
 def test_a_notebook_shows_the_same_page(page):

@@ -97,9 +97,14 @@ def motion(model: Model) -> str:
     return f'dap.animate(result, "{model.name}.gif", fps=12.5, size=(480, 0), force=True)'
 
 
+def scene(model: Model) -> str:
+    """The moving scene, to be turned and stepped through, as `dap3d view` shows it."""
+    return "dap.view(result, fps=25)"
+
+
 #: How a model is shown: functions that return the code of a cell; their docstring stands above it.
 #: Below it stand the figures that it drew and, where its last line has one, that value's HTML.
-VIEWS: tuple[Callable[[Model], str], ...] = (curves, motion)
+VIEWS: tuple[Callable[[Model], str], ...] = (curves, motion, scene)
 
 
 def _command(model: Model, name: str) -> list[str]:

@@ -4,10 +4,9 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from dap3d_core.view.gallery import model_page
 from dap3d_core.view.page import View, view
 
-__all__ = ["View", "model_page", "view"]
+__all__ = ["View", "view"]
 
 
 class _CallableModule(ModuleType):
