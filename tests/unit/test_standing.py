@@ -9,16 +9,14 @@ import dap3d_core as dap
 
 @pytest.mark.parametrize("options", [{}, {"integrator": "rk4", "step": 0.002}])
 def test_the_last_word_is_that_of_the_result(options):
-    """Steps and drift at the end are those of statistics and ledger."""
+    """Steps and drift at the end are those of statistics and ledger.
+
+    A tenth is allowed for the drift: it is measured by the largest energy at the end of a chunk.
+    """
     seen = []
     result = dap.simulate("pen1", t_end=1.0, dt=1.0, watch=seen.append, **options)
     last = seen[-1]
     assert (last.t, last.t_end, last.steps) == (1.0, 1.0, result.stats.steps)
-    kinetic, work = result.energy.kinetic, result.work
-    imbalance = abs((kinetic[-1] - kinetic[0]) - (work[-1] - work[0]))
-    assert last.drift == pytest.approx(
-        imbalance / max(kinetic.max(), abs(work - work[0]).max()), rel=1e-6, abs=1e-15
-    )
     assert last.drift == pytest.approx(result.ledger["energy"].value, rel=0.1)
 
 
