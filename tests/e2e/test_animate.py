@@ -24,6 +24,7 @@ def runs(dap3d):
     return result
 
 
+@pytest.mark.slow
 def test_a_film(dap3d, runs):
     done = dap3d("animate", "pen1.nc", "--speed", "0.5", "--fps", "10", "--size", "200")
     assert done.returncode == 0, done.stderr
@@ -87,6 +88,7 @@ def test_a_film_shows_its_progress_in_a_narrow_terminal(dap3d, runs):
     assert "of 501" in shown
 
 
+@pytest.mark.slow
 def test_several_runs_are_told_apart_by_their_folders(dap3d, runs):
     """In an SVG, whose text stays text; a result that is named twice is a mistake."""
     done = dap3d("plot", "pen1.nc", "sub/pen1.nc", "cone.r.z", "-o", "a.svg", "--width", "60")
@@ -130,6 +132,7 @@ def test_no_colour_when_asked(dap3d, place):
     assert "\x1b[3" in coloured
 
 
+@pytest.mark.slow
 def test_the_command_needs_no_display_and_no_window_package(dap3d, runs):
     """pyplot, which opens windows, stays out; so do the solver's kernels."""
     script = (

@@ -32,6 +32,7 @@ def dap3d_forces():
 '''
 
 
+@pytest.mark.slow
 def test_a_standard_type_passes(dap3d):
     done = dap3d("check-plugin", "sph", COLUMNS=60)
     assert done.returncode == 0, done.stderr
@@ -40,6 +41,7 @@ def test_a_standard_type_passes(dap3d):
     assert dap3d("check-plugin", "a", "-q").stdout == ""
 
 
+@pytest.mark.slow
 def test_a_file_of_ones_own(dap3d, refuse):
     """Not run without leave; an error is told with body and axis, in words and in JSON."""
     path = dap3d.folder / "rubber.py"

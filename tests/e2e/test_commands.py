@@ -26,6 +26,7 @@ def test_check_counts_and_runs_nothing(dap3d):
     assert "no mistakes" in dap3d("check", "fourbar3").stdout
 
 
+@pytest.mark.slow
 def test_check_tells_redundant_joints(dap3d, scene_file):
     """A door on two hinges: ten rows, five independent (spec 8)."""
     hinge = 'type = "rev"\nP_i = "{p}"\nP_j = "ground.O"\na_i = "stone.z"\na_j = "ground.z"\n'
@@ -64,6 +65,7 @@ def test_check_tells_what_is_redundant_at_this_pose_alone(dap3d):
     assert "2 of the 8 are redundant only at this pose" in told
 
 
+@pytest.mark.slow
 def test_check_names_joints_that_contradict_each_other(dap3d):
     """Two drivers of one angle at rates 1 and 2, and two joints 2 m apart: the second cannot be
     assembled, and the command says which joints are open."""
@@ -170,6 +172,7 @@ def test_info_says_what_a_file_holds(dap3d, result):
         assert words in shown
 
 
+@pytest.mark.slow
 def test_plot_draws_into_files(dap3d, result):
     assert dap3d("plot", "pen1.nc").returncode == 0
     assert (dap3d.folder / "pen1.png").read_bytes().startswith(b"\x89PNG")

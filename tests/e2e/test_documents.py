@@ -41,6 +41,7 @@ def dap3d(words, folder):
     )
 
 
+@pytest.mark.slow
 def test_the_readme(tmp_path):
     """The scene, the commands and the script of the README, in this order, in an empty folder."""
     text = (REPOSITORY / "README.md").read_text()
@@ -99,6 +100,7 @@ def test_the_page_on_methods(tmp_path):
         assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_the_page_on_events(tmp_path):
     """Its script, which holds assertions of its own, and its commands."""
     text = (REPOSITORY / "docs" / "events.md").read_text()

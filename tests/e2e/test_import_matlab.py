@@ -14,6 +14,7 @@ from support.process import REPOSITORY
 import dap3d_core as dap
 
 
+@pytest.mark.slow
 def test_import_check_and_run(dap3d):
     """From a folder to a result, with a report on the way."""
     done = dap3d("import-matlab", MODELS / "pen2", "-o", "pen2.toml")
@@ -70,6 +71,7 @@ def test_a_stub_is_written_only_when_asked_for_and_refused_until_it_is_filled_in
     assert "no plugin to fill in" in " ".join(done.stdout.split())
 
 
+@pytest.mark.slow
 def test_lines_fit_a_narrow_terminal(dap3d):
     for name in ("ball1", "tri", "fourbar4"):
         done = dap3d("import-matlab", MODELS / name, "--force", COLUMNS=60)

@@ -67,6 +67,7 @@ def test_a_table_reads_back_bit_for_bit(dap3d, result):
             assert quantity.unit == unit
 
 
+@pytest.mark.slow
 def test_a_table_of_picked_quantities(dap3d, result):
     done = dap3d("post", "pen1.nc", "-o", "some.csv", "--select", "cone.r", "J1.force.norm")
     assert done.returncode == 0, done.stderr
@@ -80,6 +81,7 @@ def test_a_table_of_picked_quantities(dap3d, result):
     assert list(table_of(dap3d.folder / "more.csv")) == ["t [s]", "energy.total [J]"]
 
 
+@pytest.mark.slow
 def test_a_file_with_named_dimensions(dap3d, result):
     assert dap3d("post", "pen1.nc", "-o", "all.nc", "--jacobian").returncode == 0
     with xarray.open_dataset(dap3d.folder / "all.nc") as data:

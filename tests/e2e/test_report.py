@@ -125,6 +125,7 @@ def test_the_page_on_reports(dap3d):
         assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_the_error_of_a_run_is_estimated_shown_and_stored(dap3d):
     done = dap3d("run", "pen1", "--t-end", "0.2", "--error")
     assert done.returncode == 0, done.stderr

@@ -46,6 +46,7 @@ def test_json_is_one_object_with_the_same_facts(dap3d):
     assert found["initial"]["bodies"]["crank"]["w"] == result.w[0, 0].tolist()
 
 
+@pytest.mark.slow
 def test_the_corrected_initial_conditions_are_reported(dap3d):
     done = dap3d("run", "fourbar3", "--t-end", "0.05", "--dt", "0.05")
     assert "corrected initial conditions" in done.stdout
@@ -66,6 +67,7 @@ def test_quiet_prints_nothing(dap3d):
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
+@pytest.mark.slow
 def test_strict_makes_changes_a_failure_and_saves_all_the_same(dap3d):
     """Velocities that the scene leaves open are for information; positions that were corrected by
     a millimetre are a change of what was given."""
@@ -208,6 +210,7 @@ def test_a_run_that_cannot_be_assembled_leaves_nothing(dap3d, scene_file):
     assert not (dap3d.folder / "fall.nc").exists()
 
 
+@pytest.mark.slow
 def test_a_reader_that_leaves_early_is_no_failure(dap3d):
     dap3d("run", "pen1", "--t-end", "0.1", "-o", "first.nc")  # compiles, where nobody did before
     process = dap3d.start("run", "pen1", "--t-end", "0.1")

@@ -100,6 +100,7 @@ def test_no_line_is_wider_than_60_columns(dap3d, arguments):
     assert [line for line in said if len(line) > 60] == []
 
 
+@pytest.mark.slow
 def test_without_a_model_it_asks_the_questions_of_the_manual(dap3d):
     answers = "no such\npen1\n\nsoon\n0.1\n0.05\ns\n"
     code, shown = in_terminal(dap3d, 80, "run", answers=answers)

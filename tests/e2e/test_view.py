@@ -9,6 +9,8 @@ from support.browser import Opened, browser
 import dap3d_core as dap
 from dap3d_core.model.kinematics import to_global
 
+pytestmark = pytest.mark.slow  # a browser that draws without a graphics card
+
 
 @pytest.fixture(scope="module")
 def chromium():
@@ -58,7 +60,6 @@ def pen1(dap3d):
     dap.simulate("pen1", t_end=0.1, dt=0.02).save(dap3d.folder / "pen1.nc")
 
 
-@pytest.mark.slow
 def test_the_command_writes_a_page(dap3d, refuse, pen1):
     done = dap3d("view", "pen1.nc")
     assert done.returncode == 0, done.stderr
@@ -156,7 +157,6 @@ def test_it_plays_pauses_and_steps_by_keys(opened, four):
     assert opened.run("dap3d.time") == four.t[-1]
 
 
-@pytest.mark.slow
 def test_switches_change_the_picture_and_back(opened):
     opened.run("dap3d.seek(0.3)")
     opened.drawn()
@@ -254,7 +254,6 @@ def test_pixels_are_where_the_body_is(chromium, tmp_path):
     assert page.complaints == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("size", [(1280, 800), (800, 600), (390, 844)])
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_the_whole_motion_is_in_the_frame(chromium, four_page, four, size, theme):
@@ -272,7 +271,6 @@ def test_the_whole_motion_is_in_the_frame(chromium, four_page, four, size, theme
     assert page.complaints == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("model", ["pen1", "bodies2", "tri", "A05", "N1", "ball1"])
 def test_shipped_models_are_shown_without_complaint(chromium, tmp_path, model):
     result = dap.simulate(model, t_end=0.2, dt=0.02, allow_code=True)
@@ -284,13 +282,11 @@ def test_shipped_models_are_shown_without_complaint(chromium, tmp_path, model):
     assert page.complaints == []
 
 
-@pytest.mark.slow
 def test_ten_seconds_of_five_bodies_are_under_three_megabytes(tmp_path):
     result = dap.simulate(chain(5), t_end=10.0, dt=0.01)
     assert dap.view(result).save(tmp_path / "page.html").stat().st_size < 3e6
 
 
-@pytest.mark.slow
 def test_two_hundred_bodies_take_little_of_each_picture(chromium, tmp_path):
     """What the page computes for a picture; a graphics card draws its 10 calls meanwhile.
 

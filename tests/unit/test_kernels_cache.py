@@ -74,6 +74,7 @@ def write_plugin(folder, strength=3.0, offset=0.5):
     (folder / "constants.py").write_text(CONSTANTS.format(offset=offset))
 
 
+@pytest.mark.slow
 def test_an_edited_helper_gives_the_new_number(tmp_path):
     """A change in a helper of the kernel's helper is seen, and only then compiled anew."""
     cache = tmp_path / "cache"
@@ -130,6 +131,7 @@ print(result.r[-1, 0, 2])
 """
 
 
+@pytest.mark.slow
 def test_a_model_with_its_own_types_can_be_copied(tmp_path):
     """The same plugin.py in another folder is another module, with compiled code of its own."""
     assert run_copy(tmp_path / "first") == run_copy(tmp_path / "second")

@@ -15,6 +15,7 @@ for array in (result.u, result.v_dot, result.Lam, result.energy.total):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not jit_is_on(), reason="compares with compiled code")
 @pytest.mark.parametrize(
     ("model", "integrator"),
