@@ -21,11 +21,11 @@ MARK, SECONDS = 1.3, 2.0
 
 
 def derivable(registry):
-    """(title, hand-written type) of the standard joints and variants that C determines."""
+    """(title, hand-written type) of the joints and variants that C determines."""
     for keyword in registry.keywords("joint"):
         examined = registry.get("joint", keyword)
         for conditions, e in (({}, examined), *examined.variants):
-            if "C" in e.kernels and "J" in e.kernels and all_of_position_level(e.type):
+            if "C" in e.kernels and not e.derived and all_of_position_level(e.type):
                 words = ", ".join(f"{n} = {v}" for n, v in conditions.items())
                 yield f"{keyword}{f' ({words})' if words else ''}", e
 
