@@ -227,3 +227,25 @@ def test_sympy_is_imported_for_the_first_derivation_alone(tmp_path):
     here = {"PYTHONPATH": os.pathsep.join([str(REPOSITORY / "tests"), *sys.path])}
     assert run(SCRIPT, tmp_path, **here) == "True"
     assert run(SCRIPT, tmp_path, **here) == "False"
+
+
+ANEW = """
+from dap3d_core.interface import examine
+from dap3d_core.kernels.cache import cache_folder
+from support.derived_types import {types}
+for type_ in ({types},):
+    examine(type_)
+texts = [path.read_text() for path in cache_folder().glob("derived-*/*.py")]
+print(*(text for text in texts if "spindle" in text))
+"""
+
+
+def test_a_derivation_does_not_depend_on_what_was_before(tmp_path):
+    """The same text alone, after others, and with other hashes: so runs repeat to the last bit."""
+    here = {"PYTHONPATH": os.pathsep.join([str(REPOSITORY / "tests"), *sys.path])}
+    texts = {
+        run(ANEW.format(types=types), tmp_path / f"{seed}", PYTHONHASHSEED=seed, **here)
+        for seed, types in enumerate(["Spindle", "Unsteady, Rolling, Spindle", "Spindle"])
+    }
+    assert len(texts) == 1
+    assert "def gamma(" in texts.pop()

@@ -9,7 +9,7 @@ import sympy
 from sympy.printing.pycode import PythonCodePrinter
 
 from dap3d_core.interface.namespace import Quantity
-from dap3d_core.interface.symbolic import DerivationError, Steps, Symbols, flat, fresh
+from dap3d_core.interface.symbolic import DerivationError, Steps, Symbols, flat
 
 #: sympy's functions that kernels have under the same name.
 WORDS = ("sin", "cos", "tanh", "atan2")
@@ -105,7 +105,7 @@ def kernel_source(
         steps: what symbols in them stand for.
         symbols, offered: the names that it may ask for.
     """
-    lines, numbers = _ordered(steps, flat(value), offered)
+    lines, numbers = _ordered(steps, flat(value), symbols, offered)
     used = [x for _, x in lines] + numbers
     called = {type(call).__name__ for x in used for call in x.atoms(sympy.Function)}
     free = set().union(*(x.free_symbols for x in used)) - {s for s, _ in lines}
@@ -125,11 +125,11 @@ def kernel_source(
 
 
 def _ordered(
-    steps: Steps, numbers: Sequence[Any], offered: Mapping[str, Quantity]
+    steps: Steps, numbers: Sequence[Any], symbols: Symbols, offered: Mapping[str, Quantity]
 ) -> tuple[list[tuple[Any, Any]], list[Any]]:
     """The steps that the numbers need, each after what it needs, and the numbers; e0, e1, ..."""
     written = [factored(x) for x in (*steps.values(), *numbers)]
-    common, reduced = sympy.cse(written, symbols=fresh)
+    common, reduced = sympy.cse(written, symbols=symbols.fresh)
     known = dict(common) | dict(zip(steps, reduced, strict=False))
     results = reduced[len(steps) :]
     order: dict[Any, Any] = {}

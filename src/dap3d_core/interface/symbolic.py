@@ -9,7 +9,7 @@ its body, W_i x s_P_i. With V_i, W_i the velocities of the bodies this gives, fo
 Only reached for a type that leaves formulas to be derived, so sympy is imported for it alone.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -52,15 +52,6 @@ def flat(value: Any) -> list[Expression]:
     return [sympy.sympify(value)]
 
 
-#: Symbols of steps, all of them different in a process: they are renamed when they are printed.
-fresh = sympy.numbered_symbols("step", real=True)
-
-
-def new_step() -> Expression:
-    """A symbol that stands for a step of a program."""
-    return next(fresh)
-
-
 @attrs.frozen
 class Program:
     """Expressions with common parts in steps: derivatives of steps are steps, so nothing swells.
@@ -68,13 +59,16 @@ class Program:
     Attributes:
         steps: symbol -> expression over the symbols before it.
         results: expressions over all of them.
+        fresh: gives symbols for further steps; numbered from zero in each derivation, for the
+            order of a sum depends on names.
     """
 
     steps: dict[Expression, Expression]
     results: list[Expression]
+    fresh: Iterator[Expression]
 
     @classmethod
-    def of(cls, results: Sequence[Expression]) -> "Program":
+    def of(cls, results: Sequence[Expression], fresh: Iterator[Expression]) -> "Program":
         """With a step for what occurs more than once, and for each argument of a function."""
         common, reduced = sympy.cse(results, symbols=fresh)
         steps: dict[Expression, Expression] = {}
@@ -84,7 +78,7 @@ class Program:
             if x.is_Atom:
                 return x
             if x not in known:
-                known[x] = new_step()
+                known[x] = next(fresh)
                 steps[known[x]] = x
             return known[x]
 
@@ -98,7 +92,7 @@ class Program:
 
         for symbol, expression in common:
             steps[symbol] = split(expression)
-        return cls(steps, [split(x) for x in reduced])
+        return cls(steps, [split(x) for x in reduced], fresh)
 
     def gradient(self, result: int) -> tuple["Program", dict[Expression, Expression]]:
         """Derivatives of one result by the symbols that are no steps (reverse accumulation).
@@ -117,11 +111,12 @@ class Program:
         for symbol, expression in reversed(self.steps.items()):
             weight = sympy.Add(*found.pop(symbol, ()))
             if not weight.is_Atom:
-                step = new_step()
+                step = next(self.fresh)
                 steps[step], weight = weight, step
             if weight != 0:
                 give(expression, weight)
-        return Program(steps, self.results), {s: sympy.Add(*x) for s, x in found.items()}
+        program = attrs.evolve(self, steps=steps)
+        return program, {s: sympy.Add(*x) for s, x in found.items()}
 
     def plain(self, result: int) -> Expression:
         """One result without steps."""
@@ -149,6 +144,7 @@ class Symbols(Mapping[str, Any]):
         self._values: dict[str, Any] = {}
         self._rates: dict[str, list[Expression]] = {}
         self._steps: dict[Expression, Expression] = {}
+        self.fresh = sympy.numbered_symbols("step", real=True)
         self.velocities = {f"{v.upper()}_{s}": self._velocity(f"{v}_{s}")
                            for s in slots for v in ("v", "w")}  # fmt: skip
         self.basic = [x for s in slots for v in ("V", "W") for x in self.velocities[f"{v}_{s}"]]
@@ -228,10 +224,10 @@ class Symbols(Mapping[str, Any]):
             if symbol not in self._steps:
                 rate = self._d_dt(expression)
                 if not rate.is_Atom:
-                    step = new_step()
+                    step = next(self.fresh)
                     steps[step], rate = rate, step
                 self._steps[symbol] = rate
-        return Program(steps, [self._d_dt(x) for x in program.results])
+        return Program(steps, [self._d_dt(x) for x in program.results], self.fresh)
 
     def _d_dt(self, expression: Expression) -> Expression:
         symbols = sorted(expression.free_symbols, key=str)
@@ -315,7 +311,7 @@ def derive_joint(
     for kernel, which, what in ((C, position_rows, "C"), (C_dot, velocity_rows, "C_dot")):
         if kernel is None:
             continue
-        program = Program.of(traced(kernel, symbols, what))
+        program = Program.of(traced(kernel, symbols, what), symbols.fresh)
         phi = symbols.d_dt(program) if what == "C" else program
         rate = symbols.d_dt(phi)
         steps |= rate.steps
@@ -360,10 +356,10 @@ def _at_rest(phi: Program, symbols: Symbols) -> Program:
     steps: Steps = {}
     for symbol, expression in phi.steps.items():
         rest = expression.xreplace(zero)
-        zero[symbol] = rest if rest.is_Atom else new_step()
+        zero[symbol] = rest if rest.is_Atom else next(symbols.fresh)
         if not rest.is_Atom:
             steps[zero[symbol]] = rest
-    return Program(steps, [x.xreplace(zero) for x in phi.results])
+    return Program(steps, [x.xreplace(zero) for x in phi.results], symbols.fresh)
 
 
 def _check_linear(form: Expression, row: int, symbols: Symbols) -> None:
@@ -376,7 +372,8 @@ def _check_linear(form: Expression, row: int, symbols: Symbols) -> None:
 
 def derive_wrench(energy: Callable[..., Any], symbols: Symbols) -> tuple[dict[str, Any], Steps]:
     """The wrench of a potential: its gradient along each velocity of each body, reversed."""
-    program, gradient = Program.of(traced(energy, symbols, "energy")).gradient(0)
+    potential = Program.of(traced(energy, symbols, "energy"), symbols.fresh)
+    program, gradient = potential.gradient(0)
     force = [-x for x in _coefficients(gradient, symbols, of_rates=False)]
     pairs = [[force[n : n + 3], force[n + 3 : n + 6]] for n in range(0, len(force), 6)]
     return {"wrench": pairs}, program.steps
