@@ -45,8 +45,8 @@ test-all: $(VENV)/.installed-docs  ## all tests, the slow verification as well
 verify: $(VENV)/.installed-docs  ## the slow verification alone
 	@$(PYTHON) -m pytest -n auto -m slow
 
-unit-nojit: $(VENV)/.installed-test  ## unit tests with kernels as plain Python, and their coverage
-	@NUMBA_DISABLE_JIT=1 $(PYTHON) -m pytest -n auto --cov --cov-report=term tests/unit
+unit-nojit: $(VENV)/.installed-test  ## quick unit tests with kernels as plain Python, and their coverage
+	@NUMBA_DISABLE_JIT=1 $(PYTHON) -m pytest -n auto -m "not slow" --cov --cov-report=term tests/unit
 
 # All checks run, also after one has failed; the last line says which.
 lint: $(VENV)/.installed-dev  ## format, lint, types, floors, sizes
