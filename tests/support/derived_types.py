@@ -8,6 +8,7 @@ from dap3d_core.interface import (
     Joint,
     Point,
     Vector,
+    angle,
     body,
     function,
     number,
@@ -61,6 +62,33 @@ class Spindle(Joint):
         d = sub(r_P_j, r_P_i)
         turn = dot(u_i, m_j) / sqrt(dot(u_i, n_j) ** 2 + dot(u_i, m_j) ** 2)
         return dot(a_i, n_j), dot(a_i, m_j), dot(d, n_j), dot(d, m_j), dot(d, a_j) - pitch * turn
+
+
+class Winding(Joint):
+    """P_j moves along a_j as body i turns against body j; whole turns are counted."""
+
+    keyword, rows = "winding", 1
+    P_i: Point = point()
+    P_j: Point = point()
+    a_j: Vector = vector()
+    pitch: float = number()
+    theta: float = angle("u_i", "n_j", "a_j")
+
+    def prepare(self, bodies):
+        n, _ = normals(self.a_j)
+        return {"n_j": n, "u_i": bodies["i"].to_local(bodies["j"].to_global(n))}
+
+    def C(r_P_i, r_P_j, a_j, theta, pitch):
+        return dot(a_j, sub(r_P_j, r_P_i)) - pitch * theta
+
+
+class Spooling(Winding):
+    """The same by speeds alone; theta_dot is k . (w_j - w_i), wherever the axes point."""
+
+    keyword, holonomic, C = "spooling", False, None
+
+    def C_dot(v_P_i, v_P_j, a_j, theta_dot, pitch):
+        return dot(a_j, sub(v_P_j, v_P_i)) - pitch * theta_dot
 
 
 class Cam(Joint):

@@ -17,8 +17,10 @@ from support.derived_types import (
     Elastic,
     Rolling,
     Spindle,
+    Spooling,
     Unsteady,
     Wave,
+    Winding,
     from_C_alone,
 )
 from support.motions import Motion, derivative
@@ -32,6 +34,7 @@ from dap3d_core.model import build_model
 from dap3d_core.model.kinematics import rotation, split
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import Scene, check
+from dap3d_core.testing import check_type
 
 pytest.importorskip("sympy")
 
@@ -249,3 +252,12 @@ def test_a_derivation_does_not_depend_on_what_was_before(tmp_path):
     }
     assert len(texts) == 1
     assert "def gamma(" in texts.pop()
+
+
+@pytest.mark.parametrize("type_", [Winding, Spooling], ids=lambda t: t.keyword)
+def test_an_angle_has_the_rate_of_its_formula(type_):
+    """Off the common axis, too, where its rate is not theta_dot = k . (w_j - w_i)."""
+    report = check_type(type_)
+    assert report.ok, str(report)
+    by_name = {outcome.check: outcome for outcome in report.outcomes}
+    assert by_name["J" if type_ is Winding else "velocity form"].error < 1e-12

@@ -16,9 +16,8 @@ from dap3d_core.interface.types import Joint, TypeBase
 
 Kernel = Callable[..., Any]
 
-#: Which kernel others are derived from, and which are derived.
-FORMULAS = {"joint": (("C", "C_dot"), ("J", "gamma", "nu")), "force": (("energy",), ("wrench",)),
-            "function": (("value",), ("value",))}  # fmt: skip
+#: Which kernels others are derived from.
+GIVEN = {"joint": ("C", "C_dot"), "force": ("energy",), "function": ("value",)}
 
 
 class CannotDeriveError(ValueError):
@@ -54,7 +53,7 @@ def derive(
     from dap3d_core.kernels import written
     from dap3d_core.kernels.cache import cache_folder, digest, identities, sources
 
-    given = {n: k for n, k in type_.kernels().items() if n in FORMULAS[type_.kind][0]}
+    given = {n: k for n, k in type_.kernels().items() if n in GIVEN[type_.kind]}
     offered, here = [repr(q) for q in names.values()], Path(__file__)
     how = [here.with_name(f"{n}.py").read_bytes() for n in ("derivation", "symbolic", "printing")]
     kernels = given.values()

@@ -54,6 +54,8 @@ class Quantity:
         rate: its rate of change as an expression over ``needs`` and the velocities ``V_i``, ``W_i``
             of the bodies: what is derived is derived from it. "" for a constant.
         rate_name: the name that holds its rate; "" where there is none.
+        motion: of a name of the velocity level that is the rate of no other: what it is, over the
+            same names as a rate.
         derivable: whether formulas that use it can be derived.
     """
 
@@ -67,6 +69,7 @@ class Quantity:
     derivative: int = -1
     rate: str = ""
     rate_name: str = ""
+    motion: str = ""
     derivable: bool = True
 
 
@@ -178,11 +181,14 @@ def _offer_angle(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
     at, axes = f"par[p1 + {layout.angles[name]}]", f"x_{u}, x_{v}, x_{k}"
     code = f"unwound(angle_about({axes}), {at})"
     one, other = slot_of(u), slot_of(v)
-    turns = {"rate": f"dot(x_{k}, sub(W_{other}, W_{one}))", "rate_name": f"{name}_dot"}
-    offer(name, (), code, (u, v, k), doc=f"angle from {u} to {v} about {k}, rad", **turns)
+    # its rate is that of the formula; theta_dot is it where both bodies turn about k alone
+    turning = ", ".join(f"cross(W_{slot_of(a)}, x_{a})" for a in spec.axes)
+    rates = {"rate": f"angle_rate({axes}, {turning})", "derivable": slot_of(k) is not None}
+    offer(name, (), code, (u, v, k), doc=f"angle from {u} to {v} about {k}, rad", **rates)
     rate = f"dot(x_{k}, sub(x_w_{other}, x_w_{one}))"
     needs = (k, f"w_{one}", f"w_{other}")
-    offer(f"{name}_dot", (), rate, needs, True, f"rate of {name}, rad/s")
+    motion = f"dot(x_{k}, sub(W_{other}, W_{one}))"
+    offer(f"{name}_dot", (), rate, needs, True, f"rate of {name}, rad/s", motion=motion)
 
 
 def _offer_point(offer: Callable[..., None], name: str, s: str, layout: Layout) -> None:

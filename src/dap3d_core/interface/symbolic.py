@@ -41,8 +41,17 @@ def euler_rate(w: Any, p: Any) -> Any:
     return (-half * dot(e, w), *(half * x for x in turning))
 
 
+def angle_rate(u: Any, v: Any, k: Any, u_dot: Any, v_dot: Any, k_dot: Any) -> Any:
+    """Rate of the angle from u to v about k (gather.angle_about): of atan2(y, x)."""
+    y, x = dot(k, cross(u, v)), dot(u, v) - dot(u, k) * dot(v, k)
+    y_dot = dot(k_dot, cross(u, v)) + dot(k, add(cross(u_dot, v), cross(u, v_dot)))
+    x_dot = (dot(u_dot, v) + dot(u, v_dot) - (dot(u_dot, k) + dot(u, k_dot)) * dot(v, k)
+             - dot(u, k) * (dot(v_dot, k) + dot(v, k_dot)))  # fmt: skip
+    return (x * y_dot - y * x_dot) / (x**2 + y**2)
+
+
 _WORDS = {"add": add, "sub": sub, "cross": cross, "dot": dot, "turned": turned,
-          "euler_rate": euler_rate}  # fmt: skip
+          "euler_rate": euler_rate, "angle_rate": angle_rate}  # fmt: skip
 
 
 def flat(value: Any) -> list[Expression]:
@@ -148,9 +157,9 @@ class Symbols(Mapping[str, Any]):
         self.velocities = {f"{v.upper()}_{s}": self._velocity(f"{v}_{s}")
                            for s in slots for v in ("v", "w")}  # fmt: skip
         self.basic = [x for s in slots for v in ("V", "W") for x in self.velocities[f"{v}_{s}"]]
-        #: what has a name for its rate, by that name
-        self.base = {
-            q.rate_name: q.name
+        #: names of the velocity level, and what they are in the velocities of the bodies
+        self.motions = {q.name: q.motion for q in names.values() if q.motion} | {
+            q.rate_name: q.rate
             for q in names.values()
             if q.rate_name in names and names[q.rate_name].velocity
         }
@@ -213,9 +222,12 @@ class Symbols(Mapping[str, Any]):
                     f"how {name} changes is not known here; write the missing formulas by hand"
                 )
             zero = [sympy.Integer(0)] * len(flat(self.value(name)))
-            found = flat(eval(quantity.rate, dict(_WORDS), self)) if quantity.rate else zero
-            self._rates[name] = [exact(x) for x in found]
+            self._rates[name] = self._evaluated(quantity.rate) if quantity.rate else zero
         return self._rates[name]
+
+    def _evaluated(self, code: str) -> list[Expression]:
+        """The numbers of an expression of ``Quantity``, over symbols."""
+        return [exact(x) for x in flat(eval(code, dict(_WORDS), self))]
 
     def d_dt(self, program: Program) -> Program:
         """Rates of a program's results, at V_dot = W_dot = 0; named rates stand by their names."""
@@ -239,18 +251,18 @@ class Symbols(Mapping[str, Any]):
         if symbol in self.basic:
             return sympy.Integer(0)
         name, k = self.owner[symbol]
-        if name in self.base:
-            return self._d_dt(self.rate(self.base[name])[k])
+        if name in self.motions:
+            return self._d_dt(self._evaluated(self.motions[name])[k])
         rate = self.rate(name)[k]
         known_as = self.names[name].rate_name
-        return flat(self.value(known_as))[k] if known_as in self.base else rate
+        return flat(self.value(known_as))[k] if known_as in self.motions else rate
 
     def motion(self, symbol: Expression) -> Expression:
-        """A named rate written out in the velocities of the bodies; None for what is no rate."""
+        """A velocity written out in those of the bodies; None for what is of no velocity."""
         if symbol in self.basic:
             return symbol
         name, k = self.owner.get(symbol, ("", 0))
-        return self.rate(self.base[name])[k] if name in self.base else None
+        return self._evaluated(self.motions[name])[k] if name in self.motions else None
 
 
 def _symbols(name: str, shape: tuple[int, ...]) -> Any:
