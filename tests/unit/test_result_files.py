@@ -201,7 +201,7 @@ def test_an_existing_file_is_kept_unless_forced(tmp_path):
     with pytest.raises(ResultError, match=r"cannot write .*run\.nc: the file exists; force"):
         result.save(path)
     with pytest.raises(ResultError, match="the file exists"):
-        ResultWriter(path, result.model, result.record)
+        ResultWriter(path, result.subject, result.record, len(result.t))
     assert path.read_text() == "precious"
     assert os.listdir(tmp_path) == ["run.nc"]
     result.save(path, force=True)

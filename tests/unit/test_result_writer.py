@@ -6,23 +6,21 @@ import subprocess
 import sys
 import textwrap
 
-import attrs
-import netCDF4
 import numpy as np
 import pytest
-from unit.test_result import CONTROLLED, circling, model_of
-from unit.test_result_files import ABOUT, noisy, run, same_bits
+from unit.test_result import circling, model_of
+from unit.test_result_files import noisy, run, same_bits
 
-from dap3d_core.model.kinematics import to_integrated
-from dap3d_core.result import Record, Result, ResultError, ResultWriter, open_result
-from dap3d_core.result.arrays import COLUMNS
+from dap3d_core.result import Result, ResultError, ResultWriter, open_result
+from dap3d_core.result.arrays import COLUMNS, arrays_of
+from dap3d_core.result.layout import write_rows
 from dap3d_core.scene import load
 
 
-def rows_of_result(result):
-    last = [getattr(result.arrays, c.name) for c in COLUMNS[5:]]
-    y = to_integrated(result.u, result.subject.body_count, result.work)
-    return np.column_stack([result.t, y, result.v_dot, result.Lam, *last])
+def grown(path, result, *, most=None, force=False):
+    """A writer for as many rows as a result has."""
+    most = len(result.t) if most is None else most
+    return ResultWriter(path, result.subject, result.record, most, force=force)
 
 
 @pytest.mark.parametrize("pieces", [(1,) * 9, (4, 5), (9,), (0, 8, 1)])
@@ -30,31 +28,24 @@ def rows_of_result(result):
 def test_a_file_grown_in_pieces_is_that_of_the_whole(tmp_path, pieces, name):
     model = model_of(load(name))
     rows = noisy(model)
-    record = Record(scene_text="[scene]\n", settings=CONTROLLED, notes=["as it starts"])
-    with ResultWriter(tmp_path / "run.nc", model, record) as writer:
+    whole = Result(model=model, machine_of=lambda: None, rows=rows, scene_text="[scene]\n")
+    with grown(tmp_path / "run.nc", whole, most=12) as writer:
         first = 0
         for count in pieces:
-            writer.append(rows[first : first + count])
+            writer.append(arrays_of(rows[first : first + count], whole.subject))
             first += count
         assert writer.count == 9
         assert os.listdir(tmp_path) == ["run.nc.part"]
-        final = attrs.evolve(record, notes=["as it ended"], stats=ABOUT["stats"])
-        assert writer.close(final) == tmp_path / "run.nc"
-    assert os.listdir(tmp_path) == ["run.nc"]
-    whole = Result(model=model, machine_of=lambda: None, rows=rows, scene_text="[scene]\n")
-    found = open_result(tmp_path / "run.nc")
-    assert same_bits(found, whole)
-    assert found.record == final
+    assert same_bits(open_result(tmp_path / "run.nc.part"), whole)
 
 
 def test_a_writer_left_with_an_error_leaves_what_it_had(tmp_path):
     result, _, _ = circling()
-    rows = rows_of_result(result)
-    writer = ResultWriter(tmp_path / "run.nc", result.model, result.record)
+    writer = grown(tmp_path / "run.nc", result)
 
     def interrupted():
         with writer:
-            writer.append(rows[:7])
+            writer.append(result.arrays.part(slice(7)))
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -66,22 +57,29 @@ def test_a_writer_left_with_an_error_leaves_what_it_had(tmp_path):
     ]
     np.testing.assert_array_equal(found.t, result.t[:7])
     with pytest.raises(ResultError, match="the writer is closed"):
-        writer.append(rows[7:])
+        writer.append(result.arrays.part(slice(7, None)))
+
+
+def test_a_writer_that_had_nothing_yet_leaves_no_instant(tmp_path):
+    result, _, _ = circling()
+    grown(tmp_path / "run.nc", result).leave()
+    found = open_result(tmp_path / "run.nc.part")
+    assert (len(found.t), found.status) == (0, "interrupted")
+    assert "nothing was reported" in found.notes[-1]
 
 
 def test_an_unfinished_file_is_not_overwritten_by_the_next_run(tmp_path):
     result, _, _ = circling()
     for _ in range(2):
-        with ResultWriter(tmp_path / "run.nc", result.model, result.record) as writer:
-            writer.append(rows_of_result(result))
+        with grown(tmp_path / "run.nc", result) as writer:
+            writer.append(result.arrays)
     assert sorted(os.listdir(tmp_path)) == ["run.nc.part", "run.nc.part2"]
 
 
 def test_after_a_failed_write_no_later_rows_follow(tmp_path, monkeypatch):
     result, _, _ = circling()
-    rows = rows_of_result(result)
-    writer = ResultWriter(tmp_path / "run.nc", result.model, result.record)
-    writer.append(rows[:5])
+    writer = grown(tmp_path / "run.nc", result)
+    writer.append(result.arrays.part(slice(5)))
 
     def fail(*_):
         raise RuntimeError("NetCDF: HDF error")
@@ -89,20 +87,32 @@ def test_after_a_failed_write_no_later_rows_follow(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr("dap3d_core.result.writing.write_rows", fail)
         with pytest.raises(ResultError, match="is the disk full"):
-            writer.append(rows[5:6])
+            writer.append(result.arrays.part(slice(5, 6)))
     with pytest.raises(ResultError, match="the writer is closed"):
-        writer.append(rows[6:])
+        writer.append(result.arrays.part(slice(6, None)))
     np.testing.assert_array_equal(open_result(tmp_path / "run.nc.part").t, result.t[:5])
 
 
-def test_rows_of_another_width_are_refused_and_the_writer_goes_on(tmp_path):
-    result, _, _ = circling()
-    with ResultWriter(tmp_path / "run.nc", result.model, result.record) as writer:
-        with pytest.raises(ValueError, match="shape"):
-            writer.append(np.zeros((3, 5)))
-        writer.append(rows_of_result(result))
-        writer.close(result.record)
-    assert len(open_result(tmp_path / "run.nc").t) == 21
+def test_adding_rows_changes_nothing_but_their_places(tmp_path):
+    """So that a writer may be killed at any moment: what describes the file is never touched."""
+    result, _, _ = circling(nt=200)
+    path = tmp_path / "run.nc.part"
+    with grown(tmp_path / "run.nc", result) as writer:
+        writer.append(result.arrays.part(slice(1)))
+        before = np.fromfile(path, dtype=np.uint8)
+        writer.append(result.arrays.part(slice(1, 150)))
+        after = np.fromfile(path, dtype=np.uint8)
+    assert len(before) == len(after)
+    stored = [getattr(result.arrays, column.name)[1:150] for column in COLUMNS]
+    assert 0 < np.count_nonzero(before != after) <= sum(a.nbytes for a in stored)
+    blank = b"\0" * 8
+    for column, values in zip(COLUMNS, stored, strict=True):
+        rows = values.tobytes()
+        at = bytes(after).find(rows)
+        if values.size and any(values.ravel()):
+            assert at > 0, column.name
+            after[at : at + len(rows)] = np.frombuffer(blank * values.size, dtype=np.uint8)
+    assert bytes(after) == bytes(before)
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
@@ -112,13 +122,11 @@ def test_a_killed_run_leaves_a_readable_file(tmp_path):
         import os, signal, sys
         sys.path.insert(0, {os.path.dirname(os.path.dirname(__file__))!r})
         from unit.test_result import circling
-        from unit.test_result_writer import rows_of_result
-        from dap3d_core.result import ResultWriter
+        from unit.test_result_writer import grown
         result = circling(nt=300)[0]
-        rows = rows_of_result(result)
-        writer = ResultWriter("run.nc", result.model, result.record)
+        writer = grown("run.nc", result)
         for first in range(0, 270, 27):
-            writer.append(rows[first : first + 27])
+            writer.append(result.arrays.part(slice(first, first + 27)))
         print("written", flush=True)
         os.kill(os.getpid(), signal.SIGKILL)
     """
@@ -136,12 +144,11 @@ def test_a_killed_run_leaves_a_readable_file(tmp_path):
 
 
 def test_rows_that_did_not_reach_the_file_whole_are_left_out(tmp_path):
-    """As after a kill between two variables: the last instant lacks its multipliers."""
+    """As after a kill between two variables: the time of the last instants is not there yet."""
     result, _, _ = circling()
-    with ResultWriter(tmp_path / "run.nc", result.model, result.record) as writer:
-        writer.append(rows_of_result(result))
-    with netCDF4.Dataset(tmp_path / "run.nc.part", "a") as file:
-        file["Lam"][20, 1] = np.nan
+    with grown(tmp_path / "run.nc", result) as writer:
+        writer.append(result.arrays.part(slice(20)))
+        write_rows(writer._dataset, result.arrays.part(slice(20, None)), 20)
     found = open_result(tmp_path / "run.nc.part")
     assert len(found.t) == len(found.u) == len(found.Lam) == 20
 
@@ -154,16 +161,5 @@ def test_a_writer_that_cannot_begin_leaves_nothing(tmp_path, monkeypatch):
 
     monkeypatch.setattr("dap3d_core.result.writing.define", fail)
     with pytest.raises(ResultError, match="is the disk full"):
-        ResultWriter(tmp_path / "run.nc", result.model, result.record)
+        grown(tmp_path / "run.nc", result)
     assert os.listdir(tmp_path) == []
-
-
-def test_a_file_that_appears_meanwhile_is_kept(tmp_path):
-    result, _, _ = circling()
-    writer = ResultWriter(tmp_path / "run.nc", result.model, result.record)
-    writer.append(rows_of_result(result))
-    (tmp_path / "run.nc").write_text("precious")
-    with pytest.raises(ResultError, match="the file exists"):
-        writer.close(result.record)
-    assert (tmp_path / "run.nc").read_text() == "precious"
-    assert same_bits(open_result(tmp_path / "run.nc.part"), result)

@@ -112,4 +112,5 @@ def _initial(outcome: Outcome) -> dict[str, Any] | None:
     result = outcome.result
     if not (result.settings.get("correct") and result.subject.row_count and len(result.t)):
         return None
-    return start_facts(result.subject.body_names, outcome.compiled.model.u0, result.u[0])
+    first = result.arrays.part(slice(1)).u[0]
+    return start_facts(result.subject.body_names, outcome.compiled.model.u0, first)

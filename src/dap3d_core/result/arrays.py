@@ -1,11 +1,12 @@
 """The arrays that a result stores; all others are computed from them."""
 
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import attrs
 import numpy as np
 
-from dap3d_core.model.groups import Floats
+from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.kinematics import from_integrated
 from dap3d_core.result.subject import Subject
 
@@ -18,6 +19,9 @@ class Column(NamedTuple):
     unit: str
     meaning: str
 
+
+#: Numbers in a block.
+BLOCK = 2**18
 
 #: "SI" stands where the unit differs from entry to entry; the meaning says how.
 COLUMNS = (
@@ -74,6 +78,56 @@ class Arrays:
             getattr(self, column.name).flags.writeable = False
         if self.u_error is not None:
             self.u_error.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def has_error(self) -> bool:
+        """Whether there is an estimate of the error of u."""
+        return self.u_error is not None
+
+    def part(self, rows: slice) -> "Arrays":
+        """The same for some of the instants; of arrays in memory these are views."""
+        error = None if self.u_error is None else self.u_error[rows]
+        return arrays_from((getattr(self, column.name)[rows] for column in COLUMNS), error)
+
+    def at(self, places: Integers) -> "Arrays":
+        """The same at some instants alone, (k,) places."""
+        return arrays_from(getattr(self, column.name)[places] for column in COLUMNS)
+
+    def blocks(self) -> "Iterator[Arrays]":
+        """Parts of some hundred thousand numbers each, in order: all of it in little memory."""
+        width = len(COLUMNS) + self.width
+        for rows in block_rows(len(self), width):
+            yield self.part(rows)
+
+    @property
+    def width(self) -> int:
+        """Numbers of u, v_dot and Lam at an instant."""
+        return sum(a.shape[1] for a in (self.u, self.v_dot, self.Lam))
+
+    def with_error(self, u_error: Floats) -> "Arrays":
+        """The same with an estimate of the error of u."""
+        return arrays_from((getattr(self, column.name) for column in COLUMNS), u_error)
+
+
+def arrays_from(columns: Iterable[Floats], u_error: Floats | None = None) -> Arrays:
+    """Arrays from those of ``COLUMNS``, in their order."""
+    names = (column.name for column in COLUMNS)
+    return Arrays(**dict(zip(names, columns, strict=True)), u_error=u_error)
+
+
+def joined(parts: Sequence[Arrays]) -> Arrays:
+    """Parts that follow on one another, as one."""
+    columns = ([getattr(part, column.name) for part in parts] for column in COLUMNS)
+    return arrays_from(np.concatenate(column) for column in columns)
+
+
+def block_rows(count: int, width: int) -> Iterator[slice]:
+    """Slices of ``count`` rows of ``width`` numbers, each of BLOCK numbers or one row."""
+    step = max(1, BLOCK // max(1, width))
+    return (slice(first, min(first + step, count)) for first in range(0, count, step))
 
 
 def column_sizes(subject: Subject) -> dict[str, int]:

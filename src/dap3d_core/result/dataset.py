@@ -42,7 +42,7 @@ def dataset_of(result: "Result") -> "xarray.Dataset":
 
     subject = result.subject
     variables: dict[str, Any] = {}
-    optional = () if result.arrays.u_error is None else (U_ERROR,)
+    optional = (U_ERROR,) if result.arrays.has_error else ()
     for column in (*COLUMNS[1:], *optional):
         dimensions = ("time", column.dimension) if column.dimension else ("time",)
         about = {"units": column.unit, "long_name": column.meaning}

@@ -10,9 +10,9 @@ from dap3d_core.result.errors import ResultError
 from dap3d_core.result.files import cannot, whole_file
 from dap3d_core.result.kinds import ACTIONS, AXES, EULER
 from dap3d_core.result.layout import attributes
+from dap3d_core.result.netcdf import NETCDF
 from dap3d_core.result.quantities import find
 from dap3d_core.result.reactions import DENSE_ROWS, rows_at
-from dap3d_core.result.writing import NETCDF
 
 if TYPE_CHECKING:
     import xarray

@@ -67,6 +67,12 @@ def reserve(target: Path) -> Path:
     raise ResultError(f"cannot write {target}: {_MOST_PARTS} unfinished files lie beside it")
 
 
+def synchronise(path: Path) -> None:
+    """Wait until a file's content is on the disk; OSError where the system refuses."""
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
+
+
 def put_in_place(part: Path, target: Path) -> None:
     """Give a finished file its name, once its content is on the disk.
 
@@ -74,8 +80,7 @@ def put_in_place(part: Path, target: Path) -> None:
         ResultError: the system refuses.
     """
     try:
-        with part.open("rb+") as file:
-            os.fsync(file.fileno())
+        synchronise(part)
         os.replace(part, target)
         with suppress(OSError):  # not every system lets a folder be synchronised
             folder = os.open(target.parent, os.O_RDONLY)

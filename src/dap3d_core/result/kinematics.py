@@ -8,6 +8,7 @@ from dap3d_core.model.groups import Floats
 from dap3d_core.model.kinematics import split, to_body
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.motion import accelerations, point_motion
+from dap3d_core.result.on_file import FileArrays
 from dap3d_core.result.subject import Subject
 
 
@@ -20,7 +21,7 @@ class Kinematics:
     """
 
     subject: Subject
-    arrays: Arrays
+    arrays: Arrays | FileArrays
 
     @property
     def t(self) -> Floats:

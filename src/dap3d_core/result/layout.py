@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 #: Version of this layout, raised when an older reader would misread it.
 FORMAT = 1
 CONVENTIONS = "dap3d-result"
-#: A growing variable is stored in pieces of about this many numbers.
-_PIECE = 32768
 
 
 class Constant(NamedTuple):
@@ -72,6 +70,7 @@ def attributes(subject: "Subject", record: Record) -> dict[str, Any]:
         "status": record.status,
         "method": record.method,
         "integrator": record.integrator,
+        "run": record.run,
         "notes": to_json(record.notes),
         "settings": to_json(record.settings),
         "statistics": to_json(attrs.asdict(record.stats)),
@@ -90,6 +89,7 @@ def record_of(found: dict[str, Any]) -> Record:
         status=str(found["status"]),
         method=str(found["method"]),
         integrator=str(found["integrator"]),
+        run=str(found["run"]),
         notes=found["notes"],
         settings=found["settings"],
         stats=Statistics(**found["statistics"]),
@@ -99,14 +99,18 @@ def record_of(found: dict[str, Any]) -> Record:
 
 
 def define(
-    dataset: Any, subject: "Subject", record: Record, nt: int | None, *, with_error: bool = False
+    dataset: Any, subject: "Subject", record: Record, nt: int, *, with_error: bool = False
 ) -> None:
     """Define everything in a new file and write all but the rows.
+
+    Each variable lies in one piece whose place is fixed here: writing rows changes nothing else of
+    the file, so that a writer may be killed at any moment. What was not written is zero, and takes
+    no room on a disk.
 
     Args:
         dataset: a netCDF4.Dataset, empty.
         subject, record: what the file is about.
-        nt: number of reported instants; None lets the file grow.
+        nt: number of reported instants there is room for.
         with_error: whether an estimate of the error of u comes, too.
     """
     length = sizes(subject)
@@ -134,15 +138,12 @@ def define(
         count = length[column.dimension] if column.dimension else 1
         if count:
             dimensions = ("time", column.dimension) if column.dimension else ("time",)
-            if nt:
-                storage: dict[str, Any] = {"contiguous": True}
-            else:
-                pieces = (max(1, min(4096, _PIECE // count)), count)
-                storage = {"chunksizes": pieces[: len(dimensions)]}
-            # NaN marks what a killed writer left out: rows themselves are finite.
+            storage: dict[str, Any] = {"contiguous": True} if nt else {}
             variable = dataset.createVariable(
-                column.name, "f8", dimensions, fill_value=np.nan, **storage
+                column.name, "f8", dimensions, fill_value=False, **storage
             )
+            if nt:
+                variable[nt - 1] = 0.0  # takes its place in the file
             _describe(variable, column.unit, column.meaning)
             if column.name != "t":
                 variable.setncattr_string("coordinates", "t")
@@ -159,11 +160,16 @@ def write_attributes(dataset: Any, found: dict[str, Any]) -> None:
 
 
 def write_rows(dataset: Any, arrays: Arrays, first: int) -> None:
-    """Write arrays into the rows of a file from ``first`` on."""
-    rows = slice(first, first + len(arrays.t))
-    for column in (*COLUMNS, U_ERROR):
+    """Write arrays but ``t`` into the rows of a file from ``first`` on."""
+    rows = slice(first, first + len(arrays))
+    for column in (*COLUMNS[1:], U_ERROR):
         if column.name in dataset.variables:
             dataset.variables[column.name][rows] = getattr(arrays, column.name)
+
+
+def write_times(dataset: Any, arrays: Arrays, first: int) -> None:
+    """Write ``t`` of the same rows, which says that they are there: once they are in the file."""
+    dataset.variables["t"][first : first + len(arrays)] = arrays.t
 
 
 def _describe(variable: Any, unit: str, meaning: str) -> None:

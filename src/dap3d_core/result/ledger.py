@@ -10,9 +10,9 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.model.kinematics import split
 from dap3d_core.result.arrays import Arrays
-from dap3d_core.result.motion import kinetic_energy, momentum
+from dap3d_core.result.course import Course, course_of
+from dap3d_core.result.on_file import FileArrays
 from dap3d_core.result.record import Record
 from dap3d_core.result.subject import Subject
 
@@ -59,21 +59,22 @@ def _entry(value: float, limit: float | None, unit: str, text: str) -> Entry:
 CONSERVATIVE = 1e-3
 
 
-def ledger_of(subject: Subject, arrays: Arrays, record: Record) -> dict[str, Entry]:
+def ledger_of(subject: Subject, arrays: Arrays | FileArrays, record: Record) -> dict[str, Entry]:
     """All entries of a run, by name; none for a run without reported instants.
 
     Names: energy; total energy (where potentials alone do work); momentum (where nothing
     outside acts on the bodies); position, velocity, acceleration; quaternion.
     """
-    if not len(arrays.t):
+    if not len(arrays):
         return {}
-    entries = {"energy": _energy(subject, arrays, record)}
-    if subject.has_potential and _is_conservative(subject, arrays, record):
-        entries["total energy"] = _total_energy(subject, arrays, record)
+    course = course_of(subject, arrays)
+    entries = {"energy": _energy(subject, course, record)}
+    if subject.has_potential and _is_conservative(subject, course, record):
+        entries["total energy"] = _total_energy(subject, course, record)
     if subject.is_isolated:
-        entries["momentum"] = _momentum(subject, arrays, record)
-    entries |= _constraints(subject, arrays, record)
-    entries["quaternion"] = _quaternion(subject, arrays, record)
+        entries["momentum"] = _momentum(subject, course, record)
+    entries |= _constraints(subject, course, record)
+    entries["quaternion"] = _quaternion(course, record)
     return entries
 
 
@@ -89,7 +90,7 @@ def _floor(record: Record) -> float:
     return 0.0 if control is None else control[1] / control[0]
 
 
-def _energy_scale(subject: Subject, arrays: Arrays, record: Record) -> float:
+def _energy_scale(subject: Subject, course: Course, record: Record) -> float:
     """What an imbalance of energy is compared with, J: the largest kinetic energy or work.
 
     Below a speed of atol / rtol error control is absolute: an error atol of the speed v is one of
@@ -98,21 +99,13 @@ def _energy_scale(subject: Subject, arrays: Arrays, record: Record) -> float:
     are given the share that ROUNDING is of the limit.
     """
     floor, limit = _floor(record), _relative_limit(record)
-    speed, spin = _momenta(subject, arrays)
-    kinetic = np.max(kinetic_energy(subject, arrays.u) + floor * (speed + spin))
+    kinetic = np.max(course.kinetic + floor * (course.speed + course.spin))
     rounding = 0.0
     if limit is not None and record.tolerances is not None:
         at_rest = record.tolerances[1] ** 2 * (subject.mass.sum() + _inertia(subject))
-        rounding = (ROUNDING * _largest(arrays.potential_energy) + at_rest) / limit
-    work = _largest(arrays.work - arrays.work[0])
+        rounding = (ROUNDING * _largest(course.potential_energy) + at_rest) / limit
+    work = _largest(course.work - course.work[0])
     return max(float(kinetic), work, rounding, float(np.finfo(float).tiny))
-
-
-def _momenta(subject: Subject, arrays: Arrays) -> tuple[Floats, Floats]:
-    """(nt,) sums of m |r_dot|, kg m/s, and of |J| |omega|, kg m^2/s, over the bodies."""
-    _, _, rd, w = split(arrays.u, subject.body_count)
-    inertia = np.linalg.norm(subject.Jp, ord=2, axis=(1, 2))
-    return np.linalg.norm(rd, axis=2) @ subject.mass, np.linalg.norm(w, axis=2) @ inertia
 
 
 def _inertia(subject: Subject) -> float:
@@ -120,12 +113,11 @@ def _inertia(subject: Subject) -> float:
     return float(np.linalg.norm(subject.Jp, ord=2, axis=(1, 2)).sum())
 
 
-def _energy(subject: Subject, arrays: Arrays, record: Record) -> Entry:
+def _energy(subject: Subject, course: Course, record: Record) -> Entry:
     """Kinetic energy against the work done by forces and drivers, dampers included."""
-    kinetic = kinetic_energy(subject, arrays.u)
-    imbalance = (kinetic - kinetic[0]) - (arrays.work - arrays.work[0])
-    worst, when = _worst(imbalance, arrays.t)
-    scale = _energy_scale(subject, arrays, record)
+    kinetic, work = course.kinetic, course.work
+    worst, when = _worst((kinetic - kinetic[0]) - (work - work[0]), course.t)
+    scale = _energy_scale(subject, course, record)
     text = (
         f"change of kinetic energy less work of forces and drivers: {worst:.2g} J "
         f"at t = {when:g} s, relative to {scale:.3g} J"
@@ -133,21 +125,22 @@ def _energy(subject: Subject, arrays: Arrays, record: Record) -> Entry:
     return _entry(worst / scale, _relative_limit(record), "1", text)
 
 
-def _is_conservative(subject: Subject, arrays: Arrays, record: Record) -> bool:
+def _is_conservative(subject: Subject, course: Course, record: Record) -> bool:
     """Whether potentials account for all work: by what the elements are, and as measured.
 
     As measured, because a damper may act only where bodies touch.
     """
-    other = (arrays.work - arrays.work[0]) + (arrays.potential_energy - arrays.potential_energy[0])
-    little = _largest(other) <= CONSERVATIVE * _energy_scale(subject, arrays, record)
+    work, potential = course.work, course.potential_energy
+    other = (work - work[0]) + (potential - potential[0])
+    little = _largest(other) <= CONSERVATIVE * _energy_scale(subject, course, record)
     return little and bool(record.settings.get("conservative"))
 
 
-def _total_energy(subject: Subject, arrays: Arrays, record: Record) -> Entry:
+def _total_energy(subject: Subject, course: Course, record: Record) -> Entry:
     """Change of kinetic and potential energy together: zero where potentials alone do work."""
-    total = kinetic_energy(subject, arrays.u) + arrays.potential_energy
-    worst, when = _worst(total - total[0], arrays.t)
-    scale = _energy_scale(subject, arrays, record)
+    total = course.kinetic + course.potential_energy
+    worst, when = _worst(total - total[0], course.t)
+    scale = _energy_scale(subject, course, record)
     text = (
         f"change of kinetic and potential energy: {worst:.2g} J at t = {when:g} s, relative to "
         f"{scale:.3g} J"
@@ -155,21 +148,16 @@ def _total_energy(subject: Subject, arrays: Arrays, record: Record) -> Entry:
     return _entry(worst / scale, _relative_limit(record), "1", text)
 
 
-def _momentum(subject: Subject, arrays: Arrays, record: Record) -> Entry:
+def _momentum(subject: Subject, course: Course, record: Record) -> Entry:
     """Drift of linear and angular momentum, relative to the momenta of the bodies added up."""
-    r, _, rd, _ = split(arrays.u, subject.body_count)
-    far, fast = np.linalg.norm(r, axis=2), np.linalg.norm(rd, axis=2)
     floor = _floor(record)  # of coordinates and velocities alike, to first order
-    inertia = _inertia(subject)
-    speed, spin = _momenta(subject, arrays)
-    orbit = (far * fast + floor * (far + fast)) @ subject.mass
     scales = (
-        np.max(speed) + floor * subject.mass.sum(),
-        np.max(orbit + spin) + floor * inertia,
+        np.max(course.speed) + floor * subject.mass.sum(),
+        np.max(course.orbit + floor * course.far + course.spin) + floor * _inertia(subject),
     )
     drifts = []
-    for values, scale in zip(momentum(subject, arrays.u), scales, strict=True):
-        worst, _ = _worst(np.linalg.norm(values - values[0], axis=1), arrays.t)
+    for values, scale in zip((course.linear, course.angular), scales, strict=True):
+        worst, _ = _worst(np.linalg.norm(values - values[0], axis=1), course.t)
         drifts.append(worst / max(float(scale), float(np.finfo(float).tiny)))
     text = (
         f"relative drift of linear momentum {drifts[0]:.2g}, of angular momentum about the origin "
@@ -178,15 +166,13 @@ def _momentum(subject: Subject, arrays: Arrays, record: Record) -> Entry:
     return _entry(float(np.max(drifts)), _relative_limit(record), "1", text)
 
 
-def _constraints(subject: Subject, arrays: Arrays, record: Record) -> dict[str, Entry]:
+def _constraints(subject: Subject, course: Course, record: Record) -> dict[str, Entry]:
     """Largest residuals of the constraints at the three levels.
 
     Position and velocity: with projection as far as a projection may leave them, else what errors
     of steps come to. Acceleration: the equations solved for it, at any tolerance.
     """
-    r, _, _, _ = split(arrays.u, subject.body_count)
-    speeds = arrays.u[:, 7 * subject.body_count :]
-    sizes = [1.0 + _largest(a) for a in (r, speeds, arrays.v_dot)]
+    sizes = [1.0 + size for size in course.sizes]
     limits = [*(_state_limit(record, size) for size in sizes[:2]), SOLVED * sizes[2]]
     if record.method == "penalty":
         limits[2] = None  # its springs give way, by lambda / alpha
@@ -195,7 +181,7 @@ def _constraints(subject: Subject, arrays: Arrays, record: Record) -> dict[str, 
         ("position", "velocity", "acceleration"), ("C", "D v - nu", "D v_dot - gamma"), limits,
         strict=True,
     ):  # fmt: skip
-        worst, when = _worst(getattr(arrays, f"{name}_residual"), arrays.t)
+        worst, when = _worst(getattr(course, f"{name}_residual"), course.t)
         text = f"largest |{residual}| of {subject.row_count} constraint rows, at t = {when:g} s"
         if not subject.row_count:
             text = "no constraints"
@@ -210,11 +196,9 @@ def _state_limit(record: Record, size: float) -> float | None:
     return None if control is None else LOOSE * (control[0] * size + control[1])
 
 
-def _quaternion(subject: Subject, arrays: Arrays, record: Record) -> Entry:
+def _quaternion(course: Course, record: Record) -> Entry:
     """Euler parameters are normalised by projection; without it their length drifts."""
-    _, p, _, _ = split(arrays.u, subject.body_count)
-    off = np.abs(np.linalg.norm(p, axis=2) - 1.0)
-    worst, when = _worst(off.max(axis=1, initial=0.0), arrays.t)
+    worst, when = _worst(course.off_unit, course.t)
     limit = UNIT_LENGTH if record.projected else _state_limit(record, 1.0)
     text = f"largest deviation of Euler parameters from unit length, at t = {when:g} s"
     return _entry(worst, limit, "1", text)

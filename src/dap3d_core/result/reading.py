@@ -4,23 +4,20 @@ import json
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
 import numpy as np
 
-from dap3d_core.result.arrays import COLUMNS, Arrays, column_sizes
+from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.errors import ResultError
-from dap3d_core.result.estimate import U_ERROR
 from dap3d_core.result.files import cannot
 from dap3d_core.result.layout import CONSTANTS, CONVENTIONS, FORMAT, record_of
+from dap3d_core.result.netcdf import NETCDF
+from dap3d_core.result.on_file import LARGE, FileArrays
 from dap3d_core.result.record import RUNNING, Record
 from dap3d_core.result.result import Rebuild, Result
 from dap3d_core.result.subject import Subject
-from dap3d_core.result.writing import NETCDF
-
-if TYPE_CHECKING:
-    from dap3d_core.model.groups import Floats
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _JSON = ("notes", "settings", "statistics", "versions", "events")
@@ -35,8 +32,9 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
             Jacobian or a reaction is asked for, without it these are refused.
 
     Returns:
-        The result, its arrays equal to the saved ones bit for bit. Of a file whose writer was
-        killed, what it had written: its status is "interrupted" and a note says so.
+        The result, its arrays equal to the saved ones bit for bit; those of a large file are read
+        when they are asked for. Of a file whose writer was killed, what it had written: its status
+        is "interrupted" and a note says so.
 
     Raises:
         ResultError: there is no such file, it is not a result, it is damaged, or it was written by
@@ -56,14 +54,31 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
             _check_format(file, dataset)
             subject, record, arrays = _read(dataset)
         except ResultError:
+            dataset.close()
             raise
         except Exception as error:  # whatever a damaged file makes of it
-            raise _unreadable(file, error) from error
-        finally:
             dataset.close()
-    if record.status == RUNNING:
-        arrays, record = _unfinished(arrays, record)
+            raise _unreadable(file, error) from error
+        if isinstance(arrays, Arrays):
+            dataset.close()
     return Result.of_parts(subject, arrays, record, _origin(file, subject, record, rebuild))
+
+
+def arrays_in(path: Path, subject: Subject, count: int) -> FileArrays:
+    """The arrays of a file that this program has just written, read when they are asked for.
+
+    Raises:
+        ResultError: it cannot be read.
+    """
+    with NETCDF:
+        import netCDF4
+
+        try:
+            dataset = netCDF4.Dataset(os.path.abspath(path), "r")
+        except (OSError, RuntimeError) as error:
+            raise _unreadable(path, error) from error
+        dataset.set_auto_maskandscale(False)
+        return FileArrays(dataset, subject, count)
 
 
 def _check_signature(file: Path) -> None:
@@ -101,27 +116,19 @@ def _check_format(file: Path, dataset: Any) -> None:
         )
 
 
-def _read(dataset: Any) -> tuple[Subject, Record, Arrays]:
+def _read(dataset: Any) -> tuple[Subject, Record, Arrays | FileArrays]:
     found = {name: dataset.getncattr(name) for name in dataset.ncattrs()}
-    found.setdefault("events", "[]")  # older files have none
+    found = {"events": "[]", "run": ""} | found  # older files have none
     for name in _JSON:
         found[name] = json.loads(found[name])
-    subject = _subject(dataset, found)
-    nt = len(dataset.dimensions["time"])
-    width = {"": None, **column_sizes(subject)}
-    columns: list[Floats] = []
-    optional = (U_ERROR,) if U_ERROR.name in dataset.variables else ()
-    for column in (*COLUMNS, *optional):
-        size = width[column.dimension]
-        shape = (nt,) if size is None else (nt, size)
-        if size == 0:
-            columns.append(np.zeros(shape))
-            continue
-        values = np.asarray(dataset.variables[column.name][:], dtype=float)
-        if values.shape != shape:
-            raise ValueError(f"{column.name} has the shape {values.shape}, not {shape}")
-        columns.append(values)
-    return subject, record_of(found), Arrays(*columns)
+    subject, record = _subject(dataset, found), record_of(found)
+    count = len(dataset.dimensions["time"])
+    if record.status == RUNNING:
+        count = _complete(dataset, count)
+        record = _unfinished(dataset, record, count)
+    arrays = FileArrays(dataset, subject, count)
+    large = 8 * count * arrays.width > LARGE
+    return subject, record, arrays if large else arrays.part(slice(None))
 
 
 def _subject(dataset: Any, found: dict[str, Any]) -> Subject:
@@ -141,17 +148,22 @@ def _subject(dataset: Any, found: dict[str, Any]) -> Subject:
     return Subject(**parts)
 
 
-def _unfinished(arrays: Arrays, record: Record) -> tuple[Arrays, Record]:
-    """Of a file whose writer was killed: the rows that are complete, and a note."""
-    complete = np.ones(len(arrays.t), dtype=bool)
-    for column in COLUMNS:
-        values = getattr(arrays, column.name).reshape(len(arrays.t), -1)
-        complete &= np.isfinite(values).all(axis=1)
-    count = int(np.argmin(complete)) if not complete.all() else len(complete)
-    kept = Arrays(*(getattr(arrays, column.name)[:count] for column in COLUMNS))
-    last = f"the last instant is t = {kept.t[-1]:g} s" if count else "nothing was reported"
+def _complete(dataset: Any, count: int) -> int:
+    """Rows of a file whose writer was killed that are there: what was not written is zero."""
+    t = np.asarray(dataset.variables["t"][:count], dtype=float)
+    if not count or not np.any(dataset.variables["u"][0]):
+        return 0
+    rising = t[1:] > t[:-1]
+    return 1 + (len(rising) if rising.all() else int(np.argmin(rising)))
+
+
+def _unfinished(dataset: Any, record: Record, count: int) -> Record:
+    """The record of a run whose writer was killed."""
+    last = "nothing was reported"
+    if count:
+        last = f"the last instant is t = {float(dataset.variables['t'][count - 1]):g} s"
     note = f"the run was killed, or is still being written: {last}"
-    return kept, attrs.evolve(record, status="interrupted", notes=(*record.notes, note))
+    return attrs.evolve(record, status="interrupted", notes=(*record.notes, note))
 
 
 def _origin(

@@ -85,6 +85,7 @@ class Record:
         settings: rtol, atol, step, project, correct and the like, as they were used.
         stats: what it cost.
         events: what happened at instants that were located, in their order.
+        run: by which a checkpoint knows the rows that belong to it; "" where there is none.
         known_versions: of dap3d, numpy, numba, python; None for those that are installed.
     """
 
@@ -96,6 +97,7 @@ class Record:
     settings: dict[str, Any] = attrs.field(factory=dict, converter=_plain)
     stats: Statistics = attrs.Factory(Statistics)
     events: tuple[Occurrence, ...] = attrs.field(default=(), converter=_occurrences)
+    run: str = attrs.field(default="", eq=False)
     known_versions: Mapping[str, str] | None = attrs.field(
         default=None, eq=lambda known: _installed() if known is None else dict(known)
     )

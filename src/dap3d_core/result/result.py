@@ -15,6 +15,7 @@ from dap3d_core.result.kinematics import Kinematics
 from dap3d_core.result.ledger import Entry, ledger_of
 from dap3d_core.result.motion import Energy, kinetic_energy
 from dap3d_core.result.occurrence import Occurrence
+from dap3d_core.result.on_file import FileArrays
 from dap3d_core.result.quantities import find
 from dap3d_core.result.reactions import Reaction, jacobians, reactions
 from dap3d_core.result.record import Record, Statistics
@@ -106,7 +107,11 @@ class Result(Kinematics):
 
     @classmethod
     def of_parts(
-        cls, subject: Subject, arrays: Arrays, record: Record, origin: Callable[[], Origin]
+        cls,
+        subject: Subject,
+        arrays: Arrays | FileArrays,
+        record: Record,
+        origin: Callable[[], Origin],
     ) -> Self:
         """A result put together from its parts, as one from a file is.
 
@@ -119,7 +124,11 @@ class Result(Kinematics):
         return result
 
     def _fill(
-        self, subject: Subject, arrays: Arrays, record: Record, origin: Callable[[], Origin]
+        self,
+        subject: Subject,
+        arrays: Arrays | FileArrays,
+        record: Record,
+        origin: Callable[[], Origin],
     ) -> None:
         self.subject, self.arrays, self.record = subject, arrays, record
         self._make_origin = origin

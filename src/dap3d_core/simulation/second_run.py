@@ -73,7 +73,7 @@ def add_error(
         _amend(result, output, f"its error was not estimated: {note}")
         return
     steps = second.stats.steps
-    result.arrays = attrs.evolve(result.arrays, u_error=estimated_error(result.u, second.u, steps))
+    result.arrays = result.arrays.with_error(estimated_error(result.u, second.u, steps))
     note = f"{INFORMATION}its error is estimated by a second run at {words} ({steps:,} steps)"
     _amend(result, output, note)
 

@@ -3,7 +3,6 @@
 import os
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from dap3d_core.formulations.friction import PASSES
 from dap3d_core.integrators import METHODS, Integration, Status, make_adams
 from dap3d_core.integrators.integration import Statistics as Counts
 from dap3d_core.kernels.cache import driver_is_cached
-from dap3d_core.result import Occurrence, Record, Result, ResultWriter, Statistics, check_target
+from dap3d_core.result import Occurrence, Record, Result, Statistics
 from dap3d_core.scene import Mistake, Scene, SceneError, Simulation
 from dap3d_core.simulation.asked import compiled_for, refuse_adams, report_times, settings_of
 from dap3d_core.simulation.compiled import CompiledModel
@@ -28,6 +27,7 @@ from dap3d_core.simulation.implicit import (
     stiffness_notes,
 )
 from dap3d_core.simulation.initial import correction_notes, violation
+from dap3d_core.simulation.keeping import Keeper
 from dap3d_core.simulation.redundancy import Redundancy
 from dap3d_core.simulation.second_run import Again, add_error
 from dap3d_core.simulation.standing import Observer, Standing
@@ -38,8 +38,6 @@ Progress = Callable[[float, float], None]
 
 #: Seconds that a compiled chunk should take: Ctrl-C and the progress bar wait for its end.
 CHUNK_SECONDS = 0.1
-#: A run that lasts longer writes its rows to disk as they come, so that it may be killed.
-SHORT_SECONDS = 1.0
 #: Numbers that wait in the row buffer at most.
 BUFFER_NUMBERS = 4_000_000
 #: A start this far off the constraints, left uncorrected, gets a note.
@@ -124,10 +122,7 @@ class _Run:
         self.settings = settings
         self.times = report_times(settings.t_end, settings.dt)
         self.notes = [*compiled.notes, f"method {compiled.method}: {compiled.reason}"]
-        self.rows: list[Floats] = []
-        self.output: Path | None = None
-        self.force = False
-        self.writer: ResultWriter | None = None
+        self.keeper: Keeper | None = None
         self.started = self.compile_time = 0.0
         self.rank = 0
         self.first_step: float | None = None
@@ -151,9 +146,7 @@ class _Run:
         if self.settings.integrator != "radau":  # which evaluates its stages otherwise
             integration.beside = self.machine.second_thread
         self._begin(integration)
-        if output is not None:
-            self.output = check_target(output, force)
-            self.force = force
+        self.keeper = Keeper(self.machine, output, len(self.times) + 1, force=force)
         try:
             self._advance(progress)
             if self.runs[-1].status is Status.STIFF:
@@ -295,15 +288,9 @@ class _Run:
         if not self.runs:
             return
         rows = self.runs[-1].rows()
-        if not len(rows):
-            return
-        self.rows.append(rows)
-        if self.writer is not None:
-            self.writer.append(rows)
-        elif self.output and time.perf_counter() - self.started > SHORT_SECONDS:
-            record, model = self._record("done"), self.machine.model
-            self.writer = ResultWriter(self.output, model, record, force=self.force)
-            self.writer.append(np.concatenate(self.rows))
+        if len(rows):
+            assert self.keeper is not None
+            self.keeper.take(rows, lambda: self._record("done"))
 
     def _stopped(self) -> SimulationError:
         """Why the integration ended early, with what was computed."""
@@ -313,7 +300,7 @@ class _Run:
 
     def _kept(self, status: str) -> Result | None:
         """The result of what was computed, whole on disk if asked for; None where nothing was."""
-        if not self.rows:
+        if self.keeper is None or not self.keeper.count:
             return None
         if count := self.machine.unsettled:
             self.notes.append(
@@ -323,17 +310,7 @@ class _Run:
             )
         self.notes += event_notes(self.runs, self._events())
         self.notes += stiffness_notes(self.runs, self.settings.integrator)
-        record = self._record(status)
-        result = Result.of_run(
-            self.machine.model, np.concatenate(self.rows), record, lambda: self.machine
-        )
-        if self.writer is not None:
-            self.writer.leave()
-        if self.output is not None:
-            result.save(self.output, force=self.force)
-        if self.writer is not None:
-            self.writer.part.unlink(missing_ok=True)
-        return result
+        return self.keeper.result(self._record(status))
 
     def _events(self) -> list[Occurrence]:
         found = self.watcher.occurrences if self.watcher else []

@@ -9,7 +9,6 @@ import numpy as np
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.kinematics import split, to_body, to_global
 from dap3d_core.result import Result
-from dap3d_core.result.arrays import COLUMNS, Arrays
 from dap3d_core.result.motion import motion_of
 from dap3d_core.view.marks import Located
 
@@ -52,9 +51,11 @@ def thinned(result: Result, places: Integers) -> Result:
     """A result with some of its instants alone, whose model is that of the whole."""
     if len(places) == len(result.t):
         return result
-    arrays = Arrays(*(getattr(result.arrays, column.name)[places] for column in COLUMNS))
     return Result.of_parts(
-        result.subject, arrays, result.record, lambda: (result.model, lambda: result.machine)
+        result.subject,
+        result.arrays.at(places),
+        result.record,
+        lambda: (result.model, lambda: result.machine),
     )
 
 

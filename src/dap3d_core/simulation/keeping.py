@@ -1,0 +1,129 @@
+"""What a run reports, kept: in memory while it is little, in a file beside the output when not."""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.result import Record, Result, ResultError, ResultWriter, check_target
+from dap3d_core.result.arrays import Arrays, arrays_of, joined
+from dap3d_core.result.on_file import LARGE, FileArrays
+from dap3d_core.result.reading import arrays_in
+from dap3d_core.result.subject import subject_of
+
+Floats = NDArray[np.float64]
+
+#: A run that lasts longer writes its rows to disk as they come, so that it may be killed.
+SHORT_SECONDS = 1.0
+
+
+class Keeper:
+    """Keeps the rows of one run.
+
+    Attributes:
+        run: the identity that its files carry.
+        output: the file that is wanted in the end, or None.
+        count: instants reported so far.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        output: str | os.PathLike[str] | None,
+        most: int,
+        *,
+        force: bool,
+        run: str = "",
+    ) -> None:
+        """Args:
+            machine: whose rows come.
+            output, force: as ``simulate`` has them.
+            most: how many rows come at most.
+            run: identity of the run that this one goes on with.
+
+        Raises:
+            ResultError: the output cannot be written.
+        """
+        self.run = run or os.urandom(16).hex()
+        self.output: Path | None = None if output is None else check_target(output, force)
+        self.count = 0
+        self._machine, self._most, self._force = machine, most, force
+        self._subject = subject_of(machine.model)
+        self._parts: list[Arrays] = []
+        self._bytes = 0
+        self._writer: ResultWriter | None = None
+        self._began = time.perf_counter()
+
+    def take(self, rows: Floats, record: Callable[[], Record]) -> None:
+        """Keep what was reported since the last time; record: what is known of the run."""
+        self.add(arrays_of(rows, self._subject), record)
+
+    def add(self, arrays: Arrays, record: Callable[[], Record]) -> None:
+        """The same for arrays."""
+        self.count += len(arrays)
+        self._bytes += 8 * len(arrays) * arrays.width
+        large = self._bytes > LARGE
+        if self._writer is None:
+            self._parts.append(arrays)
+            if self.output and (large or time.perf_counter() - self._began > SHORT_SECONDS):
+                self.write(record)
+        else:
+            self._writer.append(arrays)
+            if self._parts:
+                self._parts.append(arrays)
+        if large and self._writer is not None:
+            self._parts.clear()
+
+    def write(self, record: Callable[[], Record]) -> None:
+        """Have all rows in a file from now on."""
+        if self._writer is None:
+            assert self.output is not None
+            about = attrs.evolve(record(), run=self.run)
+            self._writer = ResultWriter(
+                self.output, self._subject, about, self._most, force=self._force
+            )
+            for part in self._parts:
+                self._writer.append(part)
+
+    def to_disk(self, record: Callable[[], Record]) -> None:
+        """Wait until all rows are on the disk."""
+        self.write(record)
+        assert self._writer is not None
+        self._writer.to_disk()
+
+    def result(self, record: Record) -> Result | None:
+        """The result of what was kept, whole in the output if there is one; None of nothing."""
+        if not self.count:
+            return None
+        machine = self._machine
+        if self._writer is not None:
+            self._writer.leave()
+        result = Result.of_parts(
+            self._subject,
+            self._arrays(),
+            attrs.evolve(record, run=self.run),
+            lambda: (machine.model, lambda: machine),
+        )
+        if self.output is not None:
+            try:
+                result.save(self.output, force=self._force)
+            except ResultError as error:
+                if self._writer is None:
+                    raise
+                words = f"{error}; what was computed is in {self._writer.part}"
+                raise ResultError(words) from error
+            self._force = True  # it is ours now
+        if self._writer is not None:
+            self._writer.discard()
+        return result
+
+    def _arrays(self) -> Arrays | FileArrays:
+        if self._parts:
+            return joined(self._parts)
+        assert self._writer is not None
+        return arrays_in(self._writer.part, self._subject, self.count)
