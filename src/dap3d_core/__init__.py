@@ -24,6 +24,8 @@ if TYPE_CHECKING:
         Event,
         RedundantError,
         SimulationError,
+        rerun,
+        resume,
         simulate,
     )
     from dap3d_core.simulation import compile_scene as compile
@@ -48,6 +50,8 @@ _HOMES = {
     "plot": ("plot", "plot"),
     "report": ("report", "report"),
     "shipped_models": ("scene", "shipped_models"),
+    "rerun": ("simulation", "rerun"),
+    "resume": ("simulation", "resume"),
     "simulate": ("simulation", "simulate"),
     "view": ("view", "view"),
 }
@@ -69,6 +73,8 @@ __all__ = [
     "open",
     "plot",
     "report",
+    "rerun",
+    "resume",
     "shipped_models",
     "simulate",
     "view",

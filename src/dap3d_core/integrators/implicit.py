@@ -1,5 +1,6 @@
 """One implicit integration, seen from Python; it has the face of ``Integration``."""
 
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any, NamedTuple, cast
 
@@ -141,6 +142,12 @@ class RadauIntegration(Integration):
         """As ``Integration.state_arrays``."""
         matrix = self.matrix
         return [*super().state_arrays(), matrix.spin, matrix.D, matrix.compliance]
+
+    def all_arrays(self) -> Iterator[tuple[str, Any]]:
+        """As ``Integration.all_arrays``."""
+        yield from super().all_arrays()
+        yield from self.tangent.walk("tangent.")
+        yield from self.matrix.walk("matrix.")
 
     @property
     def slope(self) -> Any:

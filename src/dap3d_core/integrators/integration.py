@@ -1,6 +1,6 @@
 """One integration, seen from Python: set up, advanced in chunks, drained of its rows."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -189,6 +189,13 @@ class Integration:
         names = [name for name, _ in self.work.type_of().members if name not in same]
         arrays = [getattr(self.work, name) for name in names]
         return [array for array in arrays if isinstance(array, np.ndarray)]
+
+    def all_arrays(self) -> Iterator[tuple[str, Any]]:
+        """Name and array of all that a run goes on from, once its ``rows`` are taken.
+
+        What ``functions`` keep in ``system`` is not among them.
+        """
+        return ((name, a) for name, a in self.work.walk() if name not in ("times", "rows"))
 
     def restart(self) -> None:
         """Let the next step start anew: what the functions compute has changed."""

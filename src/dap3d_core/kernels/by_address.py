@@ -108,6 +108,15 @@ class Arrays:
         """The members, in order."""
         return (getattr(self, name) for name, _ in self.type_of().members)
 
+    def walk(self, before: str = "") -> Iterator[tuple[str, Any]]:
+        """Name and array of each member, those of further classes behind a dot."""
+        for name, _ in self.type_of().members:
+            member = getattr(self, name)
+            if isinstance(member, Arrays):
+                yield from member.walk(f"{before}{name}.")
+            elif member is not None:
+                yield f"{before}{name}", member
+
     @classmethod
     def type_of(cls) -> ByAddress:
         """The type of the class in compiled code."""

@@ -71,7 +71,8 @@ def digest(*parts: str | bytes) -> str:
 
 
 @cache
-def _driver_digest(floor: str) -> str:
+def driver_digest(floor: str) -> str:
+    """Digest of all sources that decide what the compiled code of a floor of the core computes."""
     root = Path(__file__).parents[1]
     below = COMPILED_FLOORS[: COMPILED_FLOORS.index(floor) + 1]
     files = sorted(f for name in below for f in (root / name).glob("*.py"))
@@ -104,12 +105,12 @@ def compiled_into(function):
 def driver_is_cached(floor: str) -> bool:
     """Whether compiled code of a floor of the core is there from an earlier process."""
     folder = cache_folder()
-    return folder is not None and any((folder / f"{floor}-{_driver_digest(floor)}").glob("*/*.nbc"))
+    return folder is not None and any((folder / f"{floor}-{driver_digest(floor)}").glob("*/*.nbc"))
 
 
 def _driver_folder(function) -> str:
     floor = function.__module__.split(".")[1]
-    return f"{floor}-{_driver_digest(floor)}"
+    return f"{floor}-{driver_digest(floor)}"
 
 
 def compiled_in(folder: Path | None, name: str, function, **options):

@@ -47,6 +47,22 @@ def compiled_for(
     return scene
 
 
+def check_checkpoint(seconds: float | None, output: str | os.PathLike[str] | None) -> None:
+    """Refuse checkpoints that make no sense.
+
+    Raises:
+        SceneError: their distance is no positive time, or there is no result file.
+    """
+    if seconds is None:
+        return
+    if not isinstance(seconds, (int, float)) or isinstance(seconds, bool) or not seconds > 0.0:
+        words = "the time between two checkpoints is a positive number of seconds"
+        raise SceneError([Mistake("checkpoint", seconds, words)])
+    if output is None:
+        words = "a checkpoint belongs to a result file"
+        raise SceneError([Mistake("checkpoint", seconds, words, remedy="give output")])
+
+
 def report_times(t_end: float | None, dt: float | None) -> Floats:
     """Reporting times (nt,): multiples of dt, and t_end where it is none of them.
 

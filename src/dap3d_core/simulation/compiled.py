@@ -66,7 +66,8 @@ class CompiledModel:
         if method is not None:
             settings = attrs.evolve(scene.simulation, method=method)
             check_simulation(settings, self.model.body_names)
-        asked = method or str(scene.simulation.method)
+        #: The method that was asked for, perhaps "auto".
+        self.asked = asked = method or str(scene.simulation.method)
         self._starts: dict[tuple[bool, tuple[str, ...], str], Start] = {}
         self.machine = Machine(self.model, choose_method(self.model, asked)[0], announce)
         self.method, self.reason = self.choice(asked)

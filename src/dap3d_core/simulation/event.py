@@ -144,11 +144,15 @@ class Instant:
 
 
 class Numbers:
-    """The numbers of the forces of a compiled model; what was changed can be put back."""
+    """The numbers of the forces of a compiled model; what was changed can be put back.
+
+    Attributes:
+        given: those of the scene, once they were changed; else None.
+    """
 
     def __init__(self, compiled: CompiledModel) -> None:
         self._compiled = compiled
-        self._given: Floats | None = None
+        self.given: Floats | None = None
 
     def set(self, force: str, fields: dict[str, Any]) -> None:
         """As ``Instant.set``."""
@@ -159,17 +163,17 @@ class Numbers:
             raise ValueError(f"there is no force {force!r}; {hint}")
         model, par = self._compiled.model, self._compiled.machine.system.par
         change = changed(self._compiled.checked, model, names.index(force), fields)
-        if self._given is None:
-            self._given = par.copy()
+        if self.given is None:
+            self.given = par.copy()
         rows = self._rows(change)
         rows[change.where] = change.new[change.where]
         self._write(change, rows)
 
     def put_back(self) -> None:
         """Make the numbers those of the scene again."""
-        if self._given is not None:
-            self._compiled.machine.system.par[:] = self._given
-            self._given = None
+        if self.given is not None:
+            self._compiled.machine.system.par[:] = self.given
+            self.given = None
 
     def _first(self, group: Any) -> int:
         machine = self._compiled.machine

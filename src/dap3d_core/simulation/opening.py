@@ -52,15 +52,25 @@ def open_result(
 
 def _unmade(path: str | os.PathLike[str], error: Exception, allowed: bool) -> ResultError:
     """The error for a model that cannot be made again from the scene in a result."""
-    mistakes = getattr(error, "mistakes", None)
-    reason = mistakes[0].what if mistakes else str(error)
-    remedy = (
-        "install what brings the type"
-        if allowed
-        else "install what brings the type or, where that is the plugin.py of the model, open the "
-        "result with model=FOLDER and allow_code=True (dap3d post --model FOLDER --allow-code)"
-    )
     return ResultError(
         f"the model of {path} cannot be made again, which the Jacobian, reactions and forces need: "
-        f"{reason}; {remedy}. All other arrays are in the file"
+        f"{why_unmade(error, allowed=allowed)}. All other arrays are in the file"
+    )
+
+
+def why_unmade(error: Exception, *, allowed: bool) -> str:
+    """Why the model of a stored scene cannot be made, and what helps.
+
+    Args:
+        error: what came of it.
+        allowed: whether the types of a model's own file were allowed.
+    """
+    mistakes = getattr(error, "mistakes", None)
+    reason = mistakes[0].what if mistakes else str(error)
+    if allowed:
+        return f"{reason}; install what brings the type"
+    return (
+        f"{reason}; install what brings the type or, where that is the plugin.py of the model, "
+        "name the model and allow its code: model=FOLDER, allow_code=True, or on the command line "
+        "--model FOLDER --allow-code"
     )

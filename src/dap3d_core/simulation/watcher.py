@@ -8,6 +8,7 @@ step (its error, the constraints) holds of the state at an event.
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import attrs
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,6 +38,22 @@ class Watcher:
         self.occurrences: list[Occurrence] = []
         self._values: list[float] = []
         self._sides: list[float] = []
+
+    def state(self) -> tuple[dict[str, Any], Floats | None]:
+        """What was found and is known so far, as plain data; the forces' numbers as given."""
+        found = {
+            "titles": [event.title for event in self.events],
+            "occurrences": [attrs.asdict(one) for one in self.occurrences],
+            "values": self._values,
+            "sides": self._sides,
+        }
+        return found, self.numbers.given
+
+    def restore(self, found: dict[str, Any], given: Floats | None) -> None:
+        """Go on from what ``state`` gave."""
+        self.occurrences = [Occurrence(**one) for one in found["occurrences"]]
+        self._values, self._sides = list(found["values"]), list(found["sides"])
+        self.numbers.given = given
 
     def advance(self, integration: Integration, budget: int) -> Status:
         """As ``Integration.advance``, step by step."""

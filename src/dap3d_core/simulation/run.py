@@ -1,0 +1,334 @@
+"""One run: initial conditions, method, integration in chunks, and what is left behind."""
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.friction import PASSES
+from dap3d_core.integrators import METHODS, Integration, Status, make_adams
+from dap3d_core.integrators.integration import Statistics as Counts
+from dap3d_core.kernels.cache import driver_is_cached
+from dap3d_core.result import Occurrence, Record, Result, Statistics
+from dap3d_core.scene import Mistake, SceneError, Simulation
+from dap3d_core.simulation.asked import refuse_adams, report_times
+from dap3d_core.simulation.compiled import CompiledModel
+from dap3d_core.simulation.elsewhere import redundancy_elsewhere
+from dap3d_core.simulation.ending import event_notes, occurrences, why_stopped
+from dap3d_core.simulation.errors import RedundantError, SimulationError
+from dap3d_core.simulation.event import Event
+from dap3d_core.simulation.implicit import (
+    EXPLICIT,
+    implicit_integration,
+    implicit_rest,
+    stiffness_notes,
+)
+from dap3d_core.simulation.initial import correction_notes, violation
+from dap3d_core.simulation.keeping import Keeper
+from dap3d_core.simulation.redundancy import Redundancy
+from dap3d_core.simulation.saving import Saver
+from dap3d_core.simulation.second_run import Again, add_error
+from dap3d_core.simulation.standing import Observer, Standing
+from dap3d_core.simulation.watcher import Watcher
+
+Floats = NDArray[np.float64]
+Progress = Callable[[float, float], None]
+
+#: Seconds that a compiled chunk should take: Ctrl-C and the progress bar wait for its end.
+CHUNK_SECONDS = 0.1
+#: Numbers that wait in the row buffer at most.
+BUFFER_NUMBERS = 4_000_000
+#: A start this far off the constraints, left uncorrected, gets a note.
+OFF_CONSTRAINTS = 1e-6
+
+
+class Run:
+    """One run of a compiled model."""
+
+    def __init__(
+        self,
+        compiled: CompiledModel,
+        settings: Any,
+        announce: Callable[[str], None] | None,
+        events: Sequence[Event] = (),
+        watch: Callable[[Standing], None] | None = None,
+    ) -> None:
+        self.announce = announce
+        self.compiled = compiled
+        self.machine = compiled.machine
+        self.settings = settings
+        self.times = report_times(settings.t_end, settings.dt)
+        self.notes = [*compiled.notes, f"method {compiled.method}: {compiled.reason}"]
+        self.keeper: Keeper | None = None
+        self.saver: Saver | None = None
+        #: Whether the run stands between two chunks, and nothing is half done.
+        self.is_whole = False
+        self.started = self.compile_time = 0.0
+        self.rank = 0
+        self.first_step: float | None = None
+        self.watcher = Watcher(compiled, events) if events else None
+        self.watch, end = watch, float(self.times[-1])
+        self.observer = None if watch is None else Observer(self.machine.model, end, watch)
+        #: The integrations, one after the other: "auto" may take a second one.
+        self.runs: list[Integration] = []
+        self.options: dict[str, Any] = {}
+
+    def go(
+        self,
+        progress: Progress | None,
+        output: str | os.PathLike[str] | None,
+        *,
+        force: bool,
+        estimate_error: bool = False,
+        checkpoint: float | None = None,
+    ) -> Result:
+        """Run from the start to the end; arguments and errors as of ``simulate``."""
+        self.prepare()
+        self.keep(output, force=force)
+        self.saver = Saver(self, checkpoint, estimate_error, force) if checkpoint else None
+        return self.finish(progress, estimate_error)
+
+    def prepare(self) -> None:
+        """Stand at the start: corrected, compiled, nothing integrated."""
+        self.started = time.perf_counter()
+        integration = self._integration(self._start())
+        if self.settings.integrator != "radau":  # which evaluates its stages otherwise
+            integration.beside = self.machine.second_thread
+        self._begin(integration)
+
+    def keep(
+        self, output: str | os.PathLike[str] | None, *, force: bool, identity: str = ""
+    ) -> None:
+        """Keep what will be reported, and where; identity: of the run that this one goes on with.
+
+        Raises:
+            ResultError: the output cannot be written.
+        """
+        most = len(self.times) + 1  # an event may end a run between two of them
+        self.keeper = Keeper(self.machine, output, most, force=force, run=identity)
+
+    def finish(self, progress: Progress | None, estimate_error: bool) -> Result:
+        """Integrate to the end from where the run stands."""
+        keeper = self.keeper
+        assert keeper is not None
+        try:
+            self._advance(progress)
+            if self.runs[-1].status is Status.STIFF:
+                self.begin_implicit()
+                self._advance(progress)
+        except BaseException as error:
+            if isinstance(error, OSError):  # the disk: what is there stays as it is
+                raise
+            self._take_rows()
+            status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
+            error.result = self._kept(status)  # type: ignore[attr-defined]
+            if self.saver is not None:
+                self.saver.leave(error)
+            raise
+        finally:
+            if self.watcher:
+                self.watcher.numbers.put_back()
+        ended = self.runs[-1].status
+        if ended not in (Status.FINISHED, Status.ENDED):
+            raise self._stopped()
+        result = self._kept("done" if ended is Status.FINISHED else "stopped")
+        assert result is not None
+        if self.saver is not None:
+            self.saver.remove()
+        if estimate_error:
+            add_error(result, self.settings, self._again(progress), keeper.output)
+        return result
+
+    def begin_implicit(self) -> None:
+        """Go on with the implicit integrator, where the other one has found the scene stiff."""
+        self._begin(implicit_rest(self.machine, self.runs[-1], self.times, self.options))
+
+    def _again(self, progress: Progress | None) -> Again:
+        """Makes a run with other settings and another first step, in memory."""
+
+        def again(settings: Simulation, first_step: float | None) -> Result:
+            events = self.watcher.events if self.watcher else ()
+            run = Run(self.compiled, settings, self.announce, events, self.watch)
+            run.first_step = first_step
+            return run.go(progress, None, force=False)
+
+        return again
+
+    def _start(self) -> Floats:
+        """The initial state, corrected if asked for; its rank must suit the method."""
+        settings, scene = self.settings, self.compiled.scene
+        metric = str(settings.correct_metric)
+        start = self.compiled.start(bool(settings.correct), settings.hold, metric)
+        if start.initial is not None:
+            self.notes += correction_notes(start.initial, self.machine, scene)
+        elif max(violation(self.machine, start.u)) > OFF_CONSTRAINTS:
+            position, velocity = violation(self.machine, start.u)
+            self.notes.append(
+                f"the initial conditions violate the constraints (position {position:.2g}, "
+                f"velocity {velocity:.2g}) and were not corrected; switch correct on"
+            )
+        self.rank = start.redundancy.rank.rank
+        if start.redundancy.rank.redundant:
+            self._judge_redundancy(start.redundancy, start.u)
+        return start.u
+
+    def _judge_redundancy(self, redundancy: Redundancy, u: Floats) -> None:
+        """Refuse redundant rows, or note what they leave open."""
+        words = redundancy.describe()
+        if self.compiled.method == "standard":
+            elsewhere = redundancy_elsewhere(self.machine, u, redundancy).describe(redundancy)
+            raise RedundantError(
+                f"{words}; {elsewhere}. The standard method needs independent rows"
+            )
+        if redundancy.contradictions:
+            raise RedundantError(f"{words}. No motion satisfies them all")
+        least = " (reported are those of least |lambda|)" if self.compiled.method == "lsq" else ""
+        self.notes.append(
+            f"{words}. Accelerations are unique; reactions in these joints are not{least}"
+        )
+
+    def _integration(self, u0: Floats) -> Integration:
+        machine, settings = self.machine, self.settings
+        machine.watch_pivots(0.0, u0)
+        machine.start(0.0, u0)
+        y0 = machine.integrated(u0)
+        width = 1 + len(y0) + machine.report_size
+        self.options = options = dict(
+            rtol=settings.rtol,
+            atol=settings.atol,
+            step=settings.step,
+            first_step=self.first_step,
+            project_on=settings.project,
+            error_size=len(y0) - 1,  # the work does not steer the step
+            report_size=machine.report_size,
+            buffer_rows=max(1, min(len(self.times), BUFFER_NUMBERS // width)),
+            ends=machine.ending,
+        )
+        try:
+            if settings.integrator == "radau":
+                return implicit_integration(machine, y0, self.times, options)
+            options = options | {
+                "length_count": machine.length_count,
+                "watched": machine.counts_turns,
+            }
+            problem = machine.functions, machine.system, machine.loops, y0, self.times
+            if settings.integrator == "adams":
+                refuse_adams(machine)
+                del options["ends"]
+                return make_adams(*problem, **options)
+            if settings.integrator == "auto":
+                leave = machine.method != "penalty"  # which radau does not solve
+                return Integration(METHODS[EXPLICIT], *problem, leave_stiff=leave, **options)
+            return Integration(METHODS[settings.integrator], *problem, **options)
+        except ValueError as error:
+            raise SceneError([Mistake("step", settings.step, str(error))]) from error
+
+    def _begin(self, integration: Integration) -> None:
+        """Compile an integrator before the clock of the run goes on; it is the present one then."""
+        if self.announce is not None and not driver_is_cached("integrators"):
+            self.announce("the integrator")
+        before = time.perf_counter()
+        integration.compile()
+        spent = time.perf_counter() - before
+        self.compile_time += spent
+        self.started += spent
+        self.runs.append(integration)
+        if self.observer is not None:
+            self.observer.begin(integration)
+
+    def _advance(self, progress: Progress | None) -> None:
+        """Advance in chunks whose length in right-hand sides follows the clock."""
+        integration = self.runs[-1]
+        budget, t_end = 100, float(self.times[-1])
+        while integration.status is Status.RUNNING:
+            before, clock = integration.statistics.rhs, time.perf_counter()
+            self.is_whole = False
+            if self.watcher:
+                self.watcher.advance(integration, budget)
+            else:
+                integration.advance(budget)
+            self._take_rows()
+            self.is_whole = True
+            if self.saver is not None:
+                self.saver.look()
+            done, seconds = integration.statistics.rhs - before, time.perf_counter() - clock
+            if progress is not None:
+                progress(integration.t, t_end)
+            if self.observer is not None:
+                self.observer.look()
+            if done and seconds > 0.0:
+                budget = int(min(max(1.0, done * CHUNK_SECONDS / seconds), 4.0 * budget, 1e9))
+
+    def _take_rows(self) -> None:
+        """Take what was reported since the last chunk; in a long run, also onto disk."""
+        if not self.runs:
+            return
+        rows = self.runs[-1].rows()
+        if len(rows):
+            assert self.keeper is not None
+            self.keeper.take(rows, lambda: self.record("done"))
+
+    def _stopped(self) -> SimulationError:
+        """Why the integration ended early, with what was computed."""
+        message = why_stopped(self.machine, self.runs[-1])
+        self.notes.append(message)
+        return SimulationError(message, self._kept("stopped"))
+
+    def _kept(self, status: str) -> Result | None:
+        """The result of what was computed, whole on disk if asked for; None where nothing was."""
+        if self.keeper is None or not self.keeper.count:
+            return None
+        if count := self.machine.unsettled:
+            self.notes.append(
+                f"friction: the multipliers did not settle in {PASSES} passes, {count} times of "
+                f"{self._statistics().rhs} or more; the last ones were used. Motion there is "
+                "uncertain: a high mu may lock the joint by itself"
+            )
+        self.notes += event_notes(self.runs, self._events())
+        self.notes += stiffness_notes(self.runs, self.settings.integrator)
+        return self.keeper.result(self.record(status))
+
+    def _events(self) -> list[Occurrence]:
+        found = self.watcher.occurrences if self.watcher else []
+        return occurrences(self.machine, self.runs, found)
+
+    def _statistics(self) -> Counts:
+        """What all integrations have done together."""
+        return Counts(*(sum(n) for n in zip(*(run.statistics for run in self.runs), strict=True)))
+
+    def record(self, status: str) -> Record:
+        """What there is to say of the run so far."""
+        counts, events = self._statistics(), self._events()
+        changes = any(event.changes for event in events)
+        return Record(
+            scene_text=self.compiled.scene_text,
+            stats=Statistics(
+                steps=counts.steps,
+                rejected=counts.rejected,
+                rhs=counts.rhs,
+                projections=counts.projections,
+                wall_time_s=time.perf_counter() - self.started,
+                compile_time_s=self.compiled.compile_time + self.compile_time,
+            ),
+            status=status,
+            method=self.compiled.method,
+            integrator=self.settings.integrator,
+            notes=self.notes,
+            events=events,
+            settings={
+                "t_end": float(self.times[-1]),
+                "dt": self.settings.dt,
+                "rtol": self.settings.rtol,
+                "atol": self.settings.atol,
+                "step": self.settings.step,
+                "project": bool(self.settings.project),
+                "correct": bool(self.settings.correct),
+                "rank": self.rank,
+                "conservative": self.compiled.is_conservative and not changes,
+                "correct_metric": str(self.settings.correct_metric),
+                "method": self.compiled.asked,
+            },
+        )

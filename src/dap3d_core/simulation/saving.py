@@ -1,0 +1,149 @@
+"""When a run writes checkpoints, and what stands in them."""
+
+import hashlib
+import inspect
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.kernels.cache import driver_digest
+from dap3d_core.result import ResultError
+from dap3d_core.result.record import to_json
+from dap3d_core.simulation.checkpoint import Checkpoint, path_of, write_checkpoint
+
+if TYPE_CHECKING:
+    from dap3d_core.simulation.compiled import CompiledModel
+    from dap3d_core.simulation.run import Run
+
+#: Arrays of the system that a run changes and goes on from. The others are scratch of one right-
+#: hand side, or constant; but a projection may use what the last one left.
+CHANGING = (
+    "body", "F", "par", "force", "gamma", "nu", "C", "x", "D", "K", "smallest", "settings",
+    "friction",
+)  # fmt: skip
+
+
+class Saver:
+    """Writes the checkpoints of a run.
+
+    Attributes:
+        path: where they stand.
+    """
+
+    def __init__(self, run: "Run", seconds: float, estimate_error: bool, force: bool) -> None:
+        """Args:
+            run: whose; its keeper has an output.
+            seconds: from one checkpoint to the next.
+            estimate_error: whether an estimate of the error follows the run.
+            force: whether a checkpoint of another run is given up.
+
+        Raises:
+            ResultError: there is one of another run.
+        """
+        keeper = run.keeper
+        assert keeper is not None
+        assert keeper.output is not None
+        self.path = path_of(keeper.output)
+        if self.path.exists() and not force:
+            raise ResultError(
+                f"{self.path} exists: a run that was ended goes on from it (dap3d resume); force "
+                "gives it up"
+            )
+        self._run, self._seconds, self._estimate_error = run, seconds, estimate_error
+        self._next = time.perf_counter() + seconds
+
+    def look(self) -> None:
+        """Write a checkpoint if it is time."""
+        if time.perf_counter() < self._next:
+            return
+        run, keeper = self._run, self._run.keeper
+        assert keeper is not None
+        if keeper.count:
+            keeper.to_disk(lambda: run.record("done"))
+            self.write()
+            self._next = time.perf_counter() + self._seconds
+
+    def leave(self, error: BaseException) -> None:
+        """Write a checkpoint where a run is ended from outside, its result being saved.
+
+        ``error.checkpoint`` names it, where the run stands between two chunks.
+        """
+        run = self._run
+        if run.is_whole and run.keeper is not None and run.keeper.count:
+            self.write()
+            error.checkpoint = self.path  # type: ignore[attr-defined]
+
+    def write(self) -> None:
+        """Write a checkpoint of the run as it stands, once its rows are in a file."""
+        write_checkpoint(self.path, checkpoint_of(self._run, self._estimate_error))
+
+    def remove(self) -> None:
+        """The run has ended by itself: nothing goes on from here."""
+        self.path.unlink(missing_ok=True)
+
+
+def checkpoint_of(run: "Run", estimate_error: bool) -> Checkpoint:
+    """A run as it stands between two chunks, its rows taken."""
+    keeper, compiled = run.keeper, run.compiled
+    assert keeper is not None
+    assert keeper.output is not None
+    arrays = dict(arrays_of(run))
+    header: dict[str, Any] = {
+        "run": keeper.run,
+        "output": keeper.output.name,
+        "rows": keeper.count,
+        "t": run.runs[-1].t,
+        "integrations": len(run.runs),
+        "scene": compiled.scene_text,
+        "method": compiled.asked,
+        "settings": attrs.asdict(run.settings),
+        "estimate_error": estimate_error,
+        "notes": run.notes,
+        "wall_time_s": time.perf_counter() - run.started,
+        "compile_time_s": run.compile_time,
+        "driver": driver_digest("integrators"),
+        "types": digests_of(compiled),
+    }
+    if run.watcher is not None:
+        header["events"], given = run.watcher.state()
+        if given is not None:
+            arrays["events.given"] = given
+    return Checkpoint(json.loads(to_json(header)), arrays)
+
+
+def arrays_of(run: "Run") -> Iterator[tuple[str, NDArray[Any]]]:
+    """Name and array of all that a run goes on from."""
+    for k, integration in enumerate(run.runs):
+        for name, array in integration.all_arrays():
+            yield f"{k}.{name}", array
+    yield from system_arrays(run.machine)
+
+
+def system_arrays(machine: Machine) -> Iterator[tuple[str, NDArray[Any]]]:
+    """The arrays of a model that a run changes."""
+    for name in CHANGING:
+        yield f"system.{name}", getattr(machine.system, name)
+    if machine.system.halves is not None:
+        yield "system.halves", machine.system.halves.numbers
+
+
+def digests_of(compiled: "CompiledModel") -> dict[str, str]:
+    """For each type of a scene, a digest of the file that it stands in."""
+    checked = compiled.checked
+    elements = (*checked.joints, *checked.forces, *checked.functions)
+    types = {(e.examined.type.kind, e.examined.type.keyword): e.examined.type for e in elements}
+    return {f"{kind} {word}": _digest(type_) for (kind, word), type_ in sorted(types.items())}
+
+
+def _digest(type_: type) -> str:
+    try:
+        source = Path(inspect.getsourcefile(type_) or "").read_bytes()
+    except (TypeError, OSError):  # typed at a prompt
+        return ""
+    return hashlib.sha256(source).hexdigest()[:20]
