@@ -162,12 +162,14 @@ def _add_commands() -> None:
     from dap3d_core.cli.plugins import plugins
     from dap3d_core.cli.post import post
     from dap3d_core.cli.report import report
+    from dap3d_core.cli.rerun import rerun
+    from dap3d_core.cli.resume import resume
     from dap3d_core.cli.run import run
     from dap3d_core.cli.view import view
 
     analysis = (info, post, plot, animate, view, report)
     authors = (describe, new_plugin, check_plugin)
-    for command in (run, check, models, plugins, *authors, *analysis, import_matlab):
+    for command in (run, resume, rerun, check, models, plugins, *authors, *analysis, import_matlab):
         dap3d.add_command(command)
 
 

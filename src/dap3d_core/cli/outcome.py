@@ -36,12 +36,14 @@ class Outcome:
         result: what was computed.
         code: the exit code, but for ``--strict``.
         reason: why it ended early; "" where it did not.
+        checkpoint: from where ``resume`` goes on; None where it cannot.
     """
 
     compiled: "CompiledModel"
     result: "Result"
     code: int
     reason: str
+    checkpoint: Path | None
 
 
 def tell(
@@ -61,6 +63,7 @@ def tell(
                 **found,
                 "initial": _initial(outcome),
                 "reason": outcome.reason,
+                "checkpoint": str(outcome.checkpoint) if outcome.checkpoint else None,
                 "exit_code": code,
             }
         )
@@ -99,6 +102,10 @@ def _show_faults(console: Terminal, outcome: Outcome, faults: list[str], target:
         say(console, outcome.reason, "bold red")
         last = f"t = {result.t[-1]:.6g} s"
         say(console, f"what was computed until then, up to {last}, is in {target}")
+        if outcome.checkpoint is not None:
+            name = shlex.quote(str(outcome.checkpoint))
+            say(console, "to go on from there:")
+            say(console, f"dap3d resume {name}", "green", indent=2, whole=True)
 
 
 def _show_corrected(console: Terminal, outcome: Outcome) -> None:

@@ -6,16 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli import exits
+from dap3d_core.cli.carrying import Seconds, carry_out
 from dap3d_core.cli.completion import models as complete_models
-from dap3d_core.cli.exits import Refused, Terminated
 from dap3d_core.cli.group import Command
 
 if TYPE_CHECKING:
-    from dap3d_core.cli.outcome import Outcome
-    from dap3d_core.cli.signals import Stopping
+    from dap3d_core.cli.carrying import Announce, Watch
+    from dap3d_core.result import Result
     from dap3d_core.scene import Scene, SceneError
-    from dap3d_core.simulation import Standing
+    from dap3d_core.simulation import CompiledModel
 
 #: Settings of a run that the command line overrides, with the options that do.
 SETTINGS = {
@@ -54,6 +53,9 @@ _OPTIONS = (
     click.option("--error", "estimate_error", is_flag=True,
                  help="Estimate the error of all positions and velocities by a second run at "
                       "tolerances ten times tighter, or half the step."),
+    click.option("--checkpoint", type=Seconds(), metavar="EVERY",
+                 help="Write RESULT.checkpoint so often: 90, 5min, 2h; dap3d resume goes on from "
+                      "it, also where the run was killed."),
     click.option("--strict", is_flag=True,
                  help="Exit with 1 if there are warnings (notes that tell of a change) or the "
                       "ledger does not close; the result is saved all the same."),
@@ -82,6 +84,7 @@ def run(
     *,
     output: str | None,
     estimate_error: bool,
+    checkpoint: float | None,
     strict: bool,
     force: bool,
     allow_code: bool,
@@ -94,8 +97,10 @@ def run(
     MODEL is the name of a shipped model (dap3d models), a folder with a scene.toml, or a TOML file.
     Without it, in a terminal, dap3d asks. What no option says is taken from the scene.
 
-    Ctrl-C ends a run; what was computed until then is saved.
+    Ctrl-C ends a run; what was computed until then is saved, and dap3d resume goes on from there.
     """
+    import math
+
     import dap3d_core as dap
     from dap3d_core.cli.files import writable
     from dap3d_core.cli.outcome import tell
@@ -106,16 +111,29 @@ def run(
         scene = dap.load(model)
     target = writable(_target(model, output), force=force, sources=(scene.path,))
     _check_settings(scene, given)
-    outcome = _simulate(
-        scene,
-        given | {"estimate_error": estimate_error},
-        allow_code=allow_code,
-        quiet=quiet,
-        debug=ctx.meta["dap3d.debug"],
-        stopping=ctx.meta["dap3d.stopping"],
-        target=target,
-        force=force,
-    )
+    found: list[CompiledModel] = []
+
+    def prepare(announce: "Announce") -> "CompiledModel":
+        method = given["method"]
+        found.append(dap.compile(scene, method=method, allow_code=allow_code, announce=announce))
+        return found[0]
+
+    def go(announce: "Announce", watch: "Watch") -> "Result":
+        try:
+            return dap.simulate(
+                found[0],
+                watch=watch,
+                announce=announce,
+                output=target,
+                force=force,
+                estimate_error=estimate_error,
+                checkpoint=math.inf if checkpoint is None else checkpoint,
+                **given,
+            )
+        except dap.SceneError as error:  # settings that only the integrator can judge
+            raise in_options(error, SETTINGS) from error
+
+    outcome = carry_out(ctx, prepare, go, quiet=quiet)
     return tell(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
 
 
@@ -175,70 +193,3 @@ def in_options(error: "SceneError", said: Collection[str]) -> "SceneError":
         else m
         for m in error.mistakes
     )
-
-
-def _simulate(
-    scene: "Scene",
-    given: dict[str, Any],
-    *,
-    allow_code: bool,
-    quiet: bool,
-    debug: bool,
-    stopping: "Stopping",
-    target: Path,
-    force: bool,
-) -> "Outcome":
-    """Compile and simulate into a file; a run that ends early gives what it computed."""
-    import dap3d_core as dap
-    from dap3d_core.cli.outcome import Outcome
-    from dap3d_core.cli.progress import RunProgress
-    from dap3d_core.scene import SceneError
-
-    with RunProgress(quiet=quiet) as progress:
-
-        def watch(standing: "Standing") -> None:
-            progress.advance(standing)
-            stopping.between_chunks()
-
-        try:
-            compiled = dap.compile(
-                scene,
-                method=given["method"],
-                allow_code=allow_code,
-                announce=progress.announce,
-            )
-        except dap.SimulationError as error:  # a method that does not fit the scene
-            raise Refused(str(error)) from error
-        progress.start()
-        try:
-            result = dap.simulate(
-                compiled,
-                watch=watch,
-                announce=progress.announce,
-                output=target,
-                force=force,
-                **given,
-            )
-        except (Exception, KeyboardInterrupt) as error:
-            kept = getattr(error, "result", None)
-            if kept is None or isinstance(error, OSError):
-                if isinstance(error, SceneError):  # settings that only the integrator can judge
-                    raise in_options(error, SETTINGS) from error
-                raise
-            if debug:
-                import traceback
-
-                traceback.print_exception(error)
-            return Outcome(compiled, kept, *_ending(error))
-        return Outcome(compiled, result, exits.DONE, "")
-
-
-def _ending(error: BaseException) -> tuple[int, str]:
-    """Exit code and reason of a run that ended early and left something to keep."""
-    from dap3d_core.simulation import SimulationError
-
-    if isinstance(error, KeyboardInterrupt):
-        return exits.INTERRUPTED, "interrupted"
-    if isinstance(error, (SimulationError, Terminated)):
-        return exits.PARTIAL, str(error)
-    return exits.PARTIAL, f"{type(error).__name__}: {error} (--debug shows where)"

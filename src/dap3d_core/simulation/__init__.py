@@ -6,7 +6,7 @@ from dap3d_core.simulation.errors import AssemblyError, RedundantError, Simulati
 from dap3d_core.simulation.event import Event, Instant
 from dap3d_core.simulation.opening import open_result
 from dap3d_core.simulation.rerunning import Repetition, rerun
-from dap3d_core.simulation.resuming import Resumption, resume
+from dap3d_core.simulation.resuming import Resumption, resume, resumption
 from dap3d_core.simulation.simulate import simulate
 from dap3d_core.simulation.standing import Standing
 
@@ -25,5 +25,6 @@ __all__ = [
     "report_times",
     "rerun",
     "resume",
+    "resumption",
     "simulate",
 ]

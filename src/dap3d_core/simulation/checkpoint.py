@@ -25,6 +25,13 @@ PROGRAM = "dap3d checkpoint"
 #: Added to the name of the result file.
 SUFFIX = ".checkpoint"
 
+#: What stands in a header, besides who wrote it (saving.py).
+KEYS: dict[str, type | tuple[type, ...]] = {
+    "run": str, "output": str, "rows": int, "t": (int, float), "integrations": int, "scene": str,
+    "method": str, "settings": dict, "estimate_error": bool, "notes": list,
+    "wall_time_s": (int, float), "compile_time_s": (int, float), "driver": str, "types": dict,
+}  # fmt: skip
+
 _HEADER = "checkpoint.json"
 _ZIP = b"PK\x03\x04"
 #: A header with the scene's text is larger than a scene may be, but not by much.
@@ -157,4 +164,7 @@ def _header(file: Path, archive: zipfile.ZipFile) -> dict[str, Any]:
             f"cannot resume from {file}: dap3d {made} wrote it in format {header.get('format')}, "
             f"this program reads format {FORMAT}; install that version of dap3d"
         )
+    for key, kind in KEYS.items():
+        if not isinstance(header.get(key), kind):
+            raise ValueError(f"its {key!r} is missing")
     return header

@@ -18,9 +18,7 @@ from dap3d_core.simulation.simulate import simulate
 from dap3d_core.simulation.standing import Standing
 
 #: Settings that a result holds and ``simulate`` takes.
-SETTINGS = (
-    "t_end", "dt", "integrator", "rtol", "atol", "step", "project", "correct", "correct_metric",
-)  # fmt: skip
+SETTINGS = ("t_end", "dt", "rtol", "atol", "step", "project", "correct", "correct_metric")
 
 
 @attrs.frozen(eq=False)
@@ -113,7 +111,7 @@ def _settings(result: Result) -> dict[str, Any]:
             "the run cannot be made again: events of a script ended or changed it, which its "
             "result does not hold; run the script again"
         )
-    return {name: result.settings[name] for name in SETTINGS}
+    return {"integrator": result.integrator} | {n: result.settings[n] for n in SETTINGS}
 
 
 def _compared(first: Result, again: Result) -> tuple[int, dict[str, float]]:

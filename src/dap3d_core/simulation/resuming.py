@@ -12,6 +12,7 @@ from dap3d_core.kernels.cache import driver_digest
 from dap3d_core.result import INFORMATION, Result, ResultError, current_versions
 from dap3d_core.result import open_result as open_file
 from dap3d_core.scene import SceneError, Simulation, load, parse
+from dap3d_core.simulation.asked import check_checkpoint
 from dap3d_core.simulation.checkpoint import (
     Checkpoint,
     CheckpointError,
@@ -60,11 +61,23 @@ def resume(
         PluginError, SceneError: a type is not installed.
         SimulationError, ResultError: as ``simulate``.
     """
+    found = resumption(path, model=model, allow_code=allow_code, announce=announce)
+    return found.go(
+        output, force=force, checkpoint=checkpoint, events=events, progress=progress, watch=watch
+    )
+
+
+def resumption(
+    path: str | os.PathLike[str],
+    *,
+    model: str | os.PathLike[str] | None = None,
+    allow_code: bool = False,
+    announce: Callable[[str], None] | None = None,
+) -> "Resumption":
+    """A checkpoint read, its model compiled; arguments and errors as of ``resume``."""
     place = Path(path)
     found = read_checkpoint(place)
-    return Resumption(place, found, model=model, allow_code=allow_code, announce=announce).go(
-        output, force, checkpoint, events=events, progress=progress, watch=watch
-    )
+    return Resumption(place, found, model=model, allow_code=allow_code, announce=announce)
 
 
 class Resumption:
@@ -97,34 +110,37 @@ class Resumption:
             words = why_unmade(error, allowed=allow_code and model is not None)
             raise CheckpointError(f"cannot resume from {path}: {words}") from error
         self._check_types()
+        # its name alone: what a file says does not point out of its folder
         self.output = path.with_name(Path(header["output"]).name)
 
     def go(
         self,
-        output: str | os.PathLike[str] | None,
-        force: bool,
-        checkpoint: float,
+        output: str | os.PathLike[str] | None = None,
         *,
-        events: Sequence[Event],
-        progress: Progress | None,
-        watch: Callable[[Standing], None] | None,
+        force: bool = False,
+        checkpoint: float = math.inf,
+        events: Sequence[Event] = (),
+        progress: Progress | None = None,
+        watch: Callable[[Standing], None] | None = None,
     ) -> Result:
         """Go on to the end; arguments and errors as of ``resume``."""
         header = self._found.header
+        check_checkpoint(checkpoint, self.output)
         before, earlier = self._rows_so_far()
         settings = Simulation(**header["settings"] | {"hold": tuple(header["settings"]["hold"])})
         run = Run(self.compiled, settings, self._announce, events, watch)
+        run.estimate_error = bool(header["estimate_error"])
         run.prepare()
         self._restore(run)
         target = self.output if output is None else Path(output)
         ours = target.exists() and before.exists() and target.samefile(before)
         run.keep(target, force=force or ours, identity=header["run"])
         assert run.keeper is not None
-        run.saver = Saver(run, checkpoint, header["estimate_error"], force or self._is_ours(target))
+        run.saver = Saver(run, checkpoint, force=force or self._is_ours(target))
         for block in earlier:
             run.keeper.add(block, lambda: run.record("done"))
         try:
-            result = run.finish(progress, header["estimate_error"])
+            result = run.finish(progress)
         except BaseException as error:
             if hasattr(error, "checkpoint"):  # what stands there takes the place of this one
                 self._remove_files(target, but=error.checkpoint)

@@ -12,7 +12,7 @@ from dap3d_core.formulations.friction import PASSES
 from dap3d_core.integrators import METHODS, Integration, Status, make_adams
 from dap3d_core.integrators.integration import Statistics as Counts
 from dap3d_core.kernels.cache import driver_is_cached
-from dap3d_core.result import Occurrence, Record, Result, Statistics
+from dap3d_core.result import Occurrence, Record, Result, ResultError, Statistics
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.asked import refuse_adams, report_times
 from dap3d_core.simulation.compiled import CompiledModel
@@ -55,7 +55,10 @@ class Run:
         announce: Callable[[str], None] | None,
         events: Sequence[Event] = (),
         watch: Callable[[Standing], None] | None = None,
+        *,
+        estimate_error: bool = False,
     ) -> None:
+        self.estimate_error = estimate_error
         self.announce = announce
         self.compiled = compiled
         self.machine = compiled.machine
@@ -82,14 +85,13 @@ class Run:
         output: str | os.PathLike[str] | None,
         *,
         force: bool,
-        estimate_error: bool = False,
         checkpoint: float | None = None,
     ) -> Result:
         """Run from the start to the end; arguments and errors as of ``simulate``."""
         self.prepare()
         self.keep(output, force=force)
-        self.saver = Saver(self, checkpoint, estimate_error, force) if checkpoint else None
-        return self.finish(progress, estimate_error)
+        self.saver = Saver(self, checkpoint, force=force) if checkpoint else None
+        return self.finish(progress)
 
     def prepare(self) -> None:
         """Stand at the start: corrected, compiled, nothing integrated."""
@@ -110,7 +112,7 @@ class Run:
         most = len(self.times) + 1  # an event may end a run between two of them
         self.keeper = Keeper(self.machine, output, most, force=force, run=identity)
 
-    def finish(self, progress: Progress | None, estimate_error: bool) -> Result:
+    def finish(self, progress: Progress | None) -> Result:
         """Integrate to the end from where the run stands."""
         keeper = self.keeper
         assert keeper is not None
@@ -120,7 +122,7 @@ class Run:
                 self.begin_implicit()
                 self._advance(progress)
         except BaseException as error:
-            if isinstance(error, OSError):  # the disk: what is there stays as it is
+            if isinstance(error, ResultError):  # the disk: what is there stays as it is
                 raise
             self._take_rows()
             status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
@@ -138,7 +140,7 @@ class Run:
         assert result is not None
         if self.saver is not None:
             self.saver.remove()
-        if estimate_error:
+        if self.estimate_error:
             add_error(result, self.settings, self._again(progress), keeper.output)
         return result
 

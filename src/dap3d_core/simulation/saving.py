@@ -36,11 +36,10 @@ class Saver:
         path: where they stand.
     """
 
-    def __init__(self, run: "Run", seconds: float, estimate_error: bool, force: bool) -> None:
+    def __init__(self, run: "Run", seconds: float, *, force: bool) -> None:
         """Args:
             run: whose; its keeper has an output.
             seconds: from one checkpoint to the next.
-            estimate_error: whether an estimate of the error follows the run.
             force: whether a checkpoint of another run is given up.
 
         Raises:
@@ -55,7 +54,7 @@ class Saver:
                 f"{self.path} exists: a run that was ended goes on from it (dap3d resume); force "
                 "gives it up"
             )
-        self._run, self._seconds, self._estimate_error = run, seconds, estimate_error
+        self._run, self._seconds = run, seconds
         self._next = time.perf_counter() + seconds
 
     def look(self) -> None:
@@ -81,14 +80,14 @@ class Saver:
 
     def write(self) -> None:
         """Write a checkpoint of the run as it stands, once its rows are in a file."""
-        write_checkpoint(self.path, checkpoint_of(self._run, self._estimate_error))
+        write_checkpoint(self.path, checkpoint_of(self._run))
 
     def remove(self) -> None:
         """The run has ended by itself: nothing goes on from here."""
         self.path.unlink(missing_ok=True)
 
 
-def checkpoint_of(run: "Run", estimate_error: bool) -> Checkpoint:
+def checkpoint_of(run: "Run") -> Checkpoint:
     """A run as it stands between two chunks, its rows taken."""
     keeper, compiled = run.keeper, run.compiled
     assert keeper is not None
@@ -103,7 +102,7 @@ def checkpoint_of(run: "Run", estimate_error: bool) -> Checkpoint:
         "scene": compiled.scene_text,
         "method": compiled.asked,
         "settings": attrs.asdict(run.settings),
-        "estimate_error": estimate_error,
+        "estimate_error": run.estimate_error,
         "notes": run.notes,
         "wall_time_s": time.perf_counter() - run.started,
         "compile_time_s": run.compile_time,

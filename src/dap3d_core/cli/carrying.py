@@ -1,0 +1,96 @@
+"""Carrying out a run for a command: progress, signals, and what is kept when it ends early."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dap3d_core.cli import exits
+from dap3d_core.cli.exits import Refused, Terminated
+
+if TYPE_CHECKING:
+    from dap3d_core.cli.outcome import Outcome
+    from dap3d_core.result import Result
+    from dap3d_core.simulation import CompiledModel, Standing
+
+    Announce = Callable[[str], None]
+    Watch = Callable[[Standing], None]
+
+
+def carry_out(
+    ctx: click.Context,
+    prepare: "Callable[[Announce], CompiledModel]",
+    go: "Callable[[Announce, Watch], Result]",
+    *,
+    quiet: bool,
+) -> "Outcome":
+    """Compile a model and run it; a run that ends early gives what it computed.
+
+    Args:
+        ctx: of the command.
+        prepare: compiles the model.
+        go: runs it.
+        quiet: whether no progress is shown.
+    """
+    import dap3d_core as dap
+    from dap3d_core.cli.outcome import Outcome
+    from dap3d_core.cli.progress import RunProgress
+
+    stopping = ctx.meta["dap3d.stopping"]
+    with RunProgress(quiet=quiet) as progress:
+
+        def watch(standing: "Standing") -> None:
+            progress.advance(standing)
+            stopping.between_chunks()
+
+        try:
+            compiled = prepare(progress.announce)
+        except dap.SimulationError as error:  # a method that does not fit the scene
+            raise Refused(str(error)) from error
+        progress.start()
+        try:
+            result = go(progress.announce, watch)
+        except (Exception, KeyboardInterrupt) as error:
+            kept = getattr(error, "result", None)
+            if kept is None:
+                raise
+            if ctx.meta["dap3d.debug"]:
+                import traceback
+
+                traceback.print_exception(error)
+            code, reason = _ending(error)
+            return Outcome(compiled, kept, code, reason, getattr(error, "checkpoint", None))
+        return Outcome(compiled, result, exits.DONE, "", None)
+
+
+def _ending(error: BaseException) -> tuple[int, str]:
+    """Exit code and reason of a run that ended early and left something to keep."""
+    from dap3d_core.simulation import SimulationError
+
+    if isinstance(error, KeyboardInterrupt):
+        return exits.INTERRUPTED, "interrupted"
+    if isinstance(error, (SimulationError, Terminated)):
+        return exits.PARTIAL, str(error)
+    return exits.PARTIAL, f"{type(error).__name__}: {error} (--debug shows where)"
+
+
+class Seconds(click.ParamType):  # type: ignore[type-arg]
+    """A time as people write it: 90, 90s, 5min, 2h; in s."""
+
+    name = "time"
+    _UNITS = (("min", 60.0), ("s", 1.0), ("h", 3600.0), ("", 1.0))
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The number of seconds."""
+        import math
+
+        if isinstance(value, float):
+            return value
+        unit, factor = next((u, f) for u, f in self._UNITS if value.endswith(u))
+        try:
+            found = float(value.removesuffix(unit)) * factor
+        except ValueError:
+            found = math.nan
+        if not 0.0 < found < math.inf:
+            self.fail(f"{value!r} is no time; write 90, 90s, 5min or 2h", param, ctx)
+        return found
