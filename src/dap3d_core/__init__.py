@@ -24,12 +24,12 @@ if TYPE_CHECKING:
         Event,
         RedundantError,
         SimulationError,
-        rerun,
-        resume,
         simulate,
     )
     from dap3d_core.simulation import compile_scene as compile
     from dap3d_core.simulation import open_result as open
+    from dap3d_core.simulation.rerunning import rerun
+    from dap3d_core.simulation.resuming import resume
     from dap3d_core.view import view
 
 _HOMES = {
@@ -50,8 +50,8 @@ _HOMES = {
     "plot": ("plot", "plot"),
     "report": ("report", "report"),
     "shipped_models": ("scene", "shipped_models"),
-    "rerun": ("simulation", "rerun"),
-    "resume": ("simulation", "resume"),
+    "rerun": ("simulation.rerunning", "rerun"),
+    "resume": ("simulation.resuming", "resume"),
     "simulate": ("simulation", "simulate"),
     "view": ("view", "view"),
 }

@@ -12,7 +12,7 @@ import dap3d_core as dap
 from dap3d_core.result import INFORMATION, estimated_error
 
 #: The module; the package has a function of its name.
-LOOP = importlib.import_module("dap3d_core.simulation.simulate")
+LOOP = importlib.import_module("dap3d_core.simulation.run")
 SHORT = dict(t_end=0.2, dt=0.05, rtol=1e-5, atol=1e-7)
 
 
@@ -133,7 +133,7 @@ def test_the_tightest_tolerance_has_no_estimate_and_says_so():
 
 def broken(monkeypatch, error):
     """Lets every second run fail."""
-    original, begun = LOOP._Run.go, []
+    original, begun = LOOP.Run.go, []
 
     def go(self, *arguments, **options):
         begun.append(self)
@@ -141,7 +141,7 @@ def broken(monkeypatch, error):
             raise error
         return original(self, *arguments, **options)
 
-    monkeypatch.setattr(LOOP._Run, "go", go)
+    monkeypatch.setattr(LOOP.Run, "go", go)
 
 
 def test_a_second_run_that_fails_leaves_the_first_with_the_reason(monkeypatch, tmp_path):

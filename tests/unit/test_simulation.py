@@ -15,7 +15,7 @@ from dap3d_core.simulation import report_times
 
 ZERO = (0.0, 0.0, 0.0)
 #: The module; its name in its package is taken by its function.
-MODULE = import_module("dap3d_core.simulation.simulate")
+MODULE = import_module("dap3d_core.simulation.run")
 
 
 def mass_point(**fields):

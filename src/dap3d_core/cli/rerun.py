@@ -9,7 +9,8 @@ from dap3d_core.cli.exits import Refused
 from dap3d_core.cli.group import Command
 
 if TYPE_CHECKING:
-    from dap3d_core.simulation import Repetition, Standing
+    from dap3d_core.simulation import Standing
+    from dap3d_core.simulation.rerunning import Repetition
 
 
 @click.command(cls=Command, short_help="Make a run again from its result, and compare.")

@@ -12,7 +12,8 @@ from dap3d_core.cli.group import Command
 if TYPE_CHECKING:
     from dap3d_core.cli.carrying import Announce, Watch
     from dap3d_core.result import Result
-    from dap3d_core.simulation import CompiledModel, Resumption
+    from dap3d_core.simulation import CompiledModel
+    from dap3d_core.simulation.resuming import Resumption
 
 
 @click.command(cls=Command, short_help="Go on with a run that was ended.")
@@ -54,7 +55,7 @@ def resume(
     from dap3d_core.cli.files import writable
     from dap3d_core.cli.outcome import tell
     from dap3d_core.result import ResultError
-    from dap3d_core.simulation import resumption
+    from dap3d_core.simulation.resuming import resumption
 
     found: list[Resumption] = []
 

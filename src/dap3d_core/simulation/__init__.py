@@ -5,8 +5,6 @@ from dap3d_core.simulation.compiled import CompiledModel, compile_scene
 from dap3d_core.simulation.errors import AssemblyError, RedundantError, SimulationError
 from dap3d_core.simulation.event import Event, Instant
 from dap3d_core.simulation.opening import open_result
-from dap3d_core.simulation.rerunning import Repetition, rerun
-from dap3d_core.simulation.resuming import Resumption, resume, resumption
 from dap3d_core.simulation.simulate import simulate
 from dap3d_core.simulation.standing import Standing
 
@@ -16,15 +14,10 @@ __all__ = [
     "Event",
     "Instant",
     "RedundantError",
-    "Repetition",
-    "Resumption",
     "SimulationError",
     "Standing",
     "compile_scene",
     "open_result",
     "report_times",
-    "rerun",
-    "resume",
-    "resumption",
     "simulate",
 ]

@@ -3,7 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,16 +29,20 @@ from dap3d_core.simulation.implicit import (
 from dap3d_core.simulation.initial import correction_notes, violation
 from dap3d_core.simulation.keeping import Keeper
 from dap3d_core.simulation.redundancy import Redundancy
-from dap3d_core.simulation.saving import Saver
 from dap3d_core.simulation.second_run import Again, add_error
 from dap3d_core.simulation.standing import Observer, Standing
 from dap3d_core.simulation.watcher import Watcher
+
+if TYPE_CHECKING:
+    from dap3d_core.simulation.saving import Saver
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
 
 #: Seconds that a compiled chunk should take: Ctrl-C and the progress bar wait for its end.
 CHUNK_SECONDS = 0.1
+#: Right-hand sides of the first chunk, before it is known how long they take.
+FIRST_CHUNK = 100
 #: Numbers that wait in the row buffer at most.
 BUFFER_NUMBERS = 4_000_000
 #: A start this far off the constraints, left uncorrected, gets a note.
@@ -90,7 +94,10 @@ class Run:
         """Run from the start to the end; arguments and errors as of ``simulate``."""
         self.prepare()
         self.keep(output, force=force)
-        self.saver = Saver(self, checkpoint, force=force) if checkpoint else None
+        if checkpoint is not None:
+            from dap3d_core.simulation.saving import Saver
+
+            self.saver = Saver(self, checkpoint, force=force)
         return self.finish(progress)
 
     def prepare(self) -> None:
@@ -244,7 +251,7 @@ class Run:
     def _advance(self, progress: Progress | None) -> None:
         """Advance in chunks whose length in right-hand sides follows the clock."""
         integration = self.runs[-1]
-        budget, t_end = 100, float(self.times[-1])
+        budget, t_end = FIRST_CHUNK, float(self.times[-1])
         while integration.status is Status.RUNNING:
             before, clock = integration.statistics.rhs, time.perf_counter()
             self.is_whole = False
@@ -283,15 +290,19 @@ class Run:
         """The result of what was computed, whole on disk if asked for; None where nothing was."""
         if self.keeper is None or not self.keeper.count:
             return None
+        return self.keeper.result(self.record(status, self._closing_notes()))
+
+    def _closing_notes(self) -> list[str]:
+        """What is only told of a run that has come to an end."""
+        notes = []
         if count := self.machine.unsettled:
-            self.notes.append(
+            notes.append(
                 f"friction: the multipliers did not settle in {PASSES} passes, {count} times of "
                 f"{self._statistics().rhs} or more; the last ones were used. Motion there is "
                 "uncertain: a high mu may lock the joint by itself"
             )
-        self.notes += event_notes(self.runs, self._events())
-        self.notes += stiffness_notes(self.runs, self.settings.integrator)
-        return self.keeper.result(self.record(status))
+        notes += event_notes(self.runs, self._events())
+        return notes + stiffness_notes(self.runs, self.settings.integrator)
 
     def _events(self) -> list[Occurrence]:
         found = self.watcher.occurrences if self.watcher else []
@@ -301,7 +312,7 @@ class Run:
         """What all integrations have done together."""
         return Counts(*(sum(n) for n in zip(*(run.statistics for run in self.runs), strict=True)))
 
-    def record(self, status: str) -> Record:
+    def record(self, status: str, more_notes: Sequence[str] = ()) -> Record:
         """What there is to say of the run so far."""
         counts, events = self._statistics(), self._events()
         changes = any(event.changes for event in events)
@@ -318,7 +329,7 @@ class Run:
             status=status,
             method=self.compiled.method,
             integrator=self.settings.integrator,
-            notes=self.notes,
+            notes=[*self.notes, *more_notes],
             events=events,
             settings={
                 "t_end": float(self.times[-1]),

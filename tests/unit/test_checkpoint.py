@@ -1,0 +1,387 @@
+"""Runs that go on from a checkpoint are those that were not ended, bit for bit."""
+
+import math
+import shutil
+import zipfile
+from importlib import import_module
+
+import numpy as np
+import pytest
+from support import mechanisms, problems
+from unit.test_result_files import same_bits
+
+import dap3d_core as dap
+from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.scene import SceneError
+from dap3d_core.simulation.checkpoint import (
+    Checkpoint,
+    CheckpointError,
+    path_of,
+    read_checkpoint,
+    write_checkpoint,
+)
+
+RUN = import_module("dap3d_core.simulation.run")
+
+
+class EndedError(Exception):
+    """What ends a run here."""
+
+
+def wheel():
+    """A wheel on a torsion spring that turns more than once; its axle rubs."""
+    scene = dap.Scene(name="wheel")
+    scene.add_body("wheel", mass=2.0, Jp=(1.0, 1.0, 1.5), w=(0.0, 0.0, 9.0))
+    scene.add_joint("rev", "axle", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
+    scene.add_force("rot_sda", "spring", v_i="wheel.x", v_j="ground.x", axis="ground.z", k=2.0)
+    scene.add_force("f", "push", body_i="wheel", f=(1.0, 0.5, 0.0))
+    scene.add_force("friction", "rubbing", joint="axle", mu=0.2, radius=0.1, v_tol=0.01)
+    return scene
+
+
+def stone():
+    """A stone in flight, whose spring an event makes stiff."""
+    scene = dap.Scene(name="stone")
+    scene.add_body("stone", mass=1.0, Jp=(1.0, 1.0, 1.0), r=(0.0, 0.0, 2.0), r_dot=(1.0, 0.0, 0.0))
+    scene.add_force("weight", "gravity")
+    scene.add_force("ptp", "spring", P_i="stone.O", P_j="ground.O", k=0.0, l0=1.0)
+    return scene
+
+
+def stiffer():
+    """New events each time: an event may keep what it has seen."""
+    return [
+        dap.Event("stone.r.z", below=1.5, action=lambda here: here.set("spring", k=50.0)),
+        dap.Event("stone.r.x", above=0.45),
+        dap.Event("stone.r.x", above=0.6, action="stop"),
+    ]
+
+
+#: Scene, settings, and where it may be ended, s.
+CASES = {
+    "dop853": (problems.pendulum, {}, 0.5),
+    "dopri5": (problems.four_bar, {"integrator": "dopri5"}, 0.2),
+    "adams": (problems.four_bar, {"integrator": "adams"}, 0.2),
+    "rk4": (problems.pendulum, {"integrator": "rk4", "step": 0.004}, 0.3),
+    "radau": (problems.pendulum, {"integrator": "radau"}, 0.3),
+    "fixed steps": (problems.pendulum, {"step": 0.01}, 0.3),
+    "no projection": (problems.four_bar, {"project": False, "t_end": 0.6}, 0.2),
+    "penalty": (problems.four_bar, {"method": "penalty", "t_end": 0.5}, 0.1),
+    "lsq": (mechanisms.door, {}, 0.3),
+    "a singular pose": (lambda: dap.load("A02-1"), {"t_end": 1.0, "dt": 0.1}, 0.5),
+    "turns and friction": (wheel, {"t_end": 1.5, "dt": 0.05}, 0.7),
+    "stiff": (lambda: dap.load("A05"), {"integrator": "auto", "t_end": 0.3, "dt": 0.01}, 0.02),
+    "events": (stone, {"t_end": 2.0, "dt": 0.05, "events": stiffer}, 0.35),
+}
+SLOW_IN_PYTHON = ("radau", "stiff", "penalty", "lsq", "a singular pose", "adams", "no projection")
+
+
+def settings_of(settings):
+    """Settings of a run, its events made anew."""
+    given = {"t_end": 2.0, "dt": 0.1} | settings
+    return given | ({"events": given["events"]()} if "events" in given else {})
+
+
+def ended_at(t):
+    """Watches a run and ends it at t."""
+
+    def watch(standing):
+        if standing.t >= t:
+            raise EndedError
+
+    return watch
+
+
+def leave(scene, folder, t, **settings):
+    """End a run at t; its checkpoint."""
+    with pytest.raises(EndedError) as caught:
+        dap.simulate(
+            scene, output=folder / "run.nc", watch=ended_at(t), checkpoint=math.inf, **settings
+        )
+    assert caught.value.checkpoint == folder / "run.nc.checkpoint"
+    assert 0.0 < caught.value.result.t[-1] <= settings["t_end"]
+    return caught.value.checkpoint
+
+
+@pytest.fixture(autouse=True)
+def short_chunks(monkeypatch):
+    """As many chunks as there are steps."""
+    monkeypatch.setattr(RUN, "CHUNK_SECONDS", 1e-9)
+    monkeypatch.setattr(RUN, "FIRST_CHUNK", 1)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_resumed_run_is_that_of_one_that_was_not_ended(case, tmp_path):
+    """Ended twice, and twice gone on with: arrays, counts and events are the same."""
+    if case in SLOW_IN_PYTHON and not jit_is_on():
+        pytest.skip("takes long in plain Python")
+    make, settings, t = CASES[case]
+    whole = dap.simulate(make(), **settings_of(settings))
+    checkpoint = leave(make(), tmp_path, t, **settings_of(settings))
+    events = {"events": settings["events"]()} if "events" in settings else {}
+    with pytest.raises(EndedError):
+        dap.resume(checkpoint, watch=ended_at(t), **events)
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["run.nc", "run.nc.checkpoint"]
+    events = {"events": settings["events"]()} if "events" in settings else {}
+    found = dap.resume(checkpoint, **events)
+    assert [f.name for f in tmp_path.iterdir()] == ["run.nc"]
+    assert same_bits(found, whole)
+    assert same_bits(dap.open(tmp_path / "run.nc"), whole)
+    assert found.events == whole.events
+    assert found.status == whole.status
+    counts = ("steps", "rejected", "rhs", "projections")
+    assert [getattr(found.stats, n) for n in counts] == [getattr(whole.stats, n) for n in counts]
+    resumed = [note for note in found.notes if "resumed from a checkpoint" in note]
+    assert len(resumed) == 2
+    assert [n for n in found.notes if n not in resumed] == list(whole.notes)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not jit_is_on(), reason="a large scene takes long in plain Python")
+def test_a_large_scene_in_two_halves_is_resumed(tmp_path):
+    settings = {"t_end": 0.05, "dt": 0.01}
+    whole = dap.simulate(problems.chain(600), **settings)
+    found = dap.resume(leave(problems.chain(600), tmp_path, 0.02, **settings))
+    assert same_bits(found, whole)
+
+
+def test_the_model_s_own_types_are_resumed_where_they_are_allowed(tmp_path):
+    """And refused where they are not, or where they have changed."""
+    folder = shutil.copytree(dap.shipped_models()["ball1"], tmp_path / "ball1")
+    settings = {"t_end": 0.8, "dt": 0.02, "allow_code": True}
+    whole = dap.simulate(folder, **settings)
+    checkpoint = leave(folder, tmp_path, 0.3, **settings)
+    with pytest.raises(CheckpointError, match=r"ball-contact.*--model FOLDER --allow-code"):
+        dap.resume(checkpoint)
+    text = (folder / "plugin.py").read_text()
+    (folder / "plugin.py").write_text(f"{text}\n# another formula\n")
+    with pytest.raises(CheckpointError, match=r"formulas of force ball-contact have changed"):
+        dap.resume(checkpoint, model=folder, allow_code=True)
+    (folder / "plugin.py").write_text(text)
+    assert same_bits(dap.resume(checkpoint, model=folder, allow_code=True), whole)
+
+
+# ------------------------------------------------------------------ when they are written
+
+SHORT = {"t_end": 0.6, "dt": 0.02}
+
+
+def test_checkpoints_are_written_now_and_then(tmp_path, monkeypatch):
+    """Each is whole, and its rows stand in the part beside it."""
+    seen = []
+    output = tmp_path / "run.nc"
+
+    def watch(standing):
+        found = read_checkpoint(path_of(output))
+        part = dap.open(tmp_path / "run.nc.part")
+        seen.append((found.header["t"], found.header["rows"], len(part.t)))
+        assert found.header["t"] == standing.t
+        assert not output.exists()
+
+    whole = dap.simulate(problems.pendulum(), **SHORT)
+    found = dap.simulate(problems.pendulum(), output=output, checkpoint=1e-9, watch=watch, **SHORT)
+    assert same_bits(found, whole)
+    assert [f.name for f in tmp_path.iterdir()] == ["run.nc"]
+    assert len(seen) > 5
+    assert all(rows == there for _, rows, there in seen)
+
+
+def test_a_checkpoint_older_than_its_rows_is_resumed(tmp_path):
+    """As after SIGKILL between two checkpoints: rows behind it are made again."""
+    kept = tmp_path / "kept"
+    kept.mkdir()
+
+    def watch(standing):
+        for name, t in (("run.nc.checkpoint", 0.2), ("run.nc.part", 0.4)):
+            if standing.t > t and not (kept / name).exists():
+                shutil.copy(tmp_path / name, kept / name)
+
+    whole = dap.simulate(
+        problems.pendulum(), output=tmp_path / "run.nc", checkpoint=1e-9, watch=watch, **SHORT
+    )
+    assert len(dap.open(kept / "run.nc.part").t) > read_checkpoint(
+        kept / "run.nc.checkpoint"
+    ).header["rows"]  # fmt: skip
+    assert same_bits(dap.resume(kept / "run.nc.checkpoint"), whole)
+    assert [f.name for f in kept.iterdir()] == ["run.nc"]
+
+
+def test_a_callback_that_fails_keeps_all_even_with_an_error_of_the_system(tmp_path):
+    def broken(standing):
+        raise ConnectionError("no one listens")
+
+    with pytest.raises(ConnectionError) as caught:
+        dap.simulate(problems.pendulum(), output=tmp_path / "run.nc", watch=broken,
+                     checkpoint=math.inf, **SHORT)  # fmt: skip
+    assert same_bits(dap.open(tmp_path / "run.nc"), caught.value.result)
+    whole = dap.simulate(problems.pendulum(), **SHORT)
+    assert same_bits(dap.resume(caught.value.checkpoint), whole)
+
+
+def test_without_asking_there_is_none(tmp_path):
+    with pytest.raises(EndedError):
+        dap.simulate(problems.pendulum(), output=tmp_path / "run.nc", watch=ended_at(0.1), **SHORT)
+    assert [f.name for f in tmp_path.iterdir()] == ["run.nc"]
+
+
+def test_a_checkpoint_of_another_run_is_not_overwritten(tmp_path):
+    checkpoint = leave(problems.pendulum(), tmp_path, 0.3, **SHORT)
+    (tmp_path / "run.nc").unlink()
+    before = checkpoint.read_bytes()
+    with pytest.raises(OSError, match=r"exists: .*dap3d resume"):
+        dap.simulate(problems.pendulum(), output=tmp_path / "run.nc", checkpoint=9.0, **SHORT)
+    assert checkpoint.read_bytes() == before
+    dap.simulate(
+        problems.pendulum(), output=tmp_path / "run.nc", checkpoint=9.0, force=True, **SHORT
+    )
+    assert not checkpoint.exists()
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"checkpoint": 0.0, "output": "run.nc"}, "positive number of seconds"),
+        ({"checkpoint": math.nan, "output": "run.nc"}, "positive number of seconds"),
+        ({"checkpoint": "often", "output": "run.nc"}, "positive number of seconds"),
+        ({"checkpoint": 1.0}, "give output"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(settings, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SceneError, match=words):
+        dap.simulate(problems.pendulum(), **SHORT, **settings)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_estimate_of_the_error_follows_the_resumed_run(tmp_path):
+    whole = dap.simulate(problems.pendulum(), estimate_error=True, **SHORT)
+    found = dap.resume(leave(problems.pendulum(), tmp_path, 0.3, estimate_error=True, **SHORT))
+    assert found.error.u.tobytes() == whole.error.u.tobytes()
+
+
+# ------------------------------------------------------------------ what cannot be resumed
+
+
+@pytest.fixture(scope="module")
+def left(tmp_path_factory):
+    """A folder with a run that was ended."""
+    folder = tmp_path_factory.mktemp("left")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(RUN, "CHUNK_SECONDS", 1e-9)
+        patch.setattr(RUN, "FIRST_CHUNK", 1)
+        leave(problems.pendulum(), folder, 0.3, **SHORT)
+    return folder
+
+
+@pytest.fixture
+def copied(left, tmp_path):
+    """A copy of it; its checkpoint."""
+    return shutil.copytree(left, tmp_path / "copied") / "run.nc.checkpoint"
+
+
+def refused(path, words, **settings):
+    with pytest.raises(CheckpointError, match=words) as caught:
+        dap.resume(path, **settings)
+    assert str(path) in str(caught.value)
+
+
+def test_what_is_no_checkpoint_is_refused(copied, tmp_path):
+    refused(tmp_path / "none.checkpoint", "there is no such file")
+    refused(tmp_path, "it is a folder")
+    (tmp_path / "empty").touch()
+    refused(tmp_path / "empty", "the file is empty")
+    (tmp_path / "text").write_text("t, x\n")
+    refused(tmp_path / "text", "it is no checkpoint of dap3d")
+    with zipfile.ZipFile(tmp_path / "other.zip", "w") as archive:
+        archive.writestr("a.txt", "words")
+    refused(tmp_path / "other.zip", "it is no checkpoint of dap3d")
+    refused(copied.with_name("run.nc"), r"it is a result; .* is run\.nc\.checkpoint")
+
+
+def test_a_checkpoint_that_was_cut_off_is_refused(copied):
+    """At any place."""
+    whole = copied.read_bytes()
+    for count in np.linspace(4, len(whole) - 1, 60).astype(int):
+        copied.write_bytes(whole[:count])
+        refused(copied, "it is cut off or damaged")
+
+
+def test_a_damaged_checkpoint_is_refused_or_does_no_harm(copied, left):
+    """One byte after another: what is not noticed is none that the run goes on from."""
+    whole = np.frombuffer(copied.read_bytes(), dtype=np.uint8)
+    rng = np.random.default_rng(7)
+    first = read_checkpoint(copied)
+    noticed = 0
+    for _ in range(300):
+        damaged = whole.copy()
+        damaged[rng.integers(4, len(whole))] ^= 1 << rng.integers(8)
+        copied.write_bytes(damaged.tobytes())
+        try:
+            found = read_checkpoint(copied)
+        except CheckpointError:
+            noticed += 1
+            continue
+        assert found.header == first.header
+        for name, array in found.arrays.items():
+            assert array.tobytes() == first.arrays[name].tobytes()
+    assert noticed > 200
+
+
+def rewritten(path, **changes):
+    """Write a checkpoint again with something changed in its header."""
+    found = read_checkpoint(path)
+    write_checkpoint(path, Checkpoint({**found.header, **changes}, found.arrays))
+
+
+def test_a_newer_checkpoint_is_refused(copied):
+    rewritten(copied, format=2, versions={"dap3d": "9.0"})
+    refused(copied, r"dap3d 9\.0 wrote it in format 2, this program reads format 1; install")
+
+
+def test_other_versions_are_noted(copied):
+    versions = read_checkpoint(copied).header["versions"]
+    rewritten(copied, versions=versions | {"numba": "0.1"})
+    found = dap.resume(copied)
+    assert found.notes[-1].startswith("the checkpoint was made with numba 0.1")
+    assert "digits may differ" in found.notes[-1]
+
+
+def test_rows_that_are_gone_are_told(copied, tmp_path):
+    whole = copied.with_name("run.nc").read_bytes()
+    copied.with_name("run.nc").unlink()
+    refused(copied, "the rows of its run are gone")
+    dap.simulate(problems.pendulum(), output=copied.with_name("run.nc"), **SHORT)  # another run
+    refused(copied, "the rows of its run are gone")
+    copied.with_name("run.nc").write_bytes(whole)
+    rewritten(copied, output="../../copied/run.nc")  # names no file of another folder
+    assert dap.resume(copied).status == "done"
+
+
+def test_a_type_that_is_not_installed_is_told(copied):
+    scene = read_checkpoint(copied).header["scene"]
+    rewritten(copied, scene=scene.replace('"sph-sph"', '"link"'))
+    refused(copied, "there is no joint type 'link'.*install what brings the type")
+
+
+def test_another_model_is_refused(copied):
+    found = read_checkpoint(copied)
+    arrays = {n: a for n, a in found.arrays.items() if n != "system.body"}
+    write_checkpoint(copied, Checkpoint(found.header, arrays))
+    refused(copied, "its scene gives another model here")
+
+
+def test_events_must_be_given_again(tmp_path):
+    settings = settings_of(CASES["events"][1])
+    checkpoint = leave(stone(), tmp_path, 0.35, **settings)
+    refused(checkpoint, r"the run has the events .*given are none; give the same again")
+    refused(checkpoint, "give the same again", events=stiffer()[:1])
+
+
+def test_another_output_leaves_what_there_is(copied):
+    """With -o the run's own result stays; the checkpoint has done its work."""
+    other = copied.with_name("other.nc")
+    whole = dap.simulate(problems.pendulum(), **SHORT)
+    other.write_text("precious")
+    with pytest.raises(OSError, match="the file exists"):
+        dap.resume(copied, output=other)
+    assert same_bits(dap.resume(copied, output=other, force=True), whole)
