@@ -1,0 +1,118 @@
+"""Runs made again from their results: equal bit for bit, or with what differs."""
+
+from importlib import import_module
+
+import attrs
+import numpy as np
+import pytest
+from support import problems
+from support.process import start
+
+import dap3d_core as dap
+from dap3d_core.result import ResultError
+
+RUN = import_module("dap3d_core.simulation.run")
+SHORT = {"t_end": 0.6, "dt": 0.02}
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"method": "lsq", "rtol": 1e-6},
+        {"integrator": "rk4", "step": 0.01, "project": False},
+        {"integrator": "adams", "correct_metric": "mass"},
+        {"correct": False, "t_end": 0.1, "dt": None},
+    ],
+)
+def test_a_run_made_again_is_equal(settings, tmp_path):
+    """From its file, which is all that is needed; settings of the run, not of the scene."""
+    dap.simulate(problems.four_bar(), output=tmp_path / "run.nc", **SHORT | settings)
+    found = dap.rerun(tmp_path / "run.nc")
+    assert found.equal
+    assert found.differences == {}
+    assert found.versions == {}
+    assert found.instants == len(dap.open(tmp_path / "run.nc").t)
+    assert [f.name for f in tmp_path.iterdir()] == ["run.nc"]
+
+
+def test_a_bit_that_differs_is_found():
+    first = dap.simulate(problems.pendulum(), **SHORT)
+    u = first.u.copy()
+    u[7, 1] = np.nextafter(u[7, 1], 1.0)
+    first.arrays = attrs.evolve(first.arrays, u=u)
+    found = dap.rerun(first)
+    assert not found.equal
+    assert found.differences == {"u": pytest.approx(np.spacing(u[7, 1]), rel=1.0)}
+
+
+def test_of_a_run_that_was_ended_the_part_that_is_there_is_compared(monkeypatch):
+    monkeypatch.setattr(RUN, "CHUNK_SECONDS", 1e-9)
+    monkeypatch.setattr(RUN, "FIRST_CHUNK", 1)
+
+    def watch(standing):
+        if standing.t > 0.3:
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError) as caught:
+        dap.simulate(problems.pendulum(), watch=watch, **SHORT)
+    found = dap.rerun(caught.value.result)
+    assert found.equal
+    assert found.instants == len(caught.value.result.t) < 31
+    assert len(found.again.t) < 31  # it does not go on to the end
+
+
+def test_a_run_that_failed_fails_again_at_the_same_place():
+    scene = dap.Scene(name="falling")
+    scene.add_body("a", mass=1.0, Jp=(1.0, 1.0, 1.0), r=(1.0, 0.0, 0.0))
+    scene.add_force("ptp", "spring", P_i="a.O", P_j="ground.O", k=-1e99, l0=0.5)
+    with pytest.raises(dap.SimulationError) as caught:
+        dap.simulate(scene, **SHORT)
+    assert dap.rerun(caught.value.result).equal
+
+
+def test_what_cannot_be_made_again_is_refused():
+    stopped = dap.simulate(
+        problems.pendulum(), events=[dap.Event("bob.r.x", above=-0.9, action="stop")], **SHORT
+    )
+    with pytest.raises(ResultError, match="events of a script"):
+        dap.rerun(stopped)
+    first = dap.simulate(problems.pendulum(), **SHORT)
+    first.record = attrs.evolve(first.record, settings={"t_end": 1.0})
+    with pytest.raises(ResultError, match="lacks the settings dt, "):
+        dap.rerun(first)
+
+
+def test_other_versions_are_told():
+    first = dap.simulate(problems.pendulum(), **SHORT)
+    versions = first.versions | {"numba": "0.1"}
+    first.record = attrs.evolve(first.record, known_versions=versions)
+    found = dap.rerun(first)
+    assert found.equal
+    assert list(found.versions) == ["numba"]
+    assert found.versions["numba"][0] == "0.1"
+
+
+DIGEST = """
+import hashlib, sys, threading
+import dap3d_core as dap
+busy = threading.Thread(target=lambda: sum(k * k for k in range(10**7)), daemon=True)
+if sys.argv[1:] == ["busy"]:
+    busy.start()
+result = dap.simulate("fourbar3", t_end=0.5, dt=0.01, integrator={integrator!r})
+seal = hashlib.sha256()
+for name in ("t", "u", "v_dot", "Lam", "work", "potential_energy"):
+    seal.update(getattr(result.arrays, name).tobytes())
+print(seal.hexdigest())
+"""
+
+
+def test_processes_give_equal_arrays_whatever_else_runs():
+    """Another seed of hashes, another thread at work, four processes at once."""
+    script = DIGEST.replace("{integrator!r}", "'dop853'")
+    busy = f"import sys; sys.argv[1:] = ['busy']\n{script}"
+    runs = [start(script, PYTHONHASHSEED=k) for k in (1, 2)] + [start(busy), start(script)]
+    found = [process.communicate(timeout=300) for process in runs]
+    assert [process.returncode for process in runs] == [0] * 4, found
+    assert len({out.strip() for out, _ in found}) == 1
+    assert len(found[0][0].strip()) == 64
