@@ -1,0 +1,186 @@
+"""Runs that were killed or ended, and what goes on from them."""
+
+import json
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from tests.e2e.conftest import environment
+
+import dap3d_core as dap
+
+KILLED = '''
+"""Kill runs at random moments; after each, what is on the disk must be whole."""
+
+import os
+import random
+import signal
+import sys
+import time
+from importlib import import_module
+from pathlib import Path
+
+import dap3d_core as dap
+from dap3d_core.simulation.checkpoint import read_checkpoint
+
+import_module("dap3d_core.simulation.run").CHUNK_SECONDS = 1e-3
+import_module("dap3d_core.simulation.keeping").SHORT_SECONDS = 0.05
+SETTINGS = {"t_end": 40.0, "dt": 0.02}
+compiled = dap.compile("pen1")
+whole = dap.simulate(compiled, **SETTINGS)
+random.seed(20)
+
+
+def begin(work):
+    """A process that does the work; its number."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            work()
+            code = 0
+        finally:
+            os._exit(code)
+    return child
+
+
+def run():
+    dap.simulate(compiled, output="run.nc", checkpoint=1e-9, force=True, **SETTINGS)
+
+
+def prefix(result):
+    count = len(result.t)
+    assert result.u.tobytes() == whole.u[:count].tobytes(), count
+    assert result.t.tobytes() == whole.t[:count].tobytes()
+    return count
+
+
+begun = time.perf_counter()
+_, status = os.waitpid(begin(run), 0)
+assert status == 0
+duration = time.perf_counter() - begun
+found = {"killed": 0, "with a checkpoint": 0, "resumed": 0, "resumed and killed": 0}
+for trial in range(int(sys.argv[1])):
+    for file in Path().iterdir():
+        file.unlink()
+    child = begin(run)
+    time.sleep(random.uniform(0.0, duration))
+    os.kill(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    if status == 0:
+        continue
+    found["killed"] += 1
+    rows = [prefix(dap.open(file)) for file in Path().glob("run.nc.part*")]
+    checkpoint = Path("run.nc.checkpoint")
+    if not checkpoint.exists():
+        continue
+    found["with a checkpoint"] += 1
+    assert read_checkpoint(checkpoint).header["rows"] <= max(rows)
+    if trial % 3 == 0:
+        child = begin(lambda: dap.resume(checkpoint, checkpoint=1e-9))
+        time.sleep(random.uniform(0.0, 0.5 * duration))
+        os.kill(child, signal.SIGKILL)
+        _, status = os.waitpid(child, 0)
+        found["resumed and killed"] += status != 0
+    if checkpoint.exists():
+        result = dap.resume(checkpoint)
+        assert result.u.tobytes() == whole.u.tobytes()
+        found["resumed"] += 1
+    assert prefix(dap.open("run.nc")) == len(whole.t)
+    assert not list(Path().glob("run.nc.part*")), list(Path().iterdir())
+print(found)
+'''
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
+def test_killed_at_fifty_moments_a_run_leaves_what_it_had(tmp_path):
+    """Rows and checkpoint are whole each time, and the run goes on to the same bits."""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", KILLED, "50"],
+        cwd=tmp_path,
+        env=environment(),
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.replace("'", '"'))
+    assert found["killed"] >= 40
+    assert found["resumed"] >= 20
+
+
+@pytest.mark.slow
+def test_a_run_is_terminated_resumed_and_made_again(dap3d):
+    """By the command line: the file is that of a run that was not ended, but for its notes."""
+    settings = ("pen1", "--t-end", "4000", "--dt", "1")
+    process = dap3d.start("run", *settings, "--checkpoint", "1s")
+    for line in process.stderr:
+        if "left" in line:
+            break
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 3, err
+    assert "dap3d resume pen1.nc.checkpoint" in err
+    found = dap3d("resume", "pen1.nc.checkpoint", "--json")
+    assert found.returncode == 0, found.stderr
+    facts = json.loads(found.stdout)
+    assert facts["status"] == "done"
+    assert facts["checkpoint"] is None
+    assert [f.name for f in dap3d.folder.iterdir()] == ["pen1.nc"]
+    assert dap3d("run", *settings, "-o", "whole.nc").returncode == 0
+    one, other = (dap.open(dap3d.folder / name) for name in ("pen1.nc", "whole.nc"))
+    assert one.u.tobytes() == other.u.tobytes()
+    again = dap3d("rerun", "pen1.nc")
+    assert again.returncode == 0
+    assert "equal bit for bit; 4,001 instants compared" in again.stdout
+
+
+def test_rerun_says_what_differs(dap3d, refuse, monkeypatch, capfd):
+    """A result that was made with other digits: exit code 1, the arrays and by how much."""
+    from dap3d_core.cli import main
+
+    result = dap.simulate("pen1", t_end=0.1, dt=0.02)
+    u = result.u.copy()
+    u[3, 0] += 1e-9
+    result.arrays = type(result.arrays)(
+        *(u if c == "u" else getattr(result.arrays, c) for c in ("t", "u", "v_dot", "Lam")),
+        *(getattr(result.arrays, c) for c in ("work", "potential_energy", "position_residual")),
+        *(getattr(result.arrays, c) for c in ("velocity_residual", "acceleration_residual")),
+    )
+    result.save(dap3d.folder / "other.nc")
+    monkeypatch.chdir(dap3d.folder)
+    monkeypatch.setenv("COLUMNS", "60")
+    assert main(["rerun", "other.nc"]) == 1
+    err = capfd.readouterr().err
+    assert "not equal" in err
+    assert "u: differs by up to 1e-09" in err
+    assert main(["rerun", "other.nc", "--json"]) == 1
+    found = json.loads(capfd.readouterr().out)
+    assert found["equal"] is False
+    assert found["differences"]["u"] == pytest.approx(1e-9, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("resume", "none.checkpoint"), "there is no such file"),
+        (("resume", "."), "it is a folder"),
+        (("resume",), "Missing argument"),
+        (("resume", "a.checkpoint", "--checkpoint", "soon"), "'soon' is no time; write 90, 90s"),
+        (("run", "pen1", "--checkpoint", "0"), "'0' is no time"),
+        (("run", "pen1", "--checkpoint", "-3min"), "'-3min' is no time"),
+        (("rerun", "none.nc"), "there is no such file"),
+        (("rerun", "."), "it is a folder"),
+    ],
+)
+def test_what_cannot_be_resumed_or_made_again_is_refused(refuse, arguments, words):
+    assert words in " ".join(refuse(*arguments).split())
+
+
+def test_times_are_written_as_people_do():
+    from dap3d_core.cli.carrying import Seconds
+
+    found = [Seconds().convert(text, None, None) for text in ("90", "90s", "5min", "2h", "0.5h")]
+    assert np.array_equal(found, [90.0, 90.0, 300.0, 7200.0, 1800.0])
