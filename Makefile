@@ -22,7 +22,7 @@ PYTHON3 ?= python3 python3.13 python3.12 python3.11 python3.14 python
 CHECK_PYTHON := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 
 .DELETE_ON_ERROR:
-.PHONY: help run install test test-all verify unit-nojit lint format docs bench bench-peers clean
+.PHONY: help run install test test-all verify unit-nojit lint audit format docs bench bench-peers clean
 
 help:  ## show this list
 	@echo "make TARGET, where TARGET is one of"
@@ -59,6 +59,12 @@ lint: $(VENV)/.installed-dev  ## format, lint, types, floors, sizes
 	check sizes $(PYTHON) tools/check_sizes.py; \
 	if [ -n "$$failed" ]; then echo "lint failed:$$failed" >&2; exit 1; fi; \
 	echo "lint: all clean"
+
+# pip-audit is no part of the other installs: where it cannot be had in this time, it is left out.
+AUDIT_WAIT ?= 60
+audit: $(VENV)/.installed-test  ## licences and known holes of what dap3d depends on
+	@$(PYTHON) -c "import pip_audit" 2>/dev/null || timeout $(AUDIT_WAIT) $(INSTALL) ".[audit]" 2>/dev/null || true
+	@$(PYTHON) tools/audit.py
 
 format: $(VENV)/.installed-dev  ## let ruff format and repair what it can
 	@$(PYTHON) -m ruff format .

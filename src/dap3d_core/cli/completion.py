@@ -3,11 +3,16 @@
 Nothing is printed here, and nothing fails: where there is nothing to offer, nothing is.
 """
 
+import re
 from contextlib import suppress
 from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
+
+#: What a shell takes as it stands: other names of a result, which may come from anywhere, are not
+#: put on somebody's command line.
+_PLAIN = re.compile(r"\w[\w.+:@%/-]*")
 
 
 def _path(incomplete: str) -> list[CompletionItem]:
@@ -29,11 +34,11 @@ def models(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[
 
 def quantities(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
     """Quantities of the result that was named before, part by part, or a path."""
-    found: list[Any] = []
+    found: list[str] = []
     with suppress(Exception):
         from dap3d_core.result import names_of, open_result
 
         # Behind an option without its value click leaves all words in ctx.args.
         result = ctx.params["result"] or ctx.args[0]
-        found += names_of(open_result(result), incomplete)
-    return found or _path(incomplete)
+        found += filter(_PLAIN.fullmatch, names_of(open_result(result), incomplete))
+    return list(found) or _path(incomplete)

@@ -61,7 +61,7 @@ def _tell_mistakes(console: Terminal, error: Any) -> None:
     number = len(error.mistakes)
     if number > 1:
         say(console, f"{number} mistakes:", "bold red")
-    for line in str(error).splitlines():
+    for line in str(error).split("\n"):
         indented = line.startswith("    ")
         say(console, line.strip(), "" if indented else "red", indent=4 if indented else 0)
 

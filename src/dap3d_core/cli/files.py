@@ -1,6 +1,7 @@
 """Files that commands read and write, refused before any work is done."""
 
 import os
+import uuid
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,6 +37,24 @@ def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) 
     if not os.access(path.parent, os.W_OK | os.X_OK):
         raise Refused(f"cannot write {path}: no permission to write in its folder; use -o")
     return path
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole, in place of what stands there; a link is replaced, never followed.
+
+    Raises:
+        Refused: it cannot be written; says why.
+    """
+    aside = path.with_name(f".{uuid.uuid4().hex}.part")
+    try:
+        try:
+            with aside.open("x", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+            os.replace(aside, path)
+        finally:
+            aside.unlink(missing_ok=True)
+    except OSError as error:
+        raise Refused(f"cannot write {path}: {error.strerror or error}") from error
 
 
 def open_result(path: str, *, model: str | None = None, allow_code: bool = False) -> "Result":

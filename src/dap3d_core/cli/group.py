@@ -4,6 +4,7 @@ Nothing here imports numpy, scipy, numba, matplotlib, netCDF4 or rich: commands 
 """
 
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -117,6 +118,19 @@ dap3d.params.append(_no_color())
 def run_line(argv: Sequence[str] | None) -> int:
     """Run the words of a command line, by default those of the process; returns the exit code."""
     prepare_streams()
+    with warnings.catch_warnings():
+        warnings.showwarning = _tell_warning
+        return _run_line(argv)
+
+
+def _tell_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    """A warning of a library, which may quote a name of a scene, as any other message."""
+    from dap3d_core.cli.rendering import messages, say
+
+    say(messages(), f"warning: {message}", "yellow", whole=True)
+
+
+def _run_line(argv: Sequence[str] | None) -> int:
     try:
         code = dap3d.main(
             args=None if argv is None else list(argv), prog_name="dap3d", standalone_mode=False

@@ -51,6 +51,7 @@ def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json:
     The report says what was read, defaulted, changed and left out. Needs the extra "matlab".
     """
     import dap3d_core as dap
+    from dap3d_core.cli.files import write_text
     from dap3d_core.cli.rendering import output as console
     from dap3d_core.cli.rendering import print_json
 
@@ -62,7 +63,7 @@ def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json:
         plugin = _target(str(target.parent / "plugin.py"), force=force, sources=sources)
     scene.save(target)
     if plugin is not None:
-        _write(plugin, report.stub)
+        write_text(plugin, report.stub)
     if as_json:
         print_json(_data(scene, report, target, plugin))
     else:
@@ -77,15 +78,6 @@ def _target(output: str, *, force: bool, sources: tuple[Path, ...]) -> Path:
     path = Path(output)
     path = path / "scene.toml" if path.is_dir() else path
     return writable(path, force=force, sources=sources)
-
-
-def _write(path: Path, text: str) -> None:
-    from dap3d_core.cli.exits import Refused
-
-    try:
-        path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise Refused(f"cannot write {path}: {error.strerror or error}") from error
 
 
 def _data(

@@ -168,10 +168,14 @@ def _template(folder: str, name: str) -> str:
 
 
 def _write(folder: Path, texts: dict[str, str]) -> None:
+    from dap3d_core.cli.files import write_text
+
     for name, text in texts.items():
         path = folder / name
         try:
+            if not path.parent.resolve().is_relative_to(folder.resolve()):
+                raise Refused(f"cannot write {path}: {path.parent} is a link out of the folder")
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8", newline="\n")
         except OSError as error:
             raise Refused(f"cannot write {path}: {error.strerror or error}") from error
+        write_text(path, text)

@@ -80,7 +80,7 @@ def _show_all(console: Terminal, outcome: Outcome, found: dict[str, Any], target
     words = found["scene"] or "scene without a name"
     title(console, words if found["status"] == "done" else f"{words}: {found['status']}")
     if outcome.compiled.scene.description:
-        say(console, str(outcome.compiled.scene.description))
+        say(console, str(outcome.compiled.scene.description), indent=2)
     facts(console, run_pairs(found))
     _show_corrected(console, outcome)
     show_events(console, found)

@@ -72,8 +72,9 @@ def say(
         style: of rich.
         indent: columns it is moved to the right.
         whole: for text with paths and commands: broken only where there is a width to keep.
+            Without an indent it is one line, whatever a path holds.
     """
-    text = Text(clean(words), style=style)
+    text = Text(clean(words) if not whole or indent else line_of(words), style=style)
     if console.has_width or (console.wraps and not whole):
         show(console, _indented(text, indent) if indent else text)
     else:
@@ -132,12 +133,12 @@ def items(console: Terminal, texts: Iterable[str], style: str = "") -> None:
             grid.add_row("  -", Text(clean(words), style=style))
             show(console, grid)
         else:
-            console.print(Text(f"  - {clean(words)}", style=style), soft_wrap=True)
+            console.print(Text(f"  - {line_of(words)}", style=style), soft_wrap=True)
 
 
 def title(console: Terminal, words: str) -> None:
-    """Print a heading."""
-    say(console, words, "bold")
+    """Print a heading, one line."""
+    say(console, line_of(words), "bold")
 
 
 def facts(console: Terminal, pairs: Iterable[tuple[str, str]]) -> None:
@@ -148,7 +149,7 @@ def facts(console: Terminal, pairs: Iterable[tuple[str, str]]) -> None:
     width = max(len(name) for name, _ in there)
     if not console.wraps:
         for name, words in there:
-            console.print(Text(f"  {name:{width}}  {clean(words)}"), soft_wrap=True)
+            console.print(Text(f"  {name:{width}}  {line_of(words)}"), soft_wrap=True)
         return
     grid = Table.grid(padding=(0, 2))
     grid.add_column(no_wrap=True, min_width=width)
@@ -199,6 +200,8 @@ def plain(value: Any) -> Any:
         value = value.tolist()
     if isinstance(value, float) and not math.isfinite(value):
         return None
+    if isinstance(value, int) and value.bit_length() > 1024:  # beyond what a float holds
+        return None
     if isinstance(value, (bool, int, float, str, type(None))):
         return value
     if isinstance(value, Mapping):
@@ -211,6 +214,11 @@ def plain(value: Any) -> Any:
 def clean(words: str) -> str:
     """Text without control characters, which could move a terminal's cursor."""
     return "".join(c if c.isprintable() or c == "\n" else _escaped(c) for c in words)
+
+
+def line_of(words: str) -> str:
+    """The same in one line: what a file holds makes no line that looks like one of ours."""
+    return clean(words.replace("\n", " "))
 
 
 def _escaped(character: str) -> str:

@@ -226,8 +226,8 @@ class Symbols(Mapping[str, Any]):
         return self._rates[name]
 
     def _evaluated(self, code: str) -> list[Expression]:
-        """The numbers of an expression of ``Quantity``, over symbols."""
-        return [exact(x) for x in flat(eval(code, dict(_WORDS), self))]
+        """The numbers of an expression of ``Quantity``, over symbols: text of the program."""
+        return [exact(x) for x in flat(eval(code, {"__builtins__": {}, **_WORDS}, self))]
 
     def d_dt(self, program: Program) -> Program:
         """Rates of a program's results, at V_dot = W_dot = 0; named rates stand by their names."""

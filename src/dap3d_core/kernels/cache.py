@@ -18,6 +18,8 @@ from pathlib import Path
 import numba
 from numba import config, njit
 
+from dap3d_core.kernels.trusted import distrust
+
 #: How the core and the group loops are compiled: no bounds checks, IEEE division, nothing
 #: reassociated.
 OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
@@ -32,21 +34,35 @@ def jit_is_on() -> bool:
     return not config.DISABLE_JIT
 
 
-@cache
 def cache_folder() -> Path | None:
-    """The folder that keeps compiled code between processes, or None where nothing can be written.
+    """The folder that keeps compiled code between processes, or None where there can be none.
 
-    The first of these that can be written: ``$DAP3D_CACHE_DIR``, the user's cache folder, a private
-    folder beside the temporary files.
+    The first of these that can be written, and by this user alone: ``$DAP3D_CACHE_DIR``, the user's
+    cache folder, a private folder beside the temporary files.
     """
+    return _chosen()[0]
+
+
+def cache_notes() -> tuple[str, ...]:
+    """Folders that were passed over because others may write to them, and what to do."""
+    return _chosen()[1]
+
+
+@cache
+def _chosen() -> tuple[Path | None, tuple[str, ...]]:
+    notes = []
     for folder in _candidates():
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            if why := distrust(folder):
+                words = f"compiled code is not kept in {folder}, for what is there is run: {why}"
+                notes.append(f"{words}; DAP3D_CACHE_DIR names another folder")
+                continue
             with tempfile.TemporaryFile(dir=folder):
-                return folder
+                return folder, tuple(notes)
         except OSError:
             continue
-    return None
+    return None, tuple(notes)
 
 
 def _candidates():
@@ -56,9 +72,7 @@ def _candidates():
     with suppress(RuntimeError):  # no home folder
         yield (Path(home) if home else Path.home() / ".cache") / "dap3d"
     user = os.getuid() if hasattr(os, "getuid") else "user"
-    private = Path(tempfile.gettempdir()) / f"dap3d-{user}"
-    if not private.exists() or not hasattr(os, "getuid") or private.stat().st_uid == os.getuid():
-        yield private
+    yield Path(tempfile.gettempdir()) / f"dap3d-{user}"
 
 
 def digest(*parts: str | bytes) -> str:

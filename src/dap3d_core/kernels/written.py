@@ -29,7 +29,8 @@ def write(name: str, text: str) -> Path | None:
     try:
         path.parent.mkdir(exist_ok=True)
         aside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-        aside.write_text(text)
+        with aside.open("x", encoding="utf-8") as file:
+            file.write(text)
         os.replace(aside, path)
     except OSError:
         return None

@@ -28,6 +28,8 @@ from dap3d_core.matlab.values import Broken, Struct, kind_of
 from dap3d_core.registry.spelling import nearest
 from dap3d_core.scene import MISSING, Mistake, SceneError
 
+#: Files that are none of a model's and are named one by one.
+OTHERS = 50
 JOINTS_FILE, ANIMATION_FILE = "inJoints.m", "inAnimate.m"
 
 
@@ -112,10 +114,10 @@ def _workspace(model: Model, path: Path, grammar: Grammar) -> Workspace | None:
     """What the statements of a file leave behind; None where it cannot be read."""
     try:
         source = read_source(path)
+        root = grammar.tree(source)
     except SceneError as error:
         model.mistakes += error.mistakes
         return None
-    root = grammar.tree(source)
     faults = syntax_mistakes(source, root)
     if faults:
         model.mistakes += faults
@@ -203,9 +205,12 @@ def _beside(model: Model, file: ModelFile, workspace: Workspace) -> None:
 
 def _others(model: Model, there: list[str]) -> None:
     known = {f.name for f in FILES} | {USER_FORCE_FILE}
-    for name in there:
-        if name not in known:
-            model.files.append(FileFacts(name, "not read", "no file of a model"))
+    others = [name for name in there if name not in known]
+    for name in others[:OTHERS]:
+        model.files.append(FileFacts(name, "not read", "no file of a model"))
+    if len(others) > OTHERS:
+        more = f"{len(others) - OTHERS} more"
+        model.files.append(FileFacts(more, "not read", "no files of a model"))
 
 
 def _plural(noun: str) -> str:

@@ -152,7 +152,7 @@ class Operation:
             if a.shape[1] != b.shape[0]:
                 what = f"matrices of {size_of(a)} and {size_of(b)} cannot be multiplied"
                 raise RefusalError(self.node, what)
-            check_size(a.shape[0] * b.shape[1], self.node)
+            check_size(a.size * b.shape[1], self.node)  # what is multiplied
             return self._checked(a @ b)
         with np.errstate(all="ignore"):
             return self._checked(a * b if "*" in operator else a / b)

@@ -2,6 +2,7 @@
 
 import os
 import stat
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,10 @@ if TYPE_CHECKING:
 
 #: Larger files are refused before they are read: recovering from errors takes time.
 LARGEST_FILE = 2**20
+#: Files of fewer bytes are parsed in a second, whatever they hold; others may take so long, s.
+QUICK, PARSING = 8192, 10.0
+#: Comments of many lines, %{ to %}, at most.
+BLOCKS = 500
 #: Errors of syntax that are reported of one file: the first ones explain the others.
 SYNTAX_ERRORS = 5
 
@@ -81,6 +86,9 @@ def refused(
 def read_source(path: Path) -> Source:
     """The text of a MATLAB file, which is UTF-8 and of reasonable size.
 
+    A link that leads out of its folder is not followed: a model from elsewhere makes nobody's other
+    files part of a scene.
+
     Raises:
         SceneError: says what is wrong with the file.
     """
@@ -88,10 +96,13 @@ def read_source(path: Path) -> Source:
         info = path.stat()
         if not stat.S_ISREG(info.st_mode):
             raise refused(path, "is not a regular file")
+        if not path.resolve().is_relative_to(path.parent.resolve()):
+            raise refused(path, "is a link out of the folder", remedy="copy the file there")
         if info.st_size > LARGEST_FILE:
             what = f"has {info.st_size / 2**20:.1f} MiB; at most {LARGEST_FILE >> 20} MiB are read"
             raise refused(path, what, remedy="build a scene of this size with a script")
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            data = file.read(LARGEST_FILE + 1)
     except OSError as error:
         raise refused(path, f"cannot be read: {error.strerror or error}") from None
     if b"\0" in data:
@@ -130,10 +141,32 @@ class Grammar:
             raise SceneError([Mistake("", MISSING, what, remedy=remedy)]) from None
 
     def tree(self, source: Source) -> "Node":
-        """The root of the tree of a file, errors of syntax included."""
+        """The root of the tree of a file, errors of syntax included.
+
+        Raises:
+            SceneError: finding it takes too long.
+        """
         text = source.text if source.text.endswith("\n") else f"{source.text}\n"
-        root: Node = self._parser.parse(text.encode("utf-8")).root_node
+        data = text.encode("utf-8")
+        if data.count(b"%{") > BLOCKS:  # one within the other, they are looked for again and again
+            raise refused(source.path, f"holds more than {BLOCKS} comments of many lines")
+        if len(data) > QUICK:
+            self._try(data, source.path)
+        root: Node = self._parser.parse(data).root_node
         return root
+
+    def _try(self, data: bytes, path: Path) -> None:
+        """Parse in pieces, which can be given up, unlike parsing a text as a whole."""
+        end = time.process_time() + PARSING
+        try:
+            self._parser.parse(
+                lambda at, _: data[at : at + QUICK],
+                progress_callback=lambda *_: time.process_time() > end,
+            )
+        except ValueError:
+            self._parser.reset()
+            what = f"is no model: finding its statements takes more than {PARSING:g} s"
+            raise refused(path, what) from None
 
 
 def syntax_mistakes(source: Source, root: "Node") -> list[Mistake]:

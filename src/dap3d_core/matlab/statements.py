@@ -22,6 +22,8 @@ from dap3d_core.scene import Mistake
 if TYPE_CHECKING:
     from tree_sitter import Node
 
+#: Structures copied in arrays: a model has hundreds, a file of 1 MiB could ask for billions.
+MOST_COPIES = 1_000_000
 #: Words that stand as a statement of their own and have nothing to do here.
 IDLE_WORDS = ("include_global",)
 #: Nodes without effect.
@@ -67,6 +69,7 @@ class _Follower:
         self.source, self.workspace = source, Workspace()
         self.variables = self.workspace.variables
         self.expressions = Expressions(source, self.variables)
+        self.copied = 0  # structures, in arrays that were assigned
 
     def top(self, root: "Node") -> None:
         """The statements of the file, inside its function where it is one."""
@@ -81,6 +84,10 @@ class _Follower:
         for statement in statements:
             if statement.type == "return_statement":
                 break  # MATLAB does not reach what follows
+            if self.copied > MOST_COPIES:
+                words = f"more than {MOST_COPIES:,} structures are copied up to here"
+                self._refuse(statement, f"{words}; what follows is not read")
+                break
             self._statement(statement)
 
     def _statement(self, node: "Node") -> None:
@@ -152,6 +159,7 @@ class _Follower:
             raise RefusalError(node, "this assignment is outside the language that is read")
         if target.type == "identifier":
             value = copied(self.expressions.value(right))
+            self.copied += len(value) if isinstance(value, list) else 0
             if isinstance(value, Struct):
                 value.variable, value.place = text_of(target), self.source.place(node)
             self.variables[text_of(target)] = value

@@ -228,8 +228,11 @@ def _with_unit(words: str, unit: str) -> str:
 
 
 def shown_text(words: str) -> str:
-    """Words as matplotlib shows them: a $ begins no formula, a _ hides no curve."""
-    words = words.replace("$", r"\$")
+    """Words as matplotlib shows them: a $ begins no formula, a _ hides no curve.
+
+    What no font draws, such as a control character, is left out.
+    """
+    words = "".join(c if c.isprintable() else " " for c in words).replace("$", r"\$")
     return f" {words}" if words.startswith("_") else words
 
 

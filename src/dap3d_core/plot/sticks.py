@@ -1,6 +1,5 @@
 """The stick figure of a result: lines from the mass centre of each body to its points."""
 
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -12,6 +11,7 @@ from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.kinematics import split, to_global
 from dap3d_core.plot.drawing import MARKERS, PALETTE
 from dap3d_core.result import Result
+from dap3d_core.scene import Scene, SceneError, parse
 
 #: Usual names of colours -> the shade of that hue in which colour-blind readers can tell it apart.
 SHADES = {
@@ -84,7 +84,7 @@ class Sticks:
 def sticks_of(result: Result) -> Sticks:
     """The stick figure of a result, from its points and from the scene in it."""
     subject = result.subject
-    scene = _tables(result.scene_text)
+    scene = _scene(result.scene_text)
     n = subject.body_count
     body = [*range(1, n + 1), *(int(b) for b in subject.point_body)]
     local = [*np.zeros((n, 3)), *subject.point_local]
@@ -98,8 +98,7 @@ def sticks_of(result: Result) -> Sticks:
             local.append(np.zeros(3))
     springs, links = (_places(pairs[kind], place) for kind in ("forces", "joints"))
     found = np.array(body)
-    colors = _colors(scene.get("bodies", {}), subject.body_names)
-    limits = scene.get("animation", {}).get("limits")
+    colors = _colors(scene, subject.body_names)
     return Sticks(
         names=subject.body_names,
         colors=colors,
@@ -110,25 +109,37 @@ def sticks_of(result: Result) -> Sticks:
         anchors=np.flatnonzero(found == 0),
         springs=springs,
         links=links,
-        limits=None if limits is None else np.array(limits, dtype=float),
+        limits=_limits(scene.animation.limits),
     )
 
 
-def _tables(scene_text: str) -> dict[str, Any]:
-    """The scene as plain tables; nothing where a result has no scene that can be read."""
+def _scene(scene_text: str) -> Scene:
+    """The scene, whatever is wrong in it; an empty one where a result has none that can be read."""
     try:
-        return tomllib.loads(scene_text)
-    except tomllib.TOMLDecodeError:
-        return {}
+        return parse(scene_text)
+    except SceneError:
+        return Scene()
 
 
-def _ends(scene: Mapping[str, Any], kind: str) -> Iterator[tuple[str, str]]:
+def _limits(given: Any) -> Floats | None:
+    """Limits of the axes (3, 2), m; None where there are none that make sense."""
+    try:
+        found = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        return None
+    return found if found.shape == (3, 2) and np.isfinite(found).all() else None
+
+
+def _ends(scene: Scene, kind: str) -> Iterator[tuple[str, str]]:
     """Names of the two points of each element that has two, given as such or by a vector."""
-    vectors = scene.get("vectors2", {})
-    for fields in scene.get(kind, {}).values():
-        of = vectors.get(fields.get("d"), fields) if isinstance(fields.get("d"), str) else fields
-        if isinstance(of.get("P_i"), str) and isinstance(of.get("P_j"), str):
-            yield of["P_i"], of["P_j"]
+    for element in getattr(scene, kind).values():
+        fields, d = element.fields, element.fields.get("d")
+        ends = fields.get("P_i"), fields.get("P_j")
+        if isinstance(d, str) and d in scene.vectors2:
+            ends = scene.vectors2[d].P_i, scene.vectors2[d].P_j
+        P_i, P_j = ends
+        if isinstance(P_i, str) and isinstance(P_j, str):
+            yield P_i, P_j
 
 
 def _places(pairs: Sequence[tuple[str, str]], place: Mapping[str, int]) -> Integers:
@@ -136,11 +147,11 @@ def _places(pairs: Sequence[tuple[str, str]], place: Mapping[str, int]) -> Integ
     return np.array(found, dtype=np.int64).reshape(-1, 2)
 
 
-def _colors(bodies: Mapping[str, Any], names: Sequence[str]) -> tuple[str, ...]:
+def _colors(scene: Scene, names: Sequence[str]) -> tuple[str, ...]:
     """The scene's colours, usual names in shades of the palette; the palette in turn elsewhere."""
     found = []
     for k, name in enumerate(names):
-        given = bodies.get(name, {}).get("color")
+        given: Any = scene.bodies[name].color if name in scene.bodies else None
         shade = SHADES.get(str(given).removeprefix("tab:"), given)
         found.append(shade if is_color_like(shade) else PALETTE[k % len(PALETTE)])
     return tuple(found)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from dap3d_core.plot.drawing import DASHES, MARKERS, PALETTE
+from dap3d_core.plot.drawing import DASHES, MARKERS, PALETTE, shown_text
 from dap3d_core.plot.saving import save_figure
 
 #: Inches. Letters of 8 points are still 5 points high where the picture is set 60 mm wide.
@@ -105,7 +105,7 @@ def draw_work_precision(
         handlelength=2.4, columnspacing=1.0, borderaxespad=0.1,
     )  # fmt: skip
     if title:
-        ax.set_title(title.replace("$", r"\$"), fontsize=LETTERS + 1)
+        ax.set_title(shown_text(title), fontsize=LETTERS + 1)
     return ax
 
 

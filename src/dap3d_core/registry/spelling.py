@@ -6,6 +6,8 @@ from typing import Any
 
 #: Beyond this many words only those of similar length that begin alike are compared.
 MANY_WORDS = 2000
+#: Nothing is similar to a longer word.
+LONGEST = 200
 
 
 def nearest(word: Any, allowed: Collection[str]) -> str:
@@ -13,7 +15,7 @@ def nearest(word: Any, allowed: Collection[str]) -> str:
 
     An abbreviation is similar to the word it stands for: ``rev`` to ``revolute``.
     """
-    if not isinstance(word, str) or not word:
+    if not isinstance(word, str) or not 0 < len(word) <= LONGEST:
         return ""
     wanted = word.casefold()
     forms: dict[str, str] = {}

@@ -36,6 +36,8 @@ def check_target(path: str | os.PathLike[str], force: bool = False) -> Path:
             fault = "it is a folder; name a file in it"
         elif target.exists():
             fault = "it is no regular file"
+        elif target.is_symlink():
+            fault = "" if force else "it is a link that leads nowhere; force replaces it"
         elif not target.parent.is_dir():
             fault = f"there is no folder {target.parent}"
         else:

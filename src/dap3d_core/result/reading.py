@@ -13,6 +13,7 @@ from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.files import cannot
 from dap3d_core.result.layout import CONSTANTS, CONVENTIONS, FORMAT, record_of
+from dap3d_core.result.limits import check_attributes, check_claims, check_subject
 from dap3d_core.result.netcdf import NETCDF
 from dap3d_core.result.on_file import LARGE, FileArrays
 from dap3d_core.result.record import RUNNING, Record
@@ -52,6 +53,7 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
         try:
             dataset.set_auto_maskandscale(False)
             _check_format(file, dataset)
+            check_claims(file, dataset)
             subject, record, arrays = _read(dataset)
         except ResultError:
             dataset.close()
@@ -121,7 +123,9 @@ def _read(dataset: Any) -> tuple[Subject, Record, Arrays | FileArrays]:
     found = {"events": "[]", "run": ""} | found  # older files have none
     for name in _JSON:
         found[name] = json.loads(found[name])
+    check_attributes(found)
     subject, record = _subject(dataset, found), record_of(found)
+    check_subject(subject)
     count = len(dataset.dimensions["time"])
     if record.status == RUNNING:
         count = _complete(dataset, count)
@@ -173,8 +177,10 @@ def _origin(
         if rebuild is None:
             raise ResultError(f"the model of {file} is needed: open it with the way to rebuild it")
         model, machine_of = rebuild(record.scene_text)
-        same = model.body_names == subject.body_names and np.array_equal(
-            model.joint_rows, subject.joint_rows
+        same = (
+            model.body_names == subject.body_names
+            and tuple(model.joint_names) == tuple(subject.joint_names)
+            and np.array_equal(model.joint_rows, subject.joint_rows)
         )
         if not same:
             raise ResultError(

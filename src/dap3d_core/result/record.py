@@ -2,7 +2,6 @@
 
 import json
 import platform
-import tomllib
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -11,6 +10,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.result.occurrence import Occurrence
+from dap3d_core.scene import SceneError, tables_of
 
 #: How a run can have ended.
 STATUSES = ("done", "interrupted", "stopped")
@@ -113,16 +113,17 @@ class Record:
         """Name of the scene, "" where it has none."""
         head = self.scene_text.partition("\n[")[0]  # the header is the first table
         try:
-            return str(tomllib.loads(head)["scene"]["name"])
-        except (tomllib.TOMLDecodeError, KeyError, TypeError):
+            name = tables_of(head)["scene"]["name"]
+        except (SceneError, KeyError, TypeError):
             return ""
+        return name if isinstance(name, str) else ""
 
     @property
     def force_names(self) -> tuple[str, ...]:
         """Names of the forces of the scene, in file order."""
         try:
-            return tuple(tomllib.loads(self.scene_text).get("forces", {}))
-        except (tomllib.TOMLDecodeError, TypeError):
+            return tuple(tables_of(self.scene_text).get("forces", {}))
+        except (SceneError, TypeError):
             return ()
 
     @property

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Numbers that are turned into text at a time.
 _BLOCK = 1_000_000
+#: How a cell begins that spreadsheets take for a formula.
+FORMULA = ("=", "+", "-", "@")
 
 
 class Column(NamedTuple):
@@ -30,8 +32,12 @@ class Column(NamedTuple):
 
     @property
     def heading(self) -> str:
-        """What stands above it: ``crank.r.x [m]``."""
-        return f"{self.name} [{self.unit}]"
+        """What stands above it: ``crank.r.x [m]``.
+
+        Behind an apostrophe where a spreadsheet would take the name for a formula and work it out.
+        """
+        mark = "'" if self.name.startswith(FORMULA) else ""
+        return f"{mark}{self.name} [{self.unit}]"
 
 
 def columns_of(result: "Result", reactions: bool = True) -> list[Column]:

@@ -15,7 +15,7 @@ from dap3d_core.scene.description import (
     Vector2,
 )
 from dap3d_core.scene.mistakes import MISSING, Mistake, SceneError
-from dap3d_core.scene.reading import load, parse, shipped_models
+from dap3d_core.scene.reading import load, parse, shipped_models, tables_of
 from dap3d_core.scene.settings import INTEGRATORS, METHODS, check_simulation
 
 __all__ = [
@@ -41,4 +41,5 @@ __all__ = [
     "mistake_at",
     "parse",
     "shipped_models",
+    "tables_of",
 ]

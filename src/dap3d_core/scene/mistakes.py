@@ -36,7 +36,8 @@ class Mistake:
     line: int | None = None
 
     def __str__(self) -> str:
-        place = ":".join(str(p) for p in (self.file, self.line) if p)
+        file = self.file if self.file.isprintable() else shown(self.file, len(self.file))
+        place = ":".join(str(p) for p in (file, self.line) if p)
         given = "" if self.value is MISSING or not self.key else f" = {shown(self.value)}"
         text = f"{self.key}{given}: {self.what}" if self.key else self.what
         text = f"{place}: {text}" if place else text
@@ -85,6 +86,10 @@ def shown(value: Any, width: int = 60) -> str:
         # A long value is cut anyway: its tail need not be written out.
         items = [shown(v, width) for v in value[: width // 2]]
         text = f"[{', '.join(items)}{', ...' if len(value) > len(items) else ''}]"
+    elif isinstance(value, int) and value.bit_length() > 4 * width:
+        # Python refuses to write out thousands of digits; a hexadecimal number may have them.
+        first = abs(value) >> (value.bit_length() - 32)
+        text = f"{'-' if value < 0 else ''}{first:#x} ... of {value.bit_length()} bits"
     elif isinstance(value, str):
         text = '"' + repr(value[:width])[1:-1] + '"'
     else:

@@ -3,6 +3,7 @@
 import os
 import re
 import stat
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,16 @@ from dap3d_core.scene.plain import plain
 
 #: Larger files are refused before they are read.
 LARGEST_FILE = 64 * 2**20
+#: Keys of more parts are refused before they are read: reading one takes the square of their number
+#: in time and memory.
+MOST_PARTS = 32
+_LONG_KEY = re.compile(
+    r"""(?:^|[,{[])[ \t]*+(?:(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
+    rf"{{{MOST_PARTS}}}",
+    re.MULTILINE,
+)
+#: Mistakes for which the nearest spelling is searched while reading.
+SUGGESTIONS = 200
 #: The scene of a model's folder, and its own types.
 SCENE_FILE, PLUGIN_FILE = "scene.toml", "plugin.py"
 
@@ -53,7 +64,16 @@ def parse(text: str) -> Scene:
     Raises:
         SceneError: the text is not TOML.
     """
-    return scene_of(_parse(text, Path("scene")))
+    return scene_of(tables_of(text))
+
+
+def tables_of(text: str) -> dict[str, Any]:
+    """The tables of the text of a scene file, or of its beginning, as they are written.
+
+    Raises:
+        SceneError: the text is not TOML.
+    """
+    return _parse(text, Path("scene"))
 
 
 def shipped_models() -> dict[str, Path]:
@@ -99,10 +119,14 @@ class _Tables:
             if name not in TABLES:
                 what = f"unknown table; a scene has {', '.join(TABLES)}"
                 value = MISSING if isinstance(content, (dict, list)) else plain(content)
-                self.fault((name,), value, what, nearest(name, TABLES))
+                self.fault((name,), value, what, self.nearest(name, TABLES))
 
     def fault(self, key: Key, value: Any, what: str, near: str = "") -> None:
         self.faults.append((key, Mistake(dotted(key), value, what, near)))
+
+    def nearest(self, word: Any, allowed: Collection[str]) -> str:
+        """The nearest right spelling; no longer searched after many faults, it takes time."""
+        return nearest(word, allowed) if len(self.faults) < SUGGESTIONS else ""
 
     def table(self, key: Key, content: Any) -> dict[str, Any]:
         """The content of a table, empty where it is none."""
@@ -122,7 +146,8 @@ class _Tables:
             return table
         for name, value in table.items():
             if name not in allowed:
-                self.fault((*key, name), plain(value), unknown_key(allowed), nearest(name, allowed))
+                near = self.nearest(name, allowed)
+                self.fault((*key, name), plain(value), unknown_key(allowed), near)
         return {k: v for k, v in table.items() if k in allowed}
 
 
@@ -209,7 +234,8 @@ def _read(path: Path) -> str:
         if info.st_size > LARGEST_FILE:
             what = f"has {info.st_size / 2**20:.0f} MiB; at most {LARGEST_FILE >> 20} MiB are read"
             raise _refused(str(path), what, remedy="build a scene of this size with a script")
-        data = path.read_bytes()
+        with path.open("rb") as file:  # no more than was promised, should it be growing
+            data = file.read(LARGEST_FILE + 1)
     except OSError as error:
         raise _unreadable(path, error) from None
     if b"\0" in data:
@@ -225,6 +251,9 @@ def _read(path: Path) -> str:
 def _parse(text: str, path: Path) -> dict[str, Any]:
     import tomllib
 
+    if long := _LONG_KEY.search(text):
+        what = f"a key of more than {MOST_PARTS} parts; those of a scene have 4 at most"
+        raise _refused(str(path), what, line=text.count("\n", 0, long.end()) + 1)
     try:
         return tomllib.loads(text)
     except RecursionError:

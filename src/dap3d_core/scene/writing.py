@@ -48,7 +48,8 @@ def save(scene: Scene, path: str | Path) -> Path:
         path = path / "scene.toml" if path.is_dir() else path
         aside = path.with_name(f".{uuid.uuid4().hex}.toml")
         try:
-            aside.write_bytes(text.encode("utf-8"))
+            with aside.open("xb") as file:
+                file.write(text.encode("utf-8"))
             os.replace(aside, path)
         finally:
             aside.unlink(missing_ok=True)

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dap3d_core.formulations.machine import Machine
-from dap3d_core.kernels.cache import driver_is_cached
+from dap3d_core.kernels.cache import cache_notes, driver_is_cached
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.registry import Registry, load_registry
+from dap3d_core.result import INFORMATION
 from dap3d_core.scene import (
     Checked,
     Scene,
@@ -79,6 +80,7 @@ class CompiledModel:
         # compiled here, and not on the clock of the first run
         _ = self.machine.functions, self.machine.second_thread
         self.notes: list[str] = [*self.checked.notes, *self.model.notes]
+        self.notes += (f"{INFORMATION}{note}" for note in cache_notes())
         self._redundancy: Redundancy | None = None
         self.compile_time = time.perf_counter() - started
 

@@ -29,6 +29,7 @@ from dap3d_core.simulation.implicit import (
 from dap3d_core.simulation.initial import correction_notes, violation
 from dap3d_core.simulation.keeping import Keeper
 from dap3d_core.simulation.redundancy import Redundancy
+from dap3d_core.simulation.room import check_room, row_width
 from dap3d_core.simulation.second_run import Again, add_error
 from dap3d_core.simulation.standing import Observer, Standing
 from dap3d_core.simulation.watcher import Watcher
@@ -92,6 +93,7 @@ class Run:
         checkpoint: float | None = None,
     ) -> Result:
         """Run from the start to the end; arguments and errors as of ``simulate``."""
+        check_room(len(self.times), row_width(self.machine), self.settings.dt, output)
         self.prepare()
         self.keep(output, force=force)
         if checkpoint is not None:

@@ -1,5 +1,7 @@
 """The page: one file of HTML that holds its data, its program and three.js, and loads nothing."""
 
+import base64
+import hashlib
 import html
 import json
 import os
@@ -9,7 +11,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.result import Result
+from dap3d_core.result import Result, ResultError
 from dap3d_core.result.files import whole_file
 from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.scene.description import Scene
@@ -76,10 +78,11 @@ class View:
         return target
 
     def _repr_html_(self) -> str:
-        """The page in a frame, for notebooks."""
+        """The page in a frame, for notebooks, from which it reaches nothing of theirs."""
         return (
             f'<iframe srcdoc="{html.escape(self.html)}" title="{html.escape(self.title)}" '
-            f'style="width: 100%; height: {NOTEBOOK_HEIGHT}px; border: 0" allowfullscreen></iframe>'
+            'sandbox="allow-scripts allow-forms" allowfullscreen '
+            f'style="width: 100%; height: {NOTEBOOK_HEIGHT}px; border: 0"></iframe>'
         )
 
 
@@ -128,15 +131,30 @@ def _page(data: dict[str, Any]) -> str:
     assets = files("dap3d_core.view") / "assets"
     vendor = files("dap3d_core.view") / "vendor"
     program = "\n".join(_text(assets / "js" / f"{part}.js") for part in PROGRAM)
+    style, three = _text(assets / "view.css"), _text(vendor / "three.min.js")
+    try:
+        text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    except ValueError:  # of a result that no run of ours has left behind
+        raise ResultError(
+            "the result holds numbers that are not finite: no page shows it"
+        ) from None
     parts = {
         "title": html.escape(str(data["about"]["title"])),
-        "style": _text(assets / "view.css"),
+        "scripts": f"{_hash(three)} {_hash(program)}",
+        "styles": _hash(style),
+        "style": style,
         "licence": html.escape(_text(vendor / "LICENSE").strip()),
-        "three": _text(vendor / "three.min.js"),
-        "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
+        "three": three,
+        "data": text.replace("<", "\\u003c"),
         "program": program,
     }
     return _filled(_text(assets / "page.html"), parts)
+
+
+def _hash(text: str) -> str:
+    """What a content security policy names a script or a style by: no other one is run."""
+    digest = hashlib.sha256(text.encode("utf-8")).digest()
+    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
 
 
 def _filled(template: str, parts: dict[str, str]) -> str:

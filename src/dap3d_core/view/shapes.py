@@ -1,6 +1,7 @@
 """Shapes of the scene as marks, lines and meshes."""
 
 from collections.abc import Sequence
+from io import BytesIO
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,10 @@ from dap3d_core.view.marks import Mark, packed, plain, turned_to
 
 #: Meshes of more triangles are not put into a page.
 MOST_TRIANGLES = 300_000
+#: Nor are further ones, once it holds so many triangles.
+MOST_IN_ALL = 1_000_000
+#: Nor are larger files read, bytes: that many triangles as text.
+LARGEST_MESH = 100 * 2**20
 #: Ground's shapes where they name no colour.
 GROUND_COLOR = "#9aa3ad"
 
@@ -30,7 +35,8 @@ class Drawn:
     Attributes:
         marks: solids.
         lines: ``body``, ``points`` (k, 3), ``color``, ``owner``.
-        meshes: the same with ``at``, ``q``, ``scale``, packed ``vertices`` and ``triangles``.
+        meshes: the same with ``at``, ``q``, ``scale``, ``count`` of triangles, packed ``vertices``
+            and ``triangles``.
         corners: (body, place) pairs that the shapes reach to, for the camera.
         bodies: indices of the bodies that have a shape.
         notes: meshes that could not be had, and why.
@@ -62,15 +68,17 @@ def drawn(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Drawn:
 def _add(found: Drawn, shape: Shape, hue: str, folder: Path | None) -> None:
     values, about = shape.values, {"color": hue, "owner": shape.name}
     if shape.type == "mesh":
-        mesh = _mesh(folder, values["file"])
+        full = sum(mesh["count"] for mesh in found.meshes) >= MOST_IN_ALL
+        words = f"the page holds {MOST_IN_ALL} triangles already, or more"
+        mesh = words if full else _mesh(folder, values["file"])
         if isinstance(mesh, str):
             found.notes.append(f"shape {shape.name} is not drawn: {mesh}")
             return
         vertices, triangles = mesh
         placed = {"body": shape.body, "at": values["at"], "q": values["p"]}
         found.meshes.append(
-            {**placed, **about, "scale": values["scale"], "vertices": packed(vertices),
-             "triangles": packed(triangles, "<u4")}
+            {**placed, **about, "scale": values["scale"], "count": len(triangles),
+             "vertices": packed(vertices), "triangles": packed(triangles, "<u4")}
         )  # fmt: skip
         reached = values["scale"] * np.array([vertices.min(axis=0), vertices.max(axis=0)])
         found.corners += _corners(shape.body, values["at"], values["p"], reached)
@@ -117,11 +125,13 @@ def _mesh(folder: Path | None, name: str) -> tuple[Floats, Any] | str:
     except ImportError:
         return "reading meshes needs trimesh: pip install 'dap3d[mesh]'"
     try:
-        with path.open(
-            "rb"
-        ) as file:  # from a stream: materials, which are other files, are not read
-            kind = path.suffix[1:].lower()
-            mesh: Any = trimesh.load(file, file_type=kind, force="mesh", skip_materials=True)
+        with path.open("rb") as file:
+            data = file.read(LARGEST_MESH + 1)
+        if len(data) > LARGEST_MESH:
+            return f"{name} has more than {LARGEST_MESH >> 20} MiB; save fewer triangles, or binary"
+        kind = path.suffix[1:].lower()
+        # from memory: materials, which are other files, are not read
+        mesh: Any = trimesh.load(BytesIO(data), file_type=kind, force="mesh", skip_materials=True)
         vertices = np.asarray(mesh.vertices, dtype=np.float64)
         triangles = np.asarray(mesh.faces, dtype=np.int64)
     except Exception as error:  # a broken file makes a reader fail in any way

@@ -18,7 +18,10 @@ const uint32 = (text) => new Uint32Array(bytes(text));
 function make(tag, text = "", attributes = {}, ...children) {
   const made = document.createElement(tag);
   if (text !== "") made.textContent = text;
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name === "style") made.style.cssText = value; // as an attribute the page's policy forbids it
+    else made.setAttribute(name, value);
+  }
   made.append(...children);
   return made;
 }

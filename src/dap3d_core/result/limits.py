@@ -1,0 +1,129 @@
+"""What a result file may claim: asked before memory is taken for it, and before it is believed."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from dap3d_core.result.errors import ResultError
+from dap3d_core.result.subject import Subject
+
+#: Arrays of so many bytes are read whatever the size of the file; beyond, a file holds at least one
+#: byte for so many. dap3d writes numbers as they are; other programs may press them together.
+ALWAYS, MOST_PRESSED = 64 * 2**20, 64
+#: Rows of a joint.
+MOST_ROWS = 1000
+
+
+def check_claims(file: Path, dataset: Any) -> None:
+    """Refuse a file that says it holds far more numbers than fit into it.
+
+    A few bytes can claim 1e12 entries: what was never written reads as a filling value.
+
+    Args:
+        file: where it lies.
+        dataset: the open netCDF4.Dataset.
+
+    Raises:
+        ResultError: it claims too much; says how much.
+    """
+    shapes = [variable.shape for variable in dataset.variables.values()]
+    check_shapes(file, shapes, file.stat().st_size)
+
+
+def check_shapes(file: Path, shapes: Iterable[tuple[int, ...]], byte_count: int) -> None:
+    """The same for arrays of these shapes, of 8 bytes a number, and a size of the file in bytes."""
+    claimed = 8 * sum(math.prod(shape) for shape in shapes)
+    if claimed > max(ALWAYS, MOST_PRESSED * byte_count):
+        raise ResultError(
+            f"cannot read {file}: it claims {claimed / 2**30:.3g} GiB of numbers and has "
+            f"{byte_count / 2**20:.3g} MiB; it is damaged, or made to fill the memory"
+        )
+
+
+def check_attributes(found: Mapping[str, Any]) -> None:
+    """Whether what a file says of its run has the form in which dap3d writes it.
+
+    Args:
+        found: the global attributes, JSON already read.
+
+    Raises:
+        ValueError: names the first that has not.
+    """
+    for name, (fits, what) in _FORMS.items():
+        if not fits(found[name]):
+            raise ValueError(f"{name} should be {what}")
+
+
+def check_subject(subject: Subject) -> None:
+    """Whether names are texts of a line, and indices and counts lie within what there is.
+
+    Raises:
+        ValueError: names what does not.
+    """
+    for kind in ("body", "joint", "point"):
+        for name in getattr(subject, f"{kind}_names"):
+            if not name or not name.isprintable():
+                raise ValueError(f"{name!r} is no name of a {kind}")
+    if not all(0 <= k <= subject.body_count for k in subject.point_body.tolist()):
+        raise ValueError("point_body names a body that there is not")
+    if not all(0 <= k <= MOST_ROWS for k in subject.joint_rows.tolist()):
+        raise ValueError("joint_rows are no numbers of rows")
+
+
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float) and abs(value) < 1e300
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(v, str) for v in value)
+
+
+def _is_plain(value: Any, depth: int = 3) -> bool:
+    """A setting: a number, a word, a truth value, nothing, or a short nest of them."""
+    if isinstance(value, (list, dict)):
+        parts = value.values() if isinstance(value, dict) else value
+        return depth > 0 and all(_is_plain(v, depth - 1) for v in parts)
+    return value is None or isinstance(value, (bool, str)) or _is_number(value)
+
+
+def _are_settings(value: Any) -> bool:
+    numbers = ("t_end", "dt", "rtol", "atol", "step")
+    return (
+        isinstance(value, dict)
+        and _is_plain(value)
+        and all(value.get(n) is None or _is_number(value[n]) for n in numbers)
+        and type(value.get("rank", 0)) is int
+    )
+
+
+def _are_numbers(value: Any) -> bool:
+    return isinstance(value, dict) and all(_is_number(v) for v in value.values())
+
+
+def _are_events(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(v, dict) and _is_event(v) for v in value)
+
+
+def _is_event(value: Mapping[str, Any]) -> bool:
+    changes = value.get("changes", {})
+    return (
+        isinstance(value.get("name"), str)
+        and _is_number(value.get("t"))
+        and type(value.get("direction")) is int
+        and isinstance(changes, dict)
+        and all(isinstance(v, dict) and _is_plain(v) for v in changes.values())
+    )
+
+
+def _are_versions(value: Any) -> bool:
+    return isinstance(value, dict) and all(isinstance(v, str) for v in value.values())
+
+
+_FORMS: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "notes": (_are_texts, "a list of texts"),
+    "settings": (_are_settings, "a table of numbers, words and truth values"),
+    "statistics": (_are_numbers, "a table of numbers"),
+    "versions": (_are_versions, "a table of texts"),
+    "events": (_are_events, "a list of tables with name, t, direction"),
+}

@@ -1,0 +1,82 @@
+"""Whether there is room for what a run will report: asked before it begins."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from dap3d_core.scene import MISSING, Mistake, SceneError
+
+#: Reports of less are not worth a look at the machine, bytes.
+ALWAYS = 64 * 2**20
+#: A result is there twice, in memory or on the disk, while it is put together.
+COPIES = 2
+
+
+def check_room(
+    rows: int, numbers: int, dt: float | None, output: str | os.PathLike[str] | None
+) -> None:
+    """Refuse a run whose reports do not fit: on the disk where they are written, else in memory.
+
+    Args:
+        rows: reported instants.
+        numbers: of each.
+        dt: reporting step, s, as it was asked for.
+        output: the file that takes them, or None.
+
+    Raises:
+        SceneError: says how much there would be, how much room there is, and what to do.
+    """
+    needed = 8 * rows * numbers * COPIES
+    if needed <= ALWAYS:
+        return
+    if output is not None:
+        place, room = "on the disk", _free_disk(Path(output).parent)
+    else:
+        place, room = "in memory", _free_memory()
+    if room is None or needed <= room:
+        return
+    what = (
+        f"the run would report {rows:,} instants of {numbers:,} numbers, {_size(needed)}; "
+        f"there is room for {_size(room)} {place}"
+    )
+    # with half of the room for all else
+    remedy = f"report less often, with a dt {2.0 * needed / max(room, 1):.3g} times as long or more"
+    if dt is not None:
+        remedy = f"give dt of at least {2.0 * dt * needed / max(room, 1):.3g}"
+    if output is None:
+        remedy += ", or name a file (output=, -o), which takes them as they come"
+    raise SceneError([Mistake("dt", MISSING if dt is None else dt, what, remedy=remedy)])
+
+
+def _free_disk(folder: Path) -> int | None:
+    try:
+        return shutil.disk_usage(folder).free
+    except OSError:  # the writer will say what is wrong with the folder
+        return None
+
+
+def _free_memory() -> int | None:
+    """Bytes that processes may still take; None where the system does not say."""
+    return min(_bounds(), default=None)
+
+
+def _bounds() -> Iterator[int]:
+    with suppress(AttributeError, OSError, ValueError):  # not on every system
+        yield os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    with suppress(OSError, ValueError, StopIteration):
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        yield next(1024 * int(x.split()[1]) for x in lines if x.startswith("MemAvailable:"))
+    with suppress(OSError, ValueError):  # of a container; ValueError: "max", no limit
+        yield int(Path("/sys/fs/cgroup/memory.max").read_text())
+
+
+def _size(byte_count: float) -> str:
+    return f"{byte_count / 2**30:,.3g} GiB"
+
+
+def row_width(machine: Any) -> int:
+    """Numbers that a run keeps of each instant: time, state, work, and what is reported beside."""
+    return int(2 + 13 * machine.model.body_count + machine.report_size)

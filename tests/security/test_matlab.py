@@ -1,0 +1,137 @@
+"""MATLAB folders that somebody made to run, to take time, or to be given other files."""
+
+import json
+import os
+import time
+
+import pytest
+from support.matlab import SMALL, write
+
+import dap3d_core as dap
+from dap3d_core.cli import main
+from dap3d_core.matlab.statements import MOST_COPIES
+from dap3d_core.scene import SceneError
+
+pytest.importorskip("tree_sitter_matlab")
+
+#: What acts, as a statement of MATLAB.
+ACTS = [
+    "system('touch pwned');", "eval('system(''touch pwned'')');", "!touch pwned",
+    "unix('touch pwned')", "dos('x')", "addpath('/tmp')", "addpath /tmp", "run('other.m')",
+    "feval('system', 'x');", "x = fopen('/etc/passwd');", "load('/etc/passwd')", "cd /",
+    "delete('inBodies.m')", "java.lang.Runtime.getRuntime();", "py.os.system('x');",
+    "web('http://x')", "websave('a', 'http://x');", "x = input('');", "pause(1e9)",
+    "evalin('base', 'x')", "assignin('base', 'x', 1)", "import java.io.*", "f = @system;",
+    "mex x.c", "perl('x.pl')", "x = zeros(1e9);", "x = ones(1e5, 1e5);", "x = eye(1e9, 1);",
+    "while true, x = 1; end", "for k = 1:1e12, x = k; end", "x = 1:1e12;",
+    "function f(), f(); end", "x = inBodies;", "x = 10^308 * 10;", "x = 1e400;",
+    "x(1e12) = 1;", "Bodies(1e12) = B1;", "x = factorial(1e9);", "x = repmat(1, 1e9);",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("line", ACTS)
+def test_what_acts_is_reported_and_not_done(tmp_path, monkeypatch, line):
+    """With file and line; the rest of the folder is read."""
+    monkeypatch.chdir(tmp_path)
+    folder = write(tmp_path / "model", inBodies=f"{SMALL['inBodies.m']}{line}\n")
+    started = time.process_time()
+    with pytest.raises(SceneError) as caught:
+        dap.import_matlab(folder)
+    assert time.process_time() - started < 5.0
+    assert any("inBodies.m:4" in str(m) for m in caught.value.mistakes), str(caught.value)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["model"]
+
+
+#: What an honest reader would be busy with for minutes or hours.
+LONG = {
+    "copies": "B = Body_struct;\nBodies = [B B B B B B B B];\n"
+    + "Bodies = [Bodies Bodies];\n" * 10
+    + "x = Bodies;\n" * 60_000,
+    "products": "x = zeros(100);\n" + "x = x*x;\n" * 60_000,
+    "dots": "a." * 200_000 + "\n",
+    "comments": "%{\n" * 100_000,
+    "brackets": "x = " + "(" * 20_000 + "1" + ")" * 20_000 + ";\n",
+    "nested": "x = [" * 100_000 + "]" * 100_000 + ";\n",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LONG)
+def test_a_file_that_takes_for_ever(tmp_path, name):
+    started = time.process_time()
+    with pytest.raises(SceneError):
+        dap.import_matlab(write(tmp_path / "model", inBodies=LONG[name]))
+    assert time.process_time() - started < 60.0
+
+
+@pytest.mark.parametrize(("name", "said"), [("products", "1000000"), ("comments", "comments of")])
+def test_a_file_that_takes_for_ever_is_refused_at_once(tmp_path, name, said):
+    folder = write(tmp_path / "model", inBodies=LONG[name][: 4 * 1024].rpartition("\n")[0])
+    with pytest.raises(SceneError, match=said):
+        dap.import_matlab(folder)
+
+
+@pytest.mark.slow
+def test_too_many_copies_are_said_once(tmp_path):
+    text = "B = Body_struct;\nBodies = [B B];\n" + "Bodies = [Bodies Bodies];\n" * 9
+    text += "x = Bodies;\n" * (MOST_COPIES // 1000)
+    with pytest.raises(SceneError, match="structures are copied") as caught:
+        dap.import_matlab(write(tmp_path / "model", inBodies=text))
+    assert sum("are copied" in str(m) for m in caught.value.mistakes) == 1
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no links")
+@pytest.mark.parametrize("name", ["inBodies.m", "inForces.m", "user_force.m"])
+def test_a_link_out_of_the_folder_is_not_followed(tmp_path, capfd, monkeypatch, name):
+    """Above all user_force.m, whose text would stand in a plugin.py."""
+    secret = tmp_path / "secret"
+    secret.write_text("TOPSECRET = 1;\n")
+    user = SMALL["inForces.m"].replace("Forces =", "F = Force_struct; F.type = 'user';\nForces =")
+    folder = write(tmp_path / "model", inForces=user.replace("[S1]", "[S1; F]"))
+    (folder / name).unlink(missing_ok=True)
+    (folder / name).symlink_to(secret)
+    monkeypatch.chdir(tmp_path)
+    assert main(["import-matlab", "model", "--stub"]) == 2
+    out, err = capfd.readouterr()
+    assert "is a link out of the folder" in err
+    assert "TOPSECRET" not in out + err
+    assert not (tmp_path / "plugin.py").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no such files")
+def test_pipes_and_devices(tmp_path):
+    folder = write(tmp_path / "model", inPoints=None, inForces=None)
+    os.mkfifo(folder / "inPoints.m")
+    (folder / "inForces.m").symlink_to("/dev/zero")
+    with pytest.raises(SceneError) as caught:
+        dap.import_matlab(folder)
+    assert sum("not a regular file" in str(m) for m in caught.value.mistakes) == 2
+
+
+def test_very_many_files(tmp_path, capfd, monkeypatch):
+    folder = write(tmp_path / "model")
+    for k in range(300):
+        (folder / f"x{k}.m").write_text("system('x')")
+    monkeypatch.chdir(tmp_path)
+    assert main(["import-matlab", "model", "--json"]) == 0
+    assert len(json.loads(capfd.readouterr().out)["files"]) < 100
+
+
+HIDDEN = "'''\n\"\"\"\n\rimport os; os.system('touch pwned')\x0b\x0c\u2028\u2029\x85import os\\\n"
+
+
+def test_the_force_of_the_user_stays_a_comment(tmp_path, monkeypatch):
+    """Whatever user_force.m holds, the stub is a module that does nothing but define a type."""
+    import ast
+
+    user = SMALL["inForces.m"].replace("Forces =", "F = Force_struct; F.type = 'user';\nForces =")
+    folder = write(tmp_path / "model", inForces=user.replace("[S1]", "[S1; F]"))
+    text = HIDDEN + "% {text} {0} %s\n# -*- coding: rot13 -*-\nBodies(1)\n"
+    (folder / "user_force.m").write_text(text, encoding="utf-8")
+    _, report = dap.import_matlab(folder)
+    tree = ast.parse(report.stub)
+    kinds = {type(node) for node in tree.body}
+    assert kinds == {ast.Expr, ast.ImportFrom, ast.Assign, ast.ClassDef, ast.FunctionDef}
+    modules = {n.module for n in tree.body if isinstance(n, ast.ImportFrom)}
+    assert modules == {"dap3d_core.interface", "dap3d_core.kernels"}
+    assert not [n for n in ast.walk(tree) if isinstance(n, ast.Import)]

@@ -1,0 +1,161 @@
+"""Scene files that are made to take time, memory or files that are not theirs."""
+
+import os
+import time
+import tomllib
+
+import pytest
+
+import dap3d_core as dap
+from dap3d_core.scene import SceneError, check
+from dap3d_core.scene.reading import LARGEST_FILE, MOST_PARTS
+from dap3d_core.scene.shapes import mesh_file
+from dap3d_core.scene.values import Fault
+
+BODY = "[bodies.b]\nmass = 1.0\nJp = [1.0, 1.0, 1.0]\n"
+#: Seconds of this process that a refusal may take; without the limits these take minutes.
+SOON = 10.0
+
+
+def refusal(path, text=None):
+    """What is said of a scene, and that it is said soon."""
+    if text is not None:
+        path.write_text(text, encoding="utf-8")
+    started = time.process_time()
+    with pytest.raises(SceneError) as caught:
+        check(dap.load(path), dap.load_registry())
+    said = str(caught.value)
+    assert time.process_time() - started < SOON
+    return said
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "a." * 100_000 + "a = 1",
+        "[" + "a . " * 100_000 + "a]",
+        "[[" + "a." * 100_000 + "a]]",
+        "x = {b = 1, " + '"a\\"".' * 100_000 + "a = 1}",
+        "x = [{" + "'a'." * 100_000 + "a = 1}]",
+        "'a'\t.\t" * 100_000 + "a = 1",
+    ],
+    ids=["key", "table", "list", "inline", "in a list", "quoted"],
+)
+def test_keys_of_very_many_parts(tmp_path, line):
+    """Python's reader takes the square of their number in memory: 200 kB would fill it."""
+    said = refusal(tmp_path / "scene.toml", f"{BODY}\n{line}\n")
+    assert f"scene.toml:5: a key of more than {MOST_PARTS} parts" in said
+
+
+@pytest.mark.parametrize("count", [1, 4, MOST_PARTS - 1])
+def test_keys_of_few_parts_are_keys(tmp_path, count):
+    said = refusal(tmp_path / "scene.toml", BODY + "[joints." + "a." * (count - 1) + "a]\n")
+    assert "a key of more than" not in said
+
+
+@pytest.mark.parametrize("run", ["x" * 3_000_000, "{" * 900, '\\"' * 500_000, ", " * 500_000,
+                                 "a " * 500_000, "1.0, " * 200_000])  # fmt: skip
+def test_long_texts_are_no_keys(tmp_path, run):
+    """The search for such keys takes no more than the length of the text."""
+    text = f'[scene]\ndescription = "{run}"\n{BODY}'
+    tomllib.loads(text)
+    (tmp_path / "scene.toml").write_text(text)
+    started = time.process_time()
+    check(dap.load(tmp_path / "scene.toml"), dap.load_registry())
+    assert time.process_time() - started < SOON
+
+
+@pytest.mark.parametrize("text", ["a = " + "[" * 100_000, "a = " + "{a = " * 100_000])
+def test_deep_nests(tmp_path, text):
+    assert "nested too deeply" in refusal(tmp_path / "scene.toml", text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        BODY.replace("mass = 1.0", "mass = {}"),
+        BODY.replace("mass = 1.0", "{0} = 1\nmass = [{0}]"),
+        BODY + "[scene]\nname = {}\n",
+        BODY + "[scene]\nschema = {}\n",
+        BODY + "[simulation]\nt_end = {}\n",
+        BODY + '[forces.g]\ntype = "weight"\ngravity = {}\n',
+        BODY + "other = {}\n",
+    ],
+)
+def test_huge_numbers(tmp_path, text, capsys):
+    """Python refuses to write out a number of thousands of digits, which a hexadecimal one has."""
+    from dap3d_core.cli import main
+
+    path = tmp_path / "scene.toml"
+    huge = "0x" + "f" * 10_000
+    assert "bits" in refusal(path, text.replace("{}", huge).replace("{0}", huge))
+    assert main(["check", str(path), "--json"]) == 2
+    assert "unexpected" not in capsys.readouterr().err
+
+
+def test_a_million_digits(tmp_path):
+    assert "not valid TOML" in refusal(tmp_path / "scene.toml", "a = " + "1" * 1_000_000)
+
+
+def test_very_many_unknown_keys(tmp_path):
+    text = BODY + "".join(f"k{k} = 1\n" for k in range(20_000))
+    assert "more mistakes" in refusal(tmp_path / "scene.toml", text)
+
+
+def test_a_file_too_large_is_not_read(tmp_path):
+    path = tmp_path / "scene.toml"
+    with path.open("wb") as file:
+        file.truncate(LARGEST_FILE + 1)
+    assert "at most 64 MiB" in refusal(path)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no such files")
+def test_what_is_no_file_is_not_opened(tmp_path):
+    """A pipe would wait for ever, a device never end."""
+    os.mkfifo(tmp_path / "scene.toml")
+    assert "not a regular file" in refusal(tmp_path)
+    (tmp_path / "zero.toml").symlink_to("/dev/zero")
+    assert "not a regular file" in refusal(tmp_path / "zero.toml")
+    for name in ("https://example.org/scene.toml", "file:///etc/passwd", "a\0b"):
+        with pytest.raises(SceneError):
+            dap.load(name)
+
+
+PATHS = ("../x.stl", "/etc/x.stl", "a/../../x.stl", "http://x/x.stl", "file:x.stl", "C:\\x.stl",
+         "\\\\host\\x.stl", "x\0.stl", "x\n.stl", "x.stl/../../y.stl", "~/x.gltf", "x.stl.gz",
+         "/dev/stdin", "x.zip", "", ".", "link.stl", "down/secret.stl", "pipe.stl", "folder.stl",
+         "zero.stl", "\u202elts.x", "x.STL\u0000.png")  # fmt: skip
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no such files")
+@pytest.mark.parametrize("name", PATHS)
+def test_a_mesh_lies_in_the_folder_of_its_scene(tmp_path, name):
+    """No other file becomes part of a page, also not by a link."""
+    folder = tmp_path / "model"
+    (folder / "folder.stl").mkdir(parents=True)
+    (tmp_path / "secret.stl").write_text("solid x")
+    (tmp_path / "x.stl").write_text("solid x")
+    (folder / "link.stl").symlink_to(tmp_path / "secret.stl")
+    (folder / "down").symlink_to(tmp_path)
+    (folder / "zero.stl").symlink_to("/dev/zero")
+    os.mkfifo(folder / "pipe.stl")
+    assert isinstance(mesh_file(folder, name), Fault)
+
+
+def test_a_link_inside_the_folder_is_followed(tmp_path):
+    (tmp_path / "a.stl").write_text("solid x")
+    (tmp_path / "b.stl").symlink_to("a.stl")
+    assert mesh_file(tmp_path, "b.stl") == tmp_path / "b.stl"
+
+
+@pytest.mark.slow
+def test_64_mib_of_names_are_refused_before_the_memory_is_gone(tmp_path):
+    """Some 2e6 bodies that are not right: minutes at most, no failure but mistakes."""
+    resource = pytest.importorskip("resource")
+    count = 400_000
+    text = "".join(f"[bodies.k{k}]\nmass = -1\n" for k in range(count))
+    (tmp_path / "scene.toml").write_text(text)
+    with pytest.raises(SceneError) as caught:
+        check(dap.load(tmp_path / "scene.toml"), dap.load_registry())
+    assert len(caught.value.mistakes) == count
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 6 * 2**20
