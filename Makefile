@@ -42,8 +42,9 @@ test: $(VENV)/.installed-test  ## the quick tests
 test-all: $(VENV)/.installed-docs  ## all tests, the slow verification as well
 	@$(PYTHON) -m pytest -n auto
 
+# A file stays with one worker: its tests share a built site, a browser, reference solutions.
 verify: $(VENV)/.installed-docs  ## the slow verification alone
-	@$(PYTHON) -m pytest -n auto -m slow
+	@$(PYTHON) -m pytest -n auto --dist loadfile --no-loadscope-reorder -m slow
 
 unit-nojit: $(VENV)/.installed-test  ## quick unit tests with kernels as plain Python, and their coverage
 	@NUMBA_DISABLE_JIT=1 $(PYTHON) -m pytest -n auto -m "not slow" --cov --cov-report=term tests/unit

@@ -1,12 +1,11 @@
 """A scene for any registered type, its fields filled at random by what they declare."""
 
-from itertools import product
-
 import numpy as np
 
 from dap3d_core.interface.fields import slot_of, specs_of
 from dap3d_core.model.kinematics import rotation
 from dap3d_core.scene import Scene
+from dap3d_core.testing.subject import own_values
 
 
 def cases(registry, kind):
@@ -18,7 +17,7 @@ def cases(registry, kind):
     for row in registry.listing():
         if row.kind == kind and row.state == "ok":
             examined = registry.get(kind, row.keyword)
-            own = _own_values(examined)
+            own = own_values(examined)
             found += [] if own is None else [(row.keyword, own)]
             found += [(row.keyword, dict(conditions)) for conditions, _ in examined.variants]
     return found
@@ -27,22 +26,6 @@ def cases(registry, kind):
 def case_names(found):
     """Names of cases for reports: ``disk[slip=nz]``."""
     return [f"{k}{[f'{n}={v}' for n, v in values.items()] or ''}" for k, values in found]
-
-
-def _own_values(examined):
-    """Values of choices for which no variant takes the type's place; None where there are none."""
-    specs = specs_of(examined.type)
-    asked = {n for conditions, _ in examined.variants for n in conditions}
-    ways = [
-        [(n, w) for w in specs[n].choices or (False,) * (not specs[n].required)]
-        for n in specs
-        if n in asked
-    ]
-    for values in map(dict, product(*ways)):
-        given = {n: v or None if specs[n].kind == "function" else v for n, v in values.items()}
-        if examined.chosen(given) is examined:
-            return values
-    return None
 
 
 def scene_for(examined, rng, *, ground=None, values=None):

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from numba import njit
-from numba.typed import List
 from scipy.integrate import solve_ivp
 from unit import test_integrators_problems as toys
 from unit.test_integrators_problems import finish, kepler, kepler_f, kepler_orbit, slope
@@ -11,19 +10,13 @@ from unit.test_integrators_problems import finish, kepler, kepler_f, kepler_orbi
 from dap3d_core.integrators import Status
 from dap3d_core.integrators import adams_formulas as adams
 from dap3d_core.integrators.adams_integration import AdamsIntegration
-from dap3d_core.kernels.cache import jit_is_on
-from dap3d_core.kernels.lists import function_type, loop_list
+from dap3d_core.kernels.lists import loop_list
 
 
 def start(rhs, y0, times, project=toys.no_constraint, report=toys.plain_report, **options):
     """An integration of a toy; its calls are counted in ``.calls``."""
-    functions = [rhs, project, report]
-    if jit_is_on():
-        functions = List.empty_list(function_type(toys.STEP))
-        for function in (rhs, project, report):
-            functions.append(toys.first_class(function))
-    calls = np.zeros(3)
-    run = AdamsIntegration(functions, (calls,), loop_list([]), y0, times, **options)
+    functions, calls = toys.first_class(rhs, project, report), np.zeros(3)
+    run = AdamsIntegration(functions, toys.counting(calls), loop_list([]), y0, times, **options)
     run.calls = calls
     return run
 
@@ -172,7 +165,7 @@ def test_a_step_that_is_taken_back_leaves_no_trace(count):
 
 def leaving(t, y, out, system, loops):
     """Stays on the unit circle, and leaves it the faster the farther off it is."""
-    system[0][0] += 1
+    system.force[0] += 1
     grow = 3.0 * (y[0] * y[0] + y[1] * y[1] - 1.0)
     out[0], out[1] = -y[1] + grow * y[0], y[0] + grow * y[1]
 

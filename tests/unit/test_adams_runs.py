@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from support import problems
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.kernels.cache import jit_is_on
 
 
 def test_a_chain_moves_as_with_another_method():
@@ -21,6 +21,7 @@ def test_a_chain_moves_as_with_another_method():
     assert ours.stats.projections > ours.stats.steps  # accepted and reported states
 
 
+@long_in_plain_python
 def test_steady_precession_of_a_top():
     """G4: the closed form of the motion; fewer right-hand sides than dop853."""
     scene = problems.heavy_top(0.5, 200.0, _precession(0.5, 200.0))
@@ -41,7 +42,7 @@ def _precession(theta, spin, A=0.02, C=0.005, moment=0.1 * 9.81):
     return (b - np.sqrt(b * b - 4 * a * moment)) / (2 * a)
 
 
-@pytest.mark.skipif(not jit_is_on(), reason="a minute in plain Python")
+@long_in_plain_python
 def test_errors_follow_the_tolerances():
     """Andrews' mechanism with 100 reports, beside dop853 at 1e-12: no setting errs out of its turn.
 

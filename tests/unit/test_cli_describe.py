@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner
 from support.derived_types import Cam
 from support.own_types import registry_of
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.cli.example import example_of
@@ -24,6 +25,7 @@ def described(keyword, *options, width=80):
     return done.output
 
 
+@long_in_plain_python
 @each
 def test_the_example_of_every_type_runs(kind, keyword, tmp_path):
     """Written to a file as it is shown, it is simulated to its end; its element is of the type."""

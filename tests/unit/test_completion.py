@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from support.plain import in_another_process
 from unit.test_result import circling
 
 from dap3d_core.result import UnknownNameError, find, names_of
@@ -81,6 +82,7 @@ def offered(folder, *words):
     return [tuple(item.split(",", 1)) for item in done.stdout.splitlines()]
 
 
+@in_another_process
 def test_a_shell_is_told(folder):
     assert offered(folder, "plot", "a.nc", "bob.r.") == [
         ("plain", f"bob.r.{part}") for part in ("x", "y", "z", "norm")

@@ -275,11 +275,23 @@ def test_what_the_second_thread_raises_comes_out(large):
 @compiled_code
 def test_one_thread_can_be_asked_for(monkeypatch):
     """DAP3D_THREADS=1, and one core alone."""
-    monkeypatch.setenv("DAP3D_THREADS", "1")
-    assert threads_allowed() == 1
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 1}, raising=False)
+    for asked, threads in (("1", 1), (" 1 ", 1), ("2", 2), ("16", 2), ("", 2)):
+        monkeypatch.setenv("DAP3D_THREADS", asked)
+        assert threads_allowed() == threads
     monkeypatch.delenv("DAP3D_THREADS")
     monkeypatch.setattr("os.sched_getaffinity", lambda _: {0}, raising=False)
     assert threads_allowed() == 1
+
+
+@pytest.mark.parametrize("asked", ["two", "0", "-3", "2.5", "1,2", "²"])
+def test_what_is_no_number_of_threads_is_refused(monkeypatch, asked):
+    """Where a scene may have a second thread: what was said, and what is allowed."""
+    monkeypatch.setattr(Machine, "halved", True)
+    monkeypatch.setenv("DAP3D_THREADS", asked)
+    words = f"DAP3D_THREADS is '{asked}'; it must be a whole number from 1"
+    with pytest.raises(dap.SimulationError, match=words):
+        dap.compile(chain(2), method="standard")
 
 
 @pytest.mark.slow

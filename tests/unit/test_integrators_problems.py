@@ -2,103 +2,108 @@
 
 import numpy as np
 import pytest
-from numba import njit, types
-from numba.typed import List
+from numba import njit
 
+from dap3d_core.assembly.system import System, step_functions
 from dap3d_core.integrators import METHODS, Integration, Status
 from dap3d_core.kernels.cache import jit_is_on
-from dap3d_core.kernels.lists import VECTOR, function_type, loop_list, step_signature
+from dap3d_core.kernels.lists import loop_list
 
-# The system is a plain tuple of one array, which counts the calls of rhs, project and report: a
-# class of this file, written into the core's cache index, would be looked for by every process.
-
-STEP = step_signature(types.UniTuple(VECTOR, 1))
+# The system is an empty one of the core, whose integrators are compiled for it already; its
+# ``force`` counts the calls of rhs, project and report.
 
 
 def oscillator(t, y, out, system, loops):
     """y'' = -y in pairs; further components are the integral of the first."""
-    system[0][0] += 1
+    system.force[0] += 1
     out[0], out[1] = y[1], -y[0]
     for i in range(2, y.size):
         out[i] = 1e6 * y[0]
 
 
 def kepler(t, y, out, system, loops):
-    system[0][0] += 1
+    system.force[0] += 1
     r3 = (y[0] * y[0] + y[1] * y[1]) ** 1.5
     out[0], out[1], out[2], out[3] = y[2], y[3], -y[0] / r3, -y[1] / r3
 
 
 def time_dependent(t, y, out, system, loops):
     """y = exp(sin t) by two roads."""
-    system[0][0] += 1
+    system.force[0] += 1
     out[0] = y[0] * np.cos(t)
     out[1] = np.exp(np.sin(t)) * np.cos(t)
 
 
 def nan_after_one(t, y, out, system, loops):
-    system[0][0] += 1
+    system.force[0] += 1
     out[0] = np.cos(t) if t <= 1.0 else np.nan
 
 
 def blow_up(t, y, out, system, loops):
     """y = 1 / (1 - t)."""
-    system[0][0] += 1
+    system.force[0] += 1
     out[0] = y[0] * y[0]
 
 
 def spiral(t, y, out, system, loops):
     """Turns at unit rate and grows; on the unit circle it is (cos t, sin t)."""
-    system[0][0] += 1
+    system.force[0] += 1
     out[0], out[1] = -y[1] + 0.1 * y[0], y[0] + 0.1 * y[1]
 
 
 def no_constraint(t, y, out, system, loops):
-    system[0][1] += 1
+    system.force[1] += 1
     out[0] = 0.0
 
 
 def circle(t, y, out, system, loops):
-    system[0][1] += 1
+    system.force[1] += 1
     r = np.sqrt(y[0] * y[0] + y[1] * y[1])
     y[0], y[1] = y[0] / r, y[1] / r
     out[0] = 1.0 if abs(r - 1.0) > 1e-14 else 0.0
 
 
 def circle_until_one(t, y, out, system, loops):
-    system[0][1] += 1
+    system.force[1] += 1
     out[1] = 1.0 if t > 1.0 else 0.0
 
 
 def plain_report(t, y, out, system, loops):
-    system[0][2] += 1
+    system.force[2] += 1
     for i in range(out.size):
         out[i] = (i + 1) * t * y[0]
 
 
 def report_until_one(t, y, out, system, loops):
-    system[0][2] += 1
+    system.force[2] += 1
     out[0] = 1.0 if t < 1.0 else np.inf
 
 
 _compiled = {}
 
 
-def first_class(function):
-    if function not in _compiled:
-        _compiled[function] = njit(STEP, error_model="numpy")(function)
-    return _compiled[function]
+def first_class(*functions):
+    """The list of functions that an integrator takes."""
+    for function in functions if jit_is_on() else ():
+        if function not in _compiled:
+            _compiled[function] = njit(error_model="numpy")(function)
+    return step_functions(*(_compiled.get(function, function) for function in functions))
+
+
+def counting(calls):
+    """A system without bodies that counts calls."""
+    empty = {
+        name: None if dtype is None else np.zeros((0,) * type_.ndim, dtype)
+        for name, type_, dtype in System.type_of().expected
+    }
+    return System(**empty | {"force": calls})
 
 
 def start(name, rhs, y0, times, project=no_constraint, report=plain_report, **options):
     """An integration of a toy; its calls are counted in ``.calls``."""
-    functions = [rhs, project, report]
-    if jit_is_on():
-        functions = List.empty_list(function_type(STEP))
-        for function in (rhs, project, report):
-            functions.append(first_class(function))
-    calls = np.zeros(3)
-    run = Integration(METHODS[name], functions, (calls,), loop_list([]), y0, times, **options)
+    functions, calls = first_class(rhs, project, report), np.zeros(3)
+    system = counting(calls)
+    run = Integration(METHODS[name], functions, system, loop_list([]), y0, times, **options)
     run.calls = calls
     return run
 
@@ -150,5 +155,5 @@ def test_answers_solve_their_problems(rhs, solution):
     """The central difference of each solution is what its right-hand side says."""
     t, h = 0.37, 1e-5
     out = np.zeros(len(solution(t)))
-    rhs(t, solution(t), out, (np.zeros(3),), None)
+    rhs(t, solution(t), out, counting(np.zeros(3)), None)
     assert np.allclose((solution(t + h) - solution(t - h)) / (2 * h), out, rtol=0, atol=1e-8)

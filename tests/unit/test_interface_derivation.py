@@ -25,11 +25,22 @@ from support.derived_types import (
 )
 from support.motions import Motion, derivative
 from support.own_types import registry_of
+from support.plain import in_another_process
 from support.process import REPOSITORY, run
 from support.scenes import scene_for
 
 from dap3d_core.formulations.machine import Machine
-from dap3d_core.interface import Joint, PluginError, Point, examine, function, point
+from dap3d_core.interface import (
+    Joint,
+    PluginError,
+    Point,
+    Vector,
+    examine,
+    function,
+    point,
+    vector,
+)
+from dap3d_core.kernels import dot
 from dap3d_core.model import build_model
 from dap3d_core.model.kinematics import rotation, split
 from dap3d_core.registry import load_registry
@@ -158,7 +169,8 @@ def test_a_function_by_its_value_alone_has_its_derivatives():
 
 
 def test_what_cannot_be_derived_is_refused_with_a_remedy():
-    """A branch by if, mathematics from elsewhere, a form that is not linear, a row without C."""
+    """A branch by if, mathematics from elsewhere, a form that is not linear, a row without C,
+    a field with the name of a velocity that is needed."""
 
     class Base(Joint):
         keyword, rows = "wrong", 1
@@ -185,6 +197,12 @@ def test_what_cannot_be_derived_is_refused_with_a_remedy():
         def C(r_P_i):
             return ()
 
+    class Hidden(Base):
+        v_i: Vector = vector()
+
+        def C(r_i, v_i):
+            return dot(r_i, r_i) - v_i[0]
+
     class Third(Base):
         function: str = function()
 
@@ -196,6 +214,7 @@ def test_what_cannot_be_derived_is_refused_with_a_remedy():
         (Elsewhere, "from dap3d_core.kernels"),
         (Quadratic, "row 1 of C_dot is not linear in the velocities"),
         (Nothing, "does not define C_dot"),
+        (Hidden, "gamma needs v_i, the velocity of the body, whose name a field has taken"),
         (Third, "how f_ddot changes is not known"),
     ]:
         with pytest.raises(PluginError, match=words):
@@ -225,6 +244,7 @@ print("sympy" in sys.modules)
 """
 
 
+@in_another_process
 def test_sympy_is_imported_for_the_first_derivation_alone(tmp_path):
     """Types with their own formulas never need it, derived ones not when they are in the cache."""
     here = {"PYTHONPATH": os.pathsep.join([str(REPOSITORY / "tests"), *sys.path])}
@@ -243,6 +263,7 @@ print(*(text for text in texts if "spindle" in text))
 """
 
 
+@in_another_process
 def test_a_derivation_does_not_depend_on_what_was_before(tmp_path):
     """The same text alone, after others, and with other hashes: so runs repeat to the last bit."""
     here = {"PYTHONPATH": os.pathsep.join([str(REPOSITORY / "tests"), *sys.path])}

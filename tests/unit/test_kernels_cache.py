@@ -1,4 +1,7 @@
-"""Compiled code is kept under a digest of all it was made from: never stale, never made twice."""
+"""Compiled code is kept under a digest of all it was made from: never stale, never made twice.
+
+That a second run of a model compiles nothing: tests/e2e/test_run.py.
+"""
 
 import shutil
 
@@ -54,18 +57,6 @@ force = np.zeros(12)
 call_loop(loop_list([loop]), 0, 0.0, arrays, np.array([0, 0, 1]), force, force, force)
 print(force[6], len(compiled_here))
 """
-#: Runs a pendulum and prints its last state, and how many functions were compiled on the way.
-PENDULUM = """
-from numba.core import event
-compiled = []
-class Listener(event.Listener):
-    def on_start(self, e): compiled.append(e.data["dispatcher"].__name__)
-    def on_end(self, e): pass
-with event.install_listener("numba:compile", Listener()):
-    import dap3d_core as dap
-    result = dap.simulate(dap.load("pen1"), t_end=0.05, dt=0.05, integrator="dopri5")
-print(" ".join(x.hex() for x in result.u[-1].tolist()), len(compiled))
-"""
 
 
 def write_plugin(folder, strength=3.0, offset=0.5):
@@ -87,16 +78,6 @@ def test_an_edited_helper_gives_the_new_number(tmp_path):
     assert run(EVALUATE, cache, cwd=tmp_path) == "9.0 1"
     write_plugin(tmp_path)
     assert run(EVALUATE, cache, cwd=tmp_path) == "6.5 0"
-
-
-@pytest.mark.slow
-def test_a_second_process_compiles_nothing(tmp_path):
-    """The second run of a model finds every function in the cache, and gives the same bits."""
-    first = run(PENDULUM, tmp_path).split()
-    second = run(PENDULUM, tmp_path).split()
-    assert int(first.pop()) > 0
-    assert second.pop() == "0"
-    assert first == second
 
 
 @pytest.mark.slow

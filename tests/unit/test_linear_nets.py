@@ -101,7 +101,7 @@ def test_trees_are_not_dissected(graph, monkeypatch):
 # ------------------------------------------------------------------ panels
 
 
-@pytest.fixture(params=[0.3, 0.9])
+@pytest.fixture(params=[0.3, 0.9] if jit_is_on() else [0.3])
 def panels_everywhere(request, monkeypatch):
     """Dissection down to four nodes and panels, whatever the size, many zeros in them."""
     monkeypatch.setattr(ordering, "WIDE", 0)

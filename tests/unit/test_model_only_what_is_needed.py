@@ -1,7 +1,10 @@
 """A scene pays for nothing that it does not use: imports and compilations in fresh processes."""
 
 import pytest
+from support.plain import in_another_process
 from support.process import run
+
+pytestmark = in_another_process
 
 MODULES = "import sys; print(' '.join(m for m in sys.modules))"
 HEAVY = {"numpy", "scipy", "numba", "matplotlib", "netCDF4", "xarray"}

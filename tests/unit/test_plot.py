@@ -13,6 +13,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from support.plain import in_another_process
 from unit.test_result import circling, drifting, model_of, result_of
 
 from dap3d_core.plot import FORMATS, plot, save_plot, show_plot
@@ -158,6 +159,7 @@ def test_without_a_display_there_is_no_window(result):
         show_plot(result, "bob.r")
 
 
+@in_another_process
 def test_a_window_shows_the_figure(tmp_path):
     """With a way to show windows that only says what it would show."""
     (tmp_path / "says.py").write_text(
@@ -300,6 +302,7 @@ def test_names_are_shown_as_they_are(tmp_path, name):
     save_plot(result, f"{name}.r", tmp_path / "a.png")
 
 
+@in_another_process
 def test_saving_needs_no_window_and_the_module_can_be_called(tmp_path):
     """pyplot, which opens windows, stays out; dap3d_core.plot(...) works with the module loaded."""
     code = """if True:

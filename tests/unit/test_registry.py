@@ -10,6 +10,7 @@ import textwrap
 from pathlib import Path
 
 import pytest
+from support.plain import in_another_process
 
 from dap3d_core.interface import PluginError
 from dap3d_core.registry import UnknownTypeError, load_registry
@@ -298,6 +299,7 @@ def test_what_a_plugin_changes_in_the_process_is_put_back(install, tmp_path, cap
     assert capsys.readouterr().out == "", "what it prints does not mix with results"
 
 
+@in_another_process
 def test_finding_types_imports_nothing_heavy_and_no_plugin():
     code = """
     import sys

@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 import pytest
 from support import problems
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.report import Report, Run, Setting
@@ -238,6 +239,7 @@ def test_the_recommended_setting_gives_the_motion_that_was_measured(small):
     assert advice.run.error <= 1e-6
 
 
+@long_in_plain_python
 def test_a_run_that_fails_is_a_row_with_its_reason(monkeypatch):
     """A spring of 1e12 N/m with a fixed step far beyond its period of 6 us: it blows up.
 
@@ -281,6 +283,7 @@ def test_redundant_scenes_refuse_the_standard_method_and_go_on():
     assert not found.failed
 
 
+@long_in_plain_python
 def test_expected_numbers_confirm_the_reference_of_a_scene_that_is_as_read():
     """pen1: r.cone and others at t = 1 (models/pen1/expected.toml); a changed scene has none."""
     quick = dict(quick=True, t_end=1.0, dt=1.0, integrators=["dop853"], methods=["standard"])

@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from support.plain import in_another_process
 
 from dap3d_core.formulations.machine import Machine
 from dap3d_core.model import build_model
@@ -352,6 +353,7 @@ def test_versions_name_what_the_numbers_depend_on():
     assert versions["numpy"] == np.__version__
 
 
+@in_another_process
 def test_importing_results_brings_in_no_compiler_and_no_plots():
     code = (
         "import dap3d_core.result, sys, json; print(json.dumps([m for m in"

@@ -8,6 +8,7 @@ import textwrap
 
 import numpy as np
 import pytest
+from support.plain import in_another_process
 from unit.test_result import circling, model_of
 from unit.test_result_files import noisy, run, same_bits
 
@@ -115,6 +116,7 @@ def test_adding_rows_changes_nothing_but_their_places(tmp_path):
     assert bytes(after) == bytes(before)
 
 
+@in_another_process
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 def test_a_killed_run_leaves_a_readable_file(tmp_path):
     """The writer is killed without a chance to close; a fresh process reads all it had reported."""

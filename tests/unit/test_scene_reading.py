@@ -6,6 +6,7 @@ import sys
 import textwrap
 
 import pytest
+from support.plain import in_another_process
 
 import dap3d_core.scene.reading as reading
 from dap3d_core.scene import SceneError, load, shipped_models
@@ -180,6 +181,7 @@ def test_loading_runs_no_code(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+@in_another_process
 def test_loading_imports_nothing_heavy():
     code = """
     import sys

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import simpson
 from support import problems
 from support.own_types import registry_of
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.interface import Body, Force, Function, body, number
@@ -396,6 +397,7 @@ def test_a_motion_that_runs_away_stops_at_the_step_floor():
     assert result.rd[:, 0, 0] == pytest.approx(np.tan(result.t), rel=1e-6)
 
 
+@long_in_plain_python
 def test_a_driver_whose_function_ends_stops_the_run_before_it():
     """The angular velocity is 1 / sqrt(1.05 - t) until then (relative 1e-9: the projection holds
     it), and the run does not step across: the function is named."""
@@ -414,6 +416,7 @@ def test_a_driver_whose_function_ends_stops_the_run_before_it():
 # ------------------------------------------------------------------ constraints and energy
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("model", ["pen2", "fourbar3"])
 def test_projection_holds_at_every_reported_state(model):
     """At rtol 1e-4, between steps too: |C| and |D v - nu| stay at rounding (coordinates of 5 m and
@@ -436,6 +439,7 @@ def test_projection_holds_at_every_reported_state(model):
     assert np.all(worst[False] > 1e-9)
 
 
+@long_in_plain_python
 def test_energy_of_dampers_leaves_the_system():
     """bodies2: the energy lost is the integral of c l_dot^2 over both dampers (Simpson, 0.5 ms: the
     error of 1.4e-7 J at 2 ms falls by 4^4), and the ledger balances."""
@@ -456,6 +460,7 @@ def test_energy_of_dampers_leaves_the_system():
     assert result.ledger["energy"].value < 1e-10
 
 
+@long_in_plain_python
 def test_energy_of_a_driver_enters_the_system():
     """fourbar3: the change of energy is the integral of lambda f_dot of the motor over half a turn
     (Simpson, 1 ms, error below 1e-7 J of 100 J), and the ledger balances."""

@@ -10,32 +10,12 @@ from dap3d_example.point_on_plane import PointOnPlane
 from dap3d_example.point_on_surface import PointOnSurface
 from dap3d_example.screw import Screw
 
-
-@pytest.mark.parametrize("check", checks_for(Screw), ids=str)
-def test_screw(check):
-    check()
+TYPES = (Screw, Gear, PointOnPlane, PointOnSurface, Bushing, Motor)
+CHECKS = [(type_, check) for type_ in TYPES for check in checks_for(type_)]
 
 
-@pytest.mark.parametrize("check", checks_for(Gear), ids=str)
-def test_gear(check):
-    check()
-
-
-@pytest.mark.parametrize("check", checks_for(PointOnPlane), ids=str)
-def test_point_on_plane(check):
-    check()
-
-
-@pytest.mark.parametrize("check", checks_for(PointOnSurface), ids=str)
-def test_point_on_surface(check):
-    check()
-
-
-@pytest.mark.parametrize("check", checks_for(Bushing), ids=str)
-def test_bushing(check):
-    check()
-
-
-@pytest.mark.parametrize("check", checks_for(Motor), ids=str)
-def test_motor(check):
+@pytest.mark.parametrize(
+    "check", [c for _, c in CHECKS], ids=[f"{t.keyword}-{c}" for t, c in CHECKS]
+)
+def test_formulas(check):
     check()

@@ -1,5 +1,6 @@
 """``dap3d resume``: go on with a run that was ended."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 @click.argument("checkpoint", type=click.Path())
 @click.option("-o", "--output", type=click.Path(), metavar="FILE",
               help="Result file; by default that of the run, beside the checkpoint.")  # fmt: skip
-@click.option("--checkpoint", "every", type=Seconds(), metavar="EVERY",
+@click.option("--checkpoint", "every", type=Seconds(), metavar="EVERY", default=math.inf,
               help="Write a checkpoint so often: 90, 5min, 2h.")  # fmt: skip
 @click.option("--model", metavar="MODEL", help="The model whose own types the run uses.")
 @click.option("--allow-code", is_flag=True,
@@ -35,7 +36,7 @@ def resume(
     ctx: click.Context,
     checkpoint: str,
     output: str | None,
-    every: float | None,
+    every: float,
     model: str | None,
     *,
     allow_code: bool,
@@ -50,8 +51,6 @@ def resume(
     --checkpoint it writes one now and then, from which a run that was killed goes on. The result is
     that of a run that was not ended, bit for bit.
     """
-    import math
-
     from dap3d_core.cli.files import writable
     from dap3d_core.cli.outcome import tell
     from dap3d_core.result import ResultError
@@ -71,7 +70,7 @@ def resume(
     def go(announce: "Announce", watch: "Watch") -> "Result":
         if output is not None:
             writable(Path(output), force=force, sources=(Path(checkpoint),))
-        return found[0].go(output, force=force, checkpoint=every or math.inf, watch=watch)
+        return found[0].go(output, force=force, checkpoint=every, watch=watch)
 
     outcome = carry_out(ctx, prepare, go, quiet=quiet)
     target = Path(output) if output is not None else found[0].output

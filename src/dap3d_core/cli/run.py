@@ -1,5 +1,6 @@
 """``dap3d run``: simulate a model and write its result."""
 
+import math
 from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,7 +54,7 @@ _OPTIONS = (
     click.option("--error", "estimate_error", is_flag=True,
                  help="Estimate the error of all positions and velocities by a second run at "
                       "tolerances ten times tighter, or half the step."),
-    click.option("--checkpoint", type=Seconds(), metavar="EVERY",
+    click.option("--checkpoint", type=Seconds(), metavar="EVERY", default=math.inf,
                  help="Write RESULT.checkpoint so often: 90, 5min, 2h; dap3d resume goes on from "
                       "it, also where the run was killed."),
     click.option("--strict", is_flag=True,
@@ -84,7 +85,7 @@ def run(
     *,
     output: str | None,
     estimate_error: bool,
-    checkpoint: float | None,
+    checkpoint: float,
     strict: bool,
     force: bool,
     allow_code: bool,
@@ -99,11 +100,10 @@ def run(
 
     Ctrl-C ends a run; what was computed until then is saved, and dap3d resume goes on from there.
     """
-    import math
-
     import dap3d_core as dap
     from dap3d_core.cli.files import writable
     from dap3d_core.cli.outcome import tell
+    from dap3d_core.integrators import ahead
 
     if model is None:
         model, scene, force = _ask(ctx, given, output, force=force)
@@ -114,6 +114,7 @@ def run(
     found: list[CompiledModel] = []
 
     def prepare(announce: "Announce") -> "CompiledModel":
+        ahead.start(given["integrator"] or str(scene.simulation.integrator))
         method = given["method"]
         found.append(dap.compile(scene, method=method, allow_code=allow_code, announce=announce))
         return found[0]
@@ -127,7 +128,7 @@ def run(
                 output=target,
                 force=force,
                 estimate_error=estimate_error,
-                checkpoint=math.inf if checkpoint is None else checkpoint,
+                checkpoint=checkpoint,
                 **given,
             )
         except dap.SceneError as error:  # settings that only the integrator can judge

@@ -133,7 +133,7 @@ def correct(system: System) -> None:
     solve_rows(system)
 
 
-@compiled_inside
+@compiled_into
 def project_onto(
     t: float,
     y: Floats,

@@ -23,14 +23,24 @@ def threads_allowed() -> int:
     """How many threads a run may use: 2 where there is a second core and nobody forbids it.
 
     ``DAP3D_THREADS=1`` forbids it.
+
+    Raises:
+        ValueError: ``DAP3D_THREADS`` is no number of threads.
     """
+    asked = os.environ.get("DAP3D_THREADS", "").strip() or "2"
+    if not (asked.isascii() and asked.isdigit() and int(asked) > 0):
+        raise ValueError(
+            f"the environment variable DAP3D_THREADS is {asked!r}; it must be a whole number from "
+            "1: 1 keeps a large scene on one core, 2 or more allow a second thread; unset, that is "
+            "allowed, too"
+        )
     if not jit_is_on() or not hasattr(os, "sched_yield"):
         return 1
-    if os.environ.get("DAP3D_THREADS", "").strip() == "1":
-        return 1
     if hasattr(os, "sched_getaffinity"):
-        return min(2, len(os.sched_getaffinity(0)))
-    return min(2, os.cpu_count() or 1)
+        cores = len(os.sched_getaffinity(0))
+    else:
+        cores = os.cpu_count() or 1
+    return min(2, cores, int(asked))
 
 
 class SecondThread:

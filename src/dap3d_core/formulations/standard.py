@@ -26,7 +26,7 @@ from dap3d_core.formulations.constraints import (
     solve_rows,
 )
 from dap3d_core.formulations.friction import solve_rubbing
-from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
+from dap3d_core.kernels.cache import compiled, compiled_into
 
 
 @compiled_into
@@ -37,7 +37,7 @@ def solve(system: System) -> None:
     solve_rows(system)
 
 
-@compiled_inside
+@compiled_into
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers."""
     power = gather_forces(t, y, system, loops)

@@ -32,6 +32,8 @@ _OUT = types.CPointer(float64)
 LOOP = types.void(float64, LoopArrays.type_of(), int64, int64, int64, _OUT, _OUT, _OUT)
 LOOP_TYPE = types.FunctionType(LOOP)
 LOOP_LIST = types.ListType(LOOP_TYPE)
+#: A Python integer as an argument.
+INTEGER = int64
 
 
 def step_signature(system: Any) -> Any:
@@ -95,6 +97,7 @@ def call_loop(
 
 
 __all__ = [
+    "INTEGER",
     "LOOP",
     "LOOP_LIST",
     "LOOP_TYPE",

@@ -78,7 +78,11 @@ class CompiledModel:
         if announce is not None and not driver_is_cached("formulations"):
             announce(f"the solver ({self.method})")
         # compiled here, and not on the clock of the first run
-        _ = self.machine.functions, self.machine.second_thread
+        try:
+            _ = self.machine.second_thread
+        except ValueError as error:  # what DAP3D_THREADS says
+            raise SimulationError(str(error)) from error
+        _ = self.machine.functions
         self.notes: list[str] = [*self.checked.notes, *self.model.notes]
         self.notes += (f"{INFORMATION}{note}" for note in cache_notes())
         self._redundancy: Redundancy | None = None

@@ -60,15 +60,20 @@ def velocity_side(subject: Subject) -> Outcome:
 def _about_nu(way: str, there: bool) -> Callable[[Wrong], str]:
     def says(x: Wrong) -> str:
         n = x.row + 1
-        wrong = f"row {n} of nu is wrong by {x.error:.3g} at this pose: it is {x.is_:.6g}"
-        if not there:
-            wrong = f"nu is missing, and row {n} of C depends on time: row {n} of nu is zero"
-        return (
-            f"{wrong} and should be {x.should:.6g}, minus the rate of row {n} of C at a fixed pose "
-            f"({way})"
-        )
+        found = f"nu is missing, and row {n} of C depends on time: row {n} of nu is zero"
+        if there:
+            found = _is_wrong("nu", x)
+        return _should_be(found, x, f"minus the rate of row {n} of C at a fixed pose", way)
 
     return says
+
+
+def _is_wrong(side: str, x: Wrong) -> str:
+    return f"row {x.row + 1} of {side} is wrong by {x.error:.3g} at this pose: it is {x.is_:.6g}"
+
+
+def _should_be(found: str, x: Wrong, source: str, way: str) -> str:
+    return f"{found} and should be {x.should:.6g}, {source} ({way})"
 
 
 def velocity_form(subject: Subject) -> Outcome:
@@ -124,10 +129,7 @@ def _about_gamma(way: str, subject: Subject) -> Callable[[Wrong], str]:
         source = f"minus the time derivative of row {n} of J, times v"
         if "nu" in subject.kernels.names():
             source = f"the time derivative of row {n} of nu less that of row {n} of J, times v"
-        return (
-            f"row {n} of gamma is wrong by {x.error:.3g} at this pose: it is {x.is_:.6g} and "
-            f"should be {x.should:.6g}, {source} ({way})"
-        )
+        return _should_be(_is_wrong("gamma", x), x, source, way)
 
     return says
 

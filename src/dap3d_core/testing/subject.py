@@ -201,7 +201,7 @@ class Subject:
 def subjects(examined: Examined, seed: int, poses: int) -> list[Subject]:
     """The type as it is, where no variant takes its place for all values, and its variants."""
     found = []
-    own = _own_values(examined)
+    own = own_values(examined)
     if own is not None:
         found.append((own, examined))
     found += [(dict(conditions), e) for conditions, e in examined.variants]
@@ -214,7 +214,7 @@ def _given(examined: Examined, values: Mapping[str, Any]) -> Examined:
     return bind_functions(examined, there) if there else examined
 
 
-def _own_values(examined: Examined) -> dict[str, Any] | None:
+def own_values(examined: Examined) -> dict[str, Any] | None:
     """Values of choices for which no variant takes the type's place; None where there are none."""
     specs = specs_of(examined.type)
     asked = [n for n in specs if any(n in conditions for conditions, _ in examined.variants)]
@@ -290,4 +290,4 @@ def _direction(x: Floats) -> Direction:
     return Direction(move, turn)
 
 
-__all__ = ["Sample", "Subject", "UndefinedError", "assembled", "subjects"]
+__all__ = ["Sample", "Subject", "UndefinedError", "assembled", "own_values", "subjects"]
