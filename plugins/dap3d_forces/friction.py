@@ -17,7 +17,7 @@ class Friction(Force):
 
     keyword = "friction"
     joint: str = joint(doc="the joint that rubs")
-    mu: float = number(default=0.5, minimum=0.0, doc="coefficient of friction")
+    mu: float = number(default=0.5, minimum=0.0, usual=(None, 10.0), doc="coefficient of friction")
     v_tol: float = number(
         default=1e-3, unit="m/s", positive=True, doc="sliding velocity below which friction fades"
     )

@@ -15,13 +15,14 @@ class PointToPoint(Force):
         energy = k (l - l0)^2 / 2 + f_a l
 
     A function of l - l0 takes the place of k (l - l0): F = f(l - l0) + c l_dot + f_a, without an
-    energy. Where the two points coincide u is undefined, and a run stops and says so.
+    energy. Where the two points coincide u is undefined: a scene that starts so is refused, and a
+    run that comes there stops and says so.
     """
 
     keyword = "ptp"
-    d: Vector2 = vector2(doc="from the end on body i to the end on body j")
-    k: float = number(default=0.0, unit="N/m", doc="stiffness")
-    c: float = number(default=0.0, unit="N s/m", doc="damping coefficient")
+    d: Vector2 = vector2(direction=True, doc="from the end on body i to the end on body j")
+    k: float = number(default=0.0, unit="N/m", usual=(0.0, None), doc="stiffness")
+    c: float = number(default=0.0, unit="N s/m", usual=(0.0, None), doc="damping coefficient")
     l0: float = number(default=0.0, unit="m", minimum=0.0, doc="undeformed length")
     f_a: float = number(default=0.0, unit="N", doc="force of the actuator, tension positive")
 

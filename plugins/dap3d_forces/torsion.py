@@ -35,11 +35,11 @@ class Torsion(Force):
 
     keyword = "rot_sda"
     energy_where = "where the bodies turn about the common axis, and without n_a"
-    v_i: Vector = vector(doc="direction the angle is measured from, on body i")
-    v_j: Vector = vector(doc="direction it is measured to, on body j")
+    v_i: Vector = vector(across="axis", doc="direction the angle is measured from, on body i")
+    v_j: Vector = vector(across="axis", doc="direction it is measured to, on body j")
     axis: Vector = vector(doc="common axis, on either body")
-    k: float = number(default=0.0, unit="N m/rad", doc="stiffness")
-    c: float = number(default=0.0, unit="N m s/rad", doc="damping coefficient")
+    k: float = number(default=0.0, unit="N m/rad", usual=(0.0, None), doc="stiffness")
+    c: float = number(default=0.0, unit="N m s/rad", usual=(0.0, None), doc="damping coefficient")
     theta_0: float = number(default=0.0, unit="rad", doc="angle without moment of the spring")
     n_a: float = number(default=0.0, unit="N m", doc="moment of the actuator, as of a spring")
     turns: bool = choice((False, True), default=False, doc="whether whole turns are counted")

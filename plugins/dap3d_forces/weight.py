@@ -17,8 +17,12 @@ class Weight(Force):
     """
 
     keyword, each_body = "weight", True
-    gravity: float = number(default=9.81, unit="m/s^2", doc="gravitational acceleration")
-    wgt: tuple = vec3(default=(0.0, 0.0, -1.0), doc="direction of gravity, used as given")
+    gravity: float = number(
+        default=9.81, unit="m/s^2", usual=(0.0, None), doc="gravitational acceleration"
+    )
+    wgt: tuple = vec3(
+        default=(0.0, 0.0, -1.0), direction=True, doc="direction of gravity, used as given"
+    )
 
     def wrench(mass_i, gravity, wgt):
         return ((scale(mass_i * gravity, wgt), ZERO),)

@@ -5,6 +5,10 @@ from dap3d_core.kernels import where
 
 interface_version = 1
 
+#: A curve that leaves the range of its three values by more than this many times the range means
+#: nothing any more.
+MOST_BEYOND = 1e3
+
 
 class SmoothHump(Function):
     """From f_start through the extreme f_max at x_max to f_end (manual: type ``c``; spec 7).
@@ -45,6 +49,12 @@ class SmoothHump(Function):
         u = np.linspace(0.0, 1.0, 1001)
         f = self.f_start + u**3 * np.polyval(q[::-1], u)
         low, high = given.min() - f.min(), f.max() - given.max()
+        if max(low, high) > MOST_BEYOND * np.ptp(given):
+            raise ValueError(
+                f"x_max = {self.x_max:g} is so near to an end that the curve reaches "
+                f"{f.min():.3g} to {f.max():.3g}; take it nearer to the middle of x_start = "
+                f"{self.x_start:g} and x_end = {self.x_end:g}"
+            )
         if max(low, high) > 1e-3 * np.ptp(given):
             worst = np.argmin(f) if low > high else np.argmax(f)
             warnings.warn(
@@ -54,6 +64,9 @@ class SmoothHump(Function):
                 stacklevel=2,
             )
         return {"q": q}
+
+    def breaks(self):
+        return self.x_start, self.x_end
 
     def value(x, x_start, x_end, f_start, f_end, q):
         D = x_end - x_start

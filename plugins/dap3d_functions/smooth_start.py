@@ -26,6 +26,9 @@ class SmoothStart(Function):
             raise ValueError(f"x_end = {self.x_end:g} must lie beyond x_start = {self.x_start:g}")
         return {}
 
+    def breaks(self):
+        return self.x_start, self.x_end
+
     def value(x, x_start, x_end, f_start, fp_end):
         D = x_end - x_start
         u = (x - x_start) / D

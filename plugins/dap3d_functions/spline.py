@@ -5,6 +5,9 @@ from dap3d_core.kernels import lookup
 
 interface_version = 1
 
+#: Three points between which the slope changes by less than this part of the largest are in line.
+STRAIGHT = 1e-9
+
 
 class Spline(Function):
     """The cubic spline through the points (x_k, y_k), x increasing; two points or more.
@@ -44,6 +47,18 @@ class Spline(Function):
         slope = b[-1] + last * (2.0 * c[-1] + last * 3.0 * d[-1])
         before, after = (x[0] - last, y[0] - b[0] * last, b[0]), (x[-1], y[-1], slope)
         return {"pieces": [[*before, 0.0, 0.0], *inner.tolist(), [*after, 0.0, 0.0]]}
+
+    def breaks(self):
+        """Both ends, and where a straight line begins to bend or ends it: a bump between them."""
+        import numpy as np
+
+        x, y = np.array(self.x), np.array(self.y)
+        slope = np.diff(y) / np.diff(x)
+        bends = np.abs(np.diff(slope)) > STRAIGHT * np.max(np.abs(slope))  # points 2 to n - 1
+        bends = np.pad(bends, 2)
+        changes = np.flatnonzero(bends[1:] != bends[:-1])  # between points k and k + 1, or beyond
+        near = np.concatenate([[0, len(x) - 1], changes - 1, changes, changes + 1])
+        return x[np.unique(np.clip(near, 0, len(x) - 1))]
 
     def value(x, pieces):
         start, a, b, c, d = lookup(pieces, x)

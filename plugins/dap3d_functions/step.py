@@ -28,6 +28,9 @@ class Step(Function):
             raise ValueError(f"x_end = {self.x_end:g} must lie beyond x_start = {self.x_start:g}")
         return {}
 
+    def breaks(self):
+        return self.x_start, self.x_end
+
     def value(x, x_start, x_end, f_start, f_end):
         D, h = x_end - x_start, f_end - f_start
         u = (x - x_start) / D

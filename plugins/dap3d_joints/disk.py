@@ -46,6 +46,20 @@ class Disk(Joint):
     )
     radius: float = number(default=1.0, unit="m", positive=True, doc="radius of the disk")
 
+    def prepare(self, bodies):
+        import warnings
+
+        Jp = bodies["i"].Jp
+        across, name = max((Jp[0][0], "x"), (Jp[2][2], "z"))
+        if across > 1.001 * Jp[1][1]:
+            warnings.warn(
+                "the axis of the disk is the y axis of its body, and its inertia about "
+                f"{name}, {across:g}, is larger than about y, {Jp[1][1]:g}; a flat disk has its "
+                "largest inertia about its axis",
+                stacklevel=2,
+            )
+        return {}
+
     def C(r_i, A_i, radius):
         return r_i[2] - radius * axis(A_i)[1]
 

@@ -31,6 +31,7 @@ class DrivenTranslation(Joint):
     """
 
     keyword, rows = "drive-tran", 1
+    drives = True
     body_i: Body = body(default=None, doc="body the motion is measured from; that of P_i")
     body_j: Body = body(default=None, doc="body that is moved; that of P_j and a_j")
     P_i: Point = point(default=None, doc="on body i; the mass centre when left out")

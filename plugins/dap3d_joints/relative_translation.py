@@ -22,6 +22,7 @@ class RelativeTranslation(Joint):
     """
 
     keyword, rows, holonomic = "rel-tran", 1, False
+    drives = True
     body_i: Body = body(doc="body that the motion is measured from")
     body_j: Body = body(default="ground", doc="body that is moved")
     a_j: Vector = vector(doc="direction, on body j")

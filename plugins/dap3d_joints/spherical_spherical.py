@@ -19,7 +19,7 @@ class SphericalSpherical(Joint):
     """
 
     keyword, rows = "sph-sph", 1
-    d: Vector2 = vector2(doc="from the link's end on body i to its end on body j")
+    d: Vector2 = vector2(direction=True, doc="from the link's end on body i to its end on body j")
     length: float = number(
         default=None, unit="m", positive=True, doc="length of the link; left out, as at the start"
     )

@@ -14,6 +14,7 @@ from support.process import REPOSITORY, environment
 #: Pages that are followed from the first step to the last, in an empty folder.
 FOLLOWED = [
     REPOSITORY / "docs" / "index.md",
+    REPOSITORY / "docs" / "bad-input.md",
     *(
         page
         for folder in ("start", "tutorials", "how-to", "concepts", "reference")

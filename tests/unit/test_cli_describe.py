@@ -115,3 +115,19 @@ def test_a_required_function_is_in_the_example():
     registry = load_registry()
     text = example_of(registry.get("force", "ptp"), registry)
     assert "function" not in next(iter(tomllib.loads(text)["forces"].values()))
+
+
+@pytest.mark.parametrize(
+    ("keyword", "field", "allowed"),
+    [
+        ("ptp", "k", "usually >= 0"),
+        ("ptp", "d", "not of zero length"),
+        ("friction", "mu", ">= 0, usually <= 10"),
+        ("rot_sda", "v_i", "not along axis"),
+        ("weight", "wgt", "of unit length"),
+    ],
+)
+def test_what_a_field_asks_for(keyword, field, allowed):
+    (type_,) = json.loads(described(keyword, "--json"))["types"]
+    fields = {f["name"]: f for f in type_["fields"]}
+    assert fields[field]["allowed"] == allowed

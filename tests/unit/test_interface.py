@@ -151,6 +151,10 @@ def prepare(constants):
             joint(fields={"d": (Vector2, vector2()), "e": (Vector2, vector2())}),
             ["more than one vector2", "ends P_i and P_j", "sub(r_Q_j, r_Q_i)"],
         ),
+        (
+            joint(fields={"a_i": (Vector, vector(across="b_j"))}),
+            ["a_i is across b_j, which is no vector field"],
+        ),
         # prepare
         (joint(prepare=prepare(None)), ["Mine.prepare should return a dict", "None"]),
         (joint(prepare=prepare([1.0])), ["Mine.prepare should return a dict", "[1.0]"]),

@@ -56,6 +56,18 @@ def test_rounding_of_unit_lengths_is_not_noted(scene_of, registry):
     assert check(scene_of(text), registry).notes == []
 
 
+def test_functions_of_time_and_of_other_arguments_are_used(registry):
+    """A motor's, of time, and a spring's, of its elongation; the third is not."""
+    scene = Scene()
+    scene.add_body("a", mass=1.0, Jp=[1.0, 1.0, 1.0])
+    for name in ("motor", "curve", "spare"):
+        scene.add_function("a", name, coeff=[0.0, 1.0, 0.0])
+    scene.add_joint("rel-rot", body_i="a", a_j="ground.z", function="motor")
+    scene.add_force("ptp", P_i="a.O", P_j="ground.O", function="curve")
+    notes = check(scene, registry).notes
+    assert notes == ["functions.spare: no joint and no force uses it"]
+
+
 def test_a_body_without_joint_or_force_is_noted(registry):
     scene = Scene()
     scene.add_body("free", mass=1.0, Jp=[1.0, 1.0, 1.0])

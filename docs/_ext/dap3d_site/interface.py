@@ -41,7 +41,8 @@ def _classes() -> Iterator[str]:
         kernel_names = ", ".join(code(kernel) for kernel in getattr(interface, name).kernel_names)
         yield f"## {name}"
         yield f"Kernels: {kernel_names}."
-        members = "position_rows, velocity_rows, prepare" if name == "Joint" else "prepare"
+        more = {"Joint": "position_rows, velocity_rows, prepare", "Function": "prepare, breaks"}
+        members = more.get(name, "prepare")
         yield directive("autoclass", f"dap3d_core.interface.{name}", f":members: {members}")
     yield "## What is refused"
     yield directive("autofunction", "dap3d_core.interface.examine")

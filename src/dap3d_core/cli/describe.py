@@ -176,6 +176,14 @@ def _allowed(spec: Any) -> str:
         words.append(f"<= {spec.maximum:g}")
     if spec.whole:
         words.append("a whole number")
+    low, high = spec.usual
+    if low is not None or high is not None:
+        least = "" if low is None else f" >= {low:g}"
+        words.append(f"usually{least}" + ("" if high is None else f" <= {high:g}"))
+    if spec.direction:
+        words.append("of unit length" if spec.kind == "vec3" else "not of zero length")
+    if spec.across:
+        words.append(f"not along {spec.across}")
     return ", ".join(words)
 
 

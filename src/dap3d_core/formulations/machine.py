@@ -172,6 +172,14 @@ class Machine:
         self._call(VALUE, t, s.force, s.force, s.force)
         s.F[:, 4] = s.F[:, 0]
 
+    @AS_COMPILED
+    def function_values(self, t: float) -> Floats:
+        """(functions, 4) values of the functions of time and their first three derivatives at t."""
+        s = self.system
+        self._call(VALUE, t, s.force, s.force, s.force)
+        values: Floats = s.F[1:, :4].copy()
+        return values
+
     def set_penalty(self, alpha: float, Omega: float, mu: float) -> None:
         """Numbers of the penalty formulation; Omega in 1/s."""
         self.system.settings[[ALPHA, OMEGA, MU]] = alpha, Omega, mu

@@ -7,7 +7,9 @@ and writes its result a few times only; the terms come from ``method.combination
 from dap3d_core.integrators.method import GROUP, GROUPS, TERMS, Floats
 from dap3d_core.kernels.cache import compiled_inside
 
-_LARGEST = 1.7976931348623157e308
+#: Larger numbers leave double precision in products such as m v^2: they end a run before an energy
+#: of it becomes infinite. What a scene may give has the same bound (scene/values.py).
+_LARGEST = 1e100
 
 
 @compiled_inside
@@ -39,7 +41,7 @@ def copy(out: Floats, x: Floats) -> None:
 
 @compiled_inside
 def all_finite(x: Floats) -> bool:
-    """Whether no component is infinite or not a number."""
+    """Whether no component is not a number, or larger than 1e100, infinite ones included."""
     bad = 0
     for i in range(x.size):
         bad |= not (abs(x[i]) <= _LARGEST)

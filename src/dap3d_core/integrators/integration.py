@@ -1,5 +1,6 @@
 """One integration, seen from Python: set up, advanced in chunks, drained of its rows."""
 
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -83,6 +84,9 @@ class Integration:
 
     #: Of a large scene a second thread, which takes part in its right-hand sides.
     beside: "SecondThread | None" = None
+    #: Times in ascending order that no step goes over, and whether the right-hand side may jump
+    #: there, so that the integration starts anew.
+    stops: Sequence[tuple[float, bool]] = ()
 
     def __init__(
         self,
@@ -166,6 +170,14 @@ class Integration:
         """
         if self.rows_are_full and self.status is Status.RUNNING:
             raise RuntimeError("the row buffer is full: take rows() before advancing")
+        asked = self.work.real[at.LIMIT]
+        if self.stops:
+            self.work.real[at.LIMIT] = min(asked, self._next_stop())
+        self._go(budget)
+        self.work.real[at.LIMIT] = asked
+        return self.status
+
+    def _go(self, budget: int) -> None:
         if self.beside is not None:
             self.beside.call(lambda: self._advance(budget), lambda: self.statistics.rhs)
         elif jit_is_on():
@@ -173,7 +185,27 @@ class Integration:
         else:
             with np.errstate(all="ignore"):  # as in compiled code, which tests what matters
                 self._advance(budget)
-        return self.status
+
+    def _next_stop(self) -> float:
+        """The time that the next step may not go over.
+
+        Where the right-hand side may jump steps end just before and go on just behind, so that none
+        has samples of both sides; the state stays, which is right to the rounding of time. Fixed
+        steps end on their grid, and on what jumps.
+        """
+        real, is_adaptive = self.work.real, self.work.real[at.STEP] == 0.0
+        for t, jumps in self.stops[bisect_left(self.stops, (self.t, False)) :]:
+            before = float(np.nextafter(t, -np.inf)) if jumps and is_adaptive else t
+            if self.t < before:
+                return before
+            if before < t:
+                real[[at.T, at.LIMIT]] = t
+                self._go(0)  # no step: what is asked for at t is reported
+                if self.rows_are_full or self.status is not Status.RUNNING:
+                    return t
+                real[at.T] = np.nextafter(t, np.inf)
+                self.restart()
+        return np.inf
 
     def advance_to(self, limit: float) -> Status:
         """Try one step, or what stands in its place, that ends at time ``limit`` at the latest."""

@@ -20,7 +20,7 @@ class Status(IntEnum):
     RUNNING = 0
     FINISHED = 1
     STEP_FLOOR = 2  # the error asks for a step that time cannot resolve
-    NOT_FINITE = 3  # dy/dt, y or a reported quantity became infinite or not a number
+    NOT_FINITE = 3  # dy/dt, y or a reported quantity: beyond 1e100, or not a number
     PROJECTION_FAILED = 4
     SWITCHED = 5  # a switch of the model that ends the run became negative
     CHATTERED = 6  # a switch changed its sign again and again while time hardly went on

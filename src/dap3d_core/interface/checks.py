@@ -289,11 +289,15 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
             f"{who} declares more than one vector2, and each would have the ends P_i and P_j; "
             "declare points, and form the others in the kernel: sub(r_Q_j, r_Q_i)"
         )
+    for name, spec in specs_of(type_).items():
+        other = specs_of(type_).get(spec.across)
+        if spec.across and (other is None or other.kind != "vector"):
+            raise PluginError(f"{who}.{name} is across {spec.across}, which is no vector field")
     taken = {f"{q}_{s}" for q in ("r", "A", "p", "w", "mass", "Jp") for s in body_slots(type_)}
     for name in specs_of(type_):
         if name in taken:
             raise PluginError(f"{who} has a field {name}, which is the body's; take another name")
-    allowed = [*type_.kernel_names, "prepare"]
+    allowed = [*type_.kernel_names, "prepare", *(["breaks"] if kind == "function" else [])]
     for name, value in vars(type_).items():
         is_public = isinstance(value, (staticmethod, FunctionType)) and not name.startswith("_")
         if is_public and name not in allowed:

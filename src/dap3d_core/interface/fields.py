@@ -31,8 +31,12 @@ class FieldSpec:
         doc: what it means, one short sentence.
         positive, minimum, maximum: what a number must satisfy beyond being finite.
         whole: whether a number must be a whole one.
+        usual: least and greatest number (None: none) outside of which a scene gets a note.
         choices: allowed words of a choice (or False and True).
         aliases: other words for some of them.
+        direction: whether a vector between two points must not be of zero length at the start of a
+            run, or three numbers should be of unit length (with a note where they are not).
+        across: the field of a vector that this one may not lie along at the start of a run.
         unit_length: whether a vector is normalised (with a warning where its length was not 1).
         ground: whether a vector must be fixed in ground.
         argument: what a function is a function of; "" for time.
@@ -49,9 +53,12 @@ class FieldSpec:
     minimum: float | None = None
     maximum: float | None = None
     whole: bool = False
+    usual: tuple[float | None, float | None] = (None, None)
     choices: tuple[Any, ...] = ()
     aliases: Mapping[str, str] = attrs.field(factory=dict)
     unit_length: bool = False
+    direction: bool = False
+    across: str = ""
     ground: bool = False
     argument: str = ""
     columns: int = 1
@@ -78,19 +85,27 @@ def point(default: Any = REQUIRED, *, doc: str = "") -> Any:
     return _field(FieldSpec("point", default, unit="m", doc=doc))
 
 
-def vector(default: Any = REQUIRED, *, ground: bool = False, doc: str = "") -> Any:
+def vector(
+    default: Any = REQUIRED, *, ground: bool = False, across: str = "", doc: str = ""
+) -> Any:
     """A unit vector fixed in a body (type 1), by name; ``a_i`` is fixed in the body of slot i.
 
     It is normalised, with a warning where its length was not 1. A vector whose name ends in no slot
     (``axis``) may be fixed in any body of the element. With ``ground`` it must be fixed in ground,
-    and makes no body slot.
+    and makes no body slot. With ``across``, the name of another vector field, a scene is refused
+    where the two are parallel at the start of a run.
     """
-    return _field(FieldSpec("vector", default, doc=doc, unit_length=True, ground=ground))
+    spec = FieldSpec("vector", default, doc=doc, unit_length=True, ground=ground, across=across)
+    return _field(spec)
 
 
-def vector2(default: Any = REQUIRED, *, doc: str = "") -> Any:
-    """A vector between two points (type 2), by name; ``P_i`` and ``P_j`` may be given instead."""
-    return _field(FieldSpec("vector2", default, unit="m", doc=doc))
+def vector2(default: Any = REQUIRED, *, direction: bool = False, doc: str = "") -> Any:
+    """A vector between two points (type 2), by name; ``P_i`` and ``P_j`` may be given instead.
+
+    With ``direction`` the element acts along it: a scene is refused where the two points coincide
+    at the start of a run.
+    """
+    return _field(FieldSpec("vector2", default, unit="m", doc=doc, direction=direction))
 
 
 def number(
@@ -102,18 +117,20 @@ def number(
     minimum: float | None = None,
     maximum: float | None = None,
     whole: bool = False,
+    usual: tuple[float | None, float | None] = (None, None),
 ) -> Any:
     """A finite number; a whole one (of teeth, say) with ``whole``.
 
-    ``default=None`` lets the scene leave it out: ``prepare`` then finds it.
+    ``default=None`` lets the scene leave it out: ``prepare`` then finds it. Outside of ``usual``,
+    (least, greatest) with None for no limit, it is allowed, and noted.
     """
-    spec = FieldSpec("number", default, unit, doc, positive, minimum, maximum, whole)
+    spec = FieldSpec("number", default, unit, doc, positive, minimum, maximum, whole, usual)
     return _field(spec)
 
 
-def vec3(default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
-    """Three finite numbers."""
-    return _field(FieldSpec("vec3", default, unit, doc))
+def vec3(default: Any = REQUIRED, *, unit: str = "", direction: bool = False, doc: str = "") -> Any:
+    """Three finite numbers; with ``direction`` a length other than 1 is noted, and used."""
+    return _field(FieldSpec("vec3", default, unit, doc, direction=direction))
 
 
 def matrix(default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:

@@ -1,4 +1,4 @@
-"""A body's pose as the ``prepare`` of a type sees it."""
+"""A body in its pose as given, as the ``prepare`` of a type sees it."""
 
 from typing import Any
 
@@ -7,11 +7,15 @@ import attrs
 
 @attrs.frozen
 class BodyPose:
-    """A body as ``prepare`` sees it: position r, Euler parameters p, rotation matrix A (rows)."""
+    """A body as ``prepare`` sees it: position r, Euler parameters p, rotation matrix A (rows).
+
+    Jp is its inertia matrix (rows) in its own axes, kg m^2; zeros for ground.
+    """
 
     r: tuple[float, ...]
     p: tuple[float, ...]
     A: tuple[tuple[float, ...], ...]
+    Jp: tuple[tuple[float, ...], ...] = ((0.0, 0.0, 0.0),) * 3
 
     def to_local(self, s: Any) -> tuple[float, ...]:
         """Components on the body of a global 3-vector."""
@@ -26,12 +30,13 @@ class BodyPose:
         return tuple(a + b for a, b in zip(self.r, self.to_global(s), strict=True))
 
 
-def pose(r: Any, p: Any) -> BodyPose:
-    """A body's pose from its position and (unit) Euler parameters."""
+def pose(r: Any, p: Any, Jp: Any = ((0.0, 0.0, 0.0),) * 3) -> BodyPose:
+    """A body's pose from its position and (unit) Euler parameters, with its inertia matrix."""
     e0, e1, e2, e3 = (float(x) for x in p)
     matrix = (
         (1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)),
         (2 * (e1 * e2 + e0 * e3), 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 - e0 * e1)),
         (2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), 1 - 2 * (e1 * e1 + e2 * e2)),
     )
-    return BodyPose(tuple(float(x) for x in r), (e0, e1, e2, e3), matrix)
+    inertia = tuple(tuple(float(x) for x in row) for row in Jp)
+    return BodyPose(tuple(float(x) for x in r), (e0, e1, e2, e3), matrix, inertia)

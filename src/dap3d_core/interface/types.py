@@ -5,7 +5,7 @@ parameter names say what they need, as a pytest test names its fixtures. ``names
 these names.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import attrs
@@ -78,6 +78,8 @@ class Joint(TypeBase):
         keyword: the word that names the type in a scene.
         rows: number of constraint equations.
         holonomic: True, False, or one truth value a row: which rows exist at position level.
+        drives: whether it prescribes a freedom that other joints leave; where there are none
+            between its bodies a scene gets a note.
     """
 
     kind = "joint"
@@ -85,6 +87,7 @@ class Joint(TypeBase):
     switch_words: ClassVar[str] = ""
     rows: ClassVar[int] = 0
     holonomic: ClassVar[bool | tuple[bool, ...]] = True
+    drives: ClassVar[bool] = False
 
     @classmethod
     def position_rows(cls) -> tuple[int, ...]:
@@ -140,7 +143,8 @@ class Force(TypeBase):
 class Function(TypeBase):
     """A function of one variable: ``value(x, ...)`` returns (f, f', f'', f''').
 
-    One that returns f alone has the others derived (derivation.py).
+    One that returns f alone has the others derived (derivation.py). No step of a run goes over an
+    argument that ``breaks`` names: a change that is shorter than a step is not missed.
     """
 
     kind = "function"
@@ -149,6 +153,10 @@ class Function(TypeBase):
     def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
         """Constants of this instance, found once (coefficients of a polynomial)."""
         return {}
+
+    def breaks(self) -> Sequence[float]:
+        """Arguments at which this instance takes another form: both ends of a transition."""
+        return ()
 
 
 KINDS: dict[str, type[TypeBase]] = {"joint": Joint, "force": Force, "function": Function}

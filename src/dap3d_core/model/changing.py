@@ -71,14 +71,16 @@ def _of_force(
     force = checked.forces[place]
     n = len(checked.body_names)
     poses = {0: pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))}
-    poses |= {b: pose(checked.r[b - 1], checked.p[b - 1]) for b in range(1, n + 1)}
+    poses |= {
+        b: pose(checked.r[b - 1], checked.p[b - 1], checked.Jp[b - 1]) for b in range(1, n + 1)
+    }
     grouping = Grouping("force", poses, n, checked.functions)
     given = {**force.values, **values}
     try:
         (old,) = grouping.groups([force], [place])
         (new,) = grouping.groups([attrs.evolve(force, values=given)], [place])
-    except ValueError as error:  # PrepareError: the place, and the type's own words
-        raise ValueError(f"force {force.name}: {error.args[-1]}") from error
+    except ValueError as error:  # PrepareError: the type's own words
+        raise ValueError(f"force {force.name}: {error}") from error
     if not _same_tables(old, new):
         raise ValueError(f"force {force.name}: this would change a table, which cannot be done")
     # what is the same stays: turns that were counted, places of tables, numbers changed before

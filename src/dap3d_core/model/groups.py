@@ -1,7 +1,7 @@
 """Instances of one type, side by side: what one group loop runs over."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -25,7 +25,14 @@ Floats = NDArray[np.float64]
 
 
 class PrepareError(ValueError):
-    """A type's ``prepare`` refuses an instance: (index of the instance, the type's own words)."""
+    """A type's ``prepare`` refuses instances: (index of one, the type's own words) of each."""
+
+    def __init__(self, *faults: tuple[int, str]) -> None:
+        super().__init__(*faults)
+        self.faults = faults
+
+    def __str__(self) -> str:
+        return "; ".join(words for _, words in self.faults)
 
 
 @attrs.frozen(eq=False)
@@ -94,15 +101,17 @@ class Grouping:
             members: their places among all elements of the kind.
 
         Raises:
-            PrepareError: a type refuses the values of an instance.
+            PrepareError: types refuse the values of instances: all of them.
         """
         by_type: dict[Any, list[int]] = {}
         for place, instance in enumerate(instances):
             given = tuple((n, f.examined.type) for n, f in self._given(instance).items())
             by_type.setdefault((instance.examined.type, given), []).append(place)
-        return tuple(
-            self._group([instances[k] for k in places], [members[k] for k in places])
-            for places in by_type.values()
+        return _each(
+            lambda places: self._group(
+                [instances[k] for k in places], [members[k] for k in places]
+            ),
+            by_type.values(),
         )
 
     def friction(
@@ -115,32 +124,33 @@ class Grouping:
             joints: name -> (place among all joints, instance).
 
         Raises:
-            PrepareError: a joint has no friction, or a number is missing.
+            PrepareError: joints have no friction, or numbers are missing.
         """
         by_type: dict[Any, list[tuple[int, Instance, int, Instance]]] = {}
         for place, force in forces:
             row, joint = joints[force.values["joint"]]
             by_type.setdefault(joint.examined.type, []).append((place, force, row, joint))
-        return tuple(self._friction(pairs) for pairs in by_type.values())
+        return _each(self._friction, by_type.values())
 
     def _friction(self, pairs: list[tuple[int, Instance, int, Instance]]) -> Group:
         examined = pairs[0][3].examined
         if "friction" not in examined.kernels:
-            words = f"joint {pairs[0][3].name}: type {examined.type.keyword} has no friction"
-            raise PrepareError(pairs[0][0], words)
+            words = f"type {examined.type.keyword} has no friction"
+            raise PrepareError(*[(place, f"joint {j.name}: {words}") for place, _, _, j in pairs])
         bound = bind_friction(examined)
         group = self._group([joint for *_, joint in pairs], [row for _, _, row, _ in pairs])
         wanted = [n for n in bound.layout.numbers if n not in examined.layout.numbers]
         asked = {q for q in wanted if q in parameters(bound.kernels["friction"])}
-        extra = np.zeros((len(pairs), len(wanted)))
+        extra, faults = np.zeros((len(pairs), len(wanted))), []
         for k, (place, force, _, _) in enumerate(pairs):
             for c, name in enumerate(wanted):
                 value = force.values.get(name)
                 if value is None and name in asked:
-                    raise PrepareError(
-                        place, f"{name} is missing, which friction in {examined.type.keyword} needs"
-                    )
+                    words = f"{name} is missing, which friction in {examined.type.keyword} needs"
+                    faults.append((place, words))
                 extra[k, c] = 0.0 if value is None else value
+        if faults:
+            raise PrepareError(*faults)
         members = np.array([place for place, *_ in pairs], dtype=np.int64)
         numbers = np.hstack([group.numbers, extra])
         return attrs.evolve(group, examined=bound, numbers=numbers, joints=group.members,
@@ -166,7 +176,8 @@ class Grouping:
             examined, numbers, more = self._with_functions(examined, functions, numbers, members)
             tables += more
         if missing := uncalled(examined):
-            raise PrepareError(members[0], f"{missing} is missing, which this type calls")
+            words = f"{missing} is missing, which this type calls"
+            raise PrepareError(*[(member, words) for member in members])
         bodies = np.array([i.bodies for i in instances], dtype=np.int64).reshape(count, -1)
         others = [(*i.functions, *i.others) for i in instances]
         integers = np.array(others, dtype=np.int64).reshape(count, -1)
@@ -193,8 +204,9 @@ class Grouping:
             try:
                 more, found = self._numbers(given, column, range(len(column)))
             except PrepareError as error:
-                k, words = error.args
-                raise PrepareError(members[k], f"function {column[k].name}: {words}") from error
+                raise PrepareError(
+                    *[(members[k], f"function {column[k].name}: {w}") for k, w in error.faults]
+                ) from error
             tables += [(k, numbers.shape[1] + offset, rows) for k, offset, rows in found]
             numbers = np.hstack([numbers, more])
         return bind_functions(examined, types), numbers, tables
@@ -207,17 +219,23 @@ class Grouping:
         if _prepares(examined.type):
             with warnings.catch_warnings(record=True) as record:
                 warnings.simplefilter("always")
-                found = []
+                found: list[dict[str, Any]] = []
+                faults: list[tuple[int, str]] = []
                 for instance, member in zip(instances, members, strict=True):
-                    found.append(_prepared(examined, fields, instance, member, self.poses))
+                    try:
+                        found.append(_prepared(examined, fields, instance, member, self.poses))
+                    except PrepareError as error:
+                        faults += error.faults
                     self._note(record, instance)
+            if faults:
+                raise PrepareError(*faults)
             given = [values | constants for values, constants in zip(given, found, strict=True)]
         numbers = np.zeros((len(instances), examined.layout.par_width))
         for name, (offset, shape) in examined.layout.numbers.items():
             column = [values.get(name) for values in given]
             if None in column:
                 words = "is missing" if name in fields else "is not among what prepare returned"
-                raise PrepareError(members[column.index(None)], f"{name} {words}")
+                raise PrepareError((members[column.index(None)], f"{name} {words}"))
             values = np.asarray(column, dtype=float).reshape(len(instances), -1)
             numbers[:, offset : offset + size(shape)] = values
         tables = []
@@ -236,6 +254,24 @@ class Grouping:
             if note not in self.notes:
                 self.notes.append(note)
         record.clear()
+
+
+def _each(make: Callable[[Any], Group], parts: Iterable[Any]) -> tuple[Group, ...]:
+    """A group of each part.
+
+    Raises:
+        PrepareError: what is wrong in all of them.
+    """
+    made: list[Group] = []
+    faults: list[tuple[int, str]] = []
+    for part in parts:
+        try:
+            made.append(make(part))
+        except PrepareError as error:
+            faults += error.faults
+    if faults:
+        raise PrepareError(*faults)
+    return tuple(made)
 
 
 def _prepares(type_: Any) -> bool:
@@ -260,15 +296,16 @@ def _prepared(
     try:
         constants = prepared(thing, bodies)
     except ValueError as error:
-        raise PrepareError(member, str(error)) from error
+        raise PrepareError((member, str(error))) from error
     for name, value in constants.items():
         if name in examined.layout.tables:
             continue
         _, shape = examined.layout.numbers.get(name, (0, None))
         if shape_of(value) != shape:
-            raise PrepareError(
-                member,
+            usual = "none" if shape is None else shape
+            words = (
                 f"prepare returned {name} of shape {shape_of(value)}, and for random values of the "
-                f"fields {'none' if shape is None else shape}; names and shapes must stay the same",
+                f"fields {usual}; names and shapes must stay the same"
             )
+            raise PrepareError((member, words))
     return constants

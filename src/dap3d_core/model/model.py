@@ -4,8 +4,7 @@ Coordinates stand in the state u in the order of the manual: r, p of every body,
 of every body.
 """
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from functools import cached_property
 
 import attrs
@@ -99,14 +98,22 @@ class Model:
 
 
 class ModelError(ValueError):
-    """A type refuses an element of the scene: (kind, name of the element, the type's own words)."""
+    """Types refuse elements of the scene.
+
+    Attributes:
+        faults: (kind, name of the element, the type's own words) of each.
+    """
+
+    def __init__(self, *faults: tuple[str, str, str]) -> None:
+        super().__init__(*faults)
+        self.faults = faults
 
 
 def build_model(checked: Checked) -> Model:
     """Turn a checked scene into a model.
 
     Raises:
-        ModelError: the ``prepare`` of a type refuses an element.
+        ModelError: the ``prepare`` of types refuses elements: all of them.
         PluginError: the ``prepare`` of a type failed.
     """
     poses = _Poses(checked)
@@ -159,26 +166,36 @@ class _Groups:
             "function": checked.functions,
         }
 
+        faults: list[tuple[str, str, str]] = []
+
         def made(kind: str, elements: Sequence[tuple[int, Instance]]) -> tuple[Group, ...]:
             places, instances = [k for k, _ in elements], [i for _, i in elements]
-            with _named(kind, names[kind]):
+            try:
                 return by_kind[kind].groups(instances, places)
+            except PrepareError as error:
+                faults.extend(_faults(kind, names[kind], error))
+                return ()
 
         self.joints = made("joint", list(joints.values()))
+        are_good = not faults
         self.forces = made("force", direct)
         self.functions = made("function", functions)
-        with _named("force", checked.forces):
-            self.friction = by_kind["joint"].friction(through, joints)
+        self.friction: tuple[Group, ...] = ()
+        try:
+            if are_good:
+                self.friction = by_kind["joint"].friction(through, joints)
+        except PrepareError as error:
+            faults.extend(_faults("force", checked.forces, error))
+        if faults:
+            raise ModelError(*faults)
         self.notes = [note for grouping in by_kind.values() for note in grouping.notes]
 
 
-@contextmanager
-def _named(kind: str, instances: Sequence[Instance]) -> Iterator[None]:
-    try:
-        yield
-    except PrepareError as error:
-        member, words = error.args
-        raise ModelError(kind, instances[member].name, words) from error
+def _faults(
+    kind: str, instances: Sequence[Instance], error: PrepareError
+) -> list[tuple[str, str, str]]:
+    """What is wrong with instances, with their names."""
+    return [(kind, instances[member].name, words) for member, words in error.faults]
 
 
 def _acts_through_joint(force: Instance) -> bool:
@@ -202,6 +219,7 @@ class _Poses(dict[int, BodyPose]):
         self._checked = checked
 
     def __missing__(self, body: int) -> BodyPose:
-        made = pose(self._checked.r[body - 1], self._checked.p[body - 1])
+        checked, k = self._checked, body - 1
+        made = pose(checked.r[k], checked.p[k], checked.Jp[k])
         self[body] = made
         return made

@@ -77,7 +77,7 @@ def _check_names(report: Collector) -> None:
     for table in NAMED:
         names = getattr(report.scene, table)
         for name in names:
-            if type(name) is str and name.isidentifier() and name != "ground":
+            if type(name) is str and name.isidentifier() and name.lower() != "ground":
                 continue  # what nearly all names are
             if fault := fault_of_name(name):
                 key = (table, str(name))
@@ -103,7 +103,8 @@ def _note_loose_bodies(report: Collector, bodies: "Bodies", elements: list[Insta
 
 def _note_unused_functions(report: Collector, elements: list[Instance]) -> None:
     used = {place for e in elements for place in e.functions}
+    called = {e.values[field] for e in elements for field in e.examined.argument_functions}
     for place, name in enumerate(report.scene.functions, 1):
-        if place not in used:
+        if place not in used and name not in called:
             key = dotted(("functions", name))
             report.note(f"{key}: no joint and no force uses it", "functions left unused")

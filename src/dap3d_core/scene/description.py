@@ -345,8 +345,10 @@ def fault_of_name(name: Any) -> str:
         return f"a name is text, not {type(name).__name__}"
     if not name.strip():
         return "a name is not empty"
-    if name == GROUND:
-        return f"{GROUND} is always there and has no data of its own"
+    if name.strip().lower() == GROUND:
+        return f"{GROUND} is always there and has no data of its own; take another name"
+    if name != name.strip():
+        return "a name neither begins nor ends with a space"
     if "." in name:
         return "a name holds no dot (NAME.O, NAME.x are the origin and axes of a body)"
     if not name.isprintable():

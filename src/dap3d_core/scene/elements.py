@@ -20,7 +20,8 @@ from dap3d_core.scene.geometry import (
     two_ends,
     vector_of,
 )
-from dap3d_core.scene.mistakes import MISSING, Key
+from dap3d_core.scene.mistakes import MISSING, Key, dotted, shown
+from dap3d_core.scene.oddities import oddity
 from dap3d_core.scene.values import (
     Fault,
     bounded,
@@ -31,8 +32,6 @@ from dap3d_core.scene.values import (
     word_of,
 )
 
-#: An angle beyond a full turn is probably given in degrees.
-TURN = 6.283185307179586
 #: The two points that may stand for a vector of type 2.
 ENDS = ("P_i", "P_j")
 
@@ -248,9 +247,6 @@ class Reader:
                 maximum=spec.maximum,
                 whole=spec.whole,
             )
-            if spec.unit == "rad" and not isinstance(found, Fault) and abs(found) > TURN:
-                key = f"{self.table}.{work.element.name}.{field.name}"
-                self.report.note(f"{key} = {found:g} is more than a full turn; angles are in rad")
         elif spec.kind == "vec3":
             found = numbers_of(value, 3)
         elif spec.kind == "matrix":
@@ -262,6 +258,8 @@ class Reader:
         if isinstance(found, Fault):
             self.report.add((*work.key, field.name), value, found.what, found.nearest, found.remedy)
             work.good = False
+        elif odd := oddity(spec, found):
+            self.report.note(f"{dotted((*work.key, field.name))} = {shown(value)} {odd}")
         work.values[field.name] = found
 
     # ---------------------------------------------------------------- bodies of slots

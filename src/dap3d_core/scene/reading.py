@@ -268,10 +268,30 @@ def _parse(text: str, path: Path) -> dict[str, Any]:
     else:
         line = int(place[1])
         what = f"not valid TOML: {what} at line {line}, column {place[2]}"
-    remedy = ""
+    remedy = "" if line is None else _remedy(text.splitlines()[line - 1 : line])
     if path.suffix == ".m":
         remedy = "this is a MATLAB file; dap3d import-matlab FOLDER makes a scene of it"
     raise _refused(str(path), what, line=line, remedy=remedy)
+
+
+#: What people write for a value that TOML has otherwise, and what to do.
+_HABITS = (
+    (r"[+-]?\d+,\d+", "a number has a decimal point, and no comma"),
+    (r"[+-]?(\.\d+|\d+\.)([eE][+-]?\d+)?", "write digits on both sides of the decimal point"),
+    (r"(?i)[+-]?(nan|inf|infinity)", "a scene has finite numbers alone"),
+    (r"(True|False|TRUE|FALSE)", "write true or false"),
+    (r"[A-Za-z_][\w .-]*", "write text in quotes"),
+)
+
+
+def _remedy(lines: list[str]) -> str:
+    """What to do about a line whose value is none, where a habit of other languages is known."""
+    for line in lines:
+        value = line.partition("=")[2].partition("#")[0].strip()
+        for habit, remedy in _HABITS:
+            if value and re.fullmatch(habit, value):
+                return remedy
+    return ""
 
 
 def _refused(file: str, what: str, *, line: int | None = None, remedy: str = "") -> SceneError:

@@ -25,13 +25,20 @@ from dap3d_core.scene import (
     mistake_at,
 )
 from dap3d_core.simulation.conservation import is_conservative
+from dap3d_core.simulation.directions import undefined_directions
+from dap3d_core.simulation.drivers import notes_on_drivers
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.explanation import explain
+from dap3d_core.simulation.initial import model_size
+from dap3d_core.simulation.pace import Pace
 from dap3d_core.simulation.redundancy import Redundancy, redundancy_of
 from dap3d_core.simulation.start import Start, find_start
 
 Floats = NDArray[np.float64]
 Announce = Callable[[str], None]
+
+#: Joints whose lines in the file a message gives.
+MOST_PLACES = 10
 
 
 class CompiledModel:
@@ -69,6 +76,7 @@ class CompiledModel:
             check_simulation(settings, self.model.body_names)
         #: The method that was asked for, perhaps "auto".
         self.asked = asked = method or str(scene.simulation.method)
+        self._paces: dict[float, Pace] = {}
         self._starts: dict[tuple[bool, tuple[str, ...], str], Start] = {}
         self.machine = Machine(self.model, choose_method(self.model, asked)[0], announce)
         self.method, self.reason = self.choice(asked)
@@ -83,8 +91,12 @@ class CompiledModel:
         except ValueError as error:  # what DAP3D_THREADS says
             raise SimulationError(str(error)) from error
         _ = self.machine.functions
-        self.notes: list[str] = [*self.checked.notes, *self.model.notes]
-        self.notes += (f"{INFORMATION}{note}" for note in cache_notes())
+        self.notes: list[str] = [
+            *self.checked.notes,
+            *self.model.notes,
+            *notes_on_drivers(self.checked),
+            *(f"{INFORMATION}{note}" for note in cache_notes()),
+        ]
         self._redundancy: Redundancy | None = None
         self.compile_time = time.perf_counter() - started
 
@@ -141,12 +153,39 @@ class CompiledModel:
             self._redundancy = redundancy_of(self.machine, state)
         return self._redundancy
 
+    def pace(self, t_end: float) -> Pace:
+        """How fast functions of time change in a run from 0 to t_end, found once."""
+        if t_end not in self._paces:
+            self._paces[t_end] = Pace(self.checked, self.machine, t_end)
+        return self._paces[t_end]
+
     def start(self, correct: bool, hold: tuple[str, ...], metric: str = "unit") -> Start:
-        """Where a run starts, found once; arguments and errors as of ``find_start``."""
+        """Where a run starts, found once; arguments and errors as of ``find_start``.
+
+        Raises:
+            SceneError: a direction that an element needs is undefined there.
+        """
         key = correct, tuple(hold), metric
         if key not in self._starts:
-            self._starts[key] = find_start(self.machine, *key)
+            try:
+                start = find_start(self.machine, *key)
+            except AssemblyError as error:
+                raise self._located(error) from error
+            mistakes = undefined_directions(
+                self.scene, self.model, start.u, model_size(self.machine)
+            )
+            if mistakes:
+                raise SceneError(mistakes)
+            self._starts[key] = start
         return self._starts[key]
+
+    def _located(self, error: AssemblyError) -> AssemblyError:
+        """The same error with the file and the lines of the joints that are open."""
+        found = [
+            mistake_at(self.scene, ("joints", name), "") for name in error.joints[:MOST_PLACES]
+        ]
+        places = [f"{m.file}:{m.line}: {m.key}" for m in found if m.line is not None]
+        return AssemblyError("\n".join([str(error), *places]), error.joints)
 
     def choice(self, asked: str) -> tuple[str, str]:
         """The formulation that a run takes when ``asked`` for one, and the reason in words.
@@ -208,8 +247,10 @@ def _modelled(checked: Checked) -> Model:
     try:
         return build_model(checked)
     except ModelError as error:
-        kind, name, words = error.args
-        raise SceneError([mistake_at(checked.scene, (f"{kind}s", name), words)]) from error
+        found = [
+            mistake_at(checked.scene, (f"{k}s", name), words) for k, name, words in error.faults
+        ]
+        raise SceneError(sorted(found, key=lambda m: m.line or 0)) from error
 
 
 def compile_scene(

@@ -11,7 +11,7 @@ from dap3d_core.simulation.offender import find_offender
 
 REASONS = {
     Status.STEP_FLOOR: "the step size fell to the resolution of time",
-    Status.NOT_FINITE: "a number became infinite or not a number",
+    Status.NOT_FINITE: "a number came up that is beyond 1e+100, infinite or not a number",
     Status.PROJECTION_FAILED: "the state could not be projected onto the constraints",
 }
 

@@ -1,5 +1,6 @@
 """What can go wrong with a run."""
 
+from collections.abc import Sequence
 from typing import Any
 
 
@@ -16,4 +17,12 @@ class RedundantError(SimulationError):
 
 
 class AssemblyError(SimulationError):
-    """The initial conditions could not be brought onto the constraints."""
+    """The initial conditions could not be brought onto the constraints.
+
+    Attributes:
+        joints: names of the joints that are open, the worst first; empty where a row is not finite.
+    """
+
+    def __init__(self, message: str, joints: Sequence[str] = ()) -> None:
+        super().__init__(message)
+        self.joints = tuple(joints)

@@ -33,6 +33,8 @@ MOST_PASSES = 25
 MOST_TURN, MOST_SHIFT = 0.5, 0.5
 #: A correction of this part of the model's size, or of the speeds, is one of rounding.
 ROUNDING = 1e-6
+#: A row of a shorter gradient, in its own units, is not changed by small changes.
+FLAT = 1e-6
 #: Joints that the message of a failure lists.
 MOST_JOINTS = 10
 #: Singular values below this part of the largest are left out of the least-norm solution.
@@ -158,7 +160,7 @@ def correct_positions(
     Raises:
         AssemblyError: the residual does not vanish.
     """
-    size = model_size(machine)
+    size, limit = model_size(machine), 1.0
     for passes in range(MOST_PASSES + 1):
         rows = finite_rows(machine, t, u)
         if _largest(rows.C) <= TOLERANCE:
@@ -172,7 +174,7 @@ def correct_positions(
         turn_limit = MOST_TURN / turn if turn else 1.0
         limit = min(1.0, shift_limit, turn_limit)
         u = displaced(u, -limit * change, machine.model.body_count)
-    raise AssemblyError(_failure(machine, rows.C, passes, held))
+    raise _failure(machine, rows, passes, held, is_far=limit < 1.0)
 
 
 def least_change(
@@ -286,31 +288,52 @@ def _largest(values: Floats) -> float:
     return float(np.max(np.abs(values), initial=0.0))
 
 
-def _failure(machine: Machine, C: Floats, passes: int, held: Integers) -> str:
+def _failure(
+    machine: Machine, rows: Rows, passes: int, held: Integers, *, is_far: bool
+) -> AssemblyError:
     """Why it failed: the joints that are open, the worst first, in lines of at most 80 columns."""
-    model = machine.model
+    model, C = machine.model, rows.C
     worst = np.array([_largest(C[a:b]) for a, b in pairwise(model.joint_start)])
     still_open = [int(k) for k in np.argsort(-worst, kind="stable") if worst[k] > TOLERANCE]
     types = {int(k): group.keyword for group in model.joints for k in group.members}
     lines = [f"  {'joint':30} {'type':10} {'residual':>9}  rows"]
     for k in still_open[:MOST_JOINTS]:
-        rows = np.flatnonzero(np.abs(C[slice(*model.joint_start[k : k + 2])]) > TOLERANCE) + 1
-        words = ", ".join(map(str, rows))
+        open_rows = np.flatnonzero(np.abs(C[slice(*model.joint_start[k : k + 2])]) > TOLERANCE) + 1
+        words = ", ".join(map(str, open_rows))
         name = f"{_cut(model.joint_names[k], 30):30} {_cut(types[k], 10):10}"
         lines.append(f"  {name} {worst[k]:9.3g}  {_cut(words, 25)}")
     if len(still_open) > MOST_JOINTS:
         lines.append(f"  and {len(still_open) - MOST_JOINTS} joints more")
     names = ", ".join(model.body_names[b - 1] for b in held)
-    return "\n".join(
+    why = ["contradictory joints cannot be assembled"]
+    if is_far:
+        why = ["the bodies were still on their way: give positions nearer to an assembled pose,",
+               "unless the joints contradict each other"]  # fmt: skip
+    if flat := _without_gradient(machine, rows):
+        why = [f"no small change closes {flat}: points coincide there, or axes are",
+               "parallel or perpendicular and should not be; begin at another pose"]  # fmt: skip
+    text = "\n".join(
         [
             "the initial positions cannot be assembled:",
             f"after {passes} passes these joints are still open",
             *lines,
             "check the points, axes and lengths of these joints;",
-            "contradictory joints cannot be assembled",
+            *why,
             *([f"held where they are: {names}"] if names else []),
         ]
     )
+    return AssemblyError(text, [model.joint_names[k] for k in still_open])
+
+
+def _without_gradient(machine: Machine, rows: Rows) -> str:
+    """The first open row that no change of the pose affects to first order, in words; else ""."""
+    length = np.bincount(rows.row, rows.value**2, minlength=rows.shape[0]) ** 0.5
+    stuck = np.flatnonzero((np.abs(rows.C) > TOLERANCE) & (length < FLAT))
+    if not len(stuck):
+        return ""
+    k = int(np.searchsorted(machine.model.joint_start, stuck[0], side="right")) - 1
+    row = int(stuck[0] - machine.model.joint_start[k]) + 1
+    return f"row {row} of {_cut(machine.model.joint_names[k], 30)}"
 
 
 def _cut(words: str, width: int) -> str:

@@ -1,49 +1,109 @@
-"""Who made a number that is not finite: the first body, force or joint to blame."""
+"""Who made a number that no run can have: the first body, force or joint to blame."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.assembly.evaluate import place_bodies
 from dap3d_core.assembly.system import KINDS
+from dap3d_core.formulations import RHS
 from dap3d_core.formulations.machine import AS_COMPILED, Machine
 from dap3d_core.interface.writer import stride
 from dap3d_core.kernels.lists import call_loop
 from dap3d_core.model import Group
+from dap3d_core.model.kinematics import from_integrated
+from dap3d_core.scene.values import LARGEST
 
 Floats = NDArray[np.float64]
 
 #: Where to look behind the last good state, as parts of the time.
 AHEAD = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
 
+#: A row this many times the others, in its own units, tells of a pose that its joint cannot have.
+STEEP = 1e6
+#: A rate, in SI units, beyond which no step goes on for long.
+ENORMOUS = 1e50
+
 
 @AS_COMPILED
 def find_offender(machine: Machine, t: float, y: Floats, t_stop: float) -> str:
-    """Name what is not finite at or just after time t with the integrated state y; else ""."""
+    """Name what is not finite, or too large, at or just after time t with the integrated state y.
+
+    "" where nothing is.
+    """
     for later in (t, t_stop, *(t + part * (1.0 + abs(t)) for part in AHEAD)):
         found = _at(machine, later, y)
         if found:
             return f"{found} (t = {later:.9g} s)"
-    return ""
+    return _steepest(machine, t, y) or _fastest(machine, t, y)
 
 
 def _at(machine: Machine, t: float, y: Floats) -> str:
     n = machine.model.body_count
     for b, name in enumerate(machine.model.body_names):
         numbers = np.concatenate([y[7 * b : 7 * b + 7], y[7 * n + 6 * b : 7 * n + 6 * b + 6]])
-        if not np.all(np.isfinite(numbers)):
-            return f"the state of body {name}"
+        if fault := _fault(numbers):
+            return f"the state of body {name} is {fault}"
     s = machine.system
     place_bodies(y, s.body, s.metric)
     s.F[:, :4] = 0.0  # filled again one by one: what stands there may be of no finite number
     for q, (kind, group) in enumerate(machine.what):
         for k in range(group.count):
-            if not _one_is_finite(machine, q, k, kind, group, t):
+            if fault := _fault_of(machine, q, k, kind, group, t):
                 name = _name(machine, kind, group, k)
-                return f"{_title(kind)} {name} (type {group.keyword}) is not finite"
-    return _singular(machine, t)
+                return f"{_title(kind)} {name} (type {group.keyword}) is {fault}"
+    return _singular(machine, t) or _accelerated(machine, t, y)
 
 
-def _one_is_finite(machine: Machine, q: int, k: int, kind: str, group: Group, t: float) -> bool:
+def _steepest(machine: Machine, t: float, y: Floats) -> str:
+    """The joint with the largest row, where its pose is so near to a singular one of its own."""
+    model = machine.model
+    if not model.row_count:
+        return ""
+    rows = machine.rows(t, from_integrated(y, model.body_count))
+    largest = np.abs(rows.gamma)
+    np.maximum.at(largest, rows.row, np.abs(rows.value))
+    worst = int(np.argmax(largest))
+    if not largest[worst] > STEEP * max(1.0, float(np.median(largest))):
+        return ""
+    size, name = largest[worst], model.row_owner(worst)
+    return f"a row of joint {name} has grown to {size:.2g} (t = {t:.9g} s)"
+
+
+def _fastest(machine: Machine, t: float, y: Floats) -> str:
+    """The body with the largest rate, where it is so large that the next step fails."""
+    rates = _rates(machine, t, y)
+    largest = [float(np.max(np.abs(of_body))) for of_body in rates]
+    b = int(np.argmax(largest))
+    if not largest[b] > ENORMOUS:
+        return ""
+    name = machine.model.body_names[b]
+    return f"a rate of body {name} has grown to {largest[b]:.2g} (t = {t:.9g} s)"
+
+
+def _fault(*numbers: Floats) -> str:
+    """What is wrong with numbers: not finite, or too large for a run; "" if nothing is."""
+    if not all(bool(np.all(np.isfinite(part))) for part in numbers):
+        return "not finite"
+    too_large = any(bool(np.any(np.abs(part) > LARGEST)) for part in numbers)
+    return f"beyond {LARGEST:g}, too large" if too_large else ""
+
+
+def _accelerated(machine: Machine, t: float, y: Floats) -> str:
+    """The body whose acceleration is too large, though all that acts on it is not."""
+    for name, rates in zip(machine.model.body_names, _rates(machine, t, y), strict=True):
+        if fault := _fault(rates):
+            return f"the acceleration of body {name} is {fault}"
+    return ""
+
+
+def _rates(machine: Machine, t: float, y: Floats) -> Floats:
+    """(n, 13) dy/dt of each body."""
+    out, n = np.zeros_like(y), machine.model.body_count
+    machine.functions[RHS](float(t), y, out, machine.system, machine.loops)
+    return np.hstack([out[: 7 * n].reshape(n, 7), out[7 * n : 13 * n].reshape(n, 6)])
+
+
+def _fault_of(machine: Machine, q: int, k: int, kind: str, group: Group, t: float) -> str:
     s = machine.system
     for out in (s.force, s.gamma, s.nu, s.C, s.D, s.x):
         out[:] = 0.0
@@ -53,7 +113,7 @@ def _one_is_finite(machine: Machine, q: int, k: int, kind: str, group: Group, t:
         joint_outs[kind] = np.zeros(len(group.examined.outputs[kind])), np.zeros(1), np.zeros(1)
     outs = joint_outs.get(kind, (s.force, s.force, s.force))
     _call_one(machine, q, k, group, t, outs)
-    return all(bool(np.all(np.isfinite(out))) for out in (*outs, s.F[:, :4]))
+    return _fault(*outs, s.F[:, :4])
 
 
 def _call_one(

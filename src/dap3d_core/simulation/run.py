@@ -181,6 +181,8 @@ class Run:
                 f"the initial conditions violate the constraints (position {position:.2g}, "
                 f"velocity {velocity:.2g}) and were not corrected; switch correct on"
             )
+        t_end = float(self.times[-1])
+        self.notes += self.compiled.pace(t_end).notes(settings, settings.dt or t_end / 100.0)
         self.rank = start.redundancy.rank.rank
         if start.redundancy.rank.redundant:
             self._judge_redundancy(start.redundancy, start.u)
@@ -241,6 +243,7 @@ class Run:
         """Compile an integrator before the clock of the run goes on; it is the present one then."""
         if self.announce is not None and not driver_is_cached("integrators"):
             self.announce("the integrator")
+        integration.stops = self.compiled.pace(float(self.times[-1])).stops
         before = time.perf_counter()
         integration.compile()
         spent = time.perf_counter() - before
