@@ -1,139 +1,509 @@
-"""Bad input as a user of the command line meets it: words, exit codes, and what is left behind."""
+"""The command line used wrongly: one message that says what is allowed, and the right exit code.
+
+What a process of its own is not needed for runs in this one, with the streams of the process.
+"""
 
 import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import threading
 
 import numpy as np
 import pytest
-from bad_input.case import PAIR, PENDULUM, ROD, changed, driven, pushed
-from bad_input.elements import SPRING
+from tests.e2e.conftest import COMMAND, SCENE, environment
 
 import dap3d_core as dap
 from dap3d_core.cli import main
 
+#: Width of the narrowest terminal that lines are made for.
+COLUMNS = 60
+
+
+@pytest.fixture(scope="module")
+def falling(tmp_path_factory):
+    """A folder with a scene, fall.toml, and its result, fall.nc."""
+    folder = tmp_path_factory.mktemp("falling")
+    (folder / "fall.toml").write_text(SCENE)
+    dap.simulate(dap.load(folder / "fall.toml"), output=folder / "fall.nc")
+    return folder
+
 
 @pytest.fixture
-def run(tmp_path, monkeypatch, capfd):
-    """Runs a command on a scene, in this process: exit code, stdout, stderr."""
+def folder(falling, tmp_path, monkeypatch):
+    """The working folder: that scene and result, and things that are none."""
+    for name in ("fall.toml", "fall.nc"):
+        shutil.copy(falling / name, tmp_path / name)
+    (tmp_path / "words").write_text("words\n")
+    (tmp_path / "words.png").write_text("words\n")
+    (tmp_path / "empty.nc").write_bytes(b"")
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "link.nc").symlink_to("fall.nc")
+    (tmp_path / "leads-nowhere.nc").symlink_to("nowhere.nc")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", str(COLUMNS))
+    return tmp_path
 
-    def call(text, *arguments):
-        (tmp_path / "scene.toml").write_text(text)
-        code = main([str(a) for a in arguments])
+
+@pytest.fixture
+def call(folder, capfd):
+    """Run a command in this process; exit code, stdout and stderr, which hold no traceback."""
+
+    def run(*words):
+        code = main([str(word) for word in words])
         out, err = capfd.readouterr()
-        assert "Traceback" not in out + err
-        assert "unexpected" not in err
-        return code, out, " ".join(err.split())
+        assert "Traceback" not in err
+        assert not err.startswith("unexpected")
+        return code, out, err
 
-    return call
-
-
-SPOILED = changed(
-    PENDULUM,
-    ("mass = 1.0", "mas = 1.0"),
-    ("Jp = [0.1, 0.1, 0.05]", "Jp = [0.1, 0.1]"),
-    ('P_j = "ground.O"', 'P_j = "grund.O"'),
-    ("dt = 0.02", "dt = -0.02"),
-)
+    return run
 
 
-def test_all_mistakes_come_at_once_with_their_places(dap3d):
-    """In a process of its own: nothing is written, the code is 2."""
-    (dap3d.folder / "scene.toml").write_text(SPOILED)
-    done = dap3d("run", "scene.toml")
-    assert (done.returncode, done.stdout) == (2, "")
-    said = " ".join(done.stderr.split())
-    lines = SPOILED.splitlines()
-    assert said.startswith("4 mistakes:")
-    for key, value, word in (
-        ("bodies.rod.mas", "1.0", "did you mean 'mass'?"),
-        ("bodies.rod.Jp", "[0.1, 0.1]", "it has 2 numbers"),
-        ("simulation.dt", "-0.02", "greater than 0"),
-        ("joints.hinge.P_j", '"grund.O"', "did you mean 'ground.O'?"),
-    ):
-        line = 1 + lines.index(f"{key.rpartition('.')[2]} = {value}")
-        assert f"scene.toml:{line}: {key} = {value}:" in said
-        assert word in said
-    assert [file.name for file in dap3d.folder.iterdir()] == ["scene.toml"]
+R = "fall.nc"
+QUIET = ("-o", "new.nc")
+#: Words of a command -> what its message says. All are refused with 2 and change no file.
+REFUSED = [
+    # settings
+    (("run", "fall.toml", "--t-end", "-1"), "--t-end = -1.0: should be at least 0"),
+    (("run", "fall.toml", "--t-end", "nan"), "finite number"),
+    (("run", "fall.toml", "--t-end", "1e999"), "finite number"),
+    (("run", "fall.toml", "--t-end", "1e308"), "products of larger ones overflow"),
+    (("run", "fall.toml", "--t-end", "soon"), "'soon' is not a valid float"),
+    (("run", "fall.toml", "--dt", "0"), "greater than 0"),
+    (("run", "fall.toml", "--dt", "-0.1"), "greater than 0"),
+    (("run", "fall.toml", "--dt", "nan"), "finite number"),
+    (("run", "fall.toml", "--dt", "5"), "longer than the run"),
+    (("run", "fall.toml", "--t-end", "1e12", "--dt", "1"), "9.69e+04 GiB"),
+    (("run", "fall.toml", "--dt", "1e-300"), "at most 5e+07 times are reported"),
+    (("run", "fall.toml", "--rtol", "0"), "at least 1e-14"),
+    (("run", "fall.toml", "--rtol", "-1"), "at least 1e-14"),
+    (("run", "fall.toml", "--rtol", "1e-20"), "at least 1e-14"),
+    (("run", "fall.toml", "--rtol", "2"), "at most 1"),
+    (("run", "fall.toml", "--rtol", "nan"), "finite number"),
+    (("run", "fall.toml", "--atol", "-1"), "at least 0"),
+    (("run", "fall.toml", "--atol", "inf"), "finite number"),
+    (("run", "fall.toml", "--step", "0"), "greater than 0"),
+    (("run", "fall.toml", "--step", "1e-300"), "the rounding of time"),
+    (("run", "fall.toml", "--integrator", "cvode"), '"dopri5", "dop853", "adams", "rk4", "radau"'),
+    (("run", "fall.toml", "--integrator", "DOP853"), "did you mean 'dop853'"),
+    (("run", "fall.toml", "--integrator", "rk4"), "rk4 does not choose its step"),
+    (("run", "fall.toml", "--integrator", "adams", "--step", "0.1"), "chooses its step itself"),
+    (("run", "fall.toml", "--method", "lagrange"), '"standard", "penalty", "lsq"'),
+    (("run", "pen1", "--method", "unconstrained"), "use standard or auto"),
+    (("run", "fall.toml", "--checkpoint", "0"), "'0' is no time; write 90, 90s, 5min or 2h"),
+    (("run", "fall.toml", "--checkpoint", "-3min"), "'-3min' is no time"),
+    (("run", "fall.toml", "--checkpoint", "nan"), "'nan' is no time"),
+    # going on, and again
+    (("resume",), "Missing argument 'CHECKPOINT'"),
+    (("resume", "none.checkpoint"), "there is no such file"),
+    (("resume", "."), "it is a folder"),
+    (("resume", "fall.toml"), "it is no checkpoint of dap3d"),
+    (("resume", "fall.toml", "--checkpoint", "soon"), "'soon' is no time"),
+    (("rerun",), "Missing argument 'RESULT'"),
+    (("rerun", "none.nc"), "there is no such file"),
+    (("rerun", "fall.toml"), "it is not a NetCDF-4 file"),
+    # options and arguments
+    (("run", "fall.toml", "--bogus"), "No such option '--bogus'"),
+    (("run", "fall.toml", "--t-ned", "1"), "'--t-end'"),
+    (("run", "fall.toml", "--t-end", "1", "--t-end", "2"), "--t-end is given more than once"),
+    (("run", "fall.toml", "--t-end"), "requires an argument"),
+    (("run", "--", "fall.toml", "--t-end", "1"), "unexpected extra arguments (--t-end 1)"),
+    (("run", "fall.toml", "--", "-o", "x.nc"), "unexpected extra arguments (-o x.nc)"),
+    (("run", "fall.toml", "pen1"), "unexpected extra argument (pen1)"),
+    (("run", ""), "is an empty word"),
+    (("run", "fall.toml", "-o", ""), "'--output' is an empty word"),
+    (("rnu", "fall.toml"), "did you mean 'run'"),
+    (("--bogus",), "No such option '--bogus'"),
+    # files of scenes
+    (("run", "pne1"), "did you mean 'pen1'"),
+    (("run", "sub"), "the folder has no scene.toml"),
+    (("run", R), "it holds NUL bytes"),
+    (("run", "/dev/null"), "is not a regular file"),
+    (("run", "https://example.org/scene.toml"), "a URL cannot be loaded"),
+    (("check", "pne1"), "did you mean 'pen1'"),
+    (("check", "fall.toml", "--methd", "lsq"), "'--method'"),
+    (("report", "pne1"), "did you mean 'pen1'"),
+    (("report", "fall.toml", "--integrator", "foo"), "should be one of"),
+    (("report", "fall.toml", "--t-end", "nan"), "finite number"),
+    (("report", "fall.toml", "--target-error", "-1"), "positive number"),
+    (("report", "fall.toml", "--plot", "x.txt"), ".png, .svg, .pdf"),
+    (("report", "fall.toml", "--csv", "x", "-o", "x"), "name one file twice"),
+    (("report", "fall.toml", "--csv", "sub"), "it is a folder"),
+    # outputs
+    (("run", "fall.toml", "-o", R), "--force overwrites it"),
+    (("run", "fall.toml", "-o", "fall.toml", "--force"), "is what is read"),
+    (("run", "fall.toml", "-o", "sub"), "it is a folder"),
+    (("run", "fall.toml", "-o", "."), "it is a folder"),
+    (("run", "fall.toml", "-o", "words/x.nc"), "there is no folder words"),
+    (("run", "fall.toml", "-o", "nowhere/x.nc"), "there is no folder nowhere"),
+    (("run", "fall.toml", "-o", "/dev/full", "--force"), "it is no regular file"),
+    (("run", "fall.toml", "-o", "/dev/null"), "it is no regular file"),
+    (("run", "fall.toml", "-o", "leads-nowhere.nc"), "a link that leads nowhere"),
+    (("run", "fall.toml", "-o", "x" * 300), "File name too long"),
+    (("run", "fall.toml", "-o", "https://example.org/x.nc"), "there is no folder"),
+    # results
+    *(((c, "nothing.nc"), "there is no such file") for c in ("info", "post", "plot", "view")),
+    *(((c, "words"), "not a NetCDF-4 file") for c in ("info", "post", "plot", "animate", "view")),
+    *(((c, "empty.nc"), "the file is empty") for c in ("info", "post", "plot", "animate", "view")),
+    *(((c, "sub"), "it is a folder") for c in ("info", "post", "plot", "animate", "view")),
+    *(((c, ""), "is an empty word") for c in ("info", "post", "plot", "animate", "view")),
+    *(((c,), "Missing argument") for c in ("info", "post", "plot", "animate", "view")),
+    *(((c, R, "--bogus"), "No such option") for c in ("info", "post", "plot", "animate", "view")),
+    (("post", R, "stnoe.r"), "did you mean 'stone.r'"),
+    (("post", R, "--select", "stone.r.w"), "stone.r has x, y, z, norm, not 'w'"),
+    (("post", R, "-o", "x.txt"), "name a .nc or a .csv file"),
+    (("post", R, "-o", "x.csv", "--format", "nc"), "leave one out"),
+    (("post", R, "--format", "xls"), "'xls' is not one of 'nc', 'csv'"),
+    (("post", R, "-o", R, "--force"), "is what is read"),
+    (("post", "link.nc", "-o", R, "--force"), "is what is read"),
+    (("plot", R, "stnoe.r.z"), "did you mean 'stone.r.z'"),
+    (("plot", R, "stone.q"), "not 'q'"),
+    (("plot", R, R), "named twice"),
+    (("plot", R, "stone.r", "--x", "stone.r"), "name one of stone.r.x"),
+    (("plot", R, "-o", "x.bmp"), ".png, .svg, .pdf"),
+    (("plot", R, "-o", "sub"), "it is a folder"),
+    (("plot", R, "--width", "0"), "--width is from 13 to 2540 mm, not 0"),
+    (("plot", R, "--width", "nan"), "--width is from 13 to 2540 mm, not nan"),
+    (("plot", R, "--height", "-5"), "--height is from 13 to 2540 mm, not -5"),
+    (("animate", R, "-o", "x.txt"), ".gif, .mp4, .png"),
+    (("animate", R, "--size", "big"), "such as 640x480"),
+    (("animate", R, "--size", "0"), "from 100 to 4096"),
+    (("animate", R, "--fps", "nan"), "from 1 to 50"),
+    (("animate", R, "--speed", "0"), "above 0"),
+    (("animate", R, "--view", "q"), "AZIMUTH,ELEVATION"),
+    (("animate", R, "--at", "99", "-o", "x.png"), "nothing to see at t = 99 s"),
+    (("view", R, "-o", "x.txt"), "a page is a .html file"),
+    (("view", R, "--quantity", "stnoe.r.z"), "did you mean 'stone.r.z'"),
+    (("view", R, "--fps", "0"), "greater than 0"),
+    # types and packages
+    (("plugins", "x"), "unexpected extra argument (x)"),
+    (("models", "--jsn"), "'--json'"),
+    (("describe",), "Missing argument"),
+    (("describe", "shp"), "did you mean 'sph'"),
+    (("check-plugin", "shp"), "did you mean 'sph'"),
+    (("check-plugin", ""), "is an empty word"),
+    (("check-plugin", "nothing.py"), "there is no file nothing.py"),
+    (("check-plugin",), "give --all"),
+    (("new-plugin",), "Missing argument"),
+    (("new-plugin", "x y"), "no keyword for a type"),
+    (("new-plugin", "mine", "--kind", "wheel"), "'wheel' is not one of"),
+    (("new-plugin", "rev"), "there is a joint type 'rev' already"),
+    (("import-matlab", "nothing"), "there is no such folder"),
+    (("import-matlab", "words"), "a MATLAB model is a folder"),
+    (("import-matlab", "sub"), "there is no inBodies.m"),
+    (("import-matlab", ""), "is an empty word"),
+]
 
 
-def test_mistakes_are_json_too(run):
-    code, out, _ = run(SPOILED, "check", "scene.toml", "--json")
-    found = json.loads(out)
-    assert (code, found["exit_code"], len(found["mistakes"])) == (2, 2, 4)
-    assert found["mistakes"][0]["nearest"] == "mass"
-    assert all(m["file"] == "scene.toml" and m["line"] for m in found["mistakes"])
+def _name(words):
+    return " ".join(word if len(word) < 30 else f"{word[:9]}..." for word in words) or "-"
 
 
-@pytest.mark.parametrize("command", ["check", "run"])
-def test_what_types_refuse_is_told_for_all_elements(run, tmp_path, command):
-    """Two functions and a friction, none of which its own type takes."""
-    text = changed(
-        driven('type = "b"\nx_start = 2.0'),
-        add='[joints.again]\ntype = "rel-rot"\nbody_i = "rod"\na_j = "ground.x"\nfunction = "n"\n'
-        '[functions.n]\ntype = "spline"\nx = [0.0, 0.0]\ny = [1.0, 2.0]\n'
-        '[forces.rub]\ntype = "friction"\njoint = "hinge"\n',
-    )
-    code, out, err = run(text, command, "scene.toml")
-    assert (code, out) == (2, "")
-    assert err.startswith("3 mistakes:")
-    for table, words in (
-        ("functions.f", "x_end = 1 must lie beyond x_start = 2"),
-        ("functions.n", "x must increase"),
-        ("forces.rub", "radius is missing"),
-    ):
-        line = 1 + text.splitlines().index(f"[{table}]")
-        assert f"scene.toml:{line}: {table}: {words}" in err
-    assert not (tmp_path / "scene.nc").exists()
+@pytest.mark.parametrize(("words", "said"), REFUSED, ids=[_name(words) for words, _ in REFUSED])
+def test_a_mistake_is_told_and_changes_nothing(call, folder, words, said):
+    """Exit code 2, nothing on stdout, lines that fit the terminal; with --json one object."""
+    before = sorted(path.name for path in folder.iterdir())
+    if words[0] == "run" and "-o" not in words and words[-1] not in ("--t-end", ""):
+        words = (words[0], *QUIET, *words[1:])
+    code, out, err = call(*words)
+    told = " ".join(err.split())
+    assert code == 2, err
+    assert out == ""
+    assert said in told or said in told.replace(" ", ""), err
+    assert all(len(line) <= COLUMNS for line in err.splitlines()), err
+    if words[0] in main_commands():
+        code, out, again = call(words[0], "--json", *words[1:])
+        assert (code, again) == (2, err)
+        found = json.loads(out)
+        assert found["exit_code"] == 2
+        assert found["error"]
+    assert sorted(path.name for path in folder.iterdir()) == before
 
 
-@pytest.mark.parametrize("command", ["check", "run"])
-def test_a_direction_that_is_undefined_is_refused(run, tmp_path, command):
-    text = pushed(SPRING, ("r = [1.0, 0.0, 0.0]", "r = [0.0, 0.0, 0.0]"), base=PAIR)
-    code, out, err = run(text, command, "scene.toml")
-    assert (code, out) == (2, "")
-    assert f"scene.toml:{1 + text.splitlines().index('[forces.F]')}: forces.F: its points" in err
-    assert not (tmp_path / "scene.nc").exists()
+def main_commands():
+    """The commands that take --json."""
+    from dap3d_core.cli.group import dap3d
+
+    return {
+        name for name, command in dap3d.commands.items()
+        if any("--json" in p.opts for p in command.params)
+    }  # fmt: skip
 
 
-def test_joints_that_contradict_each_other_leave_nothing(run, tmp_path):
-    text = changed(
-        PENDULUM,
-        add='[points.C]\nbody = "ground"\nsPp = [0, 0, 1]\n'
-        '[joints.two]\ntype = "sph"\nP_i = "A"\nP_j = "C"\n',
-    )
-    code, _, err = run(text, "run", "scene.toml")
-    assert code == 1
-    lines = text.splitlines()
-    for joint in ("hinge", "two"):
-        assert f"scene.toml:{1 + lines.index(f'[joints.{joint}]')}: joints.{joint}" in err
-    assert not (tmp_path / "scene.nc").exists()
-    code, out, _ = run(text, "check", "scene.toml")
+def test_every_command_tries_wrong_words():
+    tried = {words[0] for words, _ in REFUSED}
+    from dap3d_core.cli.group import dap3d
+
+    assert set(dap3d.commands) <= tried
+    assert set(dap3d.commands) == main_commands()
+
+
+def test_all_that_is_wrong_with_a_plot_is_told_at_once(call):
+    code, _, err = call("plot", R, "mispelt", "stnoe.r.z", "--x", "nor-this", "--width", "0",
+                        "-o", "words.png")  # fmt: skip
     assert code == 2
-    assert "joints.two" in " ".join(out.split())
+    told = " ".join(err.split())
+    for words in ("--width is from", "words.png exists", "'mispelt'", "'stone.r.z'", "'nor-this'"):
+        assert words in told, err
 
 
-def test_a_run_that_blows_up_keeps_finite_numbers(run, tmp_path):
-    """A spring that pushes: its elongation is l0 cosh(sqrt(2 |k| / m) t), beyond all bounds.
-
-    Half |k| times its square is the first number beyond 1e100.
-    """
-    text = pushed(f"{SPRING}\nk = -1e6", base=PAIR)
-    code, _, err = run(text, "run", "scene.toml", "--t-end", "2", "--dt", "0.01")
-    assert code == 3
-    assert "the run stopped at t =" in err
-    assert "beyond 1e+100" in err
-    assert "of body a" in err or "force F" in err
-    result = dap.open(tmp_path / "scene.nc")
-    end = np.arccosh(np.sqrt(2.0 * 1e100 / 1e6) / 0.5) / np.sqrt(2e6)
-    assert result.t[-1] <= end < result.t[-1] + 0.01
-    for array in (result.u, result.v_dot, result.energy.total, result.energy.kinetic):
-        assert np.all(np.isfinite(array))
+@pytest.mark.parametrize("command", ["post", "view"])
+def test_all_that_is_wrong_with_an_export_is_told_at_once(call, folder, command):
+    target = folder / ("taken.nc" if command == "post" else "taken.html")
+    target.write_text("taken")
+    option = "--select" if command == "post" else "--quantity"
+    code, _, err = call(command, R, "-o", target.name, option, "stnoe.r", option, "neither.r")
+    assert code == 2
+    told = " ".join(err.split())
+    for words in (f"{target.name} exists", "'stnoe'", "'neither'"):
+        assert words in told, err
+    assert target.read_text() == "taken"
 
 
-def test_what_is_odd_runs_and_counts_under_strict(run, tmp_path):
-    text = changed(ROD, ('type = "weight"', 'type = "weight"\nwgt = [0, 0, -2]'))
-    code, out, _ = run(text, "run", "scene.toml")
+def test_an_absolute_tolerance_of_zero_is_noted(call):
+    code, out, _ = call("run", "fall.toml", *QUIET, "--atol", "0", "--json")
     assert code == 0
-    assert "forces.g.wgt = [0, 0, -2] is a direction of length 2" in " ".join(out.split())
-    assert run(text, "run", "scene.toml", "--strict", "--force")[0] == 1
-    assert (tmp_path / "scene.nc").exists()
+    assert any("atol = 0" in note for note in json.loads(out)["notes"])
+
+
+def test_more_memory_than_the_machine_has_is_refused(call, monkeypatch):
+    from dap3d_core.scene import settings
+
+    monkeypatch.setattr(settings, "memory", lambda: 2**20)  # a machine with one MiB
+    code, _, err = call("run", "fall.toml", *QUIET, "--dt", "1e-6")
+    assert code == 2
+    assert "this machine has 0.000977 GiB" in " ".join(err.split())
+
+
+# ------------------------------------------------------------------ a package that is not there
+
+
+@pytest.mark.parametrize(
+    ("package", "extra", "words"),
+    [("tree_sitter", "dap3d[matlab]", ("import-matlab", "sub"))],
+)
+def test_a_missing_package_is_told_with_its_extra(call, folder, monkeypatch, package, extra, words):
+    (folder / "sub" / "inBodies.m").write_text("B1 = Body_struct;\n")
+    for name in [n for n in sys.modules if n.split(".")[0].startswith(package)]:
+        monkeypatch.delitem(sys.modules, name)
+    for name in [n for n in sys.modules if n.startswith("dap3d_core.matlab")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, package, None)
+    code, _, err = call(*words)
+    assert code in (1, 2)
+    assert extra in err
+
+
+# ------------------------------------------------------------------ disks and races
+
+
+def _limited(size):
+    """For a child process: no file may be larger than this."""
+
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+
+    return limit
+
+
+def _process(folder, *words, **options):
+    return subprocess.Popen(
+        [*COMMAND, *words], cwd=folder, env=environment(), stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options,
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("t_end", "left"), [("0.1", []), ("1e5", ["out.nc.part"])], ids=["short", "streaming"]
+)
+def test_a_disk_that_is_full_ends_a_run_in_a_sentence(folder, t_end, left):
+    """A short run leaves nothing; of a long one the rows that reached the disk are readable."""
+    limit = _limited(60_000 if t_end == "1e5" else 9_000)
+    words = ("run", "fall.toml", "-o", "out.nc", "--t-end", t_end, "--dt", "0.01", "--json")
+    process = _process(folder, *words, preexec_fn=limit)
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 1, err
+    assert "Traceback" not in err
+    assert "cannot write" in json.loads(out)["error"]
+    found = [path.name for path in folder.iterdir() if path.name.startswith("out")]
+    assert found in ([], left)
+    for name in found:
+        if (folder / name).stat().st_size:
+            code, _, told = _finish(_process(folder, "info", name))
+            assert code in (0, 2), told
+            assert "Traceback" not in told
+
+
+def _finish(process):
+    out, err = process.communicate(timeout=300)
+    return process.returncode, out, err
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (shutil.which("setpriv") or os.getuid()), reason="root may write all")
+def test_a_folder_that_is_read_only_is_refused(folder):
+    """Where the test is run by root, without root's right to ignore permissions."""
+    (folder / "sub").chmod(0o555)
+    words = [] if os.getuid() else ["setpriv", "--bounding-set", "-dac_override"]
+    done = subprocess.run([*words, *COMMAND, "run", "fall.toml", "-o", "sub/x.nc"], cwd=folder,
+                          env=environment(), capture_output=True, text=True)  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    assert "no permission to write in its folder" in " ".join(done.stderr.split())
+
+
+def test_of_two_that_write_one_file_at_once_one_wins_whole(tmp_path):
+    """Many times, for it is a race: the file is that of one of them, the other is told."""
+    from dap3d_core.result import ResultError
+    from dap3d_core.result.files import whole_file
+
+    told, texts = [], ["a" * 5000, "b" * 5000]
+
+    def write(target, text, barrier):
+        try:
+            with whole_file(target) as part:
+                part.write_text(text)
+                barrier.wait()
+        except ResultError as error:
+            told.append(str(error))
+
+    for k in range(50):
+        target, barrier = tmp_path / f"{k}.nc", threading.Barrier(2)
+        both = [threading.Thread(target=write, args=(target, text, barrier)) for text in texts]
+        for thread in both:
+            thread.start()
+        for thread in both:
+            thread.join()
+        assert target.read_text() in texts
+    assert len(told) == 50
+    assert all("exists" in words for words in told)
+    assert len(list(tmp_path.iterdir())) == 50
+
+
+@pytest.mark.slow
+def test_of_two_runs_that_write_one_file_one_wins_whole(folder):
+    words = ("run", "fall.toml", "-o", "both.nc", "--t-end", "200", "--dt", "0.01", "--json")
+    both = [_finish(process) for process in [_process(folder, *words) for _ in range(2)]]
+    assert sorted(code for code, _, _ in both) in ([0, 1], [0, 2]), both
+    assert all("Traceback" not in err for _, _, err in both)
+    result = dap.open(folder / "both.nc")
+    assert result.status == "done"
+    assert np.array_equal(result.t, 0.01 * np.arange(20001))
+    assert not list(folder.glob("both.nc.part*"))
+
+
+@pytest.mark.slow
+def test_a_reader_that_leaves_does_not_spoil_the_run(folder):
+    script = f"set -o pipefail; {COMMAND[0]} run fall.toml -o piped.nc --json | true"
+    done = subprocess.run(["bash", "-c", script], cwd=folder, env=environment(),
+                          capture_output=True, text=True)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert dap.open(folder / "piped.nc").status == "done"
+
+
+# ------------------------------------------------------------------ what other programs do quietly
+
+PEERS = {
+    "a mass that is NaN": ("mass = 2.0", "mass = nan", "finite number"),
+    "a time step below zero": ("dt = 0.01", "dt = -0.01", "greater than 0"),
+    "a misspelt table": ("[forces.gravity]", "[force.gravity]", "forces"),
+    "a misspelt key": ("mass = 2.0", "masss = 2.0", "mass"),
+    "an unknown key of a run": ("dt = 0.01", "dt = 0.01\nuseNewtonSolver = 1", "unknown key"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "words"), PEERS.values(), ids=PEERS)
+def test_what_mujoco_drake_and_exudyn_let_pass_is_refused(call, folder, old, new, words):
+    """MuJoCo replaces a NaN mass and takes a negative time step; Drake's URDF reader leaves a
+    misspelt tag out; Exudyn sets unknown keys without a word."""
+    (folder / "fall.toml").write_text(SCENE.replace(old, new))
+    code, out, err = call("run", "fall.toml", *QUIET)
+    assert (code, out) == (2, "")
+    assert words in " ".join(err.split())
+    assert "fall.toml:" in err
+
+
+WELDED = """
+[bodies.box]
+mass = 1.0
+Jp = [1.0, 1.0, 1.0]
+
+[points.left]
+body = "box"
+sPp = [-1.0, 0.0, 0.0]
+
+[points.right]
+body = "ground"
+sPp = [5.0, 0.0, 0.0]
+
+[joints.one]
+type = "sph"
+P_i = "left"
+P_j = "ground.O"
+
+[joints.two]
+type = "sph"
+P_i = "left"
+P_j = "right"
+
+[simulation]
+t_end = 1.0
+"""
+
+
+def test_contradictory_welds_are_refused_as_mujoco_does_not(call, folder):
+    (folder / "welded.toml").write_text(WELDED)
+    code, _, err = call("run", "welded.toml", *QUIET)
+    assert code in (1, 2)
+    assert "one" in err
+    assert "two" in err
+    assert not (folder / "new.nc").exists()
+
+
+EXPLODING = """
+[bodies.rocket]
+mass = 1.0
+Jp = [1.0, 1.0, 1.0]
+r = [1.0, 0.0, 0.0]
+
+[points.tip]
+body = "ground"
+sPp = [0.0, 0.0, 0.0]
+
+[forces.repelling]
+type = "ptp"
+P_i = "rocket.O"
+P_j = "tip"
+k = -1e8
+l0 = 0.0
+
+[simulation]
+t_end = 1.0
+dt = 0.01
+integrator = "{}"
+{}
+"""
+
+
+@pytest.mark.parametrize(
+    ("integrator", "step"),
+    [("dopri5", ""), ("dop853", ""), ("rk4", "step = 1e-3"), ("dop853", "step = 0.005")],
+    ids=["dopri5", "dop853", "rk4", "fixed"],
+)
+def test_an_exploding_run_ends_with_3_and_names_the_first_offender(call, folder, integrator, step):
+    """x grows as exp(10^4 t), beyond all numbers at 0.07 s. SciPy's LSODA and Exudyn's explicit
+    solvers report success with a NaN state; MuJoCo puts the state back and exits with 0."""
+    (folder / "exploding.toml").write_text(EXPLODING.format(integrator, step))
+    code, out, err = call("run", "exploding.toml", *QUIET, "--json")
+    assert code == 3, err
+    found = json.loads(out)
+    assert (found["status"], found["exit_code"]) == ("stopped", 3)
+    assert "repelling" in found["reason"] or "rocket" in found["reason"], found["reason"]
+    result = dap.open(folder / "new.nc")
+    assert result.status == "stopped"
+    assert all(np.all(np.isfinite(a)) for a in (result.u, result.v_dot, result.work))
+    assert result.t[-1] < 0.08

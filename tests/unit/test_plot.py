@@ -254,7 +254,7 @@ def test_a_file_is_overwritten_only_when_forced(result, tmp_path):
         (dict(quantities=[]), "at least one quantity"),
         (dict(x="bob.r"), r"x = bob\.r has components; name one of bob\.r\.x, bob\.r\.y"),
         (dict(width=0), "cannot be"),
-        (dict(dpi=1e9), "cannot be"),
+        (dict(dpi=1e9), "dpi is from 10 to 1200"),
         (dict(width=float("nan")), "cannot be"),
     ],
 )

@@ -2,6 +2,7 @@
 
 import os
 import uuid
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,14 +24,15 @@ def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) 
         Refused: says why, and what to do.
     """
     from dap3d_core.result import ResultError
-    from dap3d_core.result.files import check_target
+    from dap3d_core.result.files import cannot, check_target
 
-    if not force and path.is_file():
-        raise Refused(f"{path} exists; --force overwrites it, -o writes another file")
     try:
+        if not force and path.is_file():
+            raise Refused(f"{path} exists; --force overwrites it, -o writes another file")
         check_target(path, force)
-    except ResultError as error:
-        raise Refused(str(error)) from error
+    except OSError as error:
+        told = error if isinstance(error, ResultError) else cannot("write", path, error)
+        raise Refused(str(told)) from error
     for source in sources:
         if source is not None and path.exists() and source.exists() and path.samefile(source):
             raise Refused(f"{path} is what is read; name another file with -o")
@@ -75,3 +77,21 @@ def open_result(path: str, *, model: str | None = None, allow_code: bool = False
         return dap.open(path, model=model, allow_code=allow_code)
     except ResultError as error:
         raise Refused(str(error)) from error
+
+
+def refuse_all(*checks: Callable[[], object]) -> None:
+    """Make checks, and refuse what any of them refuses: all mistakes at once.
+
+    Raises:
+        Refused: one line for each.
+    """
+    from dap3d_core.result import ResultError, UnknownNameError
+
+    faults: dict[str, None] = {}
+    for check in checks:
+        try:
+            check()
+        except (Refused, ResultError, UnknownNameError, ValueError) as error:
+            faults[str(error)] = None
+    if faults:
+        raise Refused("\n".join(faults))

@@ -6,13 +6,14 @@ Nothing here imports numpy, scipy, numba, matplotlib, netCDF4 or rich: commands 
 import sys
 import warnings
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import click
 
 from dap3d_core.cli import exits
 from dap3d_core.cli.signals import Stopping
-from dap3d_core.cli.streams import leave_stdout, prepare_streams
+from dap3d_core.cli.streams import json_alone, leave_stdout, prepare_streams
 
 
 def _drop_colors(ctx: click.Context, option: click.Parameter, asked: bool) -> None:
@@ -31,7 +32,8 @@ def _no_color() -> click.Option:
 class Command(click.Command):
     """A command with ``--debug``; its failures become messages and exit codes.
 
-    An option that is given twice is refused: taking the last one would be a quiet choice.
+    An option that is given twice is refused, for taking the last one would be a quiet choice; so is
+    an empty word, which comes from a variable of a shell that was not set.
     """
 
     def __init__(self, *args: Any, **options: Any) -> None:
@@ -42,7 +44,7 @@ class Command(click.Command):
         self.params.append(_no_color())
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse, and refuse options that are given twice."""
+        """Parse, and refuse options that are given twice, and empty words."""
         if not ctx.resilient_parsing:
             _, _, order = self.make_parser(ctx).parse_args(args=list(args))
             for option in order:
@@ -50,7 +52,12 @@ class Command(click.Command):
                 if once and order.count(option) > 1:
                     words = f"the option {' / '.join(option.opts)} is given more than once"
                     raise click.UsageError(words, ctx)
-        return super().parse_args(ctx, args)
+        rest = super().parse_args(ctx, args)
+        for param in self.params:
+            value = ctx.params.get(param.name or "")
+            if value == "" or (isinstance(value, tuple) and "" in value):
+                raise click.UsageError(f"{param.get_error_hint(ctx)} is an empty word", ctx)
+        return rest
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; whatever it raises is reported and becomes an exit code."""
@@ -118,9 +125,13 @@ dap3d.params.append(_no_color())
 def run_line(argv: Sequence[str] | None) -> int:
     """Run the words of a command line, by default those of the process; returns the exit code."""
     prepare_streams()
-    with warnings.catch_warnings():
+    words = list(sys.argv[1:] if argv is None else argv)
+    options = words[: words.index("--")] if "--" in words else words
+    as_json = "--json" in options and not {"-h", "--help", "--version"} & set(options)
+    alone = json_alone(to_the_end=argv is None) if as_json else nullcontext()
+    with warnings.catch_warnings(), alone:
         warnings.showwarning = _tell_warning
-        return _run_line(argv)
+        return _run_words(words, as_json=as_json)
 
 
 def _tell_warning(message: Warning | str, *_: Any, **__: Any) -> None:
@@ -130,14 +141,12 @@ def _tell_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     say(messages(), f"warning: {message}", "yellow", whole=True)
 
 
-def _run_line(argv: Sequence[str] | None) -> int:
+def _run_words(words: list[str], *, as_json: bool) -> int:
     try:
-        code = dap3d.main(
-            args=None if argv is None else list(argv), prog_name="dap3d", standalone_mode=False
-        )
+        code = dap3d.main(args=words, prog_name="dap3d", standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as error:
-        _tell_usage(error)
+        _tell_usage(error, as_json=as_json)
         return error.exit_code
     except BrokenPipeError:  # the reader has seen enough
         leave_stdout()
@@ -149,12 +158,14 @@ def _run_line(argv: Sequence[str] | None) -> int:
     return code if isinstance(code, int) else exits.DONE
 
 
-def _tell_usage(error: click.ClickException) -> None:
-    from dap3d_core.cli.rendering import messages, say
+def _tell_usage(error: click.ClickException, *, as_json: bool) -> None:
+    from dap3d_core.cli.rendering import messages, print_json, say
 
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         error.show()
         return
+    if as_json:
+        print_json({"error": error.format_message(), "exit_code": error.exit_code})
     console = messages()
     ctx = getattr(error, "ctx", None)
     if ctx is not None:

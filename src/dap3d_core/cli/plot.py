@@ -1,6 +1,7 @@
 """``dap3d plot``: quantities of results as curves, in a file or a window."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -83,19 +84,20 @@ def plot(
 
     Words that end in .nc are further results, drawn in the same figure.
     """
-    from dap3d_core.cli.files import open_result, writable
+    from dap3d_core.cli.files import open_result
     from dap3d_core.cli.rendering import output as output_console
     from dap3d_core.cli.rendering import print_json, say
 
     files = [result, *(word for word in quantities if word.endswith(ENDING))]
     names = tuple(w for w in quantities if not w.endswith(ENDING)) or ENERGIES
     runs = dict(zip(_told_apart(files), map(open_result, files), strict=True))
+    shown: Mapping[str, Result] | Result = runs if len(runs) > 1 else runs.popitem()[1]
     target = None
     if output is not None or not show:
         target = Path(output or Path(result).stem + ".png")
-        writable(target, force=force, sources=tuple(map(Path, files)))
-    shown: Mapping[str, Result] | Result = runs if len(runs) > 1 else runs.popitem()[1]
-    _draw(shown, names, target, x, show, (width, height), force)
+    size = _inches(width), _inches(height)
+    _check(shown, names, target, x, {"--width": size[0], "--height": size[1]}, files, force)
+    _draw(shown, names, target, x, show, size, force)
     if target is not None and as_json:
         print_json({"file": str(target), "results": files, "quantities": names, "x": x or "t"})
     elif target is not None:
@@ -119,6 +121,39 @@ def _told_apart(files: Sequence[str]) -> list[str]:
     return [str(f) for f in files]
 
 
+def _inches(size: float | None) -> float | None:
+    return None if size is None else size / MM_PER_INCH
+
+
+def _check(
+    runs: "Mapping[str, Result] | Result",
+    names: tuple[str, ...],
+    target: Path | None,
+    x: str | None,
+    sizes: Mapping[str, float | None],
+    files: Sequence[str],
+    force: bool,
+) -> None:
+    """Refuse what cannot be drawn or written, for all reasons at once."""
+    from dap3d_core.cli.files import refuse_all, writable
+    from dap3d_core.plot.drawing import gather
+    from dap3d_core.plot.saving import SIDES, check_suffix
+
+    def fits(option: str, size: float | None) -> None:
+        if size is not None and not SIDES[0] <= size <= SIDES[1]:
+            least, most = (round(side * MM_PER_INCH) for side in SIDES)
+            raise Refused(f"{option} is from {least} to {most} mm, not {size * MM_PER_INCH:g}")
+
+    sources = tuple(map(Path, files))
+    checks: list[Callable[[], object]] = []
+    checks += [partial(fits, option, size) for option, size in sizes.items()]
+    if target is not None:
+        checks += [partial(check_suffix, target)]
+        checks += [partial(writable, target, force=force, sources=sources)]
+    checks += [partial(gather, runs, [name], None) for name in names]
+    refuse_all(*checks, partial(gather, runs, ["t"], x))
+
+
 def _draw(
     runs: "Mapping[str, Result] | Result",
     names: tuple[str, ...],
@@ -131,11 +166,11 @@ def _draw(
     from dap3d_core.plot import WIDTH, save_plot, show_plot
     from dap3d_core.result import ResultError, UnknownNameError
 
-    width, height = (None if s is None else s / MM_PER_INCH for s in size)
+    width, height = size[0] or WIDTH, size[1]
     try:
         if target is not None:
-            save_plot(runs, names, target, x=x, width=width or WIDTH, height=height, force=force)
+            save_plot(runs, names, target, x=x, width=width, height=height, force=force)
         if show:
-            show_plot(runs, names, x=x, width=width or WIDTH, height=height)
+            show_plot(runs, names, x=x, width=width, height=height)
     except (UnknownNameError, ResultError, ValueError) as error:
         raise Refused(str(error)) from error

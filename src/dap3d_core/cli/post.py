@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,14 +65,17 @@ def post(
 
     Quantities are named as for dap3d plot. --json lists what was written: names, shapes, units.
     """
-    from dap3d_core.cli.files import open_result, writable
+    from dap3d_core.cli.files import open_result, refuse_all, writable
     from dap3d_core.cli.rendering import items, messages, print_json, say, size
     from dap3d_core.cli.rendering import output as output_console
 
     target, kind = _target(result, output, kind)
     opened = open_result(result, model=model, allow_code=allow_code)
-    writable(target, force=force, sources=(Path(result),))
     names = tuple(dict.fromkeys((*selected, *quantities)))
+    refuse_all(
+        partial(writable, target, force=force, sources=(Path(result),)),
+        *(partial(opened.quantity, name) for name in names),
+    )
     left_out = "" if names else _why_no_reactions(opened)
     notes = [f"reactions are left out: {left_out}"] if left_out else []
     write = _write_table if kind == "csv" else _write_arrays

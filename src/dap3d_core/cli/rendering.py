@@ -7,7 +7,6 @@ columns then; messages keep their lines, for programs that look for places in th
 import json
 import math
 import os
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -17,7 +16,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from dap3d_core.cli.streams import leave_stdout
+from dap3d_core.cli.streams import json_stream, leave_stdout
 
 
 class Terminal(Console):
@@ -186,8 +185,9 @@ def table(
 def print_json(data: Any) -> None:
     """Print one JSON object to stdout: ASCII, numbers that are not finite as null."""
     try:
-        sys.stdout.write(json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
-        sys.stdout.flush()
+        stream = json_stream()
+        stream.write(json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
+        stream.flush()
     except OSError as error:
         leave_stdout()
         if not isinstance(error, BrokenPipeError):

@@ -3,7 +3,11 @@
 import contextlib
 import os
 import sys
+from collections.abc import Iterator
 from typing import TextIO
+
+#: Stdout while it is kept for JSON.
+_alone: TextIO | None = None
 
 
 def prepare_streams() -> None:
@@ -16,9 +20,47 @@ def prepare_streams() -> None:
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
 
 
+@contextlib.contextmanager
+def json_alone(*, to_the_end: bool = False) -> Iterator[None]:
+    """Stdout for ``json_stream`` alone.
+
+    What others write there (plugins, processes that they start, kernels that print) goes to stderr.
+    Streams that are not those of the process stay as they are.
+
+    Args:
+        to_the_end: it stays so afterwards, for what is written when the process ends.
+    """
+    global _alone
+    try:
+        ours, number = sys.stdout, sys.stdout.fileno()
+        kept = os.dup(number) if number == 1 else -1
+    except (AttributeError, ValueError, OSError):
+        kept = -1
+    if kept < 0:
+        yield
+        return
+    ours.flush()
+    with open(kept, "w", encoding=ours.encoding, errors=ours.errors) as stream:
+        os.dup2(2, number)
+        _alone = stream
+        try:
+            yield
+        finally:
+            _alone = None
+            with contextlib.suppress(OSError, ValueError):
+                ours.flush()
+            if not to_the_end:
+                os.dup2(kept, number)
+
+
+def json_stream() -> TextIO:
+    """Where a JSON object is printed."""
+    return _alone or sys.stdout
+
+
 def leave_stdout() -> None:
     """Send what is still to come on stdout nowhere, after its reader has gone."""
-    _leave(sys.stdout)
+    _leave(json_stream())
 
 
 def leave_stderr() -> None:

@@ -1,5 +1,6 @@
 """``dap3d view``: a result as one page with a moving scene, which any browser opens."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,7 +52,7 @@ def view(
 
     Quantities are named as for dap3d plot; more can be chosen in the page.
     """
-    from dap3d_core.cli.files import open_result, writable
+    from dap3d_core.cli.files import open_result, refuse_all, writable
     from dap3d_core.cli.rendering import items, messages, print_json, say, size
     from dap3d_core.cli.rendering import output as output_console
 
@@ -59,7 +60,10 @@ def view(
     if target.suffix.lower() not in (".html", ".htm"):
         raise Refused(f"cannot write {target}: a page is a .html file")
     opened = open_result(result, model=model, allow_code=allow_code)
-    writable(target, force=force, sources=(Path(result),))
+    refuse_all(
+        partial(writable, target, force=force, sources=(Path(result),)),
+        *(partial(opened.quantity, name) for name in quantities),
+    )
     page = _made(opened, quantities, fps, model)
     page.save(target, force=force)
     notes, byte_count = page.data["about"]["view_notes"], target.stat().st_size

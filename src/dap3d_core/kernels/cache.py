@@ -10,6 +10,7 @@ import hashlib
 import os
 import sys
 import tempfile
+import threading
 import types
 from contextlib import suppress
 from functools import cache
@@ -27,6 +28,10 @@ OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 #: Floors of the core that hold compiled code, low to high: a function depends on its own floor and
 #: those below.
 COMPILED_FLOORS = ("kernels", "assembly", "linear", "formulations", "integrators")
+
+#: numba takes the folder of its cache from one setting of the process. Nothing is imported while
+#: this is held.
+_folder_of_numba = threading.Lock()
 
 
 def jit_is_on() -> bool:
@@ -133,11 +138,12 @@ def compiled_in(folder: Path | None, name: str, function, **options):
         return function
     if folder is None:
         return njit(**OPTIONS, **options)(function)
-    before, config.CACHE_DIR = config.CACHE_DIR, str(folder / name)
-    try:
-        return njit(cache=True, **OPTIONS, **options)(function)
-    finally:
-        config.CACHE_DIR = before
+    with _folder_of_numba:
+        before, config.CACHE_DIR = config.CACHE_DIR, str(folder / name)
+        try:
+            return njit(cache=True, **OPTIONS, **options)(function)
+        finally:
+            config.CACHE_DIR = before
 
 
 def reached(*functions) -> tuple[list, list[str]]:

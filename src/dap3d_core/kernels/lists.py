@@ -4,6 +4,7 @@ A typed list filled from Python would be compiled anew in each process (0.3 s); 
 two cached functions of known signature. Where kernels run as plain Python the list is a plain list.
 """
 
+import threading
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
@@ -56,16 +57,21 @@ def list_type(item: Any) -> Any:
     return types.ListType(item)
 
 
+#: Held while the two functions that make a list are compiled.
+_preparing = threading.Lock()
+
+
 def fill(
     empty: Callable[[], Any], append: Callable[..., None], item: Any, functions: Sequence[Callable]
 ) -> Any:
     """A typed list of functions, by ``empty`` and ``append`` compiled for this item type alone."""
     if not jit_is_on():
         return list(functions)
-    if not empty.signatures:
-        empty.compile(types.ListType(item)())
-        append.compile(types.void(types.ListType(item), item))
-        append.disable_compile()  # else each function's own type would be compiled for
+    with _preparing:
+        if not empty.signatures:
+            empty.compile(types.ListType(item)())
+            append.compile(types.void(types.ListType(item), item))
+            append.disable_compile()  # else each function's own type would be compiled for
     result = empty()
     for function in functions:
         append(result, function)

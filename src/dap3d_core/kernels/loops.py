@@ -11,6 +11,7 @@ one list and is never recompiled for a new type:
     out1, out2, out3  what the kernels return, flat (by_address.pointer)
 """
 
+import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -50,6 +51,8 @@ def source_of(loop: Loop) -> str:
 
 
 _built: dict[str, Callable] = {}
+#: Held while a loop is built, which several threads may ask for at once.
+_building = threading.Lock()
 #: Names of the loops that this process had to compile (not those it found in the cache).
 compiled_here: list[str] = []
 
@@ -65,26 +68,26 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
     gathering = (gather.vector_at, gather.matrix_at, gather.unwound)
     kernels = loop.kernels.values()
     key = digest(text, *identities(*kernels), *sources(*kernels, *gathering))
-    if key in _built:
+    with _building:
+        if key not in _built:
+            _built[key] = _build(loop, text, f"loop-{key}", announce)
         return _built[key]
+
+
+def _build(loop: Loop, text: str, name: str, announce: Callable[[str], None] | None) -> Callable:
     folder = cache_folder()
-    name = f"loop-{key}"
     path = written.write(name, text) if jit_is_on() else None
     namespace = written.load(path, name, text)
     namespace.update(loop.kernels)
     for plain in reached(*loop.kernels.values())[0]:  # kernels and the author's own helpers
         inlined(plain)
-    if path is None:
-        function = compiled_in(None, name, namespace["loop"])
-    else:
-        function = compiled_in(folder, name, namespace["loop"])
+    function = compiled_in(None if path is None else folder, name, namespace["loop"])
     if jit_is_on():
         if announce is not None and not _is_cached(folder, name):
             announce(loop.name)
         function.compile(LOOP)
         if not function.stats.cache_hits:
             compiled_here.append(loop.name)
-    _built[key] = function
     return function
 
 

@@ -1,9 +1,13 @@
 """Euler parameters and frames for whole arrays at once (spec 1)."""
 
+from typing import Any, TypeVar
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
+#: An array of any kind.
+AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
 
 
 def rotation(p: ArrayLike) -> Floats:
@@ -67,3 +71,9 @@ def from_integrated(y: ArrayLike, n: int) -> Floats:
     """The state u (..., 13 n) of integrated states y (..., 13 n + 1)."""
     r, p, v, w = split(y, n)
     return join(r, p, v, to_global(p, w))
+
+
+def read_only(array: AnyArray) -> AnyArray:
+    """The same array, which nobody can write to by this name from here on."""
+    array.flags.writeable = False
+    return array

@@ -12,6 +12,7 @@ import numpy as np
 
 from dap3d_core.interface.checks import BodyPose, pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
+from dap3d_core.model.kinematics import read_only
 from dap3d_core.scene import Checked, Instance
 
 
@@ -74,23 +75,23 @@ class Model:
     @cached_property
     def irc(self) -> Integers:
         """(n,) index in u of the first coordinate of each body (r, then p)."""
-        return 7 * np.arange(self.body_count, dtype=np.int64)
+        return read_only(7 * np.arange(self.body_count, dtype=np.int64))
 
     @cached_property
     def iru(self) -> Integers:
         """(n,) index in u of the first velocity of each body (r_dot, then omega)."""
-        return 7 * self.body_count + self.irv
+        return read_only(7 * self.body_count + self.irv)
 
     @cached_property
     def irv(self) -> Integers:
         """(n,) index in v_dot, column in the Jacobian, of the first acceleration of each body."""
-        return 6 * np.arange(self.body_count, dtype=np.int64)
+        return read_only(6 * np.arange(self.body_count, dtype=np.int64))
 
     @cached_property
     def u0(self) -> Floats:
         """(13 n,) the state as given, p of unit length."""
         coordinates = np.hstack([self.r, self.p]).ravel()
-        return np.concatenate([coordinates, np.hstack([self.v, self.w]).ravel()])
+        return read_only(np.concatenate([coordinates, np.hstack([self.v, self.w]).ravel()]))
 
     def row_owner(self, row: int) -> str:
         """Name of the joint that a constraint row belongs to."""
@@ -120,7 +121,7 @@ def build_model(checked: Checked) -> Model:
     rows = np.array([_rows(j) for j in checked.joints], dtype=np.int64)
     mask = [_position_mask(j) for j in checked.joints]
     groups = _Groups(checked, poses)
-    return Model(
+    model = Model(
         body_names=tuple(checked.body_names),
         mass=checked.mass,
         Jp=checked.Jp,
@@ -145,6 +146,10 @@ def build_model(checked: Checked) -> Model:
         point_local=checked.point_local,
         notes=tuple(groups.notes),
     )
+    for value in attrs.astuple(model, recurse=False):
+        if isinstance(value, np.ndarray):
+            read_only(value)
+    return model
 
 
 class _Groups:

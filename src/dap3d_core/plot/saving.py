@@ -20,6 +20,8 @@ FORMATS: dict[str, dict[str, Any]] = {
     ".svg": {"Date": None},
     ".pdf": {"CreationDate": None},
 }
+#: Least and largest side of a figure, inches; dots an inch.
+SIDES, DENSITIES = (0.5, 100.0), (10.0, 1200.0)
 #: What matplotlib falls back on where it cannot open windows.
 FILES_ALONE = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
 #: A window shows a figure larger than paper does.
@@ -94,8 +96,13 @@ def save_figure(
         ResultError: the file cannot be written, or exists and ``force`` is off.
     """
     suffix = check_suffix(target)
-    if not all(0.5 <= s <= 100.0 for s in size) or not 10.0 <= dpi <= 1200.0:
-        raise ValueError(f"a figure of {size[0]:g} x {size[1]:g} inches at {dpi:g} dpi cannot be")
+    if not all(SIDES[0] <= s <= SIDES[1] for s in size):
+        raise ValueError(
+            f"a figure of {size[0]:g} x {size[1]:g} inches cannot be: each side is from "
+            f"{SIDES[0]:g} to {SIDES[1]:g}"
+        )
+    if not DENSITIES[0] <= dpi <= DENSITIES[1]:
+        raise ValueError(f"dpi is from {DENSITIES[0]:g} to {DENSITIES[1]:g}, not {dpi:g}")
     with fixed_files():
         figure = Figure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)

@@ -5,6 +5,7 @@ import hashlib
 import importlib
 import inspect
 import os
+import signal
 import sys
 import threading
 import traceback
@@ -205,14 +206,30 @@ def _guard(source: Source, notes: list[str]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _kept_in_place(source: Source, notes: list[str]) -> Iterator[None]:
-    """Put back what a plugin must not change: stdout, the working folder, numpy's error state."""
-    folder = os.getcwd()
+    """Put back what a plugin must not change: stdout, the folder, Ctrl-C, numpy's errors.
+
+    Where modules are looked for is left as the plugin wants it, and told. A copy of the process
+    that it forked and left running ends here: both would go on with the command.
+    """
+    folder, process, places = os.getcwd(), os.getpid(), list(sys.path)
+    interrupt = signal.getsignal(signal.SIGINT)
     numpy: Any = sys.modules.get("numpy")
     state: dict[str, Any] = numpy.geterr() if numpy else {}
     try:
         with contextlib.redirect_stdout(sys.stderr):
             yield
     finally:
+        if os.getpid() != process:
+            print(
+                f"{source}: forked while it was loaded; the copy ends", file=sys.stderr, flush=True
+            )
+            os._exit(1)
+        first = threading.current_thread() is threading.main_thread()  # the others may not
+        if first and interrupt and signal.getsignal(signal.SIGINT) is not interrupt:
+            signal.signal(signal.SIGINT, interrupt)
+            notes.append(f"{source}: changed what Ctrl-C does while it was loaded; put back")
+        if sys.path != places:
+            notes.append(f"{source}: changed sys.path while it was loaded; it was left so")
         if os.getcwd() != folder:
             os.chdir(folder)
             notes.append(f"{source}: changed the working folder while it was loaded; put back")

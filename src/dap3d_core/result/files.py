@@ -75,15 +75,23 @@ def synchronise(path: Path) -> None:
         os.fsync(file.fileno())
 
 
-def put_in_place(part: Path, target: Path) -> None:
+def put_in_place(part: Path, target: Path, force: bool = True) -> None:
     """Give a finished file its name, once its content is on the disk.
 
+    Args:
+        part: the finished file.
+        target: its name.
+        force: whether another file of that name is replaced.
+
     Raises:
-        ResultError: the system refuses.
+        ResultError: the system refuses; another file has the name and ``force`` is off.
     """
     try:
         synchronise(part)
-        os.replace(part, target)
+        if force:
+            os.replace(part, target)
+        else:
+            _name_if_free(part, target)
         with suppress(OSError):  # not every system lets a folder be synchronised
             folder = os.open(target.parent, os.O_RDONLY)
             try:
@@ -92,6 +100,19 @@ def put_in_place(part: Path, target: Path) -> None:
                 os.close(folder)
     except OSError as error:
         raise cannot("write", target, error) from error
+
+
+def _name_if_free(part: Path, target: Path) -> None:
+    """Give a file a name that no other has; of two processes that try, one succeeds."""
+    try:
+        os.link(part, target)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without links
+        check_target(target)
+        os.replace(part, target)
+    else:
+        part.unlink()
 
 
 @contextmanager
@@ -110,6 +131,6 @@ def whole_file(path: str | os.PathLike[str], force: bool = False) -> Iterator[Pa
     try:
         yield part
         check_target(path, force)
-        put_in_place(part, target)
+        put_in_place(part, target, force)
     finally:
         part.unlink(missing_ok=True)

@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.model.kinematics import split, to_body
+from dap3d_core.model.kinematics import read_only, split, to_body
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.motion import accelerations, point_motion
 from dap3d_core.result.on_file import FileArrays
@@ -61,7 +61,7 @@ class Kinematics:
     @cached_property
     def wp(self) -> Floats:
         """(nt, n, 3) angular velocities, rad/s, body axes: A^T omega."""
-        return to_body(self.p, self.w)
+        return read_only(to_body(self.p, self.w))
 
     @property
     def rdd(self) -> Floats:
@@ -76,7 +76,7 @@ class Kinematics:
     @cached_property
     def wpd(self) -> Floats:
         """(nt, n, 3) angular accelerations, rad/s^2, body axes: A^T omega_dot (spec 1)."""
-        return to_body(self.p, self.wd)
+        return read_only(to_body(self.p, self.wd))
 
     @cached_property
     def rP(self) -> Floats:
@@ -95,4 +95,4 @@ class Kinematics:
 
     def _points(self, level: int) -> Floats:
         every = np.arange(len(self.subject.point_names))
-        return point_motion(self.subject, self.u, self.v_dot, every, level)
+        return read_only(point_motion(self.subject, self.u, self.v_dot, every, level))

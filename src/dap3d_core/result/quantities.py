@@ -56,7 +56,10 @@ def find(result: "Result", name: str) -> Quantity:
     Raises:
         UnknownNameError: there is no such quantity; names the nearest.
         ResultError: reactions and forces of a result whose model cannot be had.
+        TypeError: the name is no text.
     """
+    if not isinstance(name, str):
+        raise TypeError(f"a quantity is named by text such as 'crank.r.z', not by {name!r}")
     if name in WHOLE:
         words, unit, of = WHOLE[name]
         return Quantity(name, of(result), words, words, unit, ())

@@ -8,7 +8,7 @@ import numpy as np
 
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats, Group, Integers
-from dap3d_core.model.kinematics import split, to_body, to_global
+from dap3d_core.model.kinematics import read_only, split, to_body, to_global
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.machine import Machine, Rows
@@ -80,7 +80,7 @@ def jacobians(machine: "Machine", t: Floats, u: Floats) -> Any:
     D = np.zeros((len(t), model.row_count, 6 * model.body_count))
     for k, rows in enumerate(rows_at(machine, t, u)):
         D[k] = rows.dense()
-    return D
+    return read_only(D)
 
 
 @np.errstate(all="ignore")  # as compiled code does
@@ -132,9 +132,9 @@ def actions_of(
     names, found = ("ground", *model.body_names), {}
     for n, (slot, body) in enumerate(zip(layout.slots, group.bodies[place], strict=True)):
         at, shape = layout.numbers.get(f"P_{slot}", (0, ()))
-        local = group.numbers[place, at : at + 3] if shape == (3,) else None
+        local = read_only(group.numbers[place, at : at + 3]) if shape == (3,) else None
         turned = p[:, body - 1] if body else np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(u), 4))
-        force, moment = wrenches[:, n, :3], wrenches[:, n, 3:]
+        force, moment = read_only(wrenches[:, n, :3]), read_only(wrenches[:, n, 3:])
         found[slot] = Reaction(names[body], force, moment, turned, local)
     return found
 

@@ -74,7 +74,7 @@ class Result(Kinematics):
 
         Args:
             model: what was run.
-            machine_of: gives a machine for the Jacobian and reactions; called at most once.
+            machine_of: gives a machine for the Jacobian and reactions: the calling thread's.
             rows: (nt, 1 + 13 n + 1 + 6 n + m + 4) as the integrator delivers them: t; coordinates,
                 velocities with the angular one in body axes, work; v_dot (global axes); lambda;
                 potential energy; largest |C|, |D v - nu|, |D v_dot - gamma|.
@@ -200,12 +200,12 @@ class Result(Kinematics):
     @property
     def settings(self) -> dict[str, Any]:
         """The settings as they were used."""
-        return self.record.settings
+        return dict(self.record.settings)
 
     @property
     def versions(self) -> dict[str, str]:
         """Versions of dap3d, numpy, numba and python that made it."""
-        return self.record.versions
+        return dict(self.record.versions)
 
     @property
     def scene_text(self) -> str:
@@ -227,9 +227,9 @@ class Result(Kinematics):
     def _origin(self) -> Origin:
         return self._make_origin()
 
-    @cached_property
+    @property
     def machine(self) -> "Machine":
-        """What evaluates the model.
+        """What evaluates the model for the thread that asks.
 
         Raises:
             ResultError: as ``model``.

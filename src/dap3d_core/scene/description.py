@@ -192,6 +192,28 @@ class Scene:
         """The folder of the file this was read from, where ``plugin.py`` may stand, or None."""
         return None if self.path is None else self.path.parent
 
+    def copy(self) -> "Scene":
+        """A scene of its own that is equal to this one: changing one leaves the other as it is."""
+        named: dict[str, Any] = {
+            table: {name: _copied(part) for name, part in getattr(self, table).items()}
+            for table in NAMED
+        }
+        points = [_copied(point) for point in self.animation.points]
+        scene = attrs.evolve(
+            self,
+            animation=attrs.evolve(self.animation, points=points),
+            simulation=_copied(self.simulation),
+            faults=list(self.faults),
+            notes=list(self.notes),
+            **named,
+        )
+        scene._counts = dict(self._counts)
+        return scene
+
+    def __deepcopy__(self, memo: Any) -> "Scene":
+        """As ``copy``, for the values in a scene are plain: they cannot be changed."""
+        return self.copy()
+
     def add_body(self, name: str, **fields: Any) -> str:
         """Add a body and return its name.
 
@@ -337,6 +359,13 @@ class Scene:
             fault = f"there is one of this name in {table} already"
         if fault:
             raise SceneError([Mistake(table, name, f"not a name for one of the {table}: {fault}")])
+
+
+def _copied(part: Any) -> Any:
+    """A part of a scene; what it holds are plain values, the fields of an element in a dict."""
+    if type(part) is Element and type(part.fields) is dict:
+        return attrs.evolve(part, fields=dict(part.fields))
+    return attrs.evolve(part)
 
 
 def fault_of_name(name: Any) -> str:

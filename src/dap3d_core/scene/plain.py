@@ -32,8 +32,10 @@ def plain(value: Any) -> Any:
 
 
 def _of_array(value: Any) -> Any:
-    """An array or a number of numpy as plain Python; arrays of objects as they are."""
+    """An array or a number of numpy as plain Python; objects and masked numbers as they are."""
     sort = getattr(getattr(value, "dtype", None), "kind", "")
+    if not value.shape and getattr(value, "mask", False):  # a number that is not there
+        return value
     listed = value if sort == "O" else value.tolist()
     if type(listed) is not type(value):
         return plain(listed)

@@ -9,7 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.machine import Machine
-from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, Simulation, check_simulation
+from dap3d_core.scene import (
+    METHODS,
+    MISSING,
+    Mistake,
+    Scene,
+    SceneError,
+    Simulation,
+    check_simulation,
+)
+from dap3d_core.scene.settings import notes_of
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 
@@ -28,6 +37,11 @@ def settings_of(compiled: CompiledModel, **asked: Any) -> Simulation:
     return settings
 
 
+def settings_notes(compiled: CompiledModel, settings: Simulation) -> list[str]:
+    """What looks odd in the settings of a run, and is not so in its scene, which notes its own."""
+    return [note for note in notes_of(settings) if note not in compiled.notes]
+
+
 def compiled_for(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     method: str | None,
@@ -37,10 +51,14 @@ def compiled_for(
     """The compiled model of a scene; one that was compiled before must have the method asked for.
 
     Raises:
+        SceneError: there is no such method.
         SimulationError: it has another.
     """
     if not isinstance(scene, CompiledModel):
         return CompiledModel(scene, method=method, allow_code=allow_code, announce=announce)
+    if method is not None and method not in METHODS:
+        settings = attrs.evolve(scene.scene.simulation, method=method)
+        check_simulation(settings, scene.model.body_names)
     if method is not None and scene.choice(method)[0] != scene.method:
         words = f"the model was compiled for method {scene.method}; compile it for {method}"
         raise SimulationError(words)

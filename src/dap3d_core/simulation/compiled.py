@@ -1,10 +1,13 @@
 """A scene made ready to run: checked, modelled, with its method chosen and its kernels compiled."""
 
 import os
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
+from typing import Any, NoReturn, Self
 
 import attrs
 import numpy as np
@@ -30,9 +33,11 @@ from dap3d_core.simulation.drivers import notes_on_drivers
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.explanation import explain
 from dap3d_core.simulation.initial import model_size
+from dap3d_core.simulation.offender import find_offender
 from dap3d_core.simulation.pace import Pace
 from dap3d_core.simulation.redundancy import Redundancy, redundancy_of
 from dap3d_core.simulation.start import Start, find_start
+from dap3d_core.simulation.state import state_of, time_of
 
 Floats = NDArray[np.float64]
 Announce = Callable[[str], None]
@@ -41,11 +46,27 @@ Announce = Callable[[str], None]
 MOST_PLACES = 10
 
 
+class _Machines(threading.local):
+    """The machines of one thread.
+
+    Attributes:
+        stack: the last one is what the thread works with.
+        running: whether it is in the middle of a run.
+    """
+
+    def __init__(self) -> None:
+        self.stack: list[Machine] = []
+        self.running = False
+
+
 class CompiledModel:
     """What ``compile`` returns: a frozen model that can be evaluated and explained.
 
+    Threads may use one at once: each has arrays of its own to work on. So may a callback of a run,
+    which may run the model again.
+
     Attributes:
-        scene: the scene, as it was when it was compiled.
+        scene: a copy of the scene, as it was when it was compiled.
         checked: the scene after its check.
         model: arrays, groups, row and column pointers (irc, iru, irv).
         method: the formulation, "unconstrained", "standard", "penalty" or "lsq".
@@ -65,7 +86,9 @@ class CompiledModel:
     ) -> None:
         """Check a scene, build its model, compile what it needs; arguments as for ``compile``."""
         started = time.perf_counter()
-        if not isinstance(scene, Scene):
+        if isinstance(scene, Scene):
+            scene = scene.copy()  # whoever has it may change it
+        else:
             scene = load(Path(scene) if isinstance(scene, os.PathLike) else scene)
         registry = registry or load_registry()
         self.scene: Scene = scene
@@ -78,11 +101,11 @@ class CompiledModel:
         self.asked = asked = method or str(scene.simulation.method)
         self._paces: dict[float, Pace] = {}
         self._starts: dict[tuple[bool, tuple[str, ...], str], Start] = {}
-        self.machine = Machine(self.model, choose_method(self.model, asked)[0], announce)
+        self._own = _Machines()
+        self._first_method = self.method = choose_method(self.model, asked)[0]
+        self._own.stack.append(self._another_machine(announce))
         self.method, self.reason = self.choice(asked)
         self.machine.method = self.method
-        settings = scene.simulation
-        self.machine.set_penalty(settings.alpha, settings.Omega, settings.mu)
         if announce is not None and not driver_is_cached("formulations"):
             announce(f"the solver ({self.method})")
         # compiled here, and not on the clock of the first run
@@ -99,6 +122,52 @@ class CompiledModel:
         ]
         self._redundancy: Redundancy | None = None
         self.compile_time = time.perf_counter() - started
+
+    @property
+    def machine(self) -> Machine:
+        """What evaluates the model for this thread; made when a thread first asks for it."""
+        stack = self._own.stack
+        if not stack:
+            stack.append(self._another_machine())
+        return stack[-1]
+
+    @contextmanager
+    def in_use(self) -> Iterator[Machine]:
+        """A machine for a run: this thread's or, in a callback of a run that has it, another."""
+        own = self._own
+        if own.running:
+            own.stack.append(self._another_machine())
+            try:
+                yield own.stack[-1]
+            finally:
+                own.stack.pop()
+            return
+        own.running = True
+        try:
+            yield self.machine
+        finally:
+            own.running = False
+
+    def _another_machine(self, announce: Announce | None = None) -> Machine:
+        machine = Machine(self.model, self._first_method, announce)
+        machine.method = self.method
+        settings = self.scene.simulation
+        machine.set_penalty(settings.alpha, settings.Omega, settings.mu)
+        return machine
+
+    def __copy__(self) -> Self:
+        """Itself: nothing of it changes."""
+        return self
+
+    def __deepcopy__(self, memo: Any) -> Self:
+        """Itself: nothing of it changes."""
+        return self
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "a compiled model stays in its process, because compiled code does: send the scene to "
+            "the other process, and compile it there"
+        )
 
     @property
     def irc(self) -> NDArray[np.int64]:
@@ -131,19 +200,24 @@ class CompiledModel:
         In the order of u: r_dot, p_dot of each body, then r_ddot, omega_dot of each.
 
         Raises:
-            ValueError: u has not 13 n finite numbers.
+            ValueError: u is not 13 n finite numbers, t is not one, or Euler parameters are zero.
+            SimulationError: the rates are not finite; names the body, force or joint.
         """
-        state = np.array(u, dtype=float)
-        count = 13 * self.model.body_count
-        if state.shape != (count,) or not np.all(np.isfinite(state)):
-            raise ValueError(
-                f"u must be {count} finite numbers, 13 a body; its shape is {state.shape}"
-            )
-        return self.machine.rhs(t, state)
+        t, state = time_of(t), state_of(u, self.model.body_names)
+        rates = self.machine.rhs(t, state)
+        if not np.all(np.isfinite(rates)):
+            machine = self.machine
+            found = find_offender(machine, t, machine.integrated(state), t)
+            raise SimulationError(f"the rates are not finite: {found or f't = {t:.9g} s'}")
+        return rates
 
     def redundancy(self, u: ArrayLike | None = None) -> Redundancy:
-        """Rank of the constraints at a state u (13 n,), or as given; see ``Redundancy``."""
-        state = self.model.u0 if u is None else np.asarray(u, dtype=float)
+        """Rank of the constraints at a state u (13 n,), or as given; see ``Redundancy``.
+
+        Raises:
+            ValueError: as ``rhs``.
+        """
+        state = self.model.u0 if u is None else state_of(u, self.model.body_names)
         for start in self._starts.values():
             if np.array_equal(start.u, state):
                 return start.redundancy

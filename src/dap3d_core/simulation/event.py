@@ -1,6 +1,6 @@
 """Events that a script asks for: what is watched, and what is done where it passes a level."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from typing import Any
 
@@ -37,7 +37,9 @@ class Event:
         name: what it is called in the result; made from the rest where it is left out.
 
     Raises:
-        ValueError: several levels, or an action or direction that does not exist.
+        ValueError: several levels, one that is no finite number, or an action or direction that
+            does not exist.
+        TypeError: ``of`` is neither a name nor a function.
     """
 
     of: str | Callable[[float, "Instant"], float]
@@ -52,6 +54,12 @@ class Event:
         given = [n for n in ("below", "above", "at") if getattr(self, n) is not None]
         if len(given) > 1:
             raise ValueError(f"an event has one level, not {' and '.join(given)}")
+        of: Any = self.of
+        if not isinstance(of, str) and not callable(of):
+            words = "an event watches a quantity by its name, or a function of t and the instant"
+            raise TypeError(f"{words}, not {of!r}")
+        if not _is_number(self.level):
+            raise ValueError(f"the level of an event is a finite number, not {self.level!r}")
         if self.direction not in (-1, 0, 1):
             raise ValueError(f"direction is {self.direction!r}; it should be -1, 0 or 1")
         if self.direction and self.sense != self.direction:
@@ -85,13 +93,41 @@ class Event:
         """How far the number is above its level.
 
         Raises:
-            ValueError: it is not one number.
+            ValueError: it is not one finite number.
         """
         of = self.of
         found = instant[of] if isinstance(of, str) else of(instant.t, instant)
         if np.ndim(found):
             raise ValueError(f"event {self.title}: it should be one number, not {np.shape(found)}")
+        if not _is_number(found):
+            truth = isinstance(found, (bool, np.bool_))
+            remedy = "; return a number that changes its sign where the event is" if truth else ""
+            raise ValueError(
+                f"event {self.title}: it should be a finite number, not {found!r}, at "
+                f"t = {instant.t:.9g} s{remedy}"
+            )
         return float(found) - self.level
+
+
+def _is_number(value: Any) -> bool:
+    """Whether this is one finite real number; a truth value is none."""
+    number = np.asarray(value)
+    return number.dtype.kind in "iuf" and not number.shape and bool(np.isfinite(number))
+
+
+def checked_events(events: Any) -> tuple[Event, ...]:
+    """The events of a run.
+
+    Raises:
+        TypeError: they are not several ``Event``.
+    """
+    if isinstance(events, Event):
+        raise TypeError("events is a list of dap.Event; write [event] for a single one")
+    found = tuple(events) if isinstance(events, Iterable) else (events,)
+    for event in found:
+        if not isinstance(event, Event):
+            raise TypeError(f"events is a list of dap.Event, not of {event!r}")
+    return found
 
 
 class Instant:

@@ -9,12 +9,12 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.machine import Machine
 from dap3d_core.result import Record, Result, ResultError, ResultWriter, check_target
 from dap3d_core.result.arrays import Arrays, arrays_of, joined
 from dap3d_core.result.on_file import LARGE, FileArrays
 from dap3d_core.result.reading import arrays_in
 from dap3d_core.result.subject import subject_of
+from dap3d_core.simulation.compiled import CompiledModel
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Keeper:
 
     def __init__(
         self,
-        machine: Machine,
+        compiled: CompiledModel,
         output: str | os.PathLike[str] | None,
         most: int,
         *,
@@ -41,7 +41,7 @@ class Keeper:
         run: str = "",
     ) -> None:
         """Args:
-            machine: whose rows come.
+            compiled: the model whose rows come.
             output, force: as ``simulate`` has them.
             most: how many rows come at most.
             run: identity of the run that this one goes on with.
@@ -52,8 +52,8 @@ class Keeper:
         self.run = run or os.urandom(16).hex()
         self.output: Path | None = None if output is None else check_target(output, force)
         self.count = 0
-        self._machine, self._most, self._force = machine, most, force
-        self._subject = subject_of(machine.model)
+        self._compiled, self._most, self._force = compiled, most, force
+        self._subject = subject_of(compiled.model)
         self._parts: list[Arrays] = []
         self._bytes = 0
         self._writer: ResultWriter | None = None
@@ -100,14 +100,14 @@ class Keeper:
         """The result of what was kept, whole in the output if there is one; None of nothing."""
         if not self.count:
             return None
-        machine = self._machine
+        compiled = self._compiled
         if self._writer is not None:
             self._writer.leave()
         result = Result.of_parts(
             self._subject,
             self._arrays(),
             attrs.evolve(record, run=self.run),
-            lambda: (machine.model, lambda: machine),
+            lambda: (compiled.model, lambda: compiled.machine),
         )
         if self.output is not None:
             try:

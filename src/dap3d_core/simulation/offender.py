@@ -20,7 +20,7 @@ AHEAD = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
 
 #: A row this many times the others, in its own units, tells of a pose that its joint cannot have.
 STEEP = 1e6
-#: A rate, in SI units, beyond which no step goes on for long.
+#: A state or a rate, in SI units, beyond which no step goes on for long: cubes of it overflow soon.
 ENORMOUS = 1e50
 
 
@@ -34,7 +34,18 @@ def find_offender(machine: Machine, t: float, y: Floats, t_stop: float) -> str:
         found = _at(machine, later, y)
         if found:
             return f"{found} (t = {later:.9g} s)"
-    return _steepest(machine, t, y) or _fastest(machine, t, y)
+    return _steepest(machine, t, y) or _fastest(machine, t, y) or _runaway(machine, y)
+
+
+def _runaway(machine: Machine, y: Floats) -> str:
+    """The body whose numbers are so large that products of them overflow."""
+    n = machine.model.body_count
+    bodies = np.hstack([y[: 7 * n].reshape(n, 7), y[7 * n : 13 * n].reshape(n, 6)])
+    largest = np.max(np.abs(bodies), axis=1, initial=0.0)
+    if not n or np.max(largest) < ENORMOUS:
+        return ""
+    first = int(np.argmax(largest))
+    return f"body {machine.model.body_names[first]} runs away (numbers of {largest[first]:.1e})"
 
 
 def _at(machine: Machine, t: float, y: Floats) -> str:
@@ -51,7 +62,19 @@ def _at(machine: Machine, t: float, y: Floats) -> str:
             if fault := _fault_of(machine, q, k, kind, group, t):
                 name = _name(machine, kind, group, k)
                 return f"{_title(kind)} {name} (type {group.keyword}) is {fault}"
-    return _singular(machine, t) or _accelerated(machine, t, y)
+    return _without_direction(machine, t, y) or _singular(machine, t) or _accelerated(machine, t, y)
+
+
+def _without_direction(machine: Machine, t: float, y: Floats) -> str:
+    """The joint of the first row whose gradient is zero: no force of it can hold anything."""
+    if not machine.model.row_count:
+        return ""
+    rows = machine.rows(t, from_integrated(y[None], machine.model.body_count)[0])
+    size = np.bincount(rows.row, np.abs(rows.value), minlength=rows.shape[0])
+    zero = np.flatnonzero(size == 0.0)
+    if not len(zero):
+        return ""
+    return f"the gradient of a row of joint {machine.model.row_owner(int(zero[0]))} is zero"
 
 
 def _steepest(machine: Machine, t: float, y: Floats) -> str:

@@ -124,29 +124,42 @@ class Resumption:
         watch: Callable[[Standing], None] | None = None,
     ) -> Result:
         """Go on to the end; arguments and errors as of ``resume``."""
-        header = self._found.header
         check_checkpoint(checkpoint, self.output)
+        target = self.output if output is None else Path(output)
+        with self.compiled.in_use():
+            run = self._run(target, events, watch, force=force)
+            run.saver = Saver(run, checkpoint, force=force or self._is_ours(target))
+            try:
+                result = run.finish(progress)
+            except BaseException as error:
+                if hasattr(error, "checkpoint"):  # what stands there takes the place of this one
+                    self._remove_files(target, but=error.checkpoint)
+                raise
+        self._remove_files(target)
+        return result
+
+    def _run(
+        self,
+        target: Path,
+        events: Sequence[Event],
+        watch: Callable[[Standing], None] | None,
+        *,
+        force: bool,
+    ) -> Run:
+        """The run, standing where the checkpoint was written, with the rows until there."""
+        header = self._found.header
         before, earlier = self._rows_so_far()
         settings = Simulation(**header["settings"] | {"hold": tuple(header["settings"]["hold"])})
         run = Run(self.compiled, settings, self._announce, events, watch)
         run.estimate_error = bool(header["estimate_error"])
-        run.prepare()
-        self._restore(run)
-        target = self.output if output is None else Path(output)
-        ours = target.exists() and before.exists() and target.samefile(before)
+        ours = target.exists() and target.samefile(before)
         run.keep(target, force=force or ours, identity=header["run"])
         assert run.keeper is not None
-        run.saver = Saver(run, checkpoint, force=force or self._is_ours(target))
+        run.prepare()
+        self._restore(run)
         for block in earlier:
             run.keeper.add(block, lambda: run.record("done"))
-        try:
-            result = run.finish(progress)
-        except BaseException as error:
-            if hasattr(error, "checkpoint"):  # what stands there takes the place of this one
-                self._remove_files(target, but=error.checkpoint)
-            raise
-        self._remove_files(target)
-        return result
+        return run
 
     def _remove_files(self, target: Path, but: Path | None = None) -> None:
         """Remove what the run had left: this checkpoint and its rows, for others stand now."""

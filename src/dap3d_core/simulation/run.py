@@ -14,7 +14,7 @@ from dap3d_core.integrators.integration import Statistics as Counts
 from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import Occurrence, Record, Result, ResultError, Statistics
 from dap3d_core.scene import Mistake, SceneError, Simulation
-from dap3d_core.simulation.asked import refuse_adams, report_times
+from dap3d_core.simulation.asked import refuse_adams, report_times, settings_notes
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.elsewhere import redundancy_elsewhere
 from dap3d_core.simulation.ending import event_notes, occurrences, why_stopped
@@ -69,7 +69,8 @@ class Run:
         self.machine = compiled.machine
         self.settings = settings
         self.times = report_times(settings.t_end, settings.dt)
-        self.notes = [*compiled.notes, f"method {compiled.method}: {compiled.reason}"]
+        self.notes = [*compiled.notes, *settings_notes(compiled, settings)]
+        self.notes.append(f"method {compiled.method}: {compiled.reason}")
         self.keeper: Keeper | None = None
         self.saver: Saver | None = None
         #: Whether the run stands between two chunks, and nothing is half done.
@@ -119,7 +120,7 @@ class Run:
             ResultError: the output cannot be written.
         """
         most = len(self.times) + 1  # an event may end a run between two of them
-        self.keeper = Keeper(self.machine, output, most, force=force, run=identity)
+        self.keeper = Keeper(self.compiled, output, most, force=force, run=identity)
 
     def finish(self, progress: Progress | None) -> Result:
         """Integrate to the end from where the run stands."""

@@ -47,14 +47,13 @@ def simulate(
         rtol, atol, step: tolerances of the step's error; a fixed step, s, without error control.
         correct, project: bring the start, and then every state, onto the constraints.
         progress: called as progress(t, t_end) between chunks of some 0.1 s.
-        allow_code, announce: as ``compile`` has them.
+        allow_code, announce: as ``compile`` has them. events: what to look out for (``Event``).
         output, force: file to write, and whether over an existing one. Rows of a run of more than
             a second stand in ``OUTPUT.part`` meanwhile, readable also when it is killed.
         correct_metric: "unit" or "mass": least correction in m and rad, or by masses.
         estimate_error: estimate ``result.error`` by a second, finer run.
         checkpoint: seconds between checkpoints in ``OUTPUT.checkpoint``, for ``resume``; inf: only
             where an exception (Ctrl-C, one of ``progress``) ends the run. Needs ``output``.
-        events: what to look out for (``Event``).
         watch: called between chunks with how the run stands (``Standing``).
 
     Returns:
@@ -69,5 +68,6 @@ def simulate(
                          rtol=rtol, atol=atol, step=step, correct=correct, project=project,
                          correct_metric=correct_metric)  # fmt: skip
     check_checkpoint(checkpoint, output)
-    run = Run(compiled, settings, announce, events, watch, estimate_error=estimate_error)
-    return run.go(progress, output, force=force, checkpoint=checkpoint)
+    with compiled.in_use():
+        run = Run(compiled, settings, announce, events, watch, estimate_error=estimate_error)
+        return run.go(progress, output, force=force, checkpoint=checkpoint)

@@ -36,6 +36,10 @@ class Observer:
     """Looks at the integrations of one run between their chunks, and tells who watches."""
 
     def __init__(self, model: Model, t_end: float, watch: Callable[[Standing], None]) -> None:
+        if not callable(watch):
+            raise TypeError(
+                f"watch is a function that is called with how the run stands, not {watch!r}"
+            )
         self._subject, self._t_end, self._watch = subject_of(model), t_end, watch
         self._of: Integration | None = None
         self._t = self._step = self._largest = 0.0

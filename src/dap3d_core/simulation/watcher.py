@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.result.occurrence import Occurrence
 from dap3d_core.simulation.compiled import CompiledModel
-from dap3d_core.simulation.event import Event, Instant, Numbers
+from dap3d_core.simulation.event import Event, Instant, Numbers, checked_events
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Watcher:
     """
 
     def __init__(self, compiled: CompiledModel, events: Sequence[Event]) -> None:
-        self.compiled, self.events = compiled, tuple(events)
+        self.compiled, self.events = compiled, checked_events(events)
         self.numbers = Numbers(compiled)
         self.occurrences: list[Occurrence] = []
         self._values: list[float] = []

@@ -1,0 +1,388 @@
+"""Types that are written or packaged wrongly: each is refused by name, and spoils nothing else.
+
+What a package may do wrong is in tests/unit/test_registry.py; here are a model's own files, what
+kernels do wrong, and what a file may do to the process that loads it.
+"""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+from support.own_types import registry_of
+from tests.e2e.conftest import COMMAND, environment
+
+import dap3d_core as dap
+from dap3d_core.interface import Body, Force, Joint, PluginError, Point, body, number, point
+from dap3d_core.kernels import row, sub
+from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.testing import check_type
+
+HEAD = """
+import os, random, sys, time
+from dap3d_core.interface import Body, Force, body, hookimpl
+from dap3d_core.kernels import sqrt
+
+interface_version = 1
+"""
+TYPE = """
+class Mine(Force):
+    keyword = "mine"
+    body_i: Body = body()
+
+    def wrench(t, r_i):
+        {}
+
+
+@hookimpl
+def dap3d_forces():
+    return [Mine]
+"""
+GOOD = "return (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)"
+SCENE = """
+[bodies.b]
+mass = 1.0
+Jp = [1.0, 1.0, 1.0]
+
+[forces.F]
+type = "mine"
+body_i = "b"
+
+[simulation]
+t_end = 0.5
+dt = 0.1
+"""
+
+
+@pytest.fixture
+def model(tmp_path):
+    """Writes a model folder with a type of its own; lines at import, lines of its kernel."""
+
+    def write(kernel=GOOD, at_import=""):
+        (tmp_path / "scene.toml").write_text(SCENE)
+        lines = textwrap.indent(textwrap.dedent(kernel), " " * 8).strip()
+        text = HEAD + textwrap.dedent(at_import) + TYPE.format(lines)
+        (tmp_path / "plugin.py").write_text(text)
+        return tmp_path
+
+    return write
+
+
+def compiled(folder):
+    return dap.compile(folder, allow_code=True)
+
+
+# ------------------------------------------------------------------ kernels
+
+KERNELS = {
+    "raises": ("raise ValueError('no')", "ValueError: no"),
+    "raises later": (f"if t > 0.3:\n    raise ValueError('no')\n{GOOD}", "ValueError: no"),
+    "returns nothing": ("return None", r"it returned shape \(\)"),
+    "returns nothing later": (f"if t > -5.0:\n    return None\n{GOOD}", r"it returned shape \(\)"),
+    "one vector": ("return (0.0, 0.0, 1.0)", r"it returned shape \(3,\)"),
+    "ragged": ("return (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0)", "differ in length"),
+    "text": ("return ('a', 0.0, 1.0), (0.0, 0.0, 0.0)", "returned 'a' where a finite number"),
+    "complex": ("return (1j, 0.0, 1.0), (0.0, 0.0, 0.0)", "returned 1j where a finite number"),
+    "truth": ("return (True, 0.0, 1.0), (0.0, 0.0, 0.0)", "returned True where a finite number"),
+    "never a number": ("return (t / t - 1.0 + 1e999, 0.0, 1.0), (0.0, 0.0, 0.0)", "returned inf"),
+    "writes to its input": (f"r_i[0] = 5.0\n{GOOD}", "does not support item assignment"),
+    "exits": ("sys.exit(3)", "SystemExit: 3"),
+    "calls itself": ("return Mine.wrench(t, r_i)", "RecursionError"),
+}
+#: numba's own reason is told; there is no quiet way round it.
+NOT_COMPILED = {
+    "imports": f"import time\n{GOOD}",
+    "asks the clock": "return (0.0, 0.0, time.time()), (0.0, 0.0, 0.0)",
+    "sleeps": f"time.sleep(1e-3)\n{GOOD}",
+    "opens a file": f"open(os.devnull).close()\n{GOOD}",
+    "a global": f"global COUNT\nCOUNT = 1\n{GOOD}",
+    "formats": "return (0.0, 0.0, float('{:f}'.format(t))), (0.0, 0.0, 0.0)",
+}
+
+
+@pytest.mark.parametrize(("kernel", "words"), KERNELS.values(), ids=KERNELS)
+def test_a_kernel_that_is_none_is_refused_with_file_and_function(model, kernel, words):
+    folder = model(kernel)
+    with pytest.raises(dap.SceneError, match=words) as caught:
+        compiled(folder)
+    said = str(caught.value)
+    assert str(folder / "plugin.py") in said
+    assert "Repair the file" in said
+    assert [m.key for m in caught.value.mistakes] == ["forces.F.type"]
+
+
+@pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
+@pytest.mark.parametrize("kernel", NOT_COMPILED.values(), ids=NOT_COMPILED)
+def test_what_numba_does_not_take_is_refused_with_its_reason(model, kernel):
+    folder = model(kernel)
+    with pytest.raises(
+        PluginError, match=r"numba cannot compile its kernels \(mine: wrench\)"
+    ) as e:
+        compiled(folder)
+    assert str(folder / "plugin.py") in str(e.value)
+    assert "A kernel is plain" in str(e.value)
+    assert "\n" not in str(e.value)
+
+
+class Wandering(Force):
+    """Another push at each call."""
+
+    keyword = "wandering"
+    body_i: Body = body()
+    calls = [0]  # noqa: RUF012 - what a kernel must not do
+
+    def wrench(t):
+        Wandering.calls[0] += 1
+        return (0.0, 0.0, float(Wandering.calls[0])), (0.0, 0.0, 0.0)
+
+
+def test_a_force_that_gives_other_numbers_when_called_again_is_found():
+    report = check_type(Wandering)
+    assert not report.ok
+    assert "other numbers when it is called again" in str(report)
+
+
+# ------------------------------------------------------------------ joints with wrong formulas
+
+
+class Plane(Joint):
+    """P_i stays in the plane z = 0 of ground, formulas right."""
+
+    keyword = "plane"
+    rows = 1
+    P_i: Point = point()
+    P_j: Point = point()
+
+    def C(r_P_i, r_P_j):
+        return (sub(r_P_i, r_P_j)[2],)
+
+    def J(s_P_i, s_P_j):
+        x, y, _ = s_P_i
+        xj, yj, _ = s_P_j
+        return row((0.0, 0.0, 1.0), (y, -x, 0.0)), row((0.0, 0.0, -1.0), (-yj, xj, 0.0))
+
+    def gamma(w_i, s_P_i_dot, w_j, s_P_j_dot):
+        a = w_i[0] * s_P_i_dot[1] - w_i[1] * s_P_i_dot[0]
+        return (w_j[0] * s_P_j_dot[1] - w_j[1] * s_P_j_dot[0] - a,)
+
+
+class WrongJ(Plane):
+    keyword = "wrong-J"
+
+    def J(s_P_i, s_P_j):
+        x, y, _ = s_P_i
+        xj, yj, _ = s_P_j
+        return row((0.0, 0.0, 1.0), (y, x, 0.0)), row((0.0, 0.0, -1.0), (-yj, xj, 0.0))
+
+
+class WrongGamma(Plane):
+    keyword = "wrong-gamma"
+
+    def gamma(w_i, s_P_i_dot, w_j, s_P_j_dot):
+        return (0.0,)
+
+
+class Rising(Plane):
+    """Its plane rises with time, which no ``nu`` says."""
+
+    keyword = "rising"
+
+    def C(t, r_P_i, r_P_j):
+        return (sub(r_P_i, r_P_j)[2] - 0.1 * t,)
+
+
+class Squared(Plane):
+    """The same plane as z^2 = 0: the gradient is zero wherever it holds."""
+
+    keyword = "squared"
+
+    def C(r_P_i, r_P_j):
+        z = sub(r_P_i, r_P_j)[2]
+        return (z * z,)
+
+    def J(r_P_i, r_P_j, s_P_i, s_P_j):
+        z = 2.0 * sub(r_P_i, r_P_j)[2]
+        x, y, _ = s_P_i
+        xj, yj, _ = s_P_j
+        return row((0.0, 0.0, z), (z * y, -z * x, 0.0)), row((0.0, 0.0, -z), (-z * yj, z * xj, 0.0))
+
+    def gamma(r_P_i, r_P_j, v_P_i, v_P_j, w_i, s_P_i_dot, w_j, s_P_j_dot):
+        z, z_dot = sub(r_P_i, r_P_j)[2], sub(v_P_i, v_P_j)[2]
+        a = w_i[0] * s_P_i_dot[1] - w_i[1] * s_P_i_dot[0]
+        b = w_j[0] * s_P_j_dot[1] - w_j[1] * s_P_j_dot[0]
+        return (-2.0 * z_dot * z_dot + 2.0 * z * (b - a),)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("type_", "words"),
+    [(Plane, ""), (WrongJ, "J is wrong by"), (WrongGamma, "gamma is wrong by"),
+     (Rising, "nu is missing, and row 1 of C depends on time")],
+    ids=lambda v: getattr(v, "keyword", ""),
+)  # fmt: skip
+def test_wrong_formulas_of_a_joint_are_found(type_, words):
+    """The plane of ground is no joint between any two bodies: that is told of all four."""
+    report = check_type(type_)
+    assert bool(re.search(r"(J|nu|gamma) is (wrong by|missing)", str(report))) == bool(words), str(
+        report
+    )
+    assert re.search(words, str(report)), str(report)
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"), [(2, "it should return"), (0, "rows"), (-1, "rows"), ("1", "rows")]
+)
+def test_a_wrong_number_of_rows_is_refused(rows, words):
+    type_ = type("Miscounted", (Plane,), {"keyword": "miscounted", "rows": rows})
+    with pytest.raises(PluginError, match=words):
+        registry_of(type_).get("joint", "miscounted")
+
+
+def _on_a_plane(type_, method=None):
+    scene = dap.Scene(name="plane")
+    scene.add_body("b", mass=1.0, Jp=(1.0, 1.0, 1.0), r_dot=(1.0, 0.0, 0.0))
+    scene.add_force("weight")
+    scene.add_joint(type_.keyword, "floor", P_i="b.O", P_j="ground.O")
+    return dap.compile(scene, method=method, registry=registry_of(type_))
+
+
+@pytest.mark.slow
+def test_a_row_whose_gradient_is_zero_at_the_start_is_named():
+    """Nothing holds the body: a run would let it fall through the plane. No method runs it."""
+    good = dap.simulate(_on_a_plane(Plane), t_end=0.2)
+    assert np.all(np.abs(good.r[:, 0, 2]) < 1e-12)
+    found = _on_a_plane(Squared)
+    assert found.redundancy().rank.rank == 0
+    with pytest.raises(dap.RedundantError, match="floor"):
+        dap.simulate(_on_a_plane(Squared, "standard"), t_end=0.2)
+    with pytest.raises(dap.SimulationError, match="gradient of a row of joint floor is zero"):
+        dap.simulate(found, t_end=0.2)
+
+
+# ------------------------------------------------------------------ what a file does to the process
+
+
+def test_what_a_models_file_changes_is_put_back_or_told(model):
+    folder = model(
+        at_import="""
+        import signal
+        os.chdir("/")
+        sys.path.insert(0, "/nowhere")
+        sys.stdout = None
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        print("said at import")
+    """
+    )
+    before = os.getcwd(), sys.stdout, signal.getsignal(signal.SIGINT)
+    try:
+        notes = "\n".join(compiled(folder).notes)
+    finally:
+        while "/nowhere" in sys.path:
+            sys.path.remove("/nowhere")
+    assert (os.getcwd(), sys.stdout, signal.getsignal(signal.SIGINT)) == before
+    for words in ("changed the working folder", "changed sys.path", "changed what Ctrl-C does"):
+        assert words in notes
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("sys.exit(0)", "SystemExit"),
+        ("raise GeneratorExit", "GeneratorExit"),
+        ("import no_such_package", "No module named 'no_such_package'"),
+        ("def f(:", "SyntaxError"),
+        ("interface_version = 99", "install a newer dap3d"),
+        ("interface_version = None", "interface_version = 1"),
+        ("x = [0] * 10**15", "MemoryError"),
+        ("def f(): return f()\nf()", "RecursionError"),
+        ("\0", "null bytes|SyntaxError|ValueError"),
+    ],
+)
+def test_a_models_file_that_fails_at_import_is_named(model, line, words):
+    folder = model(at_import=line)
+    with pytest.raises(dap.SceneError, match=words) as caught:
+        compiled(folder)
+    assert "plugin.py" in str(caught.value)
+
+
+#: Ways to write to stdout that no redirection inside Python sees.
+SPOILING = {
+    "descriptor": "os.write(1, b'raw words')",
+    "original stream": "sys.__stdout__.write('words'); sys.__stdout__.flush()",
+    "another process": "import subprocess; subprocess.run(['echo', 'words'])",
+    "at exit": "import atexit; atexit.register(print, 'words')",
+    "fork": "os.fork()",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", SPOILING.values(), ids=SPOILING)
+def test_json_is_alone_on_stdout_whatever_a_file_writes(model, line):
+    """One object, and one file: a copy of the process does not go on with the run."""
+    folder = model(at_import=line)
+    done = _run(folder)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["status"] == "done"
+    assert ("words" in done.stderr) == ("words" in line)
+    assert ("the copy ends" in done.stderr) == ("fork" in line)
+    assert not list(folder.glob("*.part*"))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
+def test_json_is_alone_on_stdout_when_a_kernel_prints(model):
+    done = _run(model(f"print('a kernel says', t)\n{GOOD}"))
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["status"] == "done"
+    assert "a kernel says" in done.stderr
+
+
+def _run(folder):
+    command = [*COMMAND, "run", ".", "--allow-code", "--json", "-o", "out.nc"]
+    return subprocess.run(
+        command, cwd=folder, env=environment(), capture_output=True, text=True, timeout=300
+    )
+
+
+def test_two_types_of_a_models_file_with_one_keyword_are_refused(model):
+    folder = model()
+    text = (folder / "plugin.py").read_text()
+    again = "class Again(Mine):\n    pass\n\n\n@hookimpl"
+    (folder / "plugin.py").write_text(
+        text.replace("@hookimpl", again).replace("[Mine]", "[Mine, Again]")
+    )
+    with pytest.raises(dap.SceneError, match="mine"):
+        compiled(folder)
+
+
+def test_a_models_file_does_not_shadow_a_standard_type_quietly(model):
+    """The installed type is taken, and a note says that the file was not loaded."""
+    folder = model()
+    for name in ("plugin.py", "scene.toml"):
+        path = folder / name
+        text = path.read_text().replace('"mine"', '"fp"').replace('"b"\n', '"b"\nfp = [1, 0, 0]\n')
+        path.write_text(text)
+    notes = compiled(folder).notes
+    assert any(str(folder / "plugin.py") in note and "was not loaded" in note for note in notes)
+
+
+class Numbered(Force):
+    """A force with a number of its own, for the test below."""
+
+    keyword = "numbered"
+    body_i: Body = body()
+    k: float = number(default=1.0)
+
+    def wrench(k):
+        return (k, 0.0, 0.0), (0.0, 0.0, 0.0)
+
+
+def test_two_types_with_one_keyword_are_both_named():
+    other = type("Other", (Numbered,), {"keyword": "numbered"})
+    with pytest.raises(PluginError, match="numbered"):
+        registry_of(Numbered, other).get("force", "numbered")
