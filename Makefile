@@ -22,7 +22,7 @@ PYTHON3 ?= python3 python3.13 python3.12 python3.11 python3.14 python
 CHECK_PYTHON := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 
 .DELETE_ON_ERROR:
-.PHONY: help run install test test-all verify unit-nojit lint audit format docs bench bench-peers clean
+.PHONY: help run install test test-all verify unit-nojit lint audit format docs bench bench-peers fuzz clean
 
 help:  ## show this list
 	@echo "make TARGET, where TARGET is one of"
@@ -80,6 +80,11 @@ docs: $(VENV)/.installed-docs  ## build the documentation into build/docs; warni
 bench: $(VENV)/.installed  ## measure speed against error (benchmarks/run.py)
 	@$(PYTHON) benchmarks/run.py
 
+# Minutes that `make fuzz` takes in all.
+MINUTES ?= 10
+fuzz: $(VENV)/.installed-fuzz  ## random and damaged inputs for MINUTES; what fails goes to build/fuzz
+	@$(PYTHON) tests/fuzz/run.py --minutes $(MINUTES)
+
 # Rivals live in an environment of their own: what they need does not touch what is tested.
 PEERS_VENV := build/peers-venv
 PEERS_PYTHON := $(PEERS_VENV)/bin/python
@@ -119,6 +124,10 @@ $(VENV)/.installed-test: $(VENV)/.installed plugins/dap3d-example/pyproject.toml
 	@echo "Installing what the tests need ..."
 	@$(INSTALL) -e ".[test]"
 	@$(INSTALL) --no-deps -e plugins/dap3d-example
+	@touch $@
+
+$(VENV)/.installed-fuzz: $(VENV)/.installed-test
+	@$(INSTALL) -e ".[fuzz]" || echo "atheris cannot be installed: fuzzing goes on without it"
 	@touch $@
 
 $(VENV)/.installed-docs: $(VENV)/.installed-test

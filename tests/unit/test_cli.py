@@ -18,7 +18,7 @@ from dap3d_core.cli.run import SETTINGS
 from dap3d_core.cli.signals import Stopping
 from dap3d_core.scene import INTEGRATORS, METHODS, Mistake, SceneError, Simulation
 
-COMMANDS = ("run", "check", "models", "plugins", "describe", "new-plugin", "check-plugin", "info",
+COMMANDS = ("run", "resume", "rerun", "check", "models", "plugins", "describe", "new-plugin", "check-plugin", "info",
             "post", "plot", "animate", "view", "report", "import-matlab")  # fmt: skip
 
 
@@ -161,6 +161,9 @@ def test_json_holds_nothing_that_is_no_json():
     numpy = importlib.import_module("numpy")
     data = {"a": numpy.array([1.0, numpy.nan]), 2: (float("inf"), numpy.int64(3)), "p": {1}}
     assert plain(data) == {"a": [1.0, None], "2": [None, 3], "p": [1]}
+    assert plain({"digits that Python refuses to write": 16**5000 - 1}) == {
+        "digits that Python refuses to write": "0x" + "f" * 5000
+    }
 
 
 def test_numbers_for_people():

@@ -266,3 +266,27 @@ def test_changed_bytes_give_a_scene_or_mistakes(tmp_path, seed):
                 assert mistake.what
                 assert mistake.file.startswith(str(folder)), mistake
     assert kept, "some changes, such as those of comments, do not matter"
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["1e308 + 1e308", "-1e308 - 1e308", "[1e200 1e200] * [1e200; 1e200]", "1e308 * 10", "1e9 ^ 99"],
+)
+def test_arithmetic_that_overflows_is_refused(refused, words):
+    """numpy's warning of it is no message to a user."""
+    (found,) = refused(**changed("inBodies", "B1.mass = 2", f"B1.mass = {words}"))
+    assert "not a finite real number" in found
+
+
+@pytest.mark.parametrize(
+    ("begin", "again"),
+    [
+        ("x = ones(100, 100);\n", "x = x * x * 1e-2;\n"),
+        ("B = Body_struct; x = [B];\n" + "x = [x; x];\n" * 13, "x = x;\n"),
+    ],
+    ids=["matrices", "structures"],
+)
+def test_work_without_end_is_refused(refused, begin, again):
+    """A file of allowed size, each statement of which is allowed, took some minutes."""
+    found = refused(inBodies=SMALL["inBodies.m"] + begin + again * 2000)
+    assert "more than 3000000 entries" in found[0]

@@ -193,3 +193,22 @@ def test_a_scene_that_was_changed_after_loading_reports_the_new_value(scene_of, 
     first, second = mistakes_of(scene, registry)
     assert (first.key, first.value, first.line) == ("bodies.crank.mass", -3.0, 6)
     assert (second.key, second.line) == ("joints.extra.P_j", None)
+
+
+def test_a_number_that_python_will_not_write_is_shown(scene_of, registry):
+    """Hexadecimal integers may have any length; their decimal digits are refused beyond 4300."""
+    huge = "0x" + "f" * 5000
+    scene = scene_of(BASE.replace("mass = 1.0", f"mass = {huge}"))
+    (mistake,) = mistakes_of(scene, registry)
+    assert str(mistake).startswith(f"{scene.path}:6: bodies.crank.mass = 0xffff")
+    assert len(str(mistake).splitlines()[0]) < 300
+    with pytest.raises(SceneError, match="cannot hold so large a number"):
+        scene.to_toml()
+
+
+def test_a_setting_that_is_missing_is_reported_where_its_table_begins(scene_of, registry):
+    """[simulation] has no names below it, as [bodies.NAME] has."""
+    scene = scene_of(BASE.replace('"dop853"', '"rk4"'))
+    (mistake,) = mistakes_of(scene, registry)
+    assert mistake.key == "simulation.step"
+    assert mistake.line == BASE.split("\n").index("[simulation]") + 1

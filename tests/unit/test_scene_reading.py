@@ -198,3 +198,29 @@ def test_loading_imports_nothing_heavy():
 
 def test_the_size_limit_is_64_mib():
     assert reading.LARGEST_FILE == 64 * 1024 * 1024
+
+
+@pytest.mark.parametrize("depth", [60, 600, 20_000])
+@pytest.mark.parametrize(
+    "nested",
+    [
+        lambda n: "joints.a" + ".a" * n + " = 1",
+        lambda n: "[joints.a" + " . 'a'" * n + "]",
+        lambda n: '[joints.j]\ntype = "sph"\nP_i = ' + "[" * n + "]" * n,
+        lambda n: '[joints.j]\ntype = "sph"\nP_i = ' + "{a = " * n + "1" + "}" * n,
+    ],
+    ids=["dotted key", "dotted table", "lists", "inline tables"],
+)
+def test_deep_nesting_is_refused_at_once(tmp_path, nested, depth):
+    """Keys of 20 000 names took tomllib a minute, those of 500 more levels than Python has."""
+    file = tmp_path / "scene.toml"
+    file.write_text(nested(depth))
+    assert any(w in refused(file) for w in ("more than 32 parts", "nested too deeply"))
+
+
+def test_what_looks_like_a_long_key_is_read_quickly(tmp_path):
+    """The search for long keys takes a time that grows with the file, whatever stands in it."""
+    file = tmp_path / "scene.toml"
+    words = "a" * 1_000_000 + '"' * 100_000 + "0.1, " * 100_000 + "a.b.c " * 100_000 + "." * 999
+    file.write_text(TEXT.replace("\n", f"\ndescription = '{words}'\n", 1))
+    assert load(file).description == words

@@ -517,3 +517,15 @@ def test_a_compiled_model_says_what_it_is():
     text = dap.compile(mass_point()).explain()
     for words in ["joints     none", "constraints: the scene has none", "unconstrained"]:
         assert words in text
+
+
+def test_a_run_that_blows_up_within_a_step_names_the_body_that_went():
+    """All is finite at the last state of a link that is drawn through its other end."""
+    scene = dap.Scene(name="link through its own point")
+    scene.add_body("idle", mass=1.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_body("bob", mass=1.0, Jp=(1.0, 1.0, 1.0), r=(0.5, 0.0, 0.0), r_dot=(-1.0, 0.0, 0.0))
+    scene.add_joint("sph-sph", P_i="bob.O", P_j="ground.O", length=0.25)
+    with pytest.raises(dap.SimulationError, match="body bob is the fastest there, with up to"):
+        dap.simulate(
+            scene, t_end=2.0, integrator="rk4", step=0.01, correct=False, project=False
+        )  # assembled and projected, the link would be as long as it is

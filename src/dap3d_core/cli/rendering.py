@@ -18,6 +18,9 @@ from rich.text import Text
 
 from dap3d_core.cli.streams import json_stream, leave_stdout
 
+#: Bits of an integer; Python refuses to write the decimal digits of some 14000.
+LONGEST_INTEGER = 4096
+
 
 class Terminal(Console):
     """A console without markup, which goes quiet when its reader has gone."""
@@ -200,8 +203,8 @@ def plain(value: Any) -> Any:
         value = value.tolist()
     if isinstance(value, float) and not math.isfinite(value):
         return None
-    if isinstance(value, int) and value.bit_length() > 1024:  # beyond what a float holds
-        return None
+    if isinstance(value, int) and value.bit_length() > LONGEST_INTEGER:
+        return hex(value)
     if isinstance(value, (bool, int, float, str, type(None))):
         return value
     if isinstance(value, Mapping):

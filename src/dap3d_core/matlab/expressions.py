@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 #: Brackets within brackets, at most.
 DEEPEST = 50
+#: Entries of all arrays that the expressions of a file come to, at most: some seconds of work.
+MOST_ENTRIES = 3_000_000
 
 _NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _OUTSIDE = {
@@ -41,6 +43,11 @@ _OUTSIDE = {
     "boolean": "a truth value",
     "superclass": "a class",
 }
+
+
+def _length(value: Any) -> int:
+    """What a value that is no matrix costs to copy, in entries of one."""
+    return 10 * len(value) if isinstance(value, list) else 1
 
 
 def named_children(node: "Node") -> list["Node"]:
@@ -58,7 +65,7 @@ class Expressions:
 
     def __init__(self, source: Source, variables: dict[str, Any]) -> None:
         self.source, self.variables = source, variables
-        self._depth = 0
+        self._depth = self._entries = 0
         self._lengths: list[int] = []  # what ``end`` means, innermost last
         self._kinds: dict[str, Callable[[Node], Any]] = {
             "number": self._number,
@@ -87,9 +94,13 @@ class Expressions:
             raise RefusalError(node, f"more than {DEEPEST} brackets within brackets")
         self._depth += 1
         try:
-            return find(node)
+            found = find(node)
         finally:
             self._depth -= 1
+        self._entries += found.size if isinstance(found, np.ndarray) else _length(found)
+        if self._entries > MOST_ENTRIES:
+            raise RefusalError(node, f"more than {MOST_ENTRIES} entries of arrays in one file")
+        return found
 
     def _number(self, node: "Node") -> Numbers:
         text = text_of(node)

@@ -78,7 +78,8 @@ class Operation:
 
     def result(self) -> Numbers:
         """The value of the whole."""
-        found = self._sum()
+        with np.errstate(all="ignore"):  # what is not finite is refused
+            found = self._sum()
         if self.place < len(self.tokens):
             token = self.tokens[self.place]
             what = f"the operator {text_of(token.node)} is not read"
@@ -154,15 +155,13 @@ class Operation:
                 raise RefusalError(self.node, what)
             check_size(a.size * b.shape[1], self.node)  # what is multiplied
             return self._checked(a @ b)
-        with np.errstate(all="ignore"):
-            return self._checked(a * b if "*" in operator else a / b)
+        return self._checked(a * b if "*" in operator else a / b)
 
     def _raised(self, operator: str, a: Numbers, b: Numbers) -> Numbers:
         if operator == "^" and (a.size, b.size) != (1, 1):
             raise RefusalError(self.node, "powers of matrices are not read", "write .^")
         self._fits(operator, a, b)
-        with np.errstate(all="ignore"):
-            return self._checked(np.asarray(a**b))
+        return self._checked(np.asarray(a**b))
 
     def _fits(self, operator: str, a: Numbers, b: Numbers) -> None:
         if a.shape != b.shape and 1 not in (a.size, b.size):

@@ -4,7 +4,7 @@ from collections.abc import Collection
 from typing import Any
 
 from dap3d_core.registry.spelling import nearest
-from dap3d_core.scene.description import Scene
+from dap3d_core.scene.description import NAMED, Scene
 from dap3d_core.scene.mistakes import MISSING, Key, Mistake, SceneError, dotted
 
 #: Mistakes for which the nearest spelling is searched among all names of the scene.
@@ -68,7 +68,7 @@ def located(scene: Scene, mistakes: list[tuple[Key, Mistake]]) -> list[Mistake]:
     found = []
     for key, mistake in mistakes:
         # What is missing is reported where its table begins; a table that a script made, nowhere.
-        shortest = min(len(key), 2)
+        shortest = min(len(key), 2 if key[:1] and key[0] in NAMED else 1)
         parts = (key[:n] for n in range(len(key), shortest - 1, -1))
         line = next((lines[part] for part in parts if part in lines), None)
         found.append(

@@ -38,6 +38,8 @@ _LONG_KEY = re.compile(
 SUGGESTIONS = 200
 #: The scene of a model's folder, and its own types.
 SCENE_FILE, PLUGIN_FILE = "scene.toml", "plugin.py"
+#: Tables and lists within one another, at most; a scene needs five.
+DEEPEST = 50
 
 
 def load(source: str | os.PathLike[str]) -> Scene:
@@ -255,11 +257,15 @@ def _parse(text: str, path: Path) -> dict[str, Any]:
         what = f"a key of more than {MOST_PARTS} parts; those of a scene have 4 at most"
         raise _refused(str(path), what, line=text.count("\n", 0, long.end()) + 1)
     try:
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
     except RecursionError:
-        raise _refused(str(path), "lists or tables are nested too deeply") from None
+        raise _too_deep(path) from None
     except ValueError as error:  # TOMLDecodeError, and integers of thousands of digits
         words = str(error)
+    else:
+        if _is_too_deep(data):
+            raise _too_deep(path)
+        return data
     place = re.search(r"\(at line (\d+), column (\d+)\)", words)
     what = re.sub(r"\s*\(at [^()]*\)$", "", words)
     if place is None:
@@ -292,6 +298,22 @@ def _remedy(lines: list[str]) -> str:
             if value and re.fullmatch(habit, value):
                 return remedy
     return ""
+
+
+def _is_too_deep(data: dict[str, Any]) -> bool:
+    """Whether tables and lists lie more than ``DEEPEST`` levels within one another."""
+    level: list[Any] = [data]
+    for _ in range(DEEPEST):
+        inside = (v for c in level for v in (c.values() if type(c) is dict else c))
+        level = [v for v in inside if type(v) in (dict, list)]
+        if not level:
+            return False
+    return True
+
+
+def _too_deep(path: Path) -> SceneError:
+    what = f"lists or tables are nested too deeply: more than {DEEPEST} within one another"
+    return _refused(str(path), what)
 
 
 def _refused(file: str, what: str, *, line: int | None = None, remedy: str = "") -> SceneError:

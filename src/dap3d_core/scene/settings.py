@@ -20,17 +20,28 @@ FIXED_STEP = ("rk4",)
 NO_STEP = ("adams",)
 #: Relative tolerances below are beyond double precision.
 SMALLEST_RTOL = 1e-14
+#: Times that are shorter, s, leave double precision in products and quotients.
+SHORTEST_TIME = 1e-100
 #: More reported times are refused before anything is computed.
 MOST_ROWS = 5e7
 
+
+def _time(value: Any, *, positive: bool = True) -> Any:
+    """A time, s, long enough to be computed with, or 0 where that is allowed."""
+    number = bounded(number_of(value), positive=positive, minimum=0.0)
+    if isinstance(number, Fault) or number == 0.0 or number >= SHORTEST_TIME:
+        return number
+    return Fault(f"should be {'' if positive else '0 or '}at least {SHORTEST_TIME:g}")
+
+
 _READ: dict[str, Callable[[Any], Any]] = {
-    "t_end": lambda v: bounded(number_of(v), minimum=0.0),
-    "dt": lambda v: bounded(number_of(v), positive=True),
+    "t_end": lambda v: _time(v, positive=False),
+    "dt": _time,
     "method": lambda v: word_of(v, METHODS),
     "integrator": lambda v: word_of(v, INTEGRATORS),
     "rtol": lambda v: bounded(number_of(v), minimum=SMALLEST_RTOL, maximum=1.0),
     "atol": lambda v: bounded(number_of(v), minimum=0.0),
-    "step": lambda v: bounded(number_of(v), positive=True),
+    "step": _time,
     "correct": truth_of,
     "project": truth_of,
     "correct_metric": lambda v: word_of(v, CORRECT_METRICS),

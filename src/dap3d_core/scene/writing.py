@@ -13,6 +13,8 @@ from dap3d_core.scene.description import NAMED, Element, Scene
 from dap3d_core.scene.mistakes import MISSING, Mistake, SceneError
 from dap3d_core.scene.plain import plain
 
+#: Bits of an integer: what other readers of TOML take is 64, Python itself writes some 14000.
+LONGEST_INTEGER = 4096
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
@@ -106,6 +108,8 @@ def _value(value: Any, place: str) -> str:
     if kind is bool:
         return "true" if value else "false"
     if kind is int:
+        if value.bit_length() > LONGEST_INTEGER:
+            raise SceneError([Mistake(place, value, "a scene file cannot hold so large a number")])
         return repr(value)
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{_key(k)} = {_value(v, place)}" for k, v in value.items()) + "}"

@@ -7,7 +7,7 @@ from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.switches import CHATTER
 from dap3d_core.integrators.work import LOGGED
 from dap3d_core.result import INFORMATION, Occurrence
-from dap3d_core.simulation.offender import find_offender
+from dap3d_core.simulation.offender import fastest_body, find_offender
 
 REASONS = {
     Status.STEP_FLOOR: "the step size fell to the resolution of time",
@@ -28,6 +28,8 @@ def why_stopped(machine: Machine, integration: Integration) -> str:
     t_stop = integration.t_stop if integration.t_stop is not None else t
     message = f"{head}: {REASONS[integration.status]}"
     culprit = find_offender(machine, t, integration.y, t_stop)
+    if not culprit and integration.status is Status.NOT_FINITE:
+        culprit = fastest_body(machine, integration.y)
     return f"{message}: {culprit}" if culprit else message
 
 

@@ -48,6 +48,18 @@ def _runaway(machine: Machine, y: Floats) -> str:
     return f"body {machine.model.body_names[first]} runs away (numbers of {largest[first]:.1e})"
 
 
+def fastest_body(machine: Machine, y: Floats) -> str:
+    """Name the body whose velocities are the largest; where all is finite it is to blame."""
+    n = machine.model.body_count
+    speeds = np.abs(y[7 * n : 13 * n]).reshape(n, 6)
+    b = int(np.argmax(speeds.max(axis=1)))
+    v, w = speeds[b, :3].max(), speeds[b, 3:].max()
+    return (
+        f"it was so within a step, not before; body {machine.model.body_names[b]} is the fastest "
+        f"there, with up to {v:.3g} m/s and {w:.3g} rad/s along an axis"
+    )
+
+
 def _at(machine: Machine, t: float, y: Floats) -> str:
     n = machine.model.body_count
     for b, name in enumerate(machine.model.body_names):

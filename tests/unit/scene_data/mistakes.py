@@ -172,6 +172,8 @@ SETTING_MISTAKES = [
     ("t_end = 2.0", "t_end = nan", "simulation.t_end", ["finite number, not nan"]),
     ("t_end = 2.0", "t_end = inf", "simulation.t_end", ["finite number, not inf"]),
     ("t_end = 2.0", "tend = 2.0", "simulation.tend", ["did you mean 't_end'?"]),
+    ("t_end = 2.0", "t_end = 1e-320", "simulation.t_end", ["0 or at least 1e-100"]),
+    ("dt = 0.05", "dt = 1e-320", "simulation.dt", ["at least 1e-100"]),
     ("dt = 0.05", "dt = 0", "simulation.dt", ["greater than 0"]),
     ("dt = 0.05", "dt = -0.05", "simulation.dt", ["greater than 0"]),
     ("dt = 0.05", "dt = 3.0", "simulation.dt", ["longer than the run"]),

@@ -1,0 +1,59 @@
+"""Random and damaged inputs are dealt with as they should be: what they end in, and what is said.
+
+The same inputs each time; ``make fuzz`` tries others. Each check says what must be true.
+"""
+
+import importlib.util
+
+import pytest
+
+from fuzz.guided import GUIDED
+from fuzz.targets import TARGETS
+
+#: How many inputs, quick and slow. A scene takes some 50 ms, what is refused some 5 ms.
+COUNTS = {
+    "scenes": (6, 40),
+    "damaged": (20, 150),
+    "matlab": (30, 200),
+    "results": (10, 60),
+    "quantities": (50, 300),
+    "commands": (10, 60),
+}
+
+
+def test_every_target_is_tried():
+    assert COUNTS.keys() == TARGETS.keys()
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_some_inputs(name):
+    TARGETS[name].run(0, COUNTS[name][0], derandomize=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COUNTS)
+def test_more_inputs(name):
+    TARGETS[name].run(1, COUNTS[name][1])
+
+
+@pytest.mark.parametrize("name", GUIDED)
+def test_what_guided_fuzzing_begins_with_is_read(name):
+    """Its seeds are good: mutations of them reach more than the first refusal."""
+    target = GUIDED[name]
+    if name == "matlab-bytes":
+        pytest.importorskip("tree_sitter_matlab")
+    found = [target.check(data) for data in target.seeds()]
+    assert found.count("read") >= len(found) / 4
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not importlib.util.find_spec("atheris"), reason="needs atheris")
+def test_guided_fuzzing_runs(tmp_path, monkeypatch):
+    """A target of atheris works for its time and reports no find."""
+    from fuzz import run
+
+    monkeypatch.setattr(run, "FINDS", tmp_path)
+    worker = run.Worker("scene-bytes", 1, 8.0)
+    worker.go()
+    assert not worker.places
+    assert worker.counts["refused"] > 0
