@@ -1,8 +1,9 @@
 """All benchmarks, as tables and as JSON.
 
-``make bench``, or ``python benchmarks/run.py [--only NAME] [-o FILE]``. scale_long, some minutes,
-and two_threads are run only when they are named. With ``--docs`` the figures of hard_cases and
-long_time go to docs/hard-cases.md as well.
+``make bench``, or ``python benchmarks/run.py [--only NAME ...] [-o FILE]``. scale_long, some
+minutes, and two_threads are run only when they are named. With ``--docs`` the figures of
+hard_cases, long_time, chaos, flips and hinges go to docs/hard-cases.md as well; ``--only hard`` is
+all of these.
 """
 
 import argparse
@@ -18,6 +19,9 @@ import calls
 import derived
 import extension
 import hard
+import hard.chaos
+import hard.flips
+import hard.hinges
 import hard.long_time
 import kernels
 import numba
@@ -36,6 +40,8 @@ NAMED = ("scale_long", "two_threads")
 COLUMNS = 8
 #: Columns that every table of one title has, and those of sentences, which stand below.
 LEADING, WORDS = ("case", "run"), ("why", "said")
+#: What docs/hard-cases.md is made of.
+HARD = ("hard_cases", "long_time", "chaos", "flips", "hinges")
 
 
 def tables(console, title, rows):
@@ -67,7 +73,7 @@ def _text(value):
 def main():
     """Measure, print, write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", help="one benchmark by name")
+    parser.add_argument("--only", nargs="+", default=[], help="benchmarks by name; hard: all those")
     parser.add_argument("--against", help="a program to compare the chains with (build, rk4)")
     parser.add_argument("-o", "--output", default="benchmarks/results.json")
     parser.add_argument("--docs", action="store_true", help="renew the page on hard cases")
@@ -87,16 +93,20 @@ def main():
         "two_threads": two_threads.measure,
         "hard_cases": hard.measure,
         "long_time": hard.long_time.measure,
+        "chaos": hard.chaos.measure,
+        "flips": hard.flips.measure,
+        "hinges": hard.hinges.measure,
     }
-    if arguments.only and arguments.only not in benchmarks:
-        sys.exit(f"no benchmark {arguments.only}; there are {', '.join(benchmarks)}")
+    only = {name for word in arguments.only for name in (HARD if word == "hard" else (word,))}
+    if unknown := only - benchmarks.keys():
+        sys.exit(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(benchmarks)}")
     console, found = Console(), {}
     for name, measure in benchmarks.items():
-        if arguments.only == name or (arguments.only is None and name not in NAMED):
+        if name in only or (not only and name not in NAMED):
             found[name] = measure()
             tables(console, name.replace("_", " "), found[name])
     if arguments.docs:
-        hard.write_page([*found.get("hard_cases", []), *found.get("long_time", [])])
+        hard.write_page([row for name in HARD for row in found.get(name, [])])
     versions = {
         "python": platform.python_version(),
         "numpy": numpy.__version__,

@@ -65,6 +65,7 @@ class Case:
             1e-8): 1e3, as in the ledger, and more where the motion itself multiplies errors.
         floor: what the reference leaves out, or to how many digits it is known.
         beyond: entry of the ledger that is beyond its limit though the run passes, or "ok".
+        slow: whether its first try takes longer than a test may that is run each time.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Case:
     loose: float = 1e3
     floor: float = 0.0
     beyond: str = "ok"
+    slow: bool = False
 
     def limit(self, attempt: Try) -> float:
         """The largest error with which a try passes."""

@@ -8,10 +8,12 @@ import json
 from pathlib import Path
 
 from hard.list import CASES
+from hard.tables import chaos_table, flips_table, hinges_table, table
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 FIGURES, PAGE = DOCS / "hard-cases.json", DOCS / "hard-cases.md"
 PICTURE = DOCS / "hard-cases-long-time.png"
+CHAOS, HINGES = DOCS / "hard-cases-chaos.png", DOCS / "hard-cases-hinges.png"
 #: The page between a pair of these is made here; the rest is written by hand.
 BEGIN, END = "<!-- {}: made by benchmarks/run.py -->\n", "<!-- end of {} -->\n"
 
@@ -39,8 +41,8 @@ def _rounded(value):
 
 
 def write(rows):
-    """Write the figures of these rows in the place of older ones, the page and its picture."""
-    from hard.long_time import draw
+    """Write the figures of these rows in the place of older ones, the page and its pictures."""
+    from hard import chaos, hinges, long_time
 
     measured = figures(rows)
     cases = {row["case"] for row in measured}
@@ -49,26 +51,24 @@ def write(rows):
     FIGURES.write_text(json.dumps(kept, indent=1) + "\n")
     PAGE.write_text(renewed(PAGE.read_text(), kept))
     if any("roundings" in row for row in measured):
-        draw(PICTURE)
+        long_time.draw(PICTURE)
+    if any("tenfold" in row for row in measured):
+        chaos.draw(CHAOS)
+    if scanned := [row for row in measured if "size" in row]:
+        hinges.draw(scanned, HINGES)
 
 
 def renewed(page, kept):
     """The page with the tables of these figures."""
-    tables = {"cases": cases_table, "runs": runs_table, "long runs": long_table}
-    for name, table in tables.items():
+    tables = {
+        "cases": cases_table, "runs": runs_table, "long runs": long_table,
+        "chaos": chaos_table, "flips": flips_table, "hinges": hinges_table,
+    }  # fmt: skip
+    for name, made in tables.items():
         begin, end = BEGIN.format(name), END.format(name)
         head, rest = page.split(begin)
-        page = head + begin + "\n" + table(kept) + "\n" + end + rest.split(end)[1]
+        page = head + begin + "\n" + made(kept) + "\n" + end + rest.split(end)[1]
     return page
-
-
-def _table(heads, rows):
-    lines = [f"| {' | '.join(heads)} |", f"| {' | '.join('---' for _ in heads)} |"]
-    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
-
-
-def _escaped(text):
-    return text.replace("|", "\\|")
 
 
 def cases_table(kept):
@@ -92,7 +92,7 @@ def cases_table(kept):
             )
         )
     heads = ("case", "what makes it hard", "passes", "best e", "steps", "fails", "test")
-    return _table(heads, [tuple(map(_escaped, row)) for row in rows])
+    return table(heads, rows)
 
 
 def runs_table(kept):
@@ -110,7 +110,7 @@ def runs_table(kept):
         rows.append((row["case"], row["run"], passes, *numbers, ledger, *counts, time))
     heads = ("case", "run", "passes", "e", "energy", "|C|", "||p| - 1|", "ledger", "steps", "rhs",
              "time")  # fmt: skip
-    return _table(tuple(map(_escaped, heads)), rows)
+    return table(heads, rows)
 
 
 def long_table(kept):
@@ -125,4 +125,4 @@ def long_table(kept):
                      f"{row['roundings']:.2g}", *other, f"{row['time']:g}"))  # fmt: skip
     heads = ("run", "settings", "steps", "energy", "power of t", "energy / (eps √steps)",
              "L", "|C|", "|D v|", "||p| - 1|", "time")  # fmt: skip
-    return _table(tuple(map(_escaped, heads)), rows)
+    return table(heads, rows)

@@ -5,6 +5,7 @@ Nothing here comes from dap3d. Equations are integrated by scipy's DOP853 at 3e-
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 
 G = 9.81
@@ -91,6 +92,47 @@ def bounce(m, k, drop, t):
         -v / w * np.sin(a) - G / w**2 * (1.0 - np.cos(a)), -v * np.cos(a) - G / w * np.sin(a)
     ])  # fmt: skip
     return np.where((s <= 2.0 * fall)[:, None], flight, pressed)
+
+
+def bounces(m, k, c, drop):
+    """Instants at which a ball on a spring k and a damper c touches and leaves, until it stays.
+
+    Off the ground it falls freely; on it m y'' = -k y - c y' - m g is a damped sine about its rest
+    position, and it leaves where y rises through zero within a turn of that sine, or never.
+    """
+    decay, rest = 0.5 * c / m, -m * G / k
+    w = np.sqrt(k / m - decay**2)
+    t, v, found = np.sqrt(2.0 * drop / G), -np.sqrt(2.0 * G * drop), []
+    while True:
+        found.append(t)
+        a, b = -rest, (v - decay * rest) / w
+
+        def height(s, a=a, b=b):
+            return rest + np.exp(-decay * s) * (a * np.cos(w * s) + b * np.sin(w * s))
+
+        s = np.linspace(0.0, 2.0 * np.pi / w, 2001)[1:]
+        out = np.flatnonzero((height(s[1:]) > 0.0) & (height(s[:-1]) <= 0.0))
+        if not len(out):
+            return found
+        s = brentq(height, s[out[0]], s[out[0] + 1], xtol=1e-18, rtol=1e-15)
+        rate = (w * b - decay * a) * np.cos(w * s) - (w * a + decay * b) * np.sin(w * s)
+        t, v = t + s, np.exp(-decay * s) * rate
+        found.append(t)
+        t, v = t + 2.0 * v / G, -v
+
+
+def euler_disk(radius, lean):
+    """The rate, rad/s, at which the contact of a disk runs round whose centre stays where it is.
+
+    With J_t = m R^2 / 4 across (a thin disk): with b = 0, no circle of the centre, the steady
+    motion has Omega^2 = m g R / (J_t sin(lean)).
+    """
+    return np.sqrt(4.0 * G / (radius * np.sin(lean)))
+
+
+def fall(t):
+    """(nt, 2) height and velocity of a body that falls freely from rest."""
+    return np.column_stack([-0.5 * G * t * t, -G * t])
 
 
 def top_axis(theta, precession, t):

@@ -1,6 +1,7 @@
 """Scenes that only the hard cases need; the others are shipped models and scenes of the tests."""
 
 import attrs
+import numpy as np
 from support import problems
 
 import dap3d_core as dap
@@ -19,6 +20,47 @@ def stiff_bounce(k=1e9):
     """The shipped ball, its ground k N/m stiff and without damping."""
     scene = dap.load("ball1")
     scene.forces["contact"].fields.update(k=k, c=0.0)
+    return scene
+
+
+def damper(k, restitution):
+    """The damper, N s/m, with which 1 kg leaves a spring k at ``restitution`` of its speed."""
+    decrement = -np.log(restitution) / np.pi  # decay over frequency of the damped sine
+    return 2.0 * np.sqrt(k) * decrement / np.sqrt(1.0 + decrement**2)
+
+
+def bounces(k=1e9, restitution=0.8):
+    """The shipped ball on stiffer ground, with a damper that leaves it a part of its speed."""
+    scene = stiff_bounce(k)
+    scene.forces["contact"].fields.update(c=damper(k, restitution))
+    return scene
+
+
+def stiff_beside_slow(k=1e9):
+    """A01, and beside it 1 kg on a spring of k N/m with a damper; the two do not touch."""
+    scene = problems.pendulum()
+    scene.add_body("weight", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(2.0, 0.0, 0.0))
+    scene.add_point("above", "ground", (2.0, 1.0, 0.0))
+    scene.add_force("ptp", "spring", P_i="weight.O", P_j="above", k=k, l0=1.0, c=np.sqrt(k))
+    return scene
+
+
+def flat_disk(lean, radius=0.5):
+    """A thin disk of 2 kg that leans by ``lean`` from lying, in steady rolling about its centre."""
+    scene = dap.Scene(name=f"a disk {lean:g} rad from lying")
+    s, c = np.sin(lean), np.cos(lean)
+    rate = np.sqrt(4.0 * 9.81 / (radius * s))
+    # from the ground axes to (t, eta, n): turned about z and x, the axis eta in the x-z plane
+    half = 0.25 * np.pi - 0.5 * lean
+    turned = np.array([np.sqrt(0.5), 0.0, 0.0, -np.sqrt(0.5)])
+    lying = np.array([np.cos(half), np.sin(half), 0.0, 0.0])
+    p = (turned[0] * lying[0], turned[0] * lying[1], turned[3] * lying[1], turned[3] * lying[0])
+    scene.add_body(
+        "coin", mass=2.0, Jp=(0.5 * radius**2, radius**2, 0.5 * radius**2),
+        r=(0.0, 0.0, radius * s), p=p, w=(-rate * c * s, 0.0, rate * s * s),
+    )  # fmt: skip
+    scene.add_joint("disk", "ground contact", body_i="coin", radius=radius, lying=0.1 * lean)
+    scene.add_force("weight")
     return scene
 
 

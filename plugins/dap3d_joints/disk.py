@@ -34,7 +34,7 @@ class Disk(Joint):
 
     keyword, rows, holonomic = "disk", 3, (False, False, True)
     switch_words = (
-        "the disk lies down (sine of the angle between disk and ground below 0.02), "
+        "the disk lies down (sine of the angle between disk and ground below its `lying`), "
         "so its point of contact is undefined"
     )
     body_i: Body = body(doc="the disk; its origin is the centre, its y axis the disk's axis")
@@ -45,6 +45,11 @@ class Disk(Joint):
         doc="directions without slip",
     )
     radius: float = number(default=1.0, unit="m", positive=True, doc="radius of the disk")
+    lying: float = number(
+        default=0.02,
+        positive=True,
+        doc="sine of the angle between disk and ground below which it lies; the run ends there",
+    )
 
     def prepare(self, bodies):
         import warnings
@@ -71,8 +76,8 @@ class Disk(Joint):
         _, s_dot = contact_rate(A_i, w_i, radius)
         return sub((0.0, 0.0, 0.0), cross(w_i, s_dot))
 
-    def switch(A_i):
-        return axis(A_i)[1] - 0.02
+    def switch(A_i, lying):
+        return axis(A_i)[1] - lying
 
 
 class Sliding(Disk, slip="z"):

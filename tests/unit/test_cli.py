@@ -18,8 +18,9 @@ from dap3d_core.cli.run import SETTINGS
 from dap3d_core.cli.signals import Stopping
 from dap3d_core.scene import INTEGRATORS, METHODS, Mistake, SceneError, Simulation
 
-COMMANDS = ("run", "resume", "rerun", "check", "models", "plugins", "describe", "new-plugin", "check-plugin", "info",
-            "post", "plot", "animate", "view", "report", "import-matlab")  # fmt: skip
+COMMANDS = ("run", "resume", "rerun", "check", "models", "plugins", "describe", "new-plugin",
+            "check-plugin", "info", "post", "plot", "animate", "view", "report",
+            "import-matlab")  # fmt: skip
 
 
 def test_every_command_is_there_and_has_help():

@@ -10,6 +10,7 @@ from support import problems
 
 import dap3d_core as dap
 from dap3d_core.result import INFORMATION, estimated_error
+from dap3d_core.result.estimate import ErrorEstimate
 
 #: The module; the package has a function of its name.
 LOOP = importlib.import_module("dap3d_core.simulation.run")
@@ -121,6 +122,31 @@ def test_from_when_on_a_state_means_nothing():
     assert w[k] > 1e-3 * size or p[k] > 1e-3
     assert (w[:k] <= 1e-3 * size).all()
     assert tight.error.meaningless_from is None
+
+
+def growing(law):
+    """The estimate of a body whose place of 1 m is off by law(t) metres at 0, 0.1, ... 10 s."""
+    t = np.linspace(0.0, 10.0, 101)
+    error = np.zeros((101, 13))
+    error[1:, 0] = law(t[1:])
+    return ErrorEstimate(t, error, {"r": 1.0, "p": 1.0, "rd": 1.0, "w": 1.0})
+
+
+def test_a_time_of_tenfold_growth():
+    """Of 1e-9 * 10^t: one second; errors as large as the motion, from 7 s on, do not count."""
+    found = growing(lambda t: np.minimum(1e-9 * 10.0**t, 1.0 + np.sin(5.0 * t)))
+    assert found.tenfold == pytest.approx(1.0, rel=1e-9)
+    assert found.meaningless_from == pytest.approx(6.1)
+
+
+@pytest.mark.parametrize("power", [1.0, 2.0, 8.0])
+def test_powers_of_time_are_no_exponentials(power):
+    assert growing(lambda t: 1e-9 * t**power).tenfold is None
+
+
+def test_little_growth_is_none():
+    """Two decades in all, of which nobody can say how they went on."""
+    assert growing(lambda t: 1e-9 * 10.0 ** (0.2 * t)).tenfold is None
 
 
 def test_the_tightest_tolerance_has_no_estimate_and_says_so():

@@ -130,8 +130,8 @@ def test_the_switch_is_the_sine_of_the_lean():
     for lean, sign in ((0.021, 1.0), (0.019, -1.0)):
         A = ((1, 0, 0), (0, np.cos(lean), -np.sin(lean)), (0, np.sin(lean), np.cos(lean)))
         tilted = tuple(tuple(row) for row in np.array(A) @ [[1, 0, 0], [0, 0, -1], [0, 1, 0]])
-        assert Disk.switch(tilted) == pytest.approx(np.sin(lean) - 0.02, abs=1e-12)
-        assert np.sign(Disk.switch(tilted)) == sign
+        assert Disk.switch(tilted, 0.02) == pytest.approx(np.sin(lean) - 0.02, abs=1e-12)
+        assert np.sign(Disk.switch(tilted, 0.02)) == sign
 
 
 def test_a_disk_that_falls_over_ends_the_run():

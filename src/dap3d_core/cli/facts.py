@@ -47,7 +47,8 @@ def _error_estimate(result: "Result") -> dict[str, Any] | None:
     error = result.error
     if error is None:
         return None
-    return {**error.largest, "meaningless_from": error.meaningless_from}
+    until = {"meaningless_from": error.meaningless_from, "tenfold": error.tenfold}
+    return {**error.largest, **until}
 
 
 def reason_of(facts: dict[str, Any]) -> str:

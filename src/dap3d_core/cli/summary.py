@@ -134,7 +134,9 @@ def error_estimate(found: dict[str, Any]) -> str:
     when = error["meaningless_from"]
     if when is None:
         return words
-    return f"{words}. From t = {when:.6g} s on beyond 1e-3 of the size: no longer meaningful"
+    words = f"{words}. From t = {when:.6g} s on beyond 1e-3 of the size: no longer meaningful"
+    tenfold = error["tenfold"]
+    return words if tenfold is None else f"{words}; until then tenfold every {tenfold:.3g} s"
 
 
 def _verdict(ok: bool | None) -> Text:

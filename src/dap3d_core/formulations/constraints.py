@@ -48,8 +48,9 @@ PART = 1e-9
 SLOW = 0.1
 
 #: A residual that stays above this many times the tolerance means that the projection did not find
-#: the constraints.
-LOST = 1e6
+#: the constraints: with independent rows, and where redundant ones may misfit (by FIT of
+#: simulation/initial.py).
+LOST, MISFIT = 1e6, 1e8
 
 
 @compiled_into
@@ -156,6 +157,7 @@ def project_onto(
     """
     metric = system.metric
     n = metric.shape[0] - 1
+    lost = LOST if part is None else MISFIT
     linear = out[0] == 1.0
     factored = linear and kept
     stale = False
@@ -181,7 +183,7 @@ def project_onto(
         linear, factored = False, part is None  # of old factors the null space would be wrong
         stale = factored
         out[0] = 1.0
-        if not worst <= LOST * limit:
+        if not worst <= lost * limit:
             out[1] = 1.0
     out[2] = worst
     if not linear:
@@ -217,7 +219,7 @@ def project_velocities(
                 factorise(system, part)
                 stale = False
         out[0] = 1.0
-        if not worst <= LOST * limit:
+        if not worst <= (LOST if part is None else MISFIT) * limit:
             out[1] = 1.0
     out[3] = worst
 

@@ -42,6 +42,9 @@ SOLVES = 3
 #: For the least multipliers: e as part of the longest row's square, and passes at most. More of
 #: them than it takes would gather rounding.
 LEAST_PART, LEAST_SOLVES = 1e-5, 50
+#: What is taken away may change D^T lambda by this part; rows that hold only weakly, like those of
+#: a door that hinges jam, need a smaller e for that, by so much at a time, down to a least one.
+TAKEN, SMALLER, SMALLEST = 1e-9, 1e-2, 1e-12
 
 
 @compiled_inside
@@ -78,18 +81,32 @@ def take_least(system: System) -> None:
     """Replace -lambda in ``x`` by the least one that gives the same D^T lambda.
 
     With one weight e for all rows, n -> e (D^ D^^T + e)^-1 n keeps what D^T does not see, and
-    takes away the rest. That is subtracted. gamma keeps what is given, C holds n.
+    takes away the rest. That is subtracted. gamma keeps what is given, C holds n. What D^T sees of
+    n in the end, e times the ``force`` of the last pass, says whether e was small enough.
     """
     x, given, n = system.x, system.gamma, system.C
     for k in range(x.shape[0]):
         given[k] = x[k]
     weigh_rows(system.blocks, system.D, 1.0, x)
-    e = LEAST_PART * largest(x)
+    longest = largest(x)
     for k in range(x.shape[0]):
         if x[k] == 0.0:  # a hub's place, or a row that does nothing
             given[k] = 0.0
-        n[k], x[k] = given[k], e
-    before = np.inf
+        n[k] = given[k]
+    e, seen = LEAST_PART * longest, np.inf
+    while seen > TAKEN * longest**0.5 * largest(given) and e > SMALLEST * longest:
+        seen = keep_unseen(system, n, e)
+        e *= SMALLER
+    for k in range(x.shape[0]):
+        x[k] = given[k] - n[k]
+
+
+@compiled_inside
+def keep_unseen(system: System, n: Floats, e: float) -> float:
+    """Take from n what D^T sees, as far as a weight e does; the largest seen of the rest."""
+    x, before = system.x, np.inf
+    for k in range(x.shape[0]):
+        x[k] = e
     assemble(system.targets, system.contributions, system.D, system.K)
     regularise(system.nodes, x, system.K)
     for k in range(x.shape[0]):
@@ -109,8 +126,7 @@ def take_least(system: System) -> None:
         if not change < 0.5 * before:
             break
         before = change
-    for k in range(x.shape[0]):
-        x[k] = given[k] - n[k]
+    return e * largest(system.force)
 
 
 @compiled

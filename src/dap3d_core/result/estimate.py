@@ -20,6 +20,9 @@ U_ERROR = Column(
 PARTS = {"r": "m", "p": "1", "rd": "m/s", "w": "rad/s"}
 #: A state means nothing any more where its error is beyond this part of its size.
 MEANINGLESS = 1e-3
+#: Errors grow exponentially, and not with a power of time, where that line fits them better, over
+#: this many instants and this many powers of ten at least.
+FEWEST, DECADES = 10, 3.0
 #: Sizes below are taken for this one (SI), as in the measure of errors (docs/report.md).
 SMALLEST_SIZE = 1e-3
 
@@ -69,10 +72,37 @@ class ErrorEstimate:
 
         Sizes below 1e-3 (m, 1, m/s, rad/s) count as 1e-3. None where no error is.
         """
-        lost = np.zeros(len(self.t), dtype=bool)
-        for name, norms in self._norms().items():
-            lost |= norms > MEANINGLESS * max(self.size[name], SMALLEST_SIZE)
+        lost = self.relative > MEANINGLESS
         return float(self.t[np.argmax(lost)]) if lost.any() else None
+
+    @property
+    def relative(self) -> Floats:
+        """(nt,) the largest error at each instant, as a part of the size of what it belongs to."""
+        parts = [
+            norms / max(self.size[name], SMALLEST_SIZE) for name, norms in self._norms().items()
+        ]
+        found: Floats = np.max(parts, axis=0, initial=0.0)
+        return found
+
+    @property
+    def tenfold(self) -> float | None:
+        """The time, s, in which the error grows tenfold, where it grows exponentially, else None.
+
+        The slope of its logarithm over the instants before ``meaningless_from``; beyond, an error
+        is as large as the motion and grows no more. None as well where log(t) fits it better than
+        t: the errors of a motion that is no chaos grow with a power of time.
+        """
+        relative, end = self.relative, self.meaningless_from
+        chosen = (self.t > self.t[0]) & (relative > 0.0)
+        if end is not None:
+            chosen &= self.t < end
+        if np.count_nonzero(chosen) < FEWEST:
+            return None
+        elapsed, digits = self.t[chosen] - self.t[0], np.log10(relative[chosen])
+        slope, missed = _line(elapsed, digits)
+        if slope * elapsed[-1] < DECADES or missed >= _line(np.log10(elapsed), digits)[1]:
+            return None
+        return 1.0 / slope
 
     def _part(self, place: int) -> Floats:
         return split(self.u, self.u.shape[1] // 13)[place]
@@ -80,6 +110,13 @@ class ErrorEstimate:
     def _norms(self) -> dict[str, Floats]:
         """By symbol, (nt,) the largest error of a body's vector."""
         return largest_norms(self.u)
+
+
+def _line(x: Floats, y: Floats) -> tuple[float, float]:
+    """Slope of the straight line through points, and the sum of squares that it misses."""
+    dx, dy = x - x.mean(), y - y.mean()
+    slope = float(dx @ dy / (dx @ dx))
+    return slope, float(np.sum((dy - slope * dx) ** 2))
 
 
 def largest_norms(u: Floats) -> dict[str, Floats]:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.machine import Machine, Rows
 from dap3d_core.linear.rank import DENSE_ROWS, WEIGHT, Dependency, Rank, dense_rank, sparse_rank
 from dap3d_core.model import Model
-from dap3d_core.simulation.initial import TOLERANCE, finite_rows
+from dap3d_core.simulation.binding import Binding, bindings
+from dap3d_core.simulation.initial import FIT, finite_rows, model_size
 
 Floats = NDArray[np.float64]
 
@@ -19,9 +20,6 @@ Floats = NDArray[np.float64]
 CONSISTENT = 1e-8
 #: Velocities this far off the constraints say nothing of the acceleration level.
 MOVING_ALONG = 1e-6
-#: Singular values below this many times the residual of the positions count as zero: an opening of
-#: that size tilts rows that would depend on each other in an assembled pose.
-BLUR = 10.0
 #: Names that a paragraph lists.
 MOST_NAMES = 12
 
@@ -98,6 +96,8 @@ class Redundancy:
         contradiction: how much prescribed velocities of dependent rows disagree.
         groups: the same joints by what they share.
         contradictions: where redundant rows ask for different things; empty if they agree.
+        bindings: where redundant rows, besides, are nearly dependent on others and so lock a
+            motion that they hardly hold.
     """
 
     rank: Rank
@@ -105,6 +105,7 @@ class Redundancy:
     contradiction: float = 0.0
     groups: tuple[Shared, ...] = ()
     contradictions: tuple[Contradiction, ...] = ()
+    bindings: tuple[Binding, ...] = ()
     _model: Model | None = attrs.field(default=None, repr=False)
     _rows: Rows | None = attrs.field(default=None, repr=False)
 
@@ -185,7 +186,7 @@ class Redundancy:
         return [
             f"{some(c.joints)} contradict each other: {what[c.level]} {c.size:.3g}"
             for c in self.contradictions
-        ]
+        ] + [binding.words for binding in self.bindings]
 
 
 def some(names: Sequence[str], most: int = MOST_NAMES) -> str:
@@ -212,14 +213,19 @@ def redundancy_of(machine: Machine, u: Floats, t: float = 0.0) -> Redundancy:
         max((float(np.linalg.norm(_gap(d, rows.nu))) for d in rank.dependencies), default=0.0),
         _groups(model, rank.dependencies),
         tuple(_contradictions(model, rank.dependencies, rows, u)),
+        bindings(machine, rows, u, t) if rank.redundant else (),
         model,
         rows,
     )
 
 
 def rank_of(machine: Machine, rows: Rows) -> Rank:
-    """Rank of the rows that ``machine`` has just evaluated."""
-    model, blur = machine.model, BLUR * min(float(np.max(np.abs(rows.C))), TOLERANCE)
+    """Rank of the rows that ``machine`` has just evaluated.
+
+    Singular values below FIT count as zero: joints are put together to no more than that, and an
+    opening tilts rows that would depend on each other by as much.
+    """
+    model, blur = machine.model, FIT * min(1.0, model_size(machine))
     if model.row_count <= DENSE_ROWS:
         return dense_rank(rows.dense(), blur)
     system = machine.system

@@ -199,6 +199,8 @@ class Run:
             )
         if redundancy.contradictions:
             raise RedundantError(f"{words}. No motion satisfies them all")
+        if redundancy.bindings:
+            raise RedundantError(words)
         least = " (reported are those of least |lambda|)" if self.compiled.method == "lsq" else ""
         self.notes.append(
             f"{words}. Accelerations are unique; reactions in these joints are not{least}"

@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.result import INFORMATION, Result, estimated_error
+from dap3d_core.result.estimate import MEANINGLESS
 from dap3d_core.scene import SceneError, Simulation
 from dap3d_core.scene.settings import SMALLEST_RTOL
 from dap3d_core.simulation.errors import SimulationError
@@ -75,7 +76,7 @@ def add_error(
     steps = second.stats.steps
     result.arrays = result.arrays.with_error(estimated_error(result.u, second.u, steps))
     note = f"{INFORMATION}its error is estimated by a second run at {words} ({steps:,} steps)"
-    _amend(result, output, note)
+    _amend(result, output, note, *_lost(result))
 
 
 def _same_instants(result: Result, second: Result) -> bool:
@@ -98,8 +99,27 @@ def _words(settings: Any) -> str:
     return f"rtol {settings.rtol:g}, atol {settings.atol:g}"
 
 
-def _amend(result: Result, output: str | os.PathLike[str] | None, note: str) -> None:
-    """Add a note, and bring the file up to date."""
-    result.record = attrs.evolve(result.record, notes=(*result.notes, note))
+def _lost(result: Result) -> list[str]:
+    """A note on where the error has become as large as to leave the state no meaning."""
+    error = result.error
+    assert error is not None
+    if (when := error.meaningless_from) is None:
+        return []
+    note = (
+        f"from t = {when:.6g} s on the estimated error is beyond {MEANINGLESS:g} of the size of "
+        "the motion: what follows is not the motion of this scene, and its estimate no measure of "
+        "how far it is off"
+    )
+    if (tenfold := error.tenfold) is None:
+        return [f"{note}. A tighter rtol, or a shorter step, goes further"]
+    return [
+        f"{note}. Until then it grew exponentially, tenfold every {tenfold:.3g} s (chaos): an "
+        f"error of the steps ten times smaller holds about {tenfold:.3g} s longer"
+    ]
+
+
+def _amend(result: Result, output: str | os.PathLike[str] | None, *notes: str) -> None:
+    """Add notes, and bring the file up to date."""
+    result.record = attrs.evolve(result.record, notes=(*result.notes, *notes))
     if output is not None:
         result.save(output, force=True)
