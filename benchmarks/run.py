@@ -1,9 +1,9 @@
 """All benchmarks, as tables and as JSON.
 
-``make bench``, or ``python benchmarks/run.py [--only NAME ...] [-o FILE]``. scale_long, some
-minutes, and two_threads are run only when they are named. With ``--docs`` the figures of
-hard_cases, long_time, chaos, flips and hinges go to docs/hard-cases.md as well; ``--only hard`` is
-all of these.
+``make bench``, or ``python benchmarks/run.py [--only NAME ...] [-o FILE]``. scale_long and
+streaming, some minutes, and two_threads are run only when they are named. With ``--docs`` the
+figures of hard_cases, long_time, chaos, flips and hinges go to docs/hard-cases.md as well;
+``--only hard`` is all of these.
 """
 
 import argparse
@@ -29,13 +29,14 @@ import numpy
 import projection
 import right_hand_side
 import scale
+import streaming
 import two_threads
 import whole_runs
 from rich.console import Console
 from rich.table import Table
 
 #: What is run only when it is named.
-NAMED = ("scale_long", "two_threads")
+NAMED = ("scale_long", "two_threads", "streaming")
 #: Columns that a table has at most beside its first.
 COLUMNS = 8
 #: Columns that every table of one title has, and those of sentences, which stand below.
@@ -91,6 +92,7 @@ def main():
         "scale": scale.measure,
         "scale_long": scale.long_chain,
         "two_threads": two_threads.measure,
+        "streaming": streaming.measure,
         "hard_cases": hard.measure,
         "long_time": hard.long_time.measure,
         "chaos": hard.chaos.measure,

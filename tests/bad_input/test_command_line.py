@@ -77,7 +77,7 @@ REFUSED = [
     (("run", "fall.toml", "--dt", "nan"), "finite number"),
     (("run", "fall.toml", "--dt", "5"), "longer than the run"),
     (("run", "fall.toml", "--t-end", "1e12", "--dt", "1"), "9.69e+04 GiB"),
-    (("run", "fall.toml", "--dt", "1e-300"), "at most 5e+07 times are reported"),
+    (("run", "fall.toml", "--dt", "1e-50"), "at most 5e+07 times are reported"),
     (("run", "fall.toml", "--rtol", "0"), "at least 1e-14"),
     (("run", "fall.toml", "--rtol", "-1"), "at least 1e-14"),
     (("run", "fall.toml", "--rtol", "1e-20"), "at least 1e-14"),
@@ -86,7 +86,7 @@ REFUSED = [
     (("run", "fall.toml", "--atol", "-1"), "at least 0"),
     (("run", "fall.toml", "--atol", "inf"), "finite number"),
     (("run", "fall.toml", "--step", "0"), "greater than 0"),
-    (("run", "fall.toml", "--step", "1e-300"), "the rounding of time"),
+    (("run", "fall.toml", "--step", "1e-50"), "the rounding of time"),
     (("run", "fall.toml", "--integrator", "cvode"), '"dopri5", "dop853", "adams", "rk4", "radau"'),
     (("run", "fall.toml", "--integrator", "DOP853"), "did you mean 'dop853'"),
     (("run", "fall.toml", "--integrator", "rk4"), "rk4 does not choose its step"),
@@ -267,15 +267,6 @@ def test_an_absolute_tolerance_of_zero_is_noted(call):
     code, out, _ = call("run", "fall.toml", *QUIET, "--atol", "0", "--json")
     assert code == 0
     assert any("atol = 0" in note for note in json.loads(out)["notes"])
-
-
-def test_more_memory_than_the_machine_has_is_refused(call, monkeypatch):
-    from dap3d_core.scene import settings
-
-    monkeypatch.setattr(settings, "memory", lambda: 2**20)  # a machine with one MiB
-    code, _, err = call("run", "fall.toml", *QUIET, "--dt", "1e-6")
-    assert code == 2
-    assert "this machine has 0.000977 GiB" in " ".join(err.split())
 
 
 # ------------------------------------------------------------------ a package that is not there

@@ -151,7 +151,7 @@ def test_a_scene_without_joints_has_no_rows_and_its_springs_have_quantities(dap3
 def test_types_of_the_model_itself_are_loaded_only_when_allowed(dap3d, result, refuse):
     """A result does not say where they stand; the message says what to do."""
     words = refuse("post", "ball1.nc", "contact.force", "-o", "a.csv")
-    for part in ("ball-contact", "--model FOLDER --allow-code", "model=FOLDER and allow_code=True"):
+    for part in ("ball-contact", "--model FOLDER --allow-code", "model=FOLDER, allow_code=True"):
         assert part in words
     words = refuse("post", "ball1.nc", "contact.force", "-o", "a.csv", "--model", "ball1")
     assert "not run unless it is allowed" in words

@@ -169,6 +169,7 @@ ALLOWED = {
     ("kernels/written.py", "exec"): "loop modules",
     ("registry/loading.py", "exec"): "plugin.py, once it is allowed",
     ("testing/element.py", "exec"): "loop modules",
+    ("kernels/beside.py", "subprocess"): "Python itself, to compile beside",
     ("plot/encoding.py", "subprocess"): "ffmpeg, without a shell",
     ("simulation/checkpoint.py", "allow_pickle"): "switched off",
 }

@@ -13,9 +13,9 @@ from unit.test_result_files import same_bits
 import dap3d_core as dap
 from dap3d_core.kernels.cache import jit_is_on
 from dap3d_core.scene import SceneError
+from dap3d_core.simulation import CheckpointError
 from dap3d_core.simulation.checkpoint import (
     Checkpoint,
-    CheckpointError,
     path_of,
     read_checkpoint,
     write_checkpoint,
@@ -48,6 +48,16 @@ def stone():
     return scene
 
 
+def driven():
+    """A crank that is turned by a step of 1 rad between 0.3 and 0.5 s: two steps end there."""
+    scene = dap.Scene(name="driven")
+    scene.add_body("crank", mass=1.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_joint("rev", "axle", P_i="crank.O", P_j="ground.O", a_i="crank.z", a_j="ground.z")
+    scene.add_function("b", "turn", x_start=0.3, x_end=0.5, f_start=0.0, f_end=1.0)
+    scene.add_joint("drive-rot", "motor", body_i="crank", a_j="ground.z", function="turn")
+    return scene
+
+
 def stiffer():
     """New events each time: an event may keep what it has seen."""
     return [
@@ -71,6 +81,7 @@ CASES = {
     "a singular pose": (lambda: dap.load("A02-1"), {"t_end": 1.0, "dt": 0.1}, 0.5),
     "turns and friction": (wheel, {"t_end": 1.5, "dt": 0.05}, 0.7),
     "stiff": (lambda: dap.load("A05"), {"integrator": "auto", "t_end": 0.3, "dt": 0.01}, 0.02),
+    "a function's breaks": (driven, {}, 0.4),
     "events": (stone, {"t_end": 2.0, "dt": 0.05, "events": stiffer}, 0.35),
 }
 SLOW_IN_PYTHON = ("radau", "stiff", "penalty", "lsq", "a singular pose", "adams", "no projection")

@@ -519,13 +519,13 @@ def test_a_compiled_model_says_what_it_is():
         assert words in text
 
 
-def test_a_run_that_blows_up_within_a_step_names_the_body_that_went():
+def test_a_run_that_blows_up_within_a_step_names_the_joint_that_did_it():
     """All is finite at the last state of a link that is drawn through its other end."""
     scene = dap.Scene(name="link through its own point")
     scene.add_body("idle", mass=1.0, Jp=(1.0, 1.0, 1.0))
     scene.add_body("bob", mass=1.0, Jp=(1.0, 1.0, 1.0), r=(0.5, 0.0, 0.0), r_dot=(-1.0, 0.0, 0.0))
     scene.add_joint("sph-sph", P_i="bob.O", P_j="ground.O", length=0.25)
-    with pytest.raises(dap.SimulationError, match="body bob is the fastest there, with up to"):
+    with pytest.raises(dap.SimulationError, match=r"joint sph-sph1 .*is beyond 1e\+100"):
         dap.simulate(
             scene, t_end=2.0, integrator="rk4", step=0.01, correct=False, project=False
         )  # assembled and projected, the link would be as long as it is

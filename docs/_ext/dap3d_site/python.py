@@ -12,8 +12,9 @@ SECTIONS = {
          "matlab.ImportReport"),
     ),
     "Runs": (
-        ("simulate", "compile", "Event"),
-        ("simulation.CompiledModel", "simulation.Instant", "simulation.Standing"),
+        ("simulate", "compile", "Event", "resume", "rerun"),
+        ("simulation.CompiledModel", "simulation.Instant", "simulation.Standing",
+         "simulation.Repetition"),
     ),
     "Results": (
         ("Result", "open", "plot", "view", "animate"),
@@ -28,7 +29,7 @@ SECTIONS = {
     "Types": (("load_registry",), ("registry.Registry", "registry.PluginInfo")),
     "Errors": (
         ("SceneError", "PluginError", "SimulationError", "AssemblyError", "RedundantError"),
-        ("registry.UnknownTypeError", "result.UnknownNameError"),
+        ("registry.UnknownTypeError", "result.UnknownNameError", "simulation.CheckpointError"),
     ),
 }  # fmt: skip
 

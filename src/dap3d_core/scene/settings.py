@@ -1,6 +1,5 @@
 """The settings of a run: [simulation] of a scene file, or what a script or command line gives."""
 
-import os
 from collections.abc import Callable, Collection
 from typing import Any
 
@@ -110,31 +109,16 @@ def _span_mistakes(
         return []
     if dt > t_end:
         fault = Fault(f"the reporting step is longer than the run (t_end = {t_end:g})")
-    else:
-        rows, numbers, there = t_end / dt, 13 * max(body_count, 1), memory()
-        needed = 8 * numbers * rows
-        words = (
+    elif t_end / dt > MOST_ROWS:
+        rows, numbers = t_end / dt, 13 * max(body_count, 1)
+        fault = Fault(
             f"t_end / dt asks for {rows:.3g} reported times of {numbers} numbers or more, "
-            f"{needed / 2**30:.3g} GiB"
+            f"{8 * numbers * rows / 2**30:.3g} GiB; at most {MOST_ROWS:g} times are reported",
+            f"give dt of at least {t_end / MOST_ROWS:.3g}",
         )
-        if rows > MOST_ROWS:
-            least = t_end / MOST_ROWS
-            words += f"; at most {MOST_ROWS:g} times are reported"
-        elif there and needed > there:
-            least = dt * needed / there
-            words += f", and this machine has {there / 2**30:.3g} GiB"
-        else:
-            return []
-        fault = Fault(words, f"give dt of at least {least:.3g}")
+    else:
+        return []
     return [_mistake((*key, "dt"), simulation.dt, fault)]
-
-
-def memory() -> int:
-    """Bytes of memory that this machine has; 0 where it does not tell."""
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):  # no POSIX
-        return 0
 
 
 def _hold_mistakes(hold: Any, body_names: Collection[str], key: Key) -> list[tuple[Key, Mistake]]:

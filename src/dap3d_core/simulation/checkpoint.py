@@ -16,8 +16,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.result import ResultError, current_versions
+from dap3d_core.result import current_versions
 from dap3d_core.result.files import cannot, whole_file
+from dap3d_core.simulation.errors import CheckpointError
 
 #: Version of this layout, raised when an older reader would misread it.
 FORMAT = 1
@@ -36,10 +37,6 @@ _HEADER = "checkpoint.json"
 _ZIP = b"PK\x03\x04"
 #: A header with the scene's text is larger than a scene may be, but not by much.
 _LARGEST_HEADER = 2**28
-
-
-class CheckpointError(ResultError):
-    """A checkpoint that cannot be read, or a run that cannot go on from it; says what to do."""
 
 
 @attrs.frozen(eq=False)

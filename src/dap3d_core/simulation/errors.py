@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
+from dap3d_core.result import ResultError
+
 
 class SimulationError(Exception):
     """A run could not start or go on; ``result`` is what was computed until then, or None."""
@@ -26,3 +28,7 @@ class AssemblyError(SimulationError):
     def __init__(self, message: str, joints: Sequence[str] = ()) -> None:
         super().__init__(message)
         self.joints = tuple(joints)
+
+
+class CheckpointError(ResultError):
+    """A checkpoint that cannot be read, or a run that cannot go on from it; says what to do."""

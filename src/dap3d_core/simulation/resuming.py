@@ -15,11 +15,11 @@ from dap3d_core.scene import SceneError, Simulation, load, parse
 from dap3d_core.simulation.asked import check_checkpoint
 from dap3d_core.simulation.checkpoint import (
     Checkpoint,
-    CheckpointError,
     path_of,
     read_checkpoint,
 )
 from dap3d_core.simulation.compiled import CompiledModel
+from dap3d_core.simulation.errors import CheckpointError
 from dap3d_core.simulation.event import Event
 from dap3d_core.simulation.opening import why_unmade
 from dap3d_core.simulation.run import Progress, Run
