@@ -38,6 +38,7 @@ def test_a_film(dap3d, runs):
     assert (found["file"], found["frames"], found["width"]) == ("a.png", 1, 640)
 
 
+@pytest.mark.slow
 def test_a_run_at_t_0_alone_gives_a_snapshot(dap3d):
     dap.simulate("fourbar3", t_end=0.0).save(dap3d.folder / "a.nc")
     done = dap3d("animate", "a.nc")
@@ -64,6 +65,7 @@ def test_what_cannot_be_animated_is_refused(refuse, dap3d, runs, monkeypatch):
     assert (dap3d.folder / "there.gif").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_no_file(dap3d, runs):
     process = dap3d.start("animate", "pen1.nc", "--speed", "0.005", "--fps", "50", "-o", "a.gif")
     part = dap3d.folder / "a.gif.part"

@@ -81,6 +81,7 @@ def test_check_names_joints_that_contradict_each_other(dap3d):
     assert "first sph 1 1" in " ".join(done.stdout.split())
 
 
+@pytest.mark.slow
 def test_check_prints_all_mistakes_as_json(dap3d, scene_file):
     scene_file(("mass = 2.0", "mass = -2.0"), ("dt = 0.01", "dt = 0.01\nrtoll = 1e-6"))
     refused = dap3d("check", "fall.toml", "--json")
@@ -100,6 +101,7 @@ def test_check_of_what_is_no_scene(dap3d, refuse):
     assert "did you mean" in refuse("check", "pen9")
 
 
+@pytest.mark.slow
 def test_models_and_plugins_are_listed(dap3d):
     shown = dap3d("models")
     listed = json.loads(dap3d("models", "--json").stdout)["models"]
@@ -126,6 +128,7 @@ def test_a_model_of_a_group_runs_with_and_without_it(dap3d):
         (dap3d.folder / "N1.nc").unlink()
 
 
+@pytest.mark.slow
 def test_a_blocked_type_is_listed_with_the_reason(dap3d):
     done = dap3d("plugins", DAP3D_BLOCK="dap3d")
     assert done.returncode == 0
@@ -161,6 +164,7 @@ def result(dap3d, run_file):
     return dap.open(run_file)
 
 
+@pytest.mark.slow
 def test_info_says_what_a_file_holds(dap3d, result):
     found = json.loads(dap3d("info", "pen1.nc", "--json").stdout)
     assert (found["status"], found["instants"], found["t_end"]) == ("done", 6, 0.1)
@@ -198,6 +202,7 @@ def test_results_that_cannot_be_read_or_drawn_are_refused(refuse, dap3d, result)
     assert (dap3d.folder / "there.png").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_check_tells_that_joints_cannot_be_assembled(dap3d, scene_file):
     scene_file(("[simulation]", '[points.P]\nbody = "ground"\nsPp = [0.0, 0.0, 1.0]\n'
                 '[joints.J]\ntype = "sph"\nP_i = "stone.O"\nP_j = "ground.O"\n'

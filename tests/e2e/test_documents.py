@@ -244,6 +244,7 @@ def test_every_decision_and_document_that_is_named_exists():
             )
 
 
+@pytest.mark.slow
 def test_the_commands_on_the_pages_of_the_models_are_there():
     """Every ``dap3d`` command that a model's page shows exists and takes the options shown."""
     for page in (scene.with_name("README.md") for scene in REPOSITORY.glob("models/**/scene.toml")):

@@ -5,11 +5,13 @@ import sys
 import time
 
 import numpy as np
+import pytest
 from support.process import environment
 
 import dap3d_core as dap
 
 
+@pytest.mark.slow
 def test_a_killed_run_leaves_a_readable_part(tmp_path):
     """SIGKILL in the middle: NAME.part opens, its rows are whole and start at t = 0."""
     command = [

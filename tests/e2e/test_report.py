@@ -36,6 +36,7 @@ def test_a_report_with_table_files_and_a_setting_that_can_be_run(dap3d):
     assert json.loads(again.stdout)["rhs"] == found["recommended"]["run"]["rhs"]
 
 
+@pytest.mark.slow
 def test_json_is_one_object_with_the_runs_and_nothing_else(dap3d):
     done = dap3d("report", "pen1", *QUICK, "--integrator", "dop853", "--integrator", "rk4",
                  "--method", "standard", "--json")  # fmt: skip

@@ -58,12 +58,14 @@ def test_the_corrected_initial_conditions_are_reported(dap3d):
     assert "corrected initial" not in again.stdout
 
 
+@pytest.mark.slow
 def test_the_end_may_be_zero(dap3d):
     done = dap3d("run", "pen1", "--t-end", "0", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["instants"] == 1
 
 
+@pytest.mark.slow
 def test_quiet_prints_nothing(dap3d):
     done = dap3d("run", "pen1", "--t-end", "0.1", "--quiet")
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
@@ -105,6 +107,7 @@ def test_the_metric_of_the_correction_can_be_chosen(dap3d):
     assert dap3d("run", "rough.toml", "--correct-metric", "energy").returncode == 2
 
 
+@pytest.mark.slow
 def test_output_that_exists_is_refused_before_running(dap3d):
     (dap3d.folder / "pen1.nc").write_text("mine")
     refused = dap3d("run", "pen1", "--t-end", "0.1")
@@ -165,6 +168,7 @@ def test_usage_errors(refuse, arguments, words):
     assert words in refuse(*arguments)
 
 
+@pytest.mark.slow
 def test_mistakes_of_a_scene_are_all_told_with_place_and_remedy(dap3d, scene_file):
     scene_file(("mass = 2.0", "mas = 2.0"), ('type = "weight"', 'type = "wieght"'))
     refused = dap3d("run", "fall.toml")
@@ -181,6 +185,7 @@ def test_mistakes_of_a_scene_are_all_told_with_place_and_remedy(dap3d, scene_fil
     assert (found["mistakes"][0]["line"], found["mistakes"][0]["nearest"]) == (5, "mass")
 
 
+@pytest.mark.slow
 def test_a_missing_point_and_a_missing_file(dap3d, scene_file):
     scene_file(("[simulation]", '[joints.J]\ntype = "sph"\nP_i = "tip"\nP_j = "ground.O"\n'
                                 "[simulation]"))  # fmt: skip
@@ -201,6 +206,7 @@ def test_file_names_of_any_kind(dap3d, scene_file):
         assert (dap3d.folder / f"{name.removesuffix('.toml')}.nc").is_file()
 
 
+@pytest.mark.slow
 def test_a_run_that_cannot_be_assembled_leaves_nothing(dap3d, scene_file):
     scene_file(("[simulation]", '[points.P]\nbody = "ground"\nsPp = [0.0, 0.0, 1.0]\n'
                 '[joints.J]\ntype = "sph"\nP_i = "stone.O"\nP_j = "ground.O"\n'

@@ -76,6 +76,7 @@ def _stop(dap3d, number):
     return process.returncode, out, "".join(lines) + err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "code", "status"),
     [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 3, "stopped")],

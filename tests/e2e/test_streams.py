@@ -7,6 +7,7 @@ import pytest
 from tests.e2e.conftest import COMMAND, environment
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "code"),
     [

@@ -72,11 +72,13 @@ def test_a_run_fits_a_narrow_terminal(dap3d):
     assert "\x1b[" in shown
 
 
+@pytest.mark.slow
 def test_no_color_is_respected(dap3d):
     _, shown = in_terminal(dap3d, 80, "run", "pen1", "--t-end", "0.1", NO_COLOR="1")
     assert not re.search(r"\x1b\[[0-9;]*(3[0-7]|38;)", shown)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [

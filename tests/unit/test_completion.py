@@ -82,6 +82,7 @@ def offered(folder, *words):
     return [tuple(item.split(",", 1)) for item in done.stdout.splitlines()]
 
 
+@pytest.mark.slow
 @in_another_process
 def test_a_shell_is_told(folder):
     assert offered(folder, "plot", "a.nc", "bob.r.") == [

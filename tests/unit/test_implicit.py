@@ -255,6 +255,7 @@ def test_a_fixed_step_without_stages_stops_the_run():
         dap.simulate(problems.chain(2), t_end=50.0, dt=25.0, step=25.0, integrator="radau")
 
 
+@pytest.mark.slow
 @in_another_process
 def test_other_integrators_load_nothing_of_it():
     """Who does not choose radau neither imports nor compiles it."""

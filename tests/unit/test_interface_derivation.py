@@ -244,6 +244,7 @@ print("sympy" in sys.modules)
 """
 
 
+@pytest.mark.slow
 @in_another_process
 def test_sympy_is_imported_for_the_first_derivation_alone(tmp_path):
     """Types with their own formulas never need it, derived ones not when they are in the cache."""
@@ -263,6 +264,7 @@ print(*(text for text in texts if "spindle" in text))
 """
 
 
+@pytest.mark.slow
 @in_another_process
 def test_a_derivation_does_not_depend_on_what_was_before(tmp_path):
     """The same text alone, after others, and with other hashes: so runs repeat to the last bit."""

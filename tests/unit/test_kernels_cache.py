@@ -92,6 +92,7 @@ def test_two_processes_race_on_an_empty_cache(tmp_path):
     assert run(EVALUATE, cache, cwd=tmp_path) == "6.5 0"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", ["through a file", "nowhere"])
 def test_a_cache_that_cannot_be_written_does_no_harm(tmp_path, where):
     """Without a folder to write to the code is compiled for this process alone."""

@@ -159,6 +159,7 @@ def test_without_a_display_there_is_no_window(result):
         show_plot(result, "bob.r")
 
 
+@pytest.mark.slow
 @in_another_process
 def test_a_window_shows_the_figure(tmp_path):
     """With a way to show windows that only says what it would show."""
@@ -302,6 +303,7 @@ def test_names_are_shown_as_they_are(tmp_path, name):
     save_plot(result, f"{name}.r", tmp_path / "a.png")
 
 
+@pytest.mark.slow
 @in_another_process
 def test_saving_needs_no_window_and_the_module_can_be_called(tmp_path):
     """pyplot, which opens windows, stays out; dap3d_core.plot(...) works with the module loaded."""

@@ -107,6 +107,7 @@ print(seal.hexdigest())
 """
 
 
+@pytest.mark.slow
 def test_processes_give_equal_arrays_whatever_else_runs():
     """Another seed of hashes, another thread at work, four processes at once."""
     script = DIGEST.replace("{integrator!r}", "'dop853'")

@@ -116,6 +116,7 @@ def test_adding_rows_changes_nothing_but_their_places(tmp_path):
     assert bytes(after) == bytes(before)
 
 
+@pytest.mark.slow
 @in_another_process
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 def test_a_killed_run_leaves_a_readable_file(tmp_path):

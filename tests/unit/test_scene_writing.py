@@ -85,6 +85,7 @@ def test_a_scene_that_was_written_is_read_back_bit_for_bit(scene):
     assert again.to_toml() == scene.to_toml()
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(scenes(good=False))
 def test_even_a_scene_of_nonsense_is_written_without_loss(scene):

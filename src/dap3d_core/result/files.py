@@ -2,6 +2,7 @@
 
 import errno
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -30,11 +31,12 @@ def check_target(path: str | os.PathLike[str], force: bool = False) -> Path:
     """
     target = Path(path)
     try:
-        if target.is_file():
+        mode = _mode_of(target)  # asked once: another process may make it meanwhile
+        if mode and stat.S_ISREG(mode):
             fault = "" if force else "the file exists; force overwrites it"
-        elif target.is_dir():
+        elif mode and stat.S_ISDIR(mode):
             fault = "it is a folder; name a file in it"
-        elif target.exists():
+        elif mode:
             fault = "it is no regular file"
         elif target.is_symlink():
             fault = "" if force else "it is a link that leads nowhere; force replaces it"
@@ -47,6 +49,14 @@ def check_target(path: str | os.PathLike[str], force: bool = False) -> Path:
     if fault:
         raise ResultError(f"cannot write {target}: {fault}")
     return target
+
+
+def _mode_of(path: Path) -> int:
+    """What there is at a path, as ``stat`` has it; 0 where there is nothing."""
+    try:
+        return path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return 0
 
 
 def reserve(target: Path) -> Path:
