@@ -52,6 +52,7 @@ from dap3d_core.integrators.work import (
     SAMPLE,
     SIDE,
     SINCE,
+    STALLS,
     STATUS,
     STEP,
     STEPS,
@@ -75,6 +76,9 @@ SHORT = 1e-9
 DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-8
 #: The least part of the way to a crossing that is left for the next step, and the greatest.
 SPARE, MOST_SPARE = 1e-4, 0.05
+#: A crossing may lie nearer than the rounding of what the switch is the difference of: the Euler
+#: step that is to reach it is doubled, so often at most.
+MOST_STALLS = 20
 #: Attempts in a row that may be cut because a cubic, and no sample, tells of two crossings.
 SUSPICIONS = 8
 #: A switch that changes its sign more often than this while time goes on by less than this part of
@@ -102,6 +106,7 @@ def next_length(
                 return 0.0
         h = reach(work, h)
     short = max(SHORT * usual_step(work), 4.0 * FLOOR * span(work))
+    short *= 2.0 ** min(integer[STALLS], MOST_STALLS)
     if h > short or h == end - real[T]:
         return h
     h = min(min(longest, 2.0 * short), work.times[integer[NEXT]] - real[T])
@@ -288,12 +293,16 @@ def settle(work: Work, h: float, longest: float, end: float) -> None:
         integer[GAP_STEP] -= 1
     if integer[SWITCHES] == 0:
         return
+    stalled = 0
     for k in range(s.shape[1]):
+        stands = (integer[CUTS] > 0) & (s[FOUND, k] == s[VALUE, k])
+        stalled |= stands & (s[SIDE, k] * s[RATE, k] < 0.0)
         s[BEND, k] = (s[FOUND_RATE, k] - s[RATE, k]) / h
         s[VALUE, k], s[RATE, k] = s[FOUND, k], s[FOUND_RATE, k]
         if s[SIDE, k] == 0.0:
             s[SIDE, k] = np.sign(s[FOUND, k])
     real[CUT], integer[CUTS] = np.inf, 0
+    integer[STALLS] = integer[STALLS] + 1 if stalled else 0
 
 
 @compiled_inside
@@ -333,6 +342,7 @@ def creep(
         integer[GAP_STEP] += 1
     integer[FRESH] = integer[LOOKED] = integer[CUTS] = 0
     real[CUT] = np.inf
+    integer[STALLS] = 0 if crossed or integer[STALLS] == 0 else integer[STALLS] + 1
     for k in range(s.shape[1]):
         if s[VALUE, k] == 0.0 and s[FOUND, k] == 0.0:
             s[SIDE, k] = 0.0  # it stays zero: it has no side until it leaves

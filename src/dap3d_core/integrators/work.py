@@ -56,8 +56,9 @@ STEPS, REJECTED, RHS, PROJECTIONS, REPORTS, POOR = range(15, 21)
 # to blame; how often a switch has changed its sign.
 SWITCHES, LOOKED, CUTS, ENDING, CULPRIT, CROSSINGS = range(21, 27)
 # LATE_STAGE: see Method; whether the run ends where the scene becomes stiff; steps that looked so,
-# and those in a row that did not since (stiffness.py).
-LATE_STAGE, LEAVE, STIFF_STEPS, CALM_STEPS, INTEGERS = range(27, 32)
+# and those in a row that did not since (stiffness.py). STALLS: steps in a row towards a crossing,
+# so short that the switch did not change by a bit.
+LATE_STAGE, LEAVE, STIFF_STEPS, CALM_STEPS, STALLS, INTEGERS = range(27, 33)
 # Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch.
 Y, TRIAL, SCRATCH, OTHER, STATES = range(5)
 # Rows of ``switches``: value, side (the sign that it keeps; 0: none yet), rate and bend (change of
