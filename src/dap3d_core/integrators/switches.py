@@ -76,8 +76,7 @@ SHORT = 1e-9
 DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-8
 #: The least part of the way to a crossing that is left for the next step, and the greatest.
 SPARE, MOST_SPARE = 1e-4, 0.05
-#: A crossing may lie nearer than the rounding of what the switch is the difference of: the Euler
-#: step that is to reach it is doubled, so often at most.
+#: How often an Euler step towards a crossing that is nearer than rounding is doubled at most.
 MOST_STALLS = 20
 #: Attempts in a row that may be cut because a cubic, and no sample, tells of two crossings.
 SUSPICIONS = 8

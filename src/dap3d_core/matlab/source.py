@@ -1,7 +1,9 @@
 """A MATLAB file as a tree. The grammar is that of tree-sitter-matlab; nothing is ever run."""
 
 import os
+import re
 import stat
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +19,11 @@ if TYPE_CHECKING:
 LARGEST_FILE = 2**20
 #: Files of fewer bytes are parsed in a second, whatever they hold; others may take so long, s.
 QUICK, PARSING = 8192, 10.0
+#: Names joined by dots, at most: of more the parser takes memory with the square of their number.
+CHAIN = 100
+_LONG_CHAIN = re.compile(rf"(?:[^\W\d]\w*+\s*+\.\s*+){{{CHAIN}}}")
+#: So much more memory a parser may take, bytes.
+MEMORY = 2**29
 #: Comments of many lines, %{ to %}, at most.
 BLOCKS = 500
 #: Errors of syntax that are reported of one file: the first ones explain the others.
@@ -150,6 +157,8 @@ class Grammar:
         data = text.encode("utf-8")
         if data.count(b"%{") > BLOCKS:  # one within the other, they are looked for again and again
             raise refused(source.path, f"holds more than {BLOCKS} comments of many lines")
+        if _LONG_CHAIN.search(text):
+            raise refused(source.path, f"joins more than {CHAIN} names by dots")
         if len(data) > QUICK:
             self._try(data, source.path)
         root: Node = self._parser.parse(data).root_node
@@ -157,16 +166,27 @@ class Grammar:
 
     def _try(self, data: bytes, path: Path) -> None:
         """Parse in pieces, which can be given up, unlike parsing a text as a whole."""
-        end = time.process_time() + PARSING
+        end, most = time.process_time() + PARSING, _peak() + MEMORY
         try:
             self._parser.parse(
                 lambda at, _: data[at : at + QUICK],
-                progress_callback=lambda *_: time.process_time() > end,
+                progress_callback=lambda *_: time.process_time() > end or _peak() > most,
             )
         except ValueError:
             self._parser.reset()
-            what = f"is no model: finding its statements takes more than {PARSING:g} s"
+            took = f"{PARSING:g} s" if _peak() <= most else f"{MEMORY >> 20} MiB"
+            what = f"is no model: finding its statements takes more than {took}"
             raise refused(path, what) from None
+
+
+def _peak() -> int:
+    """Bytes of memory that this process has had at most; 0 where the system does not tell."""
+    try:
+        import resource
+    except ImportError:  # no POSIX
+        return 0
+    found = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return found if sys.platform == "darwin" else 1024 * found
 
 
 def syntax_mistakes(source: Source, root: "Node") -> list[Mistake]:
