@@ -27,7 +27,7 @@ from dap3d_core.simulation.checkpoint import read_checkpoint
 
 import_module("dap3d_core.simulation.run").CHUNK_SECONDS = 1e-3
 import_module("dap3d_core.simulation.keeping").SHORT_SECONDS = 0.05
-SETTINGS = {"t_end": 40.0, "dt": 0.02}
+SETTINGS = {"t_end": 15.0, "dt": 0.02}
 compiled = dap.compile("pen1")
 whole = dap.simulate(compiled, **SETTINGS)
 random.seed(20)
@@ -114,7 +114,7 @@ def test_killed_at_fifty_moments_a_run_leaves_what_it_had(tmp_path):
 @pytest.mark.slow
 def test_a_run_is_terminated_resumed_and_made_again(dap3d):
     """By the command line: the file is that of a run that was not ended, but for its notes."""
-    settings = ("pen1", "--t-end", "4000", "--dt", "1")
+    settings = ("pen1", "--t-end", "16000", "--dt", "1")
     process = dap3d.start("run", *settings, "--checkpoint", "1s")
     for line in process.stderr:
         if "left" in line:
@@ -134,7 +134,7 @@ def test_a_run_is_terminated_resumed_and_made_again(dap3d):
     assert one.u.tobytes() == other.u.tobytes()
     again = dap3d("rerun", "pen1.nc")
     assert again.returncode == 0
-    assert "equal bit for bit; 4,001 instants compared" in again.stdout
+    assert "equal bit for bit; 16,001 instants compared" in again.stdout
 
 
 def test_rerun_says_what_differs(dap3d, monkeypatch, capfd):

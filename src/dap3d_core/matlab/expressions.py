@@ -99,8 +99,14 @@ class Expressions:
             self._depth -= 1
         self._entries += found.size if isinstance(found, np.ndarray) else _length(found)
         if self._entries > MOST_ENTRIES:
-            raise RefusalError(node, f"more than {MOST_ENTRIES} entries of arrays in one file")
+            words = f"more than {MOST_ENTRIES} entries of arrays in one file"
+            raise RefusalError(node, f"{words}; what follows is not read")
         return found
+
+    @property
+    def are_spent(self) -> bool:
+        """Whether the file has used up what one file may."""
+        return self._entries > MOST_ENTRIES
 
     def _number(self, node: "Node") -> Numbers:
         text = text_of(node)

@@ -89,6 +89,8 @@ class _Follower:
                 self._refuse(statement, f"{words}; what follows is not read")
                 break
             self._statement(statement)
+            if self.expressions.are_spent:
+                break
 
     def _statement(self, node: "Node") -> None:
         try:

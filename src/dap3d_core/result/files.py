@@ -3,7 +3,7 @@
 import errno
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -59,7 +59,7 @@ def _mode_of(path: Path) -> int:
         return 0
 
 
-def reserve(target: Path) -> Path:
+def reserve(target: Path, kind: str = "part") -> Path:
     """Make an empty file beside the target, ``NAME.part`` or the first of its kind that is free.
 
     An unfinished file of an earlier run that was killed is left as it is.
@@ -67,10 +67,27 @@ def reserve(target: Path) -> Path:
     Raises:
         ResultError: the folder cannot be written to.
     """
+
+    def make(part: Path) -> None:
+        os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+
+    return _first_free(target, kind, make)
+
+
+def named_part(file: Path, target: Path) -> Path:
+    """Give a file beside the target, which may be open, the name ``NAME.part``, or the like.
+
+    Raises:
+        ResultError: the system refuses.
+    """
+    return _first_free(target, "part", lambda part: _name_if_free(file, part))
+
+
+def _first_free(target: Path, kind: str, take: Callable[[Path], None]) -> Path:
     for k in range(1, _MOST_PARTS):
-        part = target.with_name(f"{target.name}.part{k if k > 1 else ''}")
+        part = target.with_name(f"{target.name}.{kind}{k if k > 1 else ''}")
         try:
-            os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+            take(part)
         except FileExistsError:
             continue
         except (OSError, ValueError) as error:
@@ -119,7 +136,8 @@ def _name_if_free(part: Path, target: Path) -> None:
     except FileExistsError:
         raise
     except OSError:  # a file system without links
-        check_target(target)
+        if target.exists():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)) from None
         os.replace(part, target)
     else:
         part.unlink()

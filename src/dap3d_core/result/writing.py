@@ -11,7 +11,7 @@ import attrs
 
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.errors import ResultError
-from dap3d_core.result.files import check_target, reserve, synchronise, whole_file
+from dap3d_core.result.files import check_target, named_part, reserve, synchronise, whole_file
 from dap3d_core.result.layout import define, write_rows, write_times
 from dap3d_core.result.netcdf import NETCDF, guarded
 from dap3d_core.result.record import RUNNING, Record
@@ -80,7 +80,7 @@ class ResultWriter:
             ResultError: the file cannot be written, or exists and ``force`` is off.
         """
         self.path = check_target(path, force)
-        self.part = reserve(self.path)
+        self.part = reserve(self.path, "new")  # killed now it leaves nothing that is half a part
         self.count = 0
         self._dataset: Any = None
         started = attrs.evolve(record, status=RUNNING)
@@ -88,6 +88,7 @@ class ResultWriter:
             with NETCDF:
                 self._dataset = guarded(self.path, lambda: _create(self.part))
                 self._do(lambda: define(self._dataset, subject, started, most), self._sync)
+            self.part = named_part(self.part, self.path)
         except BaseException:
             self.discard()
             raise
