@@ -5,6 +5,7 @@ import inspect
 import json
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.machine import Machine
 from dap3d_core.kernels.cache import driver_digest
-from dap3d_core.result import ResultError
+from dap3d_core.result import ResultError, open_result
 from dap3d_core.result.record import to_json
 from dap3d_core.simulation.checkpoint import Checkpoint, path_of, write_checkpoint
 
@@ -83,7 +84,14 @@ class Saver:
         write_checkpoint(self.path, checkpoint_of(self._run))
 
     def remove(self) -> None:
-        """The run has ended by itself: nothing goes on from here."""
+        """The run has ended by itself: nothing goes on from here. The checkpoint goes last."""
+        keeper = self._run.keeper
+        assert keeper is not None
+        assert keeper.output is not None
+        for part in keeper.output.parent.glob(f"{keeper.output.name}.part*"):
+            with suppress(ResultError):
+                if open_result(part).record.run == keeper.run:
+                    part.unlink()
         self.path.unlink(missing_ok=True)
 
 
