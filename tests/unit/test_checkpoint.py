@@ -396,3 +396,5 @@ def test_another_output_leaves_what_there_is(copied):
     with pytest.raises(OSError, match="the file exists"):
         dap.resume(copied, output=other)
     assert same_bits(dap.resume(copied, output=other, force=True), whole)
+    assert sorted(f.name for f in copied.parent.iterdir()) == ["other.nc", "run.nc"]
+    assert dap.open(copied.with_name("run.nc")).status == "stopped"

@@ -23,6 +23,23 @@ def cannot(verb: str, path: Path, error: BaseException) -> ResultError:
     return ResultError(f"cannot {verb} {path}: {reason}")
 
 
+def beginning(file: Path, count: int) -> bytes:
+    """The first bytes of a file, as many as there are of them.
+
+    Raises:
+        ResultError: there is no such file, it is a folder, or the system refuses.
+    """
+    try:
+        with file.open("rb") as stream:
+            return stream.read(count)
+    except FileNotFoundError as error:
+        raise ResultError(f"cannot read {file}: there is no such file") from error
+    except IsADirectoryError as error:
+        raise ResultError(f"cannot read {file}: it is a folder; name a file in it") from error
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise cannot("read", file, error) from error
+
+
 def check_target(path: str | os.PathLike[str], force: bool = False) -> Path:
     """The path of a file that may be written.
 

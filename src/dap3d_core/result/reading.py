@@ -11,7 +11,7 @@ import numpy as np
 
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.errors import ResultError
-from dap3d_core.result.files import cannot
+from dap3d_core.result.files import beginning
 from dap3d_core.result.layout import CONSTANTS, CONVENTIONS, FORMAT, record_of
 from dap3d_core.result.limits import check_attributes, check_claims, check_subject
 from dap3d_core.result.netcdf import NETCDF
@@ -84,15 +84,7 @@ def arrays_in(path: Path, subject: Subject, count: int) -> FileArrays:
 
 
 def _check_signature(file: Path) -> None:
-    try:
-        with file.open("rb") as stream:
-            begin = stream.read(len(_HDF5))
-    except FileNotFoundError as error:
-        raise ResultError(f"cannot read {file}: there is no such file") from error
-    except IsADirectoryError as error:
-        raise ResultError(f"cannot read {file}: it is a folder, not a result file") from error
-    except (OSError, ValueError) as error:
-        raise cannot("read", file, error) from error
+    begin = beginning(file, len(_HDF5))
     if begin != _HDF5:
         fault = "the file is empty" if not begin else "it is not a NetCDF-4 file"
         raise ResultError(f"cannot read {file}: {fault}, so no result of dap3d")

@@ -16,8 +16,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.result import current_versions
-from dap3d_core.result.files import cannot, whole_file
+from dap3d_core.result import ResultError, current_versions
+from dap3d_core.result.files import beginning, cannot, whole_file
 from dap3d_core.simulation.errors import CheckpointError
 
 #: Version of this layout, raised when an older reader would misread it.
@@ -124,14 +124,9 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[Any]:
 
 def _check_signature(file: Path) -> None:
     try:
-        with file.open("rb") as stream:
-            begin = stream.read(len(_ZIP))
-    except FileNotFoundError as error:
-        raise CheckpointError(f"cannot read {file}: there is no such file") from error
-    except IsADirectoryError as error:
-        raise CheckpointError(f"cannot read {file}: it is a folder, not a checkpoint") from error
-    except (OSError, ValueError) as error:
-        raise CheckpointError(str(cannot("read", file, error))) from error
+        begin = beginning(file, len(_ZIP))
+    except ResultError as error:
+        raise CheckpointError(str(error)) from error
     if not begin:
         raise CheckpointError(f"cannot resume from {file}: the file is empty")
     if begin.startswith(b"\x89HDF"):

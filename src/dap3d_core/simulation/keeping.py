@@ -1,5 +1,6 @@
 """What a run reports, kept: in memory while it is little, in a file beside the output when not."""
 
+import math
 import os
 import time
 from collections.abc import Callable
@@ -57,7 +58,7 @@ class Keeper:
         self._parts: list[Arrays] = []
         self._bytes = 0
         self._writer: ResultWriter | None = None
-        self._began = time.perf_counter()
+        self._began = math.inf  # when the first rows came
 
     def take(self, rows: Floats, record: Callable[[], Record]) -> None:
         """Keep what was reported since the last time; record: what is known of the run."""
@@ -65,6 +66,7 @@ class Keeper:
 
     def add(self, arrays: Arrays, record: Callable[[], Record]) -> None:
         """The same for arrays."""
+        self._began = min(self._began, time.perf_counter())
         self.count += len(arrays)
         self._bytes += 8 * len(arrays) * arrays.width
         large = self._bytes > LARGE

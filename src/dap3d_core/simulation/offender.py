@@ -34,18 +34,7 @@ def find_offender(machine: Machine, t: float, y: Floats, t_stop: float) -> str:
         found = _at(machine, later, y)
         if found:
             return f"{found} (t = {later:.9g} s)"
-    return _steepest(machine, t, y) or _fastest(machine, t, y) or _runaway(machine, y)
-
-
-def _runaway(machine: Machine, y: Floats) -> str:
-    """The body whose numbers are so large that products of them overflow."""
-    n = machine.model.body_count
-    bodies = np.hstack([y[: 7 * n].reshape(n, 7), y[7 * n : 13 * n].reshape(n, 6)])
-    largest = np.max(np.abs(bodies), axis=1, initial=0.0)
-    if not n or np.max(largest) < ENORMOUS:
-        return ""
-    first = int(np.argmax(largest))
-    return f"body {machine.model.body_names[first]} runs away (numbers of {largest[first]:.1e})"
+    return _steepest(machine, t, y) or _runaway(machine, t, y)
 
 
 def fastest_body(machine: Machine, y: Floats) -> str:
@@ -81,7 +70,7 @@ def _without_direction(machine: Machine, t: float, y: Floats) -> str:
     """The joint of the first row whose gradient is zero: no force of it can hold anything."""
     if not machine.model.row_count:
         return ""
-    rows = machine.rows(t, from_integrated(y[None], machine.model.body_count)[0])
+    rows = machine.rows(t, from_integrated(y, machine.model.body_count))
     size = np.bincount(rows.row, np.abs(rows.value), minlength=rows.shape[0])
     zero = np.flatnonzero(size == 0.0)
     if not len(zero):
@@ -104,15 +93,16 @@ def _steepest(machine: Machine, t: float, y: Floats) -> str:
     return f"a row of joint {name} has grown to {size:.2g} (t = {t:.9g} s)"
 
 
-def _fastest(machine: Machine, t: float, y: Floats) -> str:
-    """The body with the largest rate, where it is so large that the next step fails."""
-    rates = _rates(machine, t, y)
-    largest = [float(np.max(np.abs(of_body))) for of_body in rates]
-    b = int(np.argmax(largest))
-    if not largest[b] > ENORMOUS:
+def _runaway(machine: Machine, t: float, y: Floats) -> str:
+    """The body with the largest number or rate, where no step can go on with it."""
+    n = machine.model.body_count
+    states = np.hstack([y[: 7 * n].reshape(n, 7), y[7 * n : 13 * n].reshape(n, 6)])
+    largest = np.max(np.abs(np.hstack([states, _rates(machine, t, y)])), axis=1)
+    first = int(np.argmax(largest))
+    if not largest[first] > ENORMOUS:
         return ""
-    name = machine.model.body_names[b]
-    return f"a rate of body {name} has grown to {largest[b]:.2g} (t = {t:.9g} s)"
+    name = machine.model.body_names[first]
+    return f"body {name} runs away: a number or a rate of {largest[first]:.2g} (t = {t:.9g} s)"
 
 
 def _fault(*numbers: Floats) -> str:

@@ -2,28 +2,29 @@
 
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from dap3d_core.interface import PluginError
 from dap3d_core.kernels.cache import driver_digest
-from dap3d_core.result import INFORMATION, Result, ResultError, current_versions
-from dap3d_core.result import open_result as open_file
+from dap3d_core.result import INFORMATION, Result, current_versions
 from dap3d_core.scene import SceneError, Simulation, load, parse
 from dap3d_core.simulation.asked import check_checkpoint
-from dap3d_core.simulation.checkpoint import (
-    Checkpoint,
-    path_of,
-    read_checkpoint,
-)
+from dap3d_core.simulation.checkpoint import Checkpoint, path_of, read_checkpoint
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.errors import CheckpointError
 from dap3d_core.simulation.event import Event
 from dap3d_core.simulation.opening import why_unmade
 from dap3d_core.simulation.run import Progress, Run
-from dap3d_core.simulation.saving import Saver, arrays_of, digests_of
+from dap3d_core.simulation.saving import (
+    Saver,
+    arrays_of,
+    digests_of,
+    parts_of,
+    remove_parts,
+    results_of,
+)
 from dap3d_core.simulation.standing import Standing
 
 
@@ -132,10 +133,10 @@ class Resumption:
             try:
                 result = run.finish(progress)
             except BaseException as error:
-                if hasattr(error, "checkpoint"):  # what stands there takes the place of this one
-                    self._remove_files(target, but=error.checkpoint)
+                if hasattr(error, "checkpoint"):  # it takes the place of this one
+                    self._remove_what_is_replaced(target)
                 raise
-        self._remove_files(target)
+        self._remove_what_is_replaced(target)
         return result
 
     def _run(
@@ -150,8 +151,8 @@ class Resumption:
         header = self._found.header
         before, earlier = self._rows_so_far()
         settings = Simulation(**header["settings"] | {"hold": tuple(header["settings"]["hold"])})
-        run = Run(self.compiled, settings, self._announce, events, watch)
-        run.estimate_error = bool(header["estimate_error"])
+        estimate = bool(header["estimate_error"])
+        run = Run(self.compiled, settings, self._announce, events, watch, estimate_error=estimate)
         ours = target.exists() and target.samefile(before)
         run.keep(target, force=force or ours, identity=header["run"])
         assert run.keeper is not None
@@ -161,19 +162,14 @@ class Resumption:
             run.keeper.add(block, lambda: run.record("done"))
         return run
 
-    def _remove_files(self, target: Path, but: Path | None = None) -> None:
-        """Remove what the run had left: this checkpoint and its rows, for others stand now."""
-        if but is None or not but.samefile(self.path):
-            self.path.unlink(missing_ok=True)
-        for file, result in self._files():
-            if not file.samefile(target) and result.record.run == self._found.header["run"]:
-                file.unlink()
+    def _remove_what_is_replaced(self, target: Path) -> None:
+        """Remove the unfinished rows of the run, and this checkpoint where another file goes on.
 
-    def _files(self) -> Iterator[tuple[Path, Result]]:
-        """Results that may be of the run: that of its name, and unfinished ones."""
-        for file in (self.output, *sorted(self.output.parent.glob(f"{self.output.name}.part*"))):
-            with suppress(ResultError):
-                yield file, open_file(file)
+        A result file stays, whatever it holds.
+        """
+        remove_parts(self.output, self._found.header["run"])
+        if not self._is_ours(target):
+            self.path.unlink(missing_ok=True)
 
     def _is_ours(self, target: Path) -> bool:
         """Whether the checkpoints of the run that goes on replace this one."""
@@ -192,8 +188,9 @@ class Resumption:
     def _rows_so_far(self) -> tuple[Path, Any]:
         """The file that has the rows of the run, and these, block by block."""
         header = self._found.header
-        for file, result in self._files():
-            if result.record.run == header["run"] and len(result.arrays) >= header["rows"]:
+        files = (self.output, *parts_of(self.output))
+        for file, result in results_of(files, header["run"]):
+            if len(result.arrays) >= header["rows"]:
                 return file, _first(result, header["rows"])
         raise CheckpointError(
             f"cannot resume from {self.path}: the rows of its run are gone; neither {self.output} "
@@ -205,12 +202,10 @@ class Resumption:
         header, stored = self._found.header, dict(self._found.arrays)
         given = stored.pop("events.given", None)
         self._restore_events(run, given)
-        while True:
-            k = len(run.runs) - 1
-            self._put_back(run, stored)
-            if k + 1 >= header["integrations"]:
-                break
+        self._put_back(run, stored)
+        while len(run.runs) < header["integrations"]:
             run.begin_implicit()
+            self._put_back(run, stored)
         run.notes = [*header["notes"], *self._notes()]
         run.started -= header["wall_time_s"]
         run.compile_time += header["compile_time_s"]

@@ -94,13 +94,12 @@ class Run:
         checkpoint: float | None = None,
     ) -> Result:
         """Run from the start to the end; arguments and errors as of ``simulate``."""
-        check_room(len(self.times), row_width(self.machine), self.settings.dt, output)
-        self.prepare()
         self.keep(output, force=force)
         if checkpoint is not None:
             from dap3d_core.simulation.saving import Saver
 
             self.saver = Saver(self, checkpoint, force=force)
+        self.prepare()
         return self.finish(progress)
 
     def prepare(self) -> None:
@@ -118,7 +117,9 @@ class Run:
 
         Raises:
             ResultError: the output cannot be written.
+            SceneError: there is no room for it.
         """
+        check_room(len(self.times), row_width(self.machine), self.settings.dt, output)
         most = len(self.times) + 1  # an event may end a run between two of them
         self.keeper = Keeper(self.compiled, output, most, force=force, run=identity)
 

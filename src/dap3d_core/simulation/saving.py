@@ -4,7 +4,7 @@ import hashlib
 import inspect
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.machine import Machine
 from dap3d_core.kernels.cache import driver_digest
-from dap3d_core.result import ResultError, open_result
+from dap3d_core.result import Result, ResultError, open_result
 from dap3d_core.result.record import to_json
 from dap3d_core.simulation.checkpoint import Checkpoint, path_of, write_checkpoint
 
@@ -88,11 +88,28 @@ class Saver:
         keeper = self._run.keeper
         assert keeper is not None
         assert keeper.output is not None
-        for part in keeper.output.parent.glob(f"{keeper.output.name}.part*"):
-            with suppress(ResultError):
-                if open_result(part).record.run == keeper.run:
-                    part.unlink()
+        remove_parts(keeper.output, keeper.run)
         self.path.unlink(missing_ok=True)
+
+
+def results_of(files: Iterable[Path], run: str) -> Iterator[tuple[Path, Result]]:
+    """Those of some files that can be read and are of a run, given its identity."""
+    for file in files:
+        with suppress(ResultError):
+            result = open_result(file)
+            if result.record.run == run:
+                yield file, result
+
+
+def parts_of(output: Path) -> list[Path]:
+    """The unfinished files beside a result file."""
+    return sorted(output.parent.glob(f"{output.name}.part*"))
+
+
+def remove_parts(output: Path, run: str) -> None:
+    """Remove the unfinished files that a run has left beside its result file."""
+    for part, _ in results_of(parts_of(output), run):
+        part.unlink()
 
 
 def checkpoint_of(run: "Run") -> Checkpoint:
