@@ -122,7 +122,7 @@ def test_a_run_that_blows_up_keeps_finite_numbers(run, tmp_path):
     assert code == 3
     assert "the run stopped at t =" in err
     assert "beyond 1e+100" in err
-    assert "of body a" in err or "force F" in err
+    assert "body a runs away" in err or "force F" in err
     result = dap.open(tmp_path / "scene.nc")
     end = np.arccosh(np.sqrt(2.0 * 1e100 / 1e6) / 0.5) / np.sqrt(2e6)
     assert result.t[-1] <= end < result.t[-1] + 0.01

@@ -33,7 +33,9 @@ def wheel():
     scene = dap.Scene(name="wheel")
     scene.add_body("wheel", mass=2.0, Jp=(1.0, 1.0, 1.5), w=(0.0, 0.0, 9.0))
     scene.add_joint("rev", "axle", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
-    scene.add_force("rot_sda", "spring", v_i="wheel.x", v_j="ground.x", axis="ground.z", k=2.0)
+    scene.add_force(
+        "rot_sda", "spring", v_i="wheel.x", v_j="ground.x", axis="ground.z", k=2.0, turns=True
+    )
     scene.add_force("f", "push", body_i="wheel", f=(1.0, 0.5, 0.0))
     scene.add_force("friction", "rubbing", joint="axle", mu=0.2, radius=0.1, v_tol=0.01)
     return scene
