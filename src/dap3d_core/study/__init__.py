@@ -1,0 +1,19 @@
+"""The study floor: many runs of one scene with other numbers."""
+
+from dap3d_core.study.ensemble import Batch, Ensemble, PointStatus, Study
+from dap3d_core.study.names import Number, all_numbers, numbers_named, with_values
+from dap3d_core.study.outputs import REDUCTIONS, Output, outputs_of
+
+__all__ = [
+    "REDUCTIONS",
+    "Batch",
+    "Ensemble",
+    "Number",
+    "Output",
+    "PointStatus",
+    "Study",
+    "all_numbers",
+    "numbers_named",
+    "outputs_of",
+    "with_values",
+]
