@@ -97,6 +97,60 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
     )
 
 
+def load_numbers(
+    system: System, model: Model, other: Model, what: list[tuple[str, Group]]
+) -> list[tuple[str, Group]]:
+    """Put the numbers of another model of the same structure into a model's arrays.
+
+    Args:
+        system: made from ``model`` by ``build_system``.
+        model, other: the model that the loops were made for; the one whose numbers are wanted.
+        what: the loops as ``build_loops`` returned them.
+
+    Returns:
+        the same as ``what`` for the other model.
+
+    Raises:
+        ValueError: the structure is another: elements, bodies, functions or sizes of tables.
+    """
+    twins = _twins(model, other)
+    parts, seen, p0 = [], set(), 0
+    for _, group in what:
+        if id(group) not in seen:
+            seen.add(id(group))
+            parts.append(_numbers_of(twins[id(group)], p0))
+            p0 += parts[-1].size
+    if p0 != system.par.size or len(model.mass) != len(other.mass):
+        raise ValueError("models of different structure")
+    system.par[:] = np.concatenate([np.zeros(0), *parts])
+    system.body[1:, MASS] = other.mass
+    system.body[1:, JP : JP + 9] = other.Jp.reshape(-1, 9)
+    set_metric(system.metric, other.mass, other.Jp)
+    return [(kind, twins[id(group)]) for kind, group in what]
+
+
+def _twins(model: Model, other: Model) -> dict[int, Group]:
+    """id of each group of a model -> the group of another that stands in its place."""
+    found = {}
+    for mine, theirs in zip(_all_groups(model), _all_groups(other), strict=True):
+        same = (
+            mine.examined.type is theirs.examined.type
+            and mine.numbers.shape == theirs.numbers.shape
+            and all(
+                np.array_equal(getattr(mine, name), getattr(theirs, name))
+                for name in ("members", "bodies", "functions")
+            )
+        )
+        if not same:
+            raise ValueError("models of different structure")
+        found[id(mine)] = theirs
+    return found
+
+
+def _all_groups(model: Model) -> tuple[Group, ...]:
+    return (*model.functions, *model.forces, *model.joints, *model.friction)
+
+
 def set_metric(metric: Floats, mass: Floats, Jp: Floats) -> None:
     """Fill the metric's constants: 1/sqrt(m), and U = L^-T with J' = L L^T (ground: zero)."""
     if not len(mass):

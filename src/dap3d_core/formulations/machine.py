@@ -23,7 +23,7 @@ from dap3d_core.assembly.system import (
     System,
 )
 from dap3d_core.formulations import IN_HALVES, LOOPS, REPORT, RHS, functions_of
-from dap3d_core.formulations.build import build_loops, build_system
+from dap3d_core.formulations.build import build_loops, build_system, load_numbers
 from dap3d_core.linear.blocks import LESS, POOR
 from dap3d_core.linear.plan import Plan, make_plan
 from dap3d_core.model import Group, Model
@@ -151,6 +151,16 @@ class Machine:
     def unsettled(self) -> int:
         """How often since the start the multipliers did not settle with friction."""
         return int(self.system.settings[UNSETTLED])
+
+    def load(self, model: Model) -> None:
+        """Evaluate another model of the same structure from here on; nothing is compiled.
+
+        Raises:
+            ValueError: the structure is another.
+        """
+        self.what = load_numbers(self.system, self.model, model, self.what)
+        self.model = model
+        self.start_functions()
 
     @AS_COMPILED
     def start(self, t: float, u: ArrayLike) -> None:

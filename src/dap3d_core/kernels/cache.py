@@ -27,7 +27,7 @@ OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 
 #: Floors of the core that hold compiled code, low to high: a function depends on its own floor and
 #: those below.
-COMPILED_FLOORS = ("kernels", "assembly", "linear", "formulations", "integrators")
+COMPILED_FLOORS = ("kernels", "assembly", "linear", "formulations", "integrators", "study")
 
 #: numba takes the folder of its cache from one setting of the process. Nothing is imported while
 #: this is held.

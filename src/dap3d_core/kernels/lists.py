@@ -37,9 +37,14 @@ LOOP_LIST = types.ListType(LOOP_TYPE)
 INTEGER = int64
 
 
+def procedure_signature(*arguments: Any) -> Any:
+    """Signature of a function of these arguments that returns nothing."""
+    return types.void(*arguments)
+
+
 def step_signature(system: Any) -> Any:
     """Signature of a formulation's functions: (t, y, out, system, loops)."""
-    return types.void(float64, VECTOR, VECTOR, system, LOOP_LIST)
+    return procedure_signature(float64, VECTOR, VECTOR, system, LOOP_LIST)
 
 
 def number_signature(*arguments: Any) -> Any:
@@ -115,5 +120,6 @@ __all__ = [
     "list_type",
     "loop_list",
     "number_signature",
+    "procedure_signature",
     "step_signature",
 ]

@@ -28,6 +28,7 @@ class Quantity(NamedTuple):
         label: what it is in words: "velocity of crank, z".
         unit: SI unit, "1" for none, "SI" where it depends on the row.
         components: names of the columns; empty for (nt,).
+        owner: "body", "point", "joint" or "force"; "" for a quantity of the whole.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Quantity(NamedTuple):
     label: str
     unit: str
     components: tuple[str, ...]
+    owner: str = ""
 
 
 def find(result: "Result", name: str) -> Quantity:
@@ -82,7 +84,7 @@ def _read(
     label = f"{meant.words} of {owner.shown}"
     if not component:
         values = meant.values(result, owner)
-        return Quantity(name, values, meant.words, label, meant.unit, columns)
+        return Quantity(name, values, meant.words, label, meant.unit, columns, owner.kind)
     label = f"{label}, {component}"
     if component == NORM and meant.components is AXES:
         values = np.linalg.norm(meant.values(result, owner), axis=1)
@@ -90,7 +92,7 @@ def _read(
         values = meant.values(result, owner)[:, columns.index(component)]
     else:
         return None
-    return Quantity(name, values, meant.words, label, meant.unit, ())
+    return Quantity(name, values, meant.words, label, meant.unit, (), owner.kind)
 
 
 def _components(result: "Result", owner: Owner, attribute: str) -> tuple[str, ...]:

@@ -103,7 +103,7 @@ class CompiledModel:
         self._starts: dict[tuple[bool, tuple[str, ...], str], Start] = {}
         self._own = _Machines()
         self._first_method = self.method = choose_method(self.model, asked)[0]
-        self._own.stack.append(self._another_machine(announce))
+        self._own.stack.append(self.another_machine(announce))
         self.method, self.reason = self.choice(asked)
         self.machine.method = self.method
         if announce is not None and not driver_is_cached("formulations"):
@@ -128,7 +128,7 @@ class CompiledModel:
         """What evaluates the model for this thread; made when a thread first asks for it."""
         stack = self._own.stack
         if not stack:
-            stack.append(self._another_machine())
+            stack.append(self.another_machine())
         return stack[-1]
 
     @contextmanager
@@ -136,7 +136,7 @@ class CompiledModel:
         """A machine for a run: this thread's or, in a callback of a run that has it, another."""
         own = self._own
         if own.running:
-            own.stack.append(self._another_machine())
+            own.stack.append(self.another_machine())
             try:
                 yield own.stack[-1]
             finally:
@@ -148,7 +148,8 @@ class CompiledModel:
         finally:
             own.running = False
 
-    def _another_machine(self, announce: Announce | None = None) -> Machine:
+    def another_machine(self, announce: Announce | None = None) -> Machine:
+        """A machine of the model with arrays of its own, for whoever changes its numbers."""
         machine = Machine(self.model, self._first_method, announce)
         machine.method = self.method
         settings = self.scene.simulation

@@ -49,6 +49,12 @@ def undefined_directions(scene: Scene, model: Model, u: Floats, size: float) -> 
     return found
 
 
+def asks_for_directions(model: Model) -> bool:
+    """Whether any element needs a direction that a start may leave undefined."""
+    specs = (s for g in (*model.joints, *model.forces) for s in specs_of(g.examined.type).values())
+    return any(s.kind in ("vector", "vector2") and (s.direction or s.across) for s in specs)
+
+
 def _undefined(
     asking: dict[str, FieldSpec], group: Group, model: Model, u: Floats, size: float
 ) -> Iterator[tuple[int, str, str]]:

@@ -122,7 +122,7 @@ def correct_initial(
         u = u.copy()
         velocities = u[7 * machine.model.body_count :]
         velocities -= least_change(machine, rows, residual, t, None, metric)
-    moved, turned = _distance(start, u, machine.model.body_count)
+    moved, turned = distance(start, u, machine.model.body_count)
     return Initial(u, before, violation(machine, u, t), passes, moved, turned)
 
 
@@ -273,7 +273,8 @@ def displaced(u: Floats, change: Floats, n: int) -> Floats:
     return join(r + change[:, :3], p / np.linalg.norm(p, axis=1, keepdims=True), v, w)
 
 
-def _distance(u: Floats, other: Floats, n: int) -> tuple[float, float]:
+def distance(u: Floats, other: Floats, n: int) -> tuple[float, float]:
+    """Largest displacement, m, and rotation, rad, of a body between two states (13 n,)."""
     r, p, _, _ = split(u, n)
     s, q, _, _ = split(other, n)
     cosine = np.clip(np.abs(np.sum(p * q, axis=1)), 0.0, 1.0)

@@ -1,5 +1,6 @@
 """How fast functions of time change: instants that no step goes over, steps too long for one."""
 
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import Any
 
@@ -10,6 +11,7 @@ from dap3d_core.formulations.machine import Machine
 from dap3d_core.interface import PluginError
 from dap3d_core.interface.checks import where_is
 from dap3d_core.interface.fields import specs_of
+from dap3d_core.model import Model
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Checked, Instance, Simulation
 
@@ -43,10 +45,8 @@ class Pace:
     def __init__(self, checked: Checked, machine: Machine, t_end: float) -> None:
         used = sorted({int(k) for group in machine.model.functions for k in group.members})
         functions = {k: checked.functions[k] for k in used}
-        found = {float(t) for f in functions.values() for t in _breaks(f) if 0.0 < t < t_end}
-        breaks = sorted(found)
-        between = [a + part * (b - a) for a, b in pairwise(breaks) for part in SEEN]
-        self.stops = sorted([*((t, True) for t in breaks), *((t, False) for t in between)])
+        breaks = _breaks_of(functions.values(), t_end)
+        self.stops = _stops(breaks)
         self.t_end = t_end
         self.periods: dict[str, float] = {}
         if functions and t_end > 0.0:
@@ -80,6 +80,21 @@ class Pace:
                     f"(aliasing); a dt of at most {period / 4.0:.2g} s does"
                 )
         return found
+
+
+def stops_of(checked: Checked, model: Model, t_end: float) -> list[tuple[float, bool]]:
+    """``Pace.stops`` alone."""
+    used = sorted({int(k) for group in model.functions for k in group.members})
+    return _stops(_breaks_of([checked.functions[k] for k in used], t_end))
+
+
+def _breaks_of(functions: Iterable[Instance], t_end: float) -> list[float]:
+    return sorted({float(t) for f in functions for t in _breaks(f) if 0.0 < t < t_end})
+
+
+def _stops(breaks: list[float]) -> list[tuple[float, bool]]:
+    between = [a + part * (b - a) for a, b in pairwise(breaks) for part in SEEN]
+    return sorted([*((t, True) for t in breaks), *((t, False) for t in between)])
 
 
 def _instants(breaks: list[float], t_end: float) -> list[float]:

@@ -1,5 +1,6 @@
 """Runs of one scene with other numbers: what a study does at its points."""
 
+import threading
 from collections.abc import Callable, Sequence
 from enum import IntEnum
 from typing import Any
@@ -8,14 +9,19 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dap3d_core.result import Record, Result, ResultError, UnknownNameError
-from dap3d_core.scene import Mistake, Scene, SceneError
+from dap3d_core.integrators import METHODS
+from dap3d_core.result import INFORMATION, Result
+from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
 from dap3d_core.study.names import Number, numbers_named, with_values
 from dap3d_core.study.outputs import Output
+from dap3d_core.study.reduction import Reduction
 
 Floats = NDArray[np.float64]
 Announce = Callable[[str], None]
+
+#: Numbers of rows that are kept at once, at most: 64 MB.
+ROW_NUMBERS = 8_000_000
 
 
 class PointStatus(IntEnum):
@@ -62,6 +68,10 @@ class Batch:
 class Ensemble:
     """The compiled model of a study, which runs its points. Threads may use one at once.
 
+    Points run many in one compiled call (study/many.py) that lets other threads go on. A point that
+    does not go to its end there, or that cannot be run so, is run by ``simulate``, which says why.
+    Both give the same numbers, bit for bit, whichever points are run together.
+
     Attributes:
         compiled: the model, with the numbers as the scene gives them.
         numbers: those that vary.
@@ -82,23 +92,52 @@ class Ensemble:
         self.numbers: tuple[Number, ...] = numbers_named(self.compiled.checked, study.names)
         settings = study.scene.simulation
         self.times = report_times(settings.t_end, settings.dt)
-        self.labels: dict[str, str] = {}
-        self.units: dict[str, str] = {}
-        self.outputs = self._expanded(study.outputs)
-        self._refuse_series_of_other_length()
+        self.reduction = Reduction(self.compiled, self.numbers, study.outputs)
+        self.outputs = self.reduction.outputs
+        self.labels, self.units = self.reduction.labels, self.reduction.units
+        self._own = threading.local()
+        settings = study.scene.simulation
+        self._together = settings.integrator in METHODS and not any(
+            number.table == "simulation" for number in self.numbers
+        )
 
     def run(self, points: ArrayLike) -> Batch:
         """Run points (k, numbers): the values of the numbers at each."""
         values = np.asarray(points, dtype=float).reshape(-1, len(self.numbers))
         batch = self._empty(len(values))
-        notes = [self._run_one(k, point, batch) for k, point in enumerate(values)]
+        notes = [""] * len(values)
+        together = self._runner()
+        if together is not None:
+            for part in self._parts(len(values)):
+                together.run(values[part], batch, part, notes)
+        for k in np.flatnonzero(batch.status == PointStatus.OPEN):
+            notes[k] = self._run_one(int(k), values[k], batch)
         return attrs.evolve(batch, notes=tuple(notes))
+
+    def result(self, point: Sequence[float]) -> Result:
+        """The whole result of one point, as ``simulate`` gives it; errors as of that."""
+        scene = with_values(self.study.scene, self.numbers, point)
+        registry = self.compiled.checked.registry
+        return simulate(CompiledModel(scene, registry=registry))
+
+    def _runner(self) -> Any:
+        """What runs many points of this thread in one call; None where nothing does."""
+        if not hasattr(self._own, "runner"):
+            from dap3d_core.study.together import together
+
+            self._own.runner = together(self) if self._together else None
+        return self._own.runner
+
+    def _parts(self, count: int) -> list[slice]:
+        width = 2 + 20 * self.compiled.model.body_count + self.compiled.model.row_count + 4
+        most = max(1, ROW_NUMBERS // (width * len(self.times)))
+        return [slice(first, min(first + most, count)) for first in range(0, count, most)]
 
     def _empty(self, count: int) -> Batch:
         nt = len(self.times)
         return Batch(
             status=np.zeros(count, dtype=np.int8),
-            notes=("",) * count,
+            notes=(),
             values={
                 output.name: np.full((count, nt) if output.reduction == "series" else count, np.nan)
                 for output in self.outputs
@@ -106,16 +145,15 @@ class Ensemble:
         )
 
     def _run_one(self, k: int, point: Floats, batch: Batch) -> str:
-        """Run a point by the ordinary door; its outputs into place k, and its note."""
-        note = ""
+        """Run a point by itself; its outputs into place k, and its note."""
         result: Result | None
         try:
-            result, status = self.result(point.tolist()), PointStatus.DONE
+            result = self.result(point.tolist())
+            status, note = PointStatus.DONE, self._note(result)
         except (SceneError, SimulationError) as error:
-            found = getattr(error, "result", None)
+            result = getattr(error, "result", None)
+            status = PointStatus.FAILED if result is None else PointStatus.STOPPED
             note = " ".join(str(error).split())
-            status = PointStatus.FAILED if found is None else PointStatus.STOPPED
-            result = found
         batch.status[k] = status
         if result is not None:
             for output in self.outputs:
@@ -126,73 +164,8 @@ class Ensemble:
                     batch.values[output.name][k] = value[0]
         return note
 
-    def result(self, point: Sequence[float]) -> Result:
-        """The whole result of one point, as ``simulate`` gives it; errors as of that."""
-        scene = with_values(self.study.scene, self.numbers, point)
-        compiled = CompiledModel(
-            scene, allow_code=self.study.allow_code, registry=self.compiled.checked.registry
-        )
-        return simulate(compiled)
-
-    def _expanded(self, asked: Sequence[Output]) -> tuple[Output, ...]:
-        """Outputs with each vector in its components; labels and units are noted."""
-        probe = self._probe()
-        found: list[Output] = []
-        mistakes: list[Mistake] = []
-        for output in asked:
-            if callable(output.of):
-                found.append(output)
-                self.labels[output.name], self.units[output.name] = output.name, ""
-                continue
-            try:
-                quantity = probe.quantity(output.of)
-            except (UnknownNameError, ResultError) as error:
-                near = getattr(error, "nearest", "")
-                what = error.args[0] if error.args else str(error)
-                mistakes.append(Mistake("outputs", output.name, str(what), near))
-                continue
-            _, label, unit = quantity
-            parts = self._components(probe, output)
-            for part in parts:
-                found.append(part)
-                self.labels[part.name], self.units[part.name] = label, unit
-        if mistakes:
-            raise SceneError(mistakes)
-        return tuple(found)
-
-    def _components(self, probe: Result, output: Output) -> list[Output]:
-        from dap3d_core.result import find
-
-        quantity = find(probe, str(output.of))
-        if not quantity.components:
-            return [output]
-        head, colon, tail = output.name.rpartition(":")
-        head, colon, tail = (head, colon, tail) if colon else (output.name, "", "")
-        return [
-            attrs.evolve(output, name=f"{head}.{c}{colon}{tail}", of=f"{output.of}.{c}")
-            for c in quantity.components
-        ]
-
-    def _probe(self) -> Result:
-        """A result of one instant, of which names and units can be asked."""
-        machine = self.compiled.machine
-        y = machine.integrated(machine.model.u0)
-        row: Any = np.concatenate([[0.0], y, np.zeros(machine.report_size)])
-        record = Record(scene_text=self.compiled.scene_text)
-        return Result.of_run(machine.model, row[None], record, lambda: machine)
-
-    def _refuse_series_of_other_length(self) -> None:
-        timing = [n.name for n in self.numbers if n.path in TIMING]
-        if timing:
-            mistakes = [
-                Mistake("outputs", o.name, f"a series has the same length at each point, and "
-                        f"{timing[0]} varies", remedy="ask for :end, :min, :max or :mean")
-                for o in self.outputs
-                if o.reduction == "series"
-            ]  # fmt: skip
-            if mistakes:
-                raise SceneError(mistakes)
-
-
-#: Numbers that change the reporting times.
-TIMING = (("simulation", "t_end"), ("simulation", "dt"))
+    def _note(self, result: Result) -> str:
+        """The warnings of a run that the scene as given does not have."""
+        known = {*self.compiled.notes, f"method {self.compiled.method}: {self.compiled.reason}"}
+        own = [n for n in result.notes if not n.startswith((INFORMATION, "method "))]
+        return "; ".join(note for note in own if note not in known)

@@ -1,0 +1,179 @@
+"""Batches of runs of one machine, seen from Python: arrays made ready, one compiled call, rows."""
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.assembly.system import STEP_TYPE, System, step_functions
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.integrators import METHODS, Integration
+from dap3d_core.integrators.runge_kutta import advance
+from dap3d_core.integrators.work import Status, Work
+from dap3d_core.kernels.cache import compiled, jit_is_on
+from dap3d_core.kernels.lists import (
+    INTEGER,
+    LOOP_LIST,
+    List,
+    fill,
+    function_type,
+    list_type,
+    procedure_signature,
+)
+from dap3d_core.scene import Simulation
+from dap3d_core.simulation.initial import model_size
+from dap3d_core.study import many as at
+from dap3d_core.study import starting
+from dap3d_core.study.many import Points, run_points
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Right-hand sides after which a compiled call comes back, so that Ctrl-C is answered.
+CALL = 200_000
+#: Constants of the metric in which displacements are measured in m and rad.
+UNIT = np.array([1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
+
+_DRIVE = (Work.type_of(), list_type(STEP_TYPE), System.type_of(), LOOP_LIST, INTEGER)
+DRIVE_TYPE = function_type(procedure_signature(*_DRIVE))
+
+
+class Found(NamedTuple):
+    """What came of k runs.
+
+    Attributes:
+        done: (k,) whether a run went to its end; the others are to be run by themselves.
+        rows: (k, nt, width) what was reported, as the integrator delivers it.
+        given, y0: (k, n) the state that each was given, and the one it started from.
+        numbers: (k, COLUMNS) see many.py and starting.py.
+    """
+
+    done: NDArray[np.bool_]
+    rows: Floats
+    given: Floats
+    y0: Floats
+    numbers: Floats
+
+
+class Runs:
+    """Runs of one machine that differ in numbers alone. Not for two threads at once.
+
+    Attributes:
+        machine: what evaluates the model.
+        size: a length of the model, m.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        settings: Simulation,
+        times: Floats,
+        stops: list[tuple[float, bool]],
+    ) -> None:
+        """Args:
+        machine: what evaluates the model; its numbers change.
+        settings: of the runs; the integrator is one of ``METHODS``.
+        times: (nt,) reporting times.
+        stops: times that no step goes over, and whether something jumps there.
+        """
+        self.machine = machine
+        y0 = machine.integrated(machine.model.u0)
+        self.integration = Integration(
+            METHODS[str(settings.integrator)],
+            machine.functions,
+            machine.system,
+            machine.loops,
+            y0,
+            times,
+            buffer_rows=len(times),
+            **run_options(machine, settings),
+        )
+        self.stops = np.array(stops, dtype=float).reshape(-1, 2)
+        self._metric = machine.system.metric.copy()
+        work = self.integration.work
+        self._first = {
+            "first_real": work.real.copy(),
+            "first_integer": work.integer.copy(),
+            "first_switches": work.switches.copy(),
+            "first_lengths": work.lengths.copy(),
+        }
+        self._starting = _starting(machine.method)
+        self.size = model_size(machine)
+
+    def run(
+        self, table: Floats, places: Integers, y0: Floats, *, assembles: bool
+    ) -> Found:
+        """Run k points.
+
+        Args:
+            table: (k, w) numbers that differ from the model's.
+            places: (w,) where they belong: in par, body and metric, one behind the other.
+            y0: (k, n) states to start from; with ``assembles`` they are corrected first.
+        """
+        work, count = self.integration.work, len(table)
+        nt, width = work.rows.shape
+        found = np.zeros((count, at.COLUMNS))
+        found[:, starting.SIZE] = self.size
+        points = Points(
+            at=np.array([0, 0, assembles], dtype=np.int64),
+            places=np.ascontiguousarray(places, dtype=np.int64),
+            table=np.ascontiguousarray(table, dtype=float),
+            y0=np.array(y0, dtype=float),
+            metric=self._metric,
+            unit=UNIT,
+            stops=self.stops,
+            rows=np.empty((count * nt, width)),
+            found=found,
+            **self._first,
+        )
+        problem = (self.machine.functions, _drives(), self._starting)
+        system, loops = self.machine.system, self.machine.loops
+        while points.at[at.POINT] < count:
+            with np.errstate(all="ignore"):
+                run_points(points, work, *problem, system, loops, CALL)
+        rows = points.rows.reshape(count, nt, width)
+        done = (found[:, at.ENDED] == Status.FINISHED) & (found[:, at.ROWS] == nt)
+        return Found(done, rows, y0, points.y0, found)
+
+
+def run_options(machine: Machine, settings: Simulation) -> dict[str, Any]:
+    """What an explicit integration takes from a machine and the settings of a run."""
+    return {
+        "rtol": settings.rtol,
+        "atol": settings.atol,
+        "step": settings.step,
+        "project_on": settings.project,
+        "error_size": 13 * machine.model.body_count,  # the work does not steer the step
+        "report_size": machine.report_size,
+        "ends": machine.ending,
+        "length_count": machine.length_count,
+        "watched": machine.counts_turns,
+    }
+
+
+@cache
+def _starting(method: str) -> Any:
+    """What a run remembers of its start, and what brings it there, as compiled functions."""
+    if method == "unconstrained":
+        return step_functions(starting.begin_free)
+    begin = starting.begin_standard if method == "standard" else starting.begin_regularised
+    return step_functions(begin, starting.assemble_start)
+
+
+@compiled
+def _empty() -> Any:
+    return List.empty_list(DRIVE_TYPE)
+
+
+@compiled
+def _append(functions: Any, function: Any) -> None:
+    functions.append(function)
+
+
+@cache
+def _drives() -> Any:
+    """The integrator, by its address: compiled code that calls it has no copy of it."""
+    if jit_is_on():
+        advance.compile(_DRIVE)
+    return fill(_empty, _append, DRIVE_TYPE, (advance,))

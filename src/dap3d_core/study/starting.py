@@ -1,0 +1,170 @@
+"""The start of a run as compiled code, for many runs of one model (study/many.py).
+
+What simulation/initial.py and ``Machine.start`` do for one run, with the same passes: the least
+change that brings a state onto its constraints, and what a run remembers of its start.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+from dap3d_core.assembly.evaluate import call_kinds, place, place_bodies
+from dap3d_core.assembly.system import (
+    ANGLE,
+    SCRATCH,
+    UNSETTLED,
+    Floats,
+    System,
+)
+from dap3d_core.formulations.constraints import (
+    PART,
+    correct,
+    factorise,
+    linearise,
+    residuals,
+    velocity_residuals,
+)
+from dap3d_core.formulations.machine import REDUNDANT
+from dap3d_core.formulations.moves import change_velocity, move
+from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
+from dap3d_core.linear.blocks import POOR
+from dap3d_core.simulation.initial import FIT, MOST_PASSES, MOST_SHIFT, MOST_TURN, TOLERANCE
+
+# Places in ``out`` of these functions. On entry: a length of the model; then largest residuals of
+# position and velocity before and after, Newton passes, and the least pivot as a part of its row.
+SIZE, C_BEFORE, V_BEFORE, C_AFTER, V_AFTER, NEWTON, LEAST, OPEN, STARTING = range(9)
+
+
+@compiled_inside
+def smallest_share(system: System) -> float:
+    """The least pivot of the factors in K as a part of the squared length of its row of D^."""
+    length, blocks, D = system.C, system.blocks, system.D
+    for k in range(length.shape[0]):
+        length[k] = 0.0
+    for b in range(blocks.shape[0]):
+        first, height, row = blocks[b, 0], blocks[b, 2], blocks[b, 3]
+        for i in range(height):
+            for c in range(6):
+                value = D[first + 6 * i + c]
+                length[row + i] += value * value
+    least, nodes, K = 1.0, system.nodes, system.K
+    for k in range(nodes.shape[0] - 1):
+        size, first, diagonal = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        for i in range(size):
+            inverse, whole = K[diagonal + i * (size + 1)], length[first + i]
+            share = 1.0 / abs(inverse * whole) if inverse * whole != 0.0 else 0.0
+            least = min(least, share) if share == share else 0.0
+    return least
+
+
+@compiled_inside
+def shorten(system: System, longest_shift: float) -> float:
+    """Shorten a displacement in ``force``, of unit metric, so that no body moves too far.
+
+    Returns the part that is left.
+    """
+    force, shift, turn = system.force, 0.0, 0.0
+    for b in range(1, force.shape[0] // 6):
+        o = 6 * b
+        shift = max(shift, (force[o] ** 2 + force[o + 1] ** 2 + force[o + 2] ** 2) ** 0.5)
+        turn = max(turn, (force[o + 3] ** 2 + force[o + 4] ** 2 + force[o + 5] ** 2) ** 0.5)
+    part = 1.0
+    if shift > longest_shift:
+        part = longest_shift / shift
+    if turn * part > MOST_TURN:
+        part = MOST_TURN / turn
+    if part < 1.0:
+        for k in range(force.shape[0]):
+            force[k] *= part
+    return part
+
+
+@compiled
+def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """Bring a state onto its constraints, in the metric that stands in the system: unit.
+
+    As ``correct_initial`` for independent rows with position level. out: see above; OPEN is 1
+    where positions did not close.
+    """
+    size, before = out[SIZE], 1e300
+    out[OPEN], out[NEWTON] = 1.0, 0.0
+    place(t, y, system, loops)
+    worst = residuals(t, system, loops)
+    linearise(t, system, loops)
+    out[C_BEFORE], out[V_BEFORE] = worst, velocity_residuals(system)
+    for passes in range(MOST_PASSES + 1):
+        worst = residuals(t, system, loops)
+        stands = worst > 0.5 * before and worst <= FIT * min(1.0, size)
+        if worst <= TOLERANCE or stands:
+            out[OPEN] = 0.0
+            break
+        before = worst
+        if passes == MOST_PASSES or not worst < 1e100:
+            return
+        linearise(t, system, loops)
+        factorise(system, None)
+        correct(system)
+        shorten(system, MOST_SHIFT * size)
+        move(y, system.metric, system.force)
+        place_bodies(y, system.body, system.metric)
+        out[NEWTON] += 1.0
+    out[C_AFTER] = worst
+    linearise(t, system, loops)
+    factorise(system, None)
+    out[LEAST] = smallest_share(system)
+    if velocity_residuals(system) > 0.0:
+        correct(system)
+        change_velocity(y, system.metric, system.force)
+        place_bodies(y, system.body, system.metric)
+    out[V_AFTER] = velocity_residuals(system)
+
+
+@compiled_into
+def remember(t: float, y: Floats, system: System, loops: Any) -> None:
+    """The bodies placed, functions' values at the start kept, turns counted from here."""
+    unused, F = system.settings[SCRATCH : SCRATCH + 1], system.F
+    place(t, y, system, loops)
+    for k in range(F.shape[0]):
+        F[k, 4] = F[k, 0]
+    system.settings[UNSETTLED] = 0.0
+    call_kinds(ANGLE, ANGLE, t, system, loops, unused, unused, unused)
+
+
+@compiled_into
+def watch_pivots(t: float, system: System, loops: Any, part: float | None) -> None:
+    """As ``Machine.watch_pivots`` does, at the bodies as placed."""
+    smallest, nodes, K = system.smallest, system.nodes, system.K
+    for k in range(smallest.shape[0]):
+        smallest[k] = 0.0
+    linearise(t, system, loops)
+    factorise(system, part)
+    for k in range(nodes.shape[0] - 1):
+        size, first, diagonal = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        for i in range(size):
+            pivot = abs(1.0 / K[diagonal + i * (size + 1)])
+            if part is not None and pivot < REDUNDANT * system.x[first + i]:
+                pivot = 0.0
+            smallest[first + i] = POOR * pivot
+
+
+@compiled
+def begin_free(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """What a run of a scene without joints remembers of its start; ``out`` is left as it is."""
+    remember(t, y, system, loops)
+
+
+@compiled
+def begin_standard(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """The same with joints whose rows are independent."""
+    place(t, y, system, loops)
+    watch_pivots(t, system, loops, None)
+    remember(t, y, system, loops)
+
+
+@compiled
+def begin_regularised(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """The same for the formulations with regularised factors."""
+    place(t, y, system, loops)
+    watch_pivots(t, system, loops, PART)
+    remember(t, y, system, loops)

@@ -1,0 +1,155 @@
+"""The points of a study run many at once, as far as they can be; what is left is run by itself."""
+
+import contextlib
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.result import INFORMATION
+from dap3d_core.simulation import AssemblyError
+from dap3d_core.simulation.initial import ROUNDING, Initial, correction_notes, distance
+from dap3d_core.simulation.directions import asks_for_directions
+from dap3d_core.simulation.start import Start
+from dap3d_core.study import many, starting
+from dap3d_core.study.modelling import Modelling
+from dap3d_core.study.places import NotCopied, Places
+from dap3d_core.study.runs import Found, Runs
+
+if TYPE_CHECKING:
+    from dap3d_core.study.ensemble import Batch, Ensemble
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+def together(ensemble: "Ensemble") -> "Together | None":
+    """What runs points of an ensemble for this thread; None where the scene as given cannot start.
+
+    Each point is then run by itself, which says what is wrong there.
+    """
+    settings = ensemble.study.scene.simulation
+    compiled = ensemble.compiled
+    asked = bool(settings.correct), settings.hold, str(settings.correct_metric)
+    try:
+        start = compiled.start(*asked)
+    except AssemblyError:
+        return None
+    found = start.redundancy
+    if found.contradictions or found.bindings:
+        return None
+    if compiled.method == "standard" and found.rank.redundant:
+        return None
+    return Together(ensemble, start)
+
+
+class Together:
+    """Runs points in one compiled call. For one thread."""
+
+    def __init__(self, ensemble: "Ensemble", start: Start) -> None:
+        """Args: whose points; the start of the scene as given."""
+        compiled, self._ensemble, self._start = ensemble.compiled, ensemble, start
+        machine = compiled.another_machine()
+        settings = compiled.scene.simulation
+        end = float(ensemble.times[-1])
+        self._modelling = Modelling(compiled, machine, ensemble.numbers, end)
+        self._runs = Runs(machine, settings, ensemble.times, compiled.pace(end).stops)
+        self._size = self._runs.size
+        self._places: Places | None = None
+        with contextlib.suppress(NotCopied):
+            places = Places(compiled.checked, machine, ensemble.numbers)
+            needs_directions = places.moves and asks_for_directions(compiled.model)
+            if not needs_directions and (not places.moves_start or self._assembles_simply()):
+                self._places = places
+
+    def run(self, values: Floats, batch: "Batch", part: slice, notes: list[str]) -> None:
+        """Run points (k, d): the outputs of those that go to their end into a part of a batch."""
+        places = np.arange(part.start, part.stop)
+        if self._places is not None:
+            which, found = self._run_copied(values)
+        else:
+            which, found = self._run_modelled(values, notes, part.start)
+        good = found.done & (found.numbers[:, many.LOOSE] == 0.0)
+        which, rows = which[good], found.rows[good]
+        self._note(found, good, which, notes, part.start)
+        self._keep(values, which, rows, batch, part.start)
+        batch.status[places[which]] = 1
+
+    def _run_copied(self, values: Floats) -> tuple[Integers, Found]:
+        """Points whose numbers have their places: which were run, and what came of them."""
+        assert self._places is not None
+        table, fine = self._places.table(values)
+        which = np.flatnonzero(fine)
+        model, moves = self._ensemble.compiled.model, self._places.moves_start
+        if moves:
+            y0 = self._places.states(values[which], model.u0)
+        else:
+            y0 = np.repeat(self._runs.machine.integrated(self._start.u)[None], len(which), axis=0)
+        assembles = moves and model.row_count > 0 and self._start.initial is not None
+        return which, self._runs.run(table[which], self._places.places, y0, assembles=assembles)
+
+    def _run_modelled(
+        self, values: Floats, notes: list[str], first: int
+    ) -> tuple[Integers, Found]:
+        """Points each of which has a model of its own."""
+        which, table, y0 = [], [], []
+        for k, point in enumerate(values):
+            ready = self._modelling.prepare(point)
+            if ready is not None:
+                which.append(k)
+                table.append(ready.numbers)
+                y0.append(ready.y0)
+                notes[first + k] = "; ".join(ready.notes)
+        places, size = self._modelling.places, self._ensemble.compiled.model.u0.size + 1
+        numbers = np.array(table).reshape(-1, len(places))
+        states = np.array(y0).reshape(-1, size)
+        return np.array(which, dtype=np.int64), self._runs.run(
+            numbers, places, states, assembles=False
+        )
+
+    def _keep(
+        self, values: Floats, which: Integers, rows: Floats, batch: "Batch", first: int
+    ) -> None:
+        """The outputs of runs, by their rows (k, nt, width)."""
+        reduction, times = self._ensemble.reduction, self._ensemble.times
+        for name, of_rows in reduction.reduce(rows, times).items():
+            batch.values[name][first + which] = of_rows
+        others = [o for o in reduction.outputs if not reduction.of_rows[o.name]]
+        if not others:
+            return
+        machine = self._runs.machine
+        for k, of_run in zip(which, rows, strict=True):
+            _, model = self._modelling.load(values[k])
+            result = reduction.result(model, of_run, lambda: machine)
+            for output in others:
+                batch.values[output.name][first + k] = output.value(result)
+
+    def _note(
+        self, found: Found, good: NDArray[np.bool_], which: Integers, notes: list[str], first: int
+    ) -> None:
+        """Warn of starts that had to be corrected by more than rounding."""
+        scene, machine = self._ensemble.compiled.scene, self._runs.machine
+        n = machine.model.body_count
+        corrected = found.numbers[good, starting.C_BEFORE] > ROUNDING * self._size
+        for k, place in zip(np.flatnonzero(good)[corrected], which[corrected], strict=True):
+            numbers = found.numbers[k]
+            moved, turned = distance(found.given[k], found.y0[k], n)
+            initial = Initial(
+                u=machine.model.u0,
+                violation=(numbers[starting.C_BEFORE], numbers[starting.V_BEFORE]),
+                residual=(numbers[starting.C_AFTER], numbers[starting.V_AFTER]),
+                passes=int(numbers[starting.NEWTON]),
+                moved=moved,
+                turned=turned,
+            )
+            words = correction_notes(initial, machine, scene)
+            notes[first + place] = "; ".join(w for w in words if not w.startswith(INFORMATION))
+
+    def _assembles_simply(self) -> bool:
+        """Whether compiled code can correct a start: independent rows, the usual metric."""
+        compiled = self._ensemble.compiled
+        settings, model = compiled.scene.simulation, compiled.model
+        if not model.row_count or not settings.correct:
+            return not model.row_count
+        usual = str(settings.correct_metric) == "unit" and not settings.hold
+        return compiled.method == "standard" and usual and bool(np.all(model.position_row))
