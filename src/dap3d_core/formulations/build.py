@@ -130,7 +130,7 @@ def load_numbers(
 
 
 def _twins(model: Model, other: Model) -> dict[int, Group]:
-    """id of each group of a model -> the group of another that stands in its place."""
+    """Id of each group of a model -> the group of another that stands in its place."""
     found = {}
     for mine, theirs in zip(_all_groups(model), _all_groups(other), strict=True):
         same = (

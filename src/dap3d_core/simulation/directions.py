@@ -1,6 +1,6 @@
 """Directions that elements need and that the start of a run leaves undefined."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,63 +31,93 @@ def undefined_directions(scene: Scene, model: Model, u: Floats, size: float) -> 
         size: a length of the model, m.
     """
     found = []
-    for table, names, groups in (
-        ("joints", model.joint_names, model.joints),
-        ("forces", model.force_names, model.forces),
-    ):
-        for group in groups:
-            asking = {
-                name: spec
-                for name, spec in specs_of(group.examined.type).items()
-                if spec.kind in ("vector", "vector2") and (spec.direction or spec.across)
-            }
-            if not asking:
-                continue
-            for k, words, remedy in _undefined(asking, group, model, u, size):
-                name = names[int(group.members[k])]
-                found.append(mistake_at(scene, (table, name), words, remedy))
+    r, A = _frames(u, model.body_count)
+    for group, fields in _asking(model):
+        table, names = "joints", model.joint_names
+        if group.examined.type.kind == "force":
+            table, names = "forces", model.force_names
+        for name, spec in fields.items():
+            measure, least = _measured(group, name, spec, group.numbers, r, A, size)
+            for k in np.flatnonzero(measure < least):
+                words, remedy = _words(name, spec, float(measure[k]))
+                owner = names[int(group.members[k])]
+                found.append(mistake_at(scene, (table, owner), words, remedy))
     return found
 
 
-def asks_for_directions(model: Model) -> bool:
-    """Whether any element needs a direction that a start may leave undefined."""
-    specs = (s for g in (*model.joints, *model.forces) for s in specs_of(g.examined.type).values())
-    return any(s.kind in ("vector", "vector2") and (s.direction or s.across) for s in specs)
+def are_undefined(
+    model: Model, u: Floats, numbers_of: Callable[[Group], Floats], size: float
+) -> NDArray[np.bool_]:
+    """At which of k states u (k, 13 n) a direction is undefined.
+
+    Args:
+        model, size: as above.
+        numbers_of: (k, m, par_width) the numbers of a group at each of them.
+    """
+    undefined = np.zeros(len(u), dtype=bool)
+    r, A = _frames(u, model.body_count)
+    for group, fields in _asking(model):
+        numbers = numbers_of(group)
+        for name, spec in fields.items():
+            measure, least = _measured(group, name, spec, numbers, r, A, size)
+            undefined |= np.any(measure < least, axis=-1)
+    return undefined
 
 
-def _undefined(
-    asking: dict[str, FieldSpec], group: Group, model: Model, u: Floats, size: float
-) -> Iterator[tuple[int, str, str]]:
-    """Instances of a group with what is wrong and what to do."""
-    r, p, _, _ = split(u, model.body_count)
-    r = np.vstack([np.zeros(3), r])
-    A = np.concatenate([np.eye(3)[None], rotation(p)])
-    for name, spec in asking.items():
-        if spec.kind == "vector2":
-            ends = [_turned(group, end, A) + r[_bodies(group, end)] for end in ("P_i", "P_j")]
-            distance = np.linalg.norm(ends[1] - ends[0], axis=1)
-            for k in np.flatnonzero(distance < COINCIDENT * max(size, 1.0)):
-                words = (
-                    f"its points P_i and P_j coincide at the start (distance {distance[k]:.2g} m), "
-                    "so the direction it acts along is undefined"
-                )
-                yield int(k), words, "give one of the points, or of the bodies, another place"
-        else:
-            normal = np.cross(_turned(group, name, A), _turned(group, spec.across, A))
-            sine = np.linalg.norm(normal, axis=1)
-            for k in np.flatnonzero(sine < PARALLEL):
-                words = (
-                    f"{name} and {spec.across} are parallel at the start, so the angle about "
-                    f"{spec.across} is undefined"
-                )
-                yield int(k), words, f"take a vector across {spec.across} for {name}"
+def _asking(model: Model) -> Iterator[tuple[Group, dict[str, FieldSpec]]]:
+    """Groups with the fields that ask for a direction."""
+    for group in (*model.joints, *model.forces):
+        asking = {
+            name: spec
+            for name, spec in specs_of(group.examined.type).items()
+            if spec.kind in ("vector", "vector2") and (spec.direction or spec.across)
+        }
+        if asking:
+            yield group, asking
 
 
-def _turned(group: Group, name: str, A: Floats) -> Floats:
-    """(m, 3) global components of a point's arm or a vector."""
+def _frames(u: Floats, n: int) -> tuple[Floats, Floats]:
+    """R (..., n + 1, 3) and A (..., n + 1, 3, 3) of states (..., 13 n), ground first."""
+    r, p, _, _ = split(u, n)
+    ground = np.zeros((*r.shape[:-2], 1, 3))
+    axes = np.broadcast_to(np.eye(3), (*r.shape[:-2], 1, 3, 3))
+    return np.concatenate([ground, r], axis=-2), np.concatenate([axes, rotation(p)], axis=-3)
+
+
+def _measured(
+    group: Group, name: str, spec: FieldSpec, numbers: Floats, r: Floats, A: Floats, size: float
+) -> tuple[Floats, float]:
+    """Distance of two points, or sine between two vectors, (..., m), and the least that will do."""
+    if spec.kind == "vector2":
+        start, end = (
+            _turned(group, end, numbers, A) + r[..., _bodies(group, end), :]
+            for end in ("P_i", "P_j")
+        )
+        return np.linalg.norm(end - start, axis=-1), COINCIDENT * max(size, 1.0)
+    one, other = (_turned(group, vector, numbers, A) for vector in (name, spec.across))
+    return np.linalg.norm(np.cross(one, other), axis=-1), PARALLEL
+
+
+def _words(name: str, spec: FieldSpec, measure: float) -> tuple[str, str]:
+    """What is wrong and what to do."""
+    if spec.kind == "vector2":
+        return (
+            f"its points P_i and P_j coincide at the start (distance {measure:.2g} m), "
+            "so the direction it acts along is undefined",
+            "give one of the points, or of the bodies, another place",
+        )
+    return (
+        f"{name} and {spec.across} are parallel at the start, so the angle about "
+        f"{spec.across} is undefined",
+        f"take a vector across {spec.across} for {name}",
+    )
+
+
+def _turned(group: Group, name: str, numbers: Floats, A: Floats) -> Floats:
+    """(..., m, 3) a point or vector of the instances of a group, in global axes."""
     offset, _ = group.examined.layout.numbers[name]
-    local = group.numbers[:, offset : offset + 3]
-    turned: Floats = np.einsum("mrc,mc->mr", A[_bodies(group, name)], local)
+    local = numbers[..., offset : offset + 3]
+    turned: Floats = np.einsum("...mrc,...mc->...mr", A[..., _bodies(group, name), :, :], local)
     return turned
 
 

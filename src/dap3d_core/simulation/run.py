@@ -26,12 +26,12 @@ from dap3d_core.simulation.implicit import (
     implicit_rest,
     stiffness_notes,
 )
-from dap3d_core.simulation.initial import correction_notes, violation
 from dap3d_core.simulation.keeping import Keeper
 from dap3d_core.simulation.redundancy import Redundancy
 from dap3d_core.simulation.room import check_room, row_width
 from dap3d_core.simulation.second_run import Again, add_error
 from dap3d_core.simulation.standing import Observer, Standing
+from dap3d_core.simulation.start import start_notes
 from dap3d_core.simulation.watcher import Watcher
 
 if TYPE_CHECKING:
@@ -46,8 +46,6 @@ CHUNK_SECONDS = 0.1
 FIRST_CHUNK = 100
 #: Numbers that wait in the row buffer at most.
 BUFFER_NUMBERS = 4_000_000
-#: A start this far off the constraints, left uncorrected, gets a note.
-OFF_CONSTRAINTS = 1e-6
 
 
 class Run:
@@ -175,14 +173,7 @@ class Run:
         settings, scene = self.settings, self.compiled.scene
         metric = str(settings.correct_metric)
         start = self.compiled.start(bool(settings.correct), settings.hold, metric)
-        if start.initial is not None:
-            self.notes += correction_notes(start.initial, self.machine, scene)
-        elif max(violation(self.machine, start.u)) > OFF_CONSTRAINTS:
-            position, velocity = violation(self.machine, start.u)
-            self.notes.append(
-                f"the initial conditions violate the constraints (position {position:.2g}, "
-                f"velocity {velocity:.2g}) and were not corrected; switch correct on"
-            )
+        self.notes += start_notes(start, self.machine, scene)
         t_end = float(self.times[-1])
         self.notes += self.compiled.pace(t_end).notes(settings, settings.dt or t_end / 100.0)
         self.rank = start.redundancy.rank.rank

@@ -5,10 +5,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.machine import Machine
-from dap3d_core.simulation.initial import Initial, correct_initial
+from dap3d_core.scene import Scene
+from dap3d_core.simulation.initial import Initial, correct_initial, correction_notes, violation
 from dap3d_core.simulation.redundancy import Redundancy, redundancy_of
 
 Floats = NDArray[np.float64]
+
+#: A start this far off the constraints, left uncorrected, gets a note.
+OFF_CONSTRAINTS = 1e-6
 
 
 @attrs.frozen(eq=False)
@@ -46,3 +50,16 @@ def find_start(
         initial = correct_initial(machine, u, hold=held, metric=metric)
         u = initial.u
     return Start(u, initial, redundancy_of(machine, u))
+
+
+def start_notes(start: Start, machine: Machine, scene: Scene) -> list[str]:
+    """How a start was corrected, or that it is off the constraints, in words."""
+    if start.initial is not None:
+        return correction_notes(start.initial, machine, scene)
+    position, velocity = violation(machine, start.u)
+    if max(position, velocity) <= OFF_CONSTRAINTS:
+        return []
+    return [
+        f"the initial conditions violate the constraints (position {position:.2g}, "
+        f"velocity {velocity:.2g}) and were not corrected; switch correct on"
+    ]

@@ -54,7 +54,7 @@ def dependence_of(instance: Instance, poses: Mapping[int, BodyPose], body_count:
             slot: _WatchedPose(poses[body], body, read)
             for slot, body in zip(slots, of_element, strict=True)
         }
-        constants |= prepared(thing, seen).keys()  # type: ignore[arg-type]
+        constants |= prepared(thing, seen).keys()
     return Dependence(frozenset(fields), frozenset(read), frozenset(constants))
 
 

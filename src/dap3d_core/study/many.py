@@ -21,7 +21,6 @@ from dap3d_core.integrators.work import (
     CUTS,
     ERROR_OLD,
     FRESH,
-    H,
     LAST_REJECTED,
     LIMIT,
     LOOKED,
@@ -32,8 +31,9 @@ from dap3d_core.integrators.work import (
     STATUS,
     STEP,
     STEPS,
-    T,
     Function,
+    H,
+    T,
     Work,
     Y,
 )
@@ -76,6 +76,7 @@ class Points(Arrays):
     metric: Floats  # of the model, where its numbers do not change from point to point
     unit: Floats  # (7,) constants of the metric that displacements are measured by at the start
     stops: Floats  # (s, 2) times that no step goes over, and whether something jumps there
+    starting: Floats  # (STARTING + rows,) what is told to and by the start (starting.py)
     first_real: Floats  # the work as it is before a run
     first_integer: Integers
     first_switches: Floats
@@ -102,7 +103,9 @@ def put_numbers(points: Points, p: int, system: System) -> None:
         if place < first_body:
             par[place] = value
         elif place < first_metric:
-            body[(place - first_body) // body.shape[1], (place - first_body) % body.shape[1]] = value
+            body[(place - first_body) // body.shape[1], (place - first_body) % body.shape[1]] = (
+                value
+            )
         else:
             k = place - first_metric
             metric[k // metric.shape[1], k % metric.shape[1]] = value
@@ -137,7 +140,8 @@ def start(
     if points.at[ASSEMBLES] != 0:
         for b in range(1, metric.shape[0]):
             copy_into(metric[b], points.unit)
-        starting[1](t, y, found, system, loops)
+        starting[1](t, y, points.starting, system, loops)
+        copy_into(found[:STARTING], points.starting[:STARTING])
         for b in range(1, metric.shape[0]):
             copy_into(metric[b], points.metric[b])
         put_numbers(points, p, system)

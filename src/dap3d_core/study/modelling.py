@@ -12,9 +12,9 @@ from dap3d_core.scene import Checked, SceneError, check
 from dap3d_core.simulation import AssemblyError
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.directions import undefined_directions
-from dap3d_core.simulation.initial import correction_notes, model_size
+from dap3d_core.simulation.initial import model_size
 from dap3d_core.simulation.pace import stops_of
-from dap3d_core.simulation.start import find_start
+from dap3d_core.simulation.start import find_start, start_notes
 from dap3d_core.study.names import Number, with_values
 
 Floats = NDArray[np.float64]
@@ -78,9 +78,7 @@ class Modelling:
             return None
         if undefined_directions(checked.scene, model, start.u, model_size(machine)):
             return None
-        notes: list[str] = []
-        if start.initial is not None:
-            notes = correction_notes(start.initial, machine, checked.scene)
+        notes = start_notes(start, machine, checked.scene)
         warnings = tuple(note for note in notes if not note.startswith(INFORMATION))
         return Modelled(_numbers_of(machine), machine.integrated(start.u), warnings)
 

@@ -21,10 +21,12 @@ from dap3d_core.interface.poses import BodyPose
 from dap3d_core.interface.types import Function
 from dap3d_core.kernels.gather import BODY_WIDTH, JP, MASS
 from dap3d_core.model import Group
-from dap3d_core.model.kinematics import join, split, to_integrated
+from dap3d_core.model.kinematics import from_integrated, join, split, to_integrated
 from dap3d_core.scene import Checked, Instance
 from dap3d_core.scene.bodies import SMALLEST_INERTIA, ZERO_INERTIA
 from dap3d_core.scene.values import LARGEST
+from dap3d_core.simulation.directions import are_undefined
+from dap3d_core.simulation.initial import model_size
 from dap3d_core.study.dependence import Dependence, dependence_of
 from dap3d_core.study.names import Number
 
@@ -38,7 +40,7 @@ METRIC_WIDTH, CONSTANTS = 16, 7
 STATES = ("r", "r_dot", "w")
 
 
-class NotCopied(Exception):
+class NotCopiedError(Exception):
     """A number is not copied to known places."""
 
 
@@ -74,7 +76,7 @@ class Places:
         """Find the places.
 
         Raises:
-            NotCopied: one of the numbers has no such places.
+            NotCopiedError: one of the numbers has no such places.
         """
         self._checked, self._machine = checked, machine
         self._poses = _poses(checked)
@@ -139,6 +141,22 @@ class Places:
                 parts[number.path[2]][:, body, number.places[0]] = value
         return to_integrated(join(r, p, v, w), n)
 
+    def are_undefined(self, table: Floats, y0: Floats) -> Booleans:
+        """Points at whose start y0 (k, 13 n + 1) the direction of an element is undefined."""
+        machine, count = self._machine, len(table)
+        model = machine.model
+        first_of = {id(group): first for group, first in self._groups()}
+
+        def numbers_of(group: Group) -> Floats:
+            first, size = first_of[id(group)], group.numbers.size
+            numbers = np.repeat(group.numbers.reshape(1, -1), count, axis=0)
+            own = (self.places >= first) & (self.places < first + size)
+            numbers[:, self.places[own] - first] = table[:, own]
+            return numbers.reshape(count, *group.numbers.shape)
+
+        u = from_integrated(y0, model.body_count)
+        return are_undefined(model, u, numbers_of, model_size(machine))
+
     # ------------------------------------------------------------------ one number
 
     def _column(self, number: Number) -> Column:
@@ -149,7 +167,7 @@ class Places:
             return self._of_point(number)
         if table in ("joints", "forces", "functions"):
             return self._of_element(number)
-        raise NotCopied
+        raise NotCopiedError
 
     def _of_body(self, number: Number) -> Column:
         _, name, field = number.path
@@ -163,7 +181,7 @@ class Places:
         if field == "mass":
             return Column(number, limits=FieldSpec("number", 1.0, positive=True))
         if field not in ("Jp", *STATES) or field in read or len(number.places) != 1:
-            raise NotCopied  # of a whole inertia matrix two numbers would have to change
+            raise NotCopiedError  # of a whole inertia matrix two numbers would have to change
         return Column(number, moves_start=field != "Jp")
 
     def _of_point(self, number: Number) -> Column:
@@ -172,7 +190,7 @@ class Places:
         for instance in self._elements():
             for field in _point_fields(self._checked, instance, name):
                 if field in self._of(instance).fields:
-                    raise NotCopied
+                    raise NotCopiedError
                 found = list(self._targets(instance, field, number.places))
                 targets += found
                 moves = moves or instance in self._checked.joints
@@ -184,9 +202,9 @@ class Places:
         spec = specs_of(instance.examined.type).get(field)
         needs = self._of(instance)
         if spec is None or spec.kind not in ("number", "vec3") or field in needs.fields:
-            raise NotCopied
+            raise NotCopiedError
         if table == "functions" and not self._is_smooth_of_time(instance):
-            raise NotCopied
+            raise NotCopiedError
         targets = tuple(self._targets(instance, field, number.places))
         limits = spec if spec.kind == "number" else None
         return Column(number, targets, limits, moves_start=table != "forces")
@@ -217,7 +235,7 @@ class Places:
     def _targets(self, instance: Instance, field: str, places: tuple[int, ...]) -> Iterator[int]:
         """Places in par that hold a component of a field of an element."""
         if field in self._of(instance).constants:
-            raise NotCopied
+            raise NotCopiedError
         for group, first in self._groups():
             spot = group.examined.layout.numbers.get(field)
             if spot is None:
@@ -318,6 +336,6 @@ def _turn_counters(machine: Machine) -> Integers:
     for q, (kind, group) in enumerate(machine.what):
         if kind == "angle":
             first, width = int(machine.system.groups[q, 1]), group.examined.layout.par_width
-            for offset in group.examined.layout.angles.values():
-                found.append(first + offset + width * np.arange(group.count))
+            offsets = group.examined.layout.angles.values()
+            found += [first + offset + width * np.arange(group.count) for offset in offsets]
     return np.concatenate(found)

@@ -92,7 +92,7 @@ class Runs:
         self.stops = np.array(stops, dtype=float).reshape(-1, 2)
         self._metric = machine.system.metric.copy()
         work = self.integration.work
-        self._first = {
+        self._first: dict[str, Any] = {
             "first_real": work.real.copy(),
             "first_integer": work.integer.copy(),
             "first_switches": work.switches.copy(),
@@ -100,10 +100,12 @@ class Runs:
         }
         self._starting = _starting(machine.method)
         self.size = model_size(machine)
+        self._told = np.zeros(starting.STARTING + machine.plan.row_size)
+        self._told[starting.SIZE] = self.size
+        without = np.flatnonzero(~machine.model.position_row)
+        self._told[starting.STARTING + machine.system.row[without]] = 1.0
 
-    def run(
-        self, table: Floats, places: Integers, y0: Floats, *, assembles: bool
-    ) -> Found:
+    def run(self, table: Floats, places: Integers, y0: Floats, *, assembles: bool) -> Found:
         """Run k points.
 
         Args:
@@ -114,15 +116,15 @@ class Runs:
         work, count = self.integration.work, len(table)
         nt, width = work.rows.shape
         found = np.zeros((count, at.COLUMNS))
-        found[:, starting.SIZE] = self.size
         points = Points(
-            at=np.array([0, 0, assembles], dtype=np.int64),
+            at=np.array([0, 0, bool(assembles)], dtype=np.int64),
             places=np.ascontiguousarray(places, dtype=np.int64),
             table=np.ascontiguousarray(table, dtype=float),
             y0=np.array(y0, dtype=float),
             metric=self._metric,
             unit=UNIT,
             stops=self.stops,
+            starting=self._told,
             rows=np.empty((count * nt, width)),
             found=found,
             **self._first,

@@ -28,7 +28,8 @@ from dap3d_core.formulations.constraints import (
 from dap3d_core.formulations.machine import REDUNDANT
 from dap3d_core.formulations.moves import change_velocity, move
 from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
-from dap3d_core.linear.blocks import POOR
+from dap3d_core.linear.blocks import POOR, assemble, factor
+from dap3d_core.linear.rank import PIVOT_TOLERANCE
 from dap3d_core.simulation.initial import FIT, MOST_PASSES, MOST_SHIFT, MOST_TURN, TOLERANCE
 
 # Places in ``out`` of these functions. On entry: a length of the model; then largest residuals of
@@ -37,22 +38,53 @@ SIZE, C_BEFORE, V_BEFORE, C_AFTER, V_AFTER, NEWTON, LEAST, OPEN, STARTING = rang
 
 
 @compiled_inside
-def smallest_share(system: System) -> float:
-    """The least pivot of the factors in K as a part of the squared length of its row of D^."""
-    length, blocks, D = system.C, system.blocks, system.D
-    for k in range(length.shape[0]):
-        length[k] = 0.0
+def measure_rows(system: System, squares: Floats) -> None:
+    """The squared length of each row of D^."""
+    blocks, D = system.blocks, system.D
+    for k in range(squares.shape[0]):
+        squares[k] = 0.0
     for b in range(blocks.shape[0]):
         first, height, row = blocks[b, 0], blocks[b, 2], blocks[b, 3]
         for i in range(height):
             for c in range(6):
                 value = D[first + 6 * i + c]
-                length[row + i] += value * value
+                squares[row + i] += value * value
+
+
+@compiled_inside
+def leave_out(system: System, rows: Floats) -> None:
+    """Make the rows of D^ that are marked with 1 zero."""
+    blocks, D = system.blocks, system.D
+    for b in range(blocks.shape[0]):
+        first, height, row = blocks[b, 0], blocks[b, 2], blocks[b, 3]
+        for i in range(height):
+            if rows[row + i] != 0.0:
+                for c in range(6):
+                    D[first + 6 * i + c] = 0.0
+
+
+@compiled_inside
+def factor_positions(system: System, without_position: Floats) -> None:
+    """Factors of the rows that have a position level; the unknowns of the others become zero."""
+    smallest = system.smallest
+    leave_out(system, without_position)
+    assemble(system.targets, system.contributions, system.D, system.K)
+    measure_rows(system, smallest)
+    for k in range(smallest.shape[0]):
+        smallest[k] *= PIVOT_TOLERANCE
+    factor(system.nodes, system.columns, system.updates, system.K, smallest, True)
+
+
+@compiled_inside
+def smallest_share(system: System) -> float:
+    """The least pivot of the factors in K as a part of the squared length of its row of D^."""
+    squares = system.smallest
+    measure_rows(system, squares)
     least, nodes, K = 1.0, system.nodes, system.K
     for k in range(nodes.shape[0] - 1):
         size, first, diagonal = nodes[k, 0], nodes[k, 1], nodes[k, 2]
         for i in range(size):
-            inverse, whole = K[diagonal + i * (size + 1)], length[first + i]
+            inverse, whole = K[diagonal + i * (size + 1)], squares[first + i]
             share = 1.0 / abs(inverse * whole) if inverse * whole != 0.0 else 0.0
             least = min(least, share) if share == share else 0.0
     return least
@@ -84,8 +116,8 @@ def shorten(system: System, longest_shift: float) -> float:
 def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Bring a state onto its constraints, in the metric that stands in the system: unit.
 
-    As ``correct_initial`` for independent rows with position level. out: see above; OPEN is 1
-    where positions did not close.
+    As ``correct_initial`` for independent rows. out: see above; OPEN is 1 where positions did not
+    close; from STARTING on, as an argument, 1 for each row that has no position level.
     """
     size, before = out[SIZE], 1e300
     out[OPEN], out[NEWTON] = 1.0, 0.0
@@ -103,7 +135,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         if passes == MOST_PASSES or not worst < 1e100:
             return
         linearise(t, system, loops)
-        factorise(system, None)
+        factor_positions(system, out[STARTING:])
         correct(system)
         shorten(system, MOST_SHIFT * size)
         move(y, system.metric, system.force)

@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 from dap3d_core.result import INFORMATION
 from dap3d_core.simulation import AssemblyError
 from dap3d_core.simulation.initial import ROUNDING, Initial, correction_notes, distance
-from dap3d_core.simulation.directions import asks_for_directions
 from dap3d_core.simulation.start import Start
 from dap3d_core.study import many, starting
 from dap3d_core.study.modelling import Modelling
-from dap3d_core.study.places import NotCopied, Places
+from dap3d_core.study.places import NotCopiedError, Places
 from dap3d_core.study.runs import Found, Runs
 
 if TYPE_CHECKING:
@@ -56,10 +55,9 @@ class Together:
         self._runs = Runs(machine, settings, ensemble.times, compiled.pace(end).stops)
         self._size = self._runs.size
         self._places: Places | None = None
-        with contextlib.suppress(NotCopied):
+        with contextlib.suppress(NotCopiedError):
             places = Places(compiled.checked, machine, ensemble.numbers)
-            needs_directions = places.moves and asks_for_directions(compiled.model)
-            if not needs_directions and (not places.moves_start or self._assembles_simply()):
+            if not places.moves_start or self._assembles_simply():
                 self._places = places
 
     def run(self, values: Floats, batch: "Batch", part: slice, notes: list[str]) -> None:
@@ -85,12 +83,15 @@ class Together:
             y0 = self._places.states(values[which], model.u0)
         else:
             y0 = np.repeat(self._runs.machine.integrated(self._start.u)[None], len(which), axis=0)
-        assembles = moves and model.row_count > 0 and self._start.initial is not None
-        return which, self._runs.run(table[which], self._places.places, y0, assembles=assembles)
+        table = table[which]
+        found = self._runs.run(
+            table, self._places.places, y0, assembles=moves and model.row_count > 0
+        )
+        if self._places.moves:
+            found.done[self._places.are_undefined(table, found.y0)] = False
+        return which, found
 
-    def _run_modelled(
-        self, values: Floats, notes: list[str], first: int
-    ) -> tuple[Integers, Found]:
+    def _run_modelled(self, values: Floats, notes: list[str], first: int) -> tuple[Integers, Found]:
         """Points each of which has a model of its own."""
         which, table, y0 = [], [], []
         for k, point in enumerate(values):
@@ -152,4 +153,4 @@ class Together:
         if not model.row_count or not settings.correct:
             return not model.row_count
         usual = str(settings.correct_metric) == "unit" and not settings.hold
-        return compiled.method == "standard" and usual and bool(np.all(model.position_row))
+        return compiled.method == "standard" and usual
