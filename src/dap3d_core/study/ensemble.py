@@ -20,6 +20,8 @@ from dap3d_core.study.reduction import Reduction
 Floats = NDArray[np.float64]
 Announce = Callable[[str], None]
 
+#: The integrator whose steps end at each reporting time.
+STEPPED = "rk4"
 #: Numbers of rows that are kept at once, at most: 64 MB.
 ROW_NUMBERS = 8_000_000
 
@@ -86,7 +88,7 @@ class Ensemble:
         Raises:
             SceneError: an unknown name, an unknown output, or mistakes of the scene.
         """
-        self.study = study
+        self.study = study = _at_the_end_alone(study)
         allow = study.allow_code
         self.compiled = CompiledModel(study.scene, allow_code=allow, announce=announce)
         self.numbers: tuple[Number, ...] = numbers_named(self.compiled.checked, study.names)
@@ -96,7 +98,6 @@ class Ensemble:
         self.outputs = self.reduction.outputs
         self.labels, self.units = self.reduction.labels, self.reduction.units
         self._own = threading.local()
-        settings = study.scene.simulation
         self._together = settings.integrator in METHODS and not any(
             number.table == "simulation" for number in self.numbers
         )
@@ -169,3 +170,15 @@ class Ensemble:
         known = {*self.compiled.notes, f"method {self.compiled.method}: {self.compiled.reason}"}
         own = [n for n in result.notes if not n.startswith((INFORMATION, "method "))]
         return "; ".join(note for note in own if note not in known)
+
+
+def _at_the_end_alone(study: Study) -> Study:
+    """The study; its runs report at their end alone where nothing else is asked for."""
+    settings = study.scene.simulation
+    if any(output.reduction != "end" for output in study.outputs) or "simulation.dt" in study.names:
+        return study
+    if settings.integrator == STEPPED or not settings.t_end:
+        return study
+    scene = study.scene.copy()
+    scene.simulation.dt = None if "simulation.t_end" in study.names else settings.t_end
+    return attrs.evolve(study, scene=scene)

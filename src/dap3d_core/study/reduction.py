@@ -44,7 +44,10 @@ class Reduction:
         self.units: dict[str, str] = {}
         #: Whether each output is computed from the rows of many runs at once.
         self.of_rows: dict[str, bool] = {}
+        #: Outputs that stand in one column of the rows as they are.
+        self._column: dict[str, int] = {}
         self.outputs = self._expanded(asked)
+        self._find_columns()
         timing = [number.name for number in numbers if number.path in TIMING]
         if timing and any(output.reduction == "series" for output in self.outputs):
             what = f"a series has the same length at each point, and {timing[0]} varies"
@@ -60,11 +63,15 @@ class Reduction:
         wanted = [output for output in self.outputs if self.of_rows[output.name]]
         if not wanted:
             return {}
-        model = self._compiled.model
-        result = self.result(model, rows.reshape(k * nt, width), lambda: self._compiled.machine)
-        found = {}
+        model, result, found = self._compiled.model, None, {}
         for output in wanted:
-            values = result.quantity(str(output.of)).values.reshape(k, nt)
+            column = self._column.get(output.name)
+            if column is not None:
+                values = rows[:, :, column]
+            else:
+                flat = rows.reshape(k * nt, width)
+                result = result or self.result(model, flat, lambda: self._compiled.machine)
+                values = result.quantity(str(output.of)).values.reshape(k, nt)
             found[output.name] = REDUCTIONS[output.reduction](values, times)
         return found
 
@@ -100,6 +107,19 @@ class Reduction:
         if mistakes:
             raise SceneError(mistakes)
         return tuple(found)
+
+    def _find_columns(self) -> None:
+        """A quantity that equals one column of rows of random numbers is that column."""
+        machine = self._compiled.machine
+        width = 1 + len(machine.integrated(machine.model.u0)) + machine.report_size
+        rows = np.random.default_rng(0).random((3, width))
+        result = self.result(machine.model, rows, lambda: machine)
+        for output in self.outputs:
+            if self.of_rows[output.name]:
+                values = result.quantity(str(output.of)).values
+                same = np.flatnonzero(np.all(rows == values[:, None], axis=0))
+                if len(same):
+                    self._column[output.name] = int(same[0])
 
     def _is_of_rows(self, quantity: Quantity) -> bool:
         """Whether a quantity is computed with nothing that varies from point to point."""
