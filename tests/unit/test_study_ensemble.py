@@ -1,0 +1,254 @@
+"""The points of a study are the runs that ``simulate`` makes of the changed scenes, bit for bit."""
+
+import numpy as np
+import pytest
+from support import mechanisms
+from support.plain import long_in_plain_python
+from unit.test_checkpoint import driven, stone, wheel
+
+import dap3d_core as dap
+from dap3d_core.scene import SceneError
+from dap3d_core.study import Ensemble, PointStatus, Study, outputs_of, with_values
+from dap3d_core.study.dependence import dependence_of
+from dap3d_core.study.modelling import Modelling
+from dap3d_core.study.places import Places
+
+DONE, STOPPED, FAILED = PointStatus.DONE, PointStatus.STOPPED, PointStatus.FAILED
+
+
+def ensemble(scene, names, outputs, **settings):
+    """An ensemble of a scene with other settings."""
+    if isinstance(scene, str):
+        scene = dap.load(scene)
+    for name, value in settings.items():
+        setattr(scene.simulation, name, value)
+    return Ensemble(Study(scene, tuple(names), outputs_of(outputs)))
+
+
+def way(of):
+    """How an ensemble runs its points: "copied", "modelled", or "alone"."""
+    runner = of._runner()
+    if runner is None:
+        return "alone"
+    return "modelled" if runner._places is None else "copied"
+
+
+def singly(of, points):
+    """The outputs of points by ``simulate``, of the scene with these numbers."""
+    found = {output.name: [] for output in of.outputs}
+    for point in points:
+        result = dap.simulate(with_values(of.study.scene, of.numbers, point))
+        for output in of.outputs:
+            found[output.name].append(output.value(result))
+    return {name: np.array(values) for name, values in found.items()}
+
+
+def pendulum(**body):
+    scene = dap.Scene(name="pendulum")
+    given = {"mass": 2.0, "Jp": (0.1, 0.2, 0.15), "r": (0.0, -1.0, 0.0), **body}
+    scene.add_body("bob", **given)
+    scene.add_point("A", "bob", (0.0, 1.0, 0.0))
+    scene.add_joint("sph", "pivot", P_i="A", P_j="ground.O")
+    scene.add_force("weight", "gravity", gravity=9.81, wgt=(0.0, -1.0, 0.0))
+    scene.simulation.t_end, scene.simulation.dt = 0.5, 0.1
+    return scene
+
+
+def falling_linkage():
+    """A parallelogram with three rows too many, which gravity along x sets in motion."""
+    scene = mechanisms.planar_four_bar()
+    scene.add_force("weight", "gravity", gravity=9.81, wgt=(1.0, 0.0, 0.0))
+    return scene
+
+
+#: Scene, varied number, two values, output, settings, how the points are run.
+CASES = {
+    "mass": (pendulum, "bodies.bob.mass", (1.0, 3.0), "bob.r:series", {}, "copied"),
+    "inertia": (pendulum, "bodies.bob.Jp.x", (0.1, 0.2), "bob.w:max", {}, "copied"),
+    "component of a vector": (
+        pendulum, "forces.gravity.wgt.x", (0.0, 0.5), "energy.total:mean", {}, "copied"),
+    "reaction": (pendulum, "forces.gravity.gravity", (1.6, 9.81), "pivot.force:max", {}, "copied"),
+    "spring": (stone, "forces.spring.k", (3.0, 5.0), "stone.r:min", {"t_end": 0.4}, "copied"),
+    "tension": (
+        stone, "forces.spring.k", (3.0, 5.0), "spring.tension:series", {"t_end": 0.4}, "copied"),
+    "start in free flight": (
+        stone, "bodies.stone.r.z", (2.0, 2.5), "stone.r.z", {"t_end": 0.4}, "copied"),
+    "turns": (wheel, "forces.spring.k", (2.0, 2.5), "wheel.w.z:series", {"t_end": 1.5}, "copied"),
+    "friction": (wheel, "forces.rubbing.mu", (0.1, 0.3), "wheel.w.z", {"t_end": 0.5}, "copied"),
+    "breaks of a function": (
+        driven, "bodies.crank.mass", (1.0, 2.0), "crank.w.z:series", {"t_end": 1.0}, "copied"),
+    "function with breaks": (
+        driven, "functions.turn.f_end", (1.0, 2.0), "crank.w.z:max", {"t_end": 1.0}, "modelled"),
+    "redundant joints": (
+        falling_linkage, "bodies.left.mass", (1.0, 2.0), "left.w.z:min", {"t_end": 0.1}, "copied"),
+    "not corrected": (
+        pendulum, "points.A.sPp.y", (1.0, 1.0 + 1e-9), "bob.r.x", {"correct": False}, "modelled"),
+    "other steps": (
+        pendulum, "bodies.bob.mass", (1.0, 2.0), "bob.r:series",
+        {"integrator": "rk4", "step": 0.01}, "copied"),
+    "implicit": (
+        pendulum, "bodies.bob.mass", (1.0, 2.0), "bob.r.x", {"integrator": "radau"}, "alone"),
+    "tolerance": (pendulum, "simulation.rtol", (1e-6, 1e-9), "bob.r.x", {}, "alone"),
+}  # fmt: skip
+
+
+@long_in_plain_python
+@pytest.mark.parametrize("case", CASES)
+def test_points_are_single_runs_bit_for_bit(case):
+    make, name, values, output, settings, expected = CASES[case]
+    of = ensemble(make(), [name], [output], **{"dt": 0.05, **settings})
+    points = np.array(values)[:, None]
+    batch = of.run(points)
+    assert way(of) == expected
+    assert batch.status.tolist() == [DONE, DONE]
+    for output_name, single in singly(of, points).items():
+        assert np.array_equal(batch.values[output_name], single)
+        assert np.all(np.isfinite(single))
+
+
+@long_in_plain_python
+def test_a_point_does_not_depend_on_those_before_it():
+    of = ensemble(wheel(), ["forces.spring.k", "forces.rubbing.mu"], ["wheel.w.z"], t_end=0.5)
+    points = np.array([[2.0, 0.1], [3.0, 0.3], [2.5, 0.2]])
+    all_at_once = of.run(points).values["wheel.w.z"]
+    assert len(set(all_at_once.tolist())) == 3
+    assert np.array_equal(of.run(points[::-1]).values["wheel.w.z"][::-1], all_at_once)
+    one_by_one = [of.run(point).values["wheel.w.z"][0] for point in points]
+    assert np.array_equal(one_by_one, all_at_once)
+
+
+@long_in_plain_python
+@pytest.mark.parametrize("name", ["points.A.sPp.y", "bodies.bob.r_dot.x", "bodies.bob.r.z"])
+def test_starts_are_corrected_as_those_of_single_runs(name):
+    """Compiled Newton passes on the block factors, against numpy's least squares: rounding.
+
+    One radian of swing multiplies it by some ten; 1e-13 leaves another ten.
+    """
+    of = ensemble(pendulum(), [name], ["bob.r:series", "bob.w"], dt=0.1, t_end=0.5)
+    points = np.array([[0.3], [0.9], [1.1]])
+    batch = of.run(points)
+    assert way(of) == "copied"
+    assert batch.status.tolist() == [DONE] * 3
+    for output, single in singly(of, points).items():
+        np.testing.assert_allclose(batch.values[output], single, rtol=0.0, atol=1e-13 * 10.0)
+    moved = [("initial positions corrected" in note) for note in batch.notes]
+    assert moved == [name != "bodies.bob.r_dot.x"] * 3
+
+
+@long_in_plain_python
+def test_a_driver_without_position_level_is_left_out_of_the_correction_of_positions():
+    of = ensemble("fourbar3", ["points.P2.sPp.z"], ["crank.r:series"])
+    nominal = of.numbers[0].value
+    points = np.array([[nominal], [1.01 * nominal + 0.01]])
+    batch = of.run(points)
+    assert way(of) == "copied"
+    single = singly(of, points)
+    for output in of.outputs:
+        found = batch.values[output.name]
+        np.testing.assert_allclose(found, single[output.name], rtol=0.0, atol=1e-11)
+
+
+def test_failing_points_are_told_and_the_others_go_on():
+    of = ensemble(pendulum(), ["bodies.bob.mass"], ["bob.r.y"], t_end=0.02, dt=0.01)
+    batch = of.run([[1.0], [-1.0], [np.nan], [2.0]])
+    assert batch.status.tolist() == [DONE, FAILED, FAILED, DONE]
+    assert "bodies.bob.mass = -1.0: should be greater than 0" in batch.notes[1]
+    assert batch.notes[0] == batch.notes[3] == ""
+    assert np.isnan(batch.values["bob.r.y"]).tolist() == [False, True, True, False]
+
+
+def test_points_that_stop_early_keep_what_was_computed():
+    """A spring that pushes flings the stone beyond all bounds: exp(sqrt(k) t)."""
+    of = ensemble(stone(), ["forces.spring.k"], ["stone.r.z:series"], t_end=2.0, dt=0.5)
+    batch = of.run([[1.0], [-1e5]])
+    assert batch.status.tolist() == [DONE, STOPPED]
+    assert "beyond 1e+100" in batch.notes[1]
+    series = batch.values["stone.r.z:series"]
+    assert np.all(np.isfinite(series[0]))
+    assert np.isfinite(series[1, 0])
+    assert np.isnan(series[1, -1])
+
+
+@pytest.mark.parametrize(
+    ("points", "status"), [([[1.0], [0.5]], [DONE, DONE]), ([[0.0]], [FAILED])]
+)
+def test_a_direction_that_a_point_leaves_undefined_is_refused(points, status):
+    scene = stone()
+    scene.bodies["stone"].r = (0.0, 0.0, 1.0)
+    of = ensemble(scene, ["bodies.stone.r.z"], ["stone.r.z"], t_end=0.01, dt=0.01)
+    batch = of.run(points)
+    assert way(of) == "copied"
+    assert batch.status.tolist() == status
+    if status == [FAILED]:
+        assert "coincide at the start" in batch.notes[0]
+
+
+def test_numbers_that_are_copied_need_no_check_and_no_model(monkeypatch):
+    of = ensemble(pendulum(), ["bodies.bob.mass"], ["bob.r.y"], t_end=0.02, dt=0.01)
+    of.run([[1.0]])
+
+    def refuse(*args):
+        raise AssertionError("a model was made")
+
+    monkeypatch.setattr(Modelling, "load", refuse)
+    monkeypatch.setattr(Ensemble, "result", refuse)
+    assert of.run([[1.5], [2.0]]).status.tolist() == [DONE, DONE]
+
+
+def test_a_number_that_prepare_reads_is_not_copied():
+    """The axis of a revolute joint makes its normals; its points do not."""
+    compiled = dap.compile("fourbar3")
+    poses = {k: None for k in range(4)}
+    joint = next(j for j in compiled.checked.joints if j.name == "J1")
+    found = dependence_of(joint, _poses(compiled.checked), len(poses) - 1)
+    assert found.fields == {"a_j"}
+    assert found.constants == {"n_j", "m_j"}
+    assert not found.poses
+
+
+def test_poses_that_prepare_reads_are_told():
+    """``fix`` keeps the relative pose that the bodies are given in."""
+    compiled = dap.compile("fourbar4")
+    joint = next(j for j in compiled.checked.joints if j.examined.type.keyword == "fix")
+    found = dependence_of(joint, _poses(compiled.checked), len(compiled.checked.body_names))
+    assert {part for _, part in found.poses} == {"r", "p"}
+
+
+def _poses(checked):
+    from dap3d_core.study.places import _poses
+
+    return _poses(checked)
+
+
+def test_masses_beyond_what_a_scene_may_have_are_left_to_its_check():
+    of = ensemble(pendulum(), ["bodies.bob.Jp.x", "bodies.bob.mass"], ["bob.r.y"])
+    places = Places(of.compiled.checked, of.compiled.machine, of.numbers)
+    values = np.array(
+        [[0.1, 1.0], [0.1, 0.0], [0.5, 1.0], [-0.1, 1.0], [0.1, np.inf], [0.1, 1e-300]]
+    )
+    assert places.table(values)[1].tolist() == [True, False, False, False, False, False]
+
+
+def test_runs_that_are_asked_for_their_end_report_their_end():
+    of = ensemble(pendulum(), ["bodies.bob.mass"], ["bob.r.y"])
+    assert of.times.tolist() == [0.0, 0.5]
+    assert len(ensemble(pendulum(), ["bodies.bob.mass"], ["bob.r.y:max"]).times) == 6
+
+
+def test_a_series_of_varying_length_is_refused():
+    with pytest.raises(SceneError, match="a series has the same length at each point"):
+        ensemble(pendulum(), ["simulation.t_end"], ["bob.r.y:series"])
+
+
+@long_in_plain_python
+def test_the_period_of_a_spring_follows_its_stiffness():
+    """x = cos(sqrt(k / m) t) of a mass on a spring of no length, to ten times rtol."""
+    scene = dap.Scene()
+    scene.add_body("m", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(1.0, 0.0, 0.0))
+    scene.add_force("ptp", "s", P_i="m.O", P_j="ground.O", k=1.0, l0=0.0)
+    of = ensemble(scene, ["forces.s.k", "bodies.m.mass"], ["m.r.x"], t_end=1.0, dt=1.0)
+    k, mass = np.meshgrid(np.linspace(1.0, 9.0, 5), np.linspace(1.0, 4.0, 4))
+    points = np.column_stack([k.ravel(), mass.ravel()])
+    found = of.run(points).values["m.r.x"]
+    assert way(of) == "copied"
+    np.testing.assert_allclose(found, np.cos(np.sqrt(points[:, 0] / points[:, 1])), atol=1e-7)
