@@ -198,7 +198,7 @@ def test_numbers_that_are_copied_need_no_check_and_no_model(monkeypatch):
 def test_a_number_that_prepare_reads_is_not_copied():
     """The axis of a revolute joint makes its normals; its points do not."""
     compiled = dap.compile("fourbar3")
-    poses = {k: None for k in range(4)}
+    poses = dict.fromkeys(range(4))
     joint = next(j for j in compiled.checked.joints if j.name == "J1")
     found = dependence_of(joint, _poses(compiled.checked), len(poses) - 1)
     assert found.fields == {"a_j"}
