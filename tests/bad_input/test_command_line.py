@@ -14,7 +14,8 @@ import threading
 
 import numpy as np
 import pytest
-from tests.e2e.conftest import COMMAND, SCENE, environment
+from support.falling import SCENE
+from tests.e2e.conftest import COMMAND, environment
 
 import dap3d_core as dap
 from dap3d_core.cli import main

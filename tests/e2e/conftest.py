@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.falling import SCENE
 
 COMMAND = [str(Path(sys.executable).with_name("dap3d"))]
 
@@ -71,23 +72,6 @@ def refuse(dap3d, monkeypatch, capfd):
         return err
 
     return call
-
-
-SCENE = """\
-[scene]
-name = "fall"
-
-[bodies.stone]
-mass = 2.0
-Jp = [0.1, 0.1, 0.1]
-
-[forces.gravity]
-type = "weight"
-
-[simulation]
-t_end = 0.1
-dt = 0.01
-"""
 
 
 @pytest.fixture

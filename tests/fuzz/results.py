@@ -1,7 +1,8 @@
 """Result files with damaged bytes, and what must be true of reading them.
 
 The HDF5 library itself crashes on some damaged files and never ends on others, so a file is read
-in a child process; such an end is counted, and is no find (``CRASHED``, ``STUCK``).
+in a child process. A file with a seal is refused before the library sees it; for others, as older
+programs wrote them, such an end is counted, and is no find (``CRASHED``, ``STUCK``).
 """
 
 import functools
@@ -26,18 +27,25 @@ from fuzz.damage import seeds
 #: A file that takes longer to read hangs, s; in compiled code no signal is heard before its end.
 HANG, PATIENCE = 5, 10
 CRASHED, STUCK = "the HDF5 library crashed", "the HDF5 library was stuck"
+#: Bytes of a seal.
+SEAL = 40
 #: Signals by which a process ends that the library has corrupted.
 _CRASHES = (signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE)
 
 
+def is_sealed(data):
+    return b"dap3dsum" in data[-SEAL:]
+
+
 @functools.cache
 def good_files():
-    """The bytes of result files as runs save them, of one body and of several."""
+    """The bytes of result files as runs save them, of one body and of several; one not sealed."""
     with tempfile.TemporaryDirectory() as folder:
         for name in ("pen1", "fourbar3"):
             run = dap.simulate(REPOSITORY / "models" / name, t_end=0.05, dt=0.01)
             run.save(Path(folder, f"{name}.nc"))
-        return [p.read_bytes() for p in sorted(Path(folder).iterdir())]
+        sealed = [p.read_bytes() for p in sorted(Path(folder).iterdir())]
+        return [*sealed, *sealed, sealed[0][:-SEAL]]
 
 
 @st.composite
@@ -84,7 +92,8 @@ def check_result(data):
     """``examine_file`` in a process of its own.
 
     Raises:
-        AssertionError: it failed there; holds the traceback.
+        AssertionError: it failed there; holds the traceback. Or a sealed file was read though it is
+            damaged, or came to the library.
     """
     with file_of(data, "run.nc") as path:
         receive, send = os.pipe()
@@ -100,12 +109,12 @@ def check_result(data):
                 os.kill(child, signal.SIGKILL)
             answer = stream.read()
         _, status = os.waitpid(child, 0)
-    if is_stuck:
-        return STUCK
-    if os.WIFSIGNALED(status) and os.WTERMSIG(status) in _CRASHES:
-        return CRASHED
+    if is_stuck or (os.WIFSIGNALED(status) and os.WTERMSIG(status) in _CRASHES):
+        assert not is_sealed(data)
+        return STUCK if is_stuck else CRASHED
     good, words = pickle.loads(answer) if answer else (False, f"the child ended with {status}")
     assert good, words
+    assert words == "refused" or not is_sealed(data) or data in good_files()
     return words
 
 

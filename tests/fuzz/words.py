@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from hypothesis import strategies as st
+from support.falling import SCENE
 from support.process import REPOSITORY
 
 import dap3d_core as dap
@@ -77,18 +78,6 @@ def check_quantity(data):
 
 # ---------------------------------------------------------------------------- command lines
 
-SCENE = """\
-[scene]
-name = "fall"
-[bodies.stone]
-mass = 2.0
-Jp = [0.1, 0.1, 0.1]
-[forces.gravity]
-type = "weight"
-[simulation]
-t_end = 0.1
-dt = 0.01
-"""
 COMMANDS = ("run", "run", "run", "check", "check", "plot", "post", "info", "models", "plugins",
             "describe",
             "import-matlab", "resume", "animate", "new-plugin", "", "--help", "Run",

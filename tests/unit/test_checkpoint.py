@@ -3,11 +3,11 @@
 import math
 import shutil
 import zipfile
-from importlib import import_module
 
 import numpy as np
 import pytest
 from support import mechanisms, problems
+from support.ended import EndedError, ended_at, leave, shorten_chunks
 from unit.test_result_files import same_bits
 
 import dap3d_core as dap
@@ -20,12 +20,6 @@ from dap3d_core.simulation.checkpoint import (
     read_checkpoint,
     write_checkpoint,
 )
-
-RUN = import_module("dap3d_core.simulation.run")
-
-
-class EndedError(Exception):
-    """What ends a run here."""
 
 
 def wheel():
@@ -95,32 +89,10 @@ def settings_of(settings):
     return given | ({"events": given["events"]()} if "events" in given else {})
 
 
-def ended_at(t):
-    """Watches a run and ends it at t."""
-
-    def watch(standing):
-        if standing.t >= t:
-            raise EndedError
-
-    return watch
-
-
-def leave(scene, folder, t, **settings):
-    """End a run at t; its checkpoint."""
-    with pytest.raises(EndedError) as caught:
-        dap.simulate(
-            scene, output=folder / "run.nc", watch=ended_at(t), checkpoint=math.inf, **settings
-        )
-    assert caught.value.checkpoint == folder / "run.nc.checkpoint"
-    assert 0.0 < caught.value.result.t[-1] <= settings["t_end"]
-    return caught.value.checkpoint
-
-
 @pytest.fixture(autouse=True)
 def short_chunks(monkeypatch):
     """As many chunks as there are steps."""
-    monkeypatch.setattr(RUN, "CHUNK_SECONDS", 1e-9)
-    monkeypatch.setattr(RUN, "FIRST_CHUNK", 1)
+    shorten_chunks(monkeypatch)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -163,7 +135,7 @@ def test_the_model_s_own_types_are_resumed_where_they_are_allowed(tmp_path):
     folder = shutil.copytree(dap.shipped_models()["ball1"], tmp_path / "ball1")
     settings = {"t_end": 0.8, "dt": 0.02, "allow_code": True}
     whole = dap.simulate(folder, **settings)
-    checkpoint = leave(folder, tmp_path, 0.3, **settings)
+    checkpoint = leave(folder, tmp_path, 0.45, **settings)  # the ball has met the floor
     with pytest.raises(CheckpointError, match=r"ball-contact.*--model FOLDER --allow-code"):
         dap.resume(checkpoint)
     text = (folder / "plugin.py").read_text()
@@ -171,7 +143,10 @@ def test_the_model_s_own_types_are_resumed_where_they_are_allowed(tmp_path):
     with pytest.raises(CheckpointError, match=r"formulas of force ball-contact have changed"):
         dap.resume(checkpoint, model=folder, allow_code=True)
     (folder / "plugin.py").write_text(text)
-    assert same_bits(dap.resume(checkpoint, model=folder, allow_code=True), whole)
+    found = dap.resume(checkpoint, model=folder, allow_code=True)
+    assert same_bits(found, whole)
+    assert found.events == whole.events
+    assert [event.t > 0.45 for event in whole.events] == [False, True]
 
 
 # ------------------------------------------------------------------ when they are written
@@ -280,8 +255,7 @@ def left(tmp_path_factory):
     """A folder with a run that was ended."""
     folder = tmp_path_factory.mktemp("left")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(RUN, "CHUNK_SECONDS", 1e-9)
-        patch.setattr(RUN, "FIRST_CHUNK", 1)
+        shorten_chunks(patch)
         leave(problems.pendulum(), folder, 0.3, **SHORT)
     return folder
 
@@ -378,7 +352,7 @@ def test_a_type_that_is_not_installed_is_told(copied):
 
 def test_another_model_is_refused(copied):
     found = read_checkpoint(copied)
-    arrays = {n: a for n, a in found.arrays.items() if n != "system.body"}
+    arrays = {n: a for n, a in found.arrays.items() if n != "system.par"}
     write_checkpoint(copied, Checkpoint(found.header, arrays))
     refused(copied, "its scene gives another model here")
 

@@ -317,7 +317,9 @@ def test_a_file_cut_off_anywhere_is_refused(tmp_path, kept):
     data = (tmp_path / "run.nc").read_bytes()
     size = int(kept * len(data)) if isinstance(kept, float) else kept
     (tmp_path / "cut.nc").write_bytes(data[:size])
-    with pytest.raises(ResultError, match=r"cannot read .*cut\.nc: it is damaged, cut off"):
+    with pytest.raises(
+        ResultError, match=r"cannot read .*cut\.nc: it is cut off.* bytes are there"
+    ):
         open_result(tmp_path / "cut.nc")
 
 

@@ -96,6 +96,13 @@ class System(LoopArrays):
     halves: Any  # Halves of a large scene, else None: nothing reads it then
 
 
+#: What a run changes and goes on from: ``par`` holds the turns of angles and the numbers that an
+#: event has set, ``settings`` a count. All else is constant, found at the start of a run
+#: (``smallest``), or scratch: a right-hand side, projection, report or stage writes what it reads,
+#: factors too. A projection may use those of the right-hand side before it: both are of one step.
+#: No iteration begins with what another left, so that equal states have equal rates.
+KEPT = ("par", "settings")
+
 STEP = step_signature(System.type_of())
 STEP_TYPE = function_type(STEP)
 

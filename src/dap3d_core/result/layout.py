@@ -1,11 +1,12 @@
 """How a result lies in a NetCDF-4 file: dimensions, variables with units, attributes."""
 
+import os
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import attrs
 import numpy as np
 
-from dap3d_core.result.arrays import COLUMNS, Arrays, column_sizes
+from dap3d_core.result.arrays import COLUMNS, Arrays, Column, column_sizes
 from dap3d_core.result.estimate import U_ERROR
 from dap3d_core.result.kinds import AXES, EULER
 from dap3d_core.result.occurrence import Occurrence
@@ -100,18 +101,19 @@ def record_of(found: dict[str, Any]) -> Record:
 
 def define(
     dataset: Any, subject: "Subject", record: Record, nt: int, *, with_error: bool = False
-) -> None:
+) -> int:
     """Define everything in a new file and write all but the rows.
 
-    Each variable lies in one piece whose place is fixed here: writing rows changes nothing else of
-    the file, so that a writer may be killed at any moment. What was not written is zero, and takes
-    no room on a disk.
+    Each variable lies in one piece, its rows behind all else.
 
     Args:
         dataset: a netCDF4.Dataset, empty.
         subject, record: what the file is about.
         nt: number of reported instants there is room for.
         with_error: whether an estimate of the error of u comes, too.
+
+    Returns:
+        Where the rows begin, in bytes: what lies before says what the file is.
     """
     length = sizes(subject)
     dataset.createDimension("time", nt or None)
@@ -135,19 +137,33 @@ def define(
             _describe(variable, constant.unit, constant.meaning)
             variable[:] = values
     for column in (*COLUMNS, U_ERROR) if with_error else COLUMNS:
-        count = length[column.dimension] if column.dimension else 1
-        if count:
-            dimensions = ("time", column.dimension) if column.dimension else ("time",)
-            storage: dict[str, Any] = {"contiguous": True} if nt else {}
-            variable = dataset.createVariable(
-                column.name, "f8", dimensions, fill_value=False, **storage
-            )
-            if nt:
-                variable[nt - 1] = 0.0  # takes its place in the file
-            _describe(variable, column.unit, column.meaning)
-            if column.name != "t":
-                variable.setncattr_string("coordinates", "t")
+        if length.get(column.dimension, 1):
+            _column(dataset, column, length, nt)
     write_attributes(dataset, attributes(subject, record))
+    dataset.sync()
+    return os.path.getsize(dataset.filepath())
+
+
+def take_places(dataset: Any) -> None:
+    """Give the rows of a file that was defined their places in it.
+
+    Writing rows changes nothing else of the file from now on, so that a writer may be killed at any
+    moment. What was not written is zero, and takes no room on a disk.
+    """
+    nt = len(dataset.dimensions["time"])
+    for column in (*COLUMNS, U_ERROR):
+        if nt and column.name in dataset.variables:
+            dataset.variables[column.name][nt - 1] = 0.0
+
+
+def _column(dataset: Any, column: Column, length: dict[str, int], nt: int) -> None:
+    """The variable of a column, its rows to come."""
+    dimensions = ("time", column.dimension) if column.dimension else ("time",)
+    storage: dict[str, Any] = {"contiguous": True} if nt else {}
+    variable = dataset.createVariable(column.name, "f8", dimensions, fill_value=False, **storage)
+    _describe(variable, column.unit, column.meaning)
+    if column.name != "t":
+        variable.setncattr_string("coordinates", "t")
 
 
 def write_attributes(dataset: Any, found: dict[str, Any]) -> None:

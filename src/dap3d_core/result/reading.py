@@ -18,6 +18,7 @@ from dap3d_core.result.netcdf import NETCDF
 from dap3d_core.result.on_file import LARGE, FileArrays
 from dap3d_core.result.record import RUNNING, Record
 from dap3d_core.result.result import Rebuild, Result
+from dap3d_core.result.seal import check_seal
 from dap3d_core.result.subject import Subject
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -43,6 +44,7 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
     """
     file = Path(path)
     _check_signature(file)
+    check_seal(file)
     with NETCDF:
         import netCDF4
 

@@ -5,16 +5,17 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import attrs
 
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.files import check_target, named_part, reserve, synchronise, whole_file
-from dap3d_core.result.layout import define, write_rows, write_times
+from dap3d_core.result.layout import define, take_places, write_rows, write_times
 from dap3d_core.result.netcdf import NETCDF, guarded
 from dap3d_core.result.record import RUNNING, Record
+from dap3d_core.result.seal import write_seal
 
 if TYPE_CHECKING:
     from dap3d_core.result.result import Result
@@ -29,28 +30,30 @@ def save(result: "Result", path: str | os.PathLike[str], force: bool = False) ->
     """
     arrays = result.arrays
     with whole_file(path, force) as part, NETCDF:
-        dataset = guarded(Path(path), lambda: _create(part))
+        dataset = guarded(Path(path), lambda: _opened(part))
 
-        def write() -> None:
+        def write() -> int:
             nt = len(arrays)
-            define(dataset, result.subject, result.record, nt, with_error=arrays.has_error)
+            rows = define(dataset, result.subject, result.record, nt, with_error=arrays.has_error)
             first = 0
             for block in arrays.blocks():
                 write_rows(dataset, block, first)
                 write_times(dataset, block, first)
                 first += len(block)
+            return rows
 
         try:
-            guarded(Path(path), write)
+            rows = guarded(Path(path), write)
         finally:
             guarded(Path(path), dataset.close)
+        guarded(Path(path), lambda: write_seal(part, rows, is_whole=True))
 
 
 class ResultWriter:
     """A result file that grows with the run: a killed run leaves what it had reported.
 
-    Its places are fixed from the start (layout.define), so that it is whole at any moment. As a
-    context manager it closes the file at the end of the block.
+    Its places are fixed from the start (layout.take_places), so that it is whole at any moment. As
+    a context manager it closes the file at the end of the block.
 
     Attributes:
         path: the result file that is wanted in the end, which ``save`` makes.
@@ -86,8 +89,13 @@ class ResultWriter:
         started = attrs.evolve(record, status=RUNNING)
         try:
             with NETCDF:
-                self._dataset = guarded(self.path, lambda: _create(self.part))
-                self._do(lambda: define(self._dataset, subject, started, most), self._sync)
+                self._dataset = guarded(self.path, lambda: _opened(self.part))
+                rows = self._do(lambda: define(self._dataset, subject, started, most))
+                self.leave()  # what describes the file lies before the rows and is not shared
+                self._dataset = guarded(self.path, lambda: _opened(self.part, "r+"))
+                self._do(lambda: take_places(self._dataset), self._sync)
+                if most:
+                    guarded(self.path, lambda: write_seal(self.part, rows, is_whole=False))
             self.part = named_part(self.part, self.path)
         except BaseException:
             self.discard()
@@ -149,13 +157,13 @@ class ResultWriter:
     def _sync(self) -> None:
         self._dataset.sync()
 
-    def _do(self, *actions: Callable[[], object]) -> None:
+    def _do(self, *actions: Callable[[], object]) -> Any:
         if self._dataset is None:
             raise ResultError(f"cannot write {self.path}: the writer is closed")
-        guarded(self.part, *actions)
+        return guarded(self.part, *actions)
 
 
-def _create(path: Path) -> Any:
+def _opened(path: Path, mode: Literal["w", "r+"] = "w") -> Any:
     import netCDF4
 
-    return netCDF4.Dataset(os.path.abspath(path), "w", format="NETCDF4")
+    return netCDF4.Dataset(os.path.abspath(path), mode, format="NETCDF4")

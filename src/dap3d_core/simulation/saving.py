@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.machine import Machine
+from dap3d_core.assembly.system import KEPT
 from dap3d_core.kernels.cache import driver_digest
 from dap3d_core.result import Result, ResultError, open_result
 from dap3d_core.result.record import to_json
@@ -21,13 +21,6 @@ from dap3d_core.simulation.checkpoint import Checkpoint, path_of, write_checkpoi
 if TYPE_CHECKING:
     from dap3d_core.simulation.compiled import CompiledModel
     from dap3d_core.simulation.run import Run
-
-#: Arrays of the system that a run changes and goes on from. The others are scratch of one right-
-#: hand side, or constant; but a projection may use what the last one left.
-CHANGING = (
-    "body", "F", "par", "force", "gamma", "nu", "C", "x", "D", "K", "smallest", "settings",
-    "friction",
-)  # fmt: skip
 
 
 class Saver:
@@ -146,15 +139,8 @@ def arrays_of(run: "Run") -> Iterator[tuple[str, NDArray[Any]]]:
     for k, integration in enumerate(run.runs):
         for name, array in integration.all_arrays():
             yield f"{k}.{name}", array
-    yield from system_arrays(run.machine)
-
-
-def system_arrays(machine: Machine) -> Iterator[tuple[str, NDArray[Any]]]:
-    """The arrays of a model that a run changes."""
-    for name in CHANGING:
-        yield f"system.{name}", getattr(machine.system, name)
-    if machine.system.halves is not None:
-        yield "system.halves", machine.system.halves.numbers
+    for name in KEPT:
+        yield f"system.{name}", getattr(run.machine.system, name)
 
 
 def digests_of(compiled: "CompiledModel") -> dict[str, str]:

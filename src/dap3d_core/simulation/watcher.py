@@ -12,6 +12,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.assembly.system import KEPT
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.result.occurrence import Occurrence
 from dap3d_core.simulation.compiled import CompiledModel
@@ -91,8 +92,8 @@ class Watcher:
 
     def _arrays(self, integration: Integration) -> list[Any]:
         """All that a step changes."""
-        s = self.compiled.machine.system
-        return [*integration.state_arrays(), s.par, s.x, s.friction, s.settings]
+        system = self.compiled.machine.system
+        return [*integration.state_arrays(), *(getattr(system, name) for name in KEPT)]
 
     def _instant(self, integration: Integration) -> Instant:
         return Instant(self.compiled, integration.t, integration.y, self.numbers)

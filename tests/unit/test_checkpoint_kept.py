@@ -1,0 +1,113 @@
+"""What a checkpoint holds matters: runs that are ended where the next step reads it."""
+
+from importlib import import_module
+
+import numpy as np
+import pytest
+from support import mechanisms, problems
+from support.ended import leave, shorten_chunks
+from unit.test_result_files import same_bits
+
+import dap3d_core as dap
+from dap3d_core.integrators.radau_work import H_FACTORED, TANGENT_NEEDED
+from dap3d_core.integrators.work import H
+from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.simulation.checkpoint import read_checkpoint
+
+RUN = import_module("dap3d_core.simulation.run")
+
+
+@pytest.fixture(autouse=True)
+def short_chunks(monkeypatch):
+    shorten_chunks(monkeypatch)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "adams", "radau"])
+def test_rows_that_wait_for_room_come_after_it(integrator, tmp_path, monkeypatch):
+    """A row fills the buffer: the others of the step are interpolated when it goes on."""
+    if integrator != "dop853" and not jit_is_on():
+        pytest.skip("takes long in plain Python")
+    monkeypatch.setattr(RUN, "BUFFER_NUMBERS", 1)
+    settings = {"t_end": 1.0, "dt": 0.002, "integrator": integrator}
+    whole = dap.simulate(problems.pendulum(), **settings)
+    checkpoint = leave(problems.pendulum(), tmp_path, 0.5, **settings)
+    header = read_checkpoint(checkpoint).header
+    assert header["t"] > 0.002 * header["rows"]  # the next row lies in the step that is done
+    assert same_bits(dap.resume(checkpoint), whole)
+
+
+def tumbling():
+    return problems.free_body((1.0, 2.0, 3.0), (0.01, 0.5, 0.02))
+
+
+@pytest.mark.skipif(not jit_is_on(), reason="takes long in plain Python")
+@pytest.mark.parametrize(
+    ("make", "t", "has_factors"),
+    [
+        (problems.pendulum, 1.16, True),
+        (problems.pendulum, 1.21, False),
+        (tumbling, 14.7, False),
+        (tumbling, 14.75, True),
+        (mechanisms.door, 0.2, False),  # its rows are regularised
+    ],
+)
+def test_a_tangent_that_is_kept_for_the_next_step(make, t, has_factors, tmp_path):
+    """It converged so fast; its factors are kept as well where the step stays as long."""
+    settings = {"t_end": t + 1.0, "dt": 0.2, "integrator": "radau"}
+    whole = dap.simulate(make(), **settings)
+    checkpoint = leave(make(), tmp_path, t, **settings)
+    arrays = read_checkpoint(checkpoint).arrays
+    assert arrays["0.integer"][TANGENT_NEEDED] == 0
+    assert (arrays["0.own"][H_FACTORED] == arrays["0.real"][H]) == has_factors
+    assert same_bits(dap.resume(checkpoint), whole)
+
+
+def paradox():
+    """A light leaning disk that slides towards its contact: no load of it is in balance.
+
+    Painleve's paradox, as in verification/test_friction.py.
+    """
+    lean, radius, J = np.pi / 4, 0.5, 0.005
+    scene = dap.Scene(name="paradox")
+    p = (np.cos(lean / 2), np.sin(lean / 2), 0.0, 0.0)
+    scene.add_body("disk", mass=1.0, Jp=(J, J, J), p=p, r=(0.0, 0.0, radius * np.cos(lean)),
+                   r_dot=(0.0, 1.0, 0.0))  # fmt: skip
+    scene.add_joint("disk", "contact", body_i="disk", slip="z", radius=radius)
+    scene.add_force("weight")
+    scene.add_force("friction", joint="contact", mu=3.0)
+    return scene
+
+
+def test_what_was_counted_before_is_told_at_the_end(tmp_path):
+    """Multipliers did not settle with friction, before the run was ended and after."""
+    settings = {"t_end": 0.02, "dt": 0.005, "integrator": "rk4", "step": 0.001}
+    whole = dap.simulate(paradox(), **settings)
+    found = dap.resume(leave(paradox(), tmp_path, 0.01, **settings))
+    told = [note for note in whole.notes if "did not settle" in note]
+    assert len(told) == 1
+    assert told[0] in found.notes
+    assert same_bits(found, whole)
+
+
+@pytest.mark.skipif(not jit_is_on(), reason="takes long in plain Python")
+@pytest.mark.parametrize("method", ["auto", "lsq", "penalty"])
+@pytest.mark.parametrize("make", [problems.four_bar, mechanisms.door, lambda: dap.load("A02-1")])
+def test_no_function_reads_what_another_has_left(make, method):
+    """Of the model's arrays a checkpoint holds those alone that functions do not write anew."""
+    compiled = dap.compile(make(), method=method)
+    machine, u = compiled.machine, compiled.model.u0
+    machine.watch_pivots(0.0, u)
+    machine.start(0.0, u)
+    y, rng = machine.integrated(u), np.random.default_rng(1)
+    sizes = (y.size, 4 + machine.length_count, machine.report_size)  # of rhs, project, report
+
+    def call(k, state, t):
+        out, state = np.zeros(sizes[k]), state.copy()
+        machine.functions[k](t, state, out, machine.system, machine.loops)
+        return out.tobytes() + state.tobytes()
+
+    for k in range(3):
+        first = call(k, y, 0.1)
+        for other in range(3):
+            call(other, y + 1e-3 * rng.standard_normal(y.size), 0.3)
+            assert call(k, y, 0.1) == first
