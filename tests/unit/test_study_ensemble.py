@@ -43,10 +43,11 @@ def singly(of, points):
     return {name: np.array(values) for name, values in found.items()}
 
 
-def pendulum(**body):
+def pendulum():
+    """A bob below its pivot, swinging and spinning."""
     scene = dap.Scene(name="pendulum")
-    given = {"mass": 2.0, "Jp": (0.1, 0.2, 0.15), "r": (0.0, -1.0, 0.0), **body}
-    scene.add_body("bob", **given)
+    motion = {"w": (1.0, 2.0, 3.0), "r_dot": (3.0, 0.0, -1.0)}
+    scene.add_body("bob", mass=2.0, Jp=(0.1, 0.2, 0.15), r=(0.0, -1.0, 0.0), **motion)
     scene.add_point("A", "bob", (0.0, 1.0, 0.0))
     scene.add_joint("sph", "pivot", P_i="A", P_j="ground.O")
     scene.add_force("weight", "gravity", gravity=9.81, wgt=(0.0, -1.0, 0.0))
@@ -88,6 +89,8 @@ CASES = {
         {"integrator": "rk4", "step": 0.01}, "copied"),
     "implicit": (
         pendulum, "bodies.bob.mass", (1.0, 2.0), "bob.r.x", {"integrator": "radau"}, "alone"),
+    "until it is stiff": (
+        pendulum, "bodies.bob.mass", (1.0, 2.0), "bob.r.x", {"integrator": "auto"}, "copied"),
     "tolerance": (pendulum, "simulation.rtol", (1e-6, 1e-9), "bob.r.x", {}, "alone"),
 }  # fmt: skip
 

@@ -20,6 +20,7 @@ from dap3d_core.integrators.work import (
     CUT,
     CUTS,
     ERROR_OLD,
+    FINISHED,
     FRESH,
     LAST_REJECTED,
     LIMIT,
@@ -45,8 +46,10 @@ from dap3d_core.study.starting import LEAST, OPEN, STARTING
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Places in ``at``: the point that is to be run, whether it has begun, how to start.
+# Places in ``at``: the point that is to be run, whether it has begun, how to start: as it stands,
+# corrected, or corrected and no more.
 POINT, BEGUN, ASSEMBLES, PLACES = range(4)
+AS_IT_STANDS, CORRECTED, ALONE = range(3)
 # Columns of ``found`` behind those of the start: status, rows, steps, right-hand sides, how often
 # friction did not settle.
 ENDED, ROWS, TAKEN, CALLS, LOOSE, COLUMNS = range(STARTING, STARTING + 6)
@@ -213,6 +216,10 @@ def run_points(
         if at[BEGUN] == 0:
             if not start(points, p, work, starting, system, loops):
                 found[p, ENDED] = NO_START
+                at[POINT] += 1
+                continue
+            if at[ASSEMBLES] == ALONE:
+                found[p, ENDED] = FINISHED
                 at[POINT] += 1
                 continue
             at[BEGUN] = 1

@@ -130,7 +130,7 @@ class Lanes:
         k, n = len(states), 7 * self._n
         parts = (states[..., :n], states[..., n:-1])
         work = np.zeros((k, 1))
-        return np.hstack([*(part.reshape(k, -1) for part in parts), work])
+        return np.hstack([*(part.reshape(k, self.count * part.shape[-1]) for part in parts), work])
 
     def rows_of(self, rows: Floats) -> Floats:
         """(k, count, nt, width) rows of the single copies, of (k, nt, width of many).

@@ -75,6 +75,19 @@ class Reduction:
             found[output.name] = REDUCTIONS[output.reduction](values, times)
         return found
 
+    @property
+    def is_of_single_copies(self) -> bool:
+        """Whether all outputs can be had of the rows of a pack, where what all share is NaN."""
+        if not all(self.of_rows.values()):
+            return False
+        model = self._compiled.model
+        machine, n, m = self._compiled.machine, model.body_count, model.row_count
+        rows = np.random.default_rng(0).random((1, 3, 2 + 19 * n + m + 4))
+        rows[..., 1 + 13 * n] = rows[..., -4:] = np.nan
+        assert rows.shape[-1] == 2 + 13 * n + machine.report_size
+        found = self.reduce(rows, np.arange(3.0))
+        return all(bool(np.all(np.isfinite(values))) for values in found.values())
+
     def result(self, model: Model, rows: Floats, machine_of: Callable[[], Machine]) -> Result:
         """A result of rows, in memory."""
         record = Record(scene_text=self._compiled.scene_text)

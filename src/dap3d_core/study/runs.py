@@ -22,6 +22,7 @@ from dap3d_core.kernels.lists import (
     procedure_signature,
 )
 from dap3d_core.scene import Simulation
+from dap3d_core.simulation.implicit import EXPLICIT
 from dap3d_core.simulation.initial import model_size
 from dap3d_core.study import many as at
 from dap3d_core.study import starting
@@ -73,20 +74,23 @@ class Runs:
     ) -> None:
         """Args:
         machine: what evaluates the model; its numbers change.
-        settings: of the runs; the integrator is one of ``METHODS``.
+        settings: of the runs; the integrator is one of ``METHODS``, or "auto": a run that turns
+            out stiff is then not done.
         times: (nt,) reporting times.
         stops: times that no step goes over, and whether something jumps there.
         """
         self.machine = machine
         y0 = machine.integrated(machine.model.u0)
+        tries = settings.integrator == "auto"
         self.integration = Integration(
-            METHODS[str(settings.integrator)],
+            METHODS[EXPLICIT if tries else str(settings.integrator)],
             machine.functions,
             machine.system,
             machine.loops,
             y0,
             times,
             buffer_rows=len(times),
+            leave_stiff=tries and machine.method != "penalty",  # as Run does
             **run_options(machine, settings),
         )
         self.stops = np.array(stops, dtype=float).reshape(-1, 2)
@@ -105,19 +109,22 @@ class Runs:
         without = np.flatnonzero(~machine.model.position_row)
         self._told[starting.STARTING + machine.system.row[without]] = 1.0
 
-    def run(self, table: Floats, places: Integers, y0: Floats, *, assembles: bool) -> Found:
+    def run(
+        self, table: Floats, places: Integers, y0: Floats, start: int = at.AS_IT_STANDS
+    ) -> Found:
         """Run k points.
 
         Args:
             table: (k, w) numbers that differ from the model's.
             places: (w,) where they belong: in par, body and metric, one behind the other.
-            y0: (k, n) states to start from; with ``assembles`` they are corrected first.
+            y0: (k, n) states to start from.
+            start: AS_IT_STANDS, CORRECTED first, or that ALONE (many.py).
         """
         work, count = self.integration.work, len(table)
         nt, width = work.rows.shape
         found = np.zeros((count, at.COLUMNS))
         points = Points(
-            at=np.array([0, 0, bool(assembles)], dtype=np.int64),
+            at=np.array([0, 0, start], dtype=np.int64),
             places=np.ascontiguousarray(places, dtype=np.int64),
             table=np.ascontiguousarray(table, dtype=float),
             y0=np.array(y0, dtype=float),
@@ -135,7 +142,7 @@ class Runs:
             with np.errstate(all="ignore"):
                 run_points(points, work, *problem, system, loops, CALL)
         rows = points.rows.reshape(count, nt, width)
-        done = (found[:, at.ENDED] == Status.FINISHED) & (found[:, at.ROWS] == nt)
+        done = found[:, at.ENDED] == Status.FINISHED
         return Found(done, rows, y0, points.y0, found)
 
 

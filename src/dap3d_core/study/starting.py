@@ -28,6 +28,7 @@ from dap3d_core.formulations.constraints import (
 from dap3d_core.formulations.machine import REDUNDANT
 from dap3d_core.formulations.moves import change_velocity, move
 from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
+from dap3d_core.kernels.gather import A, W
 from dap3d_core.linear.blocks import POOR, assemble, factor
 from dap3d_core.linear.rank import PIVOT_TOLERANCE
 from dap3d_core.simulation.initial import FIT, MOST_PASSES, MOST_SHIFT, MOST_TURN, TOLERANCE
@@ -112,6 +113,23 @@ def shorten(system: System, longest_shift: float) -> float:
     return part
 
 
+@compiled_inside
+def place_with_spin(y: Floats, system: System) -> None:
+    """Place bodies that were turned; their angular velocities stay as they are in global axes."""
+    body, first = system.body, 7 * (system.body.shape[0] - 1)
+    for b in range(1, body.shape[0]):
+        o = first + 6 * (b - 1) + 3
+        for c in range(3):
+            y[o + c] = body[b, W + c]
+    place_bodies(y, body, system.metric)
+    for b in range(1, body.shape[0]):
+        o, s = first + 6 * (b - 1) + 3, body[b]
+        w0, w1, w2 = y[o], y[o + 1], y[o + 2]
+        for c in range(3):
+            y[o + c] = s[A + c] * w0 + s[A + 3 + c] * w1 + s[A + 6 + c] * w2
+    place_bodies(y, body, system.metric)
+
+
 @compiled
 def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Bring a state onto its constraints, in the metric that stands in the system: unit.
@@ -139,7 +157,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         correct(system)
         shorten(system, MOST_SHIFT * size)
         move(y, system.metric, system.force)
-        place_bodies(y, system.body, system.metric)
+        place_with_spin(y, system)
         out[NEWTON] += 1.0
     out[C_AFTER] = worst
     linearise(t, system, loops)

@@ -12,6 +12,7 @@ from dap3d_core.simulation.initial import ROUNDING, Initial, correction_notes, d
 from dap3d_core.simulation.start import Start
 from dap3d_core.study import many, starting
 from dap3d_core.study.modelling import Modelling
+from dap3d_core.study.packs import Packs, packs_for
 from dap3d_core.study.places import NotCopiedError, Places
 from dap3d_core.study.runs import Found, Runs
 
@@ -55,10 +56,12 @@ class Together:
         self._runs = Runs(machine, settings, ensemble.times, compiled.pace(end).stops)
         self._size = self._runs.size
         self._places: Places | None = None
+        self._packs: Packs | None = None
         with contextlib.suppress(NotCopiedError):
             places = Places(compiled.checked, machine, ensemble.numbers)
             if not places.moves_start or self._assembles_simply():
                 self._places = places
+                self._packs = packs_for(ensemble, machine)
 
     def run(self, values: Floats, batch: "Batch", part: slice, notes: list[str]) -> None:
         """Run points (k, d): the outputs of those that go to their end into a part of a batch."""
@@ -83,13 +86,30 @@ class Together:
             y0 = self._places.states(values[which], model.u0)
         else:
             y0 = np.repeat(self._runs.machine.integrated(self._start.u)[None], len(which), axis=0)
-        table = table[which]
-        found = self._runs.run(
-            table, self._places.places, y0, assembles=moves and model.row_count > 0
-        )
+        table, places = table[which], self._places.places
+        start = many.CORRECTED if moves and model.row_count else many.AS_IT_STANDS
+        found = self._run_in_packs(table, places, y0, start)
         if self._places.moves:
             found.done[self._places.are_undefined(table, found.y0)] = False
         return which, found
+
+    def _run_in_packs(self, table: Floats, places: Integers, y0: Floats, start: int) -> Found:
+        """Runs of points whose numbers have their places; in packs, where that was asked for."""
+        if self._packs is None:
+            return self._runs.run(table, places, y0, start)
+        first = None
+        if start == many.CORRECTED:
+            first = self._runs.run(table, places, y0, many.ALONE)
+            y0 = np.where(first.done[:, None], first.y0, y0)
+        found = self._packs.run(table, places, y0)
+        if first is not None:
+            found = found._replace(given=first.given, numbers=first.numbers)
+            found.done[:] &= first.done
+        rest = np.flatnonzero(~found.done)
+        singly = self._runs.run(table[rest], places, found.given[rest], start)
+        for all_of_them, of_rest in zip(found, singly, strict=True):
+            all_of_them[rest] = of_rest
+        return found
 
     def _run_modelled(self, values: Floats, notes: list[str], first: int) -> tuple[Integers, Found]:
         """Points each of which has a model of its own."""
@@ -104,9 +124,7 @@ class Together:
         places, size = self._modelling.places, self._ensemble.compiled.model.u0.size + 1
         numbers = np.array(table).reshape(-1, len(places))
         states = np.array(y0).reshape(-1, size)
-        return np.array(which, dtype=np.int64), self._runs.run(
-            numbers, places, states, assembles=False
-        )
+        return np.array(which, dtype=np.int64), self._runs.run(numbers, places, states)
 
     def _keep(
         self, values: Floats, which: Integers, rows: Floats, batch: "Batch", first: int
