@@ -93,6 +93,12 @@ class Model:
         coordinates = np.hstack([self.r, self.p]).ravel()
         return read_only(np.concatenate([coordinates, np.hstack([self.v, self.w]).ravel()]))
 
+    @cached_property
+    def size(self) -> float:
+        """A length of the model, m: its extent, or one metre where it has none."""
+        points = np.vstack([self.r, self.point_local])
+        return float(np.max(np.abs(points), initial=0.0)) or 1.0
+
     def row_owner(self, row: int) -> str:
         """Name of the joint that a constraint row belongs to."""
         return self.joint_names[int(np.searchsorted(self.joint_start, row, side="right")) - 1]

@@ -123,7 +123,7 @@ def correct_initial(
         velocities = u[7 * machine.model.body_count :]
         velocities -= least_change(machine, rows, residual, t, None, metric)
     moved, turned = distance(start, u, machine.model.body_count)
-    return Initial(u, before, violation(machine, u, t), passes, moved, turned)
+    return Initial(u, before, violation(machine, u, t), passes, float(moved), float(turned))
 
 
 def correction_notes(initial: Initial, machine: Machine, scene: Scene) -> list[str]:
@@ -273,16 +273,17 @@ def displaced(u: Floats, change: Floats, n: int) -> Floats:
     return join(r + change[:, :3], p / np.linalg.norm(p, axis=1, keepdims=True), v, w)
 
 
-def distance(u: Floats, other: Floats, n: int) -> tuple[float, float]:
-    """Largest displacement, m, and rotation, rad, of a body between two states (13 n,)."""
+def distance(u: Floats, other: Floats, n: int) -> tuple[Floats, Floats]:
+    """Largest displacement, m, and rotation, rad, of a body between states (..., 13 n or more)."""
     r, p, _, _ = split(u, n)
     s, q, _, _ = split(other, n)
-    cosine = np.clip(np.abs(np.sum(p * q, axis=1)), 0.0, 1.0)
-    sine = np.linalg.norm(p - np.sign(np.sum(p * q, axis=1))[:, None] * q, axis=1)
+    cosine = np.sum(p * q, axis=-1)
+    sine = np.linalg.norm(p - np.sign(cosine)[..., None] * q, axis=-1)
+    cosine = np.clip(np.abs(cosine), 0.0, 1.0)
     small, large = 4.0 * np.arcsin(np.clip(sine / 2.0, 0, 1)), 2.0 * np.arccos(cosine)
     angle = np.where(cosine > 0.9, small, large)
-    shift = np.linalg.norm(r - s, axis=1)
-    return float(np.max(shift, initial=0.0)), float(np.max(angle, initial=0.0))
+    shift = np.linalg.norm(r - s, axis=-1)
+    return np.max(shift, axis=-1, initial=0.0), np.max(angle, axis=-1, initial=0.0)
 
 
 def _velocity_residual(rows: Rows, u: Floats) -> Floats:
@@ -291,9 +292,8 @@ def _velocity_residual(rows: Rows, u: Floats) -> Floats:
 
 
 def model_size(machine: Machine) -> float:
-    """A length of the model: its extent, or one metre where it has none."""
-    points = np.vstack([machine.model.r, machine.model.point_local])
-    return float(np.max(np.abs(points), initial=0.0)) or 1.0
+    """A length of the model, m."""
+    return machine.model.size
 
 
 def _largest(values: Floats) -> float:

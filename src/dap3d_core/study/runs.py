@@ -63,6 +63,8 @@ class Runs:
     Attributes:
         machine: what evaluates the model.
         size: a length of the model, m.
+        first: the work of the integration as it is before a run, by name.
+        last_start: (n,) the state that the last run started from.
     """
 
     def __init__(
@@ -96,7 +98,7 @@ class Runs:
         self.stops = np.array(stops, dtype=float).reshape(-1, 2)
         self._metric = machine.system.metric.copy()
         work = self.integration.work
-        self._first: dict[str, Any] = {
+        self.first: dict[str, Any] = {
             "first_real": work.real.copy(),
             "first_integer": work.integer.copy(),
             "first_switches": work.switches.copy(),
@@ -104,6 +106,7 @@ class Runs:
         }
         self._starting = _starting(machine.method)
         self.size = model_size(machine)
+        self.last_start = y0
         self._told = np.zeros(starting.STARTING + machine.plan.row_size)
         self._told[starting.SIZE] = self.size
         without = np.flatnonzero(~machine.model.position_row)
@@ -134,13 +137,15 @@ class Runs:
             starting=self._told,
             rows=np.empty((count * nt, width)),
             found=found,
-            **self._first,
+            **self.first,
         )
         problem = (self.machine.functions, _drives(), self._starting)
         system, loops = self.machine.system, self.machine.loops
         while points.at[at.POINT] < count:
             with np.errstate(all="ignore"):
                 run_points(points, work, *problem, system, loops, CALL)
+        if count:
+            self.last_start = points.y0[-1]
         rows = points.rows.reshape(count, nt, width)
         done = found[:, at.ENDED] == Status.FINISHED
         return Found(done, rows, y0, points.y0, found)

@@ -150,16 +150,17 @@ class Together:
         scene, machine = self._ensemble.compiled.scene, self._runs.machine
         n = machine.model.body_count
         corrected = found.numbers[good, starting.C_BEFORE] > ROUNDING * self._size
-        for k, place in zip(np.flatnonzero(good)[corrected], which[corrected], strict=True):
-            numbers = found.numbers[k]
-            moved, turned = distance(found.given[k], found.y0[k], n)
+        those = np.flatnonzero(good)[corrected]
+        moved, turned = distance(found.given[those], found.y0[those], n)
+        for j, (k, place) in enumerate(zip(those, which[corrected], strict=True)):
+            numbers = found.numbers[k].tolist()
             initial = Initial(
                 u=machine.model.u0,
                 violation=(numbers[starting.C_BEFORE], numbers[starting.V_BEFORE]),
                 residual=(numbers[starting.C_AFTER], numbers[starting.V_AFTER]),
                 passes=int(numbers[starting.NEWTON]),
-                moved=moved,
-                turned=turned,
+                moved=float(moved[j]),
+                turned=float(turned[j]),
             )
             words = correction_notes(initial, machine, scene)
             notes[first + place] = "; ".join(w for w in words if not w.startswith(INFORMATION))

@@ -1,0 +1,124 @@
+"""A point of a study: what it costs beside its integration, and what packs of points gain.
+
+Time of this thread, the least of several rounds in turn: what else runs on the machine does not
+count. The integration alone is the same one, started again and again by its own compiled call.
+"""
+
+import time
+
+import numpy as np
+import scenes
+
+import dap3d_core as dap
+from dap3d_core.integrators.work import Y
+from dap3d_core.study import Ensemble, Study, outputs_of
+
+ROUNDS, POINTS, PACKS = 9, 320, (4, 8, 16)
+
+
+def pendulum():
+    """A bob on a revolute joint, with its spring."""
+    scene = dap.Scene(name="pendulum")
+    scene.add_body("bob", mass=1.0, Jp=(0.01, 0.01, 0.01), r=(0.5, 0.0, 0.0))
+    scene.add_point("end", "bob", (-0.5, 0.0, 0.0))
+    scene.add_point("post", "ground", (1.0, 0.0, 1.0))
+    scene.add_joint("rev", "hinge", P_i="end", P_j="ground.O", a_i="bob.y", a_j="ground.y")
+    scene.add_force("weight", "gravity")
+    scene.add_force("ptp", "spring", P_i="bob.O", P_j="post", k=10.0, l0=0.5)
+    return scene
+
+
+def flight():
+    """A stone on a spring: no joints."""
+    scene = dap.Scene(name="flight")
+    scene.add_body("stone", mass=1.0, Jp=(0.1, 0.2, 0.3), r=(1.0, 0.0, 0.0), w=(1.0, 2.0, 3.0))
+    scene.add_force("ptp", "spring", P_i="stone.O", P_j="ground.O", k=10.0, l0=0.5)
+    return scene
+
+
+def chain():
+    """Ten rods on revolute joints."""
+    return scenes.chain(10)
+
+
+#: What varies: scene, name, least and greatest value, output.
+CASES = {
+    "stiffness of a free body": (flight, "forces.spring.k", 9.0, 11.0, "stone.r.x"),
+    "start of a free body": (flight, "bodies.stone.r_dot.y", 0.0, 1.0, "stone.r.x"),
+    "mass, one revolute": (pendulum, "bodies.bob.mass", 1.0, 1.2, "bob.r.z"),
+    "stiffness, extreme": (pendulum, "forces.spring.k", 9.0, 11.0, "bob.r.z:max"),
+    "length, start corrected": (pendulum, "points.end.sPp.x", -0.6, -0.5, "bob.r.z"),
+    "mass, ten rods": (chain, "bodies.b9.mass", 1.0, 1.2, "b9.r.z"),
+}
+
+
+def measure():
+    """Rows of the table."""
+    return [_row(name, *case) for name, case in CASES.items()]
+
+
+def _row(case, make, name, low, high, output):
+    scene = make()
+    scene.simulation.t_end, scene.simulation.dt = 1.0, 0.02
+    points = np.linspace(low, high, POINTS)[:, None]
+    least = {}
+
+    def study(pack=1):
+        return Study(scene, (name,), outputs_of([output]), pack=pack)
+
+    ways = {pack: Ensemble(study(pack)) for pack in (1, *PACKS)}
+    for of in ways.values():
+        of.run(points[:32])
+    for _ in range(ROUNDS):
+        for pack, of in ways.items():
+            _keep(least, pack, _seconds(lambda of=of: of.run(points)) / POINTS)
+        _keep(least, "simulate", _seconds(lambda: ways[1].result(points[0])))
+    short = _overhead(scene, name, points, output)
+    return {
+        "case": case,
+        "point_us": 1e6 * least[1],
+        "overhead_us": 1e6 * short,
+        "compile_and_simulate": least["simulate"] / least[1],
+        **{f"packs_of_{pack}": least[1] / least[pack] for pack in PACKS},
+    }
+
+
+def _overhead(scene, name, points, output):
+    """What a point costs beside its integration, measured where that is short: some steps."""
+    scene.simulation.t_end, scene.simulation.dt = 0.02, 0.01
+    of = Ensemble(Study(scene, (name,), outputs_of([output])))
+    many = np.tile(points, (5, 1))
+    of.run(many[:3])
+    runs = of._runner()._runs
+    integration, work = runs.integration, runs.integration.work
+    fresh = [array.copy() for array in integration.state_arrays()]
+    numbers = runs.first["first_real"], runs.first["first_integer"]
+    least = {}
+    for _ in range(ROUNDS):
+        _keep(least, "point", _seconds(lambda: of.run(many)) / len(many))
+        alone, call = [], []
+        for _ in range(200):
+            for array, before in zip(integration.state_arrays(), fresh, strict=True):
+                array[...] = before
+            work.real[:], work.integer[:] = numbers
+            work.state[Y] = runs.last_start
+            alone.append(_wall(lambda: integration.advance(10**9)))
+            call.append(_wall(lambda: integration.advance(10**9)))  # it has ended: the call alone
+        _keep(least, "alone", float(np.median(alone) - np.median(call)))
+    return least["point"] - least["alone"]
+
+
+def _keep(least, key, seconds):
+    least[key] = min(seconds, least.get(key, np.inf))
+
+
+def _seconds(do):
+    begun = time.thread_time()
+    do()
+    return time.thread_time() - begun
+
+
+def _wall(do):
+    begun = time.perf_counter()
+    do()
+    return time.perf_counter() - begun
