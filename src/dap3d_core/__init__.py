@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from dap3d_core.simulation import open_result as open
     from dap3d_core.simulation.rerunning import rerun
     from dap3d_core.simulation.resuming import resume
+    from dap3d_core.study.dataset import open_sweep
+    from dap3d_core.study.sweep import sweep
     from dap3d_core.view import view
 
 _HOMES = {
@@ -47,12 +49,14 @@ _HOMES = {
     "load": ("scene", "load"),
     "load_registry": ("registry", "load_registry"),
     "open": ("simulation", "open_result"),
+    "open_sweep": ("study.dataset", "open_sweep"),
     "plot": ("plot", "plot"),
     "report": ("report", "report"),
     "shipped_models": ("scene", "shipped_models"),
     "rerun": ("simulation.rerunning", "rerun"),
     "resume": ("simulation.resuming", "resume"),
     "simulate": ("simulation", "simulate"),
+    "sweep": ("study.sweep", "sweep"),
     "view": ("view", "view"),
 }
 
@@ -71,12 +75,14 @@ __all__ = [
     "load",
     "load_registry",
     "open",
+    "open_sweep",
     "plot",
     "report",
     "rerun",
     "resume",
     "shipped_models",
     "simulate",
+    "sweep",
     "view",
 ]
 

@@ -30,6 +30,8 @@ def falling(tmp_path_factory):
     folder = tmp_path_factory.mktemp("falling")
     (folder / "fall.toml").write_text(SCENE)
     dap.simulate(dap.load(folder / "fall.toml"), output=folder / "fall.nc")
+    dap.sweep(folder / "fall.toml", {"bodies.stone.mass": [1.0]}, outputs="stone.r.z",
+              output=folder / "swept.nc")  # fmt: skip
     return folder
 
 
@@ -38,6 +40,9 @@ def folder(falling, tmp_path, monkeypatch):
     """The working folder: that scene and result, and things that are none."""
     for name in ("fall.toml", "fall.nc"):
         shutil.copy(falling / name, tmp_path / name)
+    shutil.copy(falling / "fall.nc", tmp_path / "single.nc.part")
+    shutil.copy(falling / "swept.nc", tmp_path / "swept.nc.part")
+    (tmp_path / "foreign.nc.part").write_text("words\n")
     (tmp_path / "words").write_text("words\n")
     (tmp_path / "words.png").write_text("words\n")
     (tmp_path / "empty.nc").write_bytes(b"")
@@ -64,6 +69,9 @@ def call(folder, capfd):
 
 
 R = "fall.nc"
+#: A sweep without mistakes, in parts.
+SWEEP = ("sweep", "fall.toml")
+VARY, KEEP = ("--vary", "bodies.stone.mass=1,2"), ("--keep", "stone.r.z")
 QUIET = ("-o", "new.nc")
 #: Words of a command -> what its message says. All are refused with 2 and change no file.
 REFUSED = [
@@ -106,6 +114,51 @@ REFUSED = [
     (("rerun",), "Missing argument 'RESULT'"),
     (("rerun", "none.nc"), "there is no such file"),
     (("rerun", "fall.toml"), "it is not a NetCDF-4 file"),
+    # sweeps
+    (("sweep",), "Missing argument 'MODEL'"),
+    (("sweep", "pne1", *VARY, *KEEP), "did you mean 'pen1'"),
+    (SWEEP, "--vary: nothing varies"),
+    ((*SWEEP, *VARY), "--keep: a study needs at least one"),
+    ((*SWEEP, "--vary", "", *KEEP), "'--vary' is an empty word"),
+    ((*SWEEP, "--vary", "bodies.stone.mass", *KEEP), "what varies is NAME=FORM"),
+    ((*SWEEP, "--vary", "bodies.stnoe.mass=1,2", *KEEP), "did you mean 'bodies.stone.mass'"),
+    ((*SWEEP, "--vary", "stone.mass=1,2", *KEEP), "did you mean 'bodies.stone.mass'"),
+    ((*SWEEP, "--vary", "bodies.stone.color=1,2", *KEEP), "has no number 'color'"),
+    ((*SWEEP, "--vary", "bodies.stone.r=1,2", *KEEP), "bodies.stone.r.x"),
+    ((*SWEEP, "--vary", "bodies.stone.mass=one", *KEEP), "no finite number"),
+    ((*SWEEP, "--vary", "bodies.stone.mass=nan", *KEEP), "no finite number"),
+    ((*SWEEP, "--vary", "bodies.stone.mass=1e999", *KEEP), "no finite number"),
+    ((*SWEEP, "--vary", "bodies.stone.mass=1:2", *KEEP), "or sample"),
+    ((*SWEEP, "--vary", "bodies.stone.mass=1:2:0", *KEEP), "no points"),
+    ((*SWEEP, "--vary", "bodies.stone.mass=2:2:3", *KEEP), "begins where it ends"),
+    ((*SWEEP, "--vary", "bodies.stone.mass=0:2:3:log", *KEEP), "of positive numbers"),
+    ((*SWEEP, "--vary", "bodies.stone.mass=1,1", *KEEP), "stands in the list twice"),
+    ((*SWEEP, "--vary", "bodies.stone.mass=1~2", *KEEP), "a normal distribution is sampled"),
+    ((*SWEEP, "--vary", "bodies.stone.mass=1:2:1000000000000", *KEEP), "at most 1e+08"),
+    ((*SWEEP, *VARY, *VARY, *KEEP), "a number is varied only once"),
+    ((*SWEEP, *VARY, *KEEP, *KEEP), "an output is named once only"),
+    ((*SWEEP, *VARY, "--keep", "stnoe.r.z"), "did you mean 'stone.r.z'"),
+    ((*SWEEP, *VARY, "--keep", "stone.r.z:maximum"), "did you mean 'stone.r.z:max'"),
+    ((*SWEEP, *VARY, *KEEP, "--sample", "0"), "--sample = 0: the number of samples"),
+    ((*SWEEP, *VARY, *KEEP, "--sample", "1000000000000"), "from 1 to 1e+08"),
+    ((*SWEEP, *VARY, *KEEP, "--sample", "two"), "'two' is not a valid integer"),
+    ((*SWEEP, "--vary", "bodies.stone.mass=1:2:3", *KEEP, "--sample", "4"), "leave the count out"),
+    ((*SWEEP, *VARY, *KEEP, "--sample", "4", "--design", "lsh"), "did you mean 'lhs'"),
+    ((*SWEEP, *VARY, *KEEP, "--sample", "4", "--seed", "-1"), "--seed = -1: the seed"),
+    ((*SWEEP, *VARY, *KEEP, "--design", "lhs"), "--design is of samples"),
+    ((*SWEEP, *VARY, *KEEP, "--seed", "3"), "--seed is of samples"),
+    ((*SWEEP, *VARY, *KEEP, "--t-end", "-1"), "--t-end = -1.0: should be at least 0"),
+    ((*SWEEP, *VARY, *KEEP, "--integrator", "cvode"), '"dopri5", "dop853"'),
+    ((*SWEEP, *VARY, *KEEP, "--resume"), "there is no fall-sweep.nc.part"),
+    ((*SWEEP, *VARY, *KEEP, "-o", R), "--force overwrites it"),
+    ((*SWEEP, *VARY, *KEEP, "-o", "fall.toml", "--force"), "is what is read"),
+    ((*SWEEP, *VARY, *KEEP, "-o", "sub"), "it is a folder"),
+    ((*SWEEP, *VARY, *KEEP, "-o", "swept.nc"), "resume goes on with it"),
+    ((*SWEEP, *VARY, *KEEP, "-o", "swept.nc", "--resume"), "is of another sweep"),
+    ((*SWEEP, *VARY, *KEEP, "-o", "foreign.nc", "--resume"), "not a NetCDF-4 file"),
+    ((*SWEEP, *VARY, *KEEP, "-o", "foreign.nc", "--force"), "move it away"),
+    ((*SWEEP, *VARY, *KEEP, "-o", "single.nc", "--resume"), "the result of one run"),
+    (("plot", "swept.nc.part", "stone.r.z"), "the points of a sweep"),
     # options and arguments
     (("run", "fall.toml", "--bogus"), "No such option '--bogus'"),
     (("run", "fall.toml", "--t-ned", "1"), "'--t-end'"),

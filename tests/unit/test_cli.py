@@ -14,12 +14,12 @@ from dap3d_core.cli import exits, main
 from dap3d_core.cli.failures import report
 from dap3d_core.cli.group import dap3d
 from dap3d_core.cli.rendering import clean, count, plain, seconds, size
-from dap3d_core.cli.run import SETTINGS
+from dap3d_core.cli.settings import SETTINGS
 from dap3d_core.cli.signals import Stopping
 from dap3d_core.scene import INTEGRATORS, METHODS, Mistake, SceneError, Simulation
 
-COMMANDS = ("run", "resume", "rerun", "check", "models", "plugins", "describe", "new-plugin",
-            "check-plugin", "info", "post", "plot", "animate", "view", "report",
+COMMANDS = ("run", "resume", "rerun", "sweep", "check", "models", "plugins", "describe",
+            "new-plugin", "check-plugin", "info", "post", "plot", "animate", "view", "report",
             "import-matlab")  # fmt: skip
 
 

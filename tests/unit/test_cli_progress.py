@@ -3,7 +3,14 @@
 import pytest
 
 from dap3d_core.cli import progress
-from dap3d_core.cli.progress import ONCE, RunProgress, live_line, plain_line
+from dap3d_core.cli.progress import (
+    ONCE,
+    PointsProgress,
+    RunProgress,
+    live_line,
+    plain_line,
+    points_line,
+)
 from dap3d_core.simulation import Standing
 
 
@@ -85,3 +92,29 @@ def test_what_is_left_is_shown_as_by_a_clock(rate, words):
 
 def test_before_the_pace_is_known():
     assert "about ? left" in plain_line(standing(0.1), 0.0)
+
+
+def test_points_are_counted_with_their_rate_and_what_is_left(clock, capsys, monkeypatch):
+    """A sweep that goes on has some points already: they are none of its pace."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+    with PointsProgress(quiet=False) as shown:
+        for k in range(51):
+            clock[0] = float(k)
+            shown.count(500 + 10 * k, 1000)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == " 51%    510 of 1,000 points    10 points/s  0:49 left"
+    assert len(lines) == 6  # after 1, 2, 4, 8, ... s
+    assert (shown.ran, shown.elapsed) == (500, 50.0)
+
+
+@pytest.mark.parametrize("width", [20, 40, 58, 78])
+@pytest.mark.parametrize("total", [3, 1000, 10**8])
+@pytest.mark.parametrize("rate", [0.0, 0.0123, 5.0, 98765.4])
+def test_the_line_of_points_fits(width, total, rate):
+    """Its parts all stand from 58 columns on, but where a hundred million take weeks."""
+    words = points_line(total // 3, total, rate, width)
+    assert len(words) <= width
+    assert words.startswith(" 33%")
+    if width >= 58 and rate != 0.0123:
+        assert f" of {total:,} points" in words or f"/{total:,} " in words
+        assert words.endswith("left")

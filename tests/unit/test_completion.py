@@ -93,3 +93,24 @@ def test_a_shell_is_told(folder):
     assert offered(folder, "plot", "gone.nc", "bob") == [("file", "bob")]
     assert ("plain", "fourbar3") in offered(folder, "run", "four")
     assert ("plain", "animate") in offered(folder, "an")
+
+
+def offered_here(words):
+    """What a shell is offered behind words of a command line; the last one is incomplete."""
+    from click.shell_completion import ShellComplete
+
+    from dap3d_core.cli.group import dap3d
+
+    *before, last = words
+    return [item.value for item in ShellComplete(dap3d, {}, "dap3d", "_DAP3D").get_completions(
+        before, last)]  # fmt: skip
+
+
+def test_numbers_of_a_model_are_offered_here():
+    """For what varies, part by part; nothing where there is no such model."""
+    sweep = ["sweep", "pen1", "--vary"]
+    assert "bodies." in offered_here([*sweep, ""])
+    assert offered_here([*sweep, "bodies."]) == ["bodies.cone."]
+    assert "bodies.cone.mass" in offered_here([*sweep, "bodies.cone."])
+    assert offered_here([*sweep, "bodies.cone.w."]) == [f"bodies.cone.w.{axis}" for axis in "xyz"]
+    assert offered_here(["sweep", "none", "--vary", "bo"]) == []

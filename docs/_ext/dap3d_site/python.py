@@ -21,6 +21,7 @@ SECTIONS = {
         ("result.Reaction", "result.Energy", "result.Entry", "result.ErrorEstimate",
          "result.Occurrence", "result.Quantity", "result.Statistics", "plot.Film"),
     ),
+    "Studies": (("sweep", "open_sweep"), ()),
     "Reports": (
         ("report",),
         ("report.Report", "report.Run", "report.Setting", "report.Recommendation",

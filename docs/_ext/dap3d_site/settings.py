@@ -7,7 +7,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.cli.run import SETTINGS
+from dap3d_core.cli.settings import SETTINGS
 from dap3d_core.scene import INTEGRATORS, METHODS, Simulation
 from dap3d_core.scene.settings import CORRECT_METRICS
 from dap3d_site.markdown import code, doc_of, page, table

@@ -58,18 +58,19 @@ def carry_out(
                 import traceback
 
                 traceback.print_exception(error)
-            code, reason = _ending(error)
+            code, reason = ending(error)
             return Outcome(compiled, kept, code, reason, getattr(error, "checkpoint", None))
         return Outcome(compiled, result, exits.DONE, "", None)
 
 
-def _ending(error: BaseException) -> tuple[int, str]:
-    """Exit code and reason of a run that ended early and left something to keep."""
+def ending(error: BaseException) -> tuple[int, str]:
+    """Exit code and reason of what ended early and left something to keep."""
+    from dap3d_core.result import ResultError
     from dap3d_core.simulation import SimulationError
 
     if isinstance(error, KeyboardInterrupt):
         return exits.INTERRUPTED, "interrupted"
-    if isinstance(error, (SimulationError, Terminated)):
+    if isinstance(error, (SimulationError, ResultError, Terminated)):
         return exits.PARTIAL, str(error)
     return exits.PARTIAL, f"{type(error).__name__}: {error} (--debug shows where)"
 

@@ -1,4 +1,5 @@
-"""What a shell offers when the tab key is pressed: models, results, quantities of a result.
+"""What a shell offers when the tab key is pressed: models, results, quantities of a
+result, numbers of a scene.
 
 Nothing is printed here, and nothing fails: where there is nothing to offer, nothing is.
 """
@@ -30,6 +31,21 @@ def models(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[
     from dap3d_core.scene import shipped_models
 
     return [name for name in shipped_models() if name.startswith(incomplete)] or _path(incomplete)
+
+
+def numbers(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
+    """Numbers of the model that was named before, part by part."""
+    found: list[str] = []
+    with suppress(Exception):
+        from dap3d_core.registry import load_registry
+        from dap3d_core.scene import check, load
+        from dap3d_core.study.names import names_under
+
+        # Behind an option without its value click leaves all words in ctx.args.
+        scene = load(ctx.params["model"] or ctx.args[0])
+        checked = check(scene, load_registry(), allow_code=False)
+        found += filter(_PLAIN.fullmatch, names_under(checked, incomplete))
+    return list(found)
 
 
 def quantities(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:

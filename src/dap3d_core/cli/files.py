@@ -12,6 +12,22 @@ if TYPE_CHECKING:
     from dap3d_core.result import Result
 
 
+def named_after(model: str, output: str | None, tail: str = "") -> Path:
+    """Where a result goes: MODEL.nc in the current folder if nothing else is said.
+
+    Args:
+        model: as the command was given it.
+        output: what is said.
+        tail: what follows the name of the model.
+    """
+    if output is not None:
+        return Path(output)
+    path = Path(model)
+    if path.is_file():
+        return Path(f"{path.stem}{tail}.nc")
+    return Path(f"{path.resolve().name if path.exists() else path.name}{tail}.nc")
+
+
 def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) -> Path:
     """A path that can be written to.
 

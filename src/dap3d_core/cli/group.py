@@ -45,6 +45,7 @@ class Command(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse, and refuse options that are given twice, and empty words."""
+        ctx.meta["dap3d.words"] = tuple(args)
         if not ctx.resilient_parsing:
             _, _, order = self.make_parser(ctx).parse_args(args=list(args))
             for option in order:
@@ -190,11 +191,13 @@ def _add_commands() -> None:
     from dap3d_core.cli.rerun import rerun
     from dap3d_core.cli.resume import resume
     from dap3d_core.cli.run import run
+    from dap3d_core.cli.sweep import sweep
     from dap3d_core.cli.view import view
 
     analysis = (info, post, plot, animate, view, report)
     authors = (describe, new_plugin, check_plugin)
-    for command in (run, resume, rerun, check, models, plugins, *authors, *analysis, import_matlab):
+    runs = (run, resume, rerun, sweep)
+    for command in (*runs, check, models, plugins, *authors, *analysis, import_matlab):
         dap3d.add_command(command)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from dap3d_core.cli.completion import results as complete_results
-from dap3d_core.cli.exits import DONE
+from dap3d_core.cli.exits import DONE, Refused
 from dap3d_core.cli.group import Command
 
 
@@ -13,7 +13,36 @@ from dap3d_core.cli.group import Command
 @click.argument("result", shell_complete=complete_results)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 def info(result: str, *, as_json: bool) -> int:
-    """Say what a RESULT file holds and how its run went."""
+    """Say what a RESULT file, or that of a sweep, holds and how it went."""
+    from dap3d_core.study.dataset import is_sweep
+
+    return _of_sweep(result, as_json=as_json) if is_sweep(result) else _of_run(result, as_json)
+
+
+def _of_sweep(file: str, *, as_json: bool) -> int:
+    """Tell of the points of a sweep."""
+    import dap3d_core as dap
+    from dap3d_core.cli.rendering import output, print_json, size
+    from dap3d_core.cli.sweep_tables import show_failing, show_sweep, sweep_facts
+    from dap3d_core.result import ResultError
+
+    try:
+        with dap.open_sweep(file) as dataset:
+            found = sweep_facts(dataset)
+            text = dataset.attrs["scene"]
+    except ResultError as error:
+        raise Refused(str(error)) from error
+    byte_count = Path(file).stat().st_size
+    if as_json:
+        print_json({"file": file, "size_bytes": byte_count, **found, "scene_text": text})
+        return DONE
+    show_sweep(output(), found, f"{file}, {size(byte_count)}")
+    show_failing(output(), found, "--json has them")
+    return DONE
+
+
+def _of_run(result: str, as_json: bool) -> int:
+    """Tell of the run that made a result."""
     from dap3d_core.cli.facts import facts_of
     from dap3d_core.cli.files import open_result
     from dap3d_core.cli.rendering import facts, output, print_json, size, title

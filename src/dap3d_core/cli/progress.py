@@ -22,11 +22,11 @@ FIRST_LINE, LONGEST_PAUSE = 1.0, 60.0
 BESIDE = 2
 
 
-class RunProgress:
-    """Shows how far a run is, on stderr.
+class Preparing:
+    """Shows on stderr what is prepared; a context manager.
 
-    Use as a context manager. ``announce`` is told the names of kernels that are compiled,
-    ``advance`` how far the simulated time is; ``start`` says that the model is ready.
+    ``announce`` is told the names of kernels that are compiled, ``start`` says that the model is
+    ready.
     """
 
     def __init__(self, *, quiet: bool) -> None:
@@ -35,8 +35,6 @@ class RunProgress:
         self._bar: Progress | None = None
         self._task: Any = None
         self._told_once = False
-        self._begun: tuple[float, float] | None = None
-        self._reached = 0.0
         self._next_line = FIRST_LINE
         live = self._console.file.isatty() and not self._console.is_dumb_terminal
         if live and not quiet:
@@ -71,6 +69,35 @@ class RunProgress:
         """The model is ready; its initial conditions are next."""
         self._describe("starting")
 
+    def _tell_once(self) -> None:
+        if not self._told_once:
+            self._told_once = True
+            self._print(ONCE)
+
+    def _describe(self, words: str, line: str = "") -> None:
+        if self._bar is not None:
+            self._bar.update(self._task, description=clean(words))
+        elif line:
+            self._print(line)
+
+    def _print_line(self, words: str, elapsed: float) -> None:
+        """A line of progress, after which there is none for a while."""
+        self._print(words)
+        self._next_line = elapsed + min(max(elapsed, FIRST_LINE), LONGEST_PAUSE)
+
+    def _print(self, words: str) -> None:
+        if not self._quiet:
+            say(self._console, words)
+
+
+class RunProgress(Preparing):
+    """Shows how far a run is: ``advance`` is told how far the simulated time is."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        super().__init__(quiet=quiet)
+        self._begun: tuple[float, float] | None = None
+        self._reached = 0.0
+
     def advance(self, run: "Standing") -> None:
         """The run stands so."""
         now = time.monotonic()
@@ -83,23 +110,52 @@ class RunProgress:
             words = live_line(run, rate, self._console.width - BESIDE)
             self._bar.update(self._task, description=words)
         elif not self._quiet and elapsed >= self._next_line and 0.0 < run.t < run.t_end:
-            self._print(plain_line(run, rate))
-            self._next_line = elapsed + min(max(elapsed, FIRST_LINE), LONGEST_PAUSE)
+            self._print_line(plain_line(run, rate), elapsed)
 
-    def _tell_once(self) -> None:
-        if not self._told_once:
-            self._told_once = True
-            self._print(ONCE)
 
-    def _describe(self, words: str, line: str = "") -> None:
+class PointsProgress(Preparing):
+    """Shows how far a study is: ``count`` is told how many of its points have been run.
+
+    Attributes:
+        ran: how many were run here.
+        elapsed: seconds that took.
+    """
+
+    def __init__(self, *, quiet: bool) -> None:
+        super().__init__(quiet=quiet)
+        self._begun: tuple[float, int] | None = None
+        self.ran, self.elapsed = 0, 0.0
+
+    def count(self, done: int, total: int) -> None:
+        """So many of all points are done."""
+        now = time.monotonic()
+        if self._begun is None:
+            self._begun = (now, done)
+        self.elapsed, self.ran = now - self._begun[0], done - self._begun[1]
+        rate = self.ran / self.elapsed if self.elapsed > 0.0 else 0.0
         if self._bar is not None:
-            self._bar.update(self._task, description=clean(words))
-        elif line:
-            self._print(line)
+            words = points_line(done, total, rate, self._console.width - BESIDE)
+            self._bar.update(self._task, description=words)
+        elif not self._quiet and self.elapsed >= self._next_line and done < total:
+            self._print_line(points_line(done, total, rate), self.elapsed)
 
-    def _print(self, words: str) -> None:
-        if not self._quiet:
-            say(self._console, words)
+
+def points_line(done: int, total: int, rate: float, width: int = 80) -> str:
+    """How a study stands on one line: the fullest of several forms that fits.
+
+    Args:
+        done, total: points.
+        rate: points a second, 0 where it is not known yet.
+        width: columns there are.
+    """
+    part, left = f"{done / total:4.0%}", f"{clock((total - done) / rate) if rate else '-:--'} left"
+    now, pace = f"{done:{len(f'{total:,}')},}", f"{rate:.3g} points/s" if rate else "- points/s"
+    forms = [
+        f"{part}  {now} of {total:,} points  {pace:>13}  {left}",
+        f"{part} {now}/{total:,} {pace} {left}",
+        f"{part} {pace} {left}",
+    ]
+    return next((words for words in forms if len(words) <= width), part)
 
 
 def live_line(run: "Standing", rate: float, width: int) -> str:
@@ -140,9 +196,12 @@ def plain_line(run: "Standing", rate: float) -> str:
 
 def _left(run: "Standing", rate: float) -> str:
     """The time that is left at this rate, as a clock shows it."""
-    if not rate:
-        return "-:--"
-    minutes, rest = divmod(math.ceil((run.t_end - run.t) / rate), 60)
+    return clock((run.t_end - run.t) / rate) if rate else "-:--"
+
+
+def clock(duration: float) -> str:
+    """A time in s as a clock shows it."""
+    minutes, rest = divmod(math.ceil(duration), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 

@@ -141,7 +141,7 @@ def _measured(
     """The report and an exit code; one that ends early gives what was measured."""
     import dap3d_core as dap
     from dap3d_core.cli.report_tables import ReportProgress
-    from dap3d_core.cli.run import in_options
+    from dap3d_core.cli.settings import in_options
     from dap3d_core.scene import SceneError
 
     asked: dict[str, Any] = {name: None if value == () else value for name, value in given.items()}

@@ -1,56 +1,35 @@
 """``dap3d run``: simulate a model and write its result."""
 
 import math
-from collections.abc import Callable, Collection
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from dap3d_core.cli.carrying import Seconds, carry_out
 from dap3d_core.cli.completion import models as complete_models
+from dap3d_core.cli.files import named_after
 from dap3d_core.cli.group import Command
+from dap3d_core.cli.settings import (
+    ALLOW_CODE,
+    JSON,
+    QUIET,
+    SETTING_OPTIONS,
+    SETTINGS,
+    check_settings,
+    in_options,
+    with_options,
+)
 
 if TYPE_CHECKING:
     from dap3d_core.cli.carrying import Announce, Watch
     from dap3d_core.result import Result
-    from dap3d_core.scene import Scene, SceneError
+    from dap3d_core.scene import Scene
     from dap3d_core.simulation import CompiledModel
-
-#: Settings of a run that the command line overrides, with the options that do.
-SETTINGS = {
-    "t_end": "--t-end",
-    "dt": "--dt",
-    "method": "--method",
-    "integrator": "--integrator",
-    "rtol": "--rtol",
-    "atol": "--atol",
-    "step": "--step",
-    "correct": "--correct",
-    "project": "--project",
-    "correct_metric": "--correct-metric",
-}
 
 _OPTIONS = (
     click.option("-o", "--output", type=click.Path(), metavar="FILE",
                  help="Result file; MODEL.nc in the current folder by default."),
-    click.option("--t-end", type=float, metavar="S",
-                 help="Final time in s; 0 solves once at t = 0."),
-    click.option("--dt", type=float, metavar="S", help="Reporting step in s."),
-    click.option("--method", metavar="NAME",
-                 help="Formulation: auto, unconstrained, standard, penalty, lsq."),
-    click.option("--integrator", metavar="NAME",
-                 help="dop853, dopri5, adams, radau for stiff scenes, or rk4 with --step."),
-    click.option("--rtol", type=float, metavar="X", help="Relative tolerance."),
-    click.option("--atol", type=float, metavar="X", help="Absolute tolerance."),
-    click.option("--step", type=float, metavar="S",
-                 help="Fixed step in s, without error control."),
-    click.option("--correct/--no-correct", default=None,
-                 help="Correct the initial conditions so that they fulfil the constraints."),
-    click.option("--correct-metric", type=click.Choice(["unit", "mass"]), default=None,
-                 help="The least correction is that in m and rad, or weighted by masses."),
-    click.option("--project/--no-project", default=None,
-                 help="Bring every step onto the constraints."),
+    *SETTING_OPTIONS,
     click.option("--error", "estimate_error", is_flag=True,
                  help="Estimate the error of all positions and velocities by a second run at "
                       "tolerances ten times tighter, or half the step."),
@@ -61,22 +40,15 @@ _OPTIONS = (
                  help="Exit with 1 if there are warnings (notes that tell of a change) or the "
                       "ledger does not close; the result is saved all the same."),
     click.option("--force", is_flag=True, help="Overwrite an existing result."),
-    click.option("--allow-code", is_flag=True,
-                 help="Allow the model's own types (plugin.py in its folder) to run."),
-    click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else."),
-    click.option("-q", "--quiet", is_flag=True, help="Print what went wrong alone."),
+    ALLOW_CODE,
+    JSON,
+    QUIET,
 )  # fmt: skip
-
-
-def _with_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    for option in reversed(_OPTIONS):
-        function = option(function)
-    return function
 
 
 @click.command(cls=Command, short_help="Simulate a model, write its result.")
 @click.argument("model", required=False, shell_complete=complete_models)
-@_with_options
+@with_options(*_OPTIONS)
 @click.pass_context
 def run(
     ctx: click.Context,
@@ -109,8 +81,8 @@ def run(
         model, scene, force = _ask(ctx, given, output, force=force)
     else:
         scene = dap.load(model)
-    target = writable(_target(model, output), force=force, sources=(scene.path,))
-    _check_settings(scene, given)
+    target = writable(named_after(model, output), force=force, sources=(scene.path,))
+    check_settings(scene, given)
     found: list[CompiledModel] = []
 
     def prepare(announce: "Announce") -> "CompiledModel":
@@ -149,48 +121,7 @@ def _ask(
     from dap3d_core.cli.questions import ask
 
     model, scene = ask(given)
-    target = _target(model, output)
+    target = named_after(model, output)
     if not force and target.is_file():
         force = click.confirm(f"{target} exists. Overwrite it?", default=False, err=True)
     return model, scene, force
-
-
-def _target(model: str, output: str | None) -> Path:
-    """Where the result goes: MODEL.nc in the current folder if nothing else is said."""
-    if output is not None:
-        return Path(output)
-    path = Path(model)
-    if path.is_file():
-        return Path(f"{path.stem}.nc")
-    return Path(f"{path.resolve().name if path.exists() else path.name}.nc")
-
-
-def _check_settings(scene: "Scene", given: dict[str, Any]) -> None:
-    """Refuse what the options say before the model is compiled; names the options."""
-    import attrs
-
-    from dap3d_core.scene import SceneError, check_simulation
-
-    said = {name: value for name, value in given.items() if value is not None}
-    try:
-        check_simulation(attrs.evolve(scene.simulation, **said), scene.bodies)
-    except SceneError as error:
-        options = said.keys() | ({"step"} if "integrator" in said else set())
-        about = options | ({"dt"} if "t_end" in said else set())
-        mistakes = [m for m in error.mistakes if m.key in about]
-        if mistakes:  # others are found again with the whole scene, with their lines
-            raise in_options(SceneError(mistakes), options) from error
-
-
-def in_options(error: "SceneError", said: Collection[str]) -> "SceneError":
-    """The same mistakes, those of some settings under the names of their options."""
-    import attrs
-
-    from dap3d_core.scene import MISSING, SceneError
-
-    return SceneError(
-        attrs.evolve(m, key=SETTINGS[m.key], value=MISSING if m.value is None else m.value)
-        if m.key in said and not m.file
-        else m
-        for m in error.mistakes
-    )

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 #: Version of this layout, raised when an older reader would misread it.
 FORMAT = 1
 CONVENTIONS = "dap3d-result"
+#: The attribute by which a file of many runs is known (study/dataset.py): its version.
+SWEEP = "dap3d_sweep"
 
 
 class Constant(NamedTuple):

@@ -12,7 +12,7 @@ import numpy as np
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.files import beginning
-from dap3d_core.result.layout import CONSTANTS, CONVENTIONS, FORMAT, record_of
+from dap3d_core.result.layout import CONSTANTS, CONVENTIONS, FORMAT, SWEEP, record_of
 from dap3d_core.result.limits import check_attributes, check_claims, check_subject
 from dap3d_core.result.netcdf import NETCDF
 from dap3d_core.result.on_file import LARGE, FileArrays
@@ -43,7 +43,7 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
             a newer dap3d.
     """
     file = Path(path)
-    _check_signature(file)
+    check_signature(file)
     check_seal(file)
     with NETCDF:
         import netCDF4
@@ -51,7 +51,7 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
         try:
             dataset = netCDF4.Dataset(os.path.abspath(file), "r")
         except (OSError, RuntimeError) as error:
-            raise _unreadable(file, error) from error
+            raise unreadable(file, error) from error
         try:
             dataset.set_auto_maskandscale(False)
             _check_format(file, dataset)
@@ -62,7 +62,7 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
             raise
         except Exception as error:  # whatever a damaged file makes of it
             dataset.close()
-            raise _unreadable(file, error) from error
+            raise unreadable(file, error) from error
         if isinstance(arrays, Arrays):
             dataset.close()
     return Result.of_parts(subject, arrays, record, _origin(file, subject, record, rebuild))
@@ -80,19 +80,25 @@ def arrays_in(path: Path, subject: Subject, count: int) -> FileArrays:
         try:
             dataset = netCDF4.Dataset(os.path.abspath(path), "r")
         except (OSError, RuntimeError) as error:
-            raise _unreadable(path, error) from error
+            raise unreadable(path, error) from error
         dataset.set_auto_maskandscale(False)
         return FileArrays(dataset, subject, count)
 
 
-def _check_signature(file: Path) -> None:
+def check_signature(file: Path, kind: str = "result") -> None:
+    """Refuse what does not begin like a NetCDF-4 file.
+
+    Raises:
+        ResultError: there is no such file, it cannot be read, or is another; no ``kind`` of ours.
+    """
     begin = beginning(file, len(_HDF5))
     if begin != _HDF5:
         fault = "the file is empty" if not begin else "it is not a NetCDF-4 file"
-        raise ResultError(f"cannot read {file}: {fault}, so no result of dap3d")
+        raise ResultError(f"cannot read {file}: {fault}, so no {kind} of dap3d")
 
 
-def _unreadable(file: Path, error: BaseException) -> ResultError:
+def unreadable(file: Path, error: BaseException) -> ResultError:
+    """The error for a file that the library cannot read."""
     words = getattr(error, "strerror", None) or str(error) or type(error).__name__
     words = " ".join(words.split())
     return ResultError(
@@ -102,6 +108,11 @@ def _unreadable(file: Path, error: BaseException) -> ResultError:
 
 def _check_format(file: Path, dataset: Any) -> None:
     names = dataset.ncattrs()
+    if SWEEP in names:
+        raise ResultError(
+            f"cannot read {file}: it holds the points of a sweep, not the result of one run; "
+            "dap.open_sweep reads it, dap3d info tells of it"
+        )
     if "Conventions" not in names or dataset.getncattr("Conventions") != CONVENTIONS:
         raise ResultError(f"cannot read {file}: a NetCDF-4 file, but no result of dap3d")
     found = int(dataset.getncattr("format"))

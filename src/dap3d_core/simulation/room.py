@@ -32,10 +32,7 @@ def check_room(
     needed = 8 * rows * numbers * COPIES
     if needed <= ALWAYS:
         return
-    if output is not None:
-        place, room = "on the disk", _free_disk(Path(output).parent)
-    else:
-        place, room = "in memory", _free_memory()
+    place, room = _room(output)
     if room is None or needed <= room:
         return
     what = (
@@ -49,6 +46,38 @@ def check_room(
     if output is None:
         remedy += ", or name a file (output=, -o), which takes them as they come"
     raise SceneError([Mistake("dt", MISSING if dt is None else dt, what, remedy=remedy)])
+
+
+def check_room_of_points(count: int, width: int, output: str | os.PathLike[str] | None) -> None:
+    """Refuse a study whose points do not fit: on the disk where they are written, else in memory.
+
+    Args:
+        count: number of points.
+        width: bytes of each.
+        output: the file that takes them, or None.
+
+    Raises:
+        SceneError: says how much there would be, how much room there is, and what to do.
+    """
+    needed = count * width
+    place, room = _room(output)
+    if needed <= ALWAYS or room is None or needed <= room:
+        return
+    what = (
+        f"the study has {count:,} points of {width:,} bytes, {_size(needed)}; there is room for "
+        f"{_size(room)} {place}"
+    )
+    remedy = "take fewer points, keep less of each, or insist by force"
+    if output is None:
+        remedy += "; a file (output=, -o) takes them as they come"
+    raise SceneError([Mistake("vary", MISSING, what, remedy=remedy)])
+
+
+def _room(output: str | os.PathLike[str] | None) -> tuple[str, int | None]:
+    """Where numbers go that ``output`` takes, or nobody, and the bytes that are free there."""
+    if output is not None:
+        return "on the disk", _free_disk(Path(output).parent)
+    return "in memory", _free_memory()
 
 
 def _free_disk(folder: Path) -> int | None:

@@ -1,7 +1,7 @@
 """The study floor: many runs of one scene with other numbers."""
 
 from dap3d_core.study.ensemble import Batch, Ensemble, PointStatus, Study
-from dap3d_core.study.names import Number, all_numbers, numbers_named, with_values
+from dap3d_core.study.names import Number, all_numbers, names_under, numbers_named, with_values
 from dap3d_core.study.outputs import REDUCTIONS, Output, outputs_of
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "PointStatus",
     "Study",
     "all_numbers",
+    "names_under",
     "numbers_named",
     "outputs_of",
     "with_values",

@@ -1,6 +1,6 @@
 """What is kept of each run of a study: a quantity, at the end, its extreme, its mean, or all."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import attrs
@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from dap3d_core.registry.spelling import nearest
 from dap3d_core.result import Result
-from dap3d_core.scene import Mistake, SceneError
+from dap3d_core.scene import MISSING, Mistake, SceneError
+from dap3d_core.scene.mistakes import shown
+from dap3d_core.simulation import SimulationError
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +31,10 @@ REDUCTIONS: dict[str, Callable[[Floats, Floats], Any]] = {
     "series": lambda values, t: values,
 }
 
+#: Names that a study's data set gives to something else.
+RESERVED = ("point", "time", "status", "note")
+FORM = "an output is text such as 'crank.r.z:max', or a function of the result"
+
 
 @attrs.frozen
 class Output:
@@ -46,45 +52,87 @@ class Output:
     reduction: str = "end"
 
     def value(self, result: Result) -> Any:
-        """The output of one run: a number, or with "series" (nt,)."""
+        """The output of one run: a number, or with "series" (nt,); NaN without an instant.
+
+        Raises:
+            SimulationError: a function raises an exception, or does not return a number.
+        """
         if callable(self.of):
-            return float(self.of(result))
+            return self._returned(self.of, result)
+        if not len(result.t):
+            return np.empty(0) if self.reduction == "series" else np.nan
         return REDUCTIONS[self.reduction](result.quantity(self.of).values, result.t)
+
+    def _returned(self, function: Callable[[Result], Any], result: Result) -> float:
+        try:
+            value = function(result)
+        except Exception as error:
+            words = f"the function of output {self.name!r} raises {type(error).__name__}: {error}"
+            raise SimulationError(words) from error
+        try:
+            return float(value)
+        except (TypeError, ValueError) as error:
+            words = f"the function of output {self.name!r} should return one number"
+            raise SimulationError(f"{words}, not {shown(value)}") from error
 
 
 def outputs_of(asked: Any) -> tuple[Output, ...]:
-    """Outputs as a script asks for them: names, or label -> name or function of the result.
+    """Outputs as a script asks for them.
+
+    Args:
+        asked: the name of a quantity, perhaps with a reduction behind a colon (one of
+            ``REDUCTIONS``, "end" where there is none); a function of the ``Result`` that returns
+            one number, called by its name; a list of these; or label -> one of these.
 
     Raises:
-        SceneError: none, one twice, or an unknown reduction.
+        SceneError: none, one twice, an unknown reduction, a label that is no name; all mistakes.
     """
-    if isinstance(asked, str):
+    if isinstance(asked, str) or callable(asked):
         asked = [asked]
-    pairs: list[tuple[str, Any]]
+    pairs: list[tuple[Any, Any]]
     if isinstance(asked, Mapping):
         pairs = list(asked.items())
+    elif isinstance(asked, Iterable):
+        pairs = [(_own_name(one), one) for one in asked]
     else:
-        pairs = [(getattr(one, "__name__", one), one) for one in asked]
-    mistakes = [] if pairs else [Mistake("outputs", [], "a study needs at least one output")]
-    found: list[Output] = []
-    for label, one in pairs:
-        if callable(one):
-            found.append(Output(str(label), one, ""))
-            continue
-        if not isinstance(one, str):
-            mistakes.append(Mistake("outputs", one, "an output is text such as 'crank.r.z:max'"))
-            continue
-        quantity, colon, reduction = one.rpartition(":")
-        if not colon:
-            quantity, reduction = one, "end"
-        if reduction not in REDUCTIONS:
-            what = f"behind the colon stands one of {', '.join(REDUCTIONS)}"
-            mistakes.append(Mistake("outputs", one, what, nearest(reduction, REDUCTIONS)))
-            continue
-        found.append(Output(str(label), quantity, reduction))
+        raise SceneError([Mistake("outputs", asked, FORM)])
+    if not pairs:
+        raise SceneError([Mistake("outputs", MISSING, f"a study needs at least one; {FORM}")])
+    read = [_output(label, one) for label, one in pairs]
+    found = [one for one in read if isinstance(one, Output)]
+    mistakes = [one for one in read if isinstance(one, Mistake)]
     names = [output.name for output in found]
-    twice = sorted({name for name in names if names.count(name) > 1})
+    twice = dict.fromkeys(name for name in names if names.count(name) > 1)
     mistakes += [Mistake("outputs", name, "an output is named once only") for name in twice]
     if mistakes:
         raise SceneError(mistakes)
     return tuple(found)
+
+
+def _own_name(one: Any) -> Any:
+    """What an output is called that has no label."""
+    return getattr(one, "__name__", "") if callable(one) else one
+
+
+def _output(label: Any, one: Any) -> Output | Mistake:
+    if not callable(one) and not isinstance(one, str):
+        return Mistake("outputs", one, FORM)
+    if callable(one) and (not isinstance(label, str) or not label or label == "<lambda>"):
+        what = "a function without a name of its own needs a label"
+        return Mistake("outputs", MISSING, what, remedy='give {"label": function}')
+    if not isinstance(label, str) or not label.strip() or not label.isprintable():
+        return Mistake("outputs", label, "the label of an output is text of one line")
+    if label in RESERVED:
+        return Mistake("outputs", label, "this is the name of a part of every study; take another")
+    if callable(one):
+        return Output(label, one, "")
+    quantity, colon, reduction = one.rpartition(":")
+    if not colon or "." in reduction:  # names of bodies may hold a colon
+        quantity, reduction = one, "end"
+    if reduction in REDUCTIONS and quantity:
+        return Output(label, quantity, reduction)
+    if not quantity:
+        return Mistake("outputs", one, FORM)
+    what = f"behind the colon stands one of {', '.join(REDUCTIONS)}"
+    near = nearest(reduction, REDUCTIONS)
+    return Mistake("outputs", one, what, f"{quantity}:{near}" if near else "")
