@@ -31,12 +31,17 @@ if TYPE_CHECKING:
     from dap3d_core.simulation.rerunning import rerun
     from dap3d_core.simulation.resuming import resume
     from dap3d_core.study.dataset import open_sweep
+    from dap3d_core.study.fit_result import Fit
+    from dap3d_core.study.fitting import fit
+    from dap3d_core.study.parameters import Parameter
     from dap3d_core.study.sweep import sweep
     from dap3d_core.view import view
 
 _HOMES = {
     "AssemblyError": ("simulation", "AssemblyError"),
     "Event": ("simulation", "Event"),
+    "Fit": ("study.fit_result", "Fit"),
+    "Parameter": ("study.parameters", "Parameter"),
     "PluginError": ("interface", "PluginError"),
     "RedundantError": ("simulation", "RedundantError"),
     "Result": ("result", "Result"),
@@ -45,6 +50,7 @@ _HOMES = {
     "SimulationError": ("simulation", "SimulationError"),
     "animate": ("plot", "animate"),
     "compile": ("simulation", "compile_scene"),
+    "fit": ("study.fitting", "fit"),
     "import_matlab": ("matlab", "import_matlab"),
     "load": ("scene", "load"),
     "load_registry": ("registry", "load_registry"),
@@ -63,6 +69,8 @@ _HOMES = {
 __all__ = [
     "AssemblyError",
     "Event",
+    "Fit",
+    "Parameter",
     "PluginError",
     "RedundantError",
     "Result",
@@ -71,6 +79,7 @@ __all__ = [
     "SimulationError",
     "animate",
     "compile",
+    "fit",
     "import_matlab",
     "load",
     "load_registry",

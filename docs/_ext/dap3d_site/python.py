@@ -21,7 +21,7 @@ SECTIONS = {
         ("result.Reaction", "result.Energy", "result.Entry", "result.ErrorEstimate",
          "result.Occurrence", "result.Quantity", "result.Statistics", "plot.Film"),
     ),
-    "Studies": (("sweep", "open_sweep"), ()),
+    "Studies": (("sweep", "open_sweep", "fit", "Fit", "Parameter"), ()),
     "Reports": (
         ("report",),
         ("report.Report", "report.Run", "report.Setting", "report.Recommendation",

@@ -2,13 +2,16 @@
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import Quantity, Result, UnknownNameError, find
+
+if TYPE_CHECKING:
+    from dap3d_core.study.fit_result import Fit
 
 #: Colours that colour-blind readers can tell apart, on white (Okabe and Ito 2008, without yellow).
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -52,7 +55,7 @@ class Drawing(NamedTuple):
 
 
 def plot(
-    result: Result | Mapping[str, Result],
+    result: "Result | Mapping[str, Result] | Fit",
     *quantities: str,
     x: str | None = None,
     ax: Axes | None = None,
@@ -60,7 +63,8 @@ def plot(
     """Draw quantities of a result, those of different units in panels below one another.
 
     Args:
-        result: what to draw from; several runs as names and results, {"rtol 1e-6": result, ...}.
+        result: what to draw from; several runs as names and results, {"rtol 1e-6": result, ...};
+            a ``Fit``: its data, its curves and its residuals, of all outputs or those named.
         quantities: names such as ``crank.r.z``, ``crank.w`` (all components), ``energy.total``.
         x: the quantity they are drawn over, one number an instant; time when left out. A path, a
             length over a length, has one scale on both axes; a circle marks its start.
@@ -75,6 +79,12 @@ def plot(
         ValueError: no runs, no quantities, no instants, ``x`` has components, or ``ax`` is to take
             several units.
     """
+    if not isinstance(result, (Result, Mapping)):
+        if x is not None or ax is not None:
+            raise ValueError("a fit is drawn over time, on a figure of its own: leave x, ax out")
+        from dap3d_core.plot.fit import plot_fit
+
+        return plot_fit(result, quantities)
     drawing = gather(result, quantities, x)
     if ax is None:
         from matplotlib import pyplot
@@ -87,7 +97,7 @@ def plot(
     draw_panel(ax, drawing, drawing.panels[0], ax.get_window_extent().height / ax.figure.dpi)
     if len(drawing.panels[0].curves) > 1:
         ax.legend(fontsize="small", framealpha=0.8)
-    ax.set_xlabel(_with_unit(drawing.x.label, drawing.x.unit))
+    ax.set_xlabel(with_unit(drawing.x.label, drawing.x.unit))
     return ax
 
 
@@ -168,7 +178,7 @@ def draw(figure: Figure, drawing: Drawing) -> list[Axes]:
         for offset in (ax.xaxis.get_offset_text(), ax.yaxis.get_offset_text()):
             offset.set_fontsize(LETTERS)
     axes[-1].set_xlabel(
-        _wrapped(_with_unit(drawing.x.label, drawing.x.unit), 17 * width), fontsize=LETTERS
+        wrapped(with_unit(drawing.x.label, drawing.x.unit), 17 * width), fontsize=LETTERS
     )
     if drawing.is_path:
         axes[0].set_aspect("equal", adjustable="datalim")
@@ -205,24 +215,24 @@ def draw_panel(ax: Axes, drawing: Drawing, panel: Panel, height: float) -> None:
             linewidth=1.4,
             label=shown_text(curve.name),
         )
-    ax.set_ylabel(_wrapped(_y_label(panel), 15 * height), fontsize=LETTERS)
+    ax.set_ylabel(wrapped(_y_label(panel), 15 * height), fontsize=LETTERS)
 
 
-def _wrapped(words: str, room: float) -> str:
+def wrapped(words: str, room: float) -> str:
     """Words on lines of so many characters beside an axis."""
     return "\n".join(textwrap.wrap(words, max(14, int(room))))
 
 
 def _y_label(panel: Panel) -> str:
     if len(panel.curves) == 1:
-        return _with_unit(panel.curves[0].quantity.label, panel.unit)
+        return with_unit(panel.curves[0].quantity.label, panel.unit)
     whole = list(dict.fromkeys(c.quantity.label for c in panel.curves))
     kinds = list(dict.fromkeys(c.quantity.kind for c in panel.curves))
     words = whole[0] if len(whole) == 1 else ", ".join(kinds) if len(kinds) < 3 else ""
-    return _with_unit(words, panel.unit)
+    return with_unit(words, panel.unit)
 
 
-def _with_unit(words: str, unit: str) -> str:
+def with_unit(words: str, unit: str) -> str:
     """Words and the unit, [1] for numbers without one."""
     return shown_text(f"{words} [{unit.replace('^2', '²')}]".strip())
 
