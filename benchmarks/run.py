@@ -1,7 +1,7 @@
 """All benchmarks, as tables and as JSON.
 
 ``make bench``, or ``python benchmarks/run.py [--only NAME ...] [-o FILE]``. scale_long and
-streaming, some minutes, and two_threads are run only when they are named. With ``--docs`` the
+streaming, some minutes, two_threads and study are run only when they are named. With ``--docs`` the
 figures of hard_cases, long_time, chaos, flips and hinges go to docs/hard-cases.md as well;
 ``--only hard`` is all of these.
 """
@@ -30,13 +30,14 @@ import projection
 import right_hand_side
 import scale
 import streaming
+import study
 import two_threads
 import whole_runs
 from rich.console import Console
 from rich.table import Table
 
 #: What is run only when it is named.
-NAMED = ("scale_long", "two_threads", "streaming")
+NAMED = ("scale_long", "two_threads", "streaming", "study")
 #: Columns that a table has at most beside its first.
 COLUMNS = 8
 #: Columns that every table of one title has, and those of sentences, which stand below.
@@ -93,6 +94,7 @@ def main():
         "scale_long": scale.long_chain,
         "two_threads": two_threads.measure,
         "streaming": streaming.measure,
+        "study": study.measure,
         "hard_cases": hard.measure,
         "long_time": hard.long_time.measure,
         "chaos": hard.chaos.measure,

@@ -23,7 +23,10 @@ AUTO_METHOD = (
 #: Environment variables, and what each does.
 VARIABLES = {
     "DAP3D_CACHE_DIR": "folder that keeps compiled code; by default `dap3d` in the user's cache",
-    "DAP3D_THREADS": "`1` keeps large scenes on one core; the numbers are the same",
+    "DAP3D_THREADS": (
+        "most threads of a study, by default one for each core; `1` also keeps large scenes on one "
+        "core; the numbers are the same"
+    ),
     "DAP3D_BLOCK": "distributions whose types are left out, separated by commas",
     "NUMBA_DISABLE_JIT": "1: kernels run as plain Python, to look into them; slowly",
     "NO_COLOR": "any value: no colours in the terminal",

@@ -7,7 +7,8 @@ layer of threads that a process would keep, or that a forked child would miss.
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from dap3d_core.assembly.system import System
@@ -19,28 +20,68 @@ from dap3d_core.kernels.lists import LOOP_LIST
 TRIAL = 20
 
 
-def threads_allowed() -> int:
-    """How many threads a run may use: 2 where there is a second core and nobody forbids it.
+class _Share(threading.local):
+    """Of each thread: whether others work beside it on runs of their own."""
 
-    ``DAP3D_THREADS=1`` forbids it.
+    is_one_of_many = False
+
+
+_share = _Share()
+
+
+@contextmanager
+def one_of_many() -> Iterator[None]:
+    """Runs of this thread get no second one meanwhile: all cores have runs of their own."""
+    before, _share.is_one_of_many = _share.is_one_of_many, True
+    try:
+        yield
+    finally:
+        _share.is_one_of_many = before
+
+
+def cores_allowed() -> int:
+    """How many cores the process may use: those of the machine that are its, or DAP3D_THREADS.
 
     Raises:
         ValueError: ``DAP3D_THREADS`` is no number of threads.
     """
-    asked = os.environ.get("DAP3D_THREADS", "").strip() or "2"
-    if not (asked.isascii() and asked.isdigit() and int(asked) > 0):
-        raise ValueError(
-            f"the environment variable DAP3D_THREADS is {asked!r}; it must be a whole number from "
-            "1: 1 keeps a large scene on one core, 2 or more allow a second thread; unset, that is "
-            "allowed, too"
-        )
-    if not jit_is_on() or not hasattr(os, "sched_yield"):
-        return 1
     if hasattr(os, "sched_getaffinity"):
         cores = len(os.sched_getaffinity(0))
     else:
         cores = os.cpu_count() or 1
-    return min(2, cores, int(asked))
+    return min(cores, threads_limit() or cores)
+
+
+def threads_limit() -> int | None:
+    """What ``DAP3D_THREADS`` says: at most so many threads; None where it says nothing.
+
+    Raises:
+        ValueError: it is no number of threads.
+    """
+    asked = os.environ.get("DAP3D_THREADS", "").strip()
+    if not asked:
+        return None
+    if not (asked.isascii() and asked.isdigit() and int(asked) > 0):
+        raise ValueError(
+            f"the environment variable DAP3D_THREADS is {asked!r}; it must be a whole number from "
+            "1: at most so many threads are used, and 1 keeps a large scene on one core; unset, "
+            "all cores are allowed"
+        )
+    return int(asked)
+
+
+def threads_allowed() -> int:
+    """How many threads a run may use: 2 where there is a second core and nobody forbids it.
+
+    ``DAP3D_THREADS=1`` forbids it, and so does ``one_of_many``.
+
+    Raises:
+        ValueError: ``DAP3D_THREADS`` is no number of threads.
+    """
+    cores = cores_allowed()
+    if _share.is_one_of_many or not jit_is_on() or not hasattr(os, "sched_yield"):
+        return 1
+    return min(2, cores)
 
 
 class SecondThread:

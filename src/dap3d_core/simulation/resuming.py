@@ -177,7 +177,7 @@ class Resumption:
         return other.exists() and other.samefile(self.path)
 
     def _check_types(self) -> None:
-        known, here = self._found.header["types"], digests_of(self.compiled)
+        known, here = self._found.header["types"], digests_of(self.compiled.checked)
         changed = [name for name in known if known[name] != here.get(name)]
         if changed:
             raise CheckpointError(

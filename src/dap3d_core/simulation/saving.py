@@ -19,7 +19,7 @@ from dap3d_core.result.record import to_json
 from dap3d_core.simulation.checkpoint import Checkpoint, path_of, write_checkpoint
 
 if TYPE_CHECKING:
-    from dap3d_core.simulation.compiled import CompiledModel
+    from dap3d_core.scene import Checked
     from dap3d_core.simulation.run import Run
 
 
@@ -125,7 +125,7 @@ def checkpoint_of(run: "Run") -> Checkpoint:
         "wall_time_s": time.perf_counter() - run.started,
         "compile_time_s": run.compile_time,
         "driver": driver_digest("integrators"),
-        "types": digests_of(compiled),
+        "types": digests_of(compiled.checked),
     }
     if run.watcher is not None:
         header["events"], given = run.watcher.state()
@@ -143,9 +143,8 @@ def arrays_of(run: "Run") -> Iterator[tuple[str, NDArray[Any]]]:
         yield f"system.{name}", getattr(run.machine.system, name)
 
 
-def digests_of(compiled: "CompiledModel") -> dict[str, str]:
+def digests_of(checked: "Checked") -> dict[str, str]:
     """For each type of a scene, a digest of the file that it stands in."""
-    checked = compiled.checked
     elements = (*checked.joints, *checked.forces, *checked.functions)
     types = {(e.examined.type.kind, e.examined.type.keyword): e.examined.type for e in elements}
     return {f"{kind} {word}": _digest(type_) for (kind, word), type_ in sorted(types.items())}

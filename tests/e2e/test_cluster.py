@@ -1,0 +1,398 @@
+"""Studies on a cluster: a real scheduler and real workers, processes of their own."""
+
+import importlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+
+import attrs
+import numpy as np
+import pytest
+from support.process import REPOSITORY
+from support.studies import POINTS, bob, collected, same
+
+import dap3d_core as dap
+from dap3d_core.study import Ensemble, PointStatus, cluster
+from dap3d_core.study.cluster import ClusterError, connect, run_on
+from dap3d_core.study.environment import differences, environment_of, with_whole_path
+from dap3d_core.study.local import run_here
+
+distributed = pytest.importorskip("distributed", reason="the extra cluster is not installed")
+pytestmark = [
+    pytest.mark.slow,
+    # of distributed itself: sockets and loops of clusters that are closed
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+COUNT = 60
+PLACES = np.arange(COUNT)
+
+
+@contextmanager
+def two_workers():
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+@pytest.fixture(scope="module")
+def client():
+    """Of two workers, processes with one thread each."""
+    with two_workers() as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """What the points of the pendulum give in this process, in one thread."""
+    return collected(run_here(Ensemble(bob()), POINTS, PLACES, threads=1))
+
+
+@contextmanager
+def another_worker(client, **variables):
+    """One more worker, with other variables of the environment; its address."""
+    there = set(client.nthreads())
+    command = [sys.executable, "-m", "distributed.cli.dask_worker", client.scheduler.address]
+    options = ["--no-dashboard", "--no-nanny", "--nthreads", "1"]
+    process = subprocess.Popen(
+        [*command, *options], env=os.environ | variables, stderr=subprocess.DEVNULL
+    )
+    try:
+        client.wait_for_workers(len(there) + 1, timeout=60)
+        yield (set(client.nthreads()) - there).pop()
+    finally:
+        process.terminate()
+        process.wait(30)
+        wait_until(lambda: set(client.nthreads()) <= there)
+
+
+def wait_until(condition, seconds=30.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_numbers_are_those_of_one_process(client, alone):
+    """Bit for bit, with sizes of tasks by the clock and given ones; both workers took part."""
+    same(alone, collected(run_on(client, bob(), POINTS, PLACES)))
+    same(alone, collected(run_on(client, bob(), POINTS, PLACES, chunk=7)))
+    some = np.array([40, 3, 11])
+    found = collected(run_on(client, bob(), POINTS, some))
+    same({k: alone[k] for k in sorted(found)}, dict(sorted(found.items())))
+    assert list(run_on(client, bob(), POINTS, PLACES[:0])) == []
+    kept = client.run(lambda: len(sys.modules["dap3d_core.study.cluster"]._ensembles))
+    assert list(kept.values()) == [1, 1]  # compiled once, for all these
+
+
+def test_nothing_is_left_on_the_cluster(client):
+    """After the end, and where nobody asks for the rest."""
+    collected(run_on(client, bob(), POINTS, PLACES))
+    wait_until(lambda: not client.who_has())
+    found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
+    next(found)
+    found.close()
+    wait_until(lambda: not any(client.processing().values()))
+    wait_until(lambda: not client.who_has())
+
+
+def test_ctrl_c_cancels_the_tasks(client):
+    found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
+    next(found)
+    with pytest.raises(KeyboardInterrupt):
+        found.throw(KeyboardInterrupt)
+    wait_until(lambda: not any(client.processing().values()))
+
+
+def test_functions_of_the_script_are_sent(client, tmp_path, monkeypatch):
+    """By value; one of a module that workers have not is named, with what to do."""
+    asked = {"lowest": "bob.r.z:min", "fastest": lambda result: abs(result.w).max()}
+    study = bob(asked)
+    same(
+        collected(run_here(Ensemble(study), POINTS, PLACES[:8], threads=1)),
+        collected(run_on(client, study, POINTS, PLACES[:8])),
+    )
+    (tmp_path / "mine.py").write_text("def lowest(result):\n    return result.r[:, 0, 2].min()\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    elsewhere = bob({"lowest": importlib.import_module("mine").lowest})
+    with pytest.raises(ClusterError, match="2 of 2 workers") as error:
+        run_on(client, elsewhere, POINTS, PLACES)
+    assert "functions among the outputs must stand in the script" in str(error.value)
+
+
+def test_an_exception_of_a_function_comes_out(client):
+    """As it is, after the task was tried again."""
+
+    def fails(result):
+        raise ArithmeticError("mine")
+
+    with pytest.raises(ArithmeticError, match="mine"):
+        collected(run_on(client, bob({"none": fails}), POINTS, PLACES, retries=1))
+
+
+def test_a_point_that_fails_is_no_task_that_fails(client):
+    """It has its status and note, and the others their numbers, as in one process."""
+    points = POINTS[:6].copy()
+    points[2, 0] = -1.0  # kg
+    study, places = bob(), np.arange(6)
+    found = collected(run_on(client, study, points, places, chunk=3))
+    same(collected(run_here(Ensemble(study), points, places, threads=1)), found)
+    status = [found[k][0] for k in places]
+    assert status == [PointStatus.DONE] * 2 + [PointStatus.FAILED] + [PointStatus.DONE] * 3
+    assert "mass" in found[2][1]
+
+
+def test_a_worker_that_is_killed_loses_nothing(alone):
+    """By SIGKILL, in the middle; what it had is done by the others, and nothing comes twice."""
+    with two_workers() as client:
+        found, parts = run_on(client, bob(), POINTS, PLACES, chunk=2), []
+        parts += [next(found) for _ in range(3)]
+        victim = next(iter(client.run(os.getpid).values()))
+        os.kill(victim, signal.SIGKILL)
+        parts += list(found)
+        same(alone, dict(sorted(collected(parts).items())))
+
+
+def test_points_that_kill_their_workers_are_named():
+    """Dask gives up after some workers; the message says which points and where to look."""
+
+    def deadly(result):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    words = "a task of 1 points, from place 4 on, has ended each worker that ran it"
+    with two_workers() as client, pytest.raises(ClusterError, match=words):
+        collected(run_on(client, bob({"none": deadly}), POINTS, np.array([4])))
+
+
+PUSH = """
+from dap3d_core.interface import Body, Force, body, hookimpl, number
+
+interface_version = 1
+
+
+class Push(Force):
+    keyword = "push"
+    body_i: Body = body()
+    k: float = number(default={k})
+
+    def wrench(k):
+        return (((k, 0.0, 0.0), (0.0, 0.0, 0.0)),)
+
+
+@hookimpl
+def dap3d_forces():
+    return [Push]
+"""
+
+
+def package(folder, version, name="dap3d-push", k=1.0):
+    """A plugin as its author would install it: a module and its metadata."""
+    folder.mkdir()
+    (folder / "dap3d_push_module.py").write_text(PUSH.format(k=k))
+    info = folder / f"{name.replace('-', '_')}-{version}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    (info / "entry_points.txt").write_text("[dap3d.forces]\npush = dap3d_push_module\n")
+    return folder
+
+
+def path(*folders):
+    """PYTHONPATH with these folders first."""
+    return os.pathsep.join([*map(str, folders), os.environ.get("PYTHONPATH", "")])
+
+
+def pushed():
+    """The pendulum with a force that only a plugin brings."""
+    study = bob()
+    study.scene.add_force("push", "p", body_i="bob")
+    return study
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """The plugin is installed here, not where the workers run."""
+    folder = package(tmp_path / "here", "1.2")
+    monkeypatch.syspath_prepend(str(folder))
+    yield folder
+    sys.modules.pop("dap3d_push_module", None)
+
+
+def test_workers_without_a_plugin_are_named(client, installed, tmp_path):
+    """At once, all of them, with what is missing and what to do."""
+    with pytest.raises(ClusterError) as error:
+        run_on(client, pushed(), POINTS, PLACES)
+    title, *lines = str(error.value).splitlines()
+    assert title == "2 of 2 workers cannot run this study:"
+    wanted = "it lacks the force type 'push' of dap3d-push 1.2; pip install dap3d-push==1.2 there"
+    assert lines == [f"{worker}: {wanted}" for worker in sorted(client.nthreads())]
+
+
+@pytest.mark.parametrize(
+    ("version", "k", "words"),
+    [
+        ("1.2", 1.0, ""),
+        ("1.3", 1.0, "its force type 'push' is of dap3d-push 1.3, here of dap3d-push 1.2"),
+        ("1.2", 2.0, "the file of its force type 'push' is not the one here; install the same"),
+    ],
+)
+def test_versions_of_plugins_are_compared(client, installed, tmp_path, version, k, words):
+    """One worker has the plugin: the same, another version, the same version of another text."""
+    there = package(tmp_path / "there", version, k=k)
+    with another_worker(client, PYTHONPATH=path(there)) as address:
+        with pytest.raises(ClusterError) as error:
+            run_on(client, pushed(), POINTS, PLACES)
+        lines = [line for line in str(error.value).splitlines() if line.startswith(address)]
+        assert [line.partition(": ")[2][: len(words)] for line in lines] == [words] * bool(words)
+
+
+def test_versions_of_dap3d_are_compared(client, tmp_path):
+    info = tmp_path / "dap3d-0.0.9.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: dap3d\nVersion: 0.0.9\n")
+    with (
+        another_worker(client, PYTHONPATH=path(tmp_path)) as address,
+        pytest.raises(ClusterError) as error,
+    ):
+        run_on(client, bob(), POINTS, PLACES)
+    title, line = str(error.value).splitlines()
+    version = dap.simulate("fourbar3", t_end=0.0).record.versions["dap3d"]
+    assert title == "1 of 3 workers cannot run this study:"
+    assert line == (
+        f"{address}: it has dap3d 0.0.9, here is {version}; "
+        f'pip install "dap3d[cluster]=={version}" there'
+    )
+
+
+def test_a_worker_without_dap3d_is_named(client, tmp_path):
+    (tmp_path / "dap3d_core.py").write_text("raise ImportError('nothing here')")
+    with (
+        another_worker(client, PYTHONPATH=path(tmp_path)) as address,
+        pytest.raises(ClusterError) as error,
+    ):
+        run_on(client, bob(), POINTS, PLACES)
+    title, line = str(error.value).splitlines()
+    assert title == "1 of 3 workers cannot run this study:"
+    assert line.startswith(f"{address}: dap3d ")
+    assert 'pip install "dap3d[cluster]==' in line
+
+
+def test_a_worker_that_comes_late_is_asked_as_well(client, installed, tmp_path):
+    """By its first task: it does not compute with formulas of its own."""
+    there = package(tmp_path / "there", "1.2")
+    late = package(tmp_path / "late", "1.2", k=2.0)
+    client.run(lambda folder: sys.path.insert(0, folder), str(there))
+    try:
+        found = run_on(client, pushed(), POINTS, np.arange(200), chunk=1, retries=0)
+        with (
+            another_worker(client, PYTHONPATH=path(late)) as address,
+            pytest.raises(ClusterError, match=f"{address} cannot run this study: the file of its"),
+        ):
+            collected(found)
+    finally:
+        client.run(lambda folder: sys.path.remove(folder), str(there))
+
+
+def test_types_of_the_model_itself_need_its_folder(client, tmp_path, monkeypatch):
+    """Under the same path, also where the scene was named by a path from here."""
+    folder = tmp_path / "pushed"
+    folder.mkdir()
+    (folder / "plugin.py").write_text(PUSH.format(k=1.0))
+    pushed().scene.save(folder / "scene.toml")
+    monkeypatch.chdir(tmp_path)
+    study = attrs.evolve(bob(), scene=dap.load("pushed/scene.toml"), allow_code=True)
+    assert not study.scene.path.is_absolute()
+    same(
+        collected(run_here(Ensemble(study), POINTS, PLACES[:8], threads=1)),
+        collected(run_on(client, study, POINTS, PLACES[:8], chunk=2)),
+    )
+    here = environment_of(with_whole_path(study))
+    (folder / "plugin.py").rename(folder / "gone.py")
+    (unseen,) = differences(here, environment_of(with_whole_path(study)))
+    assert unseen == (
+        f"the force type 'push' stands in {folder / 'plugin.py'}, which it does not see; "
+        f"let it see the folder {folder} under this very path"
+    )
+
+
+def test_who_does_not_answer_is_named():
+    """Within the time given, in one sentence."""
+    begun = time.monotonic()
+    with pytest.raises(ClusterError, match=r"no dask scheduler answers at tcp://127.0.0.1:9 "):
+        connect("tcp://127.0.0.1:9", timeout=1.0)
+    assert time.monotonic() - begun < 5.0
+    for address in ("node", "http://127.0.0.1:80", ""):
+        with pytest.raises(ClusterError, match="no dask scheduler answers at"):
+            connect(address, timeout=1.0)
+
+
+def test_a_scheduler_without_workers_and_one_that_dies(tmp_path, monkeypatch):
+    """Both are told at once."""
+    monkeypatch.setattr(cluster, "ARRIVAL", 0.5)
+    file = tmp_path / "scheduler.json"
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--no-dashboard"]
+    process = subprocess.Popen(
+        [*command, "--port", "0", "--scheduler-file", str(file)], stderr=subprocess.DEVNULL
+    )
+    try:
+        wait_until(lambda: file.exists() and file.read_text().endswith("}"))
+        address = json.loads(file.read_text())["address"]
+        with connect(address) as client:
+            with pytest.raises(ClusterError, match=f"has no workers.*dask worker {address}"):
+                run_on(client, bob(), POINTS, PLACES)
+            with another_worker_of(address):
+                client.wait_for_workers(1, timeout=60)
+                found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
+                next(found)
+                process.kill()
+                with pytest.raises(ClusterError, match=f"the scheduler at {address} is gone"):
+                    collected(found)
+    finally:
+        process.kill()
+        process.wait(30)
+
+
+@contextmanager
+def another_worker_of(address):
+    command = [sys.executable, "-m", "distributed.cli.dask_worker", address]
+    process = subprocess.Popen(
+        [*command, "--no-dashboard", "--no-nanny", "--nthreads", "1"], stderr=subprocess.DEVNULL
+    )
+    try:
+        yield
+    finally:
+        process.kill()
+        process.wait(30)
+
+
+def test_what_is_no_client_is_refused(client):
+    for chunk in (0, -1, 2.5, True):
+        with pytest.raises(dap.SceneError, match=r"chunk = .*a whole number of points from 1"):
+            run_on(client, bob(), POINTS, PLACES, chunk=chunk)
+    with pytest.raises(dap.SceneError, match=r"client = .*a distributed\.Client"):
+        run_on("tcp://127.0.0.1:8786", bob(), POINTS, PLACES)
+
+
+def test_without_dask_there_is_one_sentence(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ClusterError, match=r'pip install "dap3d\[cluster\]"'):
+        connect("tcp://127.0.0.1:8786")
+
+
+def test_dask_is_not_imported_by_a_run():
+    """Nor by a study on this machine."""
+    script = (
+        "import sys, dap3d_core.study, dap3d_core.study.local as l; print('dask' in sys.modules"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", f"{script}, 'distributed' in sys.modules)"],
+        capture_output=True, text=True, check=True, cwd=REPOSITORY,
+    )  # fmt: skip
+    assert done.stdout.split() == ["False", "False"]

@@ -1,0 +1,181 @@
+"""The points of a study on the cores of a machine."""
+
+import threading
+import time
+
+import attrs
+import numpy as np
+import pytest
+from support.studies import POINTS, bob, collected, same
+
+import dap3d_core as dap
+from dap3d_core.formulations.second_thread import one_of_many, threads_allowed
+from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.study import Batch, Ensemble, PointStatus, local
+from dap3d_core.study.local import PATIENCE, Portions, run_here
+
+POINTS_COUNT = 24 if jit_is_on() else 4
+
+
+@pytest.fixture(scope="module")
+def ensemble():
+    return Ensemble(bob())
+
+
+def ours():
+    """The threads of studies that are alive."""
+    return [t for t in threading.enumerate() if t.name == "dap3d-study"]
+
+
+def test_numbers_depend_neither_on_threads_nor_on_portions(ensemble):
+    """Bit for bit: one thread, more threads than cores, all points at once, each by itself."""
+    points, places = POINTS[:POINTS_COUNT], np.arange(POINTS_COUNT)
+    one = collected(run_here(ensemble, points, places, threads=1))
+    assert sorted(one) == list(range(POINTS_COUNT))
+    for threads in (2, 3, None):
+        same(one, collected(run_here(ensemble, points, places, threads=threads)))
+    same(one, collected([(places, ensemble.run(points))]))
+    same(one, collected((places[k : k + 1], ensemble.run(points[k : k + 1])) for k in places))
+    assert not ours()
+
+
+def test_only_the_places_asked_for_are_run(ensemble):
+    """In any order; none at all gives nothing."""
+    points, places = POINTS[:9], np.array([7, 2, 5])
+    found = collected(run_here(ensemble, points, places, threads=2))
+    assert sorted(found) == [2, 5, 7]
+    for k in found:
+        same({k: found[k]}, collected([(np.array([k]), ensemble.run(points[k : k + 1]))]))
+    assert list(run_here(ensemble, points, np.array([], dtype=int))) == []
+
+
+@attrs.define
+class Slow:
+    """An ensemble that takes its time, and knows who used it."""
+
+    seconds: float = 0.0
+    fails_at: float = np.inf
+    seen: list = attrs.Factory(list)
+    alone: set = attrs.Factory(set)
+
+    def run(self, points):
+        self.seen.append((threading.current_thread().name, len(points)))
+        self.alone.add(threads_allowed())
+        time.sleep(self.seconds * len(points))
+        if (points[:, 0] >= self.fails_at).any():
+            raise ValueError("a function of the user")
+        status = np.full(len(points), PointStatus.DONE, dtype=np.int8)
+        return Batch(status, ("",) * len(points), {"mass": points[:, 0]})
+
+
+@pytest.mark.parametrize(("threads", "count"), [(1, 30), (8, 1)])
+def test_one_thread_or_one_point_makes_no_thread(threads, count):
+    slow = Slow()
+    found = run_here(slow, POINTS[:count], np.arange(count), threads=threads)
+    assert len(collected(found)) == count
+    assert {name for name, _ in slow.seen} == {threading.current_thread().name}
+
+
+def test_portions_follow_the_clock():
+    """Points of 4 ms: some 50 at once (0.2 s) in the middle, few at the end; each once."""
+    slow = Slow(0.004)
+    count = 400
+    points, places = np.zeros((count, 2)), np.arange(count)
+    assert len(collected(run_here(slow, points, places, threads=2))) == count
+    sizes = [size for _, size in slow.seen]
+    assert sum(sizes) == count
+    assert sizes[:2] == [1, 1]
+    assert 10 <= max(sizes) <= 55
+    assert sizes[-1] < 10
+
+
+def test_portions_shrink_where_points_take_longer():
+    """A portion of 1000 quick points is followed by one long one."""
+    portions = Portions(0.2, 1)
+    for size in (1, 16, 256):
+        assert portions.next(10**6) <= size
+        portions.note(size, size * 1e-4)
+    assert portions.next(10**6) == pytest.approx(2000, rel=0.01)
+    portions.note(2000, 2000.0)
+    assert portions.next(10**6) == 1
+    assert portions.next(0) >= 0
+
+
+def test_an_exception_comes_out_once_and_ends_the_others():
+    """What was done before it is given; nobody works on afterwards."""
+    points = np.column_stack([np.arange(200.0), np.zeros(200)])
+    slow = Slow(0.002, fails_at=50.0)
+    found = run_here(slow, points, np.arange(200), threads=2)
+    done = []
+    with pytest.raises(ValueError, match="a function of the user"):
+        done.extend(len(places) for places, _ in found)
+    assert 0 < sum(done) <= 150
+    assert not ours()
+    run = len(slow.seen)
+    time.sleep(0.05)
+    assert len(slow.seen) == run
+    assert list(found) == []
+
+
+@pytest.mark.parametrize("how", ["close", "Ctrl-C"])
+def test_who_ends_early_does_not_wait_for_the_rest(how):
+    """500 points of 10 ms would take 2.5 s."""
+    slow = Slow(0.01)
+    found = run_here(slow, np.zeros((500, 2)), np.arange(500), threads=2)
+    next(found)
+    begun = time.monotonic()
+    if how == "close":
+        found.close()
+    else:
+        with pytest.raises(KeyboardInterrupt):
+            found.throw(KeyboardInterrupt)
+    assert time.monotonic() - begun < PATIENCE
+    assert not ours()
+
+
+def test_a_long_point_is_not_waited_for_for_ever(monkeypatch):
+    """It is left to its thread, which begins no other one and is no hindrance to the end."""
+    monkeypatch.setattr(local, "PATIENCE", 0.1)
+    slow = Slow(0.5)
+    found = run_here(slow, POINTS[:20], np.arange(20), threads=2)
+    next(found)
+    begun = time.monotonic()
+    found.close()
+    assert time.monotonic() - begun < 0.3
+    left, run = ours(), len(slow.seen)
+    assert all(thread.daemon for thread in left)
+    for thread in left:
+        thread.join(5.0)
+    assert not ours()
+    assert len(slow.seen) == run
+
+
+@pytest.mark.skipif(not jit_is_on(), reason="large scenes have no second thread in plain Python")
+def test_many_at_once_leave_no_core_for_a_second_thread(monkeypatch):
+    """With several workers, or where one thread is asked for; a point alone may have it."""
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 1}, raising=False)
+    monkeypatch.delenv("DAP3D_THREADS", raising=False)
+    for count, threads, allowed in ((8, 2, {1}), (8, 1, {1}), (1, None, {2}), (1, 1, {1})):
+        slow = Slow(0.001)
+        collected(run_here(slow, POINTS[:count], np.arange(count), threads=threads))
+        assert slow.alone == allowed, (count, threads)
+    assert threads_allowed() == 2
+    with one_of_many(), one_of_many():
+        assert threads_allowed() == 1
+
+
+def test_the_environment_limits_threads(monkeypatch):
+    """DAP3D_THREADS, for those asked for, too; what it cannot say is refused."""
+    monkeypatch.setenv("DAP3D_THREADS", "1")
+    slow = Slow()
+    collected(run_here(slow, POINTS[:8], np.arange(8), threads=4))
+    assert {name for name, _ in slow.seen} == {threading.current_thread().name}
+    monkeypatch.setenv("DAP3D_THREADS", "none")
+    with pytest.raises(dap.SimulationError, match="DAP3D_THREADS is 'none'; it must be a whole"):
+        run_here(slow, POINTS[:8], np.arange(8))
+
+
+@pytest.mark.parametrize("threads", [0, -2, 1.5, "two", True])
+def test_what_is_no_number_of_threads_is_refused(ensemble, threads):
+    with pytest.raises(dap.SceneError, match=r"threads = .*a whole number from 1"):
+        run_here(ensemble, POINTS[:2], np.arange(2), threads=threads)
