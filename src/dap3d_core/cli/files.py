@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from dap3d_core.cli.exits import Refused
 
 if TYPE_CHECKING:
+    import xarray
+
     from dap3d_core.result import Result
 
 
@@ -91,6 +93,21 @@ def open_result(path: str, *, model: str | None = None, allow_code: bool = False
 
     try:
         return dap.open(path, model=model, allow_code=allow_code)
+    except ResultError as error:
+        raise Refused(str(error)) from error
+
+
+def open_sweep(path: str) -> "xarray.Dataset":
+    """The data set of a sweep in a file.
+
+    Raises:
+        Refused: it cannot be read; says why.
+    """
+    import dap3d_core as dap
+    from dap3d_core.result import ResultError
+
+    try:
+        return dap.open_sweep(path)
     except ResultError as error:
         raise Refused(str(error)) from error
 

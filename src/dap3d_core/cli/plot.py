@@ -1,9 +1,10 @@
-"""``dap3d plot``: quantities of results as curves, in a file or a window."""
+"""``dap3d plot``: quantities of results as curves, sweeps as maps, in a file or a window."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
@@ -12,16 +13,13 @@ from dap3d_core.cli.completion import results as complete_results
 from dap3d_core.cli.exits import DONE, Refused
 from dap3d_core.cli.group import Command
 
-if TYPE_CHECKING:
-    from dap3d_core.result import Result
-
 ENERGIES = ("energy.kinetic", "energy.potential", "energy.total")
 MM_PER_INCH = 25.4
 #: Ending of result files, by which a word is told from a quantity.
 ENDING = ".nc"
 
 
-@click.command(cls=Command, short_help="Draw curves of results.")
+@click.command(cls=Command, short_help="Draw curves of results, maps of sweeps.")
 @click.argument("result", shell_complete=complete_results)
 @click.argument(
     "quantities", metavar="[RESULT | QUANTITY]...", nargs=-1, shell_complete=complete_quantities
@@ -37,7 +35,14 @@ ENDING = ".nc"
     "--x",
     metavar="QUANTITY",
     shell_complete=complete_quantities,
-    help="What the curves are drawn over; time by default.",
+    help="What the curves are drawn over; time by default. Of a sweep a number or an output.",
+)
+@click.option(
+    "--at",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Of a sweep: only the points nearest to this value of a number; may be given several "
+    "times.",
 )
 @click.option("--show", is_flag=True, help="Open a window; writes a file only with -o.")
 @click.option(
@@ -55,13 +60,16 @@ def plot(
     *,
     output: str | None,
     x: str | None,
+    at: tuple[str, ...],
     show: bool,
     width: float | None,
     height: float | None,
     force: bool,
     as_json: bool,
 ) -> int:
-    """Draw quantities of a RESULT; without any, its energies.
+    """Draw quantities of a RESULT, or outputs of a sweep.
+
+    Without any, the energies of a result and all outputs of a sweep.
 
     \b
     BODY.r .p .rd .w .wp .rdd .wd .wpd  of a body
@@ -83,26 +91,83 @@ def plot(
     dap3d plot a.nc b.nc cone.r.z               two runs
 
     Words that end in .nc are further results, drawn in the same figure.
-    """
-    from dap3d_core.cli.files import open_result
-    from dap3d_core.cli.rendering import output as output_console
-    from dap3d_core.cli.rendering import print_json, say
 
+    A sweep is drawn as lines over one number, a map over two, parallel coordinates over more.
+
+    \b
+    dap3d plot pen1-sweep.nc cone.r.z:max
+    dap3d plot pen1-sweep.nc --at bodies.cone.mass=2
+    dap3d plot pen1-sweep.nc cone.r.z:max --x bodies.cone.mass
+    """
     files = [result, *(word for word in quantities if word.endswith(ENDING))]
-    names = tuple(w for w in quantities if not w.endswith(ENDING)) or ENERGIES
-    runs = dict(zip(_told_apart(files), map(open_result, files), strict=True))
-    shown: Mapping[str, Result] | Result = runs if len(runs) > 1 else runs.popitem()[1]
+    names = tuple(w for w in quantities if not w.endswith(ENDING))
+    shown, names, cuts = _opened(files, names, x, at)
     target = None
     if output is not None or not show:
         target = Path(output or Path(result).stem + ".png")
     size = _inches(width), _inches(height)
-    _check(shown, names, target, x, {"--width": size[0], "--height": size[1]}, files, force)
-    _draw(shown, names, target, x, show, size, force)
-    if target is not None and as_json:
-        print_json({"file": str(target), "results": files, "quantities": names, "x": x or "t"})
-    elif target is not None:
-        say(output_console(), f"{target} written", whole=True)
+    over: dict[str, Any] = {"x": x, "at": cuts}
+    _check(shown, names, target, over, {"--width": size[0], "--height": size[1]}, files, force)
+    _draw(shown, names, target, over, show, size, force)
+    if target is not None:
+        along = {"x": x, "at": cuts} if hasattr(shown, "data_vars") else {"x": x or "t"}
+        _tell({"file": str(target), "results": files, "quantities": names, **along}, as_json)
     return DONE
+
+
+def _tell(found: dict[str, Any], as_json: bool) -> None:
+    from dap3d_core.cli.rendering import output as output_console
+    from dap3d_core.cli.rendering import print_json, say
+
+    if as_json:
+        print_json(found)
+    else:
+        say(output_console(), f"{found['file']} written", whole=True)
+
+
+def _opened(
+    files: Sequence[str], names: tuple[str, ...], x: str | None, at: Sequence[str]
+) -> tuple[Any, tuple[str, ...], dict[str, float]]:
+    """What is drawn, the names in it, and where a sweep is cut.
+
+    Raises:
+        Refused: a file cannot be read; a sweep beside other files; a cut that is none.
+    """
+    from dap3d_core.cli.files import open_result, open_sweep
+    from dap3d_core.study.dataset import is_sweep
+
+    sweeps = [file for file in files if is_sweep(file)]
+    if sweeps and len(files) > 1:
+        raise Refused(f"{sweeps[0]} is a sweep, which is drawn alone")
+    if sweeps:
+        from dap3d_core.plot.sweep_table import table_of
+
+        data = open_sweep(files[0])
+        try:
+            return data, names or table_of(data).usual(x), _cuts(at)
+        except ValueError as error:
+            raise Refused(str(error)) from error
+    if at:
+        raise Refused(f"--at chooses points of a sweep; {files[0]} is none")
+    runs = dict(zip(_told_apart(files), map(open_result, files), strict=True))
+    return runs if len(runs) > 1 else runs.popitem()[1], names or ENERGIES, {}
+
+
+def _cuts(at: Sequence[str]) -> dict[str, float]:
+    """Numbers and the values they are held at."""
+    found: dict[str, float] = {}
+    for word in at:
+        name, _, value = word.rpartition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            number = float("nan")
+        if not name.strip() or not math.isfinite(number):
+            raise Refused(f"--at {word!r} should be NAME=VALUE, such as bodies.crank.mass=2")
+        if name.strip() in found:
+            raise Refused(f"--at {name.strip()} is given twice")
+        found[name.strip()] = number
+    return found
 
 
 def _told_apart(files: Sequence[str]) -> list[str]:
@@ -126,18 +191,17 @@ def _inches(size: float | None) -> float | None:
 
 
 def _check(
-    runs: "Mapping[str, Result] | Result",
+    shown: Any,
     names: tuple[str, ...],
     target: Path | None,
-    x: str | None,
+    over: Mapping[str, Any],
     sizes: Mapping[str, float | None],
     files: Sequence[str],
     force: bool,
 ) -> None:
     """Refuse what cannot be drawn or written, for all reasons at once."""
     from dap3d_core.cli.files import refuse_all, writable
-    from dap3d_core.plot.drawing import gather
-    from dap3d_core.plot.saving import SIDES, check_suffix
+    from dap3d_core.plot.saving import SIDES, check_suffix, painting
 
     def fits(option: str, size: float | None) -> None:
         if size is not None and not SIDES[0] <= size <= SIDES[1]:
@@ -150,15 +214,22 @@ def _check(
     if target is not None:
         checks += [partial(check_suffix, target)]
         checks += [partial(writable, target, force=force, sources=sources)]
-    checks += [partial(gather, runs, [name], None) for name in names]
-    refuse_all(*checks, partial(gather, runs, ["t"], x))
+    if hasattr(shown, "data_vars"):
+        from dap3d_core.plot.sweep_table import table_of
+
+        checks += [partial(table_of(shown).check, name) for name in names]
+        checks += [partial(painting, shown, names, over["x"], over["at"])]
+    else:
+        checks += [partial(painting, shown, [name], None, None) for name in names]
+        checks += [partial(painting, shown, ["t"], over["x"], None)]
+    refuse_all(*checks)
 
 
 def _draw(
-    runs: "Mapping[str, Result] | Result",
+    shown: Any,
     names: tuple[str, ...],
     target: Path | None,
-    x: str | None,
+    over: Mapping[str, Any],
     show: bool,
     size: tuple[float | None, float | None],
     force: bool,
@@ -169,8 +240,8 @@ def _draw(
     width, height = size[0] or WIDTH, size[1]
     try:
         if target is not None:
-            save_plot(runs, names, target, x=x, width=width, height=height, force=force)
+            save_plot(shown, names, target, **over, width=width, height=height, force=force)
         if show:
-            show_plot(runs, names, x=x, width=width, height=height)
+            show_plot(shown, names, **over, width=width, height=height)
     except (UnknownNameError, ResultError, ValueError) as error:
         raise Refused(str(error)) from error

@@ -1,8 +1,9 @@
-"""``dap3d view``: a result as one page with a moving scene, which any browser opens."""
+"""``dap3d view``: a result or a sweep as one page with a moving scene, which any browser opens."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -10,7 +11,6 @@ from dap3d_core.cli.exits import DONE, Refused
 from dap3d_core.cli.group import Command
 
 if TYPE_CHECKING:
-    from dap3d_core.result import Result
     from dap3d_core.view import View
 
 
@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 @click.option("--open/--no-open", "opens", default=False, help="Open the page in a browser.")
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+@click.pass_context
 def view(
+    ctx: click.Context,
     result: str,
     *,
     output: str | None,
@@ -40,7 +42,7 @@ def view(
     force: bool,
     as_json: bool,
 ) -> int:
-    """Make a page of a RESULT: the moving scene, plots, the ledger, settings.
+    """Make a page of a RESULT or a sweep: the moving scene, plots, the ledger, settings.
 
     The page is one file. It opens from disk, loads nothing from a network and can be sent to
     others. Orbit with the mouse, play, scrub, follow a body, switch traces and arrows; the question
@@ -51,42 +53,96 @@ def view(
     dap3d view pen1.nc -o tip.html --quantity cone.r.z --quantity J1.force.norm
 
     Quantities are named as for dap3d plot; more can be chosen in the page.
+
+    Points of a sweep are run again, 50 of many, and chosen in the page by sliders.
     """
-    from dap3d_core.cli.files import open_result, refuse_all, writable
+    from dap3d_core.cli.files import writable
     from dap3d_core.cli.rendering import items, messages, print_json, say, size
     from dap3d_core.cli.rendering import output as output_console
+    from dap3d_core.study.dataset import is_sweep
 
     target = Path(output) if output is not None else Path(Path(result).stem + ".html")
     if target.suffix.lower() not in (".html", ".htm"):
         raise Refused(f"cannot write {target}: a page is a .html file")
-    opened = open_result(result, model=model, allow_code=allow_code)
-    refuse_all(
-        partial(writable, target, force=force, sources=(Path(result),)),
-        *(partial(opened.quantity, name) for name in quantities),
-    )
-    page = _made(opened, quantities, fps, model)
+    free = partial(writable, target, force=force, sources=(Path(result),))
+    if is_sweep(result):
+        page = _of_sweep(ctx, result, free, quantities, fps, model, allow_code=allow_code,
+                         quiet=as_json)  # fmt: skip
+    else:
+        page = _of_result(result, free, quantities, fps, model, allow_code=allow_code)
     page.save(target, force=force)
+    points = len(page.data["sweep"]["points"]) if "sweep" in page.data else None
     notes, byte_count = page.data["about"]["view_notes"], target.stat().st_size
     if as_json:
-        about = {"file": str(target), "size_bytes": byte_count, "instants": page.instants}
+        about: dict[str, Any] = {
+            "file": str(target),
+            "size_bytes": byte_count,
+            "instants": page.instants,
+        }
+        about |= {} if points is None else {"points": points}
         print_json({**about, "quantities": list(page.data["asked"]), "notes": notes})
     else:
         items(messages(), notes)
-        contents = f"{page.instants} instants"
+        contents = f"{page.instants} instants" if points is None else f"{points} points"
         say(output_console(), f"{target} written ({size(byte_count)}): {contents}", whole=True)
     if opens:
         _open(target)
     return DONE
 
 
-def _made(result: "Result", names: tuple[str, ...], fps: float | None, model: str | None) -> "View":
+def _of_result(
+    file: str,
+    free: Callable[[], object],
+    quantities: tuple[str, ...],
+    fps: float | None,
+    model: str | None,
+    *,
+    allow_code: bool,
+) -> "View":
+    """The page of a result."""
+    from dap3d_core.cli.files import open_result, refuse_all
     from dap3d_core.result import UnknownNameError
     from dap3d_core.view import view as make_view
 
+    opened = open_result(file, model=model, allow_code=allow_code)
+    refuse_all(free, *(partial(opened.quantity, name) for name in quantities))
     try:
-        return make_view(result, *names, fps=fps, model=model)
+        return make_view(opened, *quantities, fps=fps, model=model)
     except (UnknownNameError, ValueError) as error:
         raise Refused(str(error)) from error
+
+
+def _of_sweep(
+    ctx: click.Context,
+    file: str,
+    free: Callable[[], object],
+    quantities: tuple[str, ...],
+    fps: float | None,
+    model: str | None,
+    *,
+    allow_code: bool,
+    quiet: bool,
+) -> "View":
+    """The page of a sweep, whose points are run again."""
+    from dap3d_core.cli.files import open_sweep
+    from dap3d_core.cli.progress import PointsProgress
+    from dap3d_core.result import UnknownNameError
+    from dap3d_core.view import view as make_view
+
+    data = open_sweep(file)
+    free()
+    stopping = ctx.meta["dap3d.stopping"]
+
+    def count(done: int, total: int) -> None:
+        progress.count(done, total)
+        stopping.between_chunks()
+
+    with PointsProgress(quiet=quiet) as progress:
+        try:
+            return make_view(data, *quantities, fps=fps, model=model, allow_code=allow_code,
+                             progress=count, announce=progress.announce)  # fmt: skip
+        except (UnknownNameError, ValueError) as error:
+            raise Refused(str(error)) from error
 
 
 def _open(target: Path) -> None:

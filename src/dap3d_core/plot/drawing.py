@@ -11,6 +11,8 @@ from dap3d_core.model.groups import Floats
 from dap3d_core.result import Quantity, Result, UnknownNameError, find
 
 if TYPE_CHECKING:
+    import xarray
+
     from dap3d_core.study.fit_result import Fit
 
 #: Colours that colour-blind readers can tell apart, on white (Okabe and Ito 2008, without yellow).
@@ -55,19 +57,25 @@ class Drawing(NamedTuple):
 
 
 def plot(
-    result: "Result | Mapping[str, Result] | Fit",
+    result: "Result | Mapping[str, Result] | Fit | xarray.Dataset",
     *quantities: str,
     x: str | None = None,
+    at: Mapping[str, float] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw quantities of a result, those of different units in panels below one another.
+    """Draw quantities of a result, or outputs of a sweep, in panels below one another.
 
     Args:
-        result: what to draw from; several runs as names and results, {"rtol 1e-6": result, ...};
-            a ``Fit``: its data, its curves and its residuals, of all outputs or those named.
-        quantities: names such as ``crank.r.z``, ``crank.w`` (all components), ``energy.total``.
+        result: a ``Result``; several as names and results, {"rtol 1e-6": result, ...}; a ``Fit``: its
+            data, its curves and its residuals; or the data set of a sweep.
+        quantities: names such as ``crank.r.z``, ``crank.w`` (all components), ``energy.total``;
+            those of different units stand in panels of their own. Of a fit its outputs, all when
+            left out. Of a sweep as well: lines over one number, a map over two, parallel
+            coordinates over more, curves over time (docs/how-to/look-at-sweeps.md).
         x: the quantity they are drawn over, one number an instant; time when left out. A path, a
-            length over a length, has one scale on both axes; a circle marks its start.
+            length over a length, has one scale on both axes; a circle marks its start. Of a sweep a
+            number or an output.
+        at: of a sweep: number -> value; the points nearest to it alone are drawn.
         ax: where to draw; a new pyplot figure when left out.
 
     Returns:
@@ -77,8 +85,14 @@ def plot(
     Raises:
         UnknownNameError: there is no such quantity; names the nearest.
         ValueError: no runs, no quantities, no instants, ``x`` has components, or ``ax`` is to take
-            several units.
+            several units; a sweep without values, or a data set that is no sweep.
     """
+    if hasattr(result, "data_vars"):  # a data set of xarray, which is a mapping as well
+        from dap3d_core.plot.sweeps import plot_sweep
+
+        return plot_sweep(result, quantities, x, at, ax)
+    if at:
+        raise ValueError("at chooses points of a sweep; this is none")
     if not isinstance(result, (Result, Mapping)):
         if x is not None or ax is not None:
             raise ValueError("a fit is drawn over time, on a figure of its own: leave x, ax out")

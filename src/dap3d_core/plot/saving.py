@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from dap3d_core.plot.drawing import WIDTH, draw, gather, height_of
-from dap3d_core.result import Result, ResultError
+from dap3d_core.result import ResultError
 from dap3d_core.result.files import cannot, whole_file
 
 #: Suffix -> what keeps the time of day out of the file: equal figures give equal files.
@@ -33,23 +33,25 @@ NO_WINDOW = (
 
 
 def save_plot(
-    result: Result | Mapping[str, Result],
+    result: Any,
     quantities: str | Sequence[str],
     path: str | os.PathLike[str],
     *,
     x: str | None = None,
+    at: Mapping[str, float] | None = None,
     width: float = WIDTH,
     height: float | None = None,
     dpi: float = 200.0,
     force: bool = False,
 ) -> Path:
-    """Draw quantities of a result as ``plot`` does, into a file; needs no display.
+    """Draw quantities of a result or a sweep as ``plot`` does, into a file; needs no display.
 
     Args:
-        result: what to draw from; several runs as names and results.
+        result: what to draw from; several runs as names and results; a sweep.
         quantities: one name or several.
         path: the file; its suffix says what it is, .png, .svg or .pdf.
         x: the quantity they are drawn over; time when left out.
+        at: of a sweep: number -> value, as ``plot`` has it.
         width, height: size in inches; the height fits the number of panels when left out.
         dpi: dots an inch of a PNG.
         force: whether an existing file is overwritten.
@@ -63,10 +65,27 @@ def save_plot(
     """
     target = Path(path)
     check_suffix(target)
+    paint, fitting = painting(result, quantities, x, at)
+    size = (width, fitting if height is None else height)
+    return save_figure(paint, target, size, dpi, force=force)
+
+
+def painting(
+    result: Any, quantities: str | Sequence[str], x: str | None, at: Mapping[str, float] | None
+) -> tuple[Callable[[Figure], object], float]:
+    """What draws a figure of a result or a sweep, and a good height for it, inches.
+
+    Raises:
+        UnknownNameError, ValueError: as ``plot``.
+    """
     names = [quantities] if isinstance(quantities, str) else list(quantities)
+    if hasattr(result, "data_vars"):
+        from dap3d_core.plot.sweeps import draw_sweep, gather_sweep
+
+        found = gather_sweep(result, names, x, at)
+        return (lambda figure: draw_sweep(figure, found)), found.height
     drawing = gather(result, names, x)
-    size = (width, height_of(drawing) if height is None else height)
-    return save_figure(lambda figure: draw(figure, drawing), target, size, dpi, force=force)
+    return (lambda figure: draw(figure, drawing)), height_of(drawing)
 
 
 def check_suffix(target: Path) -> str:
@@ -125,27 +144,27 @@ def fixed_files() -> Iterator[None]:
 
 
 def show_plot(
-    result: Result | Mapping[str, Result],
+    result: Any,
     quantities: str | Sequence[str],
     *,
     x: str | None = None,
+    at: Mapping[str, float] | None = None,
     width: float = WIDTH,
     height: float | None = None,
 ) -> None:
     """Draw quantities of a result as ``plot`` does, in a window; returns when it is closed.
 
     Args:
-        result, quantities, x, width, height: as ``save_plot`` has them.
+        result, quantities, x, at, width, height: as ``save_plot`` has them.
 
     Raises:
         UnknownNameError, ValueError: as ``plot``.
         ResultError: there is no display, or nothing to open windows with.
     """
-    names = [quantities] if isinstance(quantities, str) else list(quantities)
-    drawing = gather(result, names, x)
+    paint, fitting = painting(result, quantities, x, at)
     from matplotlib import pyplot
 
-    size = (width, height_of(drawing) if height is None else height)
+    size = (width, fitting if height is None else height)
     try:
         figure = pyplot.figure(figsize=size, layout="constrained", dpi=WINDOW_DPI)
     except ImportError as error:  # the environment names a way that does not work here
@@ -153,6 +172,6 @@ def show_plot(
     if matplotlib.get_backend().lower() in FILES_ALONE:
         pyplot.close(figure)
         raise ResultError(NO_WINDOW)
-    draw(figure, drawing)
+    paint(figure)
     pyplot.show()
     pyplot.close(figure)

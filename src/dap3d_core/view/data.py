@@ -18,7 +18,12 @@ USUAL = ("energy.kinetic", "energy.potential", "energy.total")
 
 
 def page_data(
-    result: Result, scene: Scene, quantities: Sequence[str], fps: float | None
+    result: Result,
+    scene: Scene,
+    quantities: Sequence[str],
+    fps: float | None,
+    *,
+    share: int = 1,
 ) -> dict[str, Any]:
     """Everything that the page knows, ready for JSON.
 
@@ -27,6 +32,7 @@ def page_data(
         scene: what was run.
         quantities: curves that are shown at once, by name.
         fps: frames a second; None for all instants, as far as they fit.
+        share: how many results share the page.
 
     Raises:
         UnknownNameError: there is no such quantity.
@@ -36,7 +42,7 @@ def page_data(
         raise ValueError("the result has no instants: there is nothing to show")
     if fps is not None and not (math.isfinite(fps) and 0.0 < fps <= 1e6):
         raise ValueError(f"fps = {fps:g}: the number of frames a second is greater than 0")
-    places = chosen(result.t, result.subject.body_count, fps)
+    places = chosen(result.t, share * result.subject.body_count, fps)
     shown = thinned(result, places)
     elements = elements_of(result)
     geometry = geometry_of(shown, scene, elements)

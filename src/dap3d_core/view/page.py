@@ -5,6 +5,7 @@ import hashlib
 import html
 import json
 import os
+from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ PROGRAM = (
     "transport",
     "panel",
     "keyboard",
+    "sweep",
     "main",
 )
 #: Height of the frame in a notebook, pixels.
@@ -87,28 +89,43 @@ class View:
 
 
 def view(
-    result: Result,
+    result: Any,
     *quantities: str,
     fps: float | None = None,
     model: str | os.PathLike[str] | None = None,
+    allow_code: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+    announce: Callable[[str], None] | None = None,
 ) -> View:
-    """A result as a page: the moving scene, plots, the ledger, settings.
+    """A result or a sweep as a page: the moving scene, plots, the ledger, settings.
+
+    The points of a sweep, some 50 of many, are run again; in the page they are chosen by sliders.
 
     Args:
-        result: what to show.
+        result: what to show: a ``Result``, or the data set of a sweep.
         quantities: curves that are drawn at once, such as ``crank.r.z``; more can be chosen in the
-            page. Without any: energies, and motion of the first body.
+            page. Without any: energies, and motion of the first body; of a sweep what it kept.
         fps: frames a second of the page, nearest reported instants; by default every instant.
-        model: the model (a name, a folder, a file) in whose folder meshes of shapes lie.
+        model: the model (a name, a folder, a file) in whose folder meshes of shapes lie; of a
+            sweep also that of its own types.
+        allow_code: of a sweep: whether types of that model's ``plugin.py`` may be loaded.
+        progress: of a sweep: called as progress(done, total). announce: as ``compile``.
 
     Returns:
         A view: shown by notebooks, written by ``.save("page.html")``.
 
     Raises:
         UnknownNameError: there is no such quantity; names the nearest.
-        ValueError: the result has no instants, or fps cannot be.
-        SceneError: there is no such model.
+        ValueError: the result has no instants, fps cannot be, or no point of a sweep runs.
+        SceneError: there is no such model, or the scene of a sweep cannot be used.
     """
+    if hasattr(result, "data_vars"):  # a data set of xarray
+        from dap3d_core.view.sweeps import sweep_data
+
+        how: dict[str, Any] = dict(model=model, allow_code=allow_code)
+        return View(
+            sweep_data(result, quantities, fps, progress=progress, announce=announce, **how)
+        )
     return View(page_data(result, _scene(result, model), quantities, fps))
 
 

@@ -22,7 +22,7 @@ function listen(app) {
   element("keys").append(...every.flatMap(([, shown, words]) => [make("dt", "", {}, make("kbd", shown)), make("dd", words)]));
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || element("help").open) return;
-    const { target } = event, typing = target.id === "time" || target.tagName === "SELECT";
+    const { target } = event, typing = target.id === "time" || target.tagName === "SELECT" || isPointSlider(target, event.key);
     if (typing && event.key !== "Escape") return;
     if (event.key === " " && target.tagName === "BUTTON") return; // a button has the space bar itself
     const found = every.find(([keys]) => keys.includes(event.key.length === 1 ? event.key.toLowerCase() : event.key));

@@ -12,13 +12,17 @@ class App {
     tellRun(data.about);
     this.stage = this.makeStage();
     this.transport = new Transport(this.motion, () => this.request());
-    if (this.stage) this.furnish();
+    if (this.stage) {
+      this.furnish();
+      this.listenToCanvas();
+    }
     this.arrows ??= { groups: {} };
     this.plots = new Plots(element("plots"), element("plot-add"), catalogue(data, this.motion, this.arrows), this.motion, (t) => this.transport.seek(t));
     this.panel = new Panel(() => this.plots.drawAll());
     if (this.stage) this.furnishPanel();
     this.firstPlots();
     this.applyTheme();
+    this.sweep = data.sweep ? new Sweep(this, data.sweep) : null;
     listen(this);
     element("theme").addEventListener("click", () => this.flipTheme());
     element("fit").addEventListener("click", () => this.fit());
@@ -51,7 +55,10 @@ class App {
     motion.place(motion.start);
     stage.place(motion);
     this.labels = new Labels(data, stage, element("labels"));
-    stage.onchange = () => this.request();
+  }
+
+  listenToCanvas() {
+    this.stage.onchange = () => this.request();
     const canvas = element("canvas");
     let down = null;
     canvas.addEventListener("pointerdown", (event) => { down = [event.clientX, event.clientY]; });
@@ -63,6 +70,25 @@ class App {
       const body = found && this.bodyOf(found);
       if (body) this.setFollow(body);
     });
+  }
+
+  // Another motion of the same mechanism: data of another point of a sweep, or null for none.
+  exchange(data) {
+    document.body.classList.toggle("nothing", data === null);
+    if (data === null) { this.request(); return; }
+    const { stage } = this;
+    this.data = data;
+    this.motion = new Motion(data);
+    this.title();
+    tellRun(data.about);
+    if (stage) {
+      stage.clear();
+      element("labels").replaceChildren();
+      this.furnish();
+      this.panel.apply();
+    }
+    this.plots.exchange(catalogue(data, this.motion, this.arrows), this.motion);
+    this.transport.exchange(this.motion);
   }
 
   furnishPanel() {
@@ -82,10 +108,12 @@ class App {
         this.labels.hidden[on ? "delete" : "add"]("ground");
       }), { key: "W" });
     }
-    if (Object.keys(this.arrows.groups).length) {
+    const kinds = kindsOfArrows(data);
+    if (kinds.size) {
       panel.heading("Arrows");
-      for (const [key, group] of Object.entries(this.arrows.groups)) {
-        const on = group.what === "force" && group.items.length <= 2 * FEW;
+      for (const [key, group] of Object.entries(ARROWS)) {
+        if (!kinds.has(key)) continue;
+        const on = key.endsWith("force") && (this.arrows.groups[key]?.items.length ?? 0) <= 2 * FEW;
         panel.toggle(group.label, group.label, on, redraw((v) => this.arrows.show(key, v)), { key: group.key, color: group.color });
       }
       panel.slider("Length", -2, 2, 0, (x) => { this.arrows.factor = 10 ** x; this.request(); });
@@ -97,9 +125,9 @@ class App {
     const list = make("div", "", { class: "list" });
     element("tab-display").append(list);
     const first = this.firstTraces();
-    for (const choice of this.traces.choices) {
-      panel.toggle("", choice.name, first.includes(choice), redraw((on) => this.traces.show(choice, on)), { color: choice.color, into: list });
-    }
+    this.traces.choices.forEach((choice, k) => {
+      panel.toggle("", choice.name, first.includes(choice), redraw((on) => this.traces.show(this.traces.choices[k], on)), { color: choice.color, into: list });
+    });
   }
 
   // Mass centres that move, of few bodies all, of many the last.
@@ -220,6 +248,7 @@ window.dap3d = {
   get playing() { return app.transport.playing; },
   get pictures() { return app.pictures; },
   drawnAt: (name, at) => app.drawnAt(name, at),
+  choose: (...places) => app.sweep.choose(places),
   onScreen: (name, at) => app.stage.project(new THREE.Vector3().fromArray(app.drawnAt(name, at))),
 };
 document.documentElement.dataset.ready = "yes";

@@ -5,7 +5,11 @@ class Panel {
     this.tabs = [...document.querySelectorAll("#tabs button")];
     for (const tab of this.tabs) tab.addEventListener("click", () => { this.open(tab.dataset.tab); onopen(); });
     this.switches = {};
+    this.settings = [];
   }
+
+  // Do what all switches say once more: what they switch was made anew.
+  apply() { for (const set of this.settings) set(); }
 
   open(name) {
     for (const tab of this.tabs) {
@@ -26,6 +30,7 @@ class Panel {
     row.append(make("span", label));
     if (key) row.append(make("kbd", key));
     into.append(row);
+    this.settings.push(() => set(input.checked));
     set(on);
     if (name) this.switches[name] = { key, flip: () => input.click(), input };
   }
@@ -33,6 +38,7 @@ class Panel {
   slider(label, least, largest, value, set) {
     const input = make("input", "", { type: "range", min: least, max: largest, step: "any", value, "aria-label": label });
     input.addEventListener("input", () => set(Number(input.value)));
+    this.settings.push(() => set(Number(input.value)));
     input.addEventListener("dblclick", () => { input.value = value; set(value); });
     element("tab-display").append(make("div", "", { class: "row" }, make("span", label), input));
   }
@@ -47,6 +53,7 @@ class Panel {
 
 function tellRun(about) {
   const tab = element("tab-run");
+  tab.replaceChildren();
   const section = (title, ...content) => tab.append(make("h2", title), ...content);
   const table = (rows) => make("table", "", {}, ...rows.map(([name, value]) => make("tr", "", {}, make("th", name), make("td", value, { class: "value" }))));
   const list = (items) => make("ul", "", { class: "notes" }, ...items.map((item) => make("li", item)));

@@ -14,6 +14,17 @@ class Plots {
     choice.addEventListener("change", () => { this.add(choice.value); choice.value = ""; });
   }
 
+  // The same curves of another motion.
+  exchange(catalogue, motion) {
+    Object.assign(this, { catalogue, motion });
+    for (const panel of this.panels) {
+      panel.quantities = panel.quantities.map((q) => catalogue.get(q.name) ?? { ...q, values: () => [] });
+      this.#keys(panel);
+    }
+    this.t = Math.min(Math.max(this.t ?? motion.start, motion.start), motion.end);
+    this.drawAll();
+  }
+
   add(name) {
     const quantity = this.catalogue.get(name);
     if (!quantity) return;

@@ -23,9 +23,20 @@ class Stage {
     this.#light();
     this.#ground();
     this.#gravity();
+    this.standing = new Set(this.scene.children);
     this.resize();
     this.fit();
     this.controls.addEventListener("change", () => this.onchange?.());
+  }
+
+  // Take away what was drawn of a motion; lights, ground and gravity stay.
+  clear() {
+    for (const object of [...this.scene.children]) {
+      if (this.standing.has(object)) continue;
+      this.scene.remove(object);
+      object.geometry?.dispose();
+      object.material?.dispose();
+    }
   }
 
   #light() {

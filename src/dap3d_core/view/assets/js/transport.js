@@ -4,13 +4,10 @@ const SPEEDS = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 1
 
 class Transport {
   constructor(motion, changed) {
-    Object.assign(this, { motion, changed, t: motion.start, playing: false, loop: true });
-    this.speed = this.#usual();
+    Object.assign(this, { changed, t: motion.start, playing: false, loop: true });
     this.slider = element("slider");
-    this.slider.min = motion.start;
-    this.slider.max = motion.end;
-    const step = motion.frames > 1 ? (motion.end - motion.start) / (motion.frames - 1) : 1;
-    this.digits = Math.min(9, Math.max(2, Math.ceil(-Math.log10(step || 1)) + 1));
+    this.#measure(motion);
+    this.speed = this.#usual();
     element("speed").append(...SPEEDS.map((s) => make("option", `${s} \u00d7`, { value: s })));
     element("play").addEventListener("click", () => this.toggle());
     element("back").addEventListener("click", () => this.step(-1));
@@ -21,6 +18,20 @@ class Transport {
     element("time").addEventListener("change", () => this.seek(Number(element("time").value.replace(",", "."))));
     this.setSpeed(this.speed);
     this.#show();
+  }
+
+  #measure(motion) {
+    this.motion = motion;
+    this.slider.min = motion.start;
+    this.slider.max = motion.end;
+    const step = motion.frames > 1 ? (motion.end - motion.start) / (motion.frames - 1) : 1;
+    this.digits = Math.min(9, Math.max(2, Math.ceil(-Math.log10(step || 1)) + 1));
+  }
+
+  // Another motion, at the same time as far as it goes.
+  exchange(motion) {
+    this.#measure(motion);
+    this.seek(this.t);
   }
 
   // The round speed nearest 1 with which the whole takes 1.5 to 40 s.
