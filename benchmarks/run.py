@@ -26,6 +26,7 @@ import hard.long_time
 import kernels
 import numba
 import numpy
+import points
 import projection
 import right_hand_side
 import scale
@@ -95,6 +96,7 @@ def main():
         "two_threads": two_threads.measure,
         "streaming": streaming.measure,
         "study": study.measure,
+        "points": points.measure,
         "hard_cases": hard.measure,
         "long_time": hard.long_time.measure,
         "chaos": hard.chaos.measure,

@@ -333,9 +333,10 @@ def test_who_does_not_answer_is_named():
             connect(address, timeout=1.0)
 
 
-def test_a_scheduler_without_workers_and_one_that_dies(tmp_path, monkeypatch):
-    """Both are told at once."""
-    monkeypatch.setattr(cluster, "ARRIVAL", 0.5)
+def test_workers_and_schedulers_that_are_gone(tmp_path, monkeypatch):
+    """No workers at the start, none any more, and a scheduler that dies: each is one sentence."""
+    for name, seconds in (("ARRIVAL", 0.5), ("ABSENCE", 0.5), ("LOOK", 0.1)):
+        monkeypatch.setattr(cluster, name, seconds)
     file = tmp_path / "scheduler.json"
     command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--no-dashboard"]
     process = subprocess.Popen(
@@ -347,6 +348,12 @@ def test_a_scheduler_without_workers_and_one_that_dies(tmp_path, monkeypatch):
         with connect(address) as client:
             with pytest.raises(ClusterError, match=f"has no workers.*dask worker {address}"):
                 run_on(client, bob(), POINTS, PLACES)
+            with another_worker_of(address):
+                client.wait_for_workers(1, timeout=60)
+                found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
+                next(found)
+            with pytest.raises(ClusterError, match=f"{address} has lost all its workers"):
+                collected(found)
             with another_worker_of(address):
                 client.wait_for_workers(1, timeout=60)
                 found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)

@@ -255,3 +255,17 @@ def test_the_period_of_a_spring_follows_its_stiffness():
     found = of.run(points).values["m.r.x"]
     assert way(of) == "copied"
     np.testing.assert_allclose(found, np.cos(np.sqrt(points[:, 0] / points[:, 1])), atol=1e-7)
+
+
+def test_a_function_of_the_user_that_raises_fails_its_point():
+    def of_small_masses(result):
+        return 1.0 / (float(result.subject.mass[0]) - 2.0)
+
+    of = ensemble(
+        pendulum(), ["bodies.bob.mass"], [of_small_masses, "bob.r.x"], t_end=0.02, dt=0.01
+    )
+    batch = of.run([[1.0], [2.0], [3.0]])
+    assert batch.status.tolist() == [DONE, FAILED, DONE]
+    assert "output 'of_small_masses' raises ZeroDivisionError" in batch.notes[1]
+    assert np.isnan(batch.values["bob.r.x"]).tolist() == [False, True, False]
+    assert batch.values["of_small_masses"][[0, 2]].tolist() == [-1.0, 1.0]

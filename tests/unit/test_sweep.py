@@ -11,6 +11,7 @@ from support.plain import in_another_process
 from support.process import run
 
 import dap3d_core as dap
+from dap3d_core.cli import sweep_tables
 from dap3d_core.result import ResultError
 from dap3d_core.simulation import room
 from dap3d_core.study import growing, sweep
@@ -253,6 +254,32 @@ def test_results_and_sweeps_are_told_apart(tmp_path):
     bare.to_netcdf(tmp_path / "bare.nc")
     with pytest.raises(ResultError, match="it has no status"):
         dap.open_sweep(tmp_path / "bare.nc")
+
+
+def test_a_large_file_is_read_when_it_is_asked_for(swept, tmp_path, monkeypatch):
+    """Lazily, with the same numbers; so are its extremes, block by block."""
+    path = tmp_path / "a.nc"
+    dap.sweep(spring(), VARY, outputs=OUTPUTS, output=path, **TIMES)
+    expected = sweep_tables.sweep_facts(swept)
+    monkeypatch.setattr("dap3d_core.study.dataset.LARGE", 0)
+    monkeypatch.setattr(sweep_tables, "LARGE", 1)
+    with dap.open_sweep(path) as found:
+        assert found["block.r.x"].variable._in_memory is False
+        assert sweep_tables.sweep_facts(found) == expected
+        assert found.load().identical(swept)
+
+
+def test_a_file_that_appears_meanwhile_is_left(tmp_path, one_by_one):
+    """The points stay in the part, from where a sweep with force is finished."""
+    path = tmp_path / "a.nc"
+    options = dict(outputs="block.r.x", output=path, **TIMES)
+    with pytest.raises(ResultError, match="cannot write") as ended:
+        dap.sweep(spring(), VARY, progress=lambda done, total: path.write_text("mine"), **options)
+    assert (ended.value.result["status"] == 1).all()
+    assert path.read_text() == "mine"
+    found = dap.sweep(spring(), VARY, resume=True, force=True, **options)
+    assert (found["status"] == 1).all()
+    assert one_by_one == [0, 1, 2, 3]
 
 
 # ---------------------------------------------------------------------------- going on

@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -66,8 +66,8 @@ def plot(
     """Draw quantities of a result, or outputs of a sweep, in panels below one another.
 
     Args:
-        result: a ``Result``; several as names and results, {"rtol 1e-6": result, ...}; a ``Fit``: its
-            data, its curves and its residuals; or the data set of a sweep.
+        result: a ``Result``; several as names and results, {"rtol 1e-6": result, ...}; a ``Fit``:
+            its data, its curves and its residuals; or the data set of a sweep.
         quantities: names such as ``crank.r.z``, ``crank.w`` (all components), ``energy.total``;
             those of different units stand in panels of their own. Of a fit its outputs, all when
             left out. Of a sweep as well: lines over one number, a map over two, parallel
@@ -90,7 +90,7 @@ def plot(
     if hasattr(result, "data_vars"):  # a data set of xarray, which is a mapping as well
         from dap3d_core.plot.sweeps import plot_sweep
 
-        return plot_sweep(result, quantities, x, at, ax)
+        return plot_sweep(cast("xarray.Dataset", result), quantities, x, at, ax)
     if at:
         raise ValueError("at chooses points of a sweep; this is none")
     if not isinstance(result, (Result, Mapping)):
@@ -99,7 +99,8 @@ def plot(
         from dap3d_core.plot.fit import plot_fit
 
         return plot_fit(result, quantities)
-    drawing = gather(result, quantities, x)
+    runs = cast("Result | Mapping[str, Result]", result)
+    drawing = gather(runs, quantities, x)
     if ax is None:
         from matplotlib import pyplot
 

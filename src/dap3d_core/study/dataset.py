@@ -149,13 +149,15 @@ def _attributes(ensemble: Ensemble, design: Design) -> dict[str, Any]:
     found: dict[str, Any] = {
         SWEEP: np.int32(FORMAT),
         "model": str(scene.name).replace("\0", ""),
-        "scene": ensemble.compiled.scene_text,
+        "scene": ensemble.asked.scene.to_toml(),
         "varied": to_json(varied),
         "outputs": to_json(outputs),
         "design": design.name,
-        "types": to_json(digests_of(ensemble.compiled)),
+        "types": to_json(digests_of(ensemble.compiled.checked)),
         "versions": to_json(current_versions()),
     }
+    if ensemble.study.pack > 1:
+        found["pack"] = np.int64(ensemble.study.pack)
     return found if design.seed is None else found | {"seed": np.int64(design.seed)}
 
 

@@ -78,6 +78,8 @@ class Ensemble:
     Both give the same numbers, bit for bit, whichever points are run together.
 
     Attributes:
+        asked, study: the study as asked for, and as it is run: where nothing but ends is kept,
+            runs report their end alone.
         compiled: the model, with the numbers as the scene gives them.
         numbers: those that vary.
         outputs: those of the study, each vector in its components.
@@ -91,7 +93,8 @@ class Ensemble:
         Raises:
             SceneError: an unknown name, an unknown output, or mistakes of the scene.
         """
-        self.study = study = _at_the_end_alone(study)
+        self.asked, self.study = study, _at_the_end_alone(study)
+        study = self.study
         allow = study.allow_code
         self.compiled = CompiledModel(study.scene, allow_code=allow, announce=announce)
         self.numbers: tuple[Number, ...] = numbers_named(self.compiled.checked, study.names)
@@ -120,7 +123,10 @@ class Ensemble:
 
     def result(self, point: Sequence[float]) -> Result:
         """The whole result of one point, as ``simulate`` gives it; errors as of that."""
-        scene = with_values(self.study.scene, self.numbers, point)
+        return self._result(self.asked.scene, point)
+
+    def _result(self, scene: Scene, point: Sequence[float]) -> Result:
+        scene = with_values(scene, self.numbers, point)
         registry = self.compiled.checked.registry
         return simulate(CompiledModel(scene, registry=registry))
 
@@ -152,7 +158,7 @@ class Ensemble:
         """Run a point by itself; its outputs into place k, and its note."""
         result: Result | None
         try:
-            result = self.result(point.tolist())
+            result = self._result(self.study.scene, point.tolist())
             status, note = PointStatus.DONE, self._note(result)
         except (SceneError, SimulationError) as error:
             result = getattr(error, "result", None)
@@ -160,13 +166,24 @@ class Ensemble:
             note = " ".join(str(error).split())
         batch.status[k] = status
         if result is not None:
-            for output in self.outputs:
+            note = self.keep(k, result, self.outputs, batch) or note
+        return note
+
+    def keep(self, k: int, result: Result, outputs: Sequence[Output], batch: Batch) -> str:
+        """Outputs of a result into place k; why the point failed there, "" where it did not."""
+        try:
+            for output in outputs:
                 value = np.atleast_1d(output.value(result))
                 if output.reduction == "series":
                     batch.values[output.name][k, : len(value)] = value
                 else:
                     batch.values[output.name][k] = value[0]
-        return note
+        except SimulationError as error:  # a function of the user's
+            batch.status[k] = PointStatus.FAILED
+            for output in self.outputs:
+                batch.values[output.name][k] = np.nan
+            return str(error)
+        return ""
 
     def _note(self, result: Result) -> str:
         """The warnings of a run that the scene as given does not have."""

@@ -2,7 +2,6 @@
 
 import os
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -94,7 +93,7 @@ class Growing:
         if late or waiting > MOST_WAITING:
             self._write(0.0)
 
-    def finish(self) -> Path:
+    def finish(self) -> None:
         """Write what is left and give the file its name.
 
         Raises:
@@ -102,7 +101,6 @@ class Growing:
         """
         self.leave()
         put_in_place(self.part, self.target, self._force)
-        return self.target
 
     def leave(self) -> None:
         """Write what is left; the part stays where it holds a point.

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+#: Larger packs gain nothing, and a hard point would hold up more of the others.
+LARGEST_PACK = 1024
 #: How a name of a NetCDF variable does not begin, and what it does not hold.
 NO_NAME = "a name in a NetCDF file begins with a letter, a digit or _ and holds no slash"
 
@@ -51,6 +53,7 @@ def sweep(
     allow_code: bool = False,
     threads: int | None = None,
     client: Any = None,
+    pack: int = 1,
     output: str | os.PathLike[str] | None = None,
     force: bool = False,
     resume: bool = False,
@@ -59,8 +62,9 @@ def sweep(
 ) -> "xarray.Dataset":
     """Run a scene at many points: combinations of values of its numbers.
 
-    The values at a point are those of ``simulate`` of the scene with its numbers, bit for bit. A
-    point that fails does not end the others. Forms and names: docs/how-to/sweeps.md.
+    The values at a point are those of ``simulate`` of the scene with its numbers, bit for bit, with
+    few remarks (docs/concepts/studies.md). A point that fails does not end the others. Forms and
+    names: docs/how-to/sweeps.md.
 
     Args:
         scene: a Scene, or what ``load`` takes.
@@ -73,6 +77,7 @@ def sweep(
         t_end, dt, method, integrator, rtol, atol, step, correct, project, correct_metric: as
             ``simulate`` has them; so has it allow_code. announce: as ``compile``.
         threads, client: points at once, or a ``distributed.Client`` whose workers run them.
+        pack: points that take their steps together, for speed: equal within the tolerances only.
         output, force, resume: file to write; over another; go on with its ``OUTPUT.part``.
         progress: called as progress(done, total).
 
@@ -87,6 +92,7 @@ def sweep(
                     step=step, correct=correct, project=project,
                     correct_metric=correct_metric)  # fmt: skip
     study, plan = _asked(scene, vary, outputs, (sample, design, seed), settings, allow_code)
+    study = attrs.evolve(study, pack=_checked_pack(pack))
     runner = _Runner(threads, client, progress, announce)
     return runner.run(study, plan, output, force=force, resume=resume)
 
@@ -119,6 +125,13 @@ def _asked(
         raise SceneError(mistakes)
     names = tuple(varied.name for varied in plan.varied)
     return Study(chosen, names, kept, allow_code), plan
+
+
+def _checked_pack(pack: Any) -> int:
+    if isinstance(pack, bool) or not isinstance(pack, int) or not 1 <= pack <= LARGEST_PACK:
+        what = f"the points of a pack are a whole number from 1 to {LARGEST_PACK}"
+        raise SceneError([Mistake("pack", pack, what)])
+    return pack
 
 
 def _ensemble(study: Study, announce: Callable[[str], None] | None) -> Ensemble:
@@ -206,11 +219,13 @@ class _Runner:
             kept = Growing(layout, output, force=force, resume=resume)
         try:
             self._go(ensemble, points, kept)
+            if isinstance(kept, Growing):
+                kept.finish()
         except BaseException as error:
             with suppress(ResultError, AttributeError):
                 error.result = _so_far(kept)  # type: ignore[attr-defined]
             raise
-        return kept.dataset() if isinstance(kept, InMemory) else open_sweep(kept.finish())
+        return kept.dataset() if isinstance(kept, InMemory) else open_sweep(kept.target)
 
     def _refuse(self, output: str | os.PathLike[str] | None, *, resume: bool) -> None:
         mistakes = []

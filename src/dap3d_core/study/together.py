@@ -19,6 +19,8 @@ from dap3d_core.study.runs import Found, Runs
 if TYPE_CHECKING:
     from dap3d_core.study.ensemble import Batch, Ensemble
 
+#: The status of a point whose run went to its end (``PointStatus``).
+DONE = 1
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -73,8 +75,8 @@ class Together:
         good = found.done & (found.numbers[:, many.LOOSE] == 0.0)
         which, rows = which[good], found.rows[good]
         self._note(found, good, which, notes, part.start)
-        self._keep(values, which, rows, batch, part.start)
-        batch.status[places[which]] = 1
+        batch.status[places[which]] = DONE
+        self._keep(values, which, rows, batch, notes, part.start)
 
     def _run_copied(self, values: Floats) -> tuple[Integers, Found]:
         """Points whose numbers have their places: which were run, and what came of them."""
@@ -127,7 +129,13 @@ class Together:
         return np.array(which, dtype=np.int64), self._runs.run(numbers, places, states)
 
     def _keep(
-        self, values: Floats, which: Integers, rows: Floats, batch: "Batch", first: int
+        self,
+        values: Floats,
+        which: Integers,
+        rows: Floats,
+        batch: "Batch",
+        notes: list[str],
+        first: int,
     ) -> None:
         """The outputs of runs, by their rows (k, nt, width)."""
         reduction, times = self._ensemble.reduction, self._ensemble.times
@@ -140,8 +148,8 @@ class Together:
         for k, of_run in zip(which, rows, strict=True):
             _, model = self._modelling.load(values[k])
             result = reduction.result(model, of_run, lambda: machine)
-            for output in others:
-                batch.values[output.name][first + k] = output.value(result)
+            why = self._ensemble.keep(first + int(k), result, others, batch)
+            notes[first + k] = why or notes[first + k]
 
     def _note(
         self, found: Found, good: NDArray[np.bool_], which: Integers, notes: list[str], first: int
