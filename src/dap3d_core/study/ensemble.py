@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dap3d_core.integrators import METHODS
+from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
@@ -107,6 +108,16 @@ class Ensemble:
         self._together = settings.integrator in (*METHODS, "auto") and not any(
             number.table == "simulation" for number in self.numbers
         )
+
+    def prepare(self, announce: Announce | None = None) -> None:
+        """Compile what runs the points now: threads would wait for one another.
+
+        Args:
+            announce: called with what has to be compiled anew.
+        """
+        if announce is not None and self._together and not driver_is_cached("study"):
+            announce("the driver of many runs")
+        self._runner()
 
     def run(self, points: ArrayLike) -> Batch:
         """Run points (k, numbers): the values of the numbers at each."""

@@ -11,6 +11,7 @@ from dap3d_core.formulations.machine import Machine
 from dap3d_core.integrators import METHODS, Integration
 from dap3d_core.integrators.runge_kutta import advance
 from dap3d_core.integrators.work import Status, Work
+from dap3d_core.kernels.beside import wait_for_what_is_beside
 from dap3d_core.kernels.cache import compiled, jit_is_on
 from dap3d_core.kernels.lists import (
     INTEGER,
@@ -111,6 +112,9 @@ class Runs:
         self._told[starting.SIZE] = self.size
         without = np.flatnonzero(~machine.model.position_row)
         self._told[starting.STARTING + machine.system.row[without]] = 1.0
+        wait_for_what_is_beside()
+        none = np.zeros((0, 0))
+        self.run(none, np.zeros(0, dtype=np.int64), y0[None][:0])  # to compile it
 
     def run(
         self, table: Floats, places: Integers, y0: Floats, start: int = at.AS_IT_STANDS
@@ -141,9 +145,11 @@ class Runs:
         )
         problem = (self.machine.functions, _drives(), self._starting)
         system, loops = self.machine.system, self.machine.loops
-        while points.at[at.POINT] < count:
-            with np.errstate(all="ignore"):
+        while True:
+            with np.errstate(all="ignore"):  # as compiled code does
                 run_points(points, work, *problem, system, loops, CALL)
+            if points.at[at.POINT] == count:
+                break
         if count:
             self.last_start = points.y0[-1]
         rows = points.rows.reshape(count, nt, width)

@@ -212,6 +212,8 @@ class _Runner:
         _check_names(ensemble, plan, in_file=output is not None)
         if not force:
             _check_room(ensemble, plan, output)
+        if self.client is None:
+            ensemble.prepare(self.announce)
         points = plan.points()
         layout = layout_of(ensemble, plan, points)
         kept: InMemory | Growing = InMemory(layout)
