@@ -284,20 +284,18 @@ def test_a_worker_without_dap3d_is_named(client, tmp_path):
     assert 'pip install "dap3d[cluster]==' in line
 
 
-def test_a_worker_that_comes_late_is_asked_as_well(client, installed, tmp_path):
+def test_a_worker_that_comes_late_is_asked_as_well(installed, tmp_path):
     """By its first task: it does not compute with formulas of its own."""
-    there = package(tmp_path / "there", "1.2")
     late = package(tmp_path / "late", "1.2", k=2.0)
-    client.run(lambda folder: sys.path.insert(0, folder), str(there))
-    try:
+    with two_workers() as client:  # which look for modules where this process does
+        first = list(client.nthreads())
         found = run_on(client, pushed(), POINTS, np.arange(200), chunk=1, retries=0)
-        with (
-            another_worker(client, PYTHONPATH=path(late)) as address,
-            pytest.raises(ClusterError, match=f"{address} cannot run this study: the file of its"),
-        ):
-            collected(found)
-    finally:
-        client.run(lambda folder: sys.path.remove(folder), str(there))
+        next(found)
+        with another_worker(client, PYTHONPATH=path(late)) as address:
+            client.retire_workers(first)
+            with pytest.raises(ClusterError) as error:
+                collected(found)
+    assert str(error.value).startswith(f"{address} cannot run this study: the file of its force")
 
 
 def test_types_of_the_model_itself_need_its_folder(client, tmp_path, monkeypatch):

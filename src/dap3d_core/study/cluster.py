@@ -199,7 +199,8 @@ def _run(
             watch.wait(done)
             future, found = next(done)
             part = waiting.pop(future)
-            if future.status != "finished":
+            # Not by the state of the future: a worker may be lost after its result was fetched.
+            if not (isinstance(found, tuple) and isinstance(found[0], Batch)):
                 _raise(client, found, part)
             batch, seconds = found
             portions.note(len(part), seconds)
