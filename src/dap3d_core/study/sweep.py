@@ -60,20 +60,18 @@ def sweep(
     progress: Callable[[int, int], None] | None = None,
     announce: Callable[[str], None] | None = None,
 ) -> "xarray.Dataset":
-    """Run a scene at many points: combinations of values of its numbers.
+    """Run a scene at many points, combinations of values of its numbers (docs/how-to/sweeps.md).
 
-    The values at a point are those of ``simulate`` of the scene with its numbers, bit for bit, with
-    few remarks (docs/concepts/studies.md). A point that fails does not end the others. Forms and
-    names: docs/how-to/sweeps.md.
+    They are those of ``simulate`` of the changed scene; remarks in docs/concepts/studies.md.
 
     Args:
         scene: a Scene, or what ``load`` takes.
         vary: name of a number (``bodies.crank.mass``) -> how it varies: a list or an array of
             numbers, "1:5:9" (from:to:count), "1:100:5:log"; for samples "1:5", "3~0.1" (normal).
-        outputs: what is kept of each run: quantities, perhaps reduced ("crank.r.z:max"), functions
-            of the ``Result``, a list of these, or label -> one of these.
-        sample, design, seed: number of samples, "lhs", "random", "sobol" or "halton", seed.
-            Without ``sample`` the points are a grid: all combinations.
+        outputs: what is kept of each run: quantities ("crank.r.z:max"), functions of the
+            ``Result``, a list of these, or label -> one of these.
+        sample, design, seed: number of samples, "lhs", "random", "sobol" or "halton", seed; a grid
+            (all combinations) without ``sample``.
         t_end, dt, method, integrator, rtol, atol, step, correct, project, correct_metric: as
             ``simulate`` has them; so has it allow_code. announce: as ``compile``.
         threads, client: points at once, or a ``distributed.Client`` whose workers run them.
@@ -82,7 +80,7 @@ def sweep(
         progress: called as progress(done, total).
 
     Returns:
-        the outputs over the numbers, or over ``point``; NaN, ``status``, ``note`` where it failed.
+        the outputs over the numbers, or over ``point``; NaN, ``status``, ``note`` where one failed.
 
     Raises:
         SceneError, PluginError, SimulationError, ResultError: nothing can be run, or kept. What
@@ -93,8 +91,8 @@ def sweep(
                     correct_metric=correct_metric)  # fmt: skip
     study, plan = _asked(scene, vary, outputs, (sample, design, seed), settings, allow_code)
     study = attrs.evolve(study, pack=_checked_pack(pack))
-    runner = _Runner(threads, client, progress, announce)
-    return runner.run(study, plan, output, force=force, resume=resume)
+    run = _Runner(threads, client, progress, announce).run
+    return run(study, plan, output, force=force, resume=resume)
 
 
 def _asked(
