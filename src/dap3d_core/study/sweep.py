@@ -68,38 +68,42 @@ def sweep(
         scene: a Scene, or what ``load`` takes.
         vary: name of a number (``bodies.crank.mass``) -> how it varies: a list or an array of
             numbers, "1:5:9" (from:to:count), "1:100:5:log"; for samples "1:5", "3~0.1" (normal).
-        outputs: what is kept of each run: quantities ("crank.r.z:max"), functions of the
-            ``Result``, a list of these, or label -> one of these.
-        sample, design, seed: number of samples, "lhs", "random", "sobol" or "halton", seed; a grid
-            (all combinations) without ``sample``.
+        outputs: quantities ("crank.r.z:max"), functions of a ``Result``, or label -> one of these.
+        sample, design, seed: number of samples (without: a grid), "lhs", "random", "sobol" or
+            "halton", seed.
         t_end, dt, method, integrator, rtol, atol, step, correct, project, correct_metric: as
             ``simulate`` has them; so has it allow_code. announce: as ``compile``.
         threads, client: points at once, or a ``distributed.Client`` whose workers run them.
         pack: points that take their steps together, for speed: equal within the tolerances only.
-        output, force, resume: file to write; over another; go on with its ``OUTPUT.part``.
+        output, force, resume: file to write; over another; go on with ``OUTPUT.part``.
         progress: called as progress(done, total).
 
     Returns:
         the outputs over the numbers, or over ``point``; NaN, ``status``, ``note`` where one failed.
 
     Raises:
-        SceneError, PluginError, SimulationError, ResultError: nothing can be run, or kept. What
-        ends it later (Ctrl-C, an exception of ``progress``) has the points so far as ``.result``.
+        SceneError, PluginError, SimulationError, ResultError: nothing can be run, or kept. What ends
+            it later (Ctrl-C, an exception of ``progress``) has the points so far as ``.result``.
     """
     settings = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol,
                     step=step, correct=correct, project=project,
                     correct_metric=correct_metric)  # fmt: skip
-    study, plan = _asked(scene, vary, outputs, (sample, design, seed), settings, allow_code)
-    study = attrs.evolve(study, pack=_checked_pack(pack))
-    run = _Runner(threads, client, progress, announce).run
-    return run(study, plan, output, force=force, resume=resume)
+    study, plan = _asked(scene, vary, outputs, (sample, design, seed), settings, allow_code, pack)
+    runner = _Runner(threads, client, progress, announce, force=force, resume=resume)
+    return runner.run(study, plan, output)
 
 
 def _asked(
-    scene: Any, vary: Any, outputs: Any, sampling: tuple[Any, ...], settings: Any, allow_code: bool
+    scene: Any,
+    vary: Any,
+    outputs: Any,
+    sampling: tuple[Any, ...],
+    settings: Any,
+    allow_code: bool,
+    pack: Any,
 ) -> tuple[Study, Design]:
     """The study and its points, as far as they can be judged before the scene is compiled."""
-    mistakes: list[Mistake] = []
+    mistakes = _pack_mistakes(pack)
     chosen = scene.copy() if isinstance(scene, Scene) else load(scene)
     given = {k: v for k, v in settings.items() if v is not None}
     chosen.simulation = attrs.evolve(chosen.simulation, **given)
@@ -122,14 +126,14 @@ def _asked(
     if mistakes or plan is None:
         raise SceneError(mistakes)
     names = tuple(varied.name for varied in plan.varied)
-    return Study(chosen, names, kept, allow_code), plan
+    return Study(chosen, names, kept, allow_code, pack), plan
 
 
-def _checked_pack(pack: Any) -> int:
-    if isinstance(pack, bool) or not isinstance(pack, int) or not 1 <= pack <= LARGEST_PACK:
-        what = f"the points of a pack are a whole number from 1 to {LARGEST_PACK}"
-        raise SceneError([Mistake("pack", pack, what)])
-    return pack
+def _pack_mistakes(pack: Any) -> list[Mistake]:
+    if isinstance(pack, int) and not isinstance(pack, bool) and 1 <= pack <= LARGEST_PACK:
+        return []
+    what = f"the points of a pack are a whole number from 1 to {LARGEST_PACK}"
+    return [Mistake("pack", pack, what)]
 
 
 def _ensemble(study: Study, announce: Callable[[str], None] | None) -> Ensemble:
@@ -194,21 +198,17 @@ class _Runner:
     client: Any
     progress: Callable[[int, int], None] | None
     announce: Callable[[str], None] | None
+    force: bool
+    resume: bool
 
     def run(
-        self,
-        study: Study,
-        plan: Design,
-        output: str | os.PathLike[str] | None,
-        *,
-        force: bool,
-        resume: bool,
+        self, study: Study, plan: Design, output: str | os.PathLike[str] | None
     ) -> "xarray.Dataset":
         """Run the points of a study that are missing, and keep what comes of them."""
-        self._refuse(output, resume=resume)
+        self._refuse(output)
         ensemble = _ensemble(study, self.announce)
         _check_names(ensemble, plan, in_file=output is not None)
-        if not force:
+        if not self.force:
             _check_room(ensemble, plan, output)
         if self.client is None:
             ensemble.prepare(self.announce)
@@ -216,7 +216,7 @@ class _Runner:
         layout = layout_of(ensemble, plan, points)
         kept: InMemory | Growing = InMemory(layout)
         if output is not None:
-            kept = Growing(layout, output, force=force, resume=resume)
+            kept = Growing(layout, output, force=self.force, resume=self.resume)
         try:
             self._go(ensemble, points, kept)
             if isinstance(kept, Growing):
@@ -227,9 +227,9 @@ class _Runner:
             raise
         return kept.dataset() if isinstance(kept, InMemory) else open_sweep(kept.target)
 
-    def _refuse(self, output: str | os.PathLike[str] | None, *, resume: bool) -> None:
+    def _refuse(self, output: str | os.PathLike[str] | None) -> None:
         mistakes = []
-        if resume and output is None:
+        if self.resume and output is None:
             what = "a sweep goes on from the part of its file"
             mistakes.append(Mistake("resume", True, what, remedy="give output"))
         if self.client is not None and self.threads is not None:
