@@ -82,7 +82,7 @@ def sweep(
         the outputs over the numbers, or over ``point``; NaN, ``status``, ``note`` where one failed.
 
     Raises:
-        SceneError, PluginError, SimulationError, ResultError: nothing can be run, or kept. What ends
+        SceneError, PluginError, SimulationError, ResultError: nothing can be run or kept. What ends
             it later (Ctrl-C, an exception of ``progress``) has the points so far as ``.result``.
     """
     settings = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol,
