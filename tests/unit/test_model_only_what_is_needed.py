@@ -71,3 +71,23 @@ def test_a_page_needs_neither_matplotlib_nor_a_reader_of_meshes():
         "assert dap.view(result).html\n"
     )
     assert not imported(script) & {"matplotlib", "trimesh", "netCDF4", "xarray", "rich", "click"}
+
+
+def test_a_run_knows_nothing_of_studies():
+    """``dap.simulate`` imports nothing of sweeps, fits or clusters."""
+    found = imported("import dap3d_core as dap\ndap.simulate('bodies2', t_end=0.04, dt=0.02)\n")
+    assert not any(name.startswith("dap3d_core.study") for name in found)
+
+
+def test_a_grid_in_memory_needs_no_samples_no_cluster_and_no_packs_of_its_own():
+    """What draws samples, fits, speaks to a cluster or draws pictures is left alone by a grid."""
+    script = (
+        "import dap3d_core as dap\n"
+        "asked = {'forces.spring1.k': [10.0, 20.0]}\n"
+        "dap.sweep('bodies2', asked, outputs='upper.r.x', t_end=0.04, threads=1)\n"
+    )
+    found = imported(script)
+    heavy = {"distributed", "dask", "cloudpickle", "scipy.stats", "scipy.optimize", "matplotlib"}
+    assert not found & heavy
+    ours = {name.rpartition(".")[2] for name in found if name.startswith("dap3d_core.study.")}
+    assert not ours & {"cluster", "environment", "fitting", "determined", "measured"}
