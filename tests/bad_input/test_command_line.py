@@ -69,6 +69,8 @@ def call(folder, capfd):
 
 
 R = "fall.nc"
+#: The file of a sweep.
+S = "swept.nc.part"
 #: A sweep without mistakes, in parts.
 SWEEP = ("sweep", "fall.toml")
 VARY, KEEP = ("--vary", "bodies.stone.mass=1,2"), ("--keep", "stone.r.z")
@@ -158,7 +160,20 @@ REFUSED = [
     ((*SWEEP, *VARY, *KEEP, "-o", "foreign.nc", "--resume"), "not a NetCDF-4 file"),
     ((*SWEEP, *VARY, *KEEP, "-o", "foreign.nc", "--force"), "move it away"),
     ((*SWEEP, *VARY, *KEEP, "-o", "single.nc", "--resume"), "the result of one run"),
-    (("plot", "swept.nc.part", "stone.r.z"), "the points of a sweep"),
+    (("animate", "swept.nc.part"), "the points of a sweep"),
+    (("plot", S, "stone.r.zz"), "did you mean 'stone.r.z'"),
+    (("plot", S, "--at", "bodies.stone.mas=1"), "did you mean 'bodies.stone.mass'"),
+    (("plot", S, "--at", "bodies.stone.mass"), "should be NAME=VALUE"),
+    (("plot", S, "--at", "bodies.stone.mass=one"), "should be NAME=VALUE"),
+    (("plot", S, "--at", "bodies.stone.mass=1", "--at", "bodies.stone.mass=2"), "given twice"),
+    (("plot", S, "--x", "bodies.stone.r.x"), "no number or output 'bodies.stone.r.x'"),
+    (("plot", S, R), "is a sweep, which is drawn alone"),
+    (("plot", S, "-o", "x.gif"), "a figure is one of"),
+    (("plot", R, "--at", "bodies.stone.mass=1"), "chooses points of a sweep"),
+    (("view", S, "--quantity", "stnoe.r.z"), "did you mean 'stone.r.z'"),
+    (("view", S, "--model", "nothing"), "nothing"),
+    (("view", S, "-o", "x.txt"), "a page is a .html file"),
+    (("view", S, "--fps", "0"), "greater than 0"),
     # options and arguments
     (("run", "fall.toml", "--bogus"), "No such option '--bogus'"),
     (("run", "fall.toml", "--t-ned", "1"), "'--t-end'"),

@@ -114,3 +114,16 @@ def test_numbers_of_a_model_are_offered_here():
     assert "bodies.cone.mass" in offered_here([*sweep, "bodies.cone."])
     assert offered_here([*sweep, "bodies.cone.w."]) == [f"bodies.cone.w.{axis}" for axis in "xyz"]
     assert offered_here(["sweep", "none", "--vary", "bo"]) == []
+
+
+def test_outputs_of_a_sweep_are_offered(tmp_path):
+    """Where a result offers its quantities."""
+    from unit.test_plot_sweep import grid
+
+    data = grid(mass=[1, 2], k=[3, 4]).drop_vars("note")
+    file = tmp_path / "s.nc"
+    data.assign_attrs(scene="", versions="{}", outputs="[]").assign(
+        note=data["status"].astype(str)
+    ).to_netcdf(file)
+    assert offered_here(["plot", str(file), "J1"]) == ["J1.force.norm:max", "J1.force.norm"]
+    assert "status" not in offered_here(["plot", str(file), ""])

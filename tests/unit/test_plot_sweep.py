@@ -216,12 +216,33 @@ def test_parallel_coordinates_join_the_values_of_a_point():
     assert all(f"{name} [kg]" in shown for name in (MASS, LENGTH, K))
 
 
+def test_outputs_without_values_do_not_hide_the_others():
+    """Colours are of the first output that has any; a band is of stopped runs if all stopped."""
+    data = samples(20, (MASS, K))
+    data["bob.r.z:min"].values[:] = np.inf
+    (lines,) = dap.plot(data, "bob.r.z:min", "J1.force.norm").collections
+    assert len(lines.get_paths()) == 20
+    np.testing.assert_array_equal(lines.get_array(), np.sort(data["J1.force.norm"].values))
+    stopped = samples(100)
+    stopped["status"].values[:] = 2
+    stopped["bob.r.z:series"].values[:, 3:] = np.nan
+    middle = dap.plot(stopped, "bob.r.z:series").lines[0]
+    np.testing.assert_array_equal(middle.get_xdata(), T[:3])
+
+
 def test_an_output_is_scattered_over_another():
     data = samples(20, (MASS, K))
     ax = dap.plot(data, "bob.r.z:min", x="J1.force.norm")
     (dots,) = ax.lines
     np.testing.assert_array_equal(dots.get_xdata(), data["J1.force.norm"].values)
     np.testing.assert_array_equal(dots.get_ydata(), data["bob.r.z:min"].values)
+
+
+def test_a_steep_map_has_colours_of_the_logarithm():
+    data = grid(mass=np.geomspace(1.0, 1e4, 7), k=[1.0, 2.0])
+    for name, scale in (("J1.force.norm", "log"), ("bob.r.z:min", "linear")):  # one is negative
+        bar = dap.plot(data, name).figure.axes[1]
+        assert bar.get_yscale() == scale
 
 
 def test_too_many_points_are_thinned_and_told():

@@ -49,12 +49,18 @@ def numbers(ctx: click.Context, param: click.Parameter, incomplete: str) -> list
 
 
 def quantities(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
-    """Quantities of the result that was named before, part by part, or a path."""
+    """Quantities of the result that was named before, part by part; outputs of a sweep; a path."""
     found: list[str] = []
     with suppress(Exception):
         from dap3d_core.result import names_of, open_result
+        from dap3d_core.study.dataset import is_sweep, open_sweep
 
         # Behind an option without its value click leaves all words in ctx.args.
         result = ctx.params["result"] or ctx.args[0]
-        found += filter(_PLAIN.fullmatch, names_of(open_result(result), incomplete))
+        if is_sweep(result):
+            kept = map(str, open_sweep(result).data_vars)
+            names = [n for n in kept if n.startswith(incomplete) and n not in ("status", "note")]
+        else:
+            names = list(names_of(open_result(result), incomplete))
+        found += filter(_PLAIN.fullmatch, names)
     return list(found) or _path(incomplete)

@@ -119,7 +119,7 @@ def name_bar(bar: Any, column: Column, height: float) -> None:
     """The label of a colour bar beside a panel of a height, inches."""
     bar.ax.tick_params(labelsize=LETTERS)
     bar.ax.yaxis.get_offset_text().set_fontsize(LETTERS)
-    bar.set_label(folded(with_unit(column), int(14 * (height - 0.4))), fontsize=LETTERS)
+    bar.set_label(folded(with_unit(column), int(13 * (height - 0.6))), fontsize=LETTERS)
 
 
 def with_unit(column: Column) -> str:

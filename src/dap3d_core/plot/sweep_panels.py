@@ -32,6 +32,8 @@ from dap3d_core.plot.sweep_table import DONE, Column
 MAP = 2.6
 #: Fewer points of a line are marked each; more on a map have no marks of their own.
 MARKED, MARKED_ON_MAP = 60, 400
+#: A map whose greatest value is so many times its median has logarithmic colours.
+STEEP = 30.0
 #: The part of samples that a band holds, in percent.
 BAND = 5.0, 95.0
 
@@ -122,7 +124,8 @@ class Heat(Panel):
         _frame(ax, self.x, [self.y], size, grid=False)
         ax.patch.set(hatch="////", facecolor="0.96", edgecolor="0.72")
         mesh = ax.pcolormesh(edges(self.x), edges(self.y), np.ma.masked_invalid(values),
-                             cmap=COLORS, norm=norm_of(values), rasterized=True)  # fmt: skip
+                             cmap=COLORS, norm=norm_of(values, _is_steep(values)),
+                             rasterized=True)  # fmt: skip
         bar = ax.figure.colorbar(mesh, ax=ax, pad=0.02)
         name_bar(bar, self.output, size[1])
         if missing.any():
@@ -132,6 +135,12 @@ class Heat(Panel):
             fates.mark(ax, self.status, missing, x, y)
         for spine in ax.spines.values():
             spine.set_visible(True)
+
+
+def _is_steep(values: Floats) -> bool:
+    """Whether one end of a map would have all its colours: these are then of the logarithm."""
+    there = values[np.isfinite(values)]
+    return bool(len(there) and there.min() > 0.0 and there.max() > STEEP * np.median(there))
 
 
 def edges(axis: Column) -> Floats:
@@ -193,7 +202,7 @@ class Band(Panel):
     Attributes:
         over: time, (m,).
         output: (k, m).
-        status: (k,); runs that did not go to their end are left out.
+        status: (k,); runs that did not go to their end are left out where others did.
     """
 
     over: Column
@@ -202,21 +211,22 @@ class Band(Panel):
 
     def paint(self, ax: Axes, size: tuple[float, float], fates: Fates) -> None:
         """The median, the band, and the extremes as thin lines."""
-        rows, x = self.output.values[self.status == DONE], self.over.values
+        whole, x = self.status == DONE, self.over.values
+        rows = self.output.values[whole if whole.any() else slice(None)]
         _frame(ax, self.over, [self.output], size)
-        if len(rows):
-            with np.errstate(all="ignore"):
-                parts = np.nanpercentile(rows, (0.0, BAND[0], 50.0, BAND[1], 100.0), axis=0)
-            least, low, middle, high, most = parts
-            color = PALETTE[0]
-            band = ax.fill_between(x, low, high, color=color, alpha=0.25, linewidth=0.0,
-                                   label=f"{BAND[0]:g} to {BAND[1]:g} %")  # fmt: skip
-            (line,) = ax.plot(x, middle, color=color, label=f"median of {len(rows)}")
-            (thin,) = ax.plot(x, least, color=color, linewidth=0.6, linestyle=":",
-                              label="least and greatest")  # fmt: skip
-            ax.plot(x, most, color=color, linewidth=0.6, linestyle=":")
-            for handle in (line, band, thin):
-                fates.add(handle)
+        reached = np.isfinite(rows).any(axis=0)
+        rows, x = rows[:, reached], x[reached]
+        parts = np.nanpercentile(rows, (0.0, BAND[0], 50.0, BAND[1], 100.0), axis=0)
+        least, low, middle, high, most = parts
+        color = PALETTE[0]
+        band = ax.fill_between(x, low, high, color=color, alpha=0.25, linewidth=0.0,
+                               label=f"{BAND[0]:g} to {BAND[1]:g} %")  # fmt: skip
+        (line,) = ax.plot(x, middle, color=color, label=f"median of {len(rows)}")
+        (thin,) = ax.plot(x, least, color=color, linewidth=0.6, linestyle=":",
+                          label="least and greatest")  # fmt: skip
+        ax.plot(x, most, color=color, linewidth=0.6, linestyle=":")
+        for handle in (line, band, thin):
+            fates.add(handle)
         _tell(fates, self.status)
 
 

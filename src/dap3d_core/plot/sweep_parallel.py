@@ -47,8 +47,9 @@ class Parallel(Panel):
         return 0.25 + 0.55 * len(self.columns)
 
     def paint(self, ax: Axes, size: tuple[float, float], fates: Fates) -> None:
-        """Lines coloured by the first output; those of points without it are grey."""
-        first = self.columns[self.numbers]
+        """Lines coloured by the first output that has values; points without it are dashed."""
+        outputs = self.columns[self.numbers :]
+        first = next((o for o in outputs if np.isfinite(o.values).any()), outputs[0])
         scales = [_Scale.of(column) for column in self.columns]
         places = np.stack([s.at(c.values) for s, c in zip(scales, self.columns, strict=True)])
         levels = -np.arange(len(self.columns), dtype=float)
@@ -112,7 +113,7 @@ class _Scale:
     def of(cls, column: Column) -> "_Scale":
         values = column.values[np.isfinite(column.values)]
         if not len(values):
-            return cls(0.0, 0.0, False)
+            return cls(np.nan, np.nan, False)
         return cls(float(values.min()), float(values.max()), column.is_log)
 
     def at(self, values: Floats) -> Floats:
@@ -125,6 +126,8 @@ class _Scale:
 
     def ticks(self, most: int) -> list[tuple[float, float]]:
         """Values and places."""
+        if not np.isfinite(self.low):
+            return []
         if not self.high > self.low:
             return [(self.low, 0.5)]
         if self.is_log:

@@ -118,9 +118,10 @@ class Table:
         """An output (points..., [time]); NaN where the run did not go to its end."""
         about = self.data[name].attrs
         kept = self.data[name].transpose(*self.dimensions, ..., missing_dims="ignore")
-        values = np.asarray(kept.values, dtype=float).reshape(*self.shape, *self._instants(name))
+        values = np.array(kept.values, dtype=float).reshape(*self.shape, *self._instants(name))
+        values[~np.isfinite(values)] = np.nan
         if not self.is_series(name):
-            values = np.where(self.status == DONE, values, np.nan)
+            values[self.status != DONE] = np.nan
         label = str(about.get("long_name", name))
         word = name.rpartition(":")[2]
         if ":" in name and word in REDUCTIONS and word != "series":
@@ -192,7 +193,8 @@ def table_of(data: "xarray.Dataset", at: Mapping[str, float] | None = None) -> T
     words += [f"{n} = {float(cut[n]):.6g}{_unit(cut, n)}" for n in alone]
     dimensions = [n for n in varied if n in cut.dims]
     if not sampled:
-        cut = cut.sortby(dimensions) if dimensions else cut
+        unsorted = [n for n in dimensions if np.any(np.diff(cut[n].values) < 0.0)]
+        cut = cut.sortby(unsorted) if unsorted else cut
         if not dimensions and varied:  # a single point is drawn over its last number
             cut, dimensions = cut.expand_dims(varied[-1]), [varied[-1]]
             words = [w for w in words if not w.startswith(f"{varied[-1]} = ")]

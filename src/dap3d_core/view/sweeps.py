@@ -108,8 +108,9 @@ class Runs:
         model: str | os.PathLike[str] | None,
         allow_code: bool,
         announce: Callable[[str], None] | None,
+        between: Callable[[float, float], None] | None = None,
     ) -> None:
-        """Check and compile the scene.
+        """Check and compile the scene; ``between`` is called now and then during a run.
 
         Raises:
             SceneError: the scene cannot be used, as where its types are not allowed.
@@ -125,14 +126,15 @@ class Runs:
             compiled = CompiledModel(self.scene, allow_code=allow_code, announce=announce)
         except SceneError as error:
             raise error if model is not None else SceneError(map(_own, error.mistakes)) from error
-        self._registry = compiled.checked.registry
+        self._registry, self._between = compiled.checked.registry, between
         self._numbers: tuple[Number, ...] = numbers_named(compiled.checked, names)
 
     def result(self, values: Sequence[float]) -> tuple[Result | None, str]:
         """The result of a point as far as it went, and why it went no further."""
         scene = with_values(self.scene, self._numbers, values)
         try:
-            return simulate(CompiledModel(scene, registry=self._registry)), ""
+            compiled = CompiledModel(scene, registry=self._registry)
+            return simulate(compiled, progress=self._between), ""
         except (SceneError, SimulationError) as error:
             return getattr(error, "result", None), " ".join(str(error).split())
 
@@ -162,7 +164,7 @@ def sweep_data(
         quantities: curves that are shown at once; without any those that the sweep kept.
         fps: frames a second.
         model, allow_code: the model whose own types and meshes are used, and whether they may be.
-        progress: called as progress(done, total).
+        progress: called as progress(done, total), now and then during runs as well.
         announce: told the names of kernels that are compiled.
 
     Raises:
@@ -172,7 +174,13 @@ def sweep_data(
     points = Points.of(data, MOST_POINTS)
     if not math.prod(points.shape):
         raise ValueError("the sweep has no points: there is nothing to show")
-    runs = Runs(data, points.names, model, allow_code, announce)
+    counts = [0, math.prod(points.shape)]
+
+    def tell(*_: float) -> None:
+        if progress is not None:
+            progress(*counts)
+
+    runs = Runs(data, points.names, model, allow_code, announce, tell)
     pages = _Pages(runs, points.names, quantities, fps)
     first = next((page for page in map(pages.of, points) if page is not None), None)
     if first is None:
@@ -180,11 +188,12 @@ def sweep_data(
         raise ValueError(f"there is nothing to show: none of {points.total} points runs: {why}")
     size = len(json.dumps(first))
     points = Points.of(data, max(2, min(MOST_POINTS, MOST_CHARACTERS // size)))
-    total, found = math.prod(points.shape), []
-    for k, point in enumerate(points):
+    found: list[dict[str, Any] | None] = []
+    counts[1] = math.prod(points.shape)
+    for point in points:
         found.append(pages.of(point))
-        if progress is not None:
-            progress(k + 1, total)
+        counts[0] += 1
+        tell()
     return _together(points, found, pages)
 
 
@@ -290,7 +299,9 @@ def _point(
     note = str(point["note"].values) if "note" in point else ""
     own = None
     if page is not None:
-        own = {k: v for k, v in {**page, **common}.items() if v != first[k]}
+        stage_here = {**common["stage"], "gravity": page["stage"]["gravity"]}
+        mine = {**page, **common, "stage": stage_here}
+        own = {k: v for k, v in mine.items() if v != first[k]}
     return {
         "values": list(values),
         "outputs": [_number(point[name].values) for name in outputs],

@@ -83,6 +83,7 @@ class App {
     tellRun(data.about);
     if (stage) {
       stage.clear();
+      if (stage.gravityTip) stage.setGravity(data.stage.gravity);
       element("labels").replaceChildren();
       this.furnish();
       this.panel.apply();

@@ -105,11 +105,18 @@ class Stage {
       const half = 0.5 * (Math.abs(right.x) * e[0] + Math.abs(right.y) * e[1] + Math.abs(right.z) * e[2]);
       this.gravity.position.copy(this.center).addScaledVector(right, -half - 0.04 * this.size)
         .addScaledVector(this.up, this.about.ground - this.center.dot(this.up));
-      this.gravity.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), this.up);
       this.gravityTip = this.gravity.position.clone().addScaledVector(this.up, length);
-      this.gravityText = `g ${short(Math.hypot(...g))} m/s\u00b2`;
+      this.setGravity(g);
     }
     this.scene.add(this.gravity);
+  }
+
+  // How strong it is and where it points, which may differ from point to point of a sweep.
+  setGravity(g) {
+    const size = Math.hypot(...(g ?? [0]));
+    this.gravityText = g ? `g ${short(size)} m/s\u00b2` : "";
+    this.gravity.scale.setScalar(size > 0 ? 1 : 1e-9);
+    if (size > 0) this.gravity.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), new THREE.Vector3().fromArray(g).divideScalar(-size));
   }
 
   setTheme(name) {

@@ -25,7 +25,7 @@ class Sweep {
     this.sliders = about.sliders.map((slider, k) => this.#slider(box, slider, k));
     this.table = make("table");
     this.note = make("p", "", { role: "status" });
-    box.append(this.table, this.note, ...about.notes.map((words) => make("p", words)));
+    box.append(this.note, this.table, ...about.notes.map((words) => make("p", words)));
     this.#tell();
   }
 
@@ -48,7 +48,7 @@ class Sweep {
     requestAnimationFrame(() => {
       this.waiting = false;
       const data = dataOf(this.base, this.point);
-      element("nothing").textContent = data === null ? `This point has no motion: ${this.point.status}` : "";
+      element("nothing").textContent = data === null ? `This point has no motion. ${this.point.note}` : "";
       this.app.exchange(data);
     });
   }
