@@ -87,7 +87,7 @@ def test_a_grid_in_memory_needs_no_samples_no_cluster_and_no_packs_of_its_own():
         "dap.sweep('bodies2', asked, outputs='upper.r.x', t_end=0.04, threads=1)\n"
     )
     found = imported(script)
-    heavy = {"distributed", "dask", "cloudpickle", "scipy.stats", "scipy.optimize", "matplotlib"}
+    heavy = {"distributed", "scipy.stats", "scipy.optimize", "matplotlib"}
     assert not found & heavy
     ours = {name.rpartition(".")[2] for name in found if name.startswith("dap3d_core.study.")}
     assert not ours & {"cluster", "environment", "fitting", "determined", "measured"}

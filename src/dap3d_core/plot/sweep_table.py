@@ -14,7 +14,7 @@ from dap3d_core.registry.spelling import nearest
 from dap3d_core.result import UnknownNameError
 from dap3d_core.result.layout import SWEEP
 from dap3d_core.study import REDUCTIONS, PointStatus
-from dap3d_core.study.choosing import evenly
+from dap3d_core.study.choosing import at_places, evenly
 
 if TYPE_CHECKING:
     import xarray
@@ -146,7 +146,7 @@ class Table:
             return self
         chosen = zip(self.dimensions, evenly(self.shape, most), strict=True)
         places = {axis: there for axis, there in chosen if axis in self.data.dims}
-        fewer = attrs.evolve(self, data=self.data.isel(places))
+        fewer = attrs.evolve(self, data=at_places(self.data, places))
         return attrs.evolve(fewer, words=(*self.words, f"{fewer.size} of {self.size} points"))
 
     def _instants(self, name: str) -> tuple[int, ...]:

@@ -1,12 +1,29 @@
 """Some of the points of a study, evenly chosen: where all are too many to be shown."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+if TYPE_CHECKING:
+    import xarray
+
 Integers = NDArray[np.int64]
+
+#: Variables of up to so many bytes are read whole: from a file, single places take far longer.
+READ_WHOLE = 2**30
+
+
+def at_places(data: "xarray.Dataset", places: Mapping[str, Integers]) -> "xarray.Dataset":
+    """A data set at some places of its dimensions."""
+
+    def chosen(array: "xarray.DataArray") -> "xarray.DataArray":
+        there = {axis: k for axis, k in places.items() if axis in array.dims}
+        return (array.compute() if array.nbytes <= READ_WHOLE else array).isel(there)
+
+    return data.map(chosen, keep_attrs=True)
 
 
 def evenly(shape: Sequence[int], most: int) -> list[Integers]:

@@ -17,7 +17,7 @@ from dap3d_core.result.layout import SWEEP
 from dap3d_core.scene import Mistake, SceneError, load, parse
 from dap3d_core.simulation import CompiledModel, SimulationError, simulate
 from dap3d_core.study import REDUCTIONS, Number, PointStatus, numbers_named, with_values
-from dap3d_core.study.choosing import evenly
+from dap3d_core.study.choosing import at_places, evenly
 from dap3d_core.view.camera import stage
 from dap3d_core.view.data import page_data
 
@@ -59,7 +59,7 @@ class Points:
         sizes = [data.sizes[axis] for axis in axes]
         places = dict(zip(axes, evenly(sizes, most), strict=True))
         shown = tuple(map(int, places["point"])) if sampled else ()
-        return cls(data.isel(places), names, sampled, math.prod(sizes), shown)
+        return cls(at_places(data, places), names, sampled, math.prod(sizes), shown)
 
     @property
     def axes(self) -> list[str]:
