@@ -55,6 +55,13 @@ def pendulum():
     return scene
 
 
+def skew():
+    """The bob off its pivot: how far it moves and how far it turns is a matter of its mass."""
+    scene = pendulum()
+    scene.bodies["bob"].r = (0.2, -1.1, 0.0)
+    return scene
+
+
 def falling_linkage():
     """A parallelogram with three rows too many, which gravity along x sets in motion."""
     scene = mechanisms.planar_four_bar()
@@ -80,6 +87,8 @@ CASES = {
         driven, "bodies.crank.mass", (1.0, 2.0), "crank.w.z:series", {"t_end": 1.0}, "copied"),
     "function with breaks": (
         driven, "functions.turn.f_end", (1.0, 2.0), "crank.w.z:max", {"t_end": 1.0}, "modelled"),
+    "mass, by which starts are corrected": (
+        skew, "bodies.bob.mass", (1.0, 3.0), "bob.r.x", {"correct_metric": "mass"}, "modelled"),
     "redundant joints": (
         falling_linkage, "bodies.left.mass", (1.0, 2.0), "left.w.z:min", {"t_end": 0.1}, "copied"),
     "not corrected": (
@@ -184,6 +193,16 @@ def test_a_direction_that_a_point_leaves_undefined_is_refused(points, status):
     assert batch.status.tolist() == status
     if status == [FAILED]:
         assert "coincide at the start" in batch.notes[0]
+
+
+def test_a_scene_that_cannot_start_as_given_has_points_that_can():
+    """The stone as given lies on the end of its spring."""
+    scene = stone()
+    scene.bodies["stone"].r = (0.0, 0.0, 0.0)
+    of = ensemble(scene, ["bodies.stone.r.z"], ["stone.r.z"], t_end=0.01, dt=0.01)
+    batch = of.run([[0.0], [2.0]])
+    assert way(of) == "alone"
+    assert batch.status.tolist() == [FAILED, DONE]
 
 
 def test_numbers_that_are_copied_need_no_check_and_no_model(monkeypatch):

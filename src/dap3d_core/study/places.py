@@ -178,11 +178,13 @@ class Places:
             for b, part in self._of(instance).poses
             if b == body
         }
+        by_mass = str(self._checked.scene.simulation.correct_metric) == "mass"
         if field == "mass":
-            return Column(number, limits=FieldSpec("number", 1.0, positive=True))
+            limits = FieldSpec("number", 1.0, positive=True)
+            return Column(number, limits=limits, moves_start=by_mass)
         if field not in ("Jp", *STATES) or field in read or len(number.places) != 1:
             raise NotCopiedError  # of a whole inertia matrix two numbers would have to change
-        return Column(number, moves_start=field != "Jp")
+        return Column(number, moves_start=field != "Jp" or by_mass)
 
     def _of_point(self, number: Number) -> Column:
         targets: list[int] = []
@@ -203,6 +205,9 @@ class Places:
         needs = self._of(instance)
         if spec is None or spec.kind not in ("number", "vec3") or field in needs.fields:
             raise NotCopiedError
+        type_: Any = instance.examined.type
+        if any(field in conditions for conditions, _ in type_.variants):
+            raise NotCopiedError  # with another value another variant may stand in
         if table == "functions" and not self._is_smooth_of_time(instance):
             raise NotCopiedError
         targets = tuple(self._targets(instance, field, number.places))

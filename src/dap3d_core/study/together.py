@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.result import INFORMATION
+from dap3d_core.scene import SceneError
 from dap3d_core.simulation import AssemblyError
 from dap3d_core.simulation.initial import ROUNDING, Initial, correction_notes, distance
 from dap3d_core.simulation.start import Start
@@ -35,7 +36,7 @@ def together(ensemble: "Ensemble") -> "Together | None":
     asked = bool(settings.correct), settings.hold, str(settings.correct_metric)
     try:
         start = compiled.start(*asked)
-    except AssemblyError:
+    except (AssemblyError, SceneError):
         return None
     found = start.redundancy
     if found.contradictions or found.bindings:
