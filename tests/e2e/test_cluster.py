@@ -128,14 +128,15 @@ def test_functions_of_the_script_are_sent(client, tmp_path, monkeypatch):
     assert "functions among the outputs must stand in the script" in str(error.value)
 
 
-def test_an_exception_of_a_function_comes_out(client):
-    """As it is, after the task was tried again."""
+def test_a_function_that_raises_fails_its_points(client):
+    """The points have failed, as in one process; their notes name the exception."""
 
     def fails(result):
         raise ArithmeticError("mine")
 
-    with pytest.raises(ArithmeticError, match="mine"):
-        collected(run_on(client, bob({"none": fails}), POINTS, PLACES, retries=1))
+    found = collected(run_on(client, bob({"none": fails}), POINTS, PLACES))
+    assert {found[k][0] for k in PLACES} == {PointStatus.FAILED}
+    assert all("raises ArithmeticError: mine" in found[k][1] for k in PLACES)
 
 
 def test_a_point_that_fails_is_no_task_that_fails(client):

@@ -100,8 +100,8 @@ def fit(
             different units need it.
         t_end, dt: of the runs, s; by default the last time measured, and a step of which the times
             are multiples. Where there is none, a spline goes between instants, which a note says.
-        method, integrator, rtol, atol, step, correct, project, correct_metric, allow_code,
-            announce: as ``simulate`` has them.
+        method, integrator, rtol, atol, step, correct, project, correct_metric, allow_code: as
+            ``simulate`` has them; announce as well.
         threads: runs at once; by default one for each core.
         progress: called as progress(iteration, cost) with each new derivative.
 
