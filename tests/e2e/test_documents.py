@@ -49,11 +49,12 @@ def test_the_readme(tmp_path):
     (scene,) = blocks(text, "toml")
     (tmp_path / "cone.toml").write_text(scene)
     found = commands(text, ".venv/bin/dap3d")
-    assert [words[0] for words in found] == ["check", "run", "plot"]
+    assert [words[0] for words in found] == ["check", "run", "plot", "sweep", "plot"]
     for words in found:
         done = dap3d(words, tmp_path)
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "cone.png").stat().st_size > 1000
+    assert (tmp_path / "sweep.png").stat().st_size > 1000
     (tmp_path / "cone.nc").unlink()
     script, joint = blocks(text, "python")
     (tmp_path / "plugin.py").write_text(joint)
