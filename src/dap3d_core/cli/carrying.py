@@ -51,16 +51,25 @@ def carry_out(
         try:
             result = go(progress.announce, watch)
         except (Exception, KeyboardInterrupt) as error:
-            kept = getattr(error, "result", None)
-            if kept is None:
-                raise
-            if ctx.meta["dap3d.debug"]:
-                import traceback
-
-                traceback.print_exception(error)
-            code, reason = ending(error)
+            kept, code, reason = what_is_left(ctx, error)
             return Outcome(compiled, kept, code, reason, getattr(error, "checkpoint", None))
         return Outcome(compiled, result, exits.DONE, "", None)
+
+
+def what_is_left(ctx: click.Context, error: BaseException) -> tuple[Any, int, str]:
+    """What was computed until an exception, the exit code, the reason.
+
+    Raises:
+        BaseException: the same exception, where it has nothing to keep.
+    """
+    kept = getattr(error, "result", None)
+    if kept is None:
+        raise error
+    if ctx.meta["dap3d.debug"]:
+        import traceback
+
+        traceback.print_exception(error)
+    return (kept, *ending(error))
 
 
 def ending(error: BaseException) -> tuple[int, str]:

@@ -103,7 +103,7 @@ def sweep(
     Ctrl-C ends a sweep; what was computed stays in FILE.part, and --resume goes on from there.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.carrying import ending
+    from dap3d_core.cli.carrying import what_is_left
     from dap3d_core.cli.files import writable
     from dap3d_core.cli.progress import PointsProgress
 
@@ -117,15 +117,7 @@ def sweep(
         try:
             dataset = _swept(ctx, scene, target, scheduler, progress, given)
         except (Exception, KeyboardInterrupt) as error:
-            kept = getattr(error, "result", None)
-            if kept is None:
-                raise
-            if ctx.meta["dap3d.debug"]:
-                import traceback
-
-                traceback.print_exception(error)
-            dataset = kept
-            code, reason = ending(error)
+            dataset, code, reason = what_is_left(ctx, error)
     return _tell(ctx, dataset, target, progress, code, reason, strict=strict, as_json=as_json,
                  quiet=quiet)  # fmt: skip
 

@@ -101,6 +101,24 @@ def report_times(t_end: float | None, dt: float | None) -> Floats:
     return times
 
 
+def integration_options(machine: Machine, settings: Simulation) -> dict[str, Any]:
+    """What any integration takes from a machine and the settings of a run."""
+    return {
+        "rtol": settings.rtol,
+        "atol": settings.atol,
+        "step": settings.step,
+        "project_on": settings.project,
+        "error_size": 13 * machine.model.body_count,  # the work does not steer the step
+        "report_size": machine.report_size,
+        "ends": machine.ending,
+    }
+
+
+def explicit_options(machine: Machine) -> dict[str, Any]:
+    """What an explicit one takes besides."""
+    return {"length_count": machine.length_count, "watched": machine.counts_turns}
+
+
 def refuse_adams(machine: Machine) -> None:
     """Adams methods look at many past states, which must lie on one smooth motion.
 

@@ -14,7 +14,13 @@ from dap3d_core.integrators.integration import Statistics as Counts
 from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import Occurrence, Record, Result, ResultError, Statistics
 from dap3d_core.scene import Mistake, SceneError, Simulation
-from dap3d_core.simulation.asked import refuse_adams, report_times, settings_notes
+from dap3d_core.simulation.asked import (
+    explicit_options,
+    integration_options,
+    refuse_adams,
+    report_times,
+    settings_notes,
+)
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.elsewhere import redundancy_elsewhere
 from dap3d_core.simulation.ending import event_notes, occurrences, why_stopped
@@ -204,24 +210,14 @@ class Run:
         machine.start(0.0, u0)
         y0 = machine.integrated(u0)
         width = 1 + len(y0) + machine.report_size
-        self.options = options = dict(
-            rtol=settings.rtol,
-            atol=settings.atol,
-            step=settings.step,
-            first_step=self.first_step,
-            project_on=settings.project,
-            error_size=len(y0) - 1,  # the work does not steer the step
-            report_size=machine.report_size,
-            buffer_rows=max(1, min(len(self.times), BUFFER_NUMBERS // width)),
-            ends=machine.ending,
-        )
+        self.options = options = integration_options(machine, settings) | {
+            "first_step": self.first_step,
+            "buffer_rows": max(1, min(len(self.times), BUFFER_NUMBERS // width)),
+        }
         try:
             if settings.integrator == "radau":
                 return implicit_integration(machine, y0, self.times, options)
-            options = options | {
-                "length_count": machine.length_count,
-                "watched": machine.counts_turns,
-            }
+            options = options | explicit_options(machine)
             problem = machine.functions, machine.system, machine.loops, y0, self.times
             if settings.integrator == "adams":
                 refuse_adams(machine)

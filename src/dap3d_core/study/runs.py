@@ -23,6 +23,7 @@ from dap3d_core.kernels.lists import (
     procedure_signature,
 )
 from dap3d_core.scene import Simulation
+from dap3d_core.simulation.asked import explicit_options, integration_options
 from dap3d_core.simulation.implicit import EXPLICIT
 from dap3d_core.simulation.initial import model_size
 from dap3d_core.study import many as at
@@ -94,7 +95,8 @@ class Runs:
             times,
             buffer_rows=len(times),
             leave_stiff=tries and machine.method != "penalty",  # as Run does
-            **run_options(machine, settings),
+            **integration_options(machine, settings),
+            **explicit_options(machine),
         )
         self.stops = np.array(stops, dtype=float).reshape(-1, 2)
         self._metric = machine.system.metric.copy()
@@ -155,21 +157,6 @@ class Runs:
         rows = points.rows.reshape(count, nt, width)
         done = found[:, at.ENDED] == Status.FINISHED
         return Found(done, rows, y0, points.y0, found)
-
-
-def run_options(machine: Machine, settings: Simulation) -> dict[str, Any]:
-    """What an explicit integration takes from a machine and the settings of a run."""
-    return {
-        "rtol": settings.rtol,
-        "atol": settings.atol,
-        "step": settings.step,
-        "project_on": settings.project,
-        "error_size": 13 * machine.model.body_count,  # the work does not steer the step
-        "report_size": machine.report_size,
-        "ends": machine.ending,
-        "length_count": machine.length_count,
-        "watched": machine.counts_turns,
-    }
 
 
 @cache
