@@ -21,6 +21,10 @@ PYTHON3 ?= python3 python3.13 python3.12 python3.11 python3.14 python
 
 CHECK_PYTHON := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 
+# Some machines forbid Python to keep its bytecode: each of the many processes of the tests would
+# then compile all sources again, a fifth of its time.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DELETE_ON_ERROR:
 .PHONY: help run install test test-all verify unit-nojit lint audit format docs bench bench-peers fuzz clean
 
