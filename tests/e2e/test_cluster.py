@@ -82,15 +82,21 @@ def wait_until(condition, seconds=30.0):
 
 
 def test_numbers_are_those_of_one_process(client, alone):
-    """Bit for bit, with sizes of tasks by the clock and given ones; both workers took part."""
+    """Bit for bit, with sizes of tasks by the clock and given ones; in the end both workers have
+    taken part, each of which has compiled the study once for all its tasks."""
     same(alone, collected(run_on(client, bob(), POINTS, PLACES)))
     same(alone, collected(run_on(client, bob(), POINTS, PLACES, chunk=7)))
     some = np.array([40, 3, 11])
     found = collected(run_on(client, bob(), POINTS, some))
     same({k: alone[k] for k in sorted(found)}, dict(sorted(found.items())))
     assert list(run_on(client, bob(), POINTS, PLACES[:0])) == []
-    kept = client.run(lambda: len(sys.modules["dap3d_core.study.cluster"]._ensembles))
-    assert list(kept.values()) == [1, 1]  # compiled once, for all these
+
+    def kept():
+        collected(run_on(client, bob(), POINTS, PLACES, chunk=1))
+        found = client.run(lambda: len(sys.modules["dap3d_core.study.cluster"]._ensembles))
+        return list(found.values())
+
+    wait_until(lambda: kept() == [1, 1], 100.0)  # a worker may have been slow to begin
 
 
 def test_nothing_is_left_on_the_cluster(client):
@@ -149,6 +155,48 @@ def test_a_point_that_fails_is_no_task_that_fails(client):
     status = [found[k][0] for k in places]
     assert status == [PointStatus.DONE] * 2 + [PointStatus.FAILED] + [PointStatus.DONE] * 3
     assert "mass" in found[2][1]
+
+
+STUMBLING = """
+import tempfile
+from pathlib import Path
+
+
+class Stumbling:
+    def __init__(self, folder):
+        self.folder = folder
+
+    def __setstate__(self, state):
+        self.__dict__ |= state
+        count = len(list(Path(self.folder).iterdir()))
+        tempfile.mkstemp(dir=self.folder)
+        if count == 2:  # both workers have been asked whether they can load it
+            raise ConnectionError("for once")
+
+    def __call__(self, result):
+        return result.r[:, 0, 2].min()
+"""
+
+
+def test_a_task_that_raises_is_tried_again(tmp_path, monkeypatch, alone):
+    """An output that cannot be unpickled once, as on a disk that is not there for a moment."""
+    (tmp_path / "stumbling.py").write_text(STUMBLING)
+    monkeypatch.setenv("PYTHONPATH", path(tmp_path))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    stumbling = importlib.import_module("stumbling").Stumbling
+    with two_workers() as client:
+        for retries in (0, 1):
+            marks = tmp_path / str(retries)
+            marks.mkdir()
+            study = bob({"lowest": stumbling(str(marks))})
+            found = run_on(client, study, POINTS, PLACES[:20], chunk=10, retries=retries)
+            if not retries:
+                with pytest.raises(ConnectionError, match="for once"):
+                    collected(found)
+                continue
+            lowest = {k: values["lowest"] for k, (_, _, values) in collected(found).items()}
+            assert lowest == {k: alone[k][2]["bob.r.z:min"] for k in range(20)}
+            assert len(list(marks.iterdir())) > 3
 
 
 def test_a_worker_that_is_killed_loses_nothing(alone):
@@ -357,6 +405,7 @@ def test_workers_and_schedulers_that_are_gone(tmp_path, monkeypatch):
                 client.wait_for_workers(1, timeout=60)
                 found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
                 next(found)
+                monkeypatch.setattr(cluster, "LOOK", 0.0)  # it is asked when it dies
                 process.kill()
                 with pytest.raises(ClusterError, match=f"the scheduler at {address} is gone"):
                     collected(found)
@@ -376,6 +425,18 @@ def another_worker_of(address):
     finally:
         process.kill()
         process.wait(30)
+
+
+def test_a_client_that_is_closed_meanwhile(client):
+    """Nothing can be asked of it, nor be told to it; so is one that was closed before."""
+    with connect(client.scheduler.address) as mine:
+        found = run_on(mine, bob(), POINTS, np.arange(200), chunk=1)
+        next(found)
+        mine.close()
+        with pytest.raises(ClusterError, match="the scheduler at .* is gone"):
+            collected(found)
+        with pytest.raises(ClusterError, match="the scheduler at .* is gone"):
+            run_on(mine, bob(), POINTS, PLACES)
 
 
 def test_what_is_no_client_is_refused(client):

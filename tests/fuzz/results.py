@@ -1,4 +1,4 @@
-"""Result files with damaged bytes, and what must be true of reading them.
+"""Files of results and sweeps with damaged bytes, and what must be true of reading them.
 
 The HDF5 library itself crashes on some damaged files and never ends on others, so a file is read
 in a child process. A file with a seal is refused before the library sees it; for others, as older
@@ -39,11 +39,14 @@ def is_sealed(data):
 
 @functools.cache
 def good_files():
-    """The bytes of result files as runs save them, of one body and of several; one not sealed."""
+    """The bytes of files as they are saved: runs of one body and of several, a sweep; one of a run
+    has no seal."""
     with tempfile.TemporaryDirectory() as folder:
         for name in ("pen1", "fourbar3"):
             run = dap.simulate(REPOSITORY / "models" / name, t_end=0.05, dt=0.01)
             run.save(Path(folder, f"{name}.nc"))
+        vary, output = {"bodies.cone.mass": [1.0, 2.0]}, Path(folder, "sweep.nc")
+        dap.sweep("pen1", vary, outputs="cone.r", t_end=0.05, dt=0.01, output=output)
         sealed = [p.read_bytes() for p in sorted(Path(folder).iterdir())]
         return [*sealed, *sealed, sealed[0][:-SEAL]]
 
@@ -71,14 +74,18 @@ def damaged_results(draw):
 
 
 def examine_file(path):
-    """A file is read, or refused as a result; what was read can be asked for."""
+    """A file is read, or refused as a result; what was read can be asked for.
+
+    That of a sweep is not known by its damaged bytes, so each file is read as both.
+    """
     with strict(HANG):
-        try:
-            found = open_result(path)
-        except ResultError as error:
-            if str(path) not in str(error):
-                raise
-            return "refused"
+        found = _read(open_result, path)
+        if found is None:
+            swept = _read(dap.open_sweep, path)
+            if swept is None:
+                return "refused"
+            repr(swept.load())
+            return "read"
         repr(found)
         assert found.status in ("done", "stopped", "interrupted")
         with np.errstate(all="ignore"):  # numbers that were damaged may overflow
@@ -86,6 +93,16 @@ def examine_file(path):
                 getattr(found, name)
             found.ledger  # noqa: B018 - computed when asked for
     return "read" if np.isfinite(found.u).all() else "read, not finite"
+
+
+def _read(reader, path):
+    """What a reader makes of a file; None where it refuses it."""
+    try:
+        return reader(path)
+    except ResultError as error:
+        if str(path) not in str(error):
+            raise
+        return None
 
 
 def check_result(data):

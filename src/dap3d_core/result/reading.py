@@ -50,7 +50,7 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
 
         try:
             dataset = netCDF4.Dataset(os.path.abspath(file), "r")
-        except (OSError, RuntimeError) as error:
+        except Exception as error:  # whatever a damaged file makes of it
             raise unreadable(file, error) from error
         try:
             dataset.set_auto_maskandscale(False)

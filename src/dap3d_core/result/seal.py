@@ -53,8 +53,8 @@ def write_seal(file: Path, rows: int, *, is_whole: bool) -> None:
     """Seal a file.
 
     Args:
-        file: a result that is complete, or one that grows and whose rows have their places.
-        rows: where they begin, bytes.
+        file: one that is complete, or one that grows and whose rows have their places.
+        rows: where they begin, bytes: of a file larger than ``WHOLE`` the bytes before are compared.
         is_whole: whether it is complete.
 
     Raises:
@@ -62,6 +62,7 @@ def write_seal(file: Path, rows: int, *, is_whole: bool) -> None:
     """
     with file.open("rb+") as stream:
         size = stream.seek(0, 2)
+        rows = min(rows, size)
         head = _checksum(stream, _HEADER, rows)
         whole = _checksum(stream, 0, size) if is_whole else 0
         said = _LAYOUT.pack(_MAGIC, is_whole, head, rows, size, whole, 0)[:-4]

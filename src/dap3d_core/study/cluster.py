@@ -6,6 +6,7 @@ import time
 import uuid
 from collections import OrderedDict
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from threading import Lock
 from typing import Any, NoReturn
 
@@ -115,14 +116,16 @@ def check_workers(client: Any, here: Environment, payload: bytes) -> None:
     Raises:
         ClusterError: there are no workers, or some cannot run the study; names them.
     """
-    try:
-        client.wait_for_workers(1, timeout=ARRIVAL)
-    except TimeoutError as error:
-        address = _address(client)
-        raise ClusterError(
-            f"the scheduler at {address} has no workers; start some with `dask worker {address}`"
-        ) from error
-    answers = client.run(environment_there, current_versions(), payload, on_error="return")
+    with _asking(client):
+        try:
+            client.wait_for_workers(1, timeout=ARRIVAL)
+        except TimeoutError as error:
+            address = _address(client)
+            raise ClusterError(
+                f"the scheduler at {address} has no workers; start some with "
+                f"`dask worker {address}`"
+            ) from error
+        answers = client.run(environment_there, current_versions(), payload, on_error="return")
     faults = {worker: _faults(here, answer) for worker, answer in sorted(answers.items())}
     unfit = [f"{worker}: {'; '.join(found)}" for worker, found in faults.items() if found]
     if unfit:
@@ -175,7 +178,8 @@ def _run(
     digest = hashlib.sha256(payload).hexdigest()
     # A task whose result is the study, and not data that is scattered: dask makes it again where
     # the worker that had it is lost. Each worker gets it once.
-    study = client.submit(_as_it_is, payload, key=f"{name}-study", pure=False)
+    with _asking(client):
+        study = client.submit(_as_it_is, payload, key=f"{name}-study", pure=False)
     done = _distributed().as_completed(loop=client.loop, with_results=True, raise_errors=False)
     portions, watch = Portions(SECONDS, 1), _Watch(client)
     waiting: dict[Any, Integers] = {}
@@ -185,15 +189,16 @@ def _run(
             while len(places) and len(waiting) < 2 * portions.workers:
                 size = chunk or portions.next(len(places))
                 part, places = places[:size], places[size:]
-                future = client.submit(
-                    run_points,
-                    study,
-                    digest,
-                    points[part],
-                    key=f"{name}-{part[0]}",
-                    retries=retries,
-                    pure=False,
-                )
+                with _asking(client):
+                    future = client.submit(
+                        run_points,
+                        study,
+                        digest,
+                        points[part],
+                        key=f"{name}-{part[0]}",
+                        retries=retries,
+                        pure=False,
+                    )
                 waiting[future] = part
                 done.add(future)
             watch.wait(done)
@@ -208,7 +213,8 @@ def _run(
             yield part, batch
     finally:
         if client.status == "running":
-            client.cancel([*waiting, study])
+            with suppress(ClusterError), _asking(client):
+                client.cancel([*waiting, study])
 
 
 class _Watch:
@@ -227,9 +233,11 @@ class _Watch:
         """Wait until a task has ended.
 
         Raises:
-            ClusterError: there have been no workers for some time.
+            ClusterError: there have been no workers for some time, or the scheduler is gone.
         """
         while not done.has_ready():
+            if self.client.status != "running":  # then dask may never speak of a task again
+                raise _gone(self.client)
             self._look()
             time.sleep(0.01)
         self._look()
@@ -239,7 +247,10 @@ class _Watch:
         if now < self._next or self.client.status != "running":
             return
         self._next = now + LOOK
-        cores = sum(self.client.nthreads().values())
+        try:
+            cores = sum(self.client.nthreads().values())
+        except OSError:  # the client itself sees whether nobody is there, and drops the tasks
+            return
         if cores:
             self._seen, self.cores = now, cores
         elif now - self._seen > ABSENCE:
@@ -300,11 +311,31 @@ def _raise(client: Any, found: Any, part: Integers) -> NoReturn:
             "not enough memory)"
         ) from error
     if not isinstance(found, tuple):  # cancelled
-        address = _address(client)
-        gone = client.status != "running"
-        reason = "is gone" if gone else "has dropped the tasks: somebody has cancelled them"
-        raise ClusterError(f"the scheduler at {address} {reason}") from error
+        if client.status != "running":
+            raise _gone(client) from error
+        raise ClusterError(
+            f"the scheduler at {_address(client)} has dropped the tasks: somebody has cancelled them"
+        ) from error
     raise error.with_traceback(found[2])
+
+
+@contextmanager
+def _asking(client: Any) -> Iterator[None]:
+    """Something asked of the scheduler, or told to it.
+
+    Raises:
+        ClusterError: it is not there any more.
+    """
+    try:
+        yield
+    except Exception as error:  # of a client that has closed meanwhile: a kind of its own
+        if isinstance(error, OSError) or client.status != "running":
+            raise _gone(client) from error
+        raise
+
+
+def _gone(client: Any) -> ClusterError:
+    return ClusterError(f"the scheduler at {_address(client)} is gone")
 
 
 def _refuse(client: Any, chunk: Any) -> None:

@@ -23,6 +23,7 @@ from dap3d_core.result.netcdf import NETCDF
 from dap3d_core.result.on_file import LARGE
 from dap3d_core.result.reading import check_signature, unreadable
 from dap3d_core.result.record import to_json
+from dap3d_core.result.seal import check_seal
 from dap3d_core.simulation.saving import digests_of
 from dap3d_core.study.ensemble import Batch, Ensemble, PointStatus
 from dap3d_core.study.points import Design
@@ -237,6 +238,7 @@ def _opened(file: Path) -> "xarray.Dataset":
     """What a file holds."""
     import xarray
 
+    check_seal(file)
     with NETCDF:
         _check(file)
         try:
@@ -266,10 +268,11 @@ def is_sweep(path: str | os.PathLike[str]) -> bool:
 def _attributes_of(file: Path) -> list[str]:
     import netCDF4
 
+    check_seal(file)
     try:
         with NETCDF, netCDF4.Dataset(os.path.abspath(file), "r") as dataset:
             return list(dataset.ncattrs())
-    except (OSError, RuntimeError) as error:
+    except Exception as error:  # whatever a damaged file makes of it
         raise unreadable(file, error) from error
 
 
@@ -278,14 +281,13 @@ def _check(file: Path) -> None:
     import netCDF4
 
     try:
-        dataset = netCDF4.Dataset(os.path.abspath(file), "r")
-    except (OSError, RuntimeError) as error:
+        with netCDF4.Dataset(os.path.abspath(file), "r") as dataset:
+            check_format(file, dataset)
+            check_claims(file, dataset)
+    except ResultError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of it
         raise unreadable(file, error) from error
-    try:
-        check_format(file, dataset)
-        check_claims(file, dataset)
-    finally:
-        dataset.close()
 
 
 def check_format(file: Path, dataset: Any) -> None:

@@ -11,6 +11,7 @@ from dap3d_core.result import ResultError, check_target
 from dap3d_core.result.files import cannot, named_part, put_in_place, reserve, synchronise
 from dap3d_core.result.netcdf import NETCDF, guarded
 from dap3d_core.result.reading import check_signature, unreadable
+from dap3d_core.result.seal import WHOLE, check_seal, write_seal
 from dap3d_core.study.dataset import Layout, check_format
 from dap3d_core.study.ensemble import Batch, PointStatus
 from dap3d_core.study.in_file import NOTE, boxes, cut, define
@@ -101,6 +102,8 @@ class Growing:
             ResultError: it cannot be written; or another has the name by now and ``force`` is off.
         """
         self.leave()
+        # numbers stand between descriptions here, so the beginning is what a large one is known by
+        guarded(self.part, lambda: write_seal(self.part, WHOLE, is_whole=True))
         put_in_place(self.part, self.target, self._force)
 
     def leave(self) -> None:
@@ -257,15 +260,12 @@ class Growing:
 
         try:
             check_signature(self.part, "sweep")
-            try:
-                dataset = netCDF4.Dataset(os.path.abspath(self.part), "r")
-            except (OSError, RuntimeError) as error:
-                raise unreadable(self.part, error) from error
-            try:
+            check_seal(self.part)
+            with netCDF4.Dataset(os.path.abspath(self.part), "r") as dataset:
                 check_format(self.part, dataset)
-            finally:
-                dataset.close()
-        except ResultError as error:
+        except Exception as error:  # whatever a damaged file makes of it
+            if not isinstance(error, ResultError):
+                error = unreadable(self.part, error)
             raise ResultError(f"{verb}: {error}; move it away, or name another file") from error
 
     def _check_same(self, dataset: Any) -> None:

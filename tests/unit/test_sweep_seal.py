@@ -1,0 +1,73 @@
+"""A sweep's file that is not as it was written is refused before any library reads it."""
+
+import netCDF4
+import numpy as np
+import pytest
+from unit.test_result_seal import REFUSED, SIZE, places_in, written
+from unit.test_sweep import spring
+
+import dap3d_core as dap
+from dap3d_core.result import ResultError, seal
+from dap3d_core.study.dataset import is_sweep
+
+ASKED = {"vary": {"forces.spring.k": [1.0, 4.0]}, "outputs": "block.r.x", "t_end": 0.1}
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    """A sweep in a file."""
+    path = tmp_path_factory.mktemp("good") / "a.nc"
+    dap.sweep(spring(), **ASKED, output=path)
+    return path
+
+
+def test_a_byte_changed_anywhere_is_refused(good, tmp_path, monkeypatch):
+    """At 200 places, and in each byte of the seal; who only asks what file it is, hangs neither."""
+
+    def opened(*_, **__):
+        raise AssertionError("the library reads the file")
+
+    monkeypatch.setattr(netCDF4, "Dataset", opened)
+    data = good.read_bytes()
+    rng = np.random.default_rng(1)
+    for at in places_in(len(data), 200, 2):
+        changed = bytearray(data)
+        changed[at] ^= int(rng.integers(1, 256))
+        if at < 8:  # then it has not HDF5's signature
+            continue
+        bad = written(tmp_path / "bad.nc", changed)
+        with pytest.raises(ResultError, match=REFUSED):
+            dap.open_sweep(bad)
+        assert not is_sweep(bad)
+
+
+def test_of_a_large_file_the_beginning_is_compared(good, tmp_path, monkeypatch):
+    """And of a small one all, whatever it says."""
+    monkeypatch.setattr(seal, "WHOLE", 1000)
+    monkeypatch.setattr("dap3d_core.study.growing.WHOLE", 1000)
+    dap.sweep(spring(), **ASKED, output=tmp_path / "a.nc")
+    assert dap.open_sweep(tmp_path / "a.nc").equals(dap.open_sweep(good))
+    data = bytearray((tmp_path / "a.nc").read_bytes())
+    data[999] ^= 1
+    with pytest.raises(ResultError, match=REFUSED):
+        dap.open_sweep(written(tmp_path / "b.nc", data))
+
+
+def test_files_without_a_seal_are_read(good, tmp_path):
+    """As older programs wrote them, and as another program leaves them that changed them."""
+    expected = dap.open_sweep(good)
+    old = written(tmp_path / "old.nc", good.read_bytes()[:-SIZE])
+    assert dap.open_sweep(old).identical(expected)
+    changed = written(tmp_path / "changed.nc", good.read_bytes())
+    with netCDF4.Dataset(changed, "a") as dataset:
+        dataset.setncattr("remark", "looked at")
+    assert b"dap3dsum" not in changed.read_bytes()
+    assert dap.open_sweep(changed).equals(expected)
+
+
+def test_a_sealed_part_gets_its_name(good, tmp_path):
+    """Whoever is killed between the seal and the name leaves that; the sweep goes on to its end."""
+    written(tmp_path / "a.nc.part", good.read_bytes())
+    found = dap.sweep(spring(), **ASKED, output=tmp_path / "a.nc", resume=True)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.nc"]
+    assert dap.open_sweep(tmp_path / "a.nc").identical(found)
