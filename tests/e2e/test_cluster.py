@@ -433,9 +433,9 @@ def test_a_client_that_is_closed_meanwhile(client):
         found = run_on(mine, bob(), POINTS, np.arange(200), chunk=1)
         next(found)
         mine.close()
-        with pytest.raises(ClusterError, match="the scheduler at .* is gone"):
+        with pytest.raises(ClusterError, match=r"the scheduler at .* is gone"):
             collected(found)
-        with pytest.raises(ClusterError, match="the scheduler at .* is gone"):
+        with pytest.raises(ClusterError, match=r"the scheduler at .* is gone"):
             run_on(mine, bob(), POINTS, PLACES)
 
 

@@ -54,7 +54,7 @@ def write_seal(file: Path, rows: int, *, is_whole: bool) -> None:
 
     Args:
         file: one that is complete, or one that grows and whose rows have their places.
-        rows: where they begin, bytes: of a file larger than ``WHOLE`` the bytes before are compared.
+        rows: where they begin, bytes: of a file beyond ``WHOLE`` what lies before is compared.
         is_whole: whether it is complete.
 
     Raises:

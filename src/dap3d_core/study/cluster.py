@@ -314,7 +314,8 @@ def _raise(client: Any, found: Any, part: Integers) -> NoReturn:
         if client.status != "running":
             raise _gone(client) from error
         raise ClusterError(
-            f"the scheduler at {_address(client)} has dropped the tasks: somebody has cancelled them"
+            f"the scheduler at {_address(client)} has dropped the tasks: somebody has cancelled "
+            "them"
         ) from error
     raise error.with_traceback(found[2])
 
