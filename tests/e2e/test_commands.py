@@ -12,6 +12,7 @@ import dap3d_core as dap
 CHECK_KEYS = {"bodies", "rows", "rank", "redundant", "dof", "joints", "violation"}
 
 
+@pytest.mark.slow
 def test_check_counts_and_runs_nothing(dap3d):
     done = dap3d("check", "fourbar3", "--json")
     assert done.returncode == 0

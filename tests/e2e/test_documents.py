@@ -20,6 +20,7 @@ FOLLOWED = [
         for folder in ("start", "tutorials", "how-to", "concepts", "reference")
         for page in sorted((REPOSITORY / "docs" / folder).glob("*.md"))
         if page.name != "your-own-joint.md"  # it installs a package: test_from_outside.py
+        and page.name != "look-at-sweeps.md"  # its pictures are compared: test_look_at_sweeps.py
     ),
 ]
 
@@ -176,9 +177,11 @@ def test_the_page_on_checking_types(tmp_path):
 
 
 def takes_long(page):
-    """Commands are processes of their own, and tutorials simulate more than once."""
-    found = list(steps(page.read_text()))
-    return any(step.kind == "command" for step in found) or len(found) > 3
+    """Commands and clusters are processes of their own, tutorials simulate more than once."""
+    text = page.read_text()
+    found = list(steps(text))
+    commands = any(step.kind == "command" for step in found)
+    return commands or "LocalCluster(" in text or len(found) > 3
 
 
 @pytest.mark.parametrize(

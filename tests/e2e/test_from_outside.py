@@ -22,6 +22,8 @@ import pytest
 from support.pages import steps, write
 from support.process import REPOSITORY
 
+from dap3d_core.linear.blocks import regularise, weigh_rows
+
 pytestmark = pytest.mark.slow
 
 #: What pip says where it can reach no index.
@@ -134,6 +136,39 @@ def nothing_of_the_working_tree_is_reached(outside):
     said = outside.run(outside.python, "-c", script).stdout
     assert str(REPOSITORY) not in said
     assert said.count(str(outside.folder.parent)) >= 3
+
+
+#: Runs the pendulum and prints its last state, and how many functions were compiled on the way.
+PENDULUM = """
+from numba.core import event
+compiled = []
+class Listener(event.Listener):
+    def on_start(self, e): compiled.append(e.data["dispatcher"].__name__)
+    def on_end(self, e): pass
+with event.install_listener("numba:compile", Listener()):
+    import dap3d_core as dap
+    result = dap.simulate(dap.load("pen1"), t_end=0.1, dt=0.1)
+print(" ".join(x.hex() for x in result.u[-1].tolist()), len(compiled))
+"""
+
+
+def the_first_run_compiles_for_all_that_follow(outside):
+    """It says so, once. Another process, a script too, finds every function in the cache, and has
+    the same bits. Nothing was compiled that formulations with dependent rows need."""
+    command = ("run", "pen1", "--t-end", "0.1", "--dt", "0.1", "-o", "pen1.nc", "--force")
+    first = outside.dap3d(*command).stderr
+    assert first.count("compiling for the first time; this happens once") == 1
+    assert "sph" in first
+    assert outside.dap3d(*command).stderr == ""
+    script = "import dap3d_core as dap; u = dap.open('pen1.nc').u[-1]"
+    script += "; print(' '.join(x.hex() for x in u.tolist()))"
+    state = outside.run(outside.python, "-c", script).stdout.split()
+    *found, compiled = outside.run(outside.python, "-c", PENDULUM).stdout.split()
+    assert compiled == "0"
+    assert found == state
+    made = {path.name.partition("-")[0] for path in outside.cache.glob("linear-*/*/*.nbi")}
+    assert {"blocks.assemble", "blocks.factor"} <= made
+    assert not made & {f"blocks.{f.__name__}" for f in (regularise, weigh_rows)}
 
 
 def a_plugin_that_was_written_there_is_checked_and_its_scene_runs(outside):
@@ -292,6 +327,7 @@ def test_from_outside(tmp_path):
     folder.mkdir()
     the_wheels_hold_what_they_should_and_no_more(outside)
     nothing_of_the_working_tree_is_reached(outside)
+    the_first_run_compiles_for_all_that_follow(outside)
     a_plugin_that_was_written_there_is_checked_and_its_scene_runs(outside)
     the_tutorial_can_be_followed(outside)
     broken_packages_break_nothing_else_and_are_explained(outside, folder)

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shlex
 
 import matplotlib.image
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 import xarray
 from support import hostile
 from support.browser import Opened, browser
-from support.pages import steps
+from support.pages import follow
 from support.process import REPOSITORY
 
 import dap3d_core as dap
@@ -87,17 +86,16 @@ def test_plot_draws_a_sweep(dap3d, refuse, file):
     assert "run.nc is none" in refuse("plot", "run.nc", "--at", f"{MASS}=1", "-o", "b.png")
 
 
-def test_pictures_of_the_page_are_those_of_its_commands(dap3d):
-    """As far as letters of another version of matplotlib let them be: seen from afar."""
+def test_the_page_and_its_pictures(tmp_path, monkeypatch):
+    """Its steps, in their order, make its pictures, as far as the letters of another version of
+    matplotlib let them: seen from afar."""
     page = REPOSITORY / "docs" / "how-to" / "look-at-sweeps.md"
     pictures = re.findall(r"!\[.*\]\((.*)\)", page.read_text())
     assert len(pictures) == 3
-    for step in steps(page.read_text()):
-        words = shlex.split(step.text)[1:] if step.kind == "command" else [""]
-        if words[0] == "sweep" or words[-1] in pictures:
-            assert dap3d(*words).returncode == 0
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    assert follow(page, tmp_path)
     for picture in pictures:
-        one, other = (afar(folder / picture) for folder in (page.parent, dap3d.folder))
+        one, other = (afar(folder / picture) for folder in (page.parent, tmp_path))
         assert np.mean(np.abs(one - other)) < 0.03
 
 

@@ -38,6 +38,7 @@ def table_of(file):
     return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
 
 
+@pytest.mark.slow
 def test_a_table_reads_back_bit_for_bit(dap3d, result):
     done = dap3d("post", "pen1.nc", "-o", "all.csv", "--jac")
     assert done.returncode == 0, done.stderr
@@ -103,6 +104,7 @@ def test_a_file_with_named_dimensions(dap3d, result):
     assert dap3d("info", "all.nc").returncode == 2  # it is no result
 
 
+@pytest.mark.slow
 def test_picked_quantities_in_a_file(dap3d, result):
     picked = ("cone.r", "cone.p", "J1.lambda", "energy.total", "cone.w.norm")
     assert dap3d("post", "pen1.nc", "--format", "nc", "-o", "some", *picked).returncode == 0

@@ -27,7 +27,7 @@ from dap3d_core.simulation.checkpoint import read_checkpoint
 
 import_module("dap3d_core.simulation.run").CHUNK_SECONDS = 1e-3
 import_module("dap3d_core.simulation.keeping").SHORT_SECONDS = 0.05
-SETTINGS = {"t_end": 15.0, "dt": 0.02}
+SETTINGS = {"t_end": 6.0, "dt": 0.02}
 compiled = dap.compile("pen1")
 whole = dap.simulate(compiled, **SETTINGS)
 random.seed(20)

@@ -7,10 +7,8 @@ import re
 import numpy as np
 import pytest
 from support.mechanisms import rough_four_bar
-from support.process import run
 
 import dap3d_core as dap
-from dap3d_core.linear.blocks import regularise, weigh_rows
 
 
 def test_run_writes_a_result_and_says_what_was_done(dap3d):
@@ -228,36 +226,3 @@ def test_a_reader_that_leaves_early_is_no_failure(dap3d):
     assert process.wait() == 0
     assert said == ""
     assert dap.open(dap3d.folder / "pen1.nc").status == "done"
-
-
-#: Runs the pendulum and prints its last state, and how many functions were compiled on the way.
-PENDULUM = """
-from numba.core import event
-compiled = []
-class Listener(event.Listener):
-    def on_start(self, e): compiled.append(e.data["dispatcher"].__name__)
-    def on_end(self, e): pass
-with event.install_listener("numba:compile", Listener()):
-    import dap3d_core as dap
-    result = dap.simulate(dap.load("pen1"), t_end=0.1, dt=0.1)
-print(" ".join(x.hex() for x in result.u[-1].tolist()), len(compiled))
-"""
-
-
-@pytest.mark.slow
-def test_the_first_run_compiles_for_all_that_follow(dap3d):
-    """It says so, once. Another process, a script too, finds every function in the cache, and has
-    the same bits. Nothing was compiled that formulations with dependent rows need."""
-    cache = dap3d.folder / "cache"
-    command = ("run", "pen1", "--t-end", "0.1", "--dt", "0.1", "--force")
-    first = dap3d(*command, DAP3D_CACHE_DIR=cache)
-    assert first.stderr.count("compiling for the first time; this happens once") == 1
-    assert "sph" in first.stderr
-    state = dap.open(dap3d.folder / "pen1.nc").u[-1]
-    assert dap3d(*command, DAP3D_CACHE_DIR=cache).stderr == ""
-    *found, compiled = run(PENDULUM, cache).split()
-    assert compiled == "0"
-    assert found == [x.hex() for x in state.tolist()]
-    made = {path.name.partition("-")[0] for path in cache.glob("linear-*/*/*.nbi")}
-    assert {"blocks.assemble", "blocks.factor"} <= made
-    assert not made & {f"blocks.{f.__name__}" for f in (regularise, weigh_rows)}

@@ -149,13 +149,14 @@ def test_a_link_inside_the_folder_is_followed(tmp_path):
 
 
 @pytest.mark.slow
-def test_64_mib_of_names_are_refused_before_the_memory_is_gone(tmp_path):
-    """Some 2e6 bodies that are not right: minutes at most, no failure but mistakes."""
+def test_very_many_names_are_refused_before_the_memory_is_gone(tmp_path):
+    """Very many bodies that are not right: no failure but mistakes."""
     resource = pytest.importorskip("resource")
-    count = 400_000
+    count = 150_000
     text = "".join(f"[bodies.k{k}]\nmass = -1\n" for k in range(count))
     (tmp_path / "scene.toml").write_text(text)
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with pytest.raises(SceneError) as caught:
         check(dap.load(tmp_path / "scene.toml"), dap.load_registry())
     assert len(caught.value.mistakes) == count
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 6 * 2**20
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < most + 2**20  # kB: 7 kB a body

@@ -280,6 +280,7 @@ def test_equal_sweeps_give_equal_files(tmp_path, suffix):
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
+@pytest.mark.slow
 def test_narrow_pictures_of_all_kinds_can_be_made(tmp_path):
     """60 mm, as beside a text: nothing is left without room, which matplotlib warns of."""
     long = "bodies.the_connecting_rod_of_the_upper_left_leg.Jp.x"

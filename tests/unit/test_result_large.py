@@ -83,6 +83,7 @@ def test_a_large_result_is_saved_again_over_itself(both, tmp_path):
     assert dap.open(tmp_path / "run.nc").error.u.tobytes() == np.abs(whole.u).tobytes()
 
 
+@pytest.mark.slow
 def test_the_ledger_of_a_large_result_takes_little_memory(monkeypatch, tmp_path):
     """A hundredth of the arrays, but for the numbers of each instant that it compares."""
     monkeypatch.setattr(READING, "LARGE", 200)
