@@ -36,6 +36,7 @@ SPOILED = changed(
 )
 
 
+@pytest.mark.slow
 def test_all_mistakes_come_at_once_with_their_places(dap3d):
     """In a process of its own: nothing is written, the code is 2."""
     (dap3d.folder / "scene.toml").write_text(SPOILED)

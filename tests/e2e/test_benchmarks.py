@@ -3,9 +3,11 @@
 import subprocess
 import sys
 
+import pytest
 from support.process import REPOSITORY, environment
 
 
+@pytest.mark.slow
 def test_the_benchmarks_start():
     """``benchmarks/run.py --help`` imports all of them."""
     program = [sys.executable, str(REPOSITORY / "benchmarks" / "run.py"), "--help"]

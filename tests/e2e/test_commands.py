@@ -137,6 +137,7 @@ def test_a_blocked_type_is_listed_with_the_reason(dap3d):
     assert "DAP3D_BLOCK" in done.stdout
 
 
+@pytest.mark.slow
 def test_describe_explains_a_type(dap3d):
     shown = dap3d("describe", "rev", "--names").stdout
     for words in ("gamma =", "5 constraint equations", "1 of 6 freedoms", "required", "r_P_i",

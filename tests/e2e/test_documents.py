@@ -120,6 +120,7 @@ def test_the_page_on_events(tmp_path):
         assert "and 19 more" in done.stdout
 
 
+@pytest.mark.slow
 def test_the_page_on_new_plugins(tmp_path):
     """Its commands, in an empty folder; what the command says comes next is what the page says."""
     text = (REPOSITORY / "docs" / "new-plugin.md").read_text()

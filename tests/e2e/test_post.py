@@ -150,6 +150,7 @@ def test_a_scene_without_joints_has_no_rows_and_its_springs_have_quantities(dap3
     assert column["spring1.tension [N]"][0] == 0.0
 
 
+@pytest.mark.slow
 def test_types_of_the_model_itself_are_loaded_only_when_allowed(dap3d, result, refuse):
     """A result does not say where they stand; the message says what to do."""
     words = refuse("post", "ball1.nc", "contact.force", "-o", "a.csv")
@@ -180,6 +181,7 @@ def test_reactions_that_cannot_be_had_are_left_out_and_told(dap3d, result):
     assert not (dap3d.folder / "c.nc").exists()
 
 
+@pytest.mark.slow
 def test_requests_that_are_refused_leave_nothing(refuse, dap3d, result):
     (dap3d.folder / "there.csv").write_text("mine")
     assert "--force overwrites it" in refuse("post", "pen1.nc", "-o", "there.csv")

@@ -30,6 +30,7 @@ def test_run_writes_a_result_and_says_what_was_done(dap3d):
     assert "\x1b" not in done.stdout + done.stderr  # nobody looks at a terminal
 
 
+@pytest.mark.slow
 def test_json_is_one_object_with_the_same_facts(dap3d):
     done = dap3d("run", "fourbar3", "--t-end", "0.1", "--json", "-o", "a.nc")
     assert done.returncode == 0

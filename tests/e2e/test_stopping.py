@@ -41,6 +41,7 @@ def breaking(scene_file):
     return scene.parent
 
 
+@pytest.mark.slow
 def test_a_models_own_code_is_not_run_unless_allowed(dap3d, breaking):
     refused = dap3d("run", "breaking")
     assert refused.returncode == 2

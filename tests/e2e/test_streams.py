@@ -32,6 +32,7 @@ def test_streams_that_take_nothing(tmp_path, line, code):
     assert len(done.stderr.splitlines()) <= 4
 
 
+@pytest.mark.slow
 def test_text_is_plain_where_the_encoding_is_ascii(tmp_path):
     (tmp_path / "stein.toml").write_text('[scene]\nname = "fällt"\n', encoding="utf-8")
     ascii_only = environment(LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0", COLUMNS="60")

@@ -64,6 +64,7 @@ def lines(shown):
     return [line for line in re.split(r"[\r\n]+", CONTROL.sub("", shown)) if line]
 
 
+@pytest.mark.slow
 def test_a_run_fits_a_narrow_terminal(dap3d):
     code, shown = in_terminal(dap3d, 60, "run", "fourbar3", "--t-end", "1")
     assert code == 0, shown

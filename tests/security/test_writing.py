@@ -67,6 +67,7 @@ def test_a_folder_or_a_link_of_another_user_is_not(tmp_path):
     assert "another user (uid 12345)" in distrust(folder)
 
 
+@pytest.mark.slow
 def test_another_folder_is_taken_and_a_note_says_so(tmp_path):
     """Nothing is written into the one that is not trusted."""
     cache, home = tmp_path / "cache", tmp_path / "home"
