@@ -4,9 +4,11 @@ Plugins here are real distributions on sys.path: a module, and a dist-info with 
 """
 
 import os
+import shutil
 import subprocess
 import sys
 import textwrap
+import time
 from pathlib import Path
 
 import pytest
@@ -276,6 +278,47 @@ def test_a_damaged_entry_point_file_stops_nobody_else(install):
     broken = [i for i in registry.listing() if i.distribution == "dap3d-broken"]
     assert [i.state for i in broken] == ["broken"]
     assert "entry_points.txt" in broken[0].reason
+
+
+def test_what_is_installed_meanwhile_is_found_and_what_is_removed_is_not(install, tmp_path):
+    before = load_registry().keywords("force")
+    for _ in range(2):
+        time.sleep(0.02)  # Python's own list of a folder is as old as a tick of the file system
+        install("dap3d-push", GOOD)
+        assert set(load_registry().keywords("force")) == {*before, "push"}
+        shutil.rmtree(tmp_path / "dap3d_push-1.2.dist-info")
+        assert load_registry().keywords("force") == before
+
+
+def test_of_two_distributions_of_one_name_the_one_that_is_imported_counts(
+    install, tmp_path, monkeypatch
+):
+    """Whether or not it declares types."""
+    install("dap3d-push", GOOD)
+    first = tmp_path / "first"
+    first.mkdir()
+    monkeypatch.syspath_prepend(str(first))
+    shutil.copytree(tmp_path / "dap3d_push-1.2.dist-info", first / "dap3d_push-1.3.dist-info")
+    info = first / "dap3d_push-1.3.dist-info"
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: dap3d_push\nVersion: 1.3\n")
+    (found,) = [t for t in load_registry().listing() if t.keyword == "push"]
+    assert (found.version, found.state) == ("1.3", "ok")
+    shutil.rmtree(info)
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: dap3d_push\nVersion: 1.3\n")
+    assert "push" not in load_registry().keywords("force")
+
+
+def test_to_know_what_is_installed_costs_once(monkeypatch):
+    """Not once for each of many runs: no file is read where no folder has changed."""
+    monkeypatch.setattr("dap3d_core.registry.discovery.SETTLED", 0)
+    before = load_registry()
+
+    def read(*_):
+        raise AssertionError("a file is read")
+
+    monkeypatch.setattr("importlib.metadata.PathDistribution.read_text", read)
+    assert load_registry().sources == before.sources
 
 
 def test_what_a_plugin_changes_in_the_process_is_put_back(install, tmp_path, capsys):

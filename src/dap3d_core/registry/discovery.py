@@ -2,8 +2,11 @@
 
 import os
 import re
-from collections.abc import Collection
-from importlib.metadata import Distribution, EntryPoint, distributions, entry_points
+import sys
+import time
+from collections.abc import Collection, Iterator
+from functools import lru_cache
+from importlib.metadata import Distribution, distributions
 from typing import Any
 
 import attrs
@@ -12,6 +15,8 @@ from dap3d_core.interface.hooks import GROUPS
 
 #: Environment variable that leaves the plugins of the named distributions out, separated by commas.
 BLOCK_VARIABLE = "DAP3D_BLOCK"
+#: Nanoseconds after which a folder's last change is told from the next one by its time.
+SETTLED = 10**9
 
 
 @attrs.frozen
@@ -47,15 +52,38 @@ class Source:
 def discover(groups: Collection[str] | None = None) -> list[Source]:
     """Every type that the installed distributions declare, in the order of kinds and keywords.
 
+    What is installed is read again when a folder that Python searches has changed.
+
     Args:
         groups: entry-point groups to read; all three by default, none with an empty collection.
     """
-    wanted = {g: kind for kind, (g, _) in GROUPS.items() if groups is None or g in groups}
-    blocked = blocked_distributions()
-    entries, found = _entries(wanted)
-    found += [_source(e, wanted[e.group], blocked) for e in entries]
+    wanted = frozenset(g for g, _ in GROUPS.values()) if groups is None else frozenset(groups)
+    return list(_discover(wanted, blocked_distributions(), tuple(map(_changed, sys.path))))
+
+
+@lru_cache(maxsize=4)
+def _discover(
+    groups: frozenset[str], blocked: frozenset[str], path: tuple[tuple[str, int], ...]
+) -> tuple[Source, ...]:
+    """The types; ``path`` says where they are looked for, and when that was changed."""
+    kinds = {group: kind for kind, (group, _) in GROUPS.items() if group in groups}
+    found = [source for one in _declaring(kinds) for source in _sources(one, kinds, blocked)]
     order = {kind: k for k, kind in enumerate(GROUPS)}
-    return sorted(found, key=lambda s: (order.get(s.kind, -1), s.keyword, s.distribution))
+    found.sort(key=lambda s: (order.get(s.kind, -1), s.keyword, s.distribution))
+    return tuple(found)
+
+
+def _changed(folder: str) -> tuple[str, int]:
+    """A folder, in full, and when something was last put into it, ns; 0 where it is not there.
+
+    Where that was just now the time is this moment: the clock of a file system ticks slowly, and
+    more may come within the tick.
+    """
+    try:
+        changed, now = os.stat(folder or ".").st_mtime_ns, time.time_ns()
+    except (OSError, ValueError):
+        return folder, 0
+    return os.path.abspath(folder), changed if now - changed > SETTLED else now
 
 
 def blocked_distributions() -> frozenset[str]:
@@ -69,43 +97,61 @@ def normal_name(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name.strip()).lower()
 
 
-def _entries(groups: Collection[str]) -> tuple[list[EntryPoint], list[Source]]:
-    """The entry points of these groups, and distributions whose entry points cannot be read."""
-    try:
-        return [entry for group in groups for entry in entry_points(group=group)], []
-    except Exception:  # one damaged file stops that call for everyone: read them one by one
-        return _entries_one_by_one(groups)
+def _declaring(groups: Collection[str]) -> Iterator[Distribution]:
+    """The distributions that have one of these groups; of two of a name the one that is imported.
 
-
-def _entries_one_by_one(groups: Collection[str]) -> tuple[list[EntryPoint], list[Source]]:
+    Entry points are looked for as text first: to parse what all the others declare, and the long
+    texts in which their names stand, would take ten times as long.
+    """
     seen: set[str] = set()
-    entries: list[EntryPoint] = []
-    broken: list[Source] = []
     for distribution in distributions():
-        name, version = _name_and_version(distribution)
-        if normal_name(name) in seen:  # the first on the path is the one that is imported
+        if not _mentions(distribution, groups):
+            continue
+        name, _ = _name_and_version(distribution)
+        if normal_name(name) in seen:
             continue
         seen.add(normal_name(name))
-        try:
-            entries += [e for e in distribution.entry_points if e.group in groups]
-        except Exception as error:
-            fault = f"its entry_points.txt cannot be read: {type(error).__name__}: {error}"
-            broken.append(Source("", "", "", name, version, fault=fault))
-    return entries, broken
+        first = next(iter(distributions(name=name)), distribution)
+        if _mentions(first, groups):
+            yield first
 
 
-def _name_and_version(distribution: Distribution | None) -> tuple[str, str]:
+def _mentions(distribution: Distribution, groups: Collection[str]) -> bool:
+    """Whether a distribution may declare entry points of these groups."""
     try:
-        metadata: Any = distribution.metadata if distribution is not None else {}
+        text = distribution.read_text("entry_points.txt") or ""
+    except Exception:  # damaged: told where it is parsed
+        return True
+    return any(group in text for group in groups)
+
+
+def _sources(
+    distribution: Distribution, kinds: dict[str, str], blocked: frozenset[str]
+) -> list[Source]:
+    """The types that a distribution declares; where it cannot be read, that."""
+    name, version = _name_and_version(distribution)
+    try:
+        entries = [entry for entry in distribution.entry_points if entry.group in kinds]
+    except Exception as error:  # of one damaged file; all others are read
+        fault = f"its entry_points.txt cannot be read: {type(error).__name__}: {error}"
+        return [Source("", "", "", name, version, fault=fault)]
+    is_blocked = normal_name(name) in blocked
+    return [
+        Source(kinds[entry.group], entry.name, value, name, version, is_blocked, _fault(value))
+        for entry, value in ((entry, str(entry.value).strip()) for entry in entries)
+    ]
+
+
+def _name_and_version(distribution: Distribution) -> tuple[str, str]:
+    try:
+        metadata: Any = distribution.metadata
         return metadata["Name"] or "unknown", metadata["Version"] or ""
     except Exception:  # metadata missing or damaged
         return "unknown", ""
 
 
-def _source(entry: EntryPoint, kind: str, blocked: frozenset[str]) -> Source:
-    name, version = _name_and_version(entry.dist)
-    value = str(entry.value).strip()
-    fault = ""
-    if not re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)*", value):
-        fault = f"its entry point should name a module, such as my_package.my_type, not {value!r}"
-    return Source(kind, entry.name, value, name, version, normal_name(name) in blocked, fault)
+def _fault(value: str) -> str:
+    """Why an entry point is of no use, by what it names."""
+    if re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)*", value):
+        return ""
+    return f"its entry point should name a module, such as my_package.my_type, not {value!r}"
