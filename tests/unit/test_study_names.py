@@ -153,14 +153,18 @@ def test_all_mistakes_at_once_and_no_number_twice(checked):
 
 
 def test_names_do_not_take_longer_in_large_scenes():
-    """Of 1e4 bodies three names take less than a hundredth of listing all numbers, or of 1 s."""
+    """Of 1e4 bodies three names take less than a hundredth of listing all numbers, or of 1 s, at
+    the best of five times: now and then a collection of garbage comes between."""
     scene = dap.Scene(name="many")
     for k in range(10_000):
         scene.add_body(f"b{k}", mass=1.0, Jp=(1.0, 1.0, 1.0))
     checked = check(scene, load_registry())
-    begun = time.process_time()
-    numbers_named(checked, ["bodies.b9999.mass", "bodies.b5.r.x", "simulation.rtol"])
-    assert time.process_time() - begun < 0.01
+    spent = []
+    for _ in range(5):
+        begun = time.process_time()
+        numbers_named(checked, ["bodies.b9999.mass", "bodies.b5.r.x", "simulation.rtol"])
+        spent.append(time.process_time() - begun)
+    assert min(spent) < 0.01
 
 
 def test_names_go_on_part_by_part(checked):
