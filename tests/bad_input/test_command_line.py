@@ -371,8 +371,9 @@ def _limited(size):
 
 
 def _process(folder, *words, **options):
+    env = environment(PYTHONDONTWRITEBYTECODE=1)  # on a small disk it would be cut off, and kept
     return subprocess.Popen(
-        [*COMMAND, *words], cwd=folder, env=environment(), stdin=subprocess.DEVNULL,
+        [*COMMAND, *words], cwd=folder, env=env, stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options,
     )  # fmt: skip
 

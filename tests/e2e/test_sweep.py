@@ -181,7 +181,8 @@ def test_a_full_disk_ends_a_sweep_in_a_sentence(dap3d, scene_file, monkeypatch):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (9_000, before[1]))
     try:
-        process = dap3d.start(*FALL, "--json")
+        # bytecode would be cut off, and kept
+        process = dap3d.start(*FALL, "--json", PYTHONDONTWRITEBYTECODE=1)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     out, err = process.communicate(timeout=300)
