@@ -51,10 +51,7 @@ class Lines(Panel):
         marked = len(self.x.values) <= MARKED
         for k, output in enumerate(self.outputs):
             self._curve(ax, k, output, marked=marked)
-        missing = np.any([~np.isfinite(o.values) for o in self.outputs], axis=0)
-        _leave_room(ax, missing)
-        fates.mark(ax, self.status, missing, self.x.values, None)
-        _frame(ax, self.x, self.outputs, size)
+        _complete(ax, self, size, fates)
 
     def _curve(self, ax: Axes, k: int, output: Column, *, marked: bool) -> None:
         alone = _alone(output.values)
@@ -65,6 +62,15 @@ class Lines(Panel):
                 label=shown_text(output.name), **look)  # fmt: skip
         if not marked and alone.any():  # a value between two gaps makes no line
             ax.plot(self.x.values[alone], output.values[alone], marker=marker, linestyle="", **look)
+
+
+def _complete(ax: Axes, panel: "Lines | Scatter", size: tuple[float, float], fates: Fates) -> None:
+    """Marks below the curves of points that have no value, and what the axes say."""
+    missing = np.any([~np.isfinite(o.values) for o in panel.outputs], axis=0)
+    _leave_room(ax, missing)
+    seen = missing & np.isfinite(panel.x.values)
+    fates.mark(ax, panel.status, seen, panel.x.values, None)
+    _frame(ax, panel.x, panel.outputs, size)
 
 
 def _leave_room(ax: Axes, missing: NDArray[np.bool_]) -> None:
@@ -96,11 +102,7 @@ class Scatter(Panel):
                     markersize=3.5 if count < 500 else 2.5, markeredgewidth=0.0, alpha=strength,
                     color=PALETTE[k % len(PALETTE)], label=shown_text(output.name),
                     rasterized=count > 2000)  # fmt: skip
-        missing = np.any([~np.isfinite(o.values) for o in self.outputs], axis=0)
-        _leave_room(ax, missing)
-        seen = missing & np.isfinite(self.x.values)
-        fates.mark(ax, self.status, seen, self.x.values, None)
-        _frame(ax, self.x, self.outputs, size)
+        _complete(ax, self, size, fates)
 
 
 @attrs.frozen(eq=False)
