@@ -38,7 +38,7 @@ def test_the_driver_of_dap3d_reaches_all_levels(tmp_path):
     cells = json.loads(output.read_text())["cells"]
     assert min(c["error"] for c in cells if c.get("error") is not None) < 1e-9
     assert max(len(c["seconds"]) for c in cells) == 2
-    assert all(0.0 < s < 10.0 for c in cells for s in c["seconds"])
+    assert all(s > 0.0 for c in cells for s in c["seconds"])
 
 
 @pytest.mark.slow
