@@ -73,7 +73,8 @@ while found["killed"] < int(sys.argv[1]):
         duration *= 0.9
         continue
     found["killed"] += 1
-    rows = [prefix(dap.open(file)) for file in Path().glob("run.nc.part*")]
+    files = [*Path().glob("run.nc.part*"), *Path().glob("run.nc")]  # it has its name at the end
+    rows = [prefix(dap.open(file)) for file in files]
     checkpoint = Path("run.nc.checkpoint")
     if not checkpoint.exists():
         continue

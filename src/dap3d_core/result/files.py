@@ -161,18 +161,21 @@ def _name_if_free(part: Path, target: Path) -> None:
 
 
 @contextmanager
-def whole_file(path: str | os.PathLike[str], force: bool = False) -> Iterator[Path]:
+def whole_file(
+    path: str | os.PathLike[str], force: bool = False, kind: str = "part"
+) -> Iterator[Path]:
     """A file to write into, which gets its name at the end; left with an error, it vanishes.
 
     Args:
         path: what it is called in the end.
         force: whether an existing file is overwritten.
+        kind: what it is called until then, after a dot behind its name.
 
     Raises:
         ResultError: the path cannot be written to.
     """
     target = check_target(path, force)
-    part = reserve(target)
+    part = reserve(target, kind)
     try:
         yield part
         check_target(path, force)

@@ -29,7 +29,8 @@ def save(result: "Result", path: str | os.PathLike[str], force: bool = False) ->
         ResultError: the file cannot be written, or exists and ``force`` is off.
     """
     arrays = result.arrays
-    with whole_file(path, force) as part, NETCDF:
+    # killed now it leaves nothing that is called a part and is none
+    with whole_file(path, force, "new") as part, NETCDF:
         dataset = guarded(Path(path), lambda: _opened(part))
 
         def write() -> int:
