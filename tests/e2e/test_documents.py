@@ -1,13 +1,12 @@
 """What the documents show works as it stands there: every block of code is run."""
 
-import contextlib
 import io
 import re
 import shlex
 import subprocess
 import sys
 import tomllib
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import NamedTuple
 
@@ -53,7 +52,7 @@ class Done(NamedTuple):
 def dap3d(words, folder):
     """Run a command, here: a process for each would take most of its time to begin."""
     out, err = io.StringIO(), io.StringIO()
-    with contextlib.chdir(folder), redirect_stdout(out), redirect_stderr(err):
+    with chdir(folder), redirect_stdout(out), redirect_stderr(err):
         code = main(words)
     return Done(code, out.getvalue(), err.getvalue())
 
@@ -201,7 +200,7 @@ def test_the_page_on_checking_types(tmp_path):
 
 
 def takes_long(page):
-    """Commands and clusters are processes of their own, tutorials simulate more than once."""
+    """Commands compile, simulate and draw; clusters are processes; tutorials run many scenes."""
     text = page.read_text()
     found = list(steps(text))
     commands = any(step.kind == "command" for step in found)

@@ -41,12 +41,16 @@ def written(path, data):
 
 @pytest.fixture
 def no_library(monkeypatch):
-    """Whoever asks the NetCDF library to open a file fails."""
+    """Whoever asks the NetCDF library to open a file fails, whatever becomes of the exception."""
+    asked = []
 
-    def opened(*_, **__):
+    def opened(file, *_, **__):
+        asked.append(file)
         raise AssertionError("the library reads the file")
 
     monkeypatch.setattr(netCDF4, "Dataset", opened)
+    yield
+    assert asked == []
 
 
 def places_in(size, count, seed):
@@ -55,17 +59,20 @@ def places_in(size, count, seed):
     return [*some.tolist(), *range(size - SIZE, size)]
 
 
-def test_a_byte_changed_anywhere_is_refused(good, tmp_path, no_library):
-    """At 400 places, and in each byte of the seal."""
-    data = good.read_bytes()
-    rng = np.random.default_rng(1)
-    for at in places_in(len(data), 400, 2):
+def changed_files(good, path, count):
+    """The file with a byte changed, at so many places and in each byte of the seal."""
+    data, rng = good.read_bytes(), np.random.default_rng(1)
+    for at in places_in(len(data), count, 2):
         changed = bytearray(data)
         changed[at] ^= int(rng.integers(1, 256))
-        if at < 8:  # then it has not HDF5's signature
-            continue
+        if at >= 8:  # or it has not HDF5's signature
+            yield written(path, changed)
+
+
+def test_a_byte_changed_anywhere_is_refused(good, tmp_path, no_library):
+    for bad in changed_files(good, tmp_path / "bad.nc", 400):
         with pytest.raises(ResultError, match=REFUSED):
-            open_result(written(tmp_path / "bad.nc", changed))
+            open_result(bad)
 
 
 def test_a_file_cut_off_anywhere_says_so(good, tmp_path, no_library):

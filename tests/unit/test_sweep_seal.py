@@ -1,15 +1,15 @@
 """A sweep's file that is not as it was written is refused before any library reads it."""
 
 import netCDF4
-import numpy as np
 import pytest
-from unit.test_result_seal import REFUSED, SIZE, places_in, written
+from unit.test_result_seal import REFUSED, SIZE, changed_files, no_library, written
 from unit.test_sweep import spring
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError, seal
 from dap3d_core.study.dataset import is_sweep
 
+__all__ = ["no_library"]  # a fixture
 ASKED = {"vary": {"forces.spring.k": [1.0, 4.0]}, "outputs": "block.r.x", "t_end": 0.1}
 
 
@@ -21,21 +21,9 @@ def good(tmp_path_factory):
     return path
 
 
-def test_a_byte_changed_anywhere_is_refused(good, tmp_path, monkeypatch):
-    """At 200 places, and in each byte of the seal; who only asks what file it is, hangs neither."""
-
-    def opened(*_, **__):
-        raise AssertionError("the library reads the file")
-
-    monkeypatch.setattr(netCDF4, "Dataset", opened)
-    data = good.read_bytes()
-    rng = np.random.default_rng(1)
-    for at in places_in(len(data), 200, 2):
-        changed = bytearray(data)
-        changed[at] ^= int(rng.integers(1, 256))
-        if at < 8:  # then it has not HDF5's signature
-            continue
-        bad = written(tmp_path / "bad.nc", changed)
+def test_a_byte_changed_anywhere_is_refused(good, tmp_path, no_library):
+    """Nor does the library see it when somebody only asks whether it is a sweep."""
+    for bad in changed_files(good, tmp_path / "bad.nc", 200):
         with pytest.raises(ResultError, match=REFUSED):
             dap.open_sweep(bad)
         assert not is_sweep(bad)
@@ -63,6 +51,24 @@ def test_files_without_a_seal_are_read(good, tmp_path):
         dataset.setncattr("remark", "looked at")
     assert b"dap3dsum" not in changed.read_bytes()
     assert dap.open_sweep(changed).equals(expected)
+
+
+def test_whatever_the_library_raises_is_one_sentence(good, tmp_path, monkeypatch):
+    """A damaged file without a seal had it raise AttributeError; such bytes may also hang it, so
+    that none are tried here."""
+
+    def opened(*_, **__):
+        raise AttributeError("NetCDF: Can't open HDF5 attribute")
+
+    old = written(tmp_path / "a.nc.part", good.read_bytes()[:-SIZE])
+    monkeypatch.setattr(netCDF4, "Dataset", opened)
+    words = r"is damaged, cut off .*\(NetCDF: Can't open HDF5 attribute\)"
+    for read in (dap.open_sweep, dap.open):
+        with pytest.raises(ResultError, match=words):
+            read(old)
+    assert not is_sweep(old)
+    with pytest.raises(ResultError, match=f"cannot resume: .*{words}; move it away"):
+        dap.sweep(spring(), **ASKED, output=tmp_path / "a.nc", resume=True)
 
 
 def test_a_sealed_part_gets_its_name(good, tmp_path):

@@ -249,7 +249,9 @@ class _Watch:
         self._next = now + LOOK
         try:
             cores = sum(self.client.nthreads().values())
-        except OSError:  # the client itself sees whether nobody is there, and drops the tasks
+        except OSError as error:  # most likely the client sees soon that nobody is there
+            if now - self._seen > ABSENCE:
+                raise _gone(self.client) from error
             return
         if cores:
             self._seen, self.cores = now, cores
