@@ -15,7 +15,7 @@ import pytest
 from support.plain import in_another_process
 
 from dap3d_core.interface import PluginError
-from dap3d_core.registry import UnknownTypeError, load_registry
+from dap3d_core.registry import UnknownTypeError, discovery, load_registry
 
 GOOD = """
     from dap3d_core.interface import Body, Force, body, hookimpl, number
@@ -310,15 +310,12 @@ def test_of_two_distributions_of_one_name_the_one_that_is_imported_counts(
 
 
 def test_to_know_what_is_installed_costs_once(monkeypatch):
-    """Not once for each of many runs: no file is read where no folder has changed."""
-    monkeypatch.setattr("dap3d_core.registry.discovery.SETTLED", 0)
-    before = load_registry()
-
-    def read(*_):
-        raise AssertionError("a file is read")
-
-    monkeypatch.setattr("importlib.metadata.PathDistribution.read_text", read)
+    """Not once for each of many runs: nothing is looked for where no folder has changed."""
+    monkeypatch.setattr(discovery, "SETTLED", 0)
+    before, asked = load_registry(), []
+    monkeypatch.setattr(discovery, "distributions", lambda **names: asked.append(names) or [])
     assert load_registry().sources == before.sources
+    assert asked == []
 
 
 def test_what_a_plugin_changes_in_the_process_is_put_back(install, tmp_path, capsys):
