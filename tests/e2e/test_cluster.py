@@ -432,9 +432,12 @@ def test_a_client_that_is_closed_meanwhile(client):
     with connect(client.scheduler.address) as mine:
         found = run_on(mine, bob(), POINTS, np.arange(200), chunk=1)
         next(found)
+        watch, silent = cluster._Watch(mine), distributed.as_completed(loop=mine.loop)
         mine.close()
         with pytest.raises(ClusterError, match=r"the scheduler at .* is gone"):
             collected(found)
+        with pytest.raises(ClusterError, match=r"the scheduler at .* is gone"):
+            watch.wait(silent)  # of tasks that were being fetched dask does not speak any more
         with pytest.raises(ClusterError, match=r"the scheduler at .* is gone"):
             run_on(mine, bob(), POINTS, PLACES)
 
