@@ -51,7 +51,8 @@ class Examined:
         kernels: its pure functions.
         variants: types that stand in for it: (values of fields, the type).
         argument_functions: its function fields of another argument than time.
-        acts_through_joint: whether it is a force that switches on the friction of a joint.
+        rubs_in: of a force that acts by the friction of a joint, the field that names the joint; ""
+            for all others.
         given: what completes it, for titles: the types of its functions of an argument.
         derived: which of its kernels were derived from others.
     """
@@ -63,7 +64,7 @@ class Examined:
     kernels: dict[str, Callable[..., Any]]
     variants: tuple[tuple[Mapping[str, Any], "Examined"], ...] = ()
     argument_functions: tuple[str, ...] = ()
-    acts_through_joint: bool = False
+    rubs_in: str = ""
     given: str = ""
     derived: tuple[str, ...] = ()
 
@@ -75,8 +76,17 @@ class Examined:
         return self
 
 
-def _has_joint(type_: type[TypeBase]) -> bool:
-    return any(spec.kind == "joint" for spec in specs_of(type_).values())
+def _rubs_in(type_: type[TypeBase]) -> str:
+    """The field of the joint by whose friction a force acts; "" where it has a law of its own."""
+    if type_.kind != "force" or {"wrench", "energy"} & set(type_.kernels()):
+        return ""
+    named = [name for name, spec in specs_of(type_).items() if spec.kind == "joint"]
+    if len(named) > 1:
+        raise PluginError(
+            f"{where_is(type_)} has no wrench and would act by the friction of a joint, but names "
+            f"several joints: {', '.join(named)}; declare one, or define wrench"
+        )
+    return named[0] if named else ""
 
 
 def _holds(type_: type[TypeBase], name: str, wanted: Any, value: Any) -> bool:
@@ -131,9 +141,9 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
     specs = specs_of(type_).items()
     functions = tuple(n for n, s in specs if s.kind == "function" and s.argument)
     derived = tuple(n for n in lacking if n in kernels)
-    by_joint = _has_joint(type_)
+    rubs_in = _rubs_in(type_)
     return Examined(
-        type_, layout, names, outputs, kernels, variants, functions, by_joint, derived=derived
+        type_, layout, names, outputs, kernels, variants, functions, rubs_in, derived=derived
     )
 
 
@@ -270,7 +280,7 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     derivable = missing(type_)
     if derivable:
         needed = []
-    by_joint = _has_joint(type_)
+    by_joint = bool(_rubs_in(type_))
     if (is_abstract and not type_.kernels()) or by_joint:
         needed = []
     elif issubclass(type_, Joint):

@@ -173,7 +173,7 @@ def choice(
 
 
 def joint(*, doc: str = "") -> Any:
-    """A joint by name, whose kernel ``friction`` the force acts by."""
+    """A joint by name; a force without a ``wrench`` acts by its kernel ``friction``."""
     return _field(FieldSpec("joint", REQUIRED, doc=doc))
 
 

@@ -116,8 +116,8 @@ class Force(TypeBase):
     Subclasses define ``wrench``, which returns for each body slot a pair (force, moment about the
     mass centre) in global axes, and where there is one ``energy``, the potential in J. A force that
     defines ``energy`` alone has its gradient for ``wrench``, derived (derivation.py). Variants and
-    ``switch`` are as for joints. A force with a ``joint`` field defines no ``wrench``: it switches
-    on the friction of that joint.
+    ``switch`` are as for joints. A force that defines neither and names one joint, by a ``joint``
+    field, switches on the friction of that joint; with a ``wrench`` it acts by that alone.
 
     Attributes:
         keyword: the word that names the type in a scene.

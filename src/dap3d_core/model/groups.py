@@ -128,7 +128,7 @@ class Grouping:
         """
         by_type: dict[Any, list[tuple[int, Instance, int, Instance]]] = {}
         for place, force in forces:
-            row, joint = joints[force.values["joint"]]
+            row, joint = joints[force.values[force.examined.rubs_in]]
             by_type.setdefault(joint.examined.type, []).append((place, force, row, joint))
         return _each(self._friction, by_type.values())
 

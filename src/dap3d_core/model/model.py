@@ -168,8 +168,8 @@ class _Groups:
         every = (*checked.joints, *checked.forces)
         used = {place - 1 for instance in every for place in instance.functions}
         functions = [(k, f) for k, f in enumerate(checked.functions) if k in used]
-        through = [(k, f) for k, f in enumerate(checked.forces) if _acts_through_joint(f)]
-        direct = [(k, f) for k, f in enumerate(checked.forces) if not _acts_through_joint(f)]
+        through = [(k, f) for k, f in enumerate(checked.forces) if f.examined.rubs_in]
+        direct = [(k, f) for k, f in enumerate(checked.forces) if not f.examined.rubs_in]
         joints = {j.name: (k, j) for k, j in enumerate(checked.joints)}
         names = {
             "joint": checked.joints,
@@ -207,10 +207,6 @@ def _faults(
 ) -> list[tuple[str, str, str]]:
     """What is wrong with instances, with their names."""
     return [(kind, instances[member].name, words) for member, words in error.faults]
-
-
-def _acts_through_joint(force: Instance) -> bool:
-    return force.examined.acts_through_joint
 
 
 def _rows(joint: Instance) -> int:

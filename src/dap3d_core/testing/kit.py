@@ -104,7 +104,7 @@ def _checks(examined: Examined, poses: int, seed: int) -> list[Check]:
     found = []
     for subject in subjects(examined, seed, poses):
         by_joint = "its formulas are the friction of its joint, which is checked with that"
-        if subject.examined.acts_through_joint:
+        if subject.examined.rubs_in:
             found.append(Check("energy", subject, by_joint, forces.potential))
             continue
         found += of_kind[subject.type.kind](subject)
