@@ -360,13 +360,50 @@ def test_two_types_of_a_models_file_with_one_keyword_are_refused(model):
         compiled(folder)
 
 
-def test_a_models_file_does_not_shadow_a_standard_type_quietly(model):
-    """The installed type is taken, and a note says that the file was not loaded."""
-    folder = model()
-    for name in ("plugin.py", "scene.toml"):
-        path = folder / name
-        text = path.read_text().replace('"mine"', '"fp"').replace('"b"\n', '"b"\nfp = [1, 0, 0]\n')
-        path.write_text(text)
+#: Classes of a model's own file that have the keyword of an installed force.
+SHADOWS = {
+    "plain": "keyword = 'fp'",
+    "among others": "rows, keyword = 0, 'fp'",
+    "found by running it": "keyword = ''.join(('f', 'p'))",
+}
+
+
+@pytest.mark.parametrize("keyword", SHADOWS.values(), ids=SHADOWS)
+@pytest.mark.parametrize("table", ["[forces.A]", "[forces.Z]"], ids=["before", "after"])
+def test_a_models_file_does_not_shadow_a_standard_type_quietly(model, table, keyword):
+    """Refused, in whichever order the scene names its types."""
+    folder = model(at_import=SHADOWING.format(keyword))
+    text = (folder / "plugin.py").read_text().replace("[Mine]", "[Mine, Fp]")
+    (folder / "plugin.py").write_text(text)
+    scene = (folder / "scene.toml").read_text()
+    fp = f'{table}\ntype = "fp"\nbody_i = "b"\nfp = [1.0, 0.0, 0.0]\n\n'
+    order = fp + "[forces.F]" if "A" in table else "[forces.F]"
+    scene = scene.replace("[forces.F]", order)
+    (folder / "scene.toml").write_text(scene if "A" in table else scene + "\n" + fp)
+    with pytest.raises(dap.SceneError, match="'fp' is brought by distribution dap3d") as caught:
+        compiled(folder)
+    assert f"and {folder / 'plugin.py'}; rename the one in the model's own file" in str(caught.value)
+
+
+SHADOWING = """
+class Fp(Force):
+    {}
+    body_i: Body = body()
+
+    def wrench(t):
+        return (t, 0.0, 0.0), (0.0, 0.0, 0.0)
+"""
+
+
+def test_a_models_file_that_is_not_needed_is_not_run_and_does_not_shadow_quietly(model):
+    """Its text tells, without leave to run it; a class of another kind shadows nothing."""
+    folder = model(at_import=SHADOWING.format("keyword = 'weight'") + "\nraise RuntimeError('ran')")
+    scene = SCENE.replace('type = "mine"\nbody_i = "b"', 'type = "weight"')
+    (folder / "scene.toml").write_text(scene)
+    with pytest.raises(dap.SceneError, match="'weight' is brought by distribution dap3d"):
+        dap.compile(folder)
+    text = (folder / "plugin.py").read_text().replace("Fp(Force)", "Fp(Function)")
+    (folder / "plugin.py").write_text(text)
     notes = compiled(folder).notes
     assert any(str(folder / "plugin.py") in note and "was not loaded" in note for note in notes)
 

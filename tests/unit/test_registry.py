@@ -3,6 +3,7 @@
 Plugins here are real distributions on sys.path: a module, and a dist-info with entry points.
 """
 
+import json
 import os
 import shutil
 import subprocess
@@ -202,9 +203,55 @@ def test_a_broken_plugin_breaks_no_other_and_is_listed(install, text, words):
 
 
 def test_ctrl_c_at_import_is_not_swallowed(install):
+    """And says which plugin was being loaded: it may be the one that takes so long."""
     install("dap3d-push", "raise KeyboardInterrupt\n")
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt, match="while force type 'push' of .*dap3d-push"):
         load_registry().get("force", "push")
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        "while True:\n    pass\n",
+        "import time\ntime.sleep(1e6)\n",
+        "while True:\n    try:\n        f()\n    except Exception:\n        pass\n",
+    ],
+    ids=["busy", "asleep", "catches everything"],
+)
+def test_a_plugin_that_never_ends_loading_is_named_and_stops_no_other(install, loop):
+    """With its line; an alarm that was set before is set again."""
+    import signal
+
+    module = install("dap3d-push", loop)
+    install("dap3d-pull", GOOD.replace('"push"', '"pull"'), "pull")
+    signal.setitimer(signal.ITIMER_REAL, 1000.0)
+    try:
+        listing = {i.keyword: i for i in load_registry().listing(limit_s=0.3)}
+        assert 0.0 < signal.getitimer(signal.ITIMER_REAL)[0] < 1000.0
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+    assert listing["push"].state == "broken"
+    for words in ["not loaded after 0.3 s", f"{module}.py:", "DAP3D_BLOCK=dap3d-push:push"]:
+        assert words in listing["push"].reason
+    assert listing["pull"].state == listing["weight"].state == "ok"
+
+
+def test_what_was_declared_since_an_editable_install_says_to_install_again(install, tmp_path):
+    """The entry points of such an install are those of the day it was made."""
+    install("dap3d-push", GOOD)
+    source = tmp_path / "source of push"
+    source.mkdir()
+    (source / "pyproject.toml").write_text(
+        '[project.entry-points."dap3d.forces"]\npush = "push"\nshove = "shove"\n'
+    )
+    origin = {"url": source.as_uri(), "dir_info": {"editable": True}}
+    (tmp_path / "dap3d_push-1.2.dist-info" / "direct_url.json").write_text(json.dumps(origin))
+    with pytest.raises(UnknownTypeError) as caught:
+        load_registry().get("force", "shove")
+    assert f"run pip install -e {source} again" in str(caught.value)
+    with pytest.raises(UnknownTypeError) as caught:
+        load_registry().get("force", "drag")
+    assert "pip install" not in str(caught.value)
 
 
 def test_two_distributions_with_one_keyword_are_both_named(install, monkeypatch):
@@ -228,7 +275,22 @@ def test_a_name_that_shadows_a_standard_type_is_a_collision(install):
     install("dap3d-mine", GOOD.replace('"push"', '"weight"'), "weight")
     said = message(keyword="weight")
     assert "dap3d-mine" in said
-    assert "DAP3D_BLOCK=dap3d " in said or "DAP3D_BLOCK=dap3d or" in said
+    assert "give the one of dap3d-mine another keyword" in said
+    assert said.endswith("with DAP3D_BLOCK=dap3d:weight or DAP3D_BLOCK=dap3d-mine:weight")
+
+
+@pytest.mark.parametrize("left_out", ["dap3d", "DAP3D_mine"])
+def test_the_advice_on_a_collision_works_and_costs_no_other_type(install, monkeypatch, left_out):
+    """Either of the two types may be left out; all others of its distribution stay."""
+    install("dap3d-mine", GOOD.replace('"push"', '"weight"'), "weight")
+    before = set(load_registry().keywords("force"))
+    monkeypatch.setenv("DAP3D_BLOCK", f"{left_out}:weight")
+    registry = load_registry()
+    assert set(registry.keywords("force")) == before
+    assert registry.get("force", "ptp").type.keyword == "ptp"
+    distribution = {"dap3d": "dap3d-mine", "DAP3D_mine": "dap3d"}[left_out]
+    listing = [i for i in registry.listing() if i.keyword == "weight"]
+    assert {i.distribution: i.state for i in listing if i.state == "ok"} == {distribution: "ok"}
 
 
 def test_a_blocked_type_says_who_blocked_it(install, monkeypatch):

@@ -95,6 +95,7 @@ def _found(
 
 def _of_name(registry: "Registry", name: str) -> Iterator[tuple[str, str]]:
     """The types of one name: a keyword, a distribution, a module, a file; all for no name."""
+    from dap3d_core.registry.declared import not_yet_installed
     from dap3d_core.registry.discovery import normal_name
     from dap3d_core.registry.spelling import nearest
 
@@ -109,7 +110,8 @@ def _of_name(registry: "Registry", name: str) -> Iterator[tuple[str, str]]:
                 yield key
     if not is_there:
         near = nearest(name, list(words))
-        hint = f"; did you mean {near!r}?" if near else ""
+        hint = not_yet_installed(name) or (f"did you mean {near!r}?" if near else "")
+        hint = f"; {hint}" if hint else ""
         raise Refused(
             f"there is no type, distribution or module {name!r}{hint} (dap3d plugins lists them)"
         )
@@ -118,10 +120,12 @@ def _of_name(registry: "Registry", name: str) -> Iterator[tuple[str, str]]:
 def _checked(registry: "Registry", kind: str, keyword: str, poses: int, seed: int) -> "Report":
     """The report on one type; a type that cannot be loaded has one finding."""
     from dap3d_core.interface import PluginError
+    from dap3d_core.registry import LOAD_LIMIT
     from dap3d_core.testing import Finding, Outcome, Report, check_type
 
     try:
-        return check_type(registry.get(kind, keyword), poses=poses, seed=seed)
+        examined = registry.get(kind, keyword, limit_s=LOAD_LIMIT)
+        return check_type(examined, poses=poses, seed=seed)
     except PluginError as error:
         words = "it can be loaded"
         outcome = Outcome("loading", "", "failed", words, None, None, (),

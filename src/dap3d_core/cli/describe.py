@@ -44,6 +44,7 @@ def describe(keyword: str, *, names: bool, source: bool, as_json: bool) -> int:
 def _kinds(registry: "Registry", keyword: str) -> list[str]:
     """The kinds that have this keyword."""
     from dap3d_core.interface.hooks import GROUPS
+    from dap3d_core.registry.declared import not_yet_installed
     from dap3d_core.registry.spelling import nearest
 
     known = {kind: registry.keywords(kind) for kind in GROUPS}
@@ -51,7 +52,8 @@ def _kinds(registry: "Registry", keyword: str) -> list[str]:
     if not found:
         near = nearest(keyword, sorted({w for words in known.values() for w in words}))
         lists = "; ".join(f"{kind}s: {', '.join(words) or 'none'}" for kind, words in known.items())
-        hint = f"; did you mean {near!r}?" if near else ""
+        hint = not_yet_installed(keyword) or (f"did you mean {near!r}?" if near else "")
+        hint = f"; {hint}" if hint else ""
         raise Refused(f"there is no type {keyword!r}{hint} ({lists})")
     return found
 

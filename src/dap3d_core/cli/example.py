@@ -69,10 +69,11 @@ class _Example:
     def first(self, kind: str, is_good: Callable[["Examined"], bool]) -> "Examined":
         """The first usable type of a kind, by keyword, that is good for something."""
         from dap3d_core.interface.checks import PluginError
+        from dap3d_core.registry import LOAD_LIMIT
 
         for keyword in self.registry.keywords(kind):
             try:
-                examined = self.registry.get(kind, keyword)
+                examined = self.registry.get(kind, keyword, limit_s=LOAD_LIMIT)
             except PluginError:
                 continue
             if is_good(examined):

@@ -72,7 +72,8 @@ def _judge(error: BaseException) -> tuple[int, str]:
     from dap3d_core.scene import SceneError
 
     if isinstance(error, KeyboardInterrupt):
-        return exits.INTERRUPTED, "interrupted; nothing was computed yet"
+        doing = f" {error}" if str(error) else ""
+        return exits.INTERRUPTED, f"interrupted{doing}; nothing was computed yet"
     if isinstance(error, exits.Terminated):
         return exits.FAILED, f"{error}; nothing was computed yet"
     if isinstance(error, (SceneError, PluginError, exits.Refused)):

@@ -8,22 +8,25 @@ from dap3d_core.cli.group import Command
 
 @click.command(cls=Command, short_help="List the installed types.")
 @click.option("--no-compile", is_flag=True, help="Do not try whether kernels compile.")
+@click.option("--limit", type=click.FloatRange(min=0.0, min_open=True), metavar="SECONDS",
+              help="How long each plugin may take to load (30 by default).")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
-def plugins(*, no_compile: bool, as_json: bool) -> int:
+def plugins(*, no_compile: bool, limit: float | None, as_json: bool) -> int:
     """List the types of joints, forces and functions that are installed.
 
     A type that cannot be loaded, or whose kernels cannot be compiled, is listed with the reason.
     The kernels of other packages are compiled for that: the first time a second or so a type.
 
-    DAP3D_BLOCK=NAME leaves out the types of a distribution.
+    DAP3D_BLOCK=NAME leaves out the types of a distribution, DAP3D_BLOCK=NAME:KEYWORD one of them.
     """
     import attrs
 
     import dap3d_core as dap
     from dap3d_core.cli.rendering import items, output, print_json, show, table, title
+    from dap3d_core.registry import LOAD_LIMIT
 
     registry = dap.load_registry()
-    found = registry.listing(compiling=not no_compile)
+    found = registry.listing(compiling=not no_compile, limit_s=limit or LOAD_LIMIT)
     if as_json:
         print_json({"types": [attrs.asdict(t) for t in found], "notes": registry.notes})
         return DONE

@@ -2,10 +2,17 @@
 
 from dap3d_core.interface import PluginError
 from dap3d_core.registry.discovery import BLOCK_VARIABLE
-from dap3d_core.registry.registry import PluginInfo, Registry, UnknownTypeError, load_registry
+from dap3d_core.registry.registry import (
+    LOAD_LIMIT,
+    PluginInfo,
+    Registry,
+    UnknownTypeError,
+    load_registry,
+)
 
 __all__ = [
     "BLOCK_VARIABLE",
+    "LOAD_LIMIT",
     "PluginError",
     "PluginInfo",
     "Registry",

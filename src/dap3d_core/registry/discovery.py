@@ -13,7 +13,8 @@ import attrs
 
 from dap3d_core.interface.hooks import GROUPS
 
-#: Environment variable that leaves the plugins of the named distributions out, separated by commas.
+#: Environment variable that leaves types out, separated by commas: all of a distribution, ``NAME``,
+#: or one of them, ``NAME:KEYWORD``.
 BLOCK_VARIABLE = "DAP3D_BLOCK"
 #: Nanoseconds after which a folder's last change is told from the next one by its time.
 SETTLED = 10**9
@@ -28,7 +29,7 @@ class Source:
         keyword: the type's word in a scene.
         module: the module that is the plugin, or the path of a model's own file.
         distribution, version: the installed package; both "" for a model's own file.
-        blocked: left out by DAP3D_BLOCK.
+        blocked: the word of DAP3D_BLOCK that leaves it out; "" for none.
         fault: why the entry point itself is of no use, "" for a good one.
         type: the class, where it is loaded already (a model's own file).
     """
@@ -38,7 +39,7 @@ class Source:
     module: str
     distribution: str = ""
     version: str = ""
-    blocked: bool = False
+    blocked: str = ""
     fault: str = ""
     type: Any = None
 
@@ -58,7 +59,7 @@ def discover(groups: Collection[str] | None = None) -> list[Source]:
         groups: entry-point groups to read; all three by default, none with an empty collection.
     """
     wanted = frozenset(g for g, _ in GROUPS.values()) if groups is None else frozenset(groups)
-    return list(_discover(wanted, blocked_distributions(), tuple(map(_changed, sys.path))))
+    return list(_discover(wanted, blocked_words(), tuple(map(_changed, sys.path))))
 
 
 @lru_cache(maxsize=4)
@@ -86,10 +87,10 @@ def _changed(folder: str) -> tuple[str, int]:
     return os.path.abspath(folder), changed if now - changed > SETTLED else now
 
 
-def blocked_distributions() -> frozenset[str]:
-    """The distributions that DAP3D_BLOCK names, in the normal form of names."""
-    words = os.environ.get(BLOCK_VARIABLE, "").split(",")
-    return frozenset(normal_name(w) for w in words if w.strip())
+def blocked_words() -> frozenset[str]:
+    """What DAP3D_BLOCK leaves out, the names of distributions in their normal form."""
+    words = (w.partition(":") for w in os.environ.get(BLOCK_VARIABLE, "").split(",") if w.strip())
+    return frozenset(f"{normal_name(name)}{colon}{word.strip()}" for name, colon, word in words)
 
 
 def normal_name(name: str) -> str:
@@ -135,10 +136,11 @@ def _sources(
     except Exception as error:  # of one damaged file; all others are read
         fault = f"its entry_points.txt cannot be read: {type(error).__name__}: {error}"
         return [Source("", "", "", name, version, fault=fault)]
-    is_blocked = normal_name(name) in blocked
+    words = {e.name: (normal_name(name), f"{normal_name(name)}:{e.name}") for e in entries}
+    blocking = {n: next((w for w in both if w in blocked), "") for n, both in words.items()}
     return [
-        Source(kinds[entry.group], entry.name, value, name, version, is_blocked, _fault(value))
-        for entry, value in ((entry, str(entry.value).strip()) for entry in entries)
+        Source(kinds[e.group], e.name, value, name, version, blocking[e.name], _fault(value))
+        for e, value in ((e, str(e.value).strip()) for e in entries)
     ]
 
 

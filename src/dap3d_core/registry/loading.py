@@ -22,23 +22,25 @@ from dap3d_core.interface.checks import Examined, examine, where_is
 from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.interface.types import KINDS, TypeBase
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source
+from dap3d_core.registry.overdue import OverdueError, within
 from dap3d_core.registry.spelling import nearest
 
 #: Plugins are loaded one at a time: the guard holds things that belong to the whole process.
 _one_at_a_time = threading.RLock()
 
 
-def load(source: Source, notes: list[str]) -> Examined:
+def load(source: Source, notes: list[str], limit_s: float | None = None) -> Examined:
     """Import a plugin and examine the type that its entry point names.
 
     Args:
         source: where the type comes from.
         notes: what the plugin changed in the process, and was put back, is told here.
+        limit_s: how long that may take; None for as long as it takes.
 
     Raises:
         PluginError: names distribution, module or file, reason and remedy.
     """
-    with _guard(source, notes):
+    with _guard(source, notes), within(limit_s):
         if source.fault:
             raise PluginError(source.fault)
         type_ = source.type
@@ -188,12 +190,18 @@ def _module_of(path: Path) -> ModuleType:
 
 @contextlib.contextmanager
 def _guard(source: Source, notes: list[str]) -> Iterator[None]:
-    """Turn every failure of a plugin but Ctrl-C into a PluginError that names it, with a remedy."""
+    """Turn every failure of a plugin into a PluginError that names it, with a remedy.
+
+    Ctrl-C stays what it is, and says what it interrupted.
+    """
     try:
         with _one_at_a_time, _kept_in_place(source, notes):
             yield
-    except KeyboardInterrupt:
-        raise
+    except KeyboardInterrupt as error:
+        raise KeyboardInterrupt(f"while {_title(source)} was loaded") from error
+    except OverdueError as error:
+        reason = f"it is not loaded after {error}{_line_of(error)}"
+        raise PluginError(f"{_title(source)}: {reason}. {_remedy(source)}") from error
     except PluginError as error:
         raise PluginError(f"{_title(source)}: {error}. {_remedy(source)}") from error
     except pluggy.PluginValidationError as error:
@@ -248,7 +256,8 @@ def _remedy(source: Source) -> str:
     if not source.distribution:
         return "Repair the file"
     name = source.distribution
-    return f"Repair, update or uninstall {name}, or leave it out with {BLOCK_VARIABLE}={name}"
+    leaving = f"{BLOCK_VARIABLE}={name}:{source.keyword}"
+    return f"Repair, update or uninstall {name}, or leave this type out with {leaving}"
 
 
 def _reason(error: BaseException) -> str:
@@ -256,10 +265,13 @@ def _reason(error: BaseException) -> str:
     words = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     if isinstance(error, SyntaxError):
         return f"{words} [{error.filename}:{error.lineno}]"
+    return words + _line_of(error)
+
+
+def _line_of(error: BaseException) -> str:
+    """The line of the plugin where an exception arose, in brackets."""
     here = [Path(__file__).parent, Path(contextlib.__file__).parent]
     frames = traceback.extract_tb(error.__traceback__)
     outside = [f for f in frames if not any(Path(f.filename).is_relative_to(h) for h in here)]
     outside = [f for f in outside if not f.filename.startswith("<frozen")]
-    if outside:
-        words += f" [{outside[-1].filename}:{outside[-1].lineno}]"
-    return words
+    return f" [{outside[-1].filename}:{outside[-1].lineno}]" if outside else ""

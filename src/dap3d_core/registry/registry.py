@@ -8,10 +8,14 @@ import attrs
 from dap3d_core.interface import PluginError
 from dap3d_core.interface.checks import Examined
 from dap3d_core.interface.hooks import GROUPS
+from dap3d_core.registry.declared import not_yet_installed
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover
 from dap3d_core.registry.loading import compile_kernels, load, load_file
 from dap3d_core.registry.spelling import nearest
 
+#: Seconds that a plugin may take to load where no scene asks for it: a command that looks at all
+#: types does not wait for one that never ends.
+LOAD_LIMIT = 30.0
 #: The distribution whose types are compiled and run by the tests of dap3d.
 OWN = "dap3d"
 
@@ -61,12 +65,13 @@ class Registry:
     notes: list[str] = attrs.field(factory=list)
     _loaded: dict[Source, Examined | str] = attrs.field(factory=dict, repr=False)
 
-    def get(self, kind: str, keyword: str) -> Examined:
+    def get(self, kind: str, keyword: str, *, limit_s: float | None = None) -> Examined:
         """The type of this keyword, loaded and examined when first asked for.
 
         Args:
             kind: joint, force or function.
             keyword: the type's word in a scene.
+            limit_s: how long its plugin may take to load; by default as long as it takes.
 
         Raises:
             UnknownTypeError: there is none; it names the nearest and all others.
@@ -79,7 +84,7 @@ class Registry:
             raise self._unknown(kind, keyword)
         if len(sources) > 1:
             raise PluginError(_collision(sources))
-        return self._load(sources[0])
+        return self._load(sources[0], limit_s)
 
     def keywords(self, kind: str) -> tuple[str, ...]:
         """All keywords of a kind, sorted, without those of blocked packages. Loads nothing."""
@@ -90,14 +95,17 @@ class Registry:
             )
         )
 
-    def listing(self, *, compiling: bool = False) -> list[PluginInfo]:
+    def listing(
+        self, *, compiling: bool = False, limit_s: float | None = LOAD_LIMIT
+    ) -> list[PluginInfo]:
         """Every type with its state; loads each in its own guard and raises nothing.
 
         Args:
+            limit_s: how long each plugin may take to load; one that takes longer is broken.
             compiling: whether the kernels of types from other packages are compiled as well, which
                 takes a second a type the first time.
         """
-        infos = [(s, self._info(s, found)) for found in self.sources.values() for s in found]
+        infos = [(s, self._info(s, found, limit_s)) for found in self.sources.values() for s in found]
         if not compiling:
             return [info for _, info in infos]
         return [self._compiled(s, info) for s, info in infos]
@@ -117,11 +125,16 @@ class Registry:
             sources.setdefault((source.kind, source.keyword), []).append(source)
         return Registry(sources, notes, dict(self._loaded))
 
-    def _load(self, source: Source) -> Examined:
+    def clash(self, kind: str, keyword: str, path: Path) -> str:
+        """What is wrong where a model's own file has the keyword of an installed type."""
+        sources = [s for s in self.sources[kind, keyword] if not s.blocked]
+        return _collision([*sources, Source(kind, keyword, str(path))])
+
+    def _load(self, source: Source, limit_s: float | None = None) -> Examined:
         found = self._loaded.get(source)
         if found is None:
             try:
-                found = load(source, self.notes)
+                found = load(source, self.notes, limit_s)
             except PluginError as error:
                 self._loaded[source] = str(error)
                 raise
@@ -130,18 +143,20 @@ class Registry:
             raise PluginError(found)
         return found
 
-    def _info(self, source: Source, rivals: list[Source]) -> PluginInfo:
+    def _info(
+        self, source: Source, rivals: list[Source], limit_s: float | None
+    ) -> PluginInfo:
         state, reason = "ok", ""
         active = [s for s in rivals if not s.blocked]
         if source.blocked:
-            state, reason = "blocked", f"{BLOCK_VARIABLE} names {source.distribution}"
+            state, reason = "blocked", f"{BLOCK_VARIABLE} names {source.blocked}"
         elif not source.kind:
             state, reason = "broken", source.fault
         elif len(active) > 1:
             state, reason = "duplicate", _collision(active)
         else:
             try:
-                self._load(source)
+                self._load(source, limit_s)
             except PluginError as error:
                 state, reason = "broken", str(error)
         return PluginInfo(
@@ -172,12 +187,14 @@ class Registry:
         blocked = self.sources.get((kind, keyword), [])
         others = [k for k in GROUPS if k != kind and (k, keyword) in self.sources]
         if blocked:
-            words += f": {BLOCK_VARIABLE} leaves {blocked[0].distribution} out"
+            words += f": {BLOCK_VARIABLE} leaves {blocked[0].blocked} out"
         elif others:
             words += f"; {keyword!r} is a {others[0]} type and belongs under {others[0]}s"
         elif near:
             words += f"; did you mean {near!r}?"
         words += f" (installed {kind} types: {', '.join(known) or 'none'})"
+        if not blocked and (how := not_yet_installed(keyword)):
+            words += f"; {how}"
         error = UnknownTypeError(words)
         error.nearest = near if near and not blocked and not others else None
         return error
@@ -208,10 +225,17 @@ def _all_blocked(sources: list[Source]) -> bool:
 def _collision(sources: list[Source]) -> str:
     title = f"{sources[0].kind} type {sources[0].keyword!r}"
     both = " and ".join(str(s) for s in sources)
-    names = sorted({s.distribution for s in sources})
-    if "" in names:
-        return f"{title} is brought by {both}; rename the one in the model's own file"
+    names = sorted({s.distribution for s in sources} - {""})
+    leaving = " or ".join(f"{BLOCK_VARIABLE}={n}:{sources[0].keyword}" for n in names)
+    if any(not s.distribution for s in sources):
+        return (
+            f"{title} is brought by {both}; rename the one in the model's own file, or leave the "
+            f"installed one out with {leaving}"
+        )
     if len(names) == 1:
         return f"{title} is declared twice, by {both}; update or uninstall {names[0]}"
-    blocks = " or ".join(f"{BLOCK_VARIABLE}={n}" for n in names)
-    return f"{title} is brought by {both}; uninstall one of them, or leave one out with {blocks}"
+    others = " or ".join(n for n in names if n != OWN)
+    return (
+        f"{title} is brought by {both}; give the one of {others} another keyword, uninstall one of "
+        f"them, or leave one type out with {leaving}"
+    )

@@ -5,6 +5,7 @@ from pathlib import Path
 from dap3d_core.interface import PluginError
 from dap3d_core.interface.checks import Examined
 from dap3d_core.registry import Registry, UnknownTypeError
+from dap3d_core.registry.declared import declares
 from dap3d_core.scene.collector import Collector
 from dap3d_core.scene.mistakes import MISSING
 from dap3d_core.scene.reading import PLUGIN_FILE
@@ -32,6 +33,7 @@ class Types:
         file = folder / PLUGIN_FILE if folder is not None else None
         self.file: Path | None = file if file is not None and file.is_file() else None
         self._refused = ""  # why the model's own file gave no types
+        self._installed: list[tuple[str, str]] = []  # types that were taken from packages
 
     def of(self, table: str) -> dict[str, Examined]:
         """The types of a table's elements by keyword; what cannot be had is reported."""
@@ -74,8 +76,9 @@ class Types:
         return None
 
     def _ask(self, kind: str, word: str) -> Examined:
+        """The type; one that the model's own file has as well is refused, whichever comes first."""
         try:
-            return self.registry.get(kind, word)
+            examined = self.registry.get(kind, word)
         except UnknownTypeError as error:
             if self.file is None or self._is_loaded() or self._refused:
                 raise
@@ -84,11 +87,19 @@ class Types:
                     f"{error}; it may be a type of the model's own file {self.file}, "
                     "which is not run unless it is allowed"
                 ) from None
+        else:
+            if self.file is not None and not self._is_loaded():
+                if declares(self.file, kind, word):
+                    raise PluginError(self.registry.clash(kind, word, self.file))
+                self._installed.append((kind, word))
+            return examined
         try:
             self.registry = self.registry.with_file(self.file)
         except PluginError as error:
             self._refused = str(error)
             raise
+        for other in self._installed:  # the text of the file may not have told its keywords
+            self.registry.get(*other)
         return self.registry.get(kind, word)
 
 

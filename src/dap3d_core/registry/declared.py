@@ -1,0 +1,74 @@
+"""Which types files declare, read as text: no line of them is run."""
+
+import ast
+import json
+import tomllib
+from importlib.metadata import distributions
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+from urllib.request import url2pathname
+
+from dap3d_core.interface.hooks import GROUPS
+from dap3d_core.interface.types import KINDS
+
+#: A file of more bytes is not read: no author wrote it.
+LONGEST = 10**6
+_BASES = {class_.__name__: kind for kind, class_ in KINDS.items()}
+
+
+def declares(path: Path, kind: str, keyword: str) -> bool:
+    """Whether a Python file has a class of this kind with this keyword, as far as its text tells.
+
+    A class whose bases stand in another file may be of any kind.
+    """
+    try:
+        text = path.read_bytes() if path.stat().st_size <= LONGEST else b""
+        tree = ast.parse(text)
+    except (OSError, ValueError, SyntaxError, RecursionError, MemoryError):
+        return False  # told where the file is run
+    kinds = dict(_BASES)
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef):
+            of_bases = [kinds.get(b.id, "") for b in node.bases if isinstance(b, ast.Name)]
+            kinds[node.name] = next(filter(None, of_bases), "")
+            if keyword in _keywords(node) and kinds[node.name] in (kind, ""):
+                return True
+    return False
+
+
+def _keywords(node: ast.ClassDef) -> list[str]:
+    """What a class sets ``keyword`` to: alone, or as one of several names."""
+    found = []
+    for line in node.body:
+        if isinstance(line, ast.Assign) and len(line.targets) == 1:
+            target = line.targets[0]
+            names = target.elts if isinstance(target, ast.Tuple) else [target]
+            values = line.value.elts if isinstance(line.value, ast.Tuple) else [line.value]
+            found += [value.value for name, value in zip(names, values, strict=False)
+                      if isinstance(name, ast.Name) and name.id == "keyword"
+                      and isinstance(value, ast.Constant) and isinstance(value.value, str)]  # fmt: skip
+    return found
+
+
+def not_yet_installed(keyword: str) -> str:
+    """How to install a type that the source of an installed package declares; "" for no such type.
+
+    The entry points of an editable install are those of the day it was made.
+    """
+    for distribution in distributions():
+        try:
+            origin = json.loads(distribution.read_text("direct_url.json") or "{}")
+            if not origin.get("dir_info", {}).get("editable"):
+                continue
+            folder = Path(url2pathname(unquote(urlparse(origin["url"]).path)))
+            file = folder / "pyproject.toml"
+            entry_points = tomllib.loads(file.read_text("utf-8"))["project"]["entry-points"]
+            groups = [entry_points.get(group, {}) for group, _ in GROUPS.values()]
+        except Exception:  # of a package that has no such files, or whose files are damaged
+            continue
+        if any(keyword in group for group in groups):
+            return (
+                f"{file} declares {keyword!r} since it was installed: "
+                f"run pip install -e {folder} again"
+            )
+    return ""
