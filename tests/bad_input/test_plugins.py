@@ -382,7 +382,9 @@ def test_a_models_file_does_not_shadow_a_standard_type_quietly(model, table, key
     (folder / "scene.toml").write_text(scene if "A" in table else scene + "\n" + fp)
     with pytest.raises(dap.SceneError, match="'fp' is brought by distribution dap3d") as caught:
         compiled(folder)
-    assert f"and {folder / 'plugin.py'}; rename the one in the model's own file" in str(caught.value)
+    assert f"and {folder / 'plugin.py'}; rename the one in the model's own file" in str(
+        caught.value
+    )
 
 
 SHADOWING = """

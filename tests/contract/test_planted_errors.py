@@ -4,14 +4,17 @@ Each type here is a standard type with one formula spoiled, or a small type that
 The set of checks that fail is asserted whole: what is right stays right.
 """
 
+import inspect
 import math
 import random
 import re
 import sys
 
 import pytest
+from scipy.special import jv
 
 from dap3d_core.interface import (
+    REQUIRED,
     Body,
     Force,
     Joint,
@@ -19,12 +22,27 @@ from dap3d_core.interface import (
     Vector,
     Vector2,
     body,
+    function,
     number,
     point,
     vector,
     vector2,
 )
-from dap3d_core.kernels import add, cross, dot, eye, hstack, neg, row, scale, skew, sqrt, sub, where
+from dap3d_core.kernels import (
+    add,
+    atan2,
+    cross,
+    dot,
+    eye,
+    hstack,
+    neg,
+    row,
+    scale,
+    skew,
+    sqrt,
+    sub,
+    where,
+)
 from dap3d_core.kernels.cache import jit_is_on
 from dap3d_core.testing import check_type, checks_for
 from dap3d_forces.point_to_point import PointToPoint, pull
@@ -157,6 +175,31 @@ class Upright(Joint):
         return -cross(w_i, a_i_dot)[2]
 
 
+class Square(Joint):
+    """P_i stays in a plane, said by the square of its distance: no force keeps it there."""
+
+    keyword, rows = "square", 1
+    P_i: Point = point()
+    P_j: Point = point()
+    a_j: Vector = vector()
+
+    def C(r_P_i, r_P_j, a_j):
+        x = dot(a_j, sub(r_P_j, r_P_i))
+        return x * x
+
+
+class TouchingLine(Square):
+    """A plane, and a surface that touches it: their normals are one where both hold."""
+
+    keyword, rows = "touching", 2
+    b_j: Vector = vector()
+
+    def C(r_P_i, r_P_j, a_j, b_j):
+        d = sub(r_P_j, r_P_i)
+        x, y = dot(a_j, d), dot(b_j, d)
+        return x, x + y * y
+
+
 class NoReaction(PointToPoint):
     variants = ()
 
@@ -224,6 +267,38 @@ class NoisyPrepare(Spring):
         return pull(k * noise, d, s_P_i, s_P_j)
 
 
+class Printing(Spring):
+    def wrench(d, k, s_P_i, s_P_j):
+        print("the stiffness is", k)
+        return pull(k, d, s_P_i, s_P_j)
+
+
+class Branching(Spring):
+    def wrench(d, k, s_P_i, s_P_j):
+        length = dot(d, d)
+        if length > 1.0:
+            k = 2.0 * k
+        return pull(k, d, s_P_i, s_P_j)
+
+
+class Limited(Spring):
+    def wrench(d, k, s_P_i, s_P_j):
+        inside = (dot(d, d) < 1.0) & (k > 0.5)
+        stiffness = where(inside, k, 0.5 * k)
+        return pull(min(stiffness, 1.0), d, s_P_i, s_P_j)
+
+
+class MathExp(Spring):
+    def wrench(d, k, s_P_i, s_P_j):
+        fading = math.exp(-dot(d, d))
+        return pull(k * fading, d, s_P_i, s_P_j)
+
+
+class Bessel(Spring):
+    def wrench(d, k, s_P_i, s_P_j):
+        return pull(k * jv(0, dot(d, d)), d, s_P_i, s_P_j)
+
+
 class MathSqrt(PointToPoint):
     """Right but for its energy, with a square root that takes no complex numbers."""
 
@@ -246,30 +321,38 @@ def wrong_derivative(order):
 
 
 PLANTED = [
-    (WrongC, {"J"}, "row 3 of J is wrong by"),
-    (WrongSignInJ, {"J", "gamma", "virtual power", "action and reaction"},
+    (WrongC, {"J", "gamma"}, "row 3 of gamma .* second time derivative of row 3 of C"),
+    (WrongSignInJ, {"J", "virtual power", "action and reaction"},
      r"column \d of body j, .* the derivative of row 1 of C by a turn of body j about [yz]"),
-    (ManualRevolute, {"J", "virtual power"}, "row 4 of J is wrong by"),
+    (ManualRevolute, {"J", "gamma", "virtual power"}, "row 4 of J is wrong by"),
     (TermMissingInGamma, {"gamma"},
      "row 4 of gamma is wrong by .* minus the time derivative of row 4 of J, times v"),
-    (NuMissing, {"nu", "gamma"}, "nu is missing, and row 1 of C depends on time"),
+    (NuMissing, {"nu"}, "nu is missing, and row 1 of C depends on time"),
     (DriveMissingInGamma, {"gamma"}, "the time derivative of row 1 of nu less that of row 1 of J"),
     (WrongSignAtVelocityLevel, {"gamma"}, "row 1 of gamma is wrong by"),
     (ManualRelativeTranslation, {"gamma"}, "row 1 of gamma is wrong by"),
     (OneVariantWrong, {"gamma"}, r"failed: gamma \[slip = xyz\]"),
     (RowTwice, {"rank"}, "the rank of J is 1 at best, and 2 rows are declared: row 2 follows"),
     (Contradiction, {"assembly"}, "no pose with C = 0 was found"),
+    (Square, {"rank"}, "the rank of J is 0 at best, .* where C = 0 the gradient of row 1 vanishes"),
+    (TouchingLine, {"rank"}, "where C = 0 .* row 2 .* though elsewhere the rank is 2"),
     (Upright, {"frame", "action and reaction"}, "row 1 of C notices where ground is"),
     (NoReaction, {"energy", "action and reaction"},
      "the moments about the origin on all bodies sum to"),
     (TwiceTheEnergy, {"energy"}, "the force on body i along x and the energy disagree by"),
     (Drag, {"frame"}, "after a common velocity of all bodies the (force|moment) on body i"),
     (Driving, {"friction power"}, "friction drives: its power is"),
-    (Noisy, {"purity", "frame"}, "it uses random of the module random"),
-    (Counting, {"purity", "frame"}, "row 1 of wrench gives other numbers when it is called again"),
+    (Noisy, {"purity"}, "it uses random of the module random"),
+    (Counting, {"purity"}, "row 1 of wrench gives other numbers when it is called again"),
     (ReadingTable, {"purity"}, "it reads LIMITS, a dict that anyone may change; make it a tuple"),
+    (Printing, {"purity"}, r"prints? is not shown: 'the stiffness is .*it calls print\(\)"),
+    (Branching, {"plain"}, r"wrench branches on a number \[.*\]; branch by where\("),
+    (Limited, {"plain"}, r"wrench branches on a number \[.*min or max"),
+    (MathExp, {"plain"},
+     r"wrench takes floats alone \(TypeError: .*\) \[.*take .*sqrt, .*not from math"),
+    (Bessel, {"plain"}, r"wrench takes floats alone \(a function of numpy or scipy\) \["),
     (NoisyPrepare, {"purity"}, "prepare returns other numbers"),
-    (MathSqrt, {"energy"}, r"energy does not run on complex numbers .* differences alone"),
+    (MathSqrt, {"energy", "plain"}, r"energy does not run on complex numbers .* differences alone"),
     (wrong_derivative(1), {"derivatives"}, "f' is wrong by .* the derivative of f "),
     (wrong_derivative(2), {"derivatives"}, "f'' is wrong by .* the derivative of f' "),
     (wrong_derivative(3), {"derivatives"}, "f''' is wrong by .* the derivative of f'' "),
@@ -286,7 +369,72 @@ def test_a_planted_error_is_found(type_, failing, words):
     outcomes = [check.run() for check in checks_for(type_) if check.name != "compiled"]
     assert {o.check for o in outcomes if not o.ok} == failing
     said = "\n".join(str(o) for o in outcomes if not o.ok)
-    assert re.search(words, said), said
+    assert re.search(words, said, re.DOTALL), said
+
+
+@pytest.mark.parametrize(
+    ("type_", "line"), [(Branching, 2), (Limited, 3), (MathExp, 1), (Bessel, 1)]
+)
+def test_what_is_not_plain_is_told_at_its_line(type_, line):
+    """Of the author's file."""
+    _, first = inspect.getsourcelines(type_.wrench)
+    (check,) = (c for c in checks_for(type_, poses=1) if c.name == "plain")
+    assert f" [{__file__}:{first + line}]; " in str(check.run())
+
+
+def test_what_a_kernel_prints_while_it_is_checked_is_not_shown(capsys):
+    """It is called hundreds of times."""
+    checks = checks_for(Printing, poses=1)
+    capsys.readouterr()
+    for check in checks:
+        check.run()
+    assert capsys.readouterr().out == ""
+
+
+def test_of_a_kernel_that_gives_other_numbers_each_time_nothing_else_is_judged():
+    """What formulas give by chance is neither right nor wrong."""
+    outcomes = {o.check: o for o in check_type(Noisy).outcomes}
+    assert outcomes.pop("purity").state == "failed"
+    assert {o.state for o in outcomes.values()} == {"not applicable"}
+    assert "other numbers each time" in outcomes["action and reaction"].words
+
+
+def test_gamma_beside_a_wrong_J_is_compared_with_C():
+    """Right or wrong, and the outcome says so; wrong by a known number."""
+    gamma = {o.check: o for o in check_type(WrongSignInJ).outcomes}["gamma"]
+    assert gamma.ok
+    assert any(n.startswith("row 1 of J or nu is not what C says") for n in gamma.notes)
+
+    class BothWrong(WrongSignInJ):
+        def gamma(s_P_i, s_P_j, w_i, w_j):
+            a, b, c = Spherical.gamma(s_P_i, s_P_j, w_i, w_j)
+            return a, b + 0.25, c
+
+    (finding,) = (f for f in check_type(BothWrong).findings if f.check == "gamma")
+    assert (finding.row, finding.error) == (2, pytest.approx(0.25, rel=1e-6))
+
+
+class Cam(Joint):
+    """A follower P_i on a plate cam j: its distance from P_j is a function of its angle."""
+
+    keyword, rows = "cam", 1
+    P_i: Point = point()
+    P_j: Point = point()
+    a_j: Vector = vector()
+    x_j: Vector = vector(across="a_j")
+    profile: str = function(REQUIRED, argument="the polar angle, rad")
+
+    def C(r_P_i, r_P_j, a_j, x_j, profile):
+        d = sub(r_P_i, r_P_j)
+        x, y = dot(x_j, d), dot(cross(a_j, x_j), d)
+        return sqrt(x * x + y * y) - profile(atan2(y, x))
+
+
+def test_a_function_that_is_always_there_is_given_to_the_type_itself():
+    """No variant is told from another by it."""
+    report = check_type(Cam)
+    assert report.ok, str(report)
+    assert {o.state for o in report.outcomes if o.check in ("J", "gamma", "rank")} == {"ok"}
 
 
 FACTOR = 1.0

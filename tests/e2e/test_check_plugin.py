@@ -60,7 +60,7 @@ def test_a_file_of_ones_own(dap3d, refuse):
     (rubber,) = found["types"]
     states = {o["check"]: o["state"] for o in rubber["outcomes"]}
     assert states == {"energy": "failed", "frame": "ok", "action and reaction": "ok",
-                      "purity": "ok", "compiled": "ok"}  # fmt: skip
+                      "purity": "ok", "plain": "ok", "compiled": "ok"}  # fmt: skip
     (energy,) = (o for o in rubber["outcomes"] if o["check"] == "energy")
     assert energy["findings"][0]["pose"]["seed"] == 3
 
@@ -70,7 +70,12 @@ def test_a_type_that_cannot_be_loaded_is_wrong(dap3d):
     (dap3d.folder / "rubber.py").write_text(SPRING.replace("dot(d, d), d)", "dot(d, e), d)"))
     done = dap3d("check-plugin", "rubber.py", "--allow-code")
     assert done.returncode == 1
-    assert "NameError" in " ".join(done.stdout.split())
+    said = " ".join(done.stdout.split())
+    assert "NameError" in said
+    line = next(k for k, x in enumerate(SPRING.splitlines(), 1) if "dot(d, d), d)" in x)
+    assert f"rubber.py:{line}]" in said.replace("rubber.py: ", "rubber.py:").replace("- ", "-")
+    assert "1 of 1 type cannot be loaded" in said
+    assert "wrong formulas" not in said
 
 
 def test_names_are_keywords_distributions_and_modules(refuse):

@@ -181,6 +181,44 @@ def test_what_is_wrong_with_a_type_is_said(type_, words):
         assert word in said
 
 
+def test_what_looks_like_a_field_and_is_none_is_said():
+    """Numbers, three of them, parts of a scene, yes or no; class constants are let be."""
+
+    class Mine(Force):
+        keyword = "mine"
+        body_i: Body = body()
+        k: float = 5.0
+        F: tuple = (0.0, 0.0, 1.0)
+        way: bool = True
+        steel: float = 7850.0
+
+        def prepare(self, bodies):
+            return {"mass": self.steel}
+
+        def wrench(mass):
+            return (mass, 0.0, 0.0), ZERO
+
+    assert examine(Mine).layout.numbers.keys() == {"mass"}
+    for name, remedy in [
+        ("k", "k: float = 5.0 is no field; write k: float = number(5.0)"),
+        ("F", "write F: tuple = vec3((0.0, 0.0, 1.0))"),
+        ("way", "write way: bool = choice((False, True), True)"),
+    ]:
+        kernel = eval(f"lambda {name}: (ZERO, ZERO)", {"ZERO": ZERO})
+        assert remedy in refusal(type("Mine", (Mine,), {"wrench": kernel, "__module__": __name__}))
+
+
+def test_a_field_without_a_maker_is_refused():
+    class Mine(Force):
+        keyword = "mine"
+        P_i: Point
+
+        def wrench(r_P_i):
+            return r_P_i, ZERO
+
+    assert "P_i: Point is no field; write P_i: Point = point()" in refusal(Mine)
+
+
 def test_a_type_that_refuses_every_instance_is_refused():
     """``prepare`` says in its own words that it cannot; for random values that is a mistake."""
 

@@ -5,6 +5,7 @@ largest term: a few hundred operations, and differences of angles near 1. Where 
 hand, rates along random motions stand for it (see tests/contract for the tolerance).
 """
 
+import inspect
 import math
 import os
 import sys
@@ -217,8 +218,11 @@ def test_what_cannot_be_derived_is_refused_with_a_remedy():
         (Hidden, "gamma needs v_i, the velocity of the body, whose name a field has taken"),
         (Third, "how f_ddot changes is not known"),
     ]:
-        with pytest.raises(PluginError, match=words):
+        with pytest.raises(PluginError, match=words) as caught:
             examine(type_)
+        if type_ in (Branch, Elsewhere):
+            _, first = inspect.getsourcelines(type_.C)
+            assert f" [{__file__}:{first + 1}]; branch by where" in str(caught.value)
 
 
 def test_a_type_that_lacks_all_says_what_it_needs():

@@ -162,6 +162,10 @@ BROKEN = {
         ["no class with the keyword 'push'", "did you mean 'pusher'"],
     ),
     "no keyword": (GOOD.replace('keyword = "push"', ""), ["no keyword"]),
+    "keyword as a field": (
+        GOOD.replace('keyword = "push"', 'keyword: str = "push"'),
+        ["no keyword", "without a type behind the name"],
+    ),
     "keyword twice": (
         GOOD.replace("return [Push]", "return [Push, Push]"),
         ["the same keyword 'push'"],
@@ -205,7 +209,7 @@ def test_a_broken_plugin_breaks_no_other_and_is_listed(install, text, words):
 def test_ctrl_c_at_import_is_not_swallowed(install):
     """And says which plugin was being loaded: it may be the one that takes so long."""
     install("dap3d-push", "raise KeyboardInterrupt\n")
-    with pytest.raises(KeyboardInterrupt, match="while force type 'push' of .*dap3d-push"):
+    with pytest.raises(KeyboardInterrupt, match=r"while force type 'push' of .*dap3d-push"):
         load_registry().get("force", "push")
 
 

@@ -1,5 +1,6 @@
 """``dap3d check-plugin``: the formulas of types against derivatives, balances and each other."""
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 #: What a check came to, as the table has it, with its colour.
 STATES = {"ok": ("ok", "green"), "failed": ("WRONG", "bold red"), "not applicable": ("-", "")}
+#: Checks of what kernels are made of, not of what they compute.
+NO_FORMULAS = {"purity", "plain", "compiled"}
 
 
 @click.command(cls=Command, name="check-plugin", short_help="Check the formulas of types.")
@@ -57,15 +60,25 @@ def check_plugin(
         reports.append(report)
         if not as_json and not (quiet and report.ok):
             _show(console, report, quiet=quiet)
-    wrong = sum(not report.ok for report in reports)
+    wrong = any(not report.ok for report in reports)
     if as_json:
         print_json({"ok": not wrong, "seed": seed, "poses": poses,
                     "types": [_facts(report) for report in reports]})  # fmt: skip
     elif wrong:
-        say(console, f"wrong formulas in {wrong} of {_count(reports)}", "bold red")
+        for words, number in Counter(map(_verdict, reports)).items():
+            if words:
+                say(console, words.format(f"{number} of {_count(reports)}"), "bold red")
     elif not quiet:
         say(console, f"{_count(reports)} checked: nothing is wrong", "green")
     return FAILED if wrong else DONE
+
+
+def _verdict(report: "Report") -> str:
+    """What is wrong with a type, in words around a count; "" for nothing."""
+    checks = {finding.check for finding in report.findings}
+    if checks <= {"loading"}:
+        return "{} cannot be loaded" if checks else ""
+    return "unfit kernels in {}" if checks <= NO_FORMULAS else "wrong formulas in {}"
 
 
 def _count(reports: list["Report"]) -> str:
@@ -157,7 +170,7 @@ def _show(console: Any, report: "Report", *, quiet: bool) -> None:
     notes = dict.fromkeys(f"{o.title}: {note}" for o in report.outcomes for note in o.notes)
     if notes and not quiet:
         items(console, notes)
-    items(console, [f"{_variant(f.variant)}{f}" for f in report.findings], "red")
+    items(console, dict.fromkeys(f"{_variant(f.variant)}{f}" for f in report.findings), "red")
     if not quiet:
         console.print()
 

@@ -26,6 +26,7 @@ from dap3d_core.interface.namespace import (
     parameters,
 )
 from dap3d_core.interface.outputs import ShapeError, checked_shape, entries, value_at
+from dap3d_core.interface.places import line_of, no_field
 from dap3d_core.interface.poses import BodyPose, pose
 from dap3d_core.interface.samples import numbers, random_field, random_pose, random_quantity
 from dap3d_core.interface.types import Function, Joint, TypeBase
@@ -164,7 +165,8 @@ def _output(
             raise PluginError(f"{who}: {error}") from None
         except Exception as error:
             reason = f"{type(error).__name__}: {error}"
-            raise PluginError(f"{who} failed on a random input: {reason}") from error
+            where = line_of(error, kernel)
+            raise PluginError(f"{who} failed on a random input: {reason}{where}") from error
         numbers = [value_at(value, path) for path in found]
         wrong = [x for x in numbers if isinstance(x, bool) or not isinstance(x, (int, float))]
         wrong = wrong or [x for x in numbers if not math.isfinite(x)]
@@ -275,7 +277,10 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     who, kind = where_is(type_), type_.kind
     if not type_.keyword:
         example = f'keyword = "{type_.__name__.lower()}"'
-        raise PluginError(f"{who} has no keyword; add e.g. {example}")
+        raise PluginError(f"{who} has no keyword; add e.g. {example}, without a type behind it")
+    for field in attrs.fields(type_):  # type: ignore[arg-type]
+        if "dap3d" not in field.metadata and field.default is attrs.NOTHING:
+            raise PluginError(f"{who}: {no_field(type_, field.name)}")
     needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[kind]
     derivable = missing(type_)
     if derivable:
@@ -325,8 +330,9 @@ def _check_names(
 ) -> None:
     for name in asked:
         if name not in names:
-            near = get_close_matches(name, names, 1)
-            hint = f"did you mean {near[0]}? " if near else ""
+            near, declared = get_close_matches(name, names, 1), no_field(type_, name)
+            hint = f"did you mean {near[0]}? " if near and not declared else ""
+            hint = f"{declared}; " if declared else hint
             raise PluginError(
                 f"{where_is(type_)}.{kernel} asks for {name}, which its fields do not offer; {hint}"
                 f"they offer {', '.join(names)}"

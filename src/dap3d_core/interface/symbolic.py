@@ -17,6 +17,8 @@ import sympy
 from sympy.logic.boolalg import Boolean
 
 from dap3d_core.interface.namespace import Quantity, parameters
+from dap3d_core.interface.places import line_of
+from dap3d_core.interface.plainly import PLAINLY
 from dap3d_core.kernels import add, cross, dot, sub
 
 Expression = Any
@@ -290,11 +292,9 @@ def traced(kernel: Callable[..., Any], symbols: Symbols, what: str) -> list[Expr
     except DerivationError:
         raise
     except Exception as error:
-        raise DerivationError(
-            f"{what} cannot be differentiated as a formula ({type(error).__name__}: {error}); "
-            "branch by where(condition, a, b), not by if, min or max, and take sqrt, sin, cos, "
-            "atan2, tanh from dap3d_core.kernels; or write the missing formulas by hand"
-        ) from error
+        reason = f"({type(error).__name__}: {error}){line_of(error, kernel)}; {PLAINLY}"
+        said = f"{what} cannot be differentiated as a formula {reason}; or write the rest by hand"
+        raise DerivationError(said) from error
 
 
 def derive_joint(

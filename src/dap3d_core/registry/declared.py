@@ -44,9 +44,10 @@ def _keywords(node: ast.ClassDef) -> list[str]:
             target = line.targets[0]
             names = target.elts if isinstance(target, ast.Tuple) else [target]
             values = line.value.elts if isinstance(line.value, ast.Tuple) else [line.value]
-            found += [value.value for name, value in zip(names, values, strict=False)
-                      if isinstance(name, ast.Name) and name.id == "keyword"
-                      and isinstance(value, ast.Constant) and isinstance(value.value, str)]  # fmt: skip
+            for name, value in zip(names, values, strict=False):
+                is_keyword = isinstance(name, ast.Name) and name.id == "keyword"
+                if is_keyword and isinstance(value, ast.Constant):
+                    found.append(str(value.value))
     return found
 
 

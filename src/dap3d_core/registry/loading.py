@@ -144,7 +144,10 @@ def _call_hook(
                     f"it returned {type_!r} among them"
                 )
             if not isinstance(type_.keyword, str) or not type_.keyword:
-                raise PluginError(f'{where_is(type_)} has no keyword; add keyword = "..."')
+                raise PluginError(
+                    f'{where_is(type_)} has no keyword; add keyword = "...", without a type '
+                    "behind the name"
+                )
             found.append(type_)
     return found
 

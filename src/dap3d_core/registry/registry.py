@@ -105,7 +105,9 @@ class Registry:
             compiling: whether the kernels of types from other packages are compiled as well, which
                 takes a second a type the first time.
         """
-        infos = [(s, self._info(s, found, limit_s)) for found in self.sources.values() for s in found]
+        infos = [
+            (s, self._info(s, found, limit_s)) for found in self.sources.values() for s in found
+        ]
         if not compiling:
             return [info for _, info in infos]
         return [self._compiled(s, info) for s, info in infos]
@@ -143,9 +145,7 @@ class Registry:
             raise PluginError(found)
         return found
 
-    def _info(
-        self, source: Source, rivals: list[Source], limit_s: float | None
-    ) -> PluginInfo:
+    def _info(self, source: Source, rivals: list[Source], limit_s: float | None) -> PluginInfo:
         state, reason = "ok", ""
         active = [s for s in rivals if not s.blocked]
         if source.blocked:

@@ -6,6 +6,7 @@ import numpy as np
 
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.testing.comparing import (
+    DIFFERENCE_TOLERANCE,
     Comparison,
     Rate,
     Wrong,
@@ -19,6 +20,9 @@ from dap3d_core.testing.verdict import Outcome
 
 #: Singular values below this part of the largest count as zero.
 RANK_TOLERANCE = 1e-8
+#: Singular values of J below this count as zero where its rows are of size one off the manifold:
+#: Newton's method leaves |C| < 1e-11, where the gradient of a square is some 1e-5.
+VANISHING = 1e-3
 
 
 def jacobian(subject: Subject) -> Outcome:
@@ -100,27 +104,72 @@ def _about_form(x: Wrong) -> str:
 
 
 def acceleration_side(subject: Subject) -> Outcome:
-    """The side gamma is what d/dt (J v - nu) = 0 leaves on the right of J v_dot = gamma."""
+    """The side gamma is what d/dt (J v - nu) = 0 leaves on the right of J v_dot = gamma.
+
+    Rows of which J or nu is wrong are compared with what C (or C_dot) says.
+    """
     c = Comparison("gamma", subject, "gamma", "gamma against the time derivative of nu - J v")
+    wrong = _rows_apart(subject)
+    good = [k for k in range(subject.type.rows) if k not in wrong]
+    for row, form in wrong.items():
+        c.note(f"row {row + 1} of J or nu is not what {form} says: gamma is compared with {form}")
     for sample in poses(subject):
-        along = sample.state.motion()
+        along, gamma, v = sample.state.motion(), sample.value("gamma"), _velocities(sample)
         J_dot = rates(sample, "J", along, c)
         still = [Rate(np.zeros(1), None, r.tolerance, r.way) for r in J_dot]
         nu_dot = rates(sample, "nu", along, c) if "nu" in subject.kernels.names() else still
-        gamma, v = sample.value("gamma"), _velocities(sample)
         for turning in J_dot:
             pushing = next((r for r in nu_dot if r.way == turning.way), nu_dot[-1])
             terms = np.einsum("srk,sk->r", turning.value, v)
             bound = None
             if turning.bound is not None:
                 bound = np.einsum("srk,sk->r", turning.bound, np.abs(v))
-                bound = bound if pushing.bound is None else bound + pushing.bound
+                bound = (bound if pushing.bound is None else bound + pushing.bound)[good]
             tolerance = max(turning.tolerance, pushing.tolerance)
             size = float(np.max(np.abs(turning.value), initial=0.0) * np.max(np.abs(v)))
-            c.compare(sample, gamma, pushing.value - terms,
-                      _about_gamma(turning.way, subject),
+            c.compare(sample, gamma[good], (pushing.value - terms)[good],
+                      _about_gamma(turning.way, subject), rows=good,
                       tolerance=tolerance, bound=bound, scale=size)  # fmt: skip
+        for form, rows in _forms(subject):
+            if apart := [k for k in rows if wrong.get(k) == form]:
+                places = [rows.index(k) for k in apart]
+                rate = sample.bend(along) if form == "C" else sample.difference(form, along)
+                value, bound = (x[places] for x in rate)
+                c.compare(sample, gamma[apart], -value, _about_gamma_by(form), rows=apart,
+                          tolerance=DIFFERENCE_TOLERANCE, bound=bound)  # fmt: skip
     return c.outcome()
+
+
+def _forms(subject: Subject) -> list[tuple[str, tuple[int, ...]]]:
+    """The kernels of which J, nu and gamma are derivatives, and the rows of each."""
+    rows = {"C": subject.type.position_rows(), "C_dot": subject.type.velocity_rows()}
+    return [(form, rows[form]) for form in rows if form in subject.kernels.names() and rows[form]]
+
+
+def _rows_apart(subject: Subject) -> dict[int, str]:
+    """Rows of which J v - nu is not the rate of C, or C_dot, that the type gives; and which."""
+    found = {}
+    for sample in poses(subject):
+        v = _velocities(sample)
+        rate = np.einsum("srk,sk->r", sample.value("J"), v)
+        if "nu" in subject.kernels.names():
+            rate = rate - sample.value("nu")
+        for form, rows in _forms(subject):
+            want, bound = sample.value(form), np.zeros(len(rows))
+            if form == "C":
+                want, bound = sample.difference("C", sample.state.motion())
+            size = 1.0 + float(np.max(np.abs(want)))
+            for k, row in enumerate(rows):
+                if abs(rate[row] - want[k]) - bound[k] > DIFFERENCE_TOLERANCE * size:
+                    found[row] = form
+    return found
+
+
+def _about_gamma_by(form: str) -> Callable[[Wrong], str]:
+    order = "second time derivative" if form == "C" else "time derivative"
+    return lambda x: _should_be(
+        _is_wrong("gamma", x), x, f"minus the {order} of row {x.row + 1} of {form} at constant "
+        "velocities", "differences")  # fmt: skip
 
 
 def _about_gamma(way: str, subject: Subject) -> Callable[[Wrong], str]:
@@ -242,31 +291,40 @@ def assembly(subject: Subject) -> Outcome:
 def rank(subject: Subject) -> Outcome:
     """The rows of J are independent, at one of the poses at least."""
     c = Comparison("rank", subject, "J", f"rank of J against {subject.type.rows} declared rows")
-    best: tuple[int, Sample, Floats] | None = None
-    for sample in subject.assembled:
-        J = sample.value("J")
-        J = J[[s for s in range(len(J)) if not (sample.grounded and s == 1)]]
-        flat = J.transpose(1, 0, 2).reshape(J.shape[1], -1)
-        values = np.linalg.svd(flat, compute_uv=False)
-        found = int(np.sum(values > RANK_TOLERANCE * max(values[0], 1e-300)))
-        if best is None or found > best[0]:
-            best = found, sample, flat
-    if best is not None and best[0] < subject.type.rows:
-        found, sample, flat = best
-        dependent = _dependent_row(flat)
-        c.fail(f"the rank of J is {found} at best, and {subject.type.rows} rows are declared: row "
-               f"{dependent + 1} follows from those before it, so one row is too many",
-               sample, dependent + 1)  # fmt: skip
+    size = np.max([np.linalg.norm(_rows_of_J(s), axis=1) for s in subject.samples], axis=0)
+    size = np.where(size > 0.0, size, 1.0)[:, None]
+    ranks = [(_rank(_rows_of_J(sample) / size), sample) for sample in subject.assembled]
+    found, sample = max(ranks, key=lambda pair: pair[0], default=(subject.type.rows, None))
+    if sample is not None and found < subject.type.rows:
+        row = _dependent_row(_rows_of_J(sample) / size) + 1
+        off = max(_rank(_rows_of_J(s) / size) for s in subject.samples)
+        why = f"row {row} follows from those before it, so one row is too many"
+        if off > found:
+            why = (
+                f"where C = 0 the gradient of row {row} vanishes or follows from those before it, "
+                f"though elsewhere the rank is {off}, so that nothing holds the bodies there; is C "
+                "a square, whose root would do?"
+            )
+        c.fail(f"the rank of J is {found} at best, and {subject.type.rows} rows are declared: "
+               f"{why}", sample, row)  # fmt: skip
     return c.outcome(sized=False)
 
 
-def _dependent_row(flat: Floats) -> int:
+def _rows_of_J(sample: Sample) -> Floats:
+    """(rows, columns) J of the bodies that are not on ground."""
+    J = sample.value("J")
+    J = J[[s for s in range(len(J)) if not (sample.grounded and s == 1)]]
+    return J.transpose(1, 0, 2).reshape(J.shape[1], -1)
+
+
+def _rank(rows: Floats) -> int:
+    """The rank of rows whose size is about one off the manifold."""
+    return int(np.sum(np.linalg.svd(rows, compute_uv=False) > VANISHING))
+
+
+def _dependent_row(rows: Floats) -> int:
     """The first row that those before it span."""
-    size = np.max(np.abs(flat), initial=1e-300)
-    ranks = [
-        np.linalg.matrix_rank(flat[: k + 1], tol=RANK_TOLERANCE * size) for k in range(len(flat))
-    ]
-    return next(k for k, r in enumerate(ranks) if r <= k)
+    return next(k for k in range(len(rows)) if _rank(rows[: k + 1]) <= k)
 
 
 def null_space(matrix: Floats) -> Floats:

@@ -1,5 +1,7 @@
 """All checks of a type: one after the other, or each as a test of its own."""
 
+import contextlib
+import io
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -7,7 +9,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.checks import Examined, examine, where_is
-from dap3d_core.testing import forces, functions, joints, purity
+from dap3d_core.testing import forces, functions, joints, plain, purity
 from dap3d_core.testing.subject import Subject, UndefinedError, subjects
 from dap3d_core.testing.verdict import FAILED, LEFT_OUT, Finding, Outcome, Report
 
@@ -34,7 +36,18 @@ class Check:
         """Carry it out."""
         if self.inapplicable:
             return Outcome(self.name, self.subject.variant, LEFT_OUT, self.inapplicable)
+        with contextlib.redirect_stdout(io.StringIO()) as printed:
+            outcome = self._outcome()
+        if self.name == "purity" and (said := printed.getvalue().strip()):
+            note = f"what its kernels print is not shown: {said.splitlines()[0]!r} and so on"
+            return attrs.evolve(outcome, notes=(*outcome.notes, note))
+        return outcome
+
+    def _outcome(self) -> Outcome:
         try:
+            if self.name != "purity" and purity.differing(self.subject):
+                words = "its kernels give other numbers each time they are called (see purity)"
+                return Outcome(self.name, self.subject.variant, LEFT_OUT, words)
             return attrs.evolve(self._run(self.subject), check=self.name)
         except Exception as error:  # of a kernel, or of random poses that give no number
             known = isinstance(error, UndefinedError)
@@ -109,6 +122,7 @@ def _checks(examined: Examined, poses: int, seed: int) -> list[Check]:
             continue
         found += of_kind[subject.type.kind](subject)
         found.append(Check("purity", subject, "", purity.purity))
+        found.append(Check("plain", subject, "", plain.plain))
         found.append(Check("compiled", subject, "", purity.compiled))
     return found
 

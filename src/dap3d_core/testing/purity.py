@@ -13,7 +13,7 @@ from dap3d_core.interface.writer import LOOP_KINDS
 from dap3d_core.kernels.cache import jit_is_on, reached
 from dap3d_core.kernels.reasons import why_not_compiled
 from dap3d_core.testing.comparing import Comparison, Wrong, left_out
-from dap3d_core.testing.subject import Subject, UndefinedError
+from dap3d_core.testing.subject import Sample, Subject, UndefinedError
 from dap3d_core.testing.verdict import Outcome
 
 #: Compiled and plain code round differently (a b + c in one rounding).
@@ -25,26 +25,19 @@ IMPURE_BUILTINS = ("delattr", "eval", "exec", "globals", "id", "input", "locals"
                    "setattr", "vars")  # fmt: skip
 #: What a kernel may read from outside: it cannot change, or is looked at in its turn.
 CONSTANTS = (bool, int, float, complex, str, bytes, type(None), type, types.FunctionType,
-             types.BuiltinFunctionType, np.generic)  # fmt: skip
+             types.BuiltinFunctionType, np.generic, np.ufunc)  # fmt: skip
 
 
 def purity(subject: Subject) -> Outcome:
     """Kernels give the same numbers each time, and read and change nothing from outside."""
     c = Comparison("purity", subject, "", "the same numbers each time, nothing from outside")
-    names = (*subject.kernels.names(), *(("friction",) if _rubs(subject) else ()))
-    for name in names:
+    for name in _names(subject):
         c.kernel = name
-        owner = subject.friction if name == "friction" else subject
-        first = [sample.value(name) for sample in owner.samples]
-        again = [sample.value(name) for sample in reversed(owner.samples)][::-1]
-        for sample, one, other in zip(owner.samples, first, again, strict=True):
-            for k in range(len(one)):
-                if not np.array_equal(one[k], other[k]):
-                    numbers = f"{_number(one[k])}, then {_number(other[k])}"
-                    c.fail(f"row {k + 1} of {name} gives other numbers when it is called again: "
-                           f"{numbers}", sample, k + 1)  # fmt: skip
         for words in _outside(subject.examined.kernels[name]):
             c.fail(f"{name} is not pure: {words}")
+    for name, difference in differing(subject).items():
+        c.kernel = name
+        c.fail(*difference)
     c.kernel = "prepare"
     try:
         same = all(a.element.par == b.element.par
@@ -56,6 +49,30 @@ def purity(subject: Subject) -> Outcome:
             "prepare returns other numbers for the same fields and poses when it is called again"
         )
     return c.outcome(sized=False)
+
+
+def differing(subject: Subject) -> dict[str, tuple[str, Sample, int]]:
+    """The kernels that give other numbers when they are called again: words, pose and row."""
+    return subject.kept("differing", lambda: dict(_differing(subject)))
+
+
+def _differing(subject: Subject) -> Iterator[tuple[str, tuple[str, Sample, int]]]:
+    for name in _names(subject):
+        samples = (subject.friction if name == "friction" else subject).samples
+        first = [sample.value(name) for sample in samples]
+        again = [sample.value(name) for sample in reversed(samples)][::-1]
+        found = [(sample, k, one[k], other[k])
+                 for sample, one, other in zip(samples, first, again, strict=True)
+                 for k in range(len(one)) if not np.array_equal(one[k], other[k])]  # fmt: skip
+        if found:
+            sample, k, one, other = found[0]
+            words = f"row {k + 1} of {name} gives other numbers when it is called again: "
+            yield name, (f"{words}{_number(one)}, then {_number(other)}", sample, k + 1)
+
+
+def _names(subject: Subject) -> tuple[str, ...]:
+    """The kernels of a type, the friction of a joint among them."""
+    return (*subject.kernels.names(), *(("friction",) if _rubs(subject) else ()))
 
 
 def compiled(subject: Subject) -> Outcome:

@@ -17,7 +17,7 @@ def _wrapped(name: str) -> Callable[..., Any]:
 
     def method(self: "Stepped", *others: Any) -> Any:
         found = operation(self, *others)
-        return found if found is NotImplemented else Stepped(found)
+        return found if found is NotImplemented else type(self)(found)
 
     method.__name__ = name
     return method

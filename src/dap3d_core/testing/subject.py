@@ -65,10 +65,26 @@ class Sample:
         The bound is large where a branch lies among the samples: ten times the difference of two
         step sizes, and of the bend between the sides that does not shrink with the step.
         """
-        h, here = 1e-3, self.value(name)
+        return self._difference(lambda state: self.value(name, state), along)
+
+    def bend(self, along: Direction) -> tuple[Floats, Floats]:
+        """The second derivative of C along a direction, and how far it may be wrong."""
+
+        def slope(state: State) -> Floats:
+            try:
+                return self.kernels.slope("C", self.element, state, along)
+            except Exception:  # of a kernel that takes floats alone
+                return attrs.evolve(self, state=state).difference("C", along)[0]
+
+        return self._difference(slope, along)
+
+    def _difference(
+        self, value: Callable[[State], Floats], along: Direction
+    ) -> tuple[Floats, Floats]:
+        h, here = 1e-3, value(self.state)
         odd, even = {}, {}
         for k in (1, 2, 3, 4, 6):
-            ahead, back = (self.value(name, self.state.moved(along, s * k * h)) for s in (1, -1))
+            ahead, back = (value(self.state.moved(along, s * k * h)) for s in (1, -1))
             odd[k], even[k] = ahead - back, np.abs(ahead - 2.0 * here + back) / (k * h)
         one, two = (
             (45.0 * odd[k] - 9.0 * odd[2 * k] + odd[3 * k]) / (60.0 * k * h) for k in (1, 2)
@@ -126,12 +142,12 @@ class Subject:
     @property
     def kernels(self) -> Kernels:
         """Its kernels."""
-        return self._kept("kernels", lambda: Kernels(self.examined))
+        return self.kept("kernels", lambda: Kernels(self.examined))
 
     @property
     def friction(self) -> "Subject":
         """The friction of a joint as an element of its own."""
-        return self._kept(
+        return self.kept(
             "friction",
             lambda: Subject(bind_friction(self.examined), self.choices, self.seed, self.poses),
         )
@@ -143,18 +159,19 @@ class Subject:
         Raises:
             UndefinedError: there are none with finite numbers.
         """
-        return self._kept("samples", lambda: [self._sample(k) for k in range(self.poses)])
+        return self.kept("samples", lambda: [self._sample(k) for k in range(self.poses)])
 
     @property
     def assembled(self) -> list[Sample]:
         """Random poses with C = 0 and velocities with J v = nu; fewer where none was found."""
-        return self._kept("assembled", lambda: list(self._assembled()))
+        return self.kept("assembled", lambda: list(self._assembled()))
 
     def again(self) -> list[Sample]:
         """The samples, drawn anew from the same random numbers."""
         return [self._sample(k) for k in range(self.poses)]
 
-    def _kept(self, name: str, make: Callable[[], Kept]) -> Kept:
+    def kept(self, name: str, make: Callable[[], Kept]) -> Kept:
+        """What is found once and asked for often."""
         if name not in self._memory:
             self._memory[name] = make()
         kept: Kept = self._memory[name]
@@ -167,8 +184,9 @@ class Subject:
         grounded = k == self.poses - 1 > 0 and layout.slots[1:2] == ("j",)
         given = [k % 2 == 0 or rng.random() < 0.5 for _ in layout.functions]
         given += [False] if self.type.kind == "function" else []  # the row that it fills itself
+        conditions = dict.fromkeys(self.examined.argument_functions, True) | dict(self.choices)
         choices = {n: "cubic" if specs_of(self.type)[n].kind == "function" else v
-                   for n, v in self.choices.items() if v is not False or
+                   for n, v in conditions.items() if v is not False or
                    specs_of(self.type)[n].kind == "choice"}  # fmt: skip
         words = "its kernels give no finite numbers"
         for _ in range(ATTEMPTS):
@@ -209,8 +227,11 @@ def subjects(examined: Examined, seed: int, poses: int) -> list[Subject]:
 
 
 def _given(examined: Examined, values: Mapping[str, Any]) -> Examined:
-    """The type with a cubic for each of its functions of an argument that is there."""
-    there = {f: examine(Cubic) for f in examined.argument_functions if values.get(f)}
+    """The type with a cubic for each of its functions of an argument that is there.
+
+    One by whose absence no variant is told from another is always there.
+    """
+    there = {f: examine(Cubic) for f in examined.argument_functions if values.get(f, True)}
     return bind_functions(examined, there) if there else examined
 
 
