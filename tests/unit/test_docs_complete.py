@@ -4,6 +4,7 @@ import inspect
 import posixpath
 import re
 import sys
+import tomllib
 from functools import cached_property
 from html import unescape
 from importlib import import_module
@@ -122,6 +123,81 @@ def test_every_word_of_kernels_is_there(pages):
     for name in kernels.__all__:
         assert shown(f"dap3d_core.kernels.{name}", pages["reference/kernel-words.md"]), name
         assert inspect.getdoc(getattr(kernels, name)), name
+
+
+def rows_of(page, head):
+    """The rows of a table, by its head: first cell -> the names in each of the others."""
+    table = page.partition(f"| {head} |")[2].partition("\n\n")[0].splitlines()[2:]
+    cells = [re.split(r"\s*\|\s*", line.strip())[1:-1] for line in table]
+    return {first: [set(re.findall(r"`([^`]+)`", c)) for c in others] for first, *others in cells}
+
+
+class Three(interface.Force):
+    """A force on three bodies, to which the fields of the page are added one by one."""
+
+    keyword = "three"
+    b_i: interface.Vector = interface.vector()
+    b_j: interface.Vector = interface.vector()
+    b_k: interface.Vector = interface.vector()
+
+
+def names_of(line="", constants=()):
+    """The names of the position and of the velocity level with one more field, or constants."""
+    from dap3d_core.interface.layout import layout_of
+    from dap3d_core.interface.namespace import namespace
+
+    members = {"__module__": __name__}
+    exec(line, vars(interface) | {}, members)
+    type_ = type("Added", (Three,), members)
+    found = namespace(type_, layout_of(type_, dict(constants))).values()
+    return [{q.name for q in found if q.velocity == level} for level in (False, True)]
+
+
+def test_the_names_of_each_field_are_those_of_the_sources():
+    """Each row of the page is a line of a class: its names are those that the line adds."""
+    page = (DOCS / "reference" / "names.md").read_text()
+    rows = rows_of(page, "field | position level | velocity level")
+    bodies, three = rows.pop(next(iter(rows))), names_of()
+    own = {"b_i", "b_i_dot"}
+    assert [{n for n in level if n.endswith("_i")} - own for level in three] == bodies
+    for line, levels in rows.items():
+        added = [a - b for a, b in zip(names_of(line.strip("`")), three, strict=True)]
+        assert added == levels, line
+    makers = {n for n in interface.__all__ if n[0].islower() and n not in ("examine", "hookimpl")}
+    assert {line.partition("= ")[2].partition("(")[0] for line in rows} == makers
+
+
+def test_the_names_besides_those_of_fields_are_those_of_the_sources():
+    """Of time, of a function's argument, of friction, of what prepare returns; of its bodies."""
+    from dap3d_core.interface.namespace import VELOCITY_KERNELS, friction_names
+    from dap3d_core.interface.poses import BodyPose
+
+    page = (DOCS / "reference" / "names.md").read_text()
+    besides = rows_of(page, "where | names")
+    assert list(besides.values()) == [[{"t"}], [{"x"}], [set(friction_names(3))]]
+    for line, levels in rows_of(page, "returned | position level | velocity level").items():
+        (constant,) = re.findall(r"`(\"\w+\": .*)`", line)
+        found = names_of(constants=eval(f"{{{constant}}}"))
+        assert [a - b for a, b in zip(found, names_of(), strict=True)] == levels
+    velocity = ", ".join(f"`{name}`" for name in VELOCITY_KERNELS)
+    assert f"may be asked for by {velocity}." in " ".join(page.split())
+    methods = {f"{n}(s)" for n, v in vars(BodyPose).items() if callable(v) and n[0] != "_"}
+    rows = rows_of(page, '`bodies["i"]` has | which is')
+    fields = {field.name for field in attrs.fields(BodyPose)}
+    assert {first.strip("`") for first in rows} == methods | fields
+
+
+def test_every_extra_is_on_the_page_about_installing():
+    page = (DOCS / "start" / "install.md").read_text()
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    for extra in project["optional-dependencies"]:
+        assert re.search(rf"^\|.*`{extra}`.* \|", page, flags=re.MULTILINE), extra
+
+
+def test_every_kernel_of_a_joint_is_on_the_page_about_levels():
+    page = (DOCS / "concepts" / "levels.md").read_text()
+    for name in interface.Joint.kernel_names:
+        assert f"`{name}`" in page, name
 
 
 def test_every_public_name_is_there(pages):

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 from dap3d_core import interface, kernels
-from dap3d_core.interface import hooks, namespace
+from dap3d_core.interface import hooks
 from dap3d_core.interface.fields import FieldSpec
-from dap3d_site.markdown import code, directive, doc_of, page, table
+from dap3d_site.markdown import code, directive, page, table
 
 #: Makers of fields, in the order in which one meets them.
 MAKERS = ("body", "point", "vector", "vector2", "number", "vec3", "matrix", "function", "angle",
@@ -58,10 +58,7 @@ def _fields() -> Iterator[str]:
     )
     annotations = ", ".join(code(name) for name in ANNOTATIONS)
     yield f"Annotations are {annotations} for names of parts of a scene, else plain types."
-    yield "## Names that fields offer"
-    yield doc_of(namespace).partition("\n\n")[2]
-    velocity = ", ".join(code(name) for name in namespace.VELOCITY_KERNELS)
-    yield f"Kernels that may ask for names of the velocity level: {velocity}."
+    yield "[Names in kernels](names.md) lists by field which names kernels may use."
     yield "## Makers"
     for name in MAKERS:
         yield f"### {name}"

@@ -1,23 +1,7 @@
 """Which names a type offers to its kernels, what each holds, and how a group loop computes it.
 
-| field | names it offers |
-| --- | --- |
-| body slot i (``body_i``, point or vector on it) | ``r_i A_i p_i mass_i Jp_i``; ``v_i w_i`` |
-| point ``P_i`` | ``s_P_i`` (arm, global) ``r_P_i``; ``s_P_i_dot v_P_i`` |
-| vector ``a_i`` | ``a_i``; ``a_i_dot`` |
-| vector ``axis`` of no slot, on any body of the element | ``axis``; ``axis_dot`` |
-| vector2 ``d`` | ``d`` and its ends as points ``P_i``, ``P_j``; ``d_dot`` |
-| number, vec3, matrix | itself |
-| function ``function`` of time | ``f f_dot f_ddot f_0``; of another name ``g``: ``g g_dot ...`` |
-| function of an argument | the same names, to be called: ``f(x)``, ``f_dot(x)``, ``f_ddot(x)`` |
-| table ``x`` | ``x``, for ``lookup(x, ...)`` |
-| angle ``theta`` | ``theta``; ``theta_dot`` |
-| what ``prepare`` returns | itself; a 3-tuple ``n_j``: a vector fixed in body j, with ``n_j_dot`` |
-| always | ``t`` |
-| a joint's ``friction`` | ``lam`` (its multipliers) ``mu v_tol radius`` |
-
-A field ``v_i`` takes the place of the velocity of that name; other names of a body are taken.
-Names after a semicolon are of the velocity level: a position-level kernel may not ask for them.
+docs/reference/names.md lists them by field. A field ``v_i`` takes the place of the velocity of that
+name; other names of a body are taken.
 """
 
 from collections.abc import Callable, Iterable, Mapping
