@@ -18,6 +18,7 @@ from support.own_types import registry_of
 from tests.e2e.conftest import COMMAND, environment
 
 import dap3d_core as dap
+from dap3d_core.cli import main
 from dap3d_core.interface import Body, Force, Joint, PluginError, Point, body, number, point
 from dap3d_core.kernels import row, sub
 from dap3d_core.kernels.cache import jit_is_on
@@ -308,6 +309,14 @@ def test_a_models_file_that_fails_at_import_is_named(model, line, words):
     with pytest.raises(dap.SceneError, match=words) as caught:
         compiled(folder)
     assert "plugin.py" in str(caught.value)
+
+
+def test_ctrl_c_while_a_models_file_is_loaded_names_it(model, capsys):
+    """A file that never ends loading is then known."""
+    folder = model(at_import="raise KeyboardInterrupt")
+    assert main(["run", str(folder), "--allow-code"]) == 130
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"interrupted while the model's own file {folder / 'plugin.py'} was loaded" in said
 
 
 #: Ways to write to stdout that no redirection inside Python sees.

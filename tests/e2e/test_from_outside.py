@@ -300,7 +300,7 @@ def the_tutorial_can_be_followed(outside):
     folder.mkdir()
     page = (REPOSITORY / "docs" / "tutorials" / "your-own-joint.md").read_text()
     script, commands = "", []
-    for step in steps(page, ("dap3d", "cp", "pip", "pytest")):
+    for step in steps(page, ("dap3d", "cp", "rm", "pip", "pytest")):
         if step.kind == "file":
             write(step.text, folder)
         elif step.kind == "python":
@@ -317,7 +317,7 @@ def the_tutorial_can_be_followed(outside):
             else:
                 outside.run(outside.bin / "dap3d" if program == "dap3d" else program, *words,
                             cwd=folder)  # fmt: skip
-    assert set(commands) == {"dap3d", "cp", "pip", "pytest"}
+    assert set(commands) == {"dap3d", "cp", "rm", "pip", "pytest"}
     assert outside.plugins()["rope", "dap3d-rope"]["state"] == "ok"
 
 

@@ -27,7 +27,8 @@ VARIABLES = {
         "most threads of a study, by default one for each core; `1` also keeps large scenes on one "
         "core; the numbers are the same"
     ),
-    "DAP3D_BLOCK": "distributions whose types are left out, separated by commas",
+    "DAP3D_BLOCK": "distributions whose types are left out, or `NAME:KEYWORD` of single types, "
+    "separated by commas",
     "NUMBA_DISABLE_JIT": "1: kernels run as plain Python, to look into them; slowly",
     "NO_COLOR": "any value: no colours in the terminal",
     "MPLBACKEND": "how `dap.plot` draws: `Agg` without a screen",

@@ -154,8 +154,8 @@ def function(default: Any = None, *, argument: str = "", doc: str = "") -> Any:
 
     Of time it offers its value and derivatives ``f``, ``f_dot``, ``f_ddot``, and ``f_0``, its value
     at t = 0. With ``argument`` (what it is a function of, in words) kernels call ``f(x)``,
-    ``f_dot(x)``, ``f_ddot(x)``: value, first and second derivative for the argument; such kernels
-    stand in a variant of the type for ``function=True``.
+    ``f_dot(x)``, ``f_ddot(x)``: value, first and second derivative for the argument; where it may
+    be left out, such kernels stand in a variant of the type for ``function=True``.
     """
     return _field(FieldSpec("function", default, doc=doc, argument=argument))
 

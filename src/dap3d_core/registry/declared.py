@@ -3,6 +3,7 @@
 import ast
 import json
 import tomllib
+import warnings
 from importlib.metadata import distributions
 from pathlib import Path
 from urllib.parse import unquote, urlparse
@@ -23,7 +24,9 @@ def declares(path: Path, kind: str, keyword: str) -> bool:
     """
     try:
         text = path.read_bytes() if path.stat().st_size <= LONGEST else b""
-        tree = ast.parse(text)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # given where the file is run
+            tree = ast.parse(text)
     except (OSError, ValueError, SyntaxError, RecursionError, MemoryError):
         return False  # told where the file is run
     kinds = dict(_BASES)
