@@ -1,9 +1,9 @@
 """What kernels are written with, in words, for whoever wrote one with something else."""
 
-from dap3d_core import kernels
+from dap3d_core.kernels import __all__ as words
 from dap3d_core.kernels import mathematics
 
-MATHEMATICS = [n for n in kernels.__all__ if hasattr(mathematics, n) and n != "where"]
+MATHEMATICS = [name for name in words if hasattr(mathematics, name) and name != "where"]
 PLAINLY = (
     "branch by where(condition, a, b), not by if, while, and, or, not, min or max, and take "
     f"{', '.join(MATHEMATICS)} from dap3d_core.kernels, not from math or numpy"
