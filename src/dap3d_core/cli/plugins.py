@@ -9,7 +9,7 @@ from dap3d_core.cli.group import Command
 @click.command(cls=Command, short_help="List the installed types.")
 @click.option("--no-compile", is_flag=True, help="Do not try whether kernels compile.")
 @click.option("--limit", type=click.FloatRange(min=0.0, min_open=True), metavar="SECONDS",
-              help="How long each plugin may take to load (30 by default).")  # fmt: skip
+              help="How long each plugin may take to load (60 by default).")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 def plugins(*, no_compile: bool, limit: float | None, as_json: bool) -> int:
     """List the types of joints, forces and functions that are installed.

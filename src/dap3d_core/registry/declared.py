@@ -2,6 +2,7 @@
 
 import ast
 import json
+import shlex
 import tomllib
 import warnings
 from importlib.metadata import distributions
@@ -73,6 +74,6 @@ def not_yet_installed(keyword: str) -> str:
         if any(keyword in group for group in groups):
             return (
                 f"{file} declares {keyword!r} since it was installed: "
-                f"run pip install -e {folder} again"
+                f"run pip install -e {shlex.quote(str(folder))} again"
             )
     return ""

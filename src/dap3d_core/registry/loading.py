@@ -29,20 +29,28 @@ from dap3d_core.registry.spelling import nearest
 _one_at_a_time = threading.RLock()
 
 
-def load(source: Source, notes: list[str], limit_s: float | None = None) -> Examined:
+def load(
+    source: Source, notes: list[str], limit_s: float | None = None, given_up: str = ""
+) -> Examined:
     """Import a plugin and examine the type that its entry point names.
 
     Args:
         source: where the type comes from.
         notes: what the plugin changed in the process, and was put back, is told here.
         limit_s: how long that may take; None for as long as it takes.
+        given_up: after how long another plugin of its package was given up; it is not waited for
+            again.
 
     Raises:
         PluginError: names distribution, module or file, reason and remedy.
     """
+    if limit_s is not None:
+        importlib.import_module("dap3d_core.kernels")  # what all of them import is not their time
     with _guard(source, notes), within(limit_s):
         if source.fault:
             raise PluginError(source.fault)
+        if given_up and limit_s is not None:
+            raise PluginError(f"its package was not loaded after {given_up}")
         type_ = source.type
         if type_ is None:
             module = importlib.import_module(source.module)

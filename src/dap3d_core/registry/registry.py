@@ -11,11 +11,12 @@ from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.registry.declared import not_yet_installed
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover
 from dap3d_core.registry.loading import compile_kernels, load, load_file
+from dap3d_core.registry.overdue import OverdueError
 from dap3d_core.registry.spelling import nearest
 
 #: Seconds that a plugin may take to load where no scene asks for it: a command that looks at all
 #: types does not wait for one that never ends.
-LOAD_LIMIT = 30.0
+LOAD_LIMIT = 60.0
 #: The distribution whose types are compiled and run by the tests of dap3d.
 OWN = "dap3d"
 
@@ -64,6 +65,7 @@ class Registry:
     sources: dict[tuple[str, str], list[Source]]
     notes: list[str] = attrs.field(factory=list)
     _loaded: dict[Source, Examined | str] = attrs.field(factory=dict, repr=False)
+    _overdue: dict[str, str] = attrs.field(factory=dict, repr=False)  # packages that were given up
 
     def get(self, kind: str, keyword: str, *, limit_s: float | None = None) -> Examined:
         """The type of this keyword, loaded and examined when first asked for.
@@ -135,10 +137,13 @@ class Registry:
     def _load(self, source: Source, limit_s: float | None = None) -> Examined:
         found = self._loaded.get(source)
         if found is None:
+            package = source.module.partition(".")[0]
             try:
-                found = load(source, self.notes, limit_s)
+                found = load(source, self.notes, limit_s, self._overdue.get(package, ""))
             except PluginError as error:
                 self._loaded[source] = str(error)
+                if isinstance(error.__cause__, OverdueError):
+                    self._overdue[package] = str(error.__cause__)
                 raise
             self._loaded[source] = found
         if isinstance(found, str):
