@@ -200,6 +200,21 @@ class TouchingLine(Square):
         return x, x + y * y
 
 
+class WrongSignBesideForm(Joint):
+    """P_i does not move along a_j as seen from P_j; gamma is derived from that, and right."""
+
+    keyword, rows, holonomic = "wrong-sign-beside-form", 1, False
+    P_i: Point = point()
+    P_j: Point = point()
+    a_j: Vector = vector()
+
+    def C_dot(v_P_i, v_P_j, a_j):
+        return dot(a_j, sub(v_P_i, v_P_j))
+
+    def J(s_P_i, s_P_j, a_j):
+        return row(a_j, cross(s_P_i, a_j)), row(neg(a_j), cross(s_P_j, a_j))
+
+
 class NoReaction(PointToPoint):
     variants = ()
 
@@ -334,6 +349,7 @@ PLANTED = [
     (OneVariantWrong, {"gamma"}, r"failed: gamma \[slip = xyz\]"),
     (RowTwice, {"rank"}, "the rank of J is 1 at best, and 2 rows are declared: row 2 follows"),
     (Contradiction, {"assembly"}, "no pose with C = 0 was found"),
+    (WrongSignBesideForm, {"velocity form"}, "row 1 of J and nu is not the form C_dot"),
     (Square, {"rank"}, "the rank of J is 0 at best, .* where C = 0 the gradient of row 1 vanishes"),
     (TouchingLine, {"rank"}, "where C = 0 .* row 2 .* though elsewhere the rank is 2"),
     (Upright, {"frame", "action and reaction"}, "row 1 of C notices where ground is"),
