@@ -212,7 +212,7 @@ class WrongSignBesideForm(Joint):
         return dot(a_j, sub(v_P_i, v_P_j))
 
     def J(s_P_i, s_P_j, a_j):
-        return row(a_j, cross(s_P_i, a_j)), row(neg(a_j), cross(s_P_j, a_j))
+        return row(a_j, neg(cross(s_P_i, a_j))), row(neg(a_j), neg(cross(s_P_j, a_j)))
 
 
 class NoReaction(PointToPoint):
