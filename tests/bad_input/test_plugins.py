@@ -407,12 +407,13 @@ class Fp(Force):
 
 
 def test_a_models_file_that_is_not_needed_is_not_run_and_does_not_shadow_quietly(model):
-    """Its text tells, without leave to run it; a class of another kind shadows nothing."""
+    """Its text tells, where it may be run; a class of another kind shadows nothing."""
     folder = model(at_import=SHADOWING.format("keyword = 'weight'") + "\nraise RuntimeError('ran')")
     scene = SCENE.replace('type = "mine"\nbody_i = "b"', 'type = "weight"')
     (folder / "scene.toml").write_text(scene)
     with pytest.raises(dap.SceneError, match="'weight' is brought by distribution dap3d"):
-        dap.compile(folder)
+        compiled(folder)
+    assert any("was not loaded" in note for note in dap.compile(folder).notes), "not even read"
     text = (folder / "plugin.py").read_text().replace("Fp(Force)", "Fp(Function)")
     (folder / "plugin.py").write_text(text)
     notes = compiled(folder).notes

@@ -2,13 +2,13 @@
 
 import ast
 import json
+import os
+import re
 import shlex
 import tomllib
 import warnings
 from importlib.metadata import distributions
 from pathlib import Path
-from urllib.parse import unquote, urlparse
-from urllib.request import url2pathname
 
 from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.interface.types import KINDS
@@ -65,7 +65,7 @@ def not_yet_installed(keyword: str) -> str:
             origin = json.loads(distribution.read_text("direct_url.json") or "{}")
             if not origin.get("dir_info", {}).get("editable"):
                 continue
-            folder = Path(url2pathname(unquote(urlparse(origin["url"]).path)))
+            folder = _folder(origin["url"])
             file = folder / "pyproject.toml"
             entry_points = tomllib.loads(file.read_text("utf-8"))["project"]["entry-points"]
             groups = [entry_points.get(group, {}) for group, _ in GROUPS.values()]
@@ -77,3 +77,10 @@ def not_yet_installed(keyword: str) -> str:
                 f"run pip install -e {shlex.quote(str(folder))} again"
             )
     return ""
+
+
+def _folder(url: str) -> Path:
+    """The folder of a file URL; read here, for what reads URLs brings all of the network."""
+    text = re.sub(rb"%([0-9A-Fa-f]{2})", lambda m: bytes.fromhex(m[1].decode()), url.encode())
+    path = text.decode().removeprefix("file://")
+    return Path(path.lstrip("/") if os.name == "nt" else path)

@@ -88,7 +88,7 @@ class Types:
                     "which is not run unless it is allowed"
                 ) from None
         else:
-            if self.file is not None and not self._is_loaded():
+            if self.file is not None and self.allow_code and not self._is_loaded():
                 if declares(self.file, kind, word):
                     raise PluginError(self.registry.clash(kind, word, self.file))
                 self._installed.append((kind, word))
