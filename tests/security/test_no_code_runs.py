@@ -188,6 +188,7 @@ def test_dangerous_words_of_python_stand_in_known_places_alone():
             if isinstance(node, ast.Import | ast.ImportFrom):
                 modules = [a.name for a in node.names]
                 modules = modules if isinstance(node, ast.Import) else [node.module or ""]
+                modules = [m for m in modules if m != "urllib.parse"]  # texts alone, no network
                 found |= {(name, m) for m in modules if m.split(".")[0] in DANGEROUS}
             elif isinstance(node, ast.Call):
                 if isinstance(node.func, ast.Name) and node.func.id in ("eval", "exec"):

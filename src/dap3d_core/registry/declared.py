@@ -3,12 +3,12 @@
 import ast
 import json
 import os
-import re
 import shlex
 import tomllib
 import warnings
 from importlib.metadata import distributions
 from pathlib import Path
+from urllib.parse import unquote
 
 from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.interface.types import KINDS
@@ -80,7 +80,6 @@ def not_yet_installed(keyword: str) -> str:
 
 
 def _folder(url: str) -> Path:
-    """The folder of a file URL; read here, for what reads URLs brings all of the network."""
-    text = re.sub(rb"%([0-9A-Fa-f]{2})", lambda m: bytes.fromhex(m[1].decode()), url.encode())
-    path = text.decode().removeprefix("file://")
+    """The folder of a file URL."""
+    path = unquote(url.removeprefix("file://"))
     return Path(path.lstrip("/") if os.name == "nt" else path)
