@@ -445,6 +445,32 @@ def test_of_two_that_write_one_file_at_once_one_wins_whole(tmp_path):
     assert len(list(tmp_path.iterdir())) == 50
 
 
+def test_of_several_that_overwrite_one_file_at_once_none_disturbs_another(tmp_path):
+    """With force each of them succeeds, and the file is always that of one of them, whole."""
+    from dap3d_core.result.files import whole_file
+
+    target, errors, texts = tmp_path / "run.nc", [], [letter * 5000 for letter in "abcd"]
+    barrier = threading.Barrier(len(texts))
+
+    def write(text):
+        barrier.wait()
+        try:
+            for _ in range(100):
+                with whole_file(target, force=True) as part:
+                    part.write_text(text)
+                assert target.read_text() in texts
+        except Exception as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=write, args=(text,)) for text in texts]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not errors
+    assert list(tmp_path.iterdir()) == [target]
+
+
 @pytest.mark.slow
 def test_of_two_runs_that_write_one_file_one_wins_whole(folder):
     words = ("run", "fall.toml", "-o", "both.nc", "--t-end", "200", "--dt", "0.01", "--json")

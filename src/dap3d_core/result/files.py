@@ -2,8 +2,9 @@
 
 import errno
 import os
+import secrets
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -76,33 +77,38 @@ def _mode_of(path: Path) -> int:
         return 0
 
 
-def reserve(target: Path, kind: str = "part") -> Path:
-    """Make an empty file beside the target, ``NAME.part`` or the first of its kind that is free.
+def reserve(target: Path) -> Path:
+    """Create an empty temporary file next to the target, ``NAME.new-`` and a random suffix.
 
-    An unfinished file of an earlier run that was killed is left as it is.
+    No other process ever uses its name, so that whoever made it may remove that name at any time,
+    even after the file has got another one.
 
     Raises:
         ResultError: the folder cannot be written to.
     """
 
-    def make(part: Path) -> None:
-        os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    def create(file: Path) -> None:
+        os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
 
-    return _first_free(target, kind, make)
+    return _claim(target, (f".new-{secrets.token_hex(6)}" for _ in range(_MOST_PARTS)), create)
 
 
 def named_part(file: Path, target: Path) -> Path:
-    """Give a file beside the target, which may be open, the name ``NAME.part``, or the like.
+    """Rename a temporary file, which may be open, to ``NAME.part`` or the first such name free.
+
+    The part of another run, or of one that was killed, stays as it is.
 
     Raises:
         ResultError: the system refuses.
     """
-    return _first_free(target, "part", lambda part: _name_if_free(file, part))
+    suffixes = (f".part{k if k > 1 else ''}" for k in range(1, _MOST_PARTS))
+    return _claim(target, suffixes, lambda part: _name_if_free(file, part))
 
 
-def _first_free(target: Path, kind: str, take: Callable[[Path], None]) -> Path:
-    for k in range(1, _MOST_PARTS):
-        part = target.with_name(f"{target.name}.{kind}{k if k > 1 else ''}")
+def _claim(target: Path, suffixes: Iterable[str], take: Callable[[Path], None]) -> Path:
+    """The target with the first suffix for which ``take`` finds no file of that name."""
+    for suffix in suffixes:
+        part = target.with_name(target.name + suffix)
         try:
             take(part)
         except FileExistsError:
@@ -161,21 +167,18 @@ def _name_if_free(part: Path, target: Path) -> None:
 
 
 @contextmanager
-def whole_file(
-    path: str | os.PathLike[str], force: bool = False, kind: str = "part"
-) -> Iterator[Path]:
+def whole_file(path: str | os.PathLike[str], force: bool = False) -> Iterator[Path]:
     """A file to write into, which gets its name at the end; left with an error, it vanishes.
 
     Args:
         path: what it is called in the end.
         force: whether an existing file is overwritten.
-        kind: what it is called until then, after a dot behind its name.
 
     Raises:
         ResultError: the path cannot be written to.
     """
     target = check_target(path, force)
-    part = reserve(target, kind)
+    part = reserve(target)
     try:
         yield part
         check_target(path, force)

@@ -30,7 +30,7 @@ def save(result: "Result", path: str | os.PathLike[str], force: bool = False) ->
     """
     arrays = result.arrays
     # killed now it leaves nothing that is called a part and is none
-    with whole_file(path, force, "new") as part, NETCDF:
+    with whole_file(path, force) as part, NETCDF:
         dataset = guarded(Path(path), lambda: _opened(part))
 
         def write() -> int:
@@ -84,7 +84,7 @@ class ResultWriter:
             ResultError: the file cannot be written, or exists and ``force`` is off.
         """
         self.path = check_target(path, force)
-        self.part = reserve(self.path, "new")  # killed now it leaves nothing that is half a part
+        self.part = reserve(self.path)  # killed now it leaves nothing that is half a part
         self.count = 0
         self._dataset: Any = None
         started = attrs.evolve(record, status=RUNNING)

@@ -216,7 +216,7 @@ class Growing:
                 )
             self._check_part("cannot overwrite")
             self.part.unlink()
-        new = reserve(self.target, "new")  # killed now it leaves nothing that is half a part
+        new = reserve(self.target)  # killed now it leaves nothing that is half a part
         try:
             dataset = guarded(
                 self.target, lambda: netCDF4.Dataset(os.path.abspath(new), "w", format="NETCDF4")
