@@ -1,6 +1,6 @@
 """A model made ready to be evaluated: plan, arrays, group loops, a formulation; for Python."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Any
 
@@ -165,15 +165,20 @@ class Machine:
     @AS_COMPILED
     def start(self, t: float, u: ArrayLike) -> None:
         """Make ready for a run from a state u (13 n,): whole turns are counted from here."""
-        for q, (kind, group) in enumerate(self.what):
-            if kind == "angle":
-                p0, width = int(self.system.groups[q, 1]), group.examined.layout.par_width
-                for offset in group.examined.layout.angles.values():
-                    self.system.par[p0 + offset : p0 + width * group.count : width] = 0.0
+        for places in self.turn_places():
+            self.system.par[places] = 0.0
         self._place(t, u)
         s = self.system
         s.settings[UNSETTLED] = 0.0
         self._call(ANGLE, t, s.force, s.force, s.force)
+
+    def turn_places(self) -> Iterator[slice]:
+        """Where in ``par`` the turns of angles are counted."""
+        for q, (kind, group) in enumerate(self.what):
+            if kind == "angle":
+                p0, width = int(self.system.groups[q, 1]), group.examined.layout.par_width
+                for offset in group.examined.layout.angles.values():
+                    yield slice(p0 + offset, p0 + width * group.count, width)
 
     @AS_COMPILED
     def start_functions(self, t: float = 0.0) -> None:

@@ -8,13 +8,24 @@ orders are those of Shampine, Gordon, Computer Solution of Ordinary Differential
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+from collections.abc import Container
 from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 
 from dap3d_core.integrators.method import Floats, Integers
-from dap3d_core.integrators.work import ATOL, ERROR_SIZE, INTEGERS, RTOL, SCRATCH, TRIAL, Y
+from dap3d_core.integrators.work import (
+    ATOL,
+    ERROR_SIZE,
+    FRESH,
+    INTEGERS,
+    MOST_COUNTED,
+    RTOL,
+    SCRATCH,
+    TRIAL,
+    Y,
+)
 from dap3d_core.kernels.by_address import INTEGERS as INTEGER_VECTOR
 from dap3d_core.kernels.by_address import MATRIX, Arrays
 from dap3d_core.kernels.cache import compiled_inside
@@ -26,6 +37,18 @@ ROWS = HIGHEST + 3
 #: the last steps were equal, the coming one included; whether the run is still starting; failures
 #: of the coming step in a row.
 ORDER_NOW, ORDER_LAST, EQUAL, STARTING, FAILURES, ADAMS_INTEGERS = range(INTEGERS, INTEGERS + 6)
+
+
+def allowed_adams_integers(found: Integers) -> dict[int, Container[int]]:
+    """What these places may hold between two chunks of a run, as ``work.allowed_integers``."""
+    return {
+        ORDER_NOW: range(1 if found[FRESH] else 0, HIGHEST + 1),
+        ORDER_LAST: range(HIGHEST + 1),
+        STARTING: (0, 1),
+        **dict.fromkeys((EQUAL, FAILURES), range(MOST_COUNTED)),
+    }
+
+
 #: Rows of ``table``. x_n - x_(n-j) for j = 1, ...; the same of the coming step; beta, g, sigma of
 #: HNW (III.5.9, 5.10) and Shampine, Gordon; scratch; |gamma*_j|, error constants at equal steps;
 #: g of an interpolation. Its row is its own: among equal steps the next step uses g once more.

@@ -1,6 +1,6 @@
 """One integration by Adams methods, seen from Python; it has the face of ``Integration``."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -10,9 +10,11 @@ from dap3d_core.integrators import work as at
 from dap3d_core.integrators.adams import advance_adams
 from dap3d_core.integrators.adams_formulas import (
     ADAMS_INTEGERS,
+    CONSTANT,
     ORDER_NOW,
     ROWS,
     AdamsWork,
+    allowed_adams_integers,
     make_table,
 )
 from dap3d_core.integrators.integration import (
@@ -23,7 +25,8 @@ from dap3d_core.integrators.integration import (
     check_state_and_times,
     switches_of,
 )
-from dap3d_core.integrators.method import Floats
+from dap3d_core.integrators.method import Floats, Integers
+from dap3d_core.integrators.restoring import restored
 from dap3d_core.integrators.work import Function
 
 
@@ -108,6 +111,16 @@ class AdamsIntegration(Integration):
     def state_arrays(self) -> list[Any]:
         """As ``Integration.state_arrays``; here the table holds where the past rates stand."""
         return [*super().state_arrays(), self._work.table]
+
+    def restored(self, name: str, array: Any, found: Any) -> Any:
+        """As ``Integration.restored``."""
+        if name == "table":
+            return restored(name, array, found, (CONSTANT,))
+        return super().restored(name, array, found)
+
+    def allowed_integers(self, found: Integers) -> dict[int, Container[int]]:
+        """As ``Integration.allowed_integers``."""
+        return super().allowed_integers(found) | allowed_adams_integers(found)
 
     @property
     def slope(self) -> Floats | None:

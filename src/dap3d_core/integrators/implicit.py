@@ -1,6 +1,6 @@
 """One implicit integration, seen from Python; it has the face of ``Integration``."""
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from functools import cached_property
 from typing import Any, NamedTuple, cast
 
@@ -20,10 +20,12 @@ from dap3d_core.integrators.integration import (
     check_state_and_times,
     switches_of,
 )
+from dap3d_core.integrators.method import Integers
 from dap3d_core.integrators.radau import advance
 from dap3d_core.integrators.radau_method import ORDER, radau_method
 from dap3d_core.integrators.radau_parts import radau_parts
 from dap3d_core.integrators.radau_work import RadauWork
+from dap3d_core.integrators.restoring import check_alike, check_pivots, restored
 from dap3d_core.linear.lu_plan import LuPlan, make_lu_plan
 
 
@@ -148,6 +150,22 @@ class RadauIntegration(Integration):
         yield from super().all_arrays()
         yield from self.tangent.walk("tangent.")
         yield from self.matrix.walk("matrix.")
+
+    def restored(self, name: str, array: Any, found: Any) -> Any:
+        """As ``Integration.restored``."""
+        if name == "own":
+            return restored(name, array, found, (at.PART,))
+        if name.startswith("method.") or (array.dtype.kind == "i" and "." in name):
+            return restored(name, array, found, range(len(array)))
+        if name in ("pivots", "pivotsc"):
+            check_alike(name, found, array)
+            sizes = self.lu_plan.nodes[:-1, 0]
+            check_pivots(name, found, np.repeat(sizes, sizes))
+        return super().restored(name, array, found)
+
+    def allowed_integers(self, found: Integers) -> dict[int, Container[int]]:
+        """As ``Integration.allowed_integers``."""
+        return super().allowed_integers(found) | at.ALLOWED
 
     @property
     def slope(self) -> Any:

@@ -1,7 +1,7 @@
 """One integration, seen from Python: set up, advanced in chunks, drained of its rows."""
 
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from dap3d_core.integrators import work as at
 from dap3d_core.integrators.control import FLOOR
 from dap3d_core.integrators.method import Floats, Integers, Method, combinations
+from dap3d_core.integrators.restoring import Restorable
 from dap3d_core.integrators.runge_kutta import advance
 from dap3d_core.integrators.work import Function, Status, Work
 from dap3d_core.kernels.beside import wait_for_what_is_beside
@@ -33,7 +34,7 @@ class Statistics(NamedTuple):
     reports: int  # calls of report
 
 
-class Integration:
+class Integration(Restorable):
     """An initial value problem on its way: ``advance`` it until its status is no longer RUNNING.
 
     Parameters
@@ -223,13 +224,6 @@ class Integration:
         names = [name for name, _ in self.work.type_of().members if name not in same]
         arrays = [getattr(self.work, name) for name in names]
         return [array for array in arrays if isinstance(array, np.ndarray)]
-
-    def all_arrays(self) -> Iterator[tuple[str, Any]]:
-        """Name and array of all that a run goes on from, once its ``rows`` are taken.
-
-        What ``functions`` keep in ``system`` is not among them.
-        """
-        return ((name, a) for name, a in self.work.walk() if name not in ("times", "rows"))
 
     def restart(self) -> None:
         """Let the next step start anew: what the functions compute has changed."""

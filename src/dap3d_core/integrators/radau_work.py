@@ -1,12 +1,13 @@
 """The state of an implicit integration: arrays that the compiled core reads and writes."""
 
+from collections.abc import Container
 from typing import Any, ClassVar
 
 import attrs
 
 from dap3d_core.integrators.method import Floats, Integers
 from dap3d_core.integrators.radau_method import RadauMethod
-from dap3d_core.integrators.work import INTEGERS, STATES
+from dap3d_core.integrators.work import INTEGERS, MOST_COUNTED, STATES
 from dap3d_core.kernels.by_address import COMPLEX_VECTOR, MATRIX, TENSOR, Arrays
 from dap3d_core.kernels.by_address import INTEGERS as INTEGER_VECTOR
 
@@ -26,6 +27,11 @@ FACCON, THETA, H_ACCEPTED, H_FACTORED, ERROR_ACCEPTED, PART, OWN = range(7)
     FACTORISATIONS,
 ) = range(INTEGERS, INTEGERS + 7)
 RADAU_INTEGERS = INTEGERS + 7
+#: What these places may hold between two chunks of a run, as ``work.allowed_integers``.
+ALLOWED: dict[int, Container[int]] = {
+    **dict.fromkeys((TANGENT_NEEDED, TANGENT_HERE, ACCEPTED), (0, 1)),
+    **dict.fromkeys(range(ITERATIONS, RADAU_INTEGERS), range(MOST_COUNTED)),
+}
 # Rows of ``state`` behind those of work.py: state before the last step, dy/dt at Y, there, and at
 # the trial state.
 OLD, SLOPE, OLD_SLOPE, TRIAL_SLOPE, RADAU_STATES = range(STATES, STATES + 5)

@@ -1,6 +1,7 @@
 """The state of an integration: arrays that the compiled core reads and writes, and their places."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Container
 from enum import IntEnum
 from typing import Any, ClassVar
 
@@ -45,6 +46,8 @@ RTOL, ATOL, STEP, EXPONENT, BETA, FACTOR_MIN, FACTOR_MAX, CALM, SAFETY = range(9
     T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, ACROSS, LIMIT, CUT, STIFF_AT, OUTCOME
 ) = range(9, 21)  # fmt: skip
 LENGTHS = OUTCOME + 4
+#: Places in ``real`` and ``integer`` that never change in the course of a run.
+REAL_SETTINGS = range(T)
 # Places in ``integer``. Settings.
 STAGES, ORDER, ERROR_SIZE, ERRORS, ERROR_USES_RESULT, DENSE, PROJECT_ON, WATCHED = range(8)
 # What changes. POOR: landings in a row that project called poor. FRESH: k[0] is f(t, y).
@@ -59,6 +62,7 @@ SWITCHES, LOOKED, CUTS, ENDING, CULPRIT, CROSSINGS = range(21, 27)
 # and those in a row that did not since (stiffness.py). STALLS: steps in a row towards a crossing,
 # so short that the switch did not change by a bit.
 LATE_STAGE, LEAVE, STIFF_STEPS, CALM_STEPS, STALLS, INTEGERS = range(27, 33)
+INTEGER_SETTINGS = (*range(STATUS), SWITCHES, LATE_STAGE, LEAVE)
 # Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch.
 Y, TRIAL, SCRATCH, OTHER, STATES = range(5)
 # Rows of ``switches``: value, side (the sign that it keeps; 0: none yet), rate and bend (change of
@@ -91,3 +95,50 @@ class Work(Arrays):
     lengths: Floats  # (2, m) at t, and their rates over the last step (crossing.py)
     switches: Floats  # (SWITCH_ROWS, q) of q switches of the model (switches.py)
     crossings: Floats  # (LOGGED, 3) where they changed their sign; no row without switches
+
+
+#: Nothing is counted beyond: a count, and twice that, are exact in double precision.
+MOST_COUNTED = 2**52
+
+
+def allowed_integers(work: Any, found: Integers) -> dict[int, Container[int]]:
+    """What each place of ``integer`` that is no setting may hold between two chunks of a run.
+
+    Args:
+        work: of the same run, with its settings.
+        found: (INTEGERS,) what is to be compared: some places limit others.
+    """
+    instants, switches, real = work.times.size, work.switches.shape[1], work.real
+    running, steps = found[STATUS] == RUNNING, int(found[GAP_STEPS])
+    by_switch = {SWITCHED, CHATTERED} if switches else set()
+    by_method = {STIFF} if work.integer[LEAVE] else set()
+    fixed = real[STEP] != 0.0
+    most_steps = math.ceil((work.times[-1] - work.times[0]) / real[STEP]) + 1 if fixed else 0
+    return {
+        STATUS: {*range(SWITCHED), Status.ENDED, *by_switch, *by_method},
+        NEXT: range(instants if running else instants + 1),
+        ROW: (0,),
+        **dict.fromkeys((FRESH, LAST_REJECTED, LOOKED), (0, 1)),
+        GAP_STEPS: range(most_steps + 1),
+        GAP_STEP: range(steps + 1),
+        ENDING: {0, Status.ENDED, *by_switch},
+        CULPRIT: range(max(1, switches)),
+        **dict.fromkeys(
+            (STEPS, REJECTED, RHS, PROJECTIONS, REPORTS, POOR, CUTS, CROSSINGS, STIFF_STEPS,
+             CALM_STEPS, STALLS), range(MOST_COUNTED)
+        ),
+    }  # fmt: skip
+
+
+def allowed_reals(work: Any) -> dict[int, tuple[float, float]]:
+    """Least and greatest value of each such place of ``real`` but those that ``project`` gives."""
+    # a step may go on just behind the last instant (Integration.stops)
+    first, last = float(work.times[0]), math.nextafter(float(work.times[-1]), math.inf)
+    largest = 1.7976931348623157e308
+    return {
+        T: (first, last),
+        **dict.fromkeys((T_DENSE, GAP_START, T_STOP), (0.0, last)),
+        **dict.fromkeys((H, H_DENSE, ERROR_OLD, ACROSS), (0.0, largest)),
+        LIMIT: (math.inf, math.inf),
+        **dict.fromkeys((CUT, STIFF_AT), (0.0, math.inf)),
+    }

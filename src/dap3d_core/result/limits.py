@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dap3d_core.result.errors import ResultError
+from dap3d_core.result.occurrence import KINDS
 from dap3d_core.result.subject import Subject
 
 #: Arrays of so many bytes are read whatever the size of the file; beyond, a file holds at least one
@@ -13,6 +14,9 @@ from dap3d_core.result.subject import Subject
 ALWAYS, MOST_PRESSED = 64 * 2**20, 64
 #: Rows of a joint.
 MOST_ROWS = 1000
+
+#: What an entry must fulfil, and what it is in words.
+Form = tuple[Callable[[Any], bool], str]
 
 
 def check_claims(file: Path, dataset: Any) -> None:
@@ -50,8 +54,13 @@ def check_attributes(found: Mapping[str, Any]) -> None:
     Raises:
         ValueError: names the first that has not.
     """
-    for name, (fits, what) in _FORMS.items():
-        if not fits(found[name]):
+    check_forms(found, FORMS)
+
+
+def check_forms(found: Mapping[str, Any], forms: Mapping[str, Form]) -> None:
+    """ValueError for the first entry that is not of its form."""
+    for name, (fits, what) in forms.items():
+        if not fits(found.get(name)):
             raise ValueError(f"{name} should be {what}")
 
 
@@ -71,11 +80,13 @@ def check_subject(subject: Subject) -> None:
         raise ValueError("joint_rows are no numbers of rows")
 
 
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Whether this is a finite number of a size that a run may meet."""
     return type(value) in (int, float) and abs(value) < 1e300
 
 
-def _are_texts(value: Any) -> bool:
+def are_texts(value: Any) -> bool:
+    """Whether this is a list of texts."""
     return isinstance(value, list) and all(isinstance(v, str) for v in value)
 
 
@@ -84,7 +95,7 @@ def _is_plain(value: Any, depth: int = 3) -> bool:
     if isinstance(value, (list, dict)):
         parts = value.values() if isinstance(value, dict) else value
         return depth > 0 and all(_is_plain(v, depth - 1) for v in parts)
-    return value is None or isinstance(value, (bool, str)) or _is_number(value)
+    return value is None or isinstance(value, (bool, str)) or is_number(value)
 
 
 def _are_settings(value: Any) -> bool:
@@ -92,38 +103,43 @@ def _are_settings(value: Any) -> bool:
     return (
         isinstance(value, dict)
         and _is_plain(value)
-        and all(value.get(n) is None or _is_number(value[n]) for n in numbers)
+        and all(value.get(n) is None or is_number(value[n]) for n in numbers)
         and type(value.get("rank", 0)) is int
     )
 
 
 def _are_numbers(value: Any) -> bool:
-    return isinstance(value, dict) and all(_is_number(v) for v in value.values())
+    return isinstance(value, dict) and all(is_number(v) for v in value.values())
 
 
-def _are_events(value: Any) -> bool:
+def are_events(value: Any) -> bool:
+    """Whether these are events as a result and a checkpoint hold them."""
     return isinstance(value, list) and all(isinstance(v, dict) and _is_event(v) for v in value)
 
 
 def _is_event(value: Mapping[str, Any]) -> bool:
-    changes = value.get("changes", {})
+    changes, u = value.get("changes", {}), value.get("u")
     return (
         isinstance(value.get("name"), str)
-        and _is_number(value.get("t"))
-        and type(value.get("direction")) is int
+        and is_number(value.get("t"))
+        and value.get("direction") in (-1, 1)
+        and value.get("kind") in KINDS
+        and (u is None or (isinstance(u, list) and all(map(is_number, u))))
         and isinstance(changes, dict)
         and all(isinstance(v, dict) and _is_plain(v) for v in changes.values())
     )
 
 
-def _are_versions(value: Any) -> bool:
+def is_table_of_texts(value: Any) -> bool:
+    """Whether this is a table whose values are texts."""
     return isinstance(value, dict) and all(isinstance(v, str) for v in value.values())
 
 
-_FORMS: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "notes": (_are_texts, "a list of texts"),
+#: Of the attributes of a result.
+FORMS: dict[str, Form] = {
+    "notes": (are_texts, "a list of texts"),
     "settings": (_are_settings, "a table of numbers, words and truth values"),
     "statistics": (_are_numbers, "a table of numbers"),
-    "versions": (_are_versions, "a table of texts"),
-    "events": (_are_events, "a list of tables with name, t, direction"),
+    "versions": (is_table_of_texts, "a table of texts"),
+    "events": (are_events, "a list of tables with name, t, direction"),
 }

@@ -16,8 +16,11 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.integrators.work import MOST_COUNTED
 from dap3d_core.result import ResultError, current_versions
 from dap3d_core.result.files import beginning, cannot, whole_file
+from dap3d_core.result.limits import Form, are_texts, check_forms, is_number, is_table_of_texts
+from dap3d_core.scene import METHODS
 from dap3d_core.simulation.errors import CheckpointError
 
 #: Version of this layout, raised when an older reader would misread it.
@@ -26,12 +29,32 @@ PROGRAM = "dap3d checkpoint"
 #: Added to the name of the result file.
 SUFFIX = ".checkpoint"
 
-#: What stands in a header, besides who wrote it (saving.py).
-KEYS: dict[str, type | tuple[type, ...]] = {
-    "run": str, "output": str, "rows": int, "t": (int, float), "integrations": int, "scene": str,
-    "method": str, "settings": dict, "estimate_error": bool, "notes": list,
-    "wall_time_s": (int, float), "compile_time_s": (int, float), "driver": str, "types": dict,
-}  # fmt: skip
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def is_count(value: Any) -> bool:
+    """Whether this is a count, which a double holds exactly."""
+    return type(value) is int and 0 <= value <= MOST_COUNTED
+
+
+def _is_duration(value: Any) -> bool:
+    return is_number(value) and value >= 0.0
+
+
+#: What stands in a header.
+KEYS: dict[str, Form] = {
+    **dict.fromkeys(("run", "output", "scene", "driver"), (_is_text, "a text")),
+    "method": (lambda value: value in METHODS, f"one of {', '.join(METHODS)}"),
+    "integrations": (lambda value: type(value) is int and value in (1, 2), "1 or 2"),
+    "rows": (is_count, "a count"),
+    **dict.fromkeys(("t", "wall_time_s", "compile_time_s"), (_is_duration, "a time in seconds")),
+    "settings": (lambda value: isinstance(value, dict), "a table"),
+    "estimate_error": (lambda value: isinstance(value, bool), "true or false"),
+    "notes": (are_texts, "a list of texts"),
+    **dict.fromkeys(("types", "versions"), (is_table_of_texts, "a table of texts")),
+}
 
 _HEADER = "checkpoint.json"
 _ZIP = b"PK\x03\x04"
@@ -156,7 +179,5 @@ def _header(file: Path, archive: zipfile.ZipFile) -> dict[str, Any]:
             f"cannot resume from {file}: dap3d {made} wrote it in format {header.get('format')}, "
             f"this program reads format {FORMAT}; install that version of dap3d"
         )
-    for key, kind in KEYS.items():
-        if not isinstance(header.get(key), kind):
-            raise ValueError(f"its {key!r} is missing")
+    check_forms(header, KEYS)
     return header

@@ -1,6 +1,6 @@
 """Events that a script asks for: what is watched, and what is done where it passes a level."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from functools import cached_property
 from typing import Any
 
@@ -204,6 +204,21 @@ class Numbers:
         rows = self._rows(change)
         rows[change.where] = change.new[change.where]
         self._write(change, rows)
+
+    def changeable(self, forces: Collection[str]) -> NDArray[np.bool_]:
+        """Which of ``par`` ``set`` may have changed, given names of forces: no place of a table."""
+        model = self._compiled.model
+        found = np.zeros(len(self._compiled.machine.system.par), dtype=bool)
+        numbers = [k for k, name in enumerate(model.force_names) if name in forces]
+        for group in (*model.forces, *model.friction):
+            changes = np.zeros(group.numbers.shape, dtype=bool)
+            changes[np.isin(group.members, numbers)] = True
+            for instance, offset, _ in group.tables:
+                changes[instance, offset : offset + 2] = False
+            if changes.any():
+                first = self._first(group)
+                found[first : first + changes.size] |= changes.ravel()
+        return found
 
     def put_back(self) -> None:
         """Make the numbers those of the scene again."""

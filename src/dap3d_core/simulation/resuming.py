@@ -2,15 +2,24 @@
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import attrs
+import numpy as np
+
+from dap3d_core.assembly.system import UNSETTLED
+from dap3d_core.integrators import Status
+from dap3d_core.integrators.restoring import check_alike, restored
+from dap3d_core.integrators.work import MOST_COUNTED, NEXT
 from dap3d_core.interface import PluginError
 from dap3d_core.kernels.cache import driver_digest
+from dap3d_core.model.kinematics import from_integrated
 from dap3d_core.result import INFORMATION, Result, current_versions
-from dap3d_core.scene import SceneError, Simulation, load, parse
-from dap3d_core.simulation.asked import check_checkpoint
+from dap3d_core.result.limits import are_texts
+from dap3d_core.scene import SceneError, Simulation, check_simulation, load, parse
+from dap3d_core.simulation.asked import check_checkpoint, report_times
 from dap3d_core.simulation.checkpoint import Checkpoint, path_of, read_checkpoint
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.errors import CheckpointError
@@ -19,13 +28,13 @@ from dap3d_core.simulation.opening import why_unmade
 from dap3d_core.simulation.run import Progress, Run
 from dap3d_core.simulation.saving import (
     Saver,
-    arrays_of,
     digests_of,
     parts_of,
     remove_parts,
     results_of,
 )
 from dap3d_core.simulation.standing import Standing
+from dap3d_core.simulation.state import state_of
 
 
 def resume(
@@ -150,8 +159,7 @@ class Resumption:
         """The run, standing where the checkpoint was written, with the rows until there."""
         header = self._found.header
         before, earlier = self._rows_so_far()
-        settings = Simulation(**header["settings"] | {"hold": tuple(header["settings"]["hold"])})
-        estimate = bool(header["estimate_error"])
+        settings, estimate = self._settings(), bool(header["estimate_error"])
         run = Run(self.compiled, settings, self._announce, events, watch, estimate_error=estimate)
         ours = target.exists() and target.samefile(before)
         run.keep(target, force=force or ours, identity=header["run"])
@@ -197,33 +205,54 @@ class Resumption:
             f"nor {self.output.name}.part holds them. Run the scene anew"
         )
 
+    def _settings(self) -> Simulation:
+        """The settings of the run, checked as those of a scene are."""
+        stored = self._found.header["settings"]
+        names = {field.name for field in attrs.fields(Simulation)}
+        if stored.keys() != names or not isinstance(stored["hold"], list):
+            other = ", ".join(sorted(stored.keys() ^ names)) or "hold"
+            raise self._damaged(f"its settings are not those of a run ({other})")
+        settings = Simulation(**stored | {"hold": tuple(stored["hold"])})
+        try:
+            check_simulation(settings, self.compiled.model.body_names)
+            report_times(settings.t_end, settings.dt)
+        except SceneError as error:
+            raise self._damaged(f"its settings make no sense: {error}") from error
+        return settings
+
     def _restore(self, run: Run) -> None:
         """Stand where the checkpoint was written."""
-        header, stored = self._found.header, dict(self._found.arrays)
-        given = stored.pop("events.given", None)
-        self._restore_events(run, given)
-        self._put_back(run, stored)
-        while len(run.runs) < header["integrations"]:
-            run.begin_implicit()
-            self._put_back(run, stored)
-        run.notes = [*header["notes"], *self._notes()]
+        header, stored = self._found.header, self._found.arrays
+        self._restore_events(run)
+        try:
+            for k in range(header["integrations"]):
+                if k:
+                    if run.runs[0].status is not Status.STIFF:
+                        raise ValueError("its first integration goes on, and there is a second")
+                    run.begin_implicit()
+                first = f"{k}."
+                run.runs[k].restore(
+                    {n.removeprefix(first): a for n, a in stored.items() if n.startswith(first)}
+                )
+            restore_system(run, stored)
+            check_position(run, header["rows"])
+        except ValueError as error:
+            raise self._damaged(str(error)) from error
+        run.notes = [*header["notes"], *self._notes(run.runs[-1].t)]
         run.started -= header["wall_time_s"]
         run.compile_time += header["compile_time_s"]
 
-    def _put_back(self, run: Run, stored: dict[str, Any]) -> None:
-        for name, array in arrays_of(run):
-            before = stored.get(name)
-            if before is None or before.shape != array.shape or before.dtype != array.dtype:
-                raise CheckpointError(
-                    f"cannot resume from {self.path}: its scene gives another model here ({name}); "
-                    "run the scene anew with this program"
-                )
-            if array.flags.writeable:
-                array[...] = before
+    def _damaged(self, words: str) -> CheckpointError:
+        return CheckpointError(
+            f"cannot resume from {self.path}: {words}; it was changed, or another program made it. "
+            "Run the scene anew"
+        )
 
-    def _restore_events(self, run: Run, given: Any) -> None:
+    def _restore_events(self, run: Run) -> None:
         events = self._found.header.get("events")
-        titles = events["titles"] if events else []
+        if not isinstance(events, dict | None) or not are_texts((events or {}).get("titles", [])):
+            raise self._damaged("its events should be a table")
+        titles = events.get("titles", []) if events else []
         asked = [event.title for event in run.watcher.events] if run.watcher else []
         if titles != asked:
             raise CheckpointError(
@@ -231,12 +260,15 @@ class Resumption:
                 f"are {asked or 'none'}; give the same again, in their order"
             )
         if events and run.watcher is not None:
-            run.watcher.restore(events, None if given is None else given.copy())
+            try:
+                run.watcher.restore(events)
+            except ValueError as error:
+                raise self._damaged(str(error)) from error
 
-    def _notes(self) -> list[str]:
+    def _notes(self, t: float) -> list[str]:
         """Where the run went on, and whether its digits may differ."""
         header = self._found.header
-        notes = [f"{INFORMATION}resumed from a checkpoint at t = {header['t']:.9g} s"]
+        notes = [f"{INFORMATION}resumed from a checkpoint at t = {t:.9g} s"]
         here = current_versions()
         other = [
             f"{name} {number} (here {here.get(name)})"
@@ -260,3 +292,39 @@ def _first(result: Result, count: int) -> Any:
         if left:
             yield block.part(slice(min(left, len(block))))
             left -= min(left, len(block))
+
+
+def restore_system(run: Run, stored: Mapping[str, Any]) -> None:
+    """Give the model the turns, changed numbers and counts of a checkpoint; the rest is its own.
+
+    What else ``par`` holds, such as the places of tables, compiled code takes for indices.
+
+    Raises:
+        ValueError: they are of another model, or not finite.
+    """
+    machine, changed = run.machine, run.watcher.changed_forces if run.watcher else ()
+    par, settings = machine.system.par, machine.system.settings
+    changes = np.zeros(len(par), dtype=bool)
+    for places in machine.turn_places():
+        changes[places] = True
+    if run.watcher and changed:
+        changes |= run.watcher.numbers.changeable(changed)
+    new = restored("system.par", par, stored.get("system.par"), np.flatnonzero(~changes))
+    counts: Any = stored.get("system.settings")
+    check_alike("system.settings", counts, settings)
+    if not (np.isfinite(new).all() and 0.0 <= counts[UNSETTLED] <= MOST_COUNTED):
+        raise ValueError("the numbers of its forces, turns or counts are not finite")
+    par[:], settings[UNSETTLED] = new, counts[UNSETTLED]
+
+
+def check_position(run: Run, rows: int) -> None:
+    """Whether a restored run stands at a state of its model, after so many rows.
+
+    Raises:
+        ValueError: it does not.
+    """
+    model, last = run.machine.model, run.runs[-1]
+    state_of(from_integrated(last.y[None], model.body_count)[0], model.body_names)
+    reported = sum(one.work.integer[NEXT] for one in run.runs) - (len(run.runs) - 1)
+    if rows - reported not in (0, 1):  # an event that ends a run reports its own instant
+        raise ValueError(f"{rows} rows are reported of the {reported} that its instants need")

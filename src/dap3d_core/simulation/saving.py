@@ -110,7 +110,6 @@ def checkpoint_of(run: "Run") -> Checkpoint:
     keeper, compiled = run.keeper, run.compiled
     assert keeper is not None
     assert keeper.output is not None
-    arrays = dict(arrays_of(run))
     header: dict[str, Any] = {
         "run": keeper.run,
         "output": keeper.output.name,
@@ -128,19 +127,18 @@ def checkpoint_of(run: "Run") -> Checkpoint:
         "types": digests_of(compiled.checked),
     }
     if run.watcher is not None:
-        header["events"], given = run.watcher.state()
-        if given is not None:
-            arrays["events.given"] = given
-    return Checkpoint(json.loads(to_json(header)), arrays)
+        header["events"] = run.watcher.state()
+    return Checkpoint(json.loads(to_json(header)), arrays_of(run))
 
 
-def arrays_of(run: "Run") -> Iterator[tuple[str, NDArray[Any]]]:
-    """Name and array of all that a run goes on from."""
-    for k, integration in enumerate(run.runs):
-        for name, array in integration.all_arrays():
-            yield f"{k}.{name}", array
-    for name in KEPT:
-        yield f"system.{name}", getattr(run.machine.system, name)
+def arrays_of(run: "Run") -> dict[str, NDArray[Any]]:
+    """All that a run goes on from, by name."""
+    found = {
+        f"{k}.{name}": array
+        for k, integration in enumerate(run.runs)
+        for name, array in integration.all_arrays()
+    }
+    return found | {f"system.{name}": getattr(run.machine.system, name) for name in KEPT}
 
 
 def digests_of(checked: "Checked") -> dict[str, str]:

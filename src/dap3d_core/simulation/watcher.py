@@ -5,7 +5,7 @@ the number that is watched passes its level there, to the last digit of time. So
 step (its error, the constraints) holds of the state at an event.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.assembly.system import KEPT
 from dap3d_core.integrators import Integration, Status
+from dap3d_core.result.limits import are_events, is_number
 from dap3d_core.result.occurrence import Occurrence
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.event import Event, Instant, Numbers, checked_events
@@ -40,21 +41,37 @@ class Watcher:
         self._values: list[float] = []
         self._sides: list[float] = []
 
-    def state(self) -> tuple[dict[str, Any], Floats | None]:
-        """What was found and is known so far, as plain data; the forces' numbers as given."""
-        found = {
+    def state(self) -> dict[str, Any]:
+        """What was found and is known so far, as plain data."""
+        return {
             "titles": [event.title for event in self.events],
             "occurrences": [attrs.asdict(one) for one in self.occurrences],
             "values": self._values,
             "sides": self._sides,
         }
-        return found, self.numbers.given
 
-    def restore(self, found: dict[str, Any], given: Floats | None) -> None:
-        """Go on from what ``state`` gave."""
+    def restore(self, found: Mapping[str, Any]) -> None:
+        """Go on from what ``state`` gave.
+
+        Raises:
+            ValueError: it is not of that form.
+        """
+        values: Any = found.get("values")
+        sides: Any = found.get("sides")
+        lengths = (0, len(self.events))
+        if not (_are_numbers(values, lengths) and _are_numbers(sides, (len(values),))):
+            raise ValueError("the values and sides of events should be a number for each")
+        if not (set(sides) <= {-1.0, 0.0, 1.0} and are_events(found.get("occurrences"))):
+            raise ValueError("what events have found is damaged")
         self.occurrences = [Occurrence(**one) for one in found["occurrences"]]
-        self._values, self._sides = list(found["values"]), list(found["sides"])
-        self.numbers.given = given
+        self._values, self._sides = list(values), list(sides)
+        if any(one.changes for one in self.occurrences):
+            self.numbers.given = self.compiled.machine.system.par.copy()
+
+    @property
+    def changed_forces(self) -> set[str]:
+        """Names of the forces whose numbers events have changed."""
+        return {force for one in self.occurrences for force in one.changes}
 
     def advance(self, integration: Integration, budget: int) -> Status:
         """As ``Integration.advance``, step by step."""
@@ -188,3 +205,7 @@ def hermite(
     a, b = part * part * (3.0 - 2.0 * part), part * (1.0 - part)
     found: Floats = (1.0 - a) * y0 + a * y1 + b * h * ((1.0 - part) * slope0 - part * slope1)
     return found
+
+
+def _are_numbers(values: Any, lengths: Collection[int]) -> bool:
+    return isinstance(values, list) and len(values) in lengths and all(map(is_number, values))
