@@ -67,6 +67,7 @@ def _facts(found: "Repetition") -> dict[str, Any]:
         "equal": found.equal,
         "instants": found.instants,
         "differences": found.differences,
+        "types": found.types,
         "versions": {n: {"result": a, "here": b} for n, (a, b) in found.versions.items()},
     }
 
@@ -75,13 +76,22 @@ def _show(found: "Repetition", result: str, *, quiet: bool) -> None:
     from dap3d_core.cli.rendering import items, messages, output, say
 
     compared = f"{found.instants:,} instants compared"
+    console = messages()
     if found.equal:
         if not quiet:
             say(output(), f"{result}: made again, equal bit for bit; {compared}", "green")
+        _show_types(found)
         return
-    console = messages()
     say(console, f"{result}: made again, not equal; {compared}", "bold red")
     items(console, [f"{name}: differs by up to {x:.3g}" for name, x in found.differences.items()])
+    _show_types(found)
     other = [f"{name} {a}, here {b}" for name, (a, b) in found.versions.items()]
     if other:
         say(console, f"it was made with other versions: {'; '.join(other)}")
+
+
+def _show_types(found: "Repetition") -> None:
+    from dap3d_core.cli.rendering import messages, say
+
+    if found.types:
+        say(messages(), f"the formulas of {', '.join(found.types)} have changed since")

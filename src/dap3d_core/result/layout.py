@@ -65,7 +65,8 @@ def sizes(subject: "Subject") -> dict[str, int]:
 
 def attributes(subject: "Subject", record: Record) -> dict[str, Any]:
     """The global attributes: what is no array. Lists and tables are JSON."""
-    return {
+    types = {} if record.types is None else {"types": to_json(record.types)}
+    return types | {
         "Conventions": CONVENTIONS,
         "format": np.int32(FORMAT),
         "title": record.title.replace("\0", ""),
@@ -93,6 +94,7 @@ def record_of(found: dict[str, Any]) -> Record:
         method=str(found["method"]),
         integrator=str(found["integrator"]),
         run=str(found["run"]),
+        types=found["types"],
         notes=found["notes"],
         settings=found["settings"],
         stats=Statistics(**found["statistics"]),

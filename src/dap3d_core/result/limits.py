@@ -130,6 +130,12 @@ def _is_event(value: Mapping[str, Any]) -> bool:
     )
 
 
+def _are_sources(value: Any) -> bool:
+    return value is None or (
+        isinstance(value, dict) and all(is_table_of_texts(of) for of in value.values())
+    )
+
+
 def is_table_of_texts(value: Any) -> bool:
     """Whether this is a table whose values are texts."""
     return isinstance(value, dict) and all(isinstance(v, str) for v in value.values())
@@ -137,6 +143,7 @@ def is_table_of_texts(value: Any) -> bool:
 
 #: Of the attributes of a result.
 FORMS: dict[str, Form] = {
+    "types": (_are_sources, "a table of tables of texts"),
     "notes": (are_texts, "a list of texts"),
     "settings": (_are_settings, "a table of numbers, words and truth values"),
     "statistics": (_are_numbers, "a table of numbers"),

@@ -19,10 +19,10 @@ from dap3d_core.result.on_file import LARGE, FileArrays
 from dap3d_core.result.record import RUNNING, Record
 from dap3d_core.result.result import Rebuild, Result
 from dap3d_core.result.seal import check_seal
-from dap3d_core.result.subject import Subject
+from dap3d_core.result.subject import Subject, is_subject_of
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
-_JSON = ("notes", "settings", "statistics", "versions", "events")
+_JSON = ("notes", "settings", "statistics", "versions", "events", "types")
 
 
 def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) -> Result:
@@ -125,7 +125,7 @@ def _check_format(file: Path, dataset: Any) -> None:
 
 def _read(dataset: Any) -> tuple[Subject, Record, Arrays | FileArrays]:
     found = {name: dataset.getncattr(name) for name in dataset.ncattrs()}
-    found = {"events": "[]", "run": ""} | found  # older files have none
+    found = {"events": "[]", "run": "", "types": "null"} | found  # older files have none
     for name in _JSON:
         found[name] = json.loads(found[name])
     check_attributes(found)
@@ -182,12 +182,7 @@ def _origin(
         if rebuild is None:
             raise ResultError(f"the model of {file} is needed: open it with the way to rebuild it")
         model, machine_of = rebuild(record.scene_text)
-        same = (
-            model.body_names == subject.body_names
-            and tuple(model.joint_names) == tuple(subject.joint_names)
-            and np.array_equal(model.joint_rows, subject.joint_rows)
-        )
-        if not same:
+        if not is_subject_of(subject, model):
             raise ResultError(
                 f"the scene in {file} gives another model than was run; its types may have changed"
             )

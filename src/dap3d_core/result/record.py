@@ -86,6 +86,8 @@ class Record:
         stats: what it cost.
         events: what happened at instants that were located, in their order.
         run: by which a checkpoint knows the rows that belong to it; "" where there is none.
+        types: where the types of the scene come from (simulation/sources.py): "joint rev" ->
+            ``digest``, ``distribution``, ``version``; None where it was not recorded.
         known_versions: of dap3d, numpy, numba, python; None for those that are installed.
     """
 
@@ -98,6 +100,7 @@ class Record:
     stats: Statistics = attrs.Factory(Statistics)
     events: tuple[Occurrence, ...] = attrs.field(default=(), converter=_occurrences)
     run: str = attrs.field(default="", eq=False)
+    types: Mapping[str, Mapping[str, str]] | None = None
     known_versions: Mapping[str, str] | None = attrs.field(
         default=None, eq=lambda known: _installed() if known is None else dict(known)
     )

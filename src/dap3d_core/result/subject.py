@@ -68,6 +68,15 @@ class Subject:
         return {name: k for k, name in enumerate(self.joint_names)}
 
 
+def is_subject_of(subject: Subject, model: Model) -> bool:
+    """Whether the arrays of a subject have the places of a model's bodies and rows."""
+    return (
+        tuple(model.body_names) == tuple(subject.body_names)
+        and tuple(model.joint_names) == tuple(subject.joint_names)
+        and np.array_equal(model.joint_rows, subject.joint_rows)
+    )
+
+
 def subject_of(model: Model) -> Subject:
     """The subject of a model."""
     return Subject(

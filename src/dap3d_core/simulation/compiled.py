@@ -36,6 +36,7 @@ from dap3d_core.simulation.initial import model_size
 from dap3d_core.simulation.offender import find_offender
 from dap3d_core.simulation.pace import Pace
 from dap3d_core.simulation.redundancy import Redundancy, redundancy_of
+from dap3d_core.simulation.sources import types_of
 from dap3d_core.simulation.start import Start, find_start
 from dap3d_core.simulation.state import state_of, time_of
 
@@ -189,6 +190,11 @@ class CompiledModel:
     def is_conservative(self) -> bool:
         """Whether potentials account for all work that can be done in the scene."""
         return is_conservative(self.machine, self.model.u0)
+
+    @cached_property
+    def types(self) -> dict[str, dict[str, str]]:
+        """Where the scene's types come from (sources.py), for the record of its results."""
+        return types_of(self.checked)
 
     @cached_property
     def scene_text(self) -> str:

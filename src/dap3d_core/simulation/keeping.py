@@ -76,7 +76,7 @@ class Keeper:
                 self.write(record)
         else:
             self._writer.append(arrays)
-            if self._parts:
+            if not large:
                 self._parts.append(arrays)
         if large and self._writer is not None:
             self._parts.clear()
@@ -101,6 +101,8 @@ class Keeper:
     def result(self, record: Record) -> Result | None:
         """The result of what was kept, whole in the output if there is one; None of nothing."""
         if not self.count:
+            if self._writer is not None:
+                self._writer.discard()
             return None
         compiled = self._compiled
         if self._writer is not None:

@@ -1,16 +1,25 @@
 """Results from disk, with the way back to a model for what only a model can compute."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+
+import attrs
 
 from dap3d_core.formulations.machine import Machine
 from dap3d_core.interface import PluginError
 from dap3d_core.model import Model
-from dap3d_core.result import Result, ResultError
+from dap3d_core.result import INFORMATION, Result, ResultError
 from dap3d_core.result import open_result as open_file
 from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.sources import changed_types
+
+#: Of results that older versions of dap3d wrote.
+NOT_RECORDED = (
+    "the file does not say which sources its types had, so that reactions, forces and the Jacobian "
+    "cannot be protected from formulas that have changed since the run"
+)
 
 
 def open_result(
@@ -45,9 +54,29 @@ def open_result(
             compiled = CompiledModel(scene, allow_code=allow_code)
         except (PluginError, SceneError, SimulationError) as error:
             raise _unmade(path, error, allow_code and home is not None) from error
+        _check_types(path, known, compiled)
         return compiled.model, lambda: compiled.machine
 
-    return open_file(path, rebuild)
+    result = open_file(path, rebuild)
+    known = result.record.types  # read by ``rebuild``, which is called later
+    if known is None:
+        notes = (*result.notes, f"{INFORMATION}{NOT_RECORDED}")
+        result.record = attrs.evolve(result.record, notes=notes)
+    return result
+
+
+def _check_types(
+    path: str | os.PathLike[str],
+    known: Mapping[str, Mapping[str, str]] | None,
+    compiled: CompiledModel,
+) -> None:
+    changed = changed_types(known or {}, compiled.types)
+    if changed:
+        raise ResultError(
+            f"the formulas of {', '.join(changed)} have changed since the run of {path}: the "
+            "Jacobian, reactions and forces cannot be computed with them. Bring back the files of "
+            "these types, or run the scene again. All other arrays are in the file"
+        )
 
 
 def _unmade(path: str | os.PathLike[str], error: Exception, allowed: bool) -> ResultError:

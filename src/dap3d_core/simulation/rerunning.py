@@ -10,11 +10,13 @@ import numpy as np
 from dap3d_core.interface import PluginError
 from dap3d_core.result import Result, ResultError, current_versions
 from dap3d_core.result.arrays import COLUMNS, Arrays
+from dap3d_core.result.subject import is_subject_of
 from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.opening import open_result, why_unmade
 from dap3d_core.simulation.simulate import simulate
+from dap3d_core.simulation.sources import changed_types
 from dap3d_core.simulation.standing import Standing
 
 #: Settings that a result holds and ``simulate`` takes.
@@ -30,12 +32,14 @@ class Repetition:
         instants: how many instants were compared, from the first on.
         differences: largest difference of each array that is not equal bit for bit, SI, by name.
         versions: those that differ: name -> (of the result, here).
+        types: those whose formulas have changed since the run, with what brings them.
     """
 
     again: Result
     instants: int
     differences: dict[str, float]
     versions: dict[str, tuple[str, str]]
+    types: list[str]
 
     @property
     def equal(self) -> bool:
@@ -80,6 +84,11 @@ def rerun(
     except (PluginError, SceneError) as error:
         words = why_unmade(error, allowed=allow_code and model is not None)
         raise ResultError(f"the run cannot be made again: {words}") from error
+    if not is_subject_of(first.subject, compiled.model):
+        raise ResultError(
+            "the run cannot be made again: the scene in its result gives other bodies or joints "
+            "than its arrays are of; the file was changed, or its types were"
+        )
     end = first.t[-1]
 
     def look(standing: Standing) -> None:
@@ -98,7 +107,8 @@ def rerun(
         for name, number in first.versions.items()
         if current_versions().get(name) != number
     }
-    return Repetition(again, instants, differences, versions)
+    types = changed_types(first.record.types or {}, compiled.types)
+    return Repetition(again, instants, differences, versions, types)
 
 
 def _settings(result: Result) -> dict[str, Any]:

@@ -28,11 +28,11 @@ from dap3d_core.simulation.opening import why_unmade
 from dap3d_core.simulation.run import Progress, Run
 from dap3d_core.simulation.saving import (
     Saver,
-    digests_of,
     parts_of,
     remove_parts,
     results_of,
 )
+from dap3d_core.simulation.sources import digests_of
 from dap3d_core.simulation.standing import Standing
 from dap3d_core.simulation.state import state_of
 
@@ -186,7 +186,7 @@ class Resumption:
 
     def _check_types(self) -> None:
         known, here = self._found.header["types"], digests_of(self.compiled.checked)
-        changed = [name for name in known if known[name] != here.get(name)]
+        changed = [name for name in {**known, **here} if known.get(name) != here.get(name)]
         if changed:
             raise CheckpointError(
                 f"cannot resume from {self.path}: the formulas of {', '.join(changed)} have "

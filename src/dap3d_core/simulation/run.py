@@ -104,6 +104,8 @@ class Run:
 
             self.saver = Saver(self, checkpoint, force=force)
         self.prepare()
+        if self.saver is not None:
+            self.saver.begin()
         return self.finish(progress)
 
     def prepare(self) -> None:
@@ -142,8 +144,10 @@ class Run:
             self._take_rows()
             status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
             error.result = self._kept(status)  # type: ignore[attr-defined]
-            if self.saver is not None:
+            if self.saver is not None and self.keeper is not None and self.keeper.count:
                 self.saver.leave(error)
+            elif self.saver is not None:
+                self.saver.remove()
             raise
         finally:
             if self.watcher:
@@ -280,11 +284,14 @@ class Run:
         """Why the integration ended early, with what was computed."""
         message = why_stopped(self.machine, self.runs[-1])
         self.notes.append(message)
-        return SimulationError(message, self._kept("stopped"))
+        result = self._kept("stopped")
+        if self.saver is not None:
+            self.saver.remove()
+        return SimulationError(message, result)
 
     def _kept(self, status: str) -> Result | None:
         """The result of what was computed, whole on disk if asked for; None where nothing was."""
-        if self.keeper is None or not self.keeper.count:
+        if self.keeper is None:
             return None
         return self.keeper.result(self.record(status, self._closing_notes()))
 
@@ -327,6 +334,7 @@ class Run:
             integrator=self.settings.integrator,
             notes=[*self.notes, *more_notes],
             events=events,
+            types=self.compiled.types,
             settings={
                 "t_end": float(self.times[-1]),
                 "dt": self.settings.dt,

@@ -1,8 +1,7 @@
 """When a run writes checkpoints, and what stands in them."""
 
-import hashlib
-import inspect
 import json
+import math
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -16,10 +15,15 @@ from dap3d_core.assembly.system import KEPT
 from dap3d_core.kernels.cache import driver_digest
 from dap3d_core.result import Result, ResultError, open_result
 from dap3d_core.result.record import to_json
-from dap3d_core.simulation.checkpoint import Checkpoint, path_of, write_checkpoint
+from dap3d_core.simulation.checkpoint import (
+    Checkpoint,
+    path_of,
+    read_checkpoint,
+    write_checkpoint,
+)
+from dap3d_core.simulation.errors import CheckpointError
 
 if TYPE_CHECKING:
-    from dap3d_core.scene import Checked
     from dap3d_core.simulation.run import Run
 
 
@@ -51,16 +55,25 @@ class Saver:
         self._run, self._seconds = run, seconds
         self._next = time.perf_counter() + seconds
 
+    def begin(self) -> None:
+        """Write the first checkpoint before anything is integrated, where more are to follow.
+
+        So a run that is killed at any later moment goes on.
+        """
+        if math.isfinite(self._seconds):
+            self._save()
+
     def look(self) -> None:
         """Write a checkpoint if it is time."""
-        if time.perf_counter() < self._next:
-            return
+        if time.perf_counter() >= self._next:
+            self._save()
+
+    def _save(self) -> None:
         run, keeper = self._run, self._run.keeper
         assert keeper is not None
-        if keeper.count:
-            keeper.to_disk(lambda: run.record("done"))
-            self.write()
-            self._next = time.perf_counter() + self._seconds
+        keeper.to_disk(lambda: run.record("done"))
+        self.write()
+        self._next = time.perf_counter() + self._seconds
 
     def leave(self, error: BaseException) -> None:
         """Write a checkpoint where a run is ended from outside, its result being saved.
@@ -68,7 +81,7 @@ class Saver:
         ``error.checkpoint`` names it, where the run stands between two chunks.
         """
         run = self._run
-        if run.is_whole and run.keeper is not None and run.keeper.count:
+        if run.is_whole:
             self.write()
             error.checkpoint = self.path  # type: ignore[attr-defined]
 
@@ -77,12 +90,17 @@ class Saver:
         write_checkpoint(self.path, checkpoint_of(self._run))
 
     def remove(self) -> None:
-        """The run has ended by itself: nothing goes on from here. The checkpoint goes last."""
+        """The run has ended by itself: nothing goes on from here. The checkpoint goes last.
+
+        That of another run, which has taken its place, stays.
+        """
         keeper = self._run.keeper
         assert keeper is not None
         assert keeper.output is not None
         remove_parts(keeper.output, keeper.run)
-        self.path.unlink(missing_ok=True)
+        with suppress(CheckpointError):
+            if read_checkpoint(self.path).header["run"] == keeper.run:
+                self.path.unlink(missing_ok=True)
 
 
 def results_of(files: Iterable[Path], run: str) -> Iterator[tuple[Path, Result]]:
@@ -124,7 +142,7 @@ def checkpoint_of(run: "Run") -> Checkpoint:
         "wall_time_s": time.perf_counter() - run.started,
         "compile_time_s": run.compile_time,
         "driver": driver_digest("integrators"),
-        "types": digests_of(compiled.checked),
+        "types": {name: one["digest"] for name, one in compiled.types.items()},
     }
     if run.watcher is not None:
         header["events"] = run.watcher.state()
@@ -139,18 +157,3 @@ def arrays_of(run: "Run") -> dict[str, NDArray[Any]]:
         for name, array in integration.all_arrays()
     }
     return found | {f"system.{name}": getattr(run.machine.system, name) for name in KEPT}
-
-
-def digests_of(checked: "Checked") -> dict[str, str]:
-    """For each type of a scene, a digest of the file that it stands in."""
-    elements = (*checked.joints, *checked.forces, *checked.functions)
-    types = {(e.examined.type.kind, e.examined.type.keyword): e.examined.type for e in elements}
-    return {f"{kind} {word}": _digest(type_) for (kind, word), type_ in sorted(types.items())}
-
-
-def _digest(type_: type) -> str:
-    try:
-        source = Path(inspect.getsourcefile(type_) or "").read_bytes()
-    except (TypeError, OSError):  # typed at a prompt
-        return ""
-    return hashlib.sha256(source).hexdigest()[:20]

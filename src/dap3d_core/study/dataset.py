@@ -24,7 +24,7 @@ from dap3d_core.result.on_file import LARGE
 from dap3d_core.result.reading import check_signature, unreadable
 from dap3d_core.result.record import to_json
 from dap3d_core.result.seal import check_seal
-from dap3d_core.simulation.saving import digests_of
+from dap3d_core.simulation.sources import digests_of
 from dap3d_core.study.ensemble import Batch, Ensemble, PointStatus
 from dap3d_core.study.points import Design
 

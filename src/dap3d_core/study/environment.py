@@ -11,7 +11,7 @@ from dap3d_core.kernels.cache import driver_digest
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.result import current_versions
 from dap3d_core.scene import SceneError, check
-from dap3d_core.simulation.saving import digests_of
+from dap3d_core.simulation.sources import digests_of
 from dap3d_core.study.ensemble import Study
 
 #: What a process has of what a study needs, as plain data, which any version of dap3d can read:

@@ -1,0 +1,92 @@
+"""Sources of the types of a scene: results and checkpoints record them, and compare them later."""
+
+import hashlib
+import sys
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dap3d_core.scene import Checked
+
+#: Its sources are known by the version of dap3d.
+CORE = "dap3d_core"
+
+
+def digests_of(checked: "Checked") -> dict[str, str]:
+    """For each type of a scene, such as "joint rev", a digest of its sources; "" where unknown."""
+    elements = (*checked.joints, *checked.forces, *checked.functions)
+    types: dict[tuple[str, str], Any] = {
+        (e.examined.type.kind, e.examined.type.keyword): e.examined.type for e in elements
+    }
+    return {f"{kind} {word}": digest_of(type_) for (kind, word), type_ in sorted(types.items())}
+
+
+def types_of(checked: "Checked") -> dict[str, dict[str, str]]:
+    """For each type of a scene its ``digest``, and the ``distribution`` and ``version`` it is from.
+
+    The latter two are "" for a type of a model's own file.
+    """
+    found = {}
+    for name, digest in digests_of(checked).items():
+        kind, word = name.split(" ", 1)
+        sources = [s for s in checked.registry.sources.get((kind, word), ()) if not s.blocked]
+        distribution, version = (
+            (sources[0].distribution, sources[0].version) if sources else ("", "")
+        )
+        found[name] = {"digest": digest, "distribution": distribution, "version": version}
+    return found
+
+
+def changed_types(
+    known: Mapping[str, Mapping[str, str]], here: Mapping[str, Mapping[str, str]]
+) -> list[str]:
+    """The types whose sources are not those that are known, each with what brings it, in words."""
+    found = []
+    for name, before in known.items():
+        now = here.get(name, {})
+        if before.get("digest") != now.get("digest"):
+            old, new = _package(before), _package(now)
+            origin = old if old == new else f"{old}, here {new}"
+            found.append(f"{name} ({origin})")
+    return found
+
+
+def _package(of: Mapping[str, str]) -> str:
+    if not of:
+        return "none"
+    return (
+        f"{of.get('distribution')} {of.get('version')}" if of.get("distribution") else "plugin.py"
+    )
+
+
+@lru_cache(maxsize=1000)
+def digest_of(type_: Any) -> str:
+    """A digest of the files that a type's formulas are in: its own, and those of its package that
+    it uses. "" where there is none, such as of a type that was typed at a prompt.
+    """
+    waiting = [sys.modules.get(base.__module__) for base in type_.__mro__]
+    root = type_.__module__.partition(".")[0]
+    modules: dict[str, bytes] = {}
+    while waiting:
+        module = waiting.pop()
+        if module is None or module.__name__ in modules:
+            continue
+        if module.__name__.partition(".")[0] != root or root == CORE:
+            continue
+        try:
+            modules[module.__name__] = Path(module.__file__ or "").read_bytes()
+        except OSError:
+            return ""
+        for value in list(vars(module).values()):
+            name = getattr(value, "__module__", None)
+            is_module = isinstance(value, ModuleType)
+            waiting.append(value if is_module else sys.modules.get(name or ""))
+    if not modules:
+        return ""
+    together = hashlib.sha256()
+    for name in sorted(modules):
+        together.update(hashlib.sha256(modules[name]).digest())
+    return together.hexdigest()[:20]
