@@ -113,31 +113,43 @@ def check_result(data):
             damaged, or came to the library.
     """
     with file_of(data, "run.nc") as path:
-        receive, send = os.pipe()
-        with warnings.catch_warnings():  # of threads, which the child has no use for
-            warnings.simplefilter("ignore", DeprecationWarning)
-            child = os.fork()
-        if child == 0:
-            _examine_and_leave(path, send)
-        os.close(send)
-        with os.fdopen(receive, "rb") as stream:
-            is_stuck = not select.select([stream], [], [], PATIENCE)[0]
-            if is_stuck:
-                os.kill(child, signal.SIGKILL)
-            answer = stream.read()
-        _, status = os.waitpid(child, 0)
-    if is_stuck or (os.WIFSIGNALED(status) and os.WTERMSIG(status) in _CRASHES):
+        answer, ending = in_child(examine_file, path)
+    if ending:
         assert not is_sealed(data)
-        return STUCK if is_stuck else CRASHED
-    good, words = pickle.loads(answer) if answer else (False, f"the child ended with {status}")
+        return ending
+    good, words = answer
     assert good, words
     assert words == "refused" or not is_sealed(data) or data in good_files()
     return words
 
 
-def _examine_and_leave(path, send):
+def in_child(examine, path, patience=PATIENCE):
+    """What ``examine`` makes of a file in a process of its own, which may crash or never end.
+
+    Returns:
+        (whether it returned, what it returned or its traceback); how else it ended, in words.
+    """
+    receive, send = os.pipe()
+    with warnings.catch_warnings():  # of threads, which the child has no use for
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child == 0:
+        _examine_and_leave(examine, path, send)
+    os.close(send)
+    with os.fdopen(receive, "rb") as stream:
+        is_stuck = not select.select([stream], [], [], patience)[0]
+        if is_stuck:
+            os.kill(child, signal.SIGKILL)
+        answer = stream.read()
+    _, status = os.waitpid(child, 0)
+    if is_stuck or (os.WIFSIGNALED(status) and os.WTERMSIG(status) in _CRASHES):
+        return None, STUCK if is_stuck else CRASHED
+    return pickle.loads(answer) if answer else (False, f"the child ended with {status}"), ""
+
+
+def _examine_and_leave(examine, path, send):
     try:
-        found = True, examine_file(path)
+        found = True, examine(path)
     except BaseException:
         found = False, traceback.format_exc()
     with os.fdopen(send, "wb") as stream:

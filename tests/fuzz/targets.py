@@ -9,6 +9,7 @@ from hypothesis.strategies import SearchStrategy
 from fuzz.acceptable import check_any_scene, check_good_scene
 from fuzz.damage import damaged_scenes
 from fuzz.matlab import check_model, damaged_models
+from fuzz.numbers import changes, check_change
 from fuzz.results import check_result, damaged_results
 from fuzz.scenes import scenes
 from fuzz.words import check_command, check_quantity, command_lines, quantity_names
@@ -64,6 +65,7 @@ TARGETS = {
         Target("damaged", damaged_scenes(), check_any_scene, ".toml"),
         Target("matlab", damaged_models(), check_model, ".json"),
         Target("results", damaged_results(), check_result, ".nc"),
+        Target("numbers", changes(), check_change, ".json"),
         Target("quantities", quantity_names(), check_quantity, ".txt"),
         Target("commands", command_lines(), check_command, ".json"),
     )

@@ -16,6 +16,7 @@ COUNTS = {
     "damaged": (20, 150),
     "matlab": (30, 200),
     "results": (10, 60),
+    "numbers": (10, 150),
     "quantities": (50, 300),
     "commands": (10, 60),
 }

@@ -5,6 +5,9 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.occurrence import KINDS
 from dap3d_core.result.subject import Subject
@@ -14,6 +17,9 @@ from dap3d_core.result.subject import Subject
 ALWAYS, MOST_PRESSED = 64 * 2**20, 64
 #: Rows of a joint.
 MOST_ROWS = 1000
+
+#: Larger numbers leave no run: it is stopped before.
+MOST = 1e100
 
 #: What an entry must fulfil, and what it is in words.
 Form = tuple[Callable[[Any], bool], str]
@@ -64,6 +70,18 @@ def check_forms(found: Mapping[str, Any], forms: Mapping[str, Form]) -> None:
             raise ValueError(f"{name} should be {what}")
 
 
+def check_numbers(file: str | Path, name: str, values: NDArray[np.float64]) -> None:
+    """Whether an array of a file holds what a run may have left; times increase.
+
+    Raises:
+        ResultError: it does not.
+    """
+    good = not values.size or (values.min() >= -MOST and values.max() <= MOST)
+    if not good or (name == "t" and not (values[1:] > values[:-1]).all()):
+        fault = "times that do not increase" if good else "a number that no run leaves"
+        raise ResultError(f"cannot read {file}: it is damaged: {name} holds {fault}")
+
+
 def check_subject(subject: Subject) -> None:
     """Whether names are texts of a line, and indices and counts lie within what there is.
 
@@ -74,6 +92,11 @@ def check_subject(subject: Subject) -> None:
         for name in getattr(subject, f"{kind}_names"):
             if not name or not name.isprintable():
                 raise ValueError(f"{name!r} is no name of a {kind}")
+    for constant in ("mass", "Jp", "point_local"):
+        if not (np.abs(getattr(subject, constant)) <= MOST).all():
+            raise ValueError(f"{constant} holds a number that no scene may have")
+    if not (subject.mass > 0.0).all():
+        raise ValueError("a mass is not positive")
     if not all(0 <= k <= subject.body_count for k in subject.point_body.tolist()):
         raise ValueError("point_body names a body that there is not")
     if not all(0 <= k <= MOST_ROWS for k in subject.joint_rows.tolist()):

@@ -7,7 +7,9 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.result.arrays import COLUMNS, Arrays, arrays_from, block_rows, column_sizes, joined
+from dap3d_core.result.errors import ResultError
 from dap3d_core.result.estimate import U_ERROR
+from dap3d_core.result.limits import check_numbers
 from dap3d_core.result.netcdf import NETCDF
 from dap3d_core.result.subject import Subject
 
@@ -89,6 +91,11 @@ class FileArrays:
         with NETCDF:
             values: Floats = np.asarray(self._dataset.variables[name][rows], dtype=float)
         if values.shape != shape:
-            raise ValueError(f"{name} has the shape {values.shape}, not {shape}")
+            file = self._dataset.filepath()
+            raise ResultError(
+                f"cannot read {file}: {name} has the shape {values.shape}, not {shape}"
+            )
+        if name != U_ERROR.name:  # an estimate may be missing
+            check_numbers(self._dataset.filepath(), name, values)
         values.flags.writeable = False
         return values
