@@ -165,3 +165,35 @@ def test_completion_offers_no_words_that_a_shell_would_run(changed, monkeypatch)
         offered = [str(getattr(w, "value", w)) for w in quantities(ctx, None, "")]
         assert not [w for w in offered if name in w]
         assert [w for w in offered if w.startswith("ball")]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("Jp", np.nan, "Jp holds a number that no scene may have"),
+        ("mass", -1.0, "a mass is not positive"),
+        ("u", 1e308, "u holds a number that no run leaves"),
+        ("t", 5.0, "t holds times that do not increase"),
+    ],
+)
+def test_numbers_that_no_run_leaves_are_refused(changed, name, value, words):
+    """They were computed with: a LinAlgError, warnings of numpy, NaN in pictures."""
+
+    def put(dataset):
+        dataset.variables[name][(0,) * dataset.variables[name].ndim] = value
+
+    with pytest.raises(ResultError, match=words):
+        dap.open(changed(put))
+
+
+def test_a_name_that_is_not_utf8_is_refused_before_the_run(tmp_path):
+    """The NetCDF library takes no other; the run was lost when it was to be saved."""
+    scene, begun = dap.Scene(name="fall"), []
+    scene.add_body("stone", mass=1.0, Jp=(1.0, 1.0, 1.0))
+    output = tmp_path / "stone\udcff.nc"
+    with pytest.raises(ResultError, match=r"cannot write .* is not UTF-8"):
+        dap.simulate(scene, t_end=0.1, dt=0.05, output=output, progress=lambda *t: begun.append(t))
+    assert not begun
+    with pytest.raises(ResultError, match=r"cannot read .* is not UTF-8"):
+        dap.open(output)
+    assert not list(tmp_path.iterdir())

@@ -13,7 +13,7 @@ from unit.test_result_files import same_bits
 import dap3d_core as dap
 from dap3d_core.kernels.cache import jit_is_on
 from dap3d_core.scene import SceneError
-from dap3d_core.simulation import CheckpointError
+from dap3d_core.simulation import CheckpointError, SimulationError
 from dap3d_core.simulation.checkpoint import (
     Checkpoint,
     path_of,
@@ -172,6 +172,45 @@ def test_checkpoints_are_written_now_and_then(tmp_path, monkeypatch):
     assert [f.name for f in tmp_path.iterdir()] == ["run.nc"]
     assert len(seen) > 5
     assert all(rows == there for _, rows, there in seen)
+
+
+def test_a_run_that_is_killed_before_its_first_checkpoint_is_due_is_resumed(tmp_path):
+    """There is one from the beginning, with no row yet; without asking there is none."""
+    kept = tmp_path / "kept"
+    kept.mkdir()
+
+    def watch(standing):
+        if not list(kept.iterdir()):
+            for name in ("run.nc.checkpoint", "run.nc.part"):
+                shutil.copy(tmp_path / name, kept / name)
+
+    settings = {"output": tmp_path / "run.nc", "watch": watch} | SHORT
+    whole = dap.simulate(problems.pendulum(), checkpoint=1e6, **settings)
+    assert read_checkpoint(kept / "run.nc.checkpoint").header["rows"] == 0
+    assert same_bits(dap.resume(kept / "run.nc.checkpoint"), whole)
+    assert [f.name for f in kept.iterdir()] == ["run.nc"]
+
+
+def test_of_a_run_that_fails_at_its_start_nothing_is_left(tmp_path):
+    """Neither a checkpoint that would fail in the same way, nor a part without rows."""
+    scene = stone()
+    scene.add_force("ptp", "stuck", P_i="stone.O", P_j="stone.O", k=1.0, l0=1.0)
+    with pytest.raises((SceneError, SimulationError)):
+        dap.simulate(scene, output=tmp_path / "run.nc", checkpoint=1e6, **SHORT)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_checkpoint_that_another_run_has_written_since_stays(tmp_path):
+    """Of two runs with one output, the first to end leaves the checkpoint of the other."""
+    checkpoint = leave(problems.pendulum(), tmp_path, 0.3, **SHORT)
+    theirs = checkpoint.read_bytes()
+
+    def watch(standing):
+        checkpoint.write_bytes(theirs)
+
+    dap.simulate(problems.pendulum(), output=tmp_path / "run.nc", checkpoint=1e6, force=True,
+                 watch=watch, **SHORT)  # fmt: skip
+    assert checkpoint.read_bytes() == theirs
 
 
 def test_a_checkpoint_older_than_its_rows_is_resumed(tmp_path):

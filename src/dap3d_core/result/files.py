@@ -69,6 +69,25 @@ def check_target(path: str | os.PathLike[str], force: bool = False) -> Path:
     return target
 
 
+def check_utf8(verb: str, path: str | os.PathLike[str]) -> None:
+    """Refuse a NetCDF file whose path is not UTF-8, such as Latin-1: the library opens none.
+
+    Args:
+        verb: "read" or "write".
+        path: the file.
+
+    Raises:
+        ResultError: its name, or that of a folder above it, is not UTF-8.
+    """
+    try:
+        os.path.abspath(path).encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise ResultError(
+            f"cannot {verb} {path}: its name, or that of a folder above it, is not UTF-8, which "
+            "the NetCDF library needs; rename it, or take another folder"
+        ) from error
+
+
 def _mode_of(path: Path) -> int:
     """What there is at a path, as ``stat`` has it; 0 where there is nothing."""
     try:

@@ -11,7 +11,7 @@ import numpy as np
 
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.errors import ResultError
-from dap3d_core.result.files import beginning
+from dap3d_core.result.files import beginning, check_utf8
 from dap3d_core.result.layout import CONSTANTS, CONVENTIONS, FORMAT, SWEEP, record_of
 from dap3d_core.result.limits import check_attributes, check_claims, check_subject
 from dap3d_core.result.netcdf import NETCDF
@@ -91,6 +91,7 @@ def check_signature(file: Path, kind: str = "result") -> None:
     Raises:
         ResultError: there is no such file, it cannot be read, or is another; no ``kind`` of ours.
     """
+    check_utf8("read", file)
     begin = beginning(file, len(_HDF5))
     if begin != _HDF5:
         fault = "the file is empty" if not begin else "it is not a NetCDF-4 file"

@@ -11,7 +11,14 @@ import attrs
 
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.errors import ResultError
-from dap3d_core.result.files import check_target, named_part, reserve, synchronise, whole_file
+from dap3d_core.result.files import (
+    check_target,
+    check_utf8,
+    named_part,
+    reserve,
+    synchronise,
+    whole_file,
+)
 from dap3d_core.result.layout import define, take_places, write_rows, write_times
 from dap3d_core.result.netcdf import NETCDF, guarded
 from dap3d_core.result.record import RUNNING, Record
@@ -28,6 +35,7 @@ def save(result: "Result", path: str | os.PathLike[str], force: bool = False) ->
     Raises:
         ResultError: the file cannot be written, or exists and ``force`` is off.
     """
+    check_utf8("write", path)
     arrays = result.arrays
     # killed now it leaves nothing that is called a part and is none
     with whole_file(path, force) as part, NETCDF:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.result import Record, Result, ResultError, ResultWriter, check_target
 from dap3d_core.result.arrays import Arrays, arrays_of, joined
+from dap3d_core.result.files import check_utf8
 from dap3d_core.result.on_file import LARGE, FileArrays
 from dap3d_core.result.reading import arrays_in
 from dap3d_core.result.subject import subject_of
@@ -50,6 +51,8 @@ class Keeper:
         Raises:
             ResultError: the output cannot be written.
         """
+        if output is not None:
+            check_utf8("write", output)
         self.run = run or os.urandom(16).hex()
         self.output: Path | None = None if output is None else check_target(output, force)
         self.count = 0

@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.result import ResultError, check_target
-from dap3d_core.result.files import cannot, named_part, put_in_place, reserve, synchronise
+from dap3d_core.result.files import (
+    cannot,
+    check_utf8,
+    named_part,
+    put_in_place,
+    reserve,
+    synchronise,
+)
 from dap3d_core.result.netcdf import NETCDF, guarded
 from dap3d_core.result.reading import check_signature, unreadable
 from dap3d_core.result.seal import WHOLE, check_seal, write_seal
@@ -64,6 +71,7 @@ class Growing:
                 is on, and there is none, or one of another sweep.
         """
         self.layout, self._force = layout, force
+        check_utf8("write", output)
         self.target = check_target(output, force)
         self.part = self.target.with_name(f"{self.target.name}.part")
         self._waiting: list[tuple[Integers, Batch]] = []

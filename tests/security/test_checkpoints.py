@@ -1,0 +1,138 @@
+"""A checkpoint from elsewhere: no number of it is an index of compiled code before it is checked.
+
+Its checksums are right, as whoever wants to do harm would make them.
+"""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from fuzz.numbers import PATIENCE, RUNS, check_change, folder, make
+from fuzz.results import in_child
+from support.ended import EndedError, ended_at, leave, shorten_chunks
+from unit.test_result_files import same_bits
+
+import dap3d_core as dap
+from dap3d_core.integrators import work as at
+from dap3d_core.integrators.adams_formulas import EQUAL, FAILURES, ORDER_LAST, ORDER_NOW
+from dap3d_core.integrators.radau_work import ITERATIONS
+from dap3d_core.simulation import CheckpointError
+from dap3d_core.simulation.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
+
+
+def crafted(run, what, where, value):
+    """The end of ``dap3d resume`` of a checkpoint with one number changed, in words."""
+    return check_change(json.dumps(["checkpoint", run, what, where, value]).encode())
+
+
+#: Places of ``integer`` that only count, and so hold any count.
+COUNTS = {at.STEPS, at.REJECTED, at.RHS, at.PROJECTIONS, at.REPORTS, at.POOR, at.CUTS,
+          at.STIFF_STEPS, at.CALM_STEPS, at.STALLS}  # fmt: skip
+
+
+@pytest.mark.parametrize("place", [at.STAGES, at.ERROR_SIZE, at.NEXT, at.ROW, at.LATE_STAGE])
+def test_an_index_out_of_its_array_is_refused(place):
+    """They crashed, or let the file write where it liked."""
+    assert crafted("pen1", "0.integer", place, 10**7) == "checkpoint refused"
+
+
+def test_an_order_that_adams_methods_do_not_have_is_refused():
+    for place in (ORDER_NOW, ORDER_LAST):
+        assert crafted("adams", "0.integer", place, 14) == "checkpoint refused"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("run", ["pen1", "adams", "radau"])
+def test_every_place_that_holds_no_count_is_limited(run):
+    size = read_checkpoint(folder() / run / "run.nc.checkpoint").arrays["0.integer"].size
+    own = {"pen1": set(), "adams": {EQUAL, FAILURES}, "radau": set(range(ITERATIONS, size))}
+    for place in range(size):
+        if place not in COUNTS | own[run]:
+            assert crafted(run, "0.integer", place, 10**7) == "checkpoint refused", place
+        assert crafted(run, "0.integer", place, -(10**7)) == "checkpoint refused", place
+
+
+def test_row_exchanges_of_an_implicit_integration_stay_in_their_blocks():
+    for value in (-1, 10**7):
+        assert crafted("radau", "0.pivots", 0, value) == "checkpoint refused"
+        assert crafted("radau", "0.matrix.body_first", 1, value) == "checkpoint refused"
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (["settings", "t_end"], 0.5),
+        (["settings", "t_end"], math.nan),
+        (["settings", "t_end"], None),
+        (["settings", "rtol"], "x"),
+        (["settings", "foo"], 1),
+        (["settings", "hold"], "ground"),
+        (["integrations"], 10**9),
+        (["integrations"], 2),
+        (["rows"], 0),
+        (["rows"], -1),
+        (["wall_time_s"], math.inf),
+        (["method"], "none"),
+        (["notes"], [1]),
+        (["types"], {"joint rev": 1}),
+    ],
+)  # fmt: skip
+def test_settings_that_no_run_has_are_refused(path, value, tmp_path):
+    """In words, at once: some never ended, others were called unexpected."""
+    found = make(["checkpoint", "pen1", "header", ["t"], 1.0], tmp_path)
+    before = read_checkpoint(found)
+    header = json.loads(json.dumps(before.header))
+    table = header if len(path) == 1 else header[path[0]]
+    table[path[-1]] = value
+    write_checkpoint(found, Checkpoint(header, before.arrays))
+    answer, ending = in_child(_words_of_refusal, found, PATIENCE)
+    assert not ending
+    assert "cannot resume from" in answer[1], answer[1]
+
+
+def _words_of_refusal(path):
+    with pytest.raises(CheckpointError) as caught:
+        dap.resume(path)
+    return str(caught.value)
+
+
+def test_state_of_zeros_is_refused(tmp_path):
+    """All floats zero: step and tolerances too, so that it never came to an end."""
+    found = make(["checkpoint", "pen1", "header", ["t"], 1.0], tmp_path)
+    before = read_checkpoint(found)
+    arrays = {n: a if a.dtype.kind == "i" else np.zeros_like(a) for n, a in before.arrays.items()}
+    write_checkpoint(found, Checkpoint(before.header, arrays))
+    with pytest.raises(CheckpointError, match="no run can have"):
+        dap.resume(found)
+
+
+def test_numbers_that_a_run_does_not_change_are_those_of_its_scene(tmp_path, monkeypatch):
+    """Places of tables stand among the numbers of forces: those of the file are not looked at."""
+    scene = dap.Scene(name="cam")
+    scene.add_body("cam", mass=1.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_joint("rev", "axle", P_i="cam.O", P_j="ground.O", a_i="cam.z", a_j="ground.z")
+    scene.add_function("spline", "law", x=(0.0, 0.4, 1.0), y=(0.0, 1.0, 0.5))
+    scene.add_joint("drive-rot", "motor", body_i="cam", a_j="ground.z", function="law")
+    settings = {"t_end": 1.0, "dt": 0.05}
+    whole = dap.simulate(scene, **settings)
+    shorten_chunks(monkeypatch)
+    found = leave(scene, tmp_path, 0.3, **settings)
+    before = read_checkpoint(found)
+    arrays = dict(before.arrays)
+    arrays["system.par"] = np.full_like(arrays["system.par"], 1e9)
+    arrays["system.settings"] = np.zeros_like(arrays["system.settings"])
+    arrays["0.real"] = arrays["0.real"].copy()
+    arrays["0.real"][at.RTOL] = 0.0
+    write_checkpoint(found, Checkpoint(before.header, arrays))
+    assert same_bits(dap.resume(found), whole)
+
+
+def test_every_run_of_the_fuzz_target_is_resumed_as_it_is(tmp_path):
+    """The files that are changed are good ones: unchanged they go on."""
+    for run in RUNS:
+        path = make(["checkpoint", run, "header", ["compile_time_s"], 1.0], tmp_path / run)
+        t = read_checkpoint(path).header["t"]
+        with pytest.raises(EndedError) as caught:
+            dap.resume(path, watch=ended_at(t))
+        assert caught.value.result.t[-1] >= t - 0.2
