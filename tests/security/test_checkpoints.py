@@ -14,6 +14,7 @@ from support.ended import EndedError, ended_at, leave, shorten_chunks
 from unit.test_result_files import same_bits
 
 import dap3d_core as dap
+from dap3d_core.cli import main
 from dap3d_core.integrators import work as at
 from dap3d_core.integrators.adams_formulas import EQUAL, FAILURES, ORDER_LAST, ORDER_NOW
 from dap3d_core.integrators.radau_work import ITERATIONS
@@ -35,6 +36,13 @@ COUNTS = {at.STEPS, at.REJECTED, at.RHS, at.PROJECTIONS, at.REPORTS, at.POOR, at
 def test_an_index_out_of_its_array_is_refused(place):
     """They crashed, or let the file write where it liked."""
     assert crafted("pen1", "0.integer", place, 10**7) == "checkpoint refused"
+
+
+def test_the_command_refuses_it_as_any_damaged_file(tmp_path, capsys):
+    path = make(["checkpoint", "pen1", "0.integer", at.ROW, 48], tmp_path)
+    assert main(["resume", str(path)]) == 2
+    words = " ".join(capsys.readouterr().err.split())
+    assert f"cannot resume from {path}: integer[{at.ROW}] is 48, which no run can have" in words
 
 
 def test_an_order_that_adams_methods_do_not_have_is_refused():

@@ -54,6 +54,7 @@ def resume(
     from dap3d_core.cli.files import writable
     from dap3d_core.cli.outcome import tell
     from dap3d_core.result import ResultError
+    from dap3d_core.simulation import CheckpointError
     from dap3d_core.simulation.resuming import resumption
 
     found: list[Resumption] = []
@@ -70,7 +71,10 @@ def resume(
     def go(announce: "Announce", watch: "Watch") -> "Result":
         if output is not None:
             writable(Path(output), force=force, sources=(Path(checkpoint),))
-        return found[0].go(output, force=force, checkpoint=every, watch=watch)
+        try:
+            return found[0].go(output, force=force, checkpoint=every, watch=watch)
+        except CheckpointError as error:  # what is wrong with the file shows as it is restored
+            raise Refused(str(error)) from error
 
     outcome = carry_out(ctx, prepare, go, quiet=quiet)
     target = Path(output) if output is not None else found[0].output
