@@ -54,11 +54,11 @@ def rebuild(text):
 
 
 def noisy(model, nt=9, seed=3):
-    """Rows of random bits in every column, unit Euler parameters and rising times aside."""
+    """Rows of random bits, as large as a run may leave; Euler parameters and times are plain."""
     rng = np.random.default_rng(seed)
     n = model.body_count
     width = 1 + 13 * n + 1 + 6 * n + model.row_count + 4
-    rows = rng.normal(size=(nt, width)) * 10.0 ** rng.integers(-200, 200, size=(nt, width))
+    rows = rng.normal(size=(nt, width)) * 10.0 ** rng.integers(-200, 99, size=(nt, width))
     rows[:, 0] = np.cumsum(rng.random(nt))
     rows[:, 1 : 1 + 13 * n] = rng.normal(size=(nt, 13 * n))
     rows[0, -1] = -0.0
