@@ -1,4 +1,4 @@
-"""Where things are written: whole, where they were asked for, never through a link."""
+"""Where things are written: whole, where they were asked for; a link that is named stays one."""
 
 import json
 import os
@@ -12,7 +12,7 @@ from support.process import run
 import dap3d_core as dap
 from dap3d_core.cli import main
 from dap3d_core.kernels.trusted import distrust
-from dap3d_core.result import ResultError
+from dap3d_core.result import ResultError, check_target
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="links and owners as POSIX has them")
 
@@ -138,18 +138,59 @@ def test_an_imported_model_is_not_written_through_links(command, tmp_path):
     assert "UserForce" in (tmp_path / "plugin.py").read_text()
 
 
-def test_a_result_takes_the_place_of_a_link(tmp_path):
+def test_a_result_is_written_where_a_link_leads(tmp_path):
+    """A link that is named stays: /dev/stdout, which is the system's, is not replaced by a file."""
     scene = dap.Scene(name="fall")
     scene.add_body("stone", mass=1.0, Jp=(1.0, 1.0, 1.0))
     run = dap.simulate(scene, t_end=0.0)
-    (tmp_path / "mine").write_text("mine")
-    (tmp_path / "run.nc").symlink_to(tmp_path / "mine")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "mine").write_text("mine")
+    (tmp_path / "run.nc").symlink_to(tmp_path / "other" / "mine")
+    with pytest.raises(ResultError, match="mine: the file exists"):
+        run.save(tmp_path / "run.nc")
     run.save(tmp_path / "run.nc", force=True)
-    assert (tmp_path / "mine").read_text() == "mine"
+    assert (tmp_path / "run.nc").readlink() == tmp_path / "other" / "mine"
+    assert dap.open(tmp_path / "other" / "mine").t.tolist() == [0.0]
+    assert [p.name for p in (tmp_path / "other").iterdir()] == ["mine"]
+
     (tmp_path / "gone.nc").symlink_to(tmp_path / "nowhere")
-    with pytest.raises(ResultError, match="link"):
+    with pytest.raises(ResultError, match="link that leads nowhere"):
         run.save(tmp_path / "gone.nc")
+    run.save(tmp_path / "gone.nc", force=True)
+    assert (tmp_path / "gone.nc").is_symlink()
+    assert dap.open(tmp_path / "nowhere").t.tolist() == [0.0]
     # a name that somebody put there in advance is not taken for ours
     (tmp_path / "late.nc.part").symlink_to(tmp_path / "mine")
     run.save(tmp_path / "late.nc")
-    assert (tmp_path / "mine").read_text() == "mine"
+    assert not (tmp_path / "mine").exists()
+
+
+def test_a_link_to_an_open_file_without_a_name_is_refused(tmp_path):
+    """What /proc calls such a file is no path; a file of that name would be a new one."""
+    with (tmp_path / "open").open("w") as file:
+        link = tmp_path / "run.nc"
+        link.symlink_to(f"/proc/{os.getpid()}/fd/{file.fileno()}")
+        if not link.exists():
+            pytest.skip("no /proc")
+        (tmp_path / "open").unlink()
+        with pytest.raises(ResultError, match="the file that it stands for has no name"):
+            check_target(link, force=True)
+
+
+def test_a_link_to_a_pipe_or_a_device_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "run.nc").symlink_to(tmp_path / "pipe")
+    with pytest.raises(ResultError, match=r"run\.nc: it is no regular file but a pipe"):
+        check_target(tmp_path / "run.nc", force=True)
+    (tmp_path / "null.nc").symlink_to("/dev/null")
+    with pytest.raises(ResultError, match="it is no regular file but a device"):
+        check_target(tmp_path / "null.nc", force=True)
+
+
+def test_a_scene_is_written_where_a_link_leads(tmp_path):
+    scene = dap.Scene(name="fall")
+    scene.add_body("stone", mass=1.0, Jp=(1.0, 1.0, 1.0))
+    (tmp_path / "scene.toml").symlink_to(tmp_path / "other.toml")
+    scene.save(tmp_path / "scene.toml")
+    assert (tmp_path / "scene.toml").is_symlink()
+    assert "stone" in (tmp_path / "other.toml").read_text()

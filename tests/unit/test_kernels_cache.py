@@ -123,3 +123,24 @@ def run_copy(folder):
     """Copy ball1 to a folder and run it there."""
     shutil.copytree(REPOSITORY / "models" / "ball1", folder)
     return run(OWN_TYPE.replace("sys.argv[1]", repr(str(folder))))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damage", ["one bit", "cut off", "empty"])
+def test_damaged_code_is_made_anew_and_a_warning_says_so(tmp_path, damage):
+    """One bit can crash the process or change a number: no damaged file is loaded or executed."""
+    cache = tmp_path / "cache"
+    write_plugin(tmp_path)
+    run(EVALUATE, cache, cwd=tmp_path)
+    files = [f for f in cache.rglob("*") if f.suffix in (".py", ".nbi", ".nbc")]
+    assert {f.suffix for f in files} == {".py", ".nbi", ".nbc"}
+    for file in files:
+        data = bytearray(file.read_bytes())
+        data[len(data) // 2] ^= 1
+        kept = {"one bit": data, "cut off": data[: len(data) // 2], "empty": b""}[damage]
+        file.write_bytes(bytes(kept))
+    process = start(EVALUATE, cache, cwd=tmp_path)
+    out, err = process.communicate(timeout=300)
+    assert (process.returncode, out) == (0, "6.5 1\n"), err
+    assert "compiled code was damaged and is made anew" in err
+    assert run(EVALUATE, cache, cwd=tmp_path) == "6.5 0"

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dap3d_core.result import Result
 
 
-@click.command(cls=Command, short_help="Draw the motion of a result as a film.")
+@click.command(cls=Command, saves=True, short_help="Draw the motion of a result as a film.")
 @click.argument("result", shell_complete=complete_results)
 @click.option(
     "-o",

@@ -1,6 +1,7 @@
 """What goes wrong, in words and as an exit code; a traceback only with ``--debug``."""
 
 import contextlib
+import os
 import sys
 import traceback
 from typing import Any
@@ -83,10 +84,26 @@ def _judge(error: BaseException) -> tuple[int, str]:
     if _is_unexpected(error):
         words = " ".join(str(error).split())
         return exits.FAILED, f"unexpected {type(error).__name__}" + (f": {words}" if words else "")
+    if isinstance(error, FileNotFoundError) and _folder_is_gone():
+        return exits.REFUSED, "the current folder is no longer there; change to another one (cd)"
+    if part := getattr(error, "part", None):  # a disk that filled up under a run
+        words = f"{error}; what was computed until then is in {part}"
+        if checkpoint := getattr(error, "checkpoint", None):
+            words += f"; once there is room, dap3d resume {checkpoint} goes on with the run"
+        return exits.PARTIAL, words
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""
         return exits.FAILED, f"cannot read or write: {file}{error.strerror}"
     return exits.FAILED, str(error)
+
+
+def _folder_is_gone() -> bool:
+    """Whether the folder in which the command was given was removed."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return True
+    return False
 
 
 def _is_unexpected(error: BaseException) -> bool:

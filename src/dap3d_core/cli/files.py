@@ -1,6 +1,7 @@
 """Files that commands read and write, refused before any work is done."""
 
 import os
+import sys
 import uuid
 from collections.abc import Callable
 from pathlib import Path
@@ -47,16 +48,26 @@ def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) 
     try:
         if not force and path.is_file():
             raise Refused(f"{path} exists; --force overwrites it, -o writes another file")
-        check_target(path, force)
+        target = check_target(path, force)
     except OSError as error:
         told = error if isinstance(error, ResultError) else cannot("write", path, error)
         raise Refused(str(told)) from error
     for source in sources:
         if source is not None and path.exists() and source.exists() and path.samefile(source):
             raise Refused(f"{path} is what is read; name another file with -o")
-    if not os.access(path.parent, os.W_OK | os.X_OK):
+    if _is_stdout(target):
+        raise Refused(f"{path} is where the words of this command go; name another file with -o")
+    if not os.access(target.parent, os.W_OK | os.X_OK):
         raise Refused(f"cannot write {path}: no permission to write in its folder; use -o")
     return path
+
+
+def _is_stdout(target: Path) -> bool:
+    """Whether the standard output leads to a file: words written there later would be lost."""
+    try:
+        return os.path.samestat(target.stat(), os.fstat(sys.stdout.fileno()))
+    except (OSError, ValueError):  # one of them does not exist, or is none of the system's
+        return False
 
 
 def write_text(path: Path, text: str) -> None:

@@ -13,7 +13,7 @@ import click
 
 from dap3d_core.cli import exits
 from dap3d_core.cli.signals import Stopping
-from dap3d_core.cli.streams import json_alone, leave_stdout, prepare_streams
+from dap3d_core.cli.streams import json_alone, leave_stdout, prepare_streams, stdout_fault
 
 
 def _drop_colors(ctx: click.Context, option: click.Parameter, asked: bool) -> None:
@@ -32,12 +32,17 @@ def _no_color() -> click.Option:
 class Command(click.Command):
     """A command with ``--debug``; its failures become messages and exit codes.
 
+    Attributes:
+        saves: whether what it makes is a file, with or without ``--output``; what it prints tells
+            of it alone.
+
     An option that is given twice is refused, for taking the last one would be a quiet choice; so is
     an empty word, which comes from a variable of a shell that was not set.
     """
 
-    def __init__(self, *args: Any, **options: Any) -> None:
+    def __init__(self, *args: Any, saves: bool = False, **options: Any) -> None:
         super().__init__(*args, **options)
+        self.saves = saves
         self.params.append(
             click.Option(["--debug"], is_flag=True, help="Show the traceback of a failure.")
         )
@@ -67,13 +72,24 @@ class Command(click.Command):
         try:
             with Stopping() as stopping:
                 ctx.meta["dap3d.stopping"] = stopping
-                return super().invoke(ctx)
+                return self._told(ctx, super().invoke(ctx))
         except (click.ClickException, click.exceptions.Exit):
             raise
         except (Exception, KeyboardInterrupt) as error:
             from dap3d_core.cli.failures import report
 
             ctx.exit(report(error, debug=debug, as_json=bool(ctx.params.get("as_json"))))
+
+    def _told(self, ctx: click.Context, code: int) -> int:
+        """The exit code of a command that has ended; of one whose words were lost it is said so."""
+        if not (fault := stdout_fault()):
+            return code
+        from dap3d_core.cli.rendering import messages, say
+
+        saves = ctx.params.get("output") is not None or self.saves
+        words = "; the files of the command are saved" if saves else ""
+        say(messages(), f"cannot write to the standard output: {fault}{words}", "bold red")
+        return code if saves else code or exits.FAILED
 
 
 class Group(click.Group):
@@ -149,6 +165,9 @@ def _run_words(words: list[str], *, as_json: bool) -> int:
     except click.ClickException as error:
         _tell_usage(error, as_json=as_json)
         return error.exit_code
+    except click.exceptions.Abort:  # Ctrl-C, as click has it, before a command has begun
+        print("interrupted", file=sys.stderr)
+        return exits.INTERRUPTED
     except BrokenPipeError:  # the reader has seen enough
         leave_stdout()
         return exits.DONE

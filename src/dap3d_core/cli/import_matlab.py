@@ -24,7 +24,9 @@ HELD = (
 )
 
 
-@click.command("import-matlab", cls=Command, short_help="Make a scene of a MATLAB model.")
+@click.command(
+    "import-matlab", cls=Command, saves=True, short_help="Make a scene of a MATLAB model."
+)
 @click.argument("folder")
 @click.option(
     "-o",

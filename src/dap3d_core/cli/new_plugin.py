@@ -25,7 +25,9 @@ IMPORTED = ("Force", "Function", "Joint", "Point", "Vector")
 OWN = "dap3d_core"
 
 
-@click.command("new-plugin", cls=Command, short_help="Write a package with a type of its own.")
+@click.command(
+    "new-plugin", cls=Command, saves=True, short_help="Write a package with a type of its own."
+)
 @click.argument("name")
 @click.option("--kind", type=click.Choice(("joint", "force", "function")), default="joint",
               show_default=True, help="What the type is.")  # fmt: skip

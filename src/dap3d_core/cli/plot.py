@@ -12,6 +12,7 @@ from dap3d_core.cli.completion import quantities as complete_quantities
 from dap3d_core.cli.completion import results as complete_results
 from dap3d_core.cli.exits import DONE, Refused
 from dap3d_core.cli.group import Command
+from dap3d_core.cli.settings import ALLOW_CODE, JSON, QUIET
 
 ENERGIES = ("energy.kinetic", "energy.potential", "energy.total")
 MM_PER_INCH = 25.4
@@ -19,7 +20,7 @@ MM_PER_INCH = 25.4
 ENDING = ".nc"
 
 
-@click.command(cls=Command, short_help="Draw curves of results, maps of sweeps.")
+@click.command(cls=Command, saves=True, short_help="Draw curves of results, maps of sweeps.")
 @click.argument("result", shell_complete=complete_results)
 @click.argument(
     "quantities", metavar="[RESULT | QUANTITY]...", nargs=-1, shell_complete=complete_quantities
@@ -53,7 +54,10 @@ ENDING = ".nc"
 )
 @click.option("--height", type=float, metavar="MM", help="Height in mm; what fits by default.")
 @click.option("--force", is_flag=True, help="Overwrite an existing picture.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+@click.option("--model", metavar="MODEL", help="The model whose own types (plugin.py) were used.")
+@ALLOW_CODE
+@JSON
+@QUIET
 def plot(
     result: str,
     quantities: tuple[str, ...],
@@ -66,6 +70,8 @@ def plot(
     height: float | None,
     force: bool,
     as_json: bool,
+    quiet: bool,
+    **types: Any,
 ) -> int:
     """Draw quantities of a RESULT, or outputs of a sweep.
 
@@ -101,32 +107,35 @@ def plot(
     """
     files = [result, *(word for word in quantities if word.endswith(ENDING))]
     names = tuple(w for w in quantities if not w.endswith(ENDING))
-    shown, names, cuts = _opened(files, names, x, at)
-    target = None
-    if output is not None or not show:
-        target = Path(output or Path(result).stem + ".png")
-    size = _inches(width), _inches(height)
+    shown, names, cuts = _opened(files, names, x, at, types)
+    target = None if show and output is None else Path(output or Path(result).stem + ".png")
     over: dict[str, Any] = {"x": x, "at": cuts}
+    size = _inches(width), _inches(height)
     _check(shown, names, target, over, {"--width": size[0], "--height": size[1]}, files, force)
     _draw(shown, names, target, over, show, size, force)
     if target is not None:
-        along = {"x": x, "at": cuts} if hasattr(shown, "data_vars") else {"x": x or "t"}
-        _tell({"file": str(target), "results": files, "quantities": names, **along}, as_json)
+        along = over if hasattr(shown, "data_vars") else {"x": x or "t"}
+        found = {"file": str(target), "results": files, "quantities": names, **along}
+        _tell(found, as_json, quiet)
     return DONE
 
 
-def _tell(found: dict[str, Any], as_json: bool) -> None:
+def _tell(found: dict[str, Any], as_json: bool, quiet: bool) -> None:
     from dap3d_core.cli.rendering import output as output_console
     from dap3d_core.cli.rendering import print_json, say
 
     if as_json:
         print_json(found)
-    else:
+    elif not quiet:
         say(output_console(), f"{found['file']} written", whole=True)
 
 
 def _opened(
-    files: Sequence[str], names: tuple[str, ...], x: str | None, at: Sequence[str]
+    files: Sequence[str],
+    names: tuple[str, ...],
+    x: str | None,
+    at: Sequence[str],
+    types: Mapping[str, Any],
 ) -> tuple[Any, tuple[str, ...], dict[str, float]]:
     """What is drawn, the names in it, and where a sweep is cut.
 
@@ -149,7 +158,7 @@ def _opened(
             raise Refused(str(error)) from error
     if at:
         raise Refused(f"--at chooses points of a sweep; {files[0]} is none")
-    runs = dict(zip(_told_apart(files), map(open_result, files), strict=True))
+    runs = dict(zip(_told_apart(files), (open_result(f, **types) for f in files), strict=True))
     return runs if len(runs) > 1 else runs.popitem()[1], names or ENERGIES, {}
 
 
@@ -241,7 +250,11 @@ def _draw(
     try:
         if target is not None:
             save_plot(shown, names, target, **over, width=width, height=height, force=force)
-        if show:
-            show_plot(shown, names, **over, width=width, height=height)
+    except (UnknownNameError, ValueError) as error:
+        raise Refused(str(error)) from error
+    if not show:
+        return
+    try:
+        show_plot(shown, names, **over, width=width, height=height)
     except (UnknownNameError, ResultError, ValueError) as error:
         raise Refused(str(error)) from error

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 FORMATS = {".nc": "nc", ".csv": "csv"}
 
 
-@click.command(cls=Command, short_help="Compute all arrays of a result.")
+@click.command(cls=Command, saves=True, short_help="Compute all arrays of a result.")
 @click.argument("result", shell_complete=complete_results)
 @click.argument("quantities", metavar="[QUANTITY]...", nargs=-1,
                 shell_complete=complete_quantities)  # fmt: skip

@@ -16,25 +16,36 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from dap3d_core.cli.streams import json_stream, leave_stdout
+from dap3d_core.cli.streams import json_stream, leave_stderr, leave_stdout
 
 #: Bits of an integer; Python refuses to write the decimal digits of some 14000.
 LONGEST_INTEGER = 4096
 
 
 class Terminal(Console):
-    """A console without markup, which goes quiet when its reader has gone."""
+    """A console without markup, which goes quiet when its reader has gone or its disk is full."""
 
     def __init__(self, *, stderr: bool = False) -> None:
         super().__init__(
             stderr=stderr, markup=False, highlight=False, emoji=False, no_color=_without_colors()
         )
 
+    def _check_buffer(self) -> None:
+        try:
+            super()._check_buffer()
+        except OSError as error:
+            self._leave(error)
+
     def on_broken_pipe(self) -> None:
         """Write nothing any more; the command goes on to its end."""
+        self._leave(None)
+
+    def _leave(self, error: OSError | None) -> None:
         self.quiet = True
-        if not self.stderr:
-            leave_stdout()
+        if self.stderr:
+            leave_stderr()
+        else:
+            leave_stdout(error)
 
     @property
     def wraps(self) -> bool:
@@ -192,9 +203,7 @@ def print_json(data: Any) -> None:
         stream.write(json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
         stream.flush()
     except OSError as error:
-        leave_stdout()
-        if not isinstance(error, BrokenPipeError):
-            raise
+        leave_stdout(error)
 
 
 def plain(value: Any) -> Any:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dap3d_core.simulation.resuming import Resumption
 
 
-@click.command(cls=Command, short_help="Go on with a run that was ended.")
+@click.command(cls=Command, saves=True, short_help="Go on with a run that was ended.")
 @click.argument("checkpoint", type=click.Path())
 @click.option("-o", "--output", type=click.Path(), metavar="FILE",
               help="Result file; by default that of the run, beside the checkpoint.")  # fmt: skip

@@ -46,7 +46,7 @@ _OPTIONS = (
 )  # fmt: skip
 
 
-@click.command(cls=Command, short_help="Simulate a model, write its result.")
+@click.command(cls=Command, saves=True, short_help="Simulate a model, write its result.")
 @click.argument("model", required=False, shell_complete=complete_models)
 @with_options(*_OPTIONS)
 @click.pass_context

@@ -8,10 +8,19 @@ from typing import TextIO
 
 #: Stdout while it is kept for JSON.
 _alone: TextIO | None = None
+#: Why stdout takes nothing any more, such as a full disk; None as long as it does.
+_fault: OSError | None = None
 
 
 def prepare_streams() -> None:
-    """Streams that were closed lead nowhere; what an encoding cannot write is escaped."""
+    """Streams that were closed lead nowhere; what an encoding cannot write is escaped.
+
+    A width of no columns, which some terminals of services give, counts as none.
+    """
+    global _fault
+    _fault = None
+    if not os.environ.get("COLUMNS", "1").strip(" 0"):
+        del os.environ["COLUMNS"]
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:  # also keeps its number from being given to a result file
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
@@ -58,14 +67,26 @@ def json_stream() -> TextIO:
     return _alone or sys.stdout
 
 
-def leave_stdout() -> None:
-    """Send what is still to come on stdout nowhere, after its reader has gone."""
+def leave_stdout(error: OSError | None = None) -> None:
+    """Send what is still to come on stdout nowhere, after its reader has gone or it has failed.
+
+    Args:
+        error: how it has failed, for ``stdout_fault``.
+    """
+    global _fault
+    if error is not None and not isinstance(error, BrokenPipeError):
+        _fault = error
     _leave(json_stream())
 
 
 def leave_stderr() -> None:
     """The same for stderr that takes nothing: Python would exit with 120 for what is left in it."""
     _leave(sys.stderr)
+
+
+def stdout_fault() -> str:
+    """Why stdout could not be written since ``prepare_streams``; "" where it could."""
+    return "" if _fault is None else _fault.strerror or str(_fault)
 
 
 def _leave(stream: TextIO) -> None:

@@ -74,7 +74,7 @@ _OPTIONS = (
 )  # fmt: skip
 
 
-@click.command(cls=Command, short_help="Run a model at many values of its numbers.")
+@click.command(cls=Command, saves=True, short_help="Run a model at many values of its numbers.")
 @click.argument("model", shell_complete=complete_models)
 @with_options(*_OPTIONS)
 @click.pass_context

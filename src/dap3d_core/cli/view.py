@@ -9,12 +9,13 @@ import click
 
 from dap3d_core.cli.exits import DONE, Refused
 from dap3d_core.cli.group import Command
+from dap3d_core.cli.settings import JSON, QUIET
 
 if TYPE_CHECKING:
     from dap3d_core.view import View
 
 
-@click.command(cls=Command, short_help="Make a page with the moving scene of a result.")
+@click.command(cls=Command, saves=True, short_help="Make a page with the moving scene of a result.")
 @click.argument("result")
 @click.option("-o", "--output", type=click.Path(), metavar="FILE",
               help="The page; RESULT.html by default.")  # fmt: skip
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 @click.option("--allow-code", is_flag=True, help="Load the types of that model's plugin.py.")
 @click.option("--open/--no-open", "opens", default=False, help="Open the page in a browser.")
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+@JSON
+@QUIET
 @click.pass_context
 def view(
     ctx: click.Context,
@@ -41,6 +43,7 @@ def view(
     opens: bool,
     force: bool,
     as_json: bool,
+    quiet: bool,
 ) -> int:
     """Make a page of a RESULT or a sweep: the moving scene, plots, the ledger, settings.
 
@@ -57,8 +60,6 @@ def view(
     Points of a sweep are run again, 50 of many, and chosen in the page by sliders.
     """
     from dap3d_core.cli.files import writable
-    from dap3d_core.cli.rendering import items, messages, print_json, say, size
-    from dap3d_core.cli.rendering import output as output_console
     from dap3d_core.study.dataset import is_sweep
 
     target = Path(output) if output is not None else Path(Path(result).stem + ".html")
@@ -67,10 +68,20 @@ def view(
     free = partial(writable, target, force=force, sources=(Path(result),))
     if is_sweep(result):
         page = _of_sweep(ctx, result, free, quantities, fps, model, allow_code=allow_code,
-                         quiet=as_json)  # fmt: skip
+                         quiet=quiet or as_json)  # fmt: skip
     else:
         page = _of_result(result, free, quantities, fps, model, allow_code=allow_code)
     page.save(target, force=force)
+    _tell(page, target, as_json=as_json, quiet=quiet)
+    if opens:
+        _open(target)
+    return DONE
+
+
+def _tell(page: "View", target: Path, *, as_json: bool, quiet: bool) -> None:
+    from dap3d_core.cli.rendering import items, messages, print_json, say, size
+    from dap3d_core.cli.rendering import output as output_console
+
     points = len(page.data["sweep"]["points"]) if "sweep" in page.data else None
     notes, byte_count = page.data["about"]["view_notes"], target.stat().st_size
     if as_json:
@@ -81,13 +92,10 @@ def view(
         }
         about |= {} if points is None else {"points": points}
         print_json({**about, "quantities": list(page.data["asked"]), "notes": notes})
-    else:
+    elif not quiet:
         items(messages(), notes)
         contents = f"{page.instants} instants" if points is None else f"{points} points"
         say(output_console(), f"{target} written ({size(byte_count)}): {contents}", whole=True)
-    if opens:
-        _open(target)
-    return DONE
 
 
 def _of_result(

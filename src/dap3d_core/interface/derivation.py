@@ -51,7 +51,7 @@ def derive(
     """
     # here, for with the first of them comes numba, which finding types by keyword does not need
     from dap3d_core.kernels import written
-    from dap3d_core.kernels.cache import cache_folder, digest, identities, sources
+    from dap3d_core.kernels.cache import digest, identities, sources
 
     given = {n: k for n, k in type_.kernels().items() if n in GIVEN[type_.kind]}
     offered, here = [repr(q) for q in names.values()], Path(__file__)
@@ -59,12 +59,10 @@ def derive(
     kernels = given.values()
     key = digest(*wanted, *offered, *how, *identities(*kernels), *sources(*kernels))
     name = f"derived-{key}"
-    folder = cache_folder()
-    path = written.place_of(folder, name) if folder is not None else None
-    text = ""
-    if path is None or not path.exists():
+    text = written.kept(name)
+    if text is None:
         text = _text(type_, given, layout, names, wanted)
-        path = written.write(name, text)
+    path = written.write(name, text)
     namespace = written.load(path, name, text)
     return {n: namespace[n] for n in wanted if n in namespace}
 

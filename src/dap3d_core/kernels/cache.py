@@ -19,6 +19,7 @@ from pathlib import Path
 import numba
 from numba import config, njit
 
+from dap3d_core.kernels.sealed_files import SealedCache
 from dap3d_core.kernels.trusted import distrust
 
 #: How the core and the group loops are compiled: no bounds checks, IEEE division, nothing
@@ -83,7 +84,7 @@ def _candidates():
 def digest(*parts: str | bytes) -> str:
     """Digest of sources and of what else decides the code made from them (Python, numba)."""
     seal = hashlib.sha256()
-    for part in (*parts, numba.__version__, f"{sys.version_info[:2]}"):
+    for part in (*parts, numba.__version__, f"{sys.version_info[:2]}", "sealed files"):
         seal.update(part.encode() if isinstance(part, str) else part)
         seal.update(b"\0")
     return seal.hexdigest()[:20]
@@ -136,14 +137,20 @@ def compiled_in(folder: Path | None, name: str, function, **options):
     """Compile with the cache in ``folder/name``; without a folder for this process alone."""
     if not jit_is_on():
         return function
+    compiled_function = njit(**OPTIONS, **options)(function)
     if folder is None:
-        return njit(**OPTIONS, **options)(function)
+        return compiled_function
     with _folder_of_numba:
         before, config.CACHE_DIR = config.CACHE_DIR, str(folder / name)
         try:
-            return njit(cache=True, **OPTIONS, **options)(function)
+            kept = SealedCache(function)
+        except RuntimeError:  # numba found no folder that can be written
+            return compiled_function
         finally:
             config.CACHE_DIR = before
+    if Path(kept.cache_path).is_relative_to(folder / name):  # not another folder of numba's choice
+        compiled_function._cache = kept
+    return compiled_function
 
 
 def reached(*functions) -> tuple[list, list[str]]:

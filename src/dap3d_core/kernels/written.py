@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dap3d_core.kernels.cache import cache_folder
+from dap3d_core.kernels.sealed_files import sealed, sealed_content
 
 
 def write(name: str, text: str) -> Path | None:
@@ -24,17 +25,27 @@ def write(name: str, text: str) -> Path | None:
     if folder is None:
         return None
     path = place_of(folder, name)
-    if path.exists():
+    if kept(name) == text:
         return path
     try:
         path.parent.mkdir(exist_ok=True)
         aside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-        with aside.open("x", encoding="utf-8") as file:
-            file.write(text)
-        os.replace(aside, path)
+        try:
+            with aside.open("xb") as file:
+                file.write(sealed(text.encode()))
+            os.replace(aside, path)
+        finally:
+            aside.unlink(missing_ok=True)
     except OSError:
         return None
     return path
+
+
+def kept(name: str) -> str | None:
+    """The source of a module that an earlier process wrote; None where there is none."""
+    folder = cache_folder()
+    content = None if folder is None else sealed_content(place_of(folder, name))
+    return None if content is None else content.decode()
 
 
 def place_of(folder: Path, name: str) -> Path:
@@ -43,7 +54,10 @@ def place_of(folder: Path, name: str) -> Path:
 
 
 def load(path: Path | None, name: str, text: str) -> dict[str, Any]:
-    """The namespace of a written module; without a path it is made from the text."""
+    """The namespace of a module, made from its text; with a path other modules can import it.
+
+    No bytecode is read or written beside it: that has no checksum.
+    """
     if path is None:
         file = f"<{name}>"
         namespace = {"__name__": f"dap3d_{name.replace('-', '_')}"}
@@ -53,5 +67,5 @@ def load(path: Path | None, name: str, text: str) -> dict[str, Any]:
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
+    exec(compile(text, str(path), "exec"), vars(module))
     return vars(module)

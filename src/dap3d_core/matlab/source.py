@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
+from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.scene import MISSING, Mistake, SceneError
 
 if TYPE_CHECKING:
@@ -108,8 +109,7 @@ def read_source(path: Path) -> Source:
         if info.st_size > LARGEST_FILE:
             what = f"has {info.st_size / 2**20:.1f} MiB; at most {LARGEST_FILE >> 20} MiB are read"
             raise refused(path, what, remedy="build a scene of this size with a script")
-        with path.open("rb") as file:
-            data = file.read(LARGEST_FILE + 1)
+        data = read_regular(path, LARGEST_FILE)
     except OSError as error:
         raise refused(path, f"cannot be read: {error.strerror or error}") from None
     if b"\0" in data:

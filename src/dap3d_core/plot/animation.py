@@ -16,8 +16,8 @@ from dap3d_core.plot.saving import FORMATS as PICTURES
 from dap3d_core.plot.saving import fixed_files
 from dap3d_core.plot.stage import Stage
 from dap3d_core.plot.sticks import pose_at, sticks_of
-from dap3d_core.result import Result, ResultError
-from dap3d_core.result.files import cannot, whole_file
+from dap3d_core.result import Result
+from dap3d_core.result.files import whole_file
 
 #: Pixels; a height of 0 becomes what fits the motion.
 SIZE = (640, 0)
@@ -65,6 +65,7 @@ class Film:
         return f'<img src="{data}" width="{width}" height="{height}" alt="{self.path.stem}">'
 
 
+@fixed_files()
 def animate(
     result: Result,
     path: str | os.PathLike[str],
@@ -217,10 +218,4 @@ def _clock(duration: float, speed: float) -> Callable[[float], str]:
 
 def _write_picture(stage: Stage, part: Path, target: Path) -> None:
     suffix = target.suffix.lower()
-    with fixed_files():
-        try:
-            stage.figure.savefig(part, format=suffix[1:], metadata=PICTURES[suffix])
-        except ResultError:
-            raise
-        except OSError as error:
-            raise cannot("write", target, error) from error
+    stage.figure.savefig(part, format=suffix[1:], metadata=PICTURES[suffix])

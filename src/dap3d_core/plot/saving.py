@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from dap3d_core.plot.drawing import WIDTH, draw, gather, height_of
 from dap3d_core.result import ResultError
-from dap3d_core.result.files import cannot, whole_file
+from dap3d_core.result.files import whole_file
 
 #: Suffix -> what keeps the time of day out of the file: equal figures give equal files.
 FORMATS: dict[str, dict[str, Any]] = {
@@ -127,19 +127,19 @@ def save_figure(
         FigureCanvasAgg(figure)
         paint(figure)
         with whole_file(target, force) as part:
-            try:
-                figure.savefig(part, format=suffix[1:], dpi=dpi, metadata=FORMATS[suffix])
-            except ResultError:
-                raise
-            except OSError as error:
-                raise cannot("write", target, error) from error
+            figure.savefig(part, format=suffix[1:], dpi=dpi, metadata=FORMATS[suffix])
     return target
 
 
 @contextmanager
 def fixed_files() -> Iterator[None]:
-    """Text in an SVG stays text; its identifiers do not change from run to run."""
-    with matplotlib.rc_context({"svg.hashsalt": "dap3d", "svg.fonttype": "none"}):
+    """Text in an SVG stays text; its identifiers do not change from run to run.
+
+    No text is TeX, whatever the user's settings: names of a scene would be source code.
+    """
+    with matplotlib.rc_context(
+        {"svg.hashsalt": "dap3d", "svg.fonttype": "none", "text.usetex": False}
+    ):
         yield
 
 

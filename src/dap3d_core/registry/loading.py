@@ -23,6 +23,7 @@ from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.interface.types import KINDS, TypeBase
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source
 from dap3d_core.registry.overdue import OverdueError, within
+from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.registry.spelling import nearest
 
 #: Plugins are loaded one at a time: the guard holds things that belong to the whole process.
@@ -178,7 +179,7 @@ def _with_keyword(source: Source, types: list[type[TypeBase]]) -> type[TypeBase]
 def _module_of(path: Path) -> ModuleType:
     """Run a file as a module whose source ``inspect`` finds; one module for a path and contents."""
     try:
-        text = path.read_bytes()
+        text = read_regular(path)
     except OSError as error:
         raise PluginError(f"it cannot be read: {error.strerror}") from error
     path = path.resolve()

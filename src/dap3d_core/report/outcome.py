@@ -14,7 +14,7 @@ from dap3d_core.report.recommending import Recommendation, recommend
 from dap3d_core.report.reference import Reference
 from dap3d_core.report.rungs import Setting
 from dap3d_core.result import Result, current_versions
-from dap3d_core.result.files import cannot, whole_file
+from dap3d_core.result.files import whole_file
 
 #: Columns of the table that are not counts.
 COLUMNS = (
@@ -228,10 +228,7 @@ class Report:
         """
         target = Path(path)
         with whole_file(target, force) as part:
-            try:
-                part.write_text(self.to_csv(), "utf-8")
-            except OSError as error:
-                raise cannot("write", target, error) from error
+            part.write_text(self.to_csv(), "utf-8")
         return target
 
     def plot(self, path: str | os.PathLike[str], force: bool = False, **options: Any) -> Path:

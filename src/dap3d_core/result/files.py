@@ -3,13 +3,17 @@
 import errno
 import os
 import secrets
+import shutil
 import stat
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from dap3d_core.registry.regular_files import kind_of, read_regular
 from dap3d_core.result.errors import ResultError
 
+#: A disk with less room, bytes, is full: a block of a file no longer fits.
+_NO_ROOM = 2**16
 #: So many unfinished files may lie beside one another.
 _MOST_PARTS = 1000
 
@@ -17,22 +21,33 @@ _MOST_PARTS = 1000
 def cannot(verb: str, path: Path, error: BaseException) -> ResultError:
     """The error for a file that the system or a library refuses, in a sentence."""
     reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    from_library = "HDF error" in reason
     if getattr(error, "errno", None) in (errno.EACCES, errno.EPERM):
         reason = "no permission"
+        from_library = os.access(path.parent, os.W_OK)  # so it calls whatever goes wrong
+    if verb == "write" and from_library and _is_full(path.parent):
+        reason = os.strerror(errno.ENOSPC)
     elif "HDF error" in reason:
         reason = f"the library says {reason!r}; is the disk full?"
     return ResultError(f"cannot {verb} {path}: {reason}")
+
+
+def _is_full(folder: Path) -> bool:
+    """Whether the disk of a folder has next to no room left."""
+    try:
+        return shutil.disk_usage(folder).free < _NO_ROOM
+    except OSError:
+        return False
 
 
 def beginning(file: Path, count: int) -> bytes:
     """The first bytes of a file, as many as there are of them.
 
     Raises:
-        ResultError: there is no such file, it is a folder, or the system refuses.
+        ResultError: there is no such file, it is no regular file, or the system refuses.
     """
     try:
-        with file.open("rb") as stream:
-            return stream.read(count)
+        return read_regular(file, count)
     except FileNotFoundError as error:
         raise ResultError(f"cannot read {file}: there is no such file") from error
     except IsADirectoryError as error:
@@ -42,22 +57,22 @@ def beginning(file: Path, count: int) -> bytes:
 
 
 def check_target(path: str | os.PathLike[str], force: bool = False) -> Path:
-    """The path of a file that may be written.
+    """The path of a file that may be written; a link is followed to the file that it stands for.
 
     Raises:
         ResultError: its folder does not exist, it is no file, or it exists and ``force`` is off.
     """
     target = Path(path)
     try:
+        if target.is_symlink():
+            return _link_target(target, force)
         mode = _mode_of(target)  # asked once: another process may make it meanwhile
         if mode and stat.S_ISREG(mode):
             fault = "" if force else "the file exists; force overwrites it"
         elif mode and stat.S_ISDIR(mode):
             fault = "it is a folder; name a file in it"
         elif mode:
-            fault = "it is no regular file"
-        elif target.is_symlink():
-            fault = "" if force else "it is a link that leads nowhere; force replaces it"
+            fault = f"it is no regular file but {kind_of(mode)}"
         elif not target.parent.is_dir():
             fault = f"there is no folder {target.parent}"
         else:
@@ -86,6 +101,24 @@ def check_utf8(verb: str, path: str | os.PathLike[str]) -> None:
             f"cannot {verb} {path}: its name, or that of a folder above it, is not UTF-8, which "
             "the NetCDF library needs; rename it, or take another folder"
         ) from error
+
+
+def _link_target(link: Path, force: bool) -> Path:
+    """The file that a link stands for, as ``check_target`` has it: the link itself stays.
+
+    A link of the system, such as /dev/stdout, may stand for an open file that has no name.
+    """
+    target = Path(os.path.realpath(link))
+    mode = _mode_of(link)
+    if mode and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+        fault = f"it is no regular file but {kind_of(mode)}"
+    elif mode and not (target.exists() and target.samefile(link)):
+        fault = "the file that it stands for has no name"
+    elif not mode and not force:
+        fault = f"it is a link that leads nowhere; force makes the file {target}"
+    else:
+        return check_target(target, force)
+    raise ResultError(f"cannot write {link}: {fault}")
 
 
 def _mode_of(path: Path) -> int:
@@ -194,12 +227,17 @@ def whole_file(path: str | os.PathLike[str], force: bool = False) -> Iterator[Pa
         force: whether an existing file is overwritten.
 
     Raises:
-        ResultError: the path cannot be written to.
+        ResultError: the path cannot be written to; also for an OSError of what writes.
     """
     target = check_target(path, force)
     part = reserve(target)
     try:
-        yield part
+        try:
+            yield part
+        except OSError as error:
+            if isinstance(error, ResultError):
+                raise
+            raise cannot("write", target, error) from error
         check_target(path, force)
         put_in_place(part, target, force)
     finally:

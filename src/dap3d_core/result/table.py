@@ -9,7 +9,7 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.result.errors import ResultError
-from dap3d_core.result.files import cannot, whole_file
+from dap3d_core.result.files import whole_file
 from dap3d_core.result.kinds import ACTIONS, AXES, BODY, KINDS, POINT_ARRAYS, WHOLE
 from dap3d_core.result.quantities import find
 from dap3d_core.result.reactions import DENSE_ROWS, jacobians
@@ -122,14 +122,8 @@ def write_csv(
     Raises:
         ResultError: the file cannot be written.
     """
-    with whole_file(path, force) as part:
-        try:
-            with part.open("w", newline="", encoding="utf-8") as file:
-                _write(file, result, columns, jacobian or [])
-        except OSError as error:
-            if isinstance(error, ResultError):
-                raise
-            raise cannot("write", path, error) from error
+    with whole_file(path, force) as part, part.open("w", newline="", encoding="utf-8") as file:
+        _write(file, result, columns, jacobian or [])
 
 
 def _write(file: TextIO, result: "Result", columns: list[Column], more: list[Column]) -> None:

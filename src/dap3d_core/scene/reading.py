@@ -7,6 +7,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
+from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.registry.spelling import nearest
 from dap3d_core.scene.description import (
     HEADER_KEYS,
@@ -236,8 +237,7 @@ def _read(path: Path) -> str:
         if info.st_size > LARGEST_FILE:
             what = f"has {info.st_size / 2**20:.0f} MiB; at most {LARGEST_FILE >> 20} MiB are read"
             raise _refused(str(path), what, remedy="build a scene of this size with a script")
-        with path.open("rb") as file:  # no more than was promised, should it be growing
-            data = file.read(LARGEST_FILE + 1)
+        data = read_regular(path, LARGEST_FILE)
     except OSError as error:
         raise _unreadable(path, error) from None
     if b"\0" in data:

@@ -48,11 +48,12 @@ def save(scene: Scene, path: str | Path) -> Path:
     try:
         path = Path(path)
         path = path / "scene.toml" if path.is_dir() else path
-        aside = path.with_name(f".{uuid.uuid4().hex}.toml")
+        written = Path(os.path.realpath(path))  # a link stays one
+        aside = written.with_name(f".{uuid.uuid4().hex}.toml")
         try:
             with aside.open("xb") as file:
                 file.write(text.encode("utf-8"))
-            os.replace(aside, path)
+            os.replace(aside, written)
         finally:
             aside.unlink(missing_ok=True)
     except (

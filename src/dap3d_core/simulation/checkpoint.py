@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.integrators.work import MOST_COUNTED
 from dap3d_core.result import ResultError, current_versions
-from dap3d_core.result.files import beginning, cannot, whole_file
+from dap3d_core.result.files import beginning, whole_file
 from dap3d_core.result.limits import Form, are_texts, check_forms, is_number, is_table_of_texts
 from dap3d_core.scene import METHODS
 from dap3d_core.simulation.errors import CheckpointError
@@ -92,16 +92,15 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
         "versions": current_versions(),
         **checkpoint.header,
     }
-    with whole_file(path, force=True) as part:
-        try:
-            with zipfile.ZipFile(part, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
-                archive.writestr(_HEADER, json.dumps(header))
-                for name, array in checkpoint.arrays.items():
-                    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                        plain = np.ascontiguousarray(array)
-                        np.lib.format.write_array(member, plain, (1, 0), allow_pickle=False)
-        except OSError as error:
-            raise cannot("write", path, error) from error
+    with (
+        whole_file(path, force=True) as part,
+        zipfile.ZipFile(part, "w", zipfile.ZIP_STORED, allowZip64=True) as archive,
+    ):
+        archive.writestr(_HEADER, json.dumps(header))
+        for name, array in checkpoint.arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                plain = np.ascontiguousarray(array)
+                np.lib.format.write_array(member, plain, (1, 0), allow_pickle=False)
 
 
 def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:

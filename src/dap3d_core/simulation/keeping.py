@@ -95,6 +95,11 @@ class Keeper:
             for part in self._parts:
                 self._writer.append(part)
 
+    @property
+    def part(self) -> Path | None:
+        """The unfinished file that holds the rows written so far; None where there is none."""
+        return None if self._writer is None or not self._writer.count else self._writer.part
+
     def to_disk(self, record: Callable[[], Record]) -> None:
         """Wait until all rows are on the disk."""
         self.write(record)

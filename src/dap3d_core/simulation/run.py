@@ -140,6 +140,9 @@ class Run:
                 self._advance(progress)
         except BaseException as error:
             if isinstance(error, ResultError):  # the disk: what is there stays as it is
+                error.part = keeper.part  # type: ignore[attr-defined]
+                if self.saver is not None and self.saver.has_written:
+                    error.checkpoint = self.saver.path  # type: ignore[attr-defined]
                 raise
             self._take_rows()
             status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"

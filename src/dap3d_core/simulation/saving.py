@@ -32,6 +32,7 @@ class Saver:
 
     Attributes:
         path: where they stand.
+        has_written: whether there is one of this run.
     """
 
     def __init__(self, run: "Run", seconds: float, *, force: bool) -> None:
@@ -52,6 +53,7 @@ class Saver:
                 f"{self.path} exists: a run that was ended goes on from it (dap3d resume); force "
                 "gives it up"
             )
+        self.has_written = False
         self._run, self._seconds = run, seconds
         self._next = time.perf_counter() + seconds
 
@@ -88,6 +90,7 @@ class Saver:
     def write(self) -> None:
         """Write a checkpoint of the run as it stands, once its rows are in a file."""
         write_checkpoint(self.path, checkpoint_of(self._run))
+        self.has_written = True
 
     def remove(self) -> None:
         """The run has ended by itself: nothing goes on from here. The checkpoint goes last.

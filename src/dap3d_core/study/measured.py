@@ -1,6 +1,7 @@
 """Measured data: what they may be given as, checked, and as plain arrays."""
 
 import csv
+import io
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,6 +11,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.registry.spelling import nearest
 from dap3d_core.scene import MISSING, Mistake
 from dap3d_core.study.parameters import is_number
@@ -119,9 +121,9 @@ def _columns(measured: Any, mistakes: list[Mistake]) -> dict[str, Any]:
 def _of_file(path: Path, mistakes: list[Mistake]) -> dict[str, Any]:
     """The columns of a CSV file; units in brackets behind names, and # lines, are left out."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [(k, row) for k, row in enumerate(csv.reader(file), start=1)
-                    if any(row) and not row[0].startswith("#")]  # fmt: skip
+        text = io.StringIO(read_regular(path).decode("utf-8-sig"), newline="")
+        rows = [(k, row) for k, row in enumerate(csv.reader(text), start=1)
+                if any(row) and not row[0].startswith("#")]  # fmt: skip
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         mistakes.append(Mistake("measured", str(path), f"cannot be read as a CSV file: {why}"))

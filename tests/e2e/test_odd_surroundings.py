@@ -1,0 +1,146 @@
+"""Commands in a shell that is not as usual: full disks, pipes for files, a folder that is gone."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import dap3d_core as dap
+from dap3d_core.cli import group, main
+
+from .conftest import COMMAND, environment
+
+FULL = Path("/dev/full")
+posix = pytest.mark.skipif(os.name != "posix", reason="pipes and links as POSIX has them")
+has_full = pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full")
+
+
+def in_shell(words, folder, **variables):
+    """Run a line of a shell, in which $DAP3D is the command."""
+    found = subprocess.run(
+        words, shell=True, cwd=folder, env=environment(DAP3D=" ".join(COMMAND), **variables),
+        stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=100, check=False,
+    )  # fmt: skip
+    assert "Traceback" not in found.stderr
+    return found
+
+
+# ---------------------------------------------------------------- streams
+
+
+@has_full
+@pytest.mark.parametrize("option", ["", "--json"])
+def test_a_result_is_saved_though_its_words_are_lost(scene_file, option):
+    """Stdout on a full disk: the exit code is that of the run, stderr says what was lost."""
+    folder = scene_file().parent
+    found = in_shell(f"$DAP3D run fall.toml --t-end 0.1 {option} > /dev/full", folder)
+    assert found.returncode == 0
+    assert found.stderr == (
+        "cannot write to the standard output: No space left on device; the files of the command "
+        "are saved\n"
+    )
+    assert dap.open(folder / "fall.nc").status == "done"
+
+
+@has_full
+def test_a_command_whose_words_are_all_it_makes_fails_with_them(scene_file):
+    found = in_shell("$DAP3D check fall.toml > /dev/full", scene_file().parent)
+    assert found.returncode == 1
+    assert "cannot write to the standard output: No space left on device" in found.stderr
+
+
+@has_full
+def test_a_full_stderr_ends_no_run(scene_file):
+    folder = scene_file().parent
+    found = in_shell("$DAP3D run fall.toml --t-end 0.1 2> /dev/full", folder)
+    assert (found.returncode, "fall.nc written" in found.stdout) == (0, True)
+
+
+@pytest.mark.parametrize("columns", ["0", "00", ""])
+def test_a_width_of_no_columns_is_none(scene_file, monkeypatch, capfd, columns):
+    """Some services export COLUMNS=0; no output at all would be the answer to that."""
+    scene = scene_file()
+    monkeypatch.setenv("COLUMNS", columns)
+    assert main(["check", str(scene)]) == 0
+    assert "no mistakes found" in capfd.readouterr().out
+    monkeypatch.setenv("COLUMNS", columns)
+    assert main(["check", "not-there"]) == 2
+    assert "no shipped model of that name" in capfd.readouterr().err
+
+
+# ---------------------------------------------------------------- files that are none
+
+
+@posix
+@pytest.mark.parametrize(
+    "words",
+    ["info f.nc", "post f.nc", "plot f.nc a.r", "view f.nc", "animate f.nc", "rerun f.nc",
+     "resume f.nc", "check f.nc", "run f.nc", "resume /dev/null", "info /dev/zero"],
+)  # fmt: skip
+def test_a_pipe_or_a_device_is_not_waited_for(dap3d, refuse, words):
+    os.mkfifo(dap3d.folder / "f.nc")
+    assert "regular file" in refuse(*words.split())
+
+
+@posix
+def test_a_sweep_does_not_wait_for_a_part_that_is_a_pipe(scene_file, refuse):
+    scene = scene_file()
+    os.mkfifo(scene.parent / "s.nc.part")
+    words = f"sweep {scene} --vary bodies.stone.mass=1:2:2 --keep stone.r.z --t-end 0.1 -o s.nc"
+    assert "no regular file but a pipe" in refuse(*words.split(), "--resume")
+
+
+@posix
+def test_own_types_and_measured_data_are_no_pipes(scene_file, refuse, tmp_path):
+    scene = scene_file()
+    os.mkfifo(tmp_path / "plugin.py")
+    assert main(["check", str(scene)]) == 0  # without --allow-code it is not opened
+    os.mkfifo(tmp_path / "data.csv")
+    with pytest.raises(dap.SceneError, match="no regular file but a pipe"):
+        dap.fit(dap.load(scene), {"bodies.stone.mass": (0.5, 2.0)}, tmp_path / "data.csv")
+
+
+@posix
+def test_a_file_of_the_system_without_a_size_is_empty(refuse):
+    """Some never end, or have nothing to give yet: /proc/kmsg would be waited for."""
+    if not Path("/proc/self/status").exists():
+        pytest.skip("no /proc")
+    assert "empty" in refuse("info", "/proc/self/status")
+
+
+@posix
+def test_a_link_of_the_system_stays_and_its_pipe_is_refused(scene_file):
+    """As root, ``-o /dev/stdout --force`` replaced the system's link by a result."""
+    folder = scene_file().parent
+    (folder / "stdout").symlink_to("/proc/self/fd/1")
+    if not (folder / "stdout").exists():
+        pytest.skip("no /proc")
+    piped = in_shell("$DAP3D run fall.toml --t-end 0.1 -o stdout --force | cat", folder)
+    assert "cannot write stdout: it is no regular file but a pipe" in piped.stderr
+    to_file = in_shell("$DAP3D run fall.toml --t-end 0.1 -o stdout --force > r.nc", folder)
+    assert to_file.returncode == 2
+    assert "stdout is where the words of this command go" in to_file.stderr
+    assert (folder / "stdout").is_symlink()
+    assert sorted(p.name for p in folder.iterdir()) == ["fall.toml", "r.nc", "stdout"]
+
+
+# ---------------------------------------------------------------- the shell itself
+
+
+@posix
+def test_a_current_folder_that_is_gone_is_named(tmp_path):
+    found = in_shell("mkdir gone && cd gone && rmdir ../gone && $DAP3D check pen1", tmp_path)
+    assert (found.returncode, found.stdout) == (2, "")
+    assert found.stderr == "the current folder is no longer there; change to another one (cd)\n"
+
+
+def test_ctrl_c_while_options_are_parsed_is_an_interruption(monkeypatch, capfd):
+    """The words of a command line are parsed before a command can answer for itself."""
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(group.Command, "parse_args", interrupted)
+    assert main(["models"]) == 130
+    assert capfd.readouterr().err.strip() == "interrupted"

@@ -1,0 +1,93 @@
+"""The current folder may be that of a stranger's model: no file in it governs what dap3d does.
+
+But for the files that a command names. matplotlib and numba read settings files there when they are
+imported, so each test is a process of its own.
+"""
+
+import os
+
+import pytest
+from support.falling import SCENE
+from support.process import run, start
+
+import dap3d_core as dap
+
+PLOT = """
+import dap3d_core as dap
+from dap3d_core.plot import animate, save_plot
+result = dap.open("run.nc")
+save_plot(result, ["stone.r"], "curve.svg", force=True)
+animate(result, "snapshot.svg", at=0.0, force=True)
+import matplotlib
+print(matplotlib.rcParams["lines.linewidth"], matplotlib.rcParams["text.usetex"])
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with a result."""
+    (tmp_path / "scene.toml").write_text(SCENE)
+    dap.simulate(dap.load(tmp_path / "scene.toml"), t_end=0.2, dt=0.1).save(tmp_path / "run.nc")
+    return tmp_path
+
+
+@pytest.mark.parametrize("settings", [b"text.usetex: True\nlines.linewidth: 77\n", b"\xff\xfe"])
+def test_a_matplotlibrc_does_not_govern_pictures(folder, settings):
+    """With usetex the name of a body would be TeX source; what is no text would stop the import."""
+    first = run(PLOT, cwd=folder, MPLCONFIGDIR=folder / "none")
+    pictures = [(folder / name).read_bytes() for name in ("curve.svg", "snapshot.svg")]
+    (folder / "matplotlibrc").write_bytes(settings)
+    assert run(PLOT, cwd=folder, MPLCONFIGDIR=folder / "none") == first
+    assert "77" not in first
+    assert [(folder / n).read_bytes() for n in ("curve.svg", "snapshot.svg")] == pictures
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes as POSIX has them")
+def test_a_matplotlibrc_that_is_a_pipe_is_not_waited_for(folder):
+    os.mkfifo(folder / "matplotlibrc")
+    assert run(PLOT, cwd=folder, MPLCONFIGDIR=folder / "none").endswith("False")
+
+
+def test_names_are_no_tex_whatever_the_users_own_settings(folder):
+    """The user may have TeX set for pictures of his own; here LaTeX would be started."""
+    (folder / "config").mkdir()
+    (folder / "config" / "matplotlibrc").write_text("text.usetex: True\n")
+    (folder / "bin").mkdir()
+    latex = folder / "bin" / "latex"
+    latex.write_text("#!/bin/sh\ntouch tex-was-here\nexit 1\n")
+    latex.chmod(0o755)
+    path = f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}"
+    assert run(PLOT, cwd=folder, MPLCONFIGDIR=folder / "config", PATH=path).endswith("True")
+    assert not list(folder.rglob("tex-was-here"))
+
+
+@pytest.mark.parametrize("settings", ["disable_jit: 1\nopt: abc\n", "- no\n- table\n"])
+def test_settings_of_the_compiler_are_not_read(tmp_path, settings):
+    """Neither as numba is imported nor later, in the folder of that time."""
+    script = """
+import warnings; warnings.simplefilter("error")
+import os
+from dap3d_core.kernels.cache import compiled_in, jit_is_on
+os.chdir("later")
+def twice(x): return 2.0 * x
+print(jit_is_on(), compiled_in(None, "", twice)(2.0), jit_is_on())
+"""
+    (tmp_path / "later").mkdir()
+    for place in (tmp_path, tmp_path / "later"):
+        (place / ".numba_config.yaml").write_text(settings)
+    assert run(script, cwd=tmp_path) == "True 4.0 True"
+
+
+def test_a_variable_that_numba_cannot_read_is_told_in_a_sentence(tmp_path):
+    """It is ignored; numba's own warning is a traceback."""
+    process = start("import dap3d_core.kernels", cwd=tmp_path, NUMBA_NUM_THREADS="abc")
+    out, err = process.communicate(timeout=100)
+    assert (process.returncode, out) == (0, "")
+    assert "NUMBA_NUM_THREADS is ignored: numba cannot read its value 'abc'" in err
+    assert "Traceback" not in err
+
+
+def test_a_script_that_has_set_matplotlib_up_keeps_it(folder):
+    """Its own figures, and so its own decision: only our import leaves the file out."""
+    (folder / "matplotlibrc").write_text("lines.linewidth: 77\n")
+    assert run(f"import matplotlib\n{PLOT}", cwd=folder).startswith("77.0")
