@@ -98,13 +98,13 @@ def test_flags_are_those_of_the_command_line():
 # ---------------------------------------------------------------------------- recommending
 
 
-def run(integrator, time_s, error, spread=0.0, repeats=5):
+def run(integrator, time_s, error, spread=0.0, repeats=5, rhs=1234):
     return Run(
         setting=Setting("standard", integrator, 1e-6, 1e-8),
         time_s=time_s, time_min_s=time_s - spread, time_max_s=time_s + spread, repeats=repeats,
         error=error, final_position_error=0.0, energy_error=0.0, constraint_error=0.0,
         constraint_velocity_error=0.0, constraint_acceleration_error=0.0, quaternion_error=0.0,
-        counts={"steps": 1, "rejected": 0, "rhs": 1234, "projections": 0},
+        counts={"steps": 1, "rejected": 0, "rhs": rhs, "projections": 0},
     )  # fmt: skip
 
 
@@ -129,6 +129,37 @@ def test_a_difference_within_the_spread_of_the_timings_is_called_so():
     assert "within the spread of the timings" in recommend(runs, None, 1e-5).reason
     once = [run("a", 2.0, 1e-7, repeats=1), run("b", 2.1, 1e-7, repeats=1)]
     assert "each timed once" in recommend(once, None, 1e-5).reason
+
+
+@pytest.mark.parametrize("timing", [dict(repeats=1), dict(spread=20.0)])
+def test_what_timings_cannot_tell_goes_by_evaluations(timing):
+    """A run that another program held up is no worse for it: here the one of half the work."""
+    made = [(22.0, 1e-3, 440), (51.0, 1e-7, 500), (40.0, 1e-8, 800), (60.0, 1e-9, 1200)]
+    runs = [run("a", time_s, error, rhs=rhs, **timing) for time_s, error, rhs in made]
+    advice = recommend(runs, None, 1e-5)
+    assert advice.run is runs[1]
+    assert "takes the least work of 3 settings" in advice.reason
+
+
+def test_evaluations_of_another_integrator_count_at_their_own_cost():
+    """One of radau costs a factorisation or more: few of them are no sign of little work."""
+    runs = [run("a", 20.0, 1e-7, repeats=1, rhs=2000), run("b", 30.0, 1e-7, repeats=1, rhs=300)]
+    assert recommend(runs, None, 1e-5).run is runs[0]
+
+
+def test_timings_that_can_tell_decide():
+    runs = [run("a", 20.0, 1e-7, spread=1.0, rhs=900), run("a", 23.0, 1e-7, spread=1.0, rhs=100)]
+    assert recommend(runs, None, 1e-5).run is runs[0]
+
+
+@pytest.mark.parametrize("integrator", ["adams", "radau"])
+def test_an_integrator_without_fixed_steps_can_be_asked_for(integrator):
+    """None of the settings that are tried beforehand gives it a step."""
+    found = dap.report(
+        problems.pendulum(), quick=True, t_end=0.1, dt=0.1, integrators=[integrator],
+        methods=["standard"],
+    )  # fmt: skip
+    assert {r.integrator for r in found.runs} == {integrator}
 
 
 def test_a_target_that_cannot_be_reached_or_told_is_said_so():

@@ -145,14 +145,13 @@ def _verdict(ok: bool | None) -> Text:
     return Text("yes", style="green") if ok else Text("NO", style="bold red")
 
 
-def show_state(console: Terminal, title_words: str, bodies: dict[str, Any], more: int) -> None:
+def show_state(console: Terminal, title_words: str, bodies: dict[str, Any]) -> None:
     """Coordinates and velocities of bodies, as the manual reports them.
 
     Args:
         console: where.
         title_words: the heading.
         bodies: name -> {"r": 3, "p": 4, "r_dot": 3, "w": 3 numbers}.
-        more: how many further bodies there are.
     """
     title(console, title_words)
     say(console, _line("", ["x, e0", "y, e1", "z, e2", "e3"]))
@@ -160,8 +159,6 @@ def show_state(console: Terminal, title_words: str, bodies: dict[str, Any], more
         say(console, name, "cyan", indent=2)
         for symbol, values in state.items():
             say(console, _line(symbol, [_short(x) for x in values]))
-    if more:
-        say(console, f"and {count(more, 'body', 'bodies')} more", indent=2)
 
 
 def _line(symbol: str, words: list[str]) -> str:

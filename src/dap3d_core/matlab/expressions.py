@@ -30,7 +30,7 @@ DEEPEST = 50
 #: Entries of all arrays that the expressions of a file come to, at most: some seconds of work.
 MOST_ENTRIES = 3_000_000
 
-_NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+_NUMBER = re.compile(r"(\d++\.?\d*+|\.\d++)([eEdD][+-]?\d++)?")
 _OUTSIDE = {
     "lambda": "a function handle",
     "range": "a range",

@@ -22,7 +22,7 @@ LARGEST_FILE = 2**20
 QUICK, PARSING = 8192, 10.0
 #: Names joined by dots, at most: of more the parser takes memory with the square of their number.
 CHAIN = 100
-_LONG_CHAIN = re.compile(rf"(?:[^\W\d]\w*+\s*+\.\s*+){{{CHAIN}}}")
+_LONG_CHAIN = re.compile(rf"(?<!\w)(?:[^\W\d]\w*+\s*+\.\s*+){{{CHAIN}}}")
 #: So much more memory a parser may take, bytes.
 MEMORY = 2**29
 #: Comments of many lines, %{ to %}, at most.

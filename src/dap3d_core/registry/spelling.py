@@ -1,13 +1,23 @@
 """The nearest right spelling of a word that is wrong."""
 
+from bisect import bisect_left
 from collections.abc import Collection
 from difflib import get_close_matches
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
-#: Beyond this many words only those of similar length that begin alike are compared.
-MANY_WORDS = 2000
+#: Of more words only those are compared that begin or end most alike: so many either way.
+MANY_WORDS, NEIGHBOURS = 200, 25
 #: Nothing is similar to a longer word.
-LONGEST = 200
+LONGEST = 80
+
+
+class _Words(NamedTuple):
+    """Words regardless of case, sorted by their beginnings, and turned round by their ends."""
+
+    word_of: dict[str, str]
+    forward: list[str]
+    backward: list[str]
 
 
 def nearest(word: Any, allowed: Collection[str]) -> str:
@@ -17,18 +27,36 @@ def nearest(word: Any, allowed: Collection[str]) -> str:
     """
     if not isinstance(word, str) or not 0 < len(word) <= LONGEST:
         return ""
-    wanted = word.casefold()
-    forms: dict[str, str] = {}
-    few = len(allowed) <= MANY_WORDS
-    for candidate in allowed:
-        form = candidate.casefold()
-        if few or (form[:1] == wanted[:1] and abs(len(form) - len(wanted)) <= 2):
-            forms.setdefault(form, candidate)
-    if wanted in forms:
-        return forms[wanted]
-    near = get_close_matches(wanted, list(forms)[:MANY_WORDS], 1)
+    wanted, words = word.casefold(), _sorted_words(tuple(allowed))
+    if wanted in words.word_of:
+        return words.word_of[wanted]
+    forms = _alike(wanted, words) if len(words.word_of) > MANY_WORDS else list(words.word_of)
+    near = get_close_matches(wanted, forms, 1)
     near = near or sorted((f for f in forms if _abbreviates(f, wanted)), key=len)[-1:]
-    return forms[near[0]] if near else ""
+    return words.word_of[near[0]] if near else ""
+
+
+@lru_cache(maxsize=4)
+def _sorted_words(allowed: tuple[str, ...]) -> _Words:
+    """The words, kept for the next mistake: a scene may have many, in references to many names."""
+    word_of: dict[str, str] = {}
+    for candidate in allowed:
+        word_of.setdefault(candidate.casefold(), candidate)
+    if len(word_of) <= MANY_WORDS:
+        return _Words(word_of, [], [])
+    return _Words(word_of, sorted(word_of), sorted(form[::-1] for form in word_of))
+
+
+def _alike(wanted: str, words: _Words) -> list[str]:
+    """The words that share the longest beginnings, and the longest ends, with another."""
+    found = _neighbours(wanted, words.forward)
+    found += [form[::-1] for form in _neighbours(wanted[::-1], words.backward)]
+    return list(dict.fromkeys(found))
+
+
+def _neighbours(wanted: str, ordered: list[str]) -> list[str]:
+    at = bisect_left(ordered, wanted)
+    return ordered[max(0, at - NEIGHBOURS) : at + NEIGHBOURS]
 
 
 def _abbreviates(form: str, wanted: str) -> bool:

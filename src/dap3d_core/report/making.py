@@ -124,7 +124,10 @@ def _prepared(
     settings = attrs.evolve(scene.simulation, **changes)
     tried = [settings]
     tried += [attrs.evolve(settings, method=name) for name in methods or ()]
-    tried += [attrs.evolve(settings, integrator=name, step=1.0) for name in integrators or ()]
+    tried += [
+        attrs.evolve(settings, integrator=name, step=1.0 if name in FIXED_STEP else None)
+        for name in integrators or ()
+    ]
     tried += [attrs.evolve(settings, rtol=rtol) for rtol in tolerances or ()]
     tried += [attrs.evolve(settings, step=step) for step in steps or ()]
     for one in tried:

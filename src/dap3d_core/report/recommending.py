@@ -1,6 +1,7 @@
 """Which setting to take for an error that is wanted, and why, in words."""
 
 import math
+import statistics
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 #: An error is smaller than another one if it is below this part of it: equal motions differ in
 #: their rounding.
 BETTER = 0.95
+#: A run that was timed once may have taken so many times its usual time: another program ran.
+ONCE = 3.0
 
 
 @attrs.frozen
@@ -65,6 +68,9 @@ def recommend(
 ) -> Recommendation:
     """The fastest run whose error is known to be within the target.
 
+    Where timings cannot tell, that with the least work is: its evaluations of the right-hand side,
+    at the cost that one has over all runs of its method and integrator.
+
     Raises:
         ValueError: the target is not a positive number.
     """
@@ -73,13 +79,36 @@ def recommend(
     reaching = [run for run in runs if known_error(run, uncertainty) <= target_error]
     if not reaching:
         return Recommendation(target_error, None, _why_none(runs, uncertainty, target_error), "")
-    best = min(reaching, key=lambda run: run.time_s)
+    fastest = min(reaching, key=lambda run: run.time_s)
+    costs = _costs(runs)
+    best = min(
+        (run for run in reaching if _cannot_tell(fastest, run)),
+        key=lambda run: (run.counts["rhs"] * costs[run.method, run.integrator], run.time_s),
+    )
     return Recommendation(target_error, best, _why(best, reaching), best.setting.flags)
 
 
+def _cannot_tell(fast: "Run", slow: "Run") -> bool:
+    """Whether the timings of two runs leave open which of them is the faster one."""
+    if min(fast.repeats, slow.repeats) < 2:
+        return slow.time_s <= ONCE * fast.time_s
+    return slow.time_min_s <= fast.time_max_s
+
+
+def _costs(runs: Sequence["Run"]) -> dict[tuple[str, str], float]:
+    """Seconds a right-hand side of each method and integrator: the median over their runs."""
+    found: dict[tuple[str, str], list[float]] = {}
+    for run in runs:
+        each = found.setdefault((run.method, run.integrator), [])
+        each.append(run.time_s / max(run.counts["rhs"], 1))
+    return {series: statistics.median(costs) for series, costs in found.items()}
+
+
 def _why(best: "Run", reaching: Sequence["Run"]) -> str:
+    is_fastest = best.time_s <= min(run.time_s for run in reaching)
+    rank = "is the fastest" if is_fastest else "takes the least work"
     words = (
-        f"{best.setting} is the fastest of {len(reaching)} settings that reach it, with an error "
+        f"{best.setting} {rank} of {len(reaching)} settings that reach it, with an error "
         f"of {best.error:.1e} in {1e3 * best.time_s:.3g} ms and {best.counts['rhs']:,} right-hand "
         "sides"
     )
@@ -93,7 +122,7 @@ def _why(best: "Run", reaching: Sequence["Run"]) -> str:
     words += f"; next is {other.setting} at {ratio:.2g} times its time"
     if min(best.repeats, other.repeats) < 2:
         return f"{words}, each timed once"
-    within = other.time_min_s <= best.time_max_s
+    within = _cannot_tell(*sorted((best, other), key=lambda run: run.time_s))
     return f"{words}, which is within the spread of the timings" if within else words
 
 

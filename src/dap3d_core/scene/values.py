@@ -10,6 +10,8 @@ from dap3d_core.scene.plain import plain
 
 #: Beyond this size products of two numbers leave double precision.
 LARGEST = 1e100
+#: Text that is a number in quotes; of longer text nobody needs to be told so.
+_NUMBER, LONGEST_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"), 60
 
 Vector3 = tuple[float, float, float]
 
@@ -36,7 +38,7 @@ def _number_fault(value: Any) -> float | Fault:
     should = "should be a number"
     if type(value) is str:
         written = value.strip().replace(",", ".")
-        is_number = re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", written)
+        is_number = len(written) <= LONGEST_NUMBER and _NUMBER.fullmatch(written)
         return Fault(f"{should}, not text", f"write {written} without quotes" if is_number else "")
     if type(value) is bool:
         return Fault(f"{should}, not a truth value")

@@ -1,11 +1,13 @@
 """The points of a study on a cluster, by dask: tasks of some points each."""
 
+import asyncio
 import hashlib
 import logging
 import time
 import uuid
 from collections import OrderedDict
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from threading import Lock
 from typing import Any, NoReturn
@@ -59,13 +61,26 @@ def connect(address: str, timeout: float = ANSWER) -> Any:
     # A scheduler that goes away is told by an error, not by a traceback in a log as well.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL + 1)
     try:
+        with ThreadPoolExecutor(1) as beside:  # this thread may have an event loop of its own
+            beside.submit(asyncio.run, _greet(address, timeout)).result()
         return distributed.Client(address, timeout=timeout, set_as_default=False)
     except (OSError, ValueError, TypeError, ImportError, RuntimeError) as error:
-        reason = str(error) or type(error).__name__
+        reason = str(error) or f"nothing was said within {timeout:g} s"
         raise ClusterError(
             f"no dask scheduler answers at {address} ({reason.splitlines()[0]}); start one with "
             "`dask scheduler`, which prints its address, such as tcp://node7:8786"
         ) from error
+
+
+async def _greet(address: str, timeout: float) -> None:
+    """Exchange greetings with a scheduler; a client would wait for ever for one that is silent.
+
+    A client that could not be made also leaves a traceback when it is collected.
+    """
+    distributed = _distributed()
+    options = distributed.Security().get_connection_args("client")
+    comm = distributed.core.connect(address, timeout=timeout, **options)
+    await (await asyncio.wait_for(comm, timeout)).close()
 
 
 def run_on(

@@ -1,0 +1,40 @@
+"""The nearest right spelling: of few words and of many, where no comparison of all ends in time."""
+
+import pytest
+
+from dap3d_core.registry.spelling import LONGEST, nearest
+
+MANY = [f"left_rear_suspension_{k:05d}" for k in range(50_000)]
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("left_raer_suspension_31234", "left_rear_suspension_31234"),
+        ("lfet_rear_suspension_31234", "left_rear_suspension_31234"),
+        ("left_rear_suspensoin_31234", "left_rear_suspension_31234"),
+        ("LEFT_rear_suspension_31234", "left_rear_suspension_31234"),
+        ("left_rear_suspension_31234x", "left_rear_suspension_31234"),
+        ("wheel", ""),
+    ],
+)
+def test_one_slip_among_many_words_is_found(word, meant):
+    assert nearest(word, MANY) == meant
+
+
+def test_an_abbreviation_among_many_words_is_found():
+    assert nearest("crank", [*MANY, "crankshaft"]) == "crankshaft"
+
+
+def test_two_words_of_other_case_are_the_first():
+    assert nearest("ROD", ["Rod", "rod"]) == "Rod"
+
+
+def test_hundreds_of_slips_among_many_words_come_to_an_end():
+    """Each compared with all took minutes for some hundreds: no scene may hang without a word."""
+    slips = [name.replace("rear", "raer") for name in MANY[-300:]]
+    assert [nearest(slip, MANY) for slip in slips] == MANY[-300:]
+
+
+def test_nothing_is_similar_to_a_very_long_word():
+    assert nearest("a" * (LONGEST + 1), ["a" * LONGEST]) == ""
