@@ -118,3 +118,27 @@ def test_the_line_of_points_fits(width, total, rate):
     if width >= 58 and rate != 0.0123:
         assert f" of {total:,} points" in words or f"/{total:,} " in words
         assert words.endswith("left")
+
+
+def test_a_long_correction_says_that_it_goes_on(capfd, monkeypatch):
+    """Elsewhere than on a terminal, until the run tells of itself: no command hangs wordless."""
+    monkeypatch.setattr(progress, "SILENCE", 0.01)
+    with RunProgress(quiet=False) as shown:
+        shown.start()
+        said = ""
+        while said.count("\n") < 2:  # ends as soon as the second line is there
+            said += capfd.readouterr().err
+        shown.advance(standing(0.0))
+        capfd.readouterr()
+        assert shown._waiting is None
+    assert said.startswith("finding the initial conditions, for ")
+    assert capfd.readouterr().err == ""
+
+
+def test_a_run_that_cannot_leave_its_start_is_told_of(clock, capsys):
+    """Steps that are rejected again and again at t = 0 are work without an end, too."""
+    with RunProgress(quiet=False) as shown:
+        for k in range(5):
+            clock[0] = float(k)
+            shown.advance(standing(0.0))
+    assert capsys.readouterr().err.startswith("t = 0 of 100 s (0%), ")

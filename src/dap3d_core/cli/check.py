@@ -47,6 +47,7 @@ def check(
             )
         except dap.SimulationError as error:  # a method that does not fit the scene
             raise Refused(str(error)) from error
+        progress.start()
         found = facts_of(compiled, correct_metric)
     if as_json:
         print_json(found)

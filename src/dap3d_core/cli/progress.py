@@ -1,6 +1,7 @@
 """What a run shows while it works: a bar on a terminal, now and then a line elsewhere."""
 
 import math
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,8 +19,32 @@ if TYPE_CHECKING:
 ONCE = "compiling for the first time; this happens once"
 #: Lines of progress come after this time, then ever more rarely, s.
 FIRST_LINE, LONGEST_PAUSE = 1.0, 60.0
+#: Work that has no progress to show is spoken of after this time, s.
+SILENCE = 10.0
 #: Columns beside the live line: the spinner and a gap.
 BESIDE = 2
+
+
+class _Waiting:
+    """Says now and then, elsewhere than on a terminal, that work without progress goes on."""
+
+    def __init__(self, words: str, tell: Callable[[str], None]) -> None:
+        self._words, self._tell = words, tell
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="dap3d-progress", daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        """It has ended, or tells of itself from now on; nothing is said after this call."""
+        self._ended.set()
+        self._thread.join()
+
+    def _work(self) -> None:
+        begun, pause = time.monotonic(), SILENCE
+        while not self._ended.wait(pause):
+            elapsed = time.monotonic() - begun
+            self._tell(f"{self._words}, for {seconds(elapsed)} so far")
+            pause = min(elapsed, LONGEST_PAUSE)
 
 
 class Preparing:
@@ -35,6 +60,7 @@ class Preparing:
         self._bar: Progress | None = None
         self._task: Any = None
         self._told_once = False
+        self._waiting: _Waiting | None = None
         self._next_line = FIRST_LINE
         live = self._console.file.isatty() and not self._console.is_dumb_terminal
         if live and not quiet:
@@ -57,17 +83,26 @@ class Preparing:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self._end_waiting()
         if self._bar is not None:
             self._bar.stop()
 
     def announce(self, kernel: str) -> None:
         """A kernel is about to be compiled."""
+        self._end_waiting()
         self._tell_once()
         self._describe(f"compiling {kernel}", line=f"  {kernel}")
 
     def start(self) -> None:
         """The model is ready; its initial conditions are next."""
         self._describe("starting")
+        if self._bar is None and not self._quiet:
+            self._waiting = _Waiting("finding the initial conditions", self._print)
+
+    def _end_waiting(self) -> None:
+        if self._waiting is not None:
+            self._waiting.end()
+            self._waiting = None
 
     def _tell_once(self) -> None:
         if not self._told_once:
@@ -100,6 +135,7 @@ class RunProgress(Preparing):
 
     def advance(self, run: "Standing") -> None:
         """The run stands so."""
+        self._end_waiting()
         now = time.monotonic()
         if self._begun is None or run.t < self._reached:  # a second run begins
             self._begun, self._next_line = (now, run.t), FIRST_LINE
@@ -109,7 +145,7 @@ class RunProgress(Preparing):
         if self._bar is not None:
             words = live_line(run, rate, self._console.width - BESIDE)
             self._bar.update(self._task, description=words)
-        elif not self._quiet and elapsed >= self._next_line and 0.0 < run.t < run.t_end:
+        elif not self._quiet and elapsed >= self._next_line and run.t < run.t_end:
             self._print_line(plain_line(run, rate), elapsed)
 
 

@@ -1,11 +1,16 @@
 """Ctrl-C and SIGTERM between two chunks of a run, so that what was computed can be kept."""
 
+import _thread
 import signal
+import sys
+import threading
 from types import FrameType, TracebackType
 from typing import Any
 
 from dap3d_core.cli.exits import Terminated
 
+#: Seconds after which a signal that was swallowed comes again.
+AGAIN = 0.05
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
@@ -14,7 +19,8 @@ class Stopping:
 
     A signal raises at once: KeyboardInterrupt for Ctrl-C, ``Terminated`` for others. From the first
     ``between_chunks`` on it waits for the next one, so that no chunk of a run is lost; a second
-    signal no longer waits.
+    signal no longer waits. One that a callback of a C library swallows, as of the compiler, comes
+    again a moment later.
     """
 
     def __init__(self) -> None:
@@ -31,6 +37,7 @@ class Stopping:
                 self._before[number] = signal.signal(number, self._handle)
             except ValueError:  # not the main thread: signals are someone else's affair
                 break
+        self._hook, sys.unraisablehook = sys.unraisablehook, self._swallowed
         return self
 
     def __exit__(
@@ -39,6 +46,7 @@ class Stopping:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        sys.unraisablehook = self._hook
         for number, before in self._before.items():
             signal.signal(number, before)
         # Packages that are imported catch everything, and stumble later over what is missing.
@@ -51,6 +59,14 @@ class Stopping:
         asked, self._asked = self._asked, None
         if asked is not None:
             raise _exception(asked)
+
+    def _swallowed(self, lost: "sys.UnraisableHookArgs") -> None:
+        if isinstance(lost.exc_value, (KeyboardInterrupt, Terminated)):
+            again = threading.Timer(AGAIN, _thread.interrupt_main, [self._asked or signal.SIGINT])
+            again.daemon = True
+            again.start()
+        else:
+            self._hook(lost)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         waits = self._patient and self._asked is None
