@@ -1,9 +1,11 @@
 """Studies on a cluster: a real scheduler and real workers, processes of their own."""
 
+import gc
 import importlib
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -378,6 +380,23 @@ def test_who_does_not_answer_is_named():
     for address in ("node", "http://127.0.0.1:80", ""):
         with pytest.raises(ClusterError, match="no dask scheduler answers at"):
             connect(address, timeout=1.0)
+
+
+def test_a_port_that_accepts_and_says_nothing_is_not_waited_for():
+    """A firewall, or another service: a client of dask would wait for ever."""
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        words = rf"answers at {address} \(nothing was said within 1 s\)"
+        with pytest.raises(ClusterError, match=words):
+            connect(address, timeout=1.0)
+
+
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
+def test_an_address_without_a_port_leaves_no_half_made_client():
+    """One would print a traceback when it is collected."""
+    with pytest.raises(ClusterError, match="missing port number in address 'node7'"):
+        connect("node7", timeout=1.0)
+    gc.collect()
 
 
 def test_workers_and_schedulers_that_are_gone(tmp_path, monkeypatch):

@@ -20,7 +20,7 @@ def in_shell(words, folder, **variables):
     """Run a line of a shell, in which $DAP3D is the command."""
     found = subprocess.run(
         words, shell=True, cwd=folder, env=environment(DAP3D=" ".join(COMMAND), **variables),
-        stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=100, check=False,
+        stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     assert "Traceback" not in found.stderr
     return found
@@ -57,6 +57,15 @@ def test_a_full_stderr_ends_no_run(scene_file):
     assert (found.returncode, "fall.nc written" in found.stdout) == (0, True)
 
 
+def test_a_quiet_view_says_nothing(scene_file, capfd, monkeypatch):
+    scene = scene_file()
+    monkeypatch.chdir(scene.parent)
+    assert main(["run", "fall.toml", "-q"]) == 0
+    assert main(["view", "fall.nc", "-q"]) == 0
+    assert capfd.readouterr() == ("", "")
+    assert (scene.parent / "fall.html").exists()
+
+
 @pytest.mark.parametrize("columns", ["0", "00", ""])
 def test_a_width_of_no_columns_is_none(scene_file, monkeypatch, capfd, columns):
     """Some services export COLUMNS=0; no output at all would be the answer to that."""
@@ -67,6 +76,43 @@ def test_a_width_of_no_columns_is_none(scene_file, monkeypatch, capfd, columns):
     monkeypatch.setenv("COLUMNS", columns)
     assert main(["check", "not-there"]) == 2
     assert "no shipped model of that name" in capfd.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_full_disk_is_named_and_what_was_computed_is_kept(scene_file):
+    """On a disk of 2 MiB: a run that fills it, all that writes a file, and a cache there.
+
+    What the run has written is a result, and the run goes on once there is room.
+    """
+    folder = scene_file(("t_end = 0.1", "t_end = 600.0")).parent
+    (folder / "disk").mkdir()
+    mount = f"mount -t tmpfs -o size=2m tmpfs {folder / 'disk'}"
+    if in_shell(f"unshare -m {mount}", folder).returncode:
+        pytest.skip("needs a file system of its own")
+    found = in_shell(
+        f"""unshare -m sh -c '
+        {mount}; $DAP3D run fall.toml --t-end 0.1 -o disk/small.nc -q; cd disk
+        $DAP3D run ../fall.toml -o large.nc -q --checkpoint 0.01; echo run $?
+        $DAP3D info large.nc.part --json > ../part.json; echo info $?
+        dd if=/dev/zero of=filled bs=1k 2> /dev/null
+        for words in "run ../fall.toml --t-end 0.1 -o a.nc -q" "post small.nc -o a.csv" \
+            "post small.nc -o b.nc" "view small.nc -o a.html" "plot small.nc stone.r -o a.png"
+        do $DAP3D $words; echo written $?; done
+        DAP3D_CACHE_DIR=$PWD/cache $DAP3D plugins > /dev/null; echo cache $?
+        rm -rf filled cache; mount -o remount,size=100m .; $DAP3D resume large.nc.checkpoint -q
+        echo resumed $?; ls; cp large.nc ..'""",
+        folder,
+    )
+    lines = found.stdout.split()
+    assert lines[:4] == ["run", "3", "info", "0"], found
+    assert lines[4:16] == ["written", "1"] * 5 + ["cache", "0"], found
+    assert lines[16:] == ["resumed", "0", "large.nc", "small.nc"], found
+    first, *others = found.stderr.splitlines()
+    assert "what was computed until then is in large.nc.part" in first
+    assert "dap3d resume large.nc.checkpoint goes on with the run" in first
+    names = ("a.nc", "a.csv", "b.nc", "a.html", "a.png")
+    assert others == [f"cannot write {name}: No space left on device" for name in names]
+    assert dap.open(folder / "large.nc").t[-1] == 600.0
 
 
 # ---------------------------------------------------------------- files that are none

@@ -167,6 +167,16 @@ def test_types_of_the_model_itself_are_loaded_only_when_allowed(dap3d, result, r
 
 
 @pytest.mark.slow
+def test_a_plot_of_such_a_force_takes_what_its_message_advises(dap3d, result, refuse):
+    words = refuse("plot", "ball1.nc", "contact.force", "-o", "a.png")
+    assert "--model FOLDER --allow-code" in words
+    done = dap3d("plot", "ball1.nc", "contact.force", "-o", "a.png", "--model", "ball1",
+                 "--allow-code", "-q")  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (dap3d.folder / "a.png").stat().st_size > 0
+
+
+@pytest.mark.slow
 def test_reactions_that_cannot_be_had_are_left_out_and_told(dap3d, result):
     """The types of the joints are blocked, as if the package that brought them were gone."""
     done = dap3d("post", "pen1.nc", "-o", "a.nc", DAP3D_BLOCK="dap3d")
