@@ -115,8 +115,7 @@ def plot(
     _draw(shown, names, target, over, show, size, force)
     if target is not None:
         along = over if hasattr(shown, "data_vars") else {"x": x or "t"}
-        found = {"file": str(target), "results": files, "quantities": names, **along}
-        _tell(found, as_json, quiet)
+        _tell({"file": str(target), "results": files, "quantities": names} | along, as_json, quiet)
     return DONE
 
 
