@@ -77,6 +77,8 @@ def check_target(path: str | os.PathLike[str], force: bool = False) -> Path:
             fault = f"there is no folder {target.parent}"
         else:
             fault = ""
+    except ResultError:
+        raise
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         raise cannot("write", target, error) from error
     if fault:
@@ -115,7 +117,7 @@ def _link_target(link: Path, force: bool) -> Path:
     elif mode and not (target.exists() and target.samefile(link)):
         fault = "the file that it stands for has no name"
     elif not mode and not force:
-        fault = f"it is a link that leads nowhere; force makes the file {target}"
+        fault = "it is a link that leads nowhere; force makes the file that it names"
     else:
         return check_target(target, force)
     raise ResultError(f"cannot write {link}: {fault}")
