@@ -4,7 +4,7 @@ A plugin imports from here only the words of its formulas; ``compiled``, the loo
 serve the core.
 """
 
-import dap3d_core.kernels.compiler_settings  # noqa: F401  it imports numba first  # isort: split
+from dap3d_core.kernels import compiler_settings  # noqa: F401  it imports numba first  # isort: split
 from dap3d_core.kernels.mathematics import atan2, cos, sin, sqrt, tanh, where
 from dap3d_core.kernels.tables import lookup
 from dap3d_core.kernels.vectors import (

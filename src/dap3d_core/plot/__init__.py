@@ -4,7 +4,7 @@ import sys
 from types import ModuleType
 from typing import Any
 
-import dap3d_core.plot.matplotlib_settings  # noqa: F401  it imports matplotlib first  # isort: split
+from dap3d_core.plot import matplotlib_settings  # noqa: F401  it sets matplotlib up  # isort: split
 from dap3d_core.plot.animation import Film, animate
 from dap3d_core.plot.drawing import WIDTH, plot
 from dap3d_core.plot.saving import FORMATS, save_plot, show_plot
