@@ -12,6 +12,7 @@ from urllib.parse import unquote
 
 from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.interface.types import KINDS
+from dap3d_core.registry.regular_files import read_regular
 
 #: A file of more bytes is not read: no author wrote it.
 LONGEST = 10**6
@@ -24,7 +25,7 @@ def declares(path: Path, kind: str, keyword: str) -> bool:
     A class whose bases stand in another file may be of any kind.
     """
     try:
-        text = path.read_bytes() if path.stat().st_size <= LONGEST else b""
+        text = read_regular(path) if path.stat().st_size <= LONGEST else b""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # given where the file is run
             tree = ast.parse(text)
