@@ -4,6 +4,7 @@ import importlib
 import shutil
 import sys
 
+import numpy as np
 import pytest
 from support import problems
 
@@ -25,7 +26,7 @@ def thrown(tmp_path):
 def changed(folder):
     """Give the model's own type another formula."""
     file = folder / "plugin.py"
-    file.write_text(file.read_text() + "\n# another formula\n")
+    file.write_text(file.read_text() + "\nEXTRA = 1\n")
 
 
 def test_with_the_same_sources_forces_are_computed_without_a_word(thrown):
@@ -47,6 +48,14 @@ def test_with_other_formulas_what_they_give_is_refused(thrown):
         with pytest.raises(ResultError, match=words):
             use()
     assert found.energy.total.shape == found.t.shape
+
+
+def test_comments_are_no_formulas(thrown):
+    """A release that explains a type better leaves results of the one before usable."""
+    file = thrown / "plugin.py"
+    file.write_text('"""Another docstring."""\n# another comment\n' + file.read_text())
+    found = dap.open(thrown.with_name("run.nc"), model=thrown, allow_code=True)
+    assert np.isfinite(found.force(found.force_names[-1])["ball"].force).all()
 
 
 def test_a_run_is_made_again_with_other_formulas_and_that_is_told(thrown):

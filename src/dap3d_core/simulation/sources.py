@@ -1,5 +1,6 @@
 """Sources of the types of a scene: results and checkpoints record them, and compare them later."""
 
+import ast
 import hashlib
 import sys
 from collections.abc import Mapping
@@ -64,8 +65,10 @@ def _package(of: Mapping[str, str]) -> str:
 
 @lru_cache(maxsize=1000)
 def digest_of(type_: Any) -> str:
-    """A digest of the files that a type's formulas are in: its own, and those of its package that
-    it uses. "" where there is none, such as of a type that was typed at a prompt.
+    """A digest of the code of a type: of its own file, and of those of its package that it uses.
+
+    Comments and docstrings are left out. "" where there is no file, such as of a type that was
+    typed at a prompt.
     """
     waiting = [sys.modules.get(base.__module__) for base in type_.__mro__]
     root = type_.__module__.partition(".")[0]
@@ -77,7 +80,7 @@ def digest_of(type_: Any) -> str:
         if module.__name__.partition(".")[0] != root or root == CORE:
             continue
         try:
-            modules[module.__name__] = Path(module.__file__ or "").read_bytes()
+            modules[module.__name__] = _code_of(Path(module.__file__ or ""))
         except OSError:
             return ""
         for value in list(vars(module).values()):
@@ -90,3 +93,21 @@ def digest_of(type_: Any) -> str:
     for name in sorted(modules):
         together.update(hashlib.sha256(modules[name]).digest())
     return together.hexdigest()[:20]
+
+
+def _code_of(path: Path) -> bytes:
+    """The content of a source file without comments and docstrings; of another file, all of it."""
+    content = path.read_bytes()
+    try:
+        tree = ast.parse(content)
+    except (SyntaxError, ValueError):
+        return content
+    return ast.unparse(_WithoutDocstrings().visit(tree)).encode()
+
+
+class _WithoutDocstrings(ast.NodeTransformer):
+    """Removes statements that are a text alone."""
+
+    def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
+        """The statement, or None where it does nothing."""
+        return None if isinstance(node.value, ast.Constant) else node
