@@ -124,7 +124,15 @@ def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
             }
     except CheckpointError:
         raise
-    except (zipfile.BadZipFile, EOFError, ValueError, OSError, MemoryError, KeyError) as error:
+    except (
+        zipfile.BadZipFile,
+        NotImplementedError,
+        EOFError,
+        ValueError,
+        OSError,
+        MemoryError,
+        KeyError,
+    ) as error:
         raise CheckpointError(
             f"cannot resume from {file}: it is cut off or damaged ({error}); the rows that its run "
             "had written are in its result file"
