@@ -30,8 +30,9 @@ KINDS = (
 VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, SWITCH = range(len(KINDS))
 
 # Places in ``settings``: projection tolerances of position and velocity, a scratch number, how
-# often the multipliers did not settle with friction, and the numbers of the penalty formulation.
-TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SETTINGS = range(8)
+# often the multipliers did not settle with friction, the numbers of the penalty formulation, and
+# how often a pose was singular where something was reported.
+TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SINGULAR, SETTINGS = range(9)
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)

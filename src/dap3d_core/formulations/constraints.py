@@ -33,7 +33,14 @@ from dap3d_core.assembly.system import (
 )
 from dap3d_core.formulations.moves import change_velocity, move, normalise, size_of
 from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
-from dap3d_core.linear.blocks import assemble, factor, pivot_lengths, regularise, weigh_rows
+from dap3d_core.linear.blocks import (
+    assemble,
+    factor,
+    have_pivots,
+    pivot_lengths,
+    regularise,
+    weigh_rows,
+)
 from dap3d_core.linear.saddle import add_product, scale_blocks, solve_saddle
 
 #: Newton passes of one projection; the second already stands at rounding.
@@ -73,6 +80,13 @@ def factorise(system: System, part: float | None) -> int:
         weigh_rows(system.blocks, system.D, part, system.x)
         regularise(system.nodes, system.x, system.K)
     return factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+
+
+@compiled_into
+def factorise_anyway(system: System, part: float | None) -> None:
+    """The same where the pose may be singular to the last digit: regularised there."""
+    if factorise(system, part) > 0 and part is None and not have_pivots(system.nodes, system.K):
+        factorise(system, PART)
 
 
 @compiled_into
@@ -171,7 +185,7 @@ def project_onto(
         if not linear:
             linearise(t, system, loops)
         if not factored:
-            factorise(system, part)
+            factorise_anyway(system, part)
         for _ in range(PASSES):
             before = worst
             correct(system)
@@ -189,7 +203,7 @@ def project_onto(
     if not linear:
         linearise(t, system, loops)
     if not factored:
-        factorise(system, part)
+        factorise_anyway(system, part)
     project_velocities(y, out, system, part, stale)
     if pivot_lengths(system.nodes, system.K, system.smallest, out[4:]) > 0 and out[1] == 0.0:
         out[1] = 2.0
@@ -216,7 +230,7 @@ def project_velocities(
             if not worst > limit or not (stale or worst < 0.5 * before):
                 break
             if stale and not worst < SLOW * before:
-                factorise(system, part)
+                factorise_anyway(system, part)
                 stale = False
         out[0] = 1.0
         if not worst <= (LOST if part is None else MISFIT) * limit:

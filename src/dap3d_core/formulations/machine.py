@@ -16,8 +16,10 @@ from dap3d_core.assembly.system import (
     MU,
     OMEGA,
     POSITION,
+    SINGULAR,
     UNSETTLED,
     VALUE,
+    WRENCH,
     Floats,
     Integers,
     System,
@@ -27,7 +29,7 @@ from dap3d_core.formulations.build import build_loops, build_system, load_number
 from dap3d_core.linear.blocks import LESS, POOR
 from dap3d_core.linear.plan import Plan, make_plan
 from dap3d_core.model import Group, Model
-from dap3d_core.model.kinematics import split, to_global, to_integrated
+from dap3d_core.model.kinematics import split, to_body, to_global, to_integrated
 
 
 @attrs.frozen
@@ -152,6 +154,11 @@ class Machine:
         """How often since the start the multipliers did not settle with friction."""
         return int(self.system.settings[UNSETTLED])
 
+    @property
+    def singular_reports(self) -> int:
+        """How often since the start a pose was singular where something was reported."""
+        return int(self.system.settings[SINGULAR])
+
     def load(self, model: Model) -> None:
         """Evaluate another model of the same structure from here on; nothing is compiled.
 
@@ -169,7 +176,7 @@ class Machine:
             self.system.par[places] = 0.0
         self._place(t, u)
         s = self.system
-        s.settings[UNSETTLED] = 0.0
+        s.settings[[UNSETTLED, SINGULAR]] = 0.0
         self._call(ANGLE, t, s.force, s.force, s.force)
 
     def turn_places(self) -> Iterator[slice]:
@@ -238,6 +245,17 @@ class Machine:
         return out[: 13 * n]
 
     @AS_COMPILED
+    def rates(self, t: float, u: ArrayLike, v_dot: Floats) -> Floats:
+        """dy/dt (13 n + 1,) with given accelerations (6 n,): r_ddot, omega_dot of each body."""
+        n, y = self.model.body_count, self.integrated(u)
+        out = np.zeros_like(y)
+        self.functions[RHS](float(t), y, out, self.system, self.loops)
+        out[7 * n : 13 * n] = v_dot
+        w_dot = split(out, n)[3]
+        w_dot[:] = to_body(split(y, n)[1], w_dot)
+        return out
+
+    @AS_COMPILED
     def report(self, t: float, u: ArrayLike) -> Floats:
         """What a run reports at a state, (report_size,).
 
@@ -246,6 +264,15 @@ class Machine:
         out = np.zeros(self.report_size)
         self.functions[REPORT](float(t), self.integrated(u), out, self.system, self.loops)
         return out
+
+    @AS_COMPILED
+    def applied_forces(self, t: float, u: ArrayLike) -> Floats:
+        """Force and moment about the mass centre on each body, (n, 6), those of joints left out."""
+        s = self.system
+        self._place(t, u)
+        s.force[:] = 0.0
+        call_kinds(VALUE, WRENCH, float(t), s, self.loops, s.force, s.force, s.force)
+        return s.force[6:].reshape(-1, 6).copy()
 
     @AS_COMPILED
     def watch_pivots(self, t: float, u: ArrayLike) -> None:

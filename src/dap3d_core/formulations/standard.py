@@ -14,7 +14,8 @@ solved by the block LDL^T of linear/blocks.py. Needs independent rows.
 from typing import Any
 
 from dap3d_core.assembly.evaluate import global_accelerations, rates
-from dap3d_core.assembly.system import Floats, System
+from dap3d_core.assembly.system import SINGULAR, Floats, System
+from dap3d_core.formulations import lsq
 from dap3d_core.formulations.constraints import (
     factorise,
     gather_forces,
@@ -27,6 +28,7 @@ from dap3d_core.formulations.constraints import (
 )
 from dap3d_core.formulations.friction import solve_rubbing
 from dap3d_core.kernels.cache import compiled, compiled_into
+from dap3d_core.linear.blocks import have_pivots
 
 
 @compiled_into
@@ -65,6 +67,9 @@ def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> Non
 def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
     accelerate(t, y, system, loops)
+    if not have_pivots(system.nodes, system.K):
+        lsq.accelerate(t, y, system, loops)
+        system.settings[SINGULAR] += 1.0
     global_accelerations(system.metric, system.force, out)
     report_multipliers(system, out)
     report_levels(t, out, system, loops)

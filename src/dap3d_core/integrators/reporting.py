@@ -130,7 +130,9 @@ def report_reached(
             y = work.state[TRIAL]
             state_at(work, t, y)
             failure = project_state(real, integer, t, y, project, system, loops)
-            if failure != RUNNING:
+            if failure == PROJECTION_FAILED:  # too close to a singular one; the row says how open
+                state_at(work, t, y)
+            elif failure != RUNNING:
                 real[T_STOP], integer[STATUS] = t, failure
                 return True
         if not write_row(work, t, y, report, system, loops):

@@ -232,6 +232,17 @@ def factor(
 
 
 @compiled_inside
+def have_pivots(nodes: Integers, K: Floats) -> bool:
+    """Whether no pivot has come out as zero or with the wrong sign, from the factors of K."""
+    for k in range(nodes.shape[0] - 1):
+        m, d = nodes[k, 0], nodes[k, 2]
+        for r in range(d, d + m * m, m + 1):
+            if K[r] != K[r]:
+                return False
+    return True
+
+
+@compiled_inside
 def pivot_lengths(nodes: Integers, K: Floats, smallest: Floats, lengths: Floats) -> int:
     """Of each node the square root of its pivots' product, from the factors of K; 0 if none.
 

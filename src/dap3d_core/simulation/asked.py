@@ -21,6 +21,7 @@ from dap3d_core.scene import (
 from dap3d_core.scene.settings import notes_of
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.implicit import EXPLICIT
 
 Floats = NDArray[np.float64]
 
@@ -135,4 +136,28 @@ def refuse_adams(machine: Machine) -> None:
         raise SimulationError(
             "integrator adams does not locate where forces or joints change their law, and the "
             "scene has such; use integrator dop853, dopri5 or radau"
+        )
+
+
+def refuse_singular_start(settings: Simulation, first_step: float) -> None:
+    """Only dop853 leaves a singular pose: its result does not use the first stages, close to it.
+
+    first_step: it takes so long, s, because close to the pose rounding takes the place of rates.
+
+    Raises:
+        SimulationError: the integrator is another, its steps are fixed, projection is off, or the
+            run is too short.
+    """
+    t_end = float(settings.t_end or 0.0)
+    if 0.0 < t_end < first_step:
+        raise SimulationError(
+            f"the run starts at a singular pose, which one step has to leave behind: give t_end of "
+            f"{first_step:.3g} s or more ({t_end:g} is given)"
+        )
+    fits = settings.integrator in ("auto", EXPLICIT) and settings.step is None
+    if not fits or not settings.project:
+        raise SimulationError(
+            f"the run starts at a singular pose, from which integrator {EXPLICIT} alone (or auto) "
+            "goes on, by steps that its error chooses and with project on; take it, or start at "
+            "another pose"
         )

@@ -7,6 +7,7 @@ from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.switches import CHATTER
 from dap3d_core.integrators.work import LOGGED
 from dap3d_core.result import INFORMATION, Occurrence
+from dap3d_core.simulation.contradicting import find_contradiction
 from dap3d_core.simulation.offender import fastest_body, find_offender
 
 REASONS = {
@@ -16,8 +17,8 @@ REASONS = {
 }
 
 
-def why_stopped(machine: Machine, integration: Integration) -> str:
-    """Why an integration ended before its time, with who is to blame."""
+def why_stopped(machine: Machine, integration: Integration, rank: int) -> str:
+    """Why an integration ended before its time, with who is to blame; rank: that of the start."""
     t = integration.t
     head = f"the run stopped at t = {t:.9g} s"
     if integration.status is Status.SWITCHED:
@@ -27,6 +28,10 @@ def why_stopped(machine: Machine, integration: Integration) -> str:
         return f"{head}: {_chatter(machine, integration)}"
     t_stop = integration.t_stop if integration.t_stop is not None else t
     message = f"{head}: {REASONS[integration.status]}"
+    if integration.status is not Status.NOT_FINITE:
+        culprit = find_contradiction(machine, t, integration.y, rank)
+        if culprit:
+            return f"{head}: {culprit}"
     culprit = find_offender(machine, t, integration.y, t_stop)
     if not culprit and integration.status is Status.NOT_FINITE:
         culprit = fastest_body(machine, integration.y)

@@ -210,7 +210,7 @@ def least_change(
         D, residual = D[keep], residual[keep]
     block = D.reshape(len(D), -1, 6)
     block[:, held - 1] = 0.0
-    scale, frame = _scaling(machine)
+    scale, frame = mass_scaling(machine)
     if metric == "mass":
         block[:, :, :3] *= scale
         block[:, :, 3:] = np.einsum("mbr,brc->mbc", block[:, :, 3:], frame)
@@ -218,20 +218,19 @@ def least_change(
     change = solution.reshape(-1, 6)
     change[held - 1] = 0.0  # rounding
     if metric == "mass":
-        _unscale(change, scale, frame)
+        change[:] = unscaled(change, scale, frame)
     return solution
 
 
-def _scaling(machine: Machine) -> tuple[Floats, Floats]:
+def mass_scaling(machine: Machine) -> tuple[Floats, Floats]:
     """1/sqrt(m) (n, 1) and B (n, 3, 3) of the bodies as placed (linear/blocks.py)."""
     metric = machine.system.metric[1:]
     return metric[:, :1], metric[:, 7:16].reshape(-1, 3, 3)
 
 
-def _unscale(change: Floats, scale: Floats, frame: Floats) -> None:
-    """From the coordinates in which masses are one to metres and rad in global axes, in place."""
-    change[:, :3] *= scale
-    change[:, 3:] = np.einsum("brc,bc->br", frame, change[:, 3:])
+def unscaled(change: Floats, scale: Floats, frame: Floats) -> Floats:
+    """From the coordinates in which masses are one, (n, 6), to metres and rad in global axes."""
+    return np.hstack([scale * change[:, :3], np.einsum("brc,bc->br", frame, change[:, 3:])])
 
 
 def _sparse_least_change(
@@ -257,8 +256,7 @@ def _sparse_least_change(
         system.C[:] = 0.0
         system.C[system.row] = -residual
         correct(system)
-        change = system.force[6:].reshape(n, 6).copy()
-        _unscale(change, *_scaling(machine))
+        change = unscaled(system.force[6:].reshape(n, 6), *mass_scaling(machine))
     finally:
         system.metric[:] = before
     return change.ravel()
@@ -294,6 +292,12 @@ def _velocity_residual(rows: Rows, u: Floats) -> Floats:
 def model_size(machine: Machine) -> float:
     """A length of the model, m."""
     return machine.model.size
+
+
+def extent(machine: Machine, v: Floats) -> float:
+    """How fast something moves at velocities (6 n,), in rad or parts of the model."""
+    x = np.abs(v.reshape(-1, 6))
+    return max(_largest(x[:, :3]) / model_size(machine), _largest(x[:, 3:]))
 
 
 def _largest(values: Floats) -> float:

@@ -12,6 +12,7 @@ from dap3d_core.linear.rank import DENSE_ROWS, WEIGHT, Dependency, Rank, dense_r
 from dap3d_core.model import Model
 from dap3d_core.simulation.binding import Binding, bindings
 from dap3d_core.simulation.initial import FIT, finite_rows, model_size
+from dap3d_core.simulation.singular_start import SingularStart, singular_start
 
 Floats = NDArray[np.float64]
 
@@ -98,6 +99,7 @@ class Redundancy:
         contradictions: where redundant rows ask for different things; empty if they agree.
         bindings: where redundant rows, besides, are nearly dependent on others and so lock a
             motion that they hardly hold.
+        singular: which way a motion goes on from here where the pose is a singular one.
     """
 
     rank: Rank
@@ -106,8 +108,14 @@ class Redundancy:
     groups: tuple[Shared, ...] = ()
     contradictions: tuple[Contradiction, ...] = ()
     bindings: tuple[Binding, ...] = ()
+    singular: SingularStart | None = None
     _model: Model | None = attrs.field(default=None, repr=False)
     _rows: Rows | None = attrs.field(default=None, repr=False)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether a run may start as from independent rows: redundant ones agree, and stay so."""
+        return not (self.contradictions or self.bindings or self.singular)
 
     @property
     def unique_joints(self) -> tuple[str, ...]:
@@ -177,16 +185,18 @@ class Redundancy:
         return f"The joints that share a freedom, in {len(self.groups)} groups: {'; '.join(words)}"
 
     def describe_contradictions(self) -> list[str]:
-        """A sentence, without its full stop, for each contradiction."""
+        """A sentence, without its full stop, for each thing that is_plain excludes."""
         what = {
             "position": "they cannot be closed together; what remains open is",
             "velocity": "their prescribed velocities disagree by",
             "acceleration": "what they ask of the accelerations disagrees by",
         }
-        return [
+        words = [
             f"{some(c.joints)} contradict each other: {what[c.level]} {c.size:.3g}"
             for c in self.contradictions
-        ] + [binding.words for binding in self.bindings]
+        ]
+        words += [binding.words for binding in self.bindings]
+        return words + ([self.singular.describe()] if self.singular else [])
 
 
 def some(names: Sequence[str], most: int = MOST_NAMES) -> str:
@@ -207,13 +217,15 @@ def redundancy_of(machine: Machine, u: Floats, t: float = 0.0) -> Redundancy:
     rows = finite_rows(machine, t, u)
     rank = rank_of(machine, rows)
     involved = sorted({k for d in rank.dependencies for k, _ in _by_joint(model, d.rows)})
+    binding = bindings(machine, rows, u, t) if rank.redundant else ()
     return Redundancy(
         rank,
         tuple(model.joint_names[k] for k in involved),
         max((float(np.linalg.norm(_gap(d, rows.nu))) for d in rank.dependencies), default=0.0),
         _groups(model, rank.dependencies),
         tuple(_contradictions(model, rank.dependencies, rows, u)),
-        bindings(machine, rows, u, t) if rank.redundant else (),
+        binding,
+        singular_start(machine, u, rank, t) if rank.redundant and not binding else None,
         model,
         rows,
     )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.friction import PASSES
 from dap3d_core.integrators import METHODS, Integration, Status, make_adams
 from dap3d_core.integrators.integration import Statistics as Counts
+from dap3d_core.integrators.singular import begin_singular
 from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import Occurrence, Record, Result, ResultError, Statistics
 from dap3d_core.scene import Mistake, SceneError, Simulation
@@ -18,6 +19,7 @@ from dap3d_core.simulation.asked import (
     explicit_options,
     integration_options,
     refuse_adams,
+    refuse_singular_start,
     report_times,
     settings_notes,
 )
@@ -33,11 +35,11 @@ from dap3d_core.simulation.implicit import (
     stiffness_notes,
 )
 from dap3d_core.simulation.keeping import Keeper
-from dap3d_core.simulation.redundancy import Redundancy
 from dap3d_core.simulation.room import check_room, row_width
 from dap3d_core.simulation.second_run import Again, add_error
+from dap3d_core.simulation.singular_start import SingularStart
 from dap3d_core.simulation.standing import Observer, Standing
-from dap3d_core.simulation.start import start_notes
+from dap3d_core.simulation.start import Start, start_notes
 from dap3d_core.simulation.watcher import Watcher
 
 if TYPE_CHECKING:
@@ -52,6 +54,8 @@ CHUNK_SECONDS = 0.1
 FIRST_CHUNK = 100
 #: Numbers that wait in the row buffer at most.
 BUFFER_NUMBERS = 4_000_000
+#: A second run, for the error, leaves a singular pose by a first step of this part.
+AGAIN = 0.8
 
 
 class Run:
@@ -80,6 +84,7 @@ class Run:
         #: Whether the run stands between two chunks, and nothing is half done.
         self.is_whole = False
         self.started = self.compile_time = 0.0
+        self.singular: SingularStart | None = None
         self.rank = 0
         self.first_step: float | None = None
         self.watcher = Watcher(compiled, events) if events else None
@@ -111,7 +116,8 @@ class Run:
     def prepare(self) -> None:
         """Stand at the start: corrected, compiled, nothing integrated."""
         self.started = time.perf_counter()
-        integration = self._integration(self._start())
+        start = self._start()
+        integration = self._integration(start)
         if self.settings.integrator != "radau":  # which evaluates its stages otherwise
             integration.beside = self.machine.second_thread
         self._begin(integration)
@@ -181,8 +187,8 @@ class Run:
 
         return again
 
-    def _start(self) -> Floats:
-        """The initial state, corrected if asked for; its rank must suit the method."""
+    def _start(self) -> Start:
+        """Where the run starts, corrected if asked for; its rank must suit the method."""
         settings, scene = self.settings, self.compiled.scene
         metric = str(settings.correct_metric)
         start = self.compiled.start(bool(settings.correct), settings.hold, metric)
@@ -191,29 +197,35 @@ class Run:
         self.notes += self.compiled.pace(t_end).notes(settings, settings.dt or t_end / 100.0)
         self.rank = start.redundancy.rank.rank
         if start.redundancy.rank.redundant:
-            self._judge_redundancy(start.redundancy, start.u)
-        return start.u
+            self._judge_redundancy(start)
+        return start
 
-    def _judge_redundancy(self, redundancy: Redundancy, u: Floats) -> None:
+    def _judge_redundancy(self, start: Start) -> None:
         """Refuse redundant rows, or note what they leave open."""
+        redundancy, u = start.redundancy, start.u
+        self.singular = singular = redundancy.singular
         words = redundancy.describe()
         if self.compiled.method == "standard":
             elsewhere = redundancy_elsewhere(self.machine, u, redundancy).describe(redundancy)
             raise RedundantError(
                 f"{words}; {elsewhere}. The standard method needs independent rows"
             )
+        if singular is not None and not singular.leads_on:
+            raise RedundantError(singular.describe())
         if redundancy.contradictions:
             raise RedundantError(f"{words}. No motion satisfies them all")
         if redundancy.bindings:
             raise RedundantError(words)
+        if singular is not None:
+            refuse_singular_start(self.settings, singular.first_step)
         least = " (reported are those of least |lambda|)" if self.compiled.method == "lsq" else ""
         self.notes.append(
             f"{words}. Accelerations are unique; reactions in these joints are not{least}"
         )
 
-    def _integration(self, u0: Floats) -> Integration:
-        machine, settings = self.machine, self.settings
-        machine.watch_pivots(0.0, u0)
+    def _integration(self, start: Start) -> Integration:
+        machine, settings, singular, u0 = self.machine, self.settings, self.singular, start.u
+        machine.watch_pivots(0.0, u0 if singular is None else singular.aside)
         machine.start(0.0, u0)
         y0 = machine.integrated(u0)
         width = 1 + len(y0) + machine.report_size
@@ -230,12 +242,17 @@ class Run:
                 refuse_adams(machine)
                 del options["ends"]
                 return make_adams(*problem, **options)
-            if settings.integrator == "auto":
-                leave = machine.method != "penalty"  # which radau does not solve
-                return Integration(METHODS[EXPLICIT], *problem, leave_stiff=leave, **options)
-            return Integration(METHODS[settings.integrator], *problem, **options)
+            name = settings.integrator
+            if name == "auto":
+                name = EXPLICIT
+                options["leave_stiff"] = machine.method != "penalty"  # which radau does not solve
+            integration = Integration(METHODS[name], *problem, **options)
         except ValueError as error:
             raise SceneError([Mistake("step", settings.step, str(error))]) from error
+        if singular is not None:
+            first = singular.first_step * (1.0 if self.first_step is None else AGAIN)
+            begin_singular(integration.work, machine.rates(0.0, u0, singular.acceleration), first)
+        return integration
 
     def _begin(self, integration: Integration) -> None:
         """Compile an integrator before the clock of the run goes on; it is the present one then."""
@@ -281,11 +298,16 @@ class Run:
         rows = self.runs[-1].rows()
         if len(rows):
             assert self.keeper is not None
+            if self.singular is not None and not self.keeper.count:
+                first = len(rows[0]) - self.machine.report_size
+                rows[0, first : first + len(self.singular.acceleration)] = (
+                    self.singular.acceleration
+                )
             self.keeper.take(rows, lambda: self.record("done"))
 
     def _stopped(self) -> SimulationError:
         """Why the integration ended early, with what was computed."""
-        message = why_stopped(self.machine, self.runs[-1])
+        message = why_stopped(self.machine, self.runs[-1], self.rank)
         self.notes.append(message)
         result = self._kept("stopped")
         if self.saver is not None:
@@ -306,6 +328,12 @@ class Run:
                 f"friction: the multipliers did not settle in {PASSES} passes, {count} times of "
                 f"{self._statistics().rhs} or more; the last ones were used. Motion there is "
                 "uncertain: a high mu may lock the joint by itself"
+            )
+        if count := self.machine.singular_reports:
+            notes.append(
+                f"{count} times a pose was singular where it was reported: the rows leave "
+                "accelerations open there, and those reported, with their multipliers, are not "
+                "determined"
             )
         notes += event_notes(self.runs, self._events())
         return notes + stiffness_notes(self.runs, self.settings.integrator)

@@ -72,7 +72,7 @@ class Modelling:
         except (SceneError, ModelError, AssemblyError, ValueError):
             return None
         found = start.redundancy
-        if found.rank.rank != self._rank or found.contradictions or found.bindings:
+        if found.rank.rank != self._rank or not found.is_plain:
             return None
         if stops_of(checked, model, self._t_end) != self._stops:
             return None

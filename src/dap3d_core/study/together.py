@@ -39,7 +39,7 @@ def together(ensemble: "Ensemble") -> "Together | None":
     except (AssemblyError, SceneError):
         return None
     found = start.redundancy
-    if found.contradictions or found.bindings:
+    if not found.is_plain:
         return None
     if compiled.method == "standard" and found.rank.redundant:
         return None
