@@ -109,6 +109,37 @@ def test_bricard():
         assert result.energy.total[0] == pytest.approx(-29.43, abs=1e-12)
 
 
+@pytest.mark.parametrize("rate", [1.0, 2.0, 3.0])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-7, 1e-9])
+def test_a_driven_parallelogram_turns_through_all_crossings(rtol, rate):
+    """No freedom is left, so that projection would hide any error of a step, but not from where it
+    was taken: the cranks stay parallel, to rounding over the distance of a report from a crossing
+    (1e-16 / 1e-3), or to the error of the interpolation where that is nearer."""
+    scene = redundant.four_bars(1)
+    scene.add_function("a", "turn", coeff=(0.0, -rate, 0.0))
+    scene.add_joint("drive-rot", "motor", body_i="crank0", a_j="ground.z", function="turn")
+    result = dap.simulate(scene, t_end=10.0, dt=0.1, rtol=rtol, atol=rtol / 100)
+    turned = rate * result.t
+    expected = np.column_stack([np.sin(turned), np.cos(turned)])
+    pivots = np.array([[0.0, 0.0], [1.0, 0.0]])
+    for crank, pivot in zip((0, 1), pivots, strict=True):
+        body = result.subject.body_names.index(f"crank{crank}")
+        assert 2.0 * (result.r[:, body, :2] - pivot) == pytest.approx(expected, abs=rtol)
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-9])
+def test_the_implicit_integrator_with_redundant_rows(rtol):
+    """A04 by radau: e follows rtol, and steps grow with its fifth root as those of order 5 do, from
+    some 20 at 1e-6 on; multipliers of rows that depend on others do not settle, and need not."""
+    result = dap.simulate(
+        redundant.bricard(), t_end=2.0, dt=0.5, integrator="radau", rtol=rtol, atol=rtol / 100
+    )
+    head = list(result.model.point_names).index("head1")
+    found = result.rP[[1, 2, 4], head]
+    assert redundant.error_of(found, np.array(list(A04.values()))) < max(10 * rtol, 1e-8)
+    assert result.stats.steps < 400
+
+
 def test_door_on_two_hinges():
     """10 rows of rank 5: a pendulum, phi'' = (m g l / (J + m l^2)) sin phi with phi from upright,
     let go level: e < 1e-6 over 5 s; the hinges share the load as the least multipliers do."""

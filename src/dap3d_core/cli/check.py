@@ -122,6 +122,8 @@ def _redundancy_facts(
             about.append(elsewhere.describe(redundancy))
         about.insert(0, redundancy.describe_groups())
         about += redundancy.describe_contradictions()
+        if redundancy.singular:
+            about.append(redundancy.singular.describe())
     return {
         "rank_method": rank.method,
         "rank_tolerance": rank.tolerance,

@@ -246,11 +246,17 @@ def size_of_multipliers(h: float, change: Floats, work: RadauWork, system: Syste
 
 @compiled_inside
 def change_stages(h: float, work: RadauWork, system: System) -> float:
-    """Add the changes in R and G to the stages; returns their norm."""
+    """Add the changes in R and G to the stages; returns their norm.
+
+    Multipliers do not count where rows are regularised: those that depend on others have a part of
+    rounding over what regularises them, new in each iteration, that moves nothing.
+    """
     real, y, worst = work.real, work.state[Y], 0.0
     for i in range(3):
         size = scaled_largest(work.R[i], y, y, work.integer[ERROR_SIZE], real[RTOL], real[ATOL])
-        other = size_of_multipliers(h, work.G[i], work, system)
+        other = 0.0
+        if work.own[PART] == 0.0:
+            other = size_of_multipliers(h, work.G[i], work, system)
         if not (size <= worst and other <= worst):
             worst = max(size, other) if size == size and other == other else math.nan
         for k in range(y.shape[0]):

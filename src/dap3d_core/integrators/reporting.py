@@ -23,6 +23,7 @@ from dap3d_core.integrators.work import (
     REPORTS,
     RHS,
     ROW,
+    RTOL,
     RUNNING,
     STATUS,
     STIFF,
@@ -130,9 +131,10 @@ def report_reached(
             y = work.state[TRIAL]
             state_at(work, t, y)
             failure = project_state(real, integer, t, y, project, system, loops)
-            if failure == PROJECTION_FAILED:  # too close to a singular one; the row says how open
-                state_at(work, t, y)
-            elif failure != RUNNING:
+            closed = real[OUTCOME + 2] <= real[RTOL] and real[OUTCOME + 3] <= real[RTOL]
+            if failure == PROJECTION_FAILED and closed:  # too close to a singular one for more
+                failure = RUNNING
+            if failure != RUNNING:
                 real[T_STOP], integer[STATUS] = t, failure
                 return True
         if not write_row(work, t, y, report, system, loops):

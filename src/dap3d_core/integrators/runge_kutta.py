@@ -95,6 +95,9 @@ ELSEWHERE, ATTEMPTS = 0.6, 4
 
 #: Near a singular state nothing is known better than to this part of the largest component.
 BLURRED = 1e-11
+#: Projection may move a result by this part of it, and no more: the error of what it takes away
+#: tells of no other branch.
+JUMP = 1e-2
 #: An error up to this may be rounding.
 ROUNDED = 100.0
 
@@ -238,6 +241,11 @@ def kept_error(
     y, trial, result, other = (work.state[Y], work.state[TRIAL], work.state[SCRATCH],
                                work.state[OTHER])  # fmt: skip
     on_constraints(work, t1, trial, project, system, loops)
+    for i in range(other.size):
+        other[i] = result[i] - trial[i]
+    jump = scaled_largest(other, y, result, integer[ERROR_SIZE], JUMP, JUMP)
+    if not jump <= 1.0:
+        return jump
     atol, main = real[ATOL], 0.0
     for i in range(integer[ERROR_SIZE]):
         atol = max(atol, BLURRED * abs(y[i]))

@@ -13,7 +13,14 @@ from dap3d_core.model import Model
 from dap3d_core.model.kinematics import from_integrated
 from dap3d_core.simulation.binding import HELD
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial import FIT, correct_positions, displaced, extent, model_size
+from dap3d_core.simulation.initial import (
+    FIT,
+    correct_positions,
+    displaced,
+    extent,
+    finite_rows,
+    model_size,
+)
 
 Floats = NDArray[np.float64]
 
@@ -44,6 +51,10 @@ def find_contradiction(machine: Machine, t: float, y: Floats, rank: int) -> str:
     if not 0 < model.row_count <= MOST_ROWS:
         return ""
     u = from_integrated(y, model.body_count)
+    try:
+        finite_rows(machine, t, u)
+    except AssemblyError:  # which find_offender tells
+        return ""
     return _out_of_reach(machine, t, u) or _come_to_hold(machine, t, u, rank)
 
 

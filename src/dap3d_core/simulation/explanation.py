@@ -38,6 +38,8 @@ def explain(
         if redundancy.rank.redundant:
             elsewhere = redundancy_elsewhere(machine, u, redundancy)
             lines.append(f"  poses      {elsewhere.describe(redundancy)}")
+            if redundancy.singular:
+                lines.append(f"  start      {redundancy.singular.describe()}")
         lines.append(
             f"  matrix     {len(ordering.early)} bodies eliminated first, then "
             f"{len(ordering.nodes)} joint nodes and {len(ordering.hubs)} hubs; "

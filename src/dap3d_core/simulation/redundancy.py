@@ -185,18 +185,16 @@ class Redundancy:
         return f"The joints that share a freedom, in {len(self.groups)} groups: {'; '.join(words)}"
 
     def describe_contradictions(self) -> list[str]:
-        """A sentence, without its full stop, for each thing that is_plain excludes."""
+        """A sentence, without its full stop, for each contradiction."""
         what = {
             "position": "they cannot be closed together; what remains open is",
             "velocity": "their prescribed velocities disagree by",
             "acceleration": "what they ask of the accelerations disagrees by",
         }
-        words = [
+        return [
             f"{some(c.joints)} contradict each other: {what[c.level]} {c.size:.3g}"
             for c in self.contradictions
-        ]
-        words += [binding.words for binding in self.bindings]
-        return words + ([self.singular.describe()] if self.singular else [])
+        ] + [binding.words for binding in self.bindings]
 
 
 def some(names: Sequence[str], most: int = MOST_NAMES) -> str:

@@ -222,6 +222,8 @@ class Run:
         self.notes.append(
             f"{words}. Accelerations are unique; reactions in these joints are not{least}"
         )
+        if singular is not None:
+            self.notes.append(singular.describe())
 
     def _integration(self, start: Start) -> Integration:
         machine, settings, singular, u0 = self.machine, self.settings, self.singular, start.u
