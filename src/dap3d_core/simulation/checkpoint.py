@@ -57,6 +57,10 @@ KEYS: dict[str, Form] = {
 }
 
 _HEADER = "checkpoint.json"
+#: What readers of archives and arrays raise for damaged ones.
+_UNREADABLE = (
+    zipfile.BadZipFile, NotImplementedError, EOFError, ValueError, OSError, MemoryError, KeyError,
+)  # fmt: skip
 _ZIP = b"PK\x03\x04"
 #: A header with the scene's text is larger than a scene may be, but not by much.
 _LARGEST_HEADER = 2**28
@@ -124,15 +128,7 @@ def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
             }
     except CheckpointError:
         raise
-    except (
-        zipfile.BadZipFile,
-        NotImplementedError,
-        EOFError,
-        ValueError,
-        OSError,
-        MemoryError,
-        KeyError,
-    ) as error:
+    except _UNREADABLE as error:
         raise CheckpointError(
             f"cannot resume from {file}: it is cut off or damaged ({error}); the rows that its run "
             "had written are in its result file"
