@@ -1,7 +1,9 @@
 """Mesh files that claim, lie, or name other files."""
 
+import os
 import struct
 import sys
+from io import BytesIO
 
 import pytest
 
@@ -64,6 +66,74 @@ def test_materials_are_other_files_and_are_not_read(tmp_path):
     assert [name for name in opened if "encodings" not in name] == [str(tmp_path / "a.obj")]
 
 
+GROUPS = "".join(f"g g{k}\no o{k}\nusemtl m{k}\nf 1 2 3 # usemtl n\n" for k in range(400)).encode()
+FACET = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet"
+SOLIDS = "".join(f"solid s{k}\n{FACET}\nendsolid s{k}\n" for k in range(400)).encode()
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "joined"),
+    [("a.obj", CORNERS + GROUPS, "_without_groups"), ("a.stl", SOLIDS, "_one_solid")],
+)
+def test_groups_are_read_as_one_mesh(tmp_path, name, data, joined):
+    """To join meshes takes a time that grows with the square of their number."""
+    import trimesh
+
+    (tmp_path / name).write_bytes(data)
+    vertices, triangles = shapes._mesh(tmp_path, name)
+    assert (len(vertices), len(triangles)) == (3, 400)
+    whole = BytesIO(getattr(shapes, joined)(data))
+    found = trimesh.load_scene(whole, file_type=name[-3:], skip_materials=True)
+    assert len(found.geometry) == 1
+
+
+def test_lines_of_an_obj_may_be_continued(tmp_path):
+    text = b"# v 9 9 9\n" + CORNERS + b"v 1 1 \\\r\n 0\r\nvt 0 0\nf 1/1 2/1 \\\n3/1\nf 2 4 3\n"
+    (tmp_path / "a.obj").write_bytes(text)
+    vertices, triangles = shapes._mesh(tmp_path, "a.obj")
+    corners = vertices[triangles].reshape(-1, 3).tolist()
+    expected = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    assert corners == expected
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields"),
+    [
+        ("mesh", {"file": "a.obj"}),
+        ("mesh", {"file": "b.obj", "scale": 1e100}),
+        ("line", {"points": [[0, 0, 0], [1e99, 0, 0]]}),
+        ("box", {"size": [1e99, 1.0, 1.0]}),
+        ("sphere", {"radius": 1e16}),
+    ],
+)
+def test_what_no_graphics_can_show_is_told_and_left_out(tmp_path, kind, fields):
+    """A vertex of 1e300 m is a number, but not in single precision."""
+    (tmp_path / "a.obj").write_bytes(b"v 1e300 0 0\nv 1 0 0\nv 0 -1e300 0\nf 1 2 3\n")
+    (tmp_path / "b.obj").write_bytes(CORNERS.replace(b"1 0 0", b"1e250 0 0") + b"f 1 2 3\n")
+    scene = dap.Scene(name="far", path=tmp_path / "scene.toml")
+    scene.add_shape(kind, "far", body="ground", **fields)
+    scene.add_shape("sphere", "near", body="ground", radius=1.0)
+    found = shapes.drawn(scene, [], [])
+    assert [note.partition(":")[0] for note in found.notes] == ["shape far is not drawn"]
+    assert [mark.owner for mark in found.marks] == ["near"]
+    assert not (found.meshes or found.lines)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="links and FIFOs of POSIX")
+def test_links_in_a_circle_and_fifos_are_mistakes_of_the_scene(tmp_path):
+    (tmp_path / "loop.obj").symlink_to("loop.obj")
+    os.mkfifo(tmp_path / "fifo.stl")
+    scene = dap.Scene(name="bad", path=tmp_path / "scene.toml")
+    scene.add_body("a", mass=1.0, Jp=[1.0, 1.0, 1.0])
+    for name in ("loop.obj", "fifo.stl"):
+        scene.add_shape("mesh", name.partition(".")[0], body="a", file=name)
+    with pytest.raises(dap.SceneError) as caught:
+        dap.compile(scene)
+    words = str(caught.value)
+    assert "shapes.loop.file" in words and "link" in words
+    assert "shapes.fifo.file" in words and "no regular file" in words
+
+
 def test_all_meshes_of_a_page_together_are_bounded(tmp_path, monkeypatch):
     """A thousand shapes may name one large file."""
     monkeypatch.setattr(shapes, "MOST_IN_ALL", 5)
@@ -72,5 +142,5 @@ def test_all_meshes_of_a_page_together_are_bounded(tmp_path, monkeypatch):
     for k in range(10):
         scene.add_shape("mesh", f"m{k}", body="ground", file="a.obj")
     found = shapes.drawn(scene, [], [])
-    assert sum(mesh["count"] for mesh in found.meshes) == 6
+    assert sum(len(mesh.triangles) for mesh in found.meshes) == 6
     assert len(found.notes) == 7

@@ -201,9 +201,13 @@ def mesh_file(folder: Path | None, name: str) -> Path | Fault:
     try:
         if not path.resolve().is_relative_to(folder.resolve()):
             return Fault("leads out of the folder of the scene", "copy the file there")
+        if path.exists() and not path.is_file():
+            return Fault("is no regular file; a mesh is a file with triangles")
         if not path.is_file():
             others = sorted(p.name for p in path.parent.glob("*") if p.suffix.lower() in MESHES)
             return Fault(f"there is no file {path}", "", nearest(path.name, others))
+    except RuntimeError:  # of Path.resolve, before Python 3.13
+        return Fault("is a link that leads back to itself", "copy the file there")
     except OSError as error:
         return Fault(f"cannot be read: {error.strerror or error}")
     return path

@@ -68,7 +68,7 @@ def links(body: int, places: list[tuple[float, ...]], unit: float, color: str, n
 
 def inertia_ellipsoid(body: int, mass: float, Jp: Floats, most: float, color: str,
                       name: str) -> Mark:  # fmt: skip
-    """A body that nothing is attached to, as the solid ellipsoid of its mass and inertia.
+    """A body that nothing is attached to, as the ellipsoid of its mass and inertia.
 
     Its semi-axes are a_k^2 = 5 (J_1 + J_2 + J_3 - 2 J_k) / (2 m) along the principal axes.
 
@@ -83,7 +83,7 @@ def inertia_ellipsoid(body: int, mass: float, Jp: Floats, most: float, color: st
     semi = np.maximum(semi, 0.05 * semi.max())
     semi *= min(1.0, most / semi.max())
     axes[:, 2] *= np.sign(np.linalg.det(axes))
-    return Mark("bodies", "sphere", body, ORIGIN, plain(semi), _quaternion(axes), color, name)
+    return Mark("inertia", "sphere", body, ORIGIN, plain(semi), _quaternion(axes), color, name)
 
 
 def _quaternion(A: Floats) -> tuple[float, ...]:

@@ -1,6 +1,6 @@
 """What the page draws of a result: bodies, shapes, joints, forces, ground, and from where."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import attrs
@@ -13,9 +13,9 @@ from dap3d_core.view.camera import stage
 from dap3d_core.view.colors import colors
 from dap3d_core.view.elements import ORIGIN, Placed, forces_of, gravity_of, joints_of
 from dap3d_core.view.joints import Drawer
-from dap3d_core.view.marks import Located, Mark
-from dap3d_core.view.motion import Motion
-from dap3d_core.view.shapes import Drawn, drawn
+from dap3d_core.view.marks import Located, Mark, Span, packed
+from dap3d_core.view.motion import Extent, Motion
+from dap3d_core.view.shapes import Drawn, Mesh, drawn
 
 #: The colour of what belongs to ground.
 GROUND = "#9aa3ad"
@@ -40,16 +40,37 @@ def elements_of(result: Result) -> Elements:
     return Elements(joints_of(model), forces_of(model), gravity_of(model), "")
 
 
-def geometry_of(result: Result, scene: Scene, elements: Elements) -> dict[str, Any]:
-    """Everything that is drawn but arrows: plain data for the page.
+@attrs.frozen(eq=False)
+class SceneGeometry:
+    """What stands for a scene in pictures of it, all but arrows.
+
+    Attributes:
+        names, colors: of the bodies, without ground.
+        marks, spans: solids fixed in bodies, and those between two.
+        shapes: lines, meshes and notes of the scene's shapes; its solids are among the marks.
+        extent: of the motion, with what is drawn.
+        unit: radius of a thin link, m.
+    """
+
+    names: tuple[str, ...]
+    colors: list[str]
+    marks: list[Mark]
+    spans: list[Span]
+    shapes: Drawn
+    extent: Extent
+    unit: float
+
+
+def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeometry:
+    """What stands for the scene of a result.
 
     Args:
-        result: its instants are those of the page.
+        result: whose motion rails and extent follow.
         scene: what was run; its folder, where known, holds its meshes.
         elements: of the result.
     """
     subject, motion = result.subject, Motion(result)
-    hues = colors(scene.bodies[name].color for name in subject.body_names)
+    hues = colors([scene.bodies[n].color for n in subject.body_names], _pairs(elements.joints))
     shapes = drawn(scene, subject.body_names, hues)
     every = [*elements.joints, *elements.forces]
     places = attached(subject, every)
@@ -67,18 +88,38 @@ def geometry_of(result: Result, scene: Scene, elements: Elements) -> dict[str, A
     drawings = [drawer.joint(j) for j in elements.joints]
     drawings += [drawer.force(f) for f in elements.forces]
     marks += [*ellipsoids, *shapes.marks, *(m for d in drawings for m in d.marks)]
+    spans = [s for d in drawings for s in d.spans]
+    return SceneGeometry(subject.body_names, hues, marks, spans, shapes, extent, unit)
+
+
+def _pairs(joints: Iterable[Placed]) -> list[tuple[int, ...]]:
+    """The bodies that each joint couples, ground left out."""
+    return [tuple(body for body in joint.bodies.values() if body) for joint in joints]
+
+
+def geometry_of(result: Result, scene: Scene, elements: Elements) -> dict[str, Any]:
+    """What stands for a scene, as plain data for the page; arguments as ``scene_geometry``."""
+    found = scene_geometry(result, scene, elements)
     return {
-        "stage": {**stage(extent, elements.gravity), "unit": unit},
-        "bodies": [{"name": n, "color": c} for n, c in zip(subject.body_names, hues, strict=True)],
+        "stage": {**stage(found.extent, elements.gravity), "unit": found.unit},
+        "bodies": [
+            {"name": n, "color": c} for n, c in zip(found.names, found.colors, strict=True)
+        ],
         "points": _points(result),
-        "joints": [_about(j, subject.body_names) for j in elements.joints],
-        "forces": [_about(f, subject.body_names) for f in elements.forces],
-        "marks": [_row(m) for m in marks],
-        "spans": [attrs.asdict(s) for d in drawings for s in d.spans],
-        "lines": shapes.lines,
-        "meshes": shapes.meshes,
-        "notes": _notes(elements, shapes),
+        "joints": [_about(j, found.names) for j in elements.joints],
+        "forces": [_about(f, found.names) for f in elements.forces],
+        "marks": [_row(m) for m in found.marks],
+        "spans": [attrs.asdict(s) for s in found.spans],
+        "lines": [attrs.asdict(line) for line in found.shapes.lines],
+        "meshes": [_packed_mesh(mesh) for mesh in found.shapes.meshes],
+        "notes": _notes(elements, found.shapes),
     }
+
+
+def _packed_mesh(mesh: Mesh) -> dict[str, Any]:
+    about = attrs.asdict(mesh, filter=lambda a, _: a.name not in ("vertices", "triangles"))
+    about |= {"vertices": packed(mesh.vertices), "triangles": packed(mesh.triangles, "<u4")}
+    return {**about, "count": len(mesh.triangles)}
 
 
 def _bodies(

@@ -36,7 +36,13 @@ class Drawer:
         return self._drawn(one, LOOKS.get(one.keyword, _declared), "joints", JOINT)
 
     def force(self, one: Placed) -> "Drawing":
-        """The marks and spans of a force: a spring between its ends, or what its type declares."""
+        """The marks and spans of a force: a spring between its ends, or what its type declares.
+
+        A force between two bodies whose type declares no place on them, such as a contact, has no
+        mark: bodies that it does not touch would look joined. Its arrow shows where it acts.
+        """
+        if not one.points and not one.vectors:
+            return Drawing([], [])
         look = _spring if one.has_ends else LOOKS.get(one.keyword, _declared)
         return self._drawn(one, look, "forces", FORCE)
 

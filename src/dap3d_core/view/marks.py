@@ -12,8 +12,8 @@ from dap3d_core.model.groups import Floats
 Located = tuple[int, tuple[float, ...]]
 #: Solids of unit size about their origin; axes along z. A cone stands on the origin.
 SOLIDS = ("sphere", "cylinder", "cone", "box", "ring")
-#: What a user switches on and off.
-LAYERS = ("bodies", "shapes", "joints", "forces")
+#: What a user switches on and off; inertia is translucent, what it surrounds is seen.
+LAYERS = ("bodies", "inertia", "shapes", "joints", "forces")
 
 
 @attrs.frozen

@@ -96,7 +96,7 @@ class App {
     const { data, panel, stage } = this;
     const redraw = (set) => (on) => { set(on); this.request(); };
     panel.heading("Show");
-    const names = { bodies: "Bodies", shapes: "Shapes", joints: "Joints", forces: "Springs and forces" };
+    const names = { bodies: "Bodies", shapes: "Shapes", joints: "Joints", forces: "Springs and forces", inertia: "Inertia ellipsoids" };
     Object.entries(names).forEach(([layer, label], k) => {
       if (this.marks.layers[layer]) panel.toggle(label, label, true, redraw((on) => this.marks.show(layer, on)), { key: String(k + 1) });
     });

@@ -13,6 +13,8 @@ const SOLIDS = {
 const TURNS = 7, MANY_SPRINGS = 40;
 
 const material = () => new THREE.MeshStandardMaterial({ roughness: 0.62, metalness: 0.04 });
+// Ellipsoids of inertia stand for bodies without a form: what they surround is seen through them.
+const TRANSLUCENT = { inertia: { transparent: true, opacity: 0.32, depthWrite: false } };
 const threeQuaternion = (p) => new THREE.Quaternion(p[1], p[2], p[3], p[0]);
 
 function instances(geometry, count) {
@@ -44,6 +46,7 @@ class Marks {
 
   #batch(layer, kind, items) {
     const mesh = instances(SOLIDS[kind](items.length < MANY), items.length);
+    mesh.material.setValues(TRANSLUCENT[layer] ?? {});
     items.forEach((item, k) => mesh.setColorAt(k, new THREE.Color(item.color)));
     mesh.userData.owners = items.map((item) => item.owner);
     mesh.userData.layer = layer;
