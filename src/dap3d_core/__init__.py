@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from dap3d_core.exchange import export
     from dap3d_core.interface import PluginError
     from dap3d_core.matlab import import_matlab
     from dap3d_core.plot import animate, plot
@@ -50,6 +51,7 @@ _HOMES = {
     "SimulationError": ("simulation", "SimulationError"),
     "animate": ("plot", "animate"),
     "compile": ("simulation", "compile_scene"),
+    "export": ("exchange", "export"),
     "fit": ("study.fitting", "fit"),
     "import_matlab": ("matlab", "import_matlab"),
     "load": ("scene", "load"),
@@ -79,6 +81,7 @@ __all__ = [
     "SimulationError",
     "animate",
     "compile",
+    "export",
     "fit",
     "import_matlab",
     "load",

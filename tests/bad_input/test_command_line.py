@@ -71,6 +71,8 @@ def call(folder, capfd):
 R = "fall.nc"
 #: The file of a sweep.
 S = "swept.nc.part"
+#: Commands that read a result.
+OF_RESULTS = ("info", "post", "export", "plot", "animate", "view")
 #: A sweep without mistakes, in parts.
 SWEEP = ("sweep", "fall.toml")
 VARY, KEEP = ("--vary", "bodies.stone.mass=1,2"), ("--keep", "stone.r.z")
@@ -215,12 +217,12 @@ REFUSED = [
     (("run", "fall.toml", "-o", "https://example.org/x.nc"), "there is no folder"),
     # results
     *(((c, "nothing.nc"), "there is no such file") for c in ("info", "post", "plot", "view")),
-    *(((c, "words"), "not a NetCDF-4 file") for c in ("info", "post", "plot", "animate", "view")),
-    *(((c, "empty.nc"), "the file is empty") for c in ("info", "post", "plot", "animate", "view")),
-    *(((c, "sub"), "it is a folder") for c in ("info", "post", "plot", "animate", "view")),
-    *(((c, ""), "is an empty word") for c in ("info", "post", "plot", "animate", "view")),
-    *(((c,), "Missing argument") for c in ("info", "post", "plot", "animate", "view")),
-    *(((c, R, "--bogus"), "No such option") for c in ("info", "post", "plot", "animate", "view")),
+    *(((c, "words"), "not a NetCDF-4 file") for c in OF_RESULTS),
+    *(((c, "empty.nc"), "the file is empty") for c in OF_RESULTS),
+    *(((c, "sub"), "it is a folder") for c in OF_RESULTS),
+    *(((c, ""), "is an empty word") for c in OF_RESULTS),
+    *(((c,), "Missing argument") for c in OF_RESULTS),
+    *(((c, R, "--bogus"), "No such option") for c in OF_RESULTS),
     (("post", R, "stnoe.r"), "did you mean 'stone.r'"),
     (("post", R, "--select", "stone.r.w"), "stone.r has x, y, z, norm, not 'w'"),
     (("post", R, "-o", "x.txt"), "name a .nc or a .csv file"),
@@ -228,6 +230,13 @@ REFUSED = [
     (("post", R, "--format", "xls"), "'xls' is not one of 'nc', 'csv'"),
     (("post", R, "-o", R, "--force"), "is what is read"),
     (("post", "link.nc", "-o", R, "--force"), "is what is read"),
+    (("export", R, "-o", "x.txt"), ".vtkhdf, .glb, .mat, .csv"),
+    (("export", R, "-o", "x.csv", "--format", "mat"), "its name says csv"),
+    (("export", R, "--format", "xls"), "'xls' is not one of"),
+    (("export", R, "--fps", "0"), "a number above 0"),
+    (("export", R, "-o", "sub"), "or a format"),
+    (("export", R, "-f", "csv", "-o", R, "--force"), "is what is read"),
+    (("export", S), "the points of a sweep"),
     (("plot", R, "stnoe.r.z"), "did you mean 'stone.r.z'"),
     (("plot", R, "stone.q"), "not 'q'"),
     (("plot", R, R), "named twice"),

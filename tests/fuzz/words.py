@@ -80,7 +80,7 @@ def check_quantity(data):
 
 COMMANDS = ("run", "run", "run", "check", "check", "plot", "post", "info", "models", "plugins",
             "describe",
-            "import-matlab", "resume", "animate", "new-plugin", "", "--help", "Run",
+            "import-matlab", "resume", "animate", "export", "new-plugin", "", "--help", "Run",
             "--version")  # fmt: skip
 OPTIONS = ("-o", "--output", "--t-end", "--dt", "--method", "--integrator", "--rtol", "--atol",
            "--step",

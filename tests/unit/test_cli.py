@@ -19,8 +19,8 @@ from dap3d_core.cli.signals import Stopping
 from dap3d_core.scene import INTEGRATORS, METHODS, Mistake, SceneError, Simulation
 
 COMMANDS = ("run", "resume", "rerun", "sweep", "check", "models", "plugins", "describe",
-            "new-plugin", "check-plugin", "info", "post", "plot", "animate", "view", "report",
-            "import-matlab")  # fmt: skip
+            "new-plugin", "check-plugin", "info", "post", "export", "plot", "animate", "view",
+            "report", "import-matlab")  # fmt: skip
 
 
 def test_every_command_is_there_and_has_help():

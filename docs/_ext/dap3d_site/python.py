@@ -17,7 +17,7 @@ SECTIONS = {
          "simulation.Repetition"),
     ),
     "Results": (
-        ("Result", "open", "plot", "view", "animate"),
+        ("Result", "open", "plot", "view", "animate", "export"),
         ("result.Reaction", "result.Energy", "result.Entry", "result.ErrorEstimate",
          "result.Occurrence", "result.Quantity", "result.Statistics", "plot.Film"),
     ),

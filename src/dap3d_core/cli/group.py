@@ -199,6 +199,7 @@ def _add_commands() -> None:
     from dap3d_core.cli.check import check
     from dap3d_core.cli.check_plugin import check_plugin
     from dap3d_core.cli.describe import describe
+    from dap3d_core.cli.export import export
     from dap3d_core.cli.import_matlab import import_matlab
     from dap3d_core.cli.info import info
     from dap3d_core.cli.models import models
@@ -213,7 +214,7 @@ def _add_commands() -> None:
     from dap3d_core.cli.sweep import sweep
     from dap3d_core.cli.view import view
 
-    analysis = (info, post, plot, animate, view, report)
+    analysis = (info, post, export, plot, animate, view, report)
     authors = (describe, new_plugin, check_plugin)
     runs = (run, resume, rerun, sweep)
     for command in (*runs, check, models, plugins, *authors, *analysis, import_matlab):

@@ -68,6 +68,7 @@ def post(
     from dap3d_core.cli.files import open_result, refuse_all, writable
     from dap3d_core.cli.rendering import items, messages, print_json, say, size
     from dap3d_core.cli.rendering import output as output_console
+    from dap3d_core.result.export import why_no_reactions
 
     target, kind = _target(result, output, kind)
     opened = open_result(result, model=model, allow_code=allow_code)
@@ -76,7 +77,7 @@ def post(
         partial(writable, target, force=force, sources=(Path(result),)),
         *(partial(opened.quantity, name) for name in names),
     )
-    left_out = "" if names else _why_no_reactions(opened)
+    left_out = "" if names else why_no_reactions(opened)
     notes = [f"reactions are left out: {left_out}"] if left_out else []
     write = _write_table if kind == "csv" else _write_arrays
     arrays = write(opened, target, names, not left_out, jacobian, force)
@@ -103,18 +104,6 @@ def _target(result: str, output: str | None, kind: str | None) -> tuple[Path, st
     if kind is not None and named not in (None, kind):
         raise Refused(f"cannot write {target}: --format {kind} and its name differ; leave one out")
     return target, kind or str(named)
-
-
-def _why_no_reactions(result: "Result") -> str:
-    """Why the reactions of joints cannot be computed, "" where they can."""
-    from dap3d_core.result import ResultError
-
-    try:
-        if result.subject.joint_names:
-            _ = result.machine
-    except ResultError as error:
-        return str(error)
-    return ""
 
 
 def _write_table(

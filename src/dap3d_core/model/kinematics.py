@@ -45,6 +45,14 @@ def _apply(A: Floats, vector: ArrayLike) -> Floats:
     return turned
 
 
+def euler_rates(p: Floats, w: Floats) -> Floats:
+    """p_dot (..., 4) of p (..., 4) and global angular velocities (..., 3): half (0, w) times p."""
+    scalar = -np.sum(w * p[..., 1:], axis=-1, keepdims=True)
+    vector = p[..., :1] * w + np.cross(w, p[..., 1:])
+    rates: Floats = 0.5 * np.concatenate([scalar, vector], axis=-1)
+    return rates
+
+
 def split(u: ArrayLike, n: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Views r (..., n, 3), p (..., n, 4), r_dot (..., n, 3), w (..., n, 3) of u (..., 13 n)."""
     u = np.asarray(u, dtype=float)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.colors import is_color_like
 
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.model.kinematics import split, to_global
+from dap3d_core.model.kinematics import euler_rates, split, to_global
 from dap3d_core.plot.drawing import MARKERS, PALETTE
 from dap3d_core.result import Result
 from dap3d_core.scene import Scene, SceneError, parse
@@ -170,7 +170,7 @@ def pose_at(result: Result, t: float) -> tuple[Floats, Floats]:
         return r[0], p[0]
     h = float(times[k + 1] - times[k])
     a = min(max((t - float(times[k])) / h, 0.0), 1.0)
-    turned = _cubic(a, h, p, _rate(p, w))
+    turned = _cubic(a, h, p, euler_rates(p, w))
     return _cubic(a, h, r, rd), turned / np.linalg.norm(turned, axis=-1, keepdims=True)
 
 
@@ -179,11 +179,3 @@ def _cubic(a: float, h: float, x: Floats, x_dot: Floats) -> Floats:
     s, b = a * a * (3.0 - 2.0 * a), a * (1.0 - a)
     found: Floats = (1.0 - s) * x[0] + s * x[1] + b * h * ((1.0 - a) * x_dot[0] - a * x_dot[1])
     return found
-
-
-def _rate(p: Floats, w: Floats) -> Floats:
-    """p_dot (..., 4) of p (..., 4) and global angular velocities (..., 3): half (0, w) times p."""
-    scalar = -np.sum(w * p[..., 1:], axis=-1, keepdims=True)
-    vector = p[..., :1] * w + np.cross(w, p[..., 1:])
-    rate: Floats = 0.5 * np.concatenate([scalar, vector], axis=-1)
-    return rate

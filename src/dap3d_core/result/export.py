@@ -32,6 +32,16 @@ def dataset_to_write(result: "Result", reactions: bool = True) -> "xarray.Datase
     return dataset.drop_dims([name for name, count in dataset.sizes.items() if not count])
 
 
+def why_no_reactions(result: "Result") -> str:
+    """Why the reactions of joints cannot be computed, "" where they can."""
+    try:
+        if result.subject.joint_names:
+            _ = result.machine
+    except ResultError as error:
+        return str(error)
+    return ""
+
+
 def reactions_of(result: "Result") -> "xarray.Dataset":
     """The reactions of all joints on all their bodies, ground included (reactions.py).
 

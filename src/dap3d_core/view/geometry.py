@@ -1,5 +1,6 @@
 """What the page draws of a result: bodies, shapes, joints, forces, ground, and from where."""
 
+import os
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -7,6 +8,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.result import Result, ResultError
+from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.scene.description import Scene
 from dap3d_core.view.bodies import attached, framing, inertia_ellipsoid, links, unit_of
 from dap3d_core.view.camera import stage
@@ -29,6 +31,20 @@ class Elements:
     forces: list[Placed]
     gravity: tuple[float, ...] | None
     missing: str
+
+
+def scene_of(result: Result, model: str | os.PathLike[str] | None = None) -> Scene:
+    """The scene that was run; its folder is that of the model, where one is named."""
+    try:
+        scene = parse(result.scene_text)
+    except SceneError:  # a result made by a script, without the text of a scene
+        scene = Scene()
+    if model is not None:
+        scene.path = load(model).path
+    for name in result.subject.body_names:
+        if name not in scene.bodies:
+            scene.add_body(name)
+    return scene
 
 
 def elements_of(result: Result) -> Elements:
@@ -102,9 +118,7 @@ def geometry_of(result: Result, scene: Scene, elements: Elements) -> dict[str, A
     found = scene_geometry(result, scene, elements)
     return {
         "stage": {**stage(found.extent, elements.gravity), "unit": found.unit},
-        "bodies": [
-            {"name": n, "color": c} for n, c in zip(found.names, found.colors, strict=True)
-        ],
+        "bodies": [{"name": n, "color": c} for n, c in zip(found.names, found.colors, strict=True)],
         "points": _points(result),
         "joints": [_about(j, found.names) for j in elements.joints],
         "forces": [_about(f, found.names) for f in elements.forces],
@@ -112,7 +126,7 @@ def geometry_of(result: Result, scene: Scene, elements: Elements) -> dict[str, A
         "spans": [attrs.asdict(s) for s in found.spans],
         "lines": [attrs.asdict(line) for line in found.shapes.lines],
         "meshes": [_packed_mesh(mesh) for mesh in found.shapes.meshes],
-        "notes": _notes(elements, found.shapes),
+        "notes": notes_of(elements, found.shapes),
     }
 
 
@@ -192,6 +206,7 @@ def _short(values: tuple[float, ...]) -> list[float]:
     return [float(f"{x:.7g}") for x in values]
 
 
-def _notes(elements: Elements, shapes: Drawn) -> list[str]:
+def notes_of(elements: Elements, shapes: Drawn) -> list[str]:
+    """What of a scene is not drawn, and why."""
     missing = f"joints and forces are not drawn: {elements.missing}" if elements.missing else ""
     return [*([missing] if missing else []), *shapes.notes]

@@ -6,7 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.model.groups import Floats
+from dap3d_core.model.groups import Floats, Integers
 
 #: A point: body index (ground 0) and its coordinates there, m.
 Located = tuple[int, tuple[float, ...]]
@@ -92,6 +92,6 @@ def plain(values: Any) -> tuple[float, ...]:
     return tuple(float(x) for x in values)
 
 
-def packed(values: Floats, kind: str = "<f4") -> str:
+def packed(values: Floats | Integers, kind: str = "<f4") -> str:
     """Numbers as base64 text of little-endian floats ("<f4", "<f8") or integers ("<u4")."""
     return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -12,11 +12,10 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.result import Result, ResultError
+from dap3d_core.result import ResultError
 from dap3d_core.result.files import whole_file
-from dap3d_core.scene import SceneError, load, parse
-from dap3d_core.scene.description import Scene
 from dap3d_core.view.data import page_data
+from dap3d_core.view.geometry import scene_of
 
 #: The program of the page, in the order in which its parts build on one another.
 PROGRAM = (
@@ -126,21 +125,7 @@ def view(
         return View(
             sweep_data(result, quantities, fps, progress=progress, announce=announce, **how)
         )
-    return View(page_data(result, _scene(result, model), quantities, fps))
-
-
-def _scene(result: Result, model: str | os.PathLike[str] | None) -> Scene:
-    """The scene that was run; its folder is that of the model, where one is named."""
-    try:
-        scene = parse(result.scene_text)
-    except SceneError:  # a result made by a script, without the text of a scene
-        scene = Scene()
-    if model is not None:
-        scene.path = load(model).path
-    for name in result.subject.body_names:
-        if name not in scene.bodies:
-            scene.add_body(name)
-    return scene
+    return View(page_data(result, scene_of(result, model), quantities, fps))
 
 
 def _page(data: dict[str, Any]) -> str:

@@ -104,7 +104,8 @@ def drawn(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Drawn:
 
 def _add(found: Drawn, shape: Shape, hue: str, folder: Path | None) -> str:
     """Add a shape to those that are drawn; "", or why it is not."""
-    values, about = shape.values, {"body": shape.body, "color": hue, "owner": shape.name}
+    values = shape.values
+    about: dict[str, Any] = {"body": shape.body, "color": hue, "owner": shape.name}
     piece: Mark | Line | Mesh
     if shape.type == "mesh":
         if sum(len(mesh.triangles) for mesh in found.meshes) >= MOST_IN_ALL:

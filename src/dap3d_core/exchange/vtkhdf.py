@@ -1,0 +1,163 @@
+"""A moving scene as a VTKHDF file, which ParaView reads: one file with its points at each instant.
+
+The form is that of "PolyData" with steps, version 2.0: cells are stored once, the points of all
+instants behind one another. Every netCDF-4 file is an HDF5 file, so that netCDF4 writes it.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.exchange.moving import MovingScene, Part, Polyline
+from dap3d_core.model.groups import Floats
+from dap3d_core.model.kinematics import rotation
+from dap3d_core.result.netcdf import NETCDF, guarded
+from dap3d_core.view.marks import LAYERS
+
+Progress = Callable[[int, int], None]
+
+#: Kinds of cells, in the order of the form.
+CELLS = ("Vertices", "Lines", "Polygons", "Strips")
+#: Numbers of coordinates that are computed at once.
+BLOCK = 3_000_000
+
+
+def write_vtkhdf(scene: MovingScene, path: Path, progress: Progress | None = None) -> None:
+    """Write a file; ``progress`` is called with the instants that are written and all.
+
+    Raises:
+        ResultError: the file cannot be written.
+    """
+    import netCDF4
+
+    with NETCDF:
+        file = guarded(path, lambda: netCDF4.Dataset(path, "w", format="NETCDF4"))
+        try:
+            guarded(path, lambda: _fill(file, scene, progress))
+        finally:
+            file.close()
+
+
+def point_count(scene: MovingScene) -> int:
+    """How many points the scene has at each instant."""
+    rigid = sum(len(one.vertices) for one in _by_body(scene))
+    return rigid + sum(len(one.form.vertices) for one in scene.stretched)
+
+
+def _fill(file: Any, scene: MovingScene, progress: Progress | None) -> None:
+    root, t = file.createGroup("VTKHDF"), scene.result.t
+    root.setncattr("Version", np.array([2, 0], dtype=np.int64))
+    root.setncattr("Type", np.bytes_("PolyData"))
+    count = point_count(scene)
+    _column(root, "NumberOfPoints", [count])
+    _cells(root, scene)
+    steps = root.createGroup("Steps")
+    steps.setncattr("NSteps", np.int64(len(t)))
+    _column(steps, "Values", t, "f8")
+    nothing = np.zeros(len(t), dtype=np.int64)
+    for name in ("PartOffsets", "NumberOfParts"):
+        _column(steps, name, nothing + (name == "NumberOfParts"))
+    _column(steps, "PointOffsets", count * np.arange(len(t)))
+    for name in ("CellOffsets", "ConnectivityIdOffsets"):
+        _column(steps, name, np.zeros((len(t), len(CELLS)), dtype=np.int64))
+    points = _array(root, "Points", "f8", (count * len(t), 3), chunk=count)
+    done = 0
+    for block in _blocks(scene, count):
+        points[count * done : count * (done + len(block))] = block.reshape(-1, 3)
+        done += len(block)
+        if progress is not None:
+            progress(done, len(t))
+
+
+def _cells(root: Any, scene: MovingScene) -> None:
+    """Lines, then triangles, with what they belong to."""
+    rigid = _by_body(scene)
+    counts = [len(one.vertices) for one in rigid] + [len(s.form.vertices) for s in scene.stretched]
+    triangles, lines = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    faces: list[Any] = []
+    edges: list[Any] = []
+    for one, end, count in zip([*rigid, *scene.stretched], np.cumsum(counts), counts, strict=True):
+        if isinstance(one, Polyline):
+            lines.append(end - count + np.arange(count))
+            edges.append(one)
+        else:
+            triangles.append(end - count + one.form.triangles)
+            faces.append(one)
+    corners = np.concatenate(triangles)
+    none = np.zeros(0, dtype=np.int64)
+    cells = {
+        "Vertices": (none, none),
+        "Lines": (np.concatenate(lines), np.cumsum([len(line) for line in lines[1:]])),
+        "Polygons": (corners.ravel(), 3 * np.arange(1, len(corners) + 1)),
+        "Strips": (none, none),
+    }
+    for name, (connectivity, ends) in cells.items():
+        group = root.createGroup(name)
+        _column(group, "NumberOfCells", [len(ends)])
+        _column(group, "NumberOfConnectivityIds", [len(connectivity)])
+        _column(group, "Connectivity", connectivity)
+        _column(group, "Offsets", [0, *ends])
+    each = np.repeat(np.arange(len(edges) + len(faces)),
+                     [1] * len(edges) + [len(one.form.triangles) for one in faces])  # fmt: skip
+    owners, data = [*edges, *faces], root.createGroup("CellData")
+    body = np.array([getattr(one, "body", -1) for one in owners], dtype=np.int64)
+    layer = np.array([LAYERS.index(one.layer) for one in owners], dtype=np.int64)
+    color = np.array([one.color for one in owners], dtype=np.uint8).reshape(-1, 3)
+    _column(data, "body", body[each])
+    _column(data, "layer", layer[each])
+    _column(data, "color", color[each], "u1")
+
+
+def _by_body(scene: MovingScene) -> list[Part | Polyline]:
+    """What is fixed in bodies, that of each body beside one another."""
+    return sorted([*scene.parts, *scene.lines], key=lambda one: one.body)
+
+
+def _blocks(scene: MovingScene, count: int) -> Iterator[Floats]:
+    """Points (instants, count, 3), m, of some instants at a time."""
+    bodies = [
+        (body, np.concatenate([one.vertices for one in ones]))
+        for body, ones in groupby(_by_body(scene), key=lambda one: one.body)
+    ]
+    r, p = scene.result.r, scene.result.p
+    step = max(1, BLOCK // (3 * max(count, 1)))
+    for start in range(0, len(r), step):
+        some = slice(start, min(start + step, len(r)))
+        out, end = np.empty((some.stop - start, count, 3)), 0
+        for body, local in bodies:
+            places = slice(end, end := end + len(local))
+            out[:, places] = local
+            if body:
+                A = rotation(p[some, body - 1])
+                out[:, places] = r[some, body - 1, None] + local @ A.transpose(0, 2, 1)
+        for one in scene.stretched:
+            places = slice(end, end := end + len(one.form.vertices))
+            out[:, places] = [one.vertices(k) for k in range(some.start, some.stop)]
+        yield out
+
+
+def _column(group: Any, name: str, values: Iterable[Any], kind: str = "i8") -> None:
+    array = np.asarray(values)
+    _array(group, name, kind, array.shape)[:] = array
+
+
+def _array(
+    group: Any, name: str, kind: str, shape: tuple[int, ...], chunk: int | None = None
+) -> Any:
+    """A variable with dimensions of its own, which stand outside of what VTK reads."""
+    file = group
+    while file.parent is not None:
+        file = file.parent
+    names = []
+    for size in shape:
+        names.append(f"size_{size}")
+        if names[-1] not in file.dimensions:
+            file.createDimension(names[-1], size or None)
+    chunks = None if chunk is None else (max(1, min(chunk, 200_000)), shape[1])
+    return group.createVariable(
+        name, kind, tuple(names), fill_value=False, zlib=chunk is not None, complevel=1,
+        shuffle=True, chunksizes=chunks,
+    )  # fmt: skip
