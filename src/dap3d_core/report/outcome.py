@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import os
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from dap3d_core.report.reference import Reference
 from dap3d_core.report.rungs import Setting
 from dap3d_core.result import Result, current_versions
 from dap3d_core.result.files import whole_file
+from dap3d_core.scene.display import html_table
 
 #: Columns of the table that are not counts.
 COLUMNS = (
@@ -138,7 +140,7 @@ def run_of(setting: Setting, result: Result, times: list[float], error: float, f
     )
 
 
-@attrs.frozen(kw_only=True, eq=False)
+@attrs.frozen(kw_only=True, eq=False, repr=False)
 class Report:
     """Speed against error of one scene.
 
@@ -166,6 +168,19 @@ class Report:
     status: str = "done"
     notes: tuple[str, ...] = ()
     versions: dict[str, str] = attrs.Factory(current_versions)
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.runs)} settings ran, {len(self.failed)} failed"
+        return f"<Report {self.scene!r}: {self.status}, {counts}; {self.recommended().reason}>"
+
+    def _repr_html_(self) -> str:
+        """The settings that ran as a table, for notebooks."""
+        header = "method", "integrator", "rtol", "step [s]", "time [s]", "error", "on the front"
+        rows = [
+            (r.method, r.integrator, r.rtol, r.step, r.time_s, r.error, "yes" if r.on_front else "")
+            for r in self.runs
+        ]
+        return f"<p>{escape(repr(self)[1:-1])}</p>{html_table(header, rows)}"
 
     def recommended(self, target_error: float | None = None) -> Recommendation:
         """The fastest setting that reaches an error.

@@ -10,6 +10,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.registry.spelling import nearest
+from dap3d_core.scene.display import SceneDisplay
 from dap3d_core.scene.mistakes import Key, Mistake, SceneError
 from dap3d_core.scene.plain import plain
 
@@ -154,8 +155,8 @@ NAMED: dict[str, type] = {
 TABLES = ("scene", *NAMED, "animation", "simulation")
 
 
-@attrs.define
-class Scene:
+@attrs.define(repr=False)
+class Scene(SceneDisplay):
     """A mechanism and the settings of its simulation, as the user described them.
 
     Attributes:
@@ -185,7 +186,7 @@ class Scene:
     path: Path | None = attrs.field(default=None, eq=False)
     faults: list[tuple[Key, Mistake]] = attrs.field(factory=list, eq=False)
     notes: list[str] = attrs.field(factory=list, eq=False)
-    _counts: dict[str, int] = attrs.field(factory=dict, eq=False, repr=False, init=False)
+    _counts: dict[str, int] = attrs.field(factory=dict, eq=False, init=False)
 
     @property
     def folder(self) -> Path | None:
@@ -227,10 +228,8 @@ class Scene:
         self._refuse_name("bodies", self.bodies, name)
         if not fields.keys() <= BODY_KEYS:
             raise _unknown_keys(f"bodies.{name}", fields, BODY_KEYS)
-        for value in fields.values():
-            if value is None:
-                fields = {k: v for k, v in fields.items() if v is not None}
-                break
+        if any(value is None for value in fields.values()):
+            fields = {k: v for k, v in fields.items() if v is not None}
         self.bodies[name] = Body(name, **fields)
         return name
 

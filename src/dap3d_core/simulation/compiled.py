@@ -1,11 +1,12 @@
 """A scene made ready to run: checked, modelled, with its method chosen and its kernels compiled."""
 
+import logging
 import os
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, NoReturn, Self
 
@@ -45,6 +46,16 @@ Announce = Callable[[str], None]
 
 #: Joints whose lines in the file a message gives.
 MOST_PLACES = 10
+
+
+@cache
+def log_first_compilation() -> None:
+    """Tell a script, once in a process, that kernels are compiled, which takes a while.
+
+    It is a warning of the logger "dap3d", which Python shows on stderr unless it is told otherwise:
+    ``logging.getLogger("dap3d").setLevel("ERROR")``. Who passes ``announce`` is told there alone.
+    """
+    logging.getLogger("dap3d").warning("compiling for the first time; this happens once")
 
 
 class _Machines(threading.local):
@@ -91,6 +102,7 @@ class CompiledModel:
             scene = scene.copy()  # whoever has it may change it
         else:
             scene = load(Path(scene) if isinstance(scene, os.PathLike) else scene)
+        announce = announce or (lambda kernel: log_first_compilation())
         registry = registry or load_registry()
         self.scene: Scene = scene
         self.checked: Checked = check(scene, registry, allow_code=allow_code)
@@ -107,7 +119,7 @@ class CompiledModel:
         self._own.stack.append(self.another_machine(announce))
         self.method, self.reason = self.choice(asked)
         self.machine.method = self.method
-        if announce is not None and not driver_is_cached("formulations"):
+        if not driver_is_cached("formulations"):
             announce(f"the solver ({self.method})")
         # compiled here, and not on the clock of the first run
         try:
@@ -349,7 +361,8 @@ def compile_scene(
         method: formulation; the scene's own choice when left out.
         allow_code: whether the model's own types (plugin.py in its folder) may be loaded.
         registry: where types come from; by default the installed plugins.
-        announce: called with the name of each kernel that has to be compiled anew.
+        announce: called with the name of each kernel that has to be compiled anew; by default the
+            first one is told as a warning of the logger "dap3d".
 
     Raises:
         SceneError: the scene has mistakes; all of them are in the message.

@@ -1,0 +1,116 @@
+"""What objects show of themselves at a prompt and in notebooks, whatever their names are."""
+
+import logging
+import time
+from html.parser import HTMLParser
+
+import pytest
+
+import dap3d_core as dap
+from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.scene.display import MOST_ROWS
+from dap3d_core.simulation.compiled import log_first_compilation
+
+HOSTILE = "<img src=x onerror=alert(1)>&\"'\n\x1b[31m"
+#: The tags that tables of ours have.
+TAGS = {"p", "strong", "table", "tr", "td", "th"}
+
+
+class Seen(HTMLParser):
+    """Tags, attributes and text of a piece of HTML."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.names, self.text = set(), set(), ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.add(tag)
+        self.names |= {name for name, _ in attributes}
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def test_a_scene_is_a_line_at_a_prompt_and_tables_in_a_notebook():
+    scene = dap.load("fourbar3")
+    assert repr(scene).startswith("<Scene 'fourbar3': 3 bodies, ")
+    assert "\n" not in repr(scene)
+    shown = Seen(scene._repr_html_())
+    for name in (*scene.bodies, *scene.joints, *scene.forces):
+        assert name in shown.text
+    assert repr(dap.Scene()) == "<Scene '': empty>"
+
+
+def test_texts_of_a_scene_are_no_html():
+    scene = dap.Scene(name=HOSTILE, description=HOSTILE)
+    scene.add_body("a", color=HOSTILE)
+    scene.add_force("f", "<b onclick=x>", body_i=HOSTILE, f=[0.0, 0.0, 1.0])
+    shown = Seen(scene._repr_html_())
+    assert shown.tags <= TAGS
+    assert not shown.names
+    assert HOSTILE in shown.text
+    assert "\x1b" not in repr(scene)
+
+
+def test_of_many_bodies_a_notebook_shows_the_first():
+    scene = dap.Scene(name="many")
+    for k in range(MOST_ROWS + 7):
+        scene.add_body(f"b{k}")
+    assert scene._repr_html_().count("<tr>") == MOST_ROWS + 2
+    assert "7 more" in scene._repr_html_()
+
+
+@pytest.mark.slow
+def test_a_report_shows_its_settings():
+    scene = dap.load("pen1")
+    report = dap.report(scene, t_end=0.1, methods=["standard"], integrators=["dop853"], repeat=1)
+    assert "pen1" in repr(report)
+    assert len(repr(report)) < 400
+    shown = Seen(report._repr_html_())
+    assert shown.tags <= TAGS
+    assert report._repr_html_().count("<tr>") == 1 + len(report.runs)
+
+
+PLUGIN = """
+from dap3d_core.interface import Body, Force, body, hookimpl
+
+interface_version = 1
+
+
+class Push(Force):
+    keyword = "push"
+    body_i: Body = body()
+
+    def wrench(r_i):
+        return (((r_i[0] + {number}, 0.0, 0.0), (0.0, 0.0, 0.0)),)
+
+
+@hookimpl
+def dap3d_forces():
+    return [Push]
+"""
+
+
+@pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
+def test_a_script_is_told_of_the_first_compilation_once(tmp_path, caplog):
+    """A type that is new, as its number is, has to be compiled."""
+    log_first_compilation.cache_clear()
+    (tmp_path / "plugin.py").write_text(PLUGIN.format(number=f"{time.time_ns()}.0"))
+    scene = dap.Scene(name="new")
+    scene.add_body("a")
+    scene.add_force("push", body_i="a")
+    scene.save(tmp_path / "scene.toml")
+    with caplog.at_level(logging.WARNING, "dap3d"):
+        for _ in range(2):
+            dap.compile(tmp_path, allow_code=True)
+    told = [record for record in caplog.records if record.name == "dap3d"]
+    assert [record.getMessage() for record in told] == [
+        "compiling for the first time; this happens once"
+    ]
+    log_first_compilation.cache_clear()
+    names = []
+    (tmp_path / "plugin.py").write_text(PLUGIN.format(number=f"{time.time_ns()}.0"))
+    dap.compile(tmp_path, allow_code=True, announce=names.append)
+    assert names
+    assert len([r for r in caplog.records if r.name == "dap3d"]) == 1
