@@ -1,6 +1,7 @@
 """``dap3d view`` writes a page; a real browser opens it from disk, without a network."""
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -340,3 +341,58 @@ def test_without_webgl_plots_and_tables_still_work(chromium, four_page):
     assert "no WebGL" in page.inner_text("#fault")
     assert page.evaluate("document.querySelectorAll('.plot').length") >= 1
     context.close()
+
+
+# ---------------------------------------------------------------- curves
+
+DRAWN = """() => {
+  const kept = [], g = CanvasRenderingContext2D.prototype;
+  const { moveTo, lineTo, bezierCurveTo, fillText } = g, words = [];
+  g.moveTo = function (x, y) { kept.push(["m", x, y]); moveTo.call(this, x, y); };
+  g.lineTo = function (x, y) { kept.push(["l", x, y]); lineTo.call(this, x, y); };
+  g.bezierCurveTo = function (...p) { kept.push(["b", ...p]); bezierCurveTo.apply(this, p); };
+  g.fillText = function (text, ...p) { words.push(text); fillText.call(this, text, ...p); };
+  window.dap3d.app.plots.drawAll();
+  Object.assign(g, { moveTo, lineTo, bezierCurveTo, fillText });
+  return { kept, words };
+}"""
+
+
+def falling(nt):
+    """A stone that falls for a second, reported at so many instants."""
+    scene = dap.Scene(name="fall")
+    scene.add_body("stone")
+    scene.add_force("weight")
+    return dap.simulate(scene, t_end=1.0, dt=1.0 / (nt - 1))
+
+
+def curve_of(chromium, tmp_path, nt):
+    """What the only curve of a page is drawn by, and the words beside it."""
+    result = falling(nt)
+    page = dap.view(result, "stone.r.z")
+    shown = Opened(chromium, page.save(tmp_path / f"{nt}.html"))
+    drawn = shown.run(DRAWN)
+    shown.close()
+    grid = max(k for k, (kind, *_) in enumerate(drawn["kept"]) if kind == "m")
+    return drawn["kept"][grid:], drawn["words"]
+
+
+def test_a_dense_curve_is_drawn_in_the_order_of_time(chromium, tmp_path):
+    """A fall goes down alone: of some thousand instants no column goes up first."""
+    pieces, words = curve_of(chromium, tmp_path, 4001)
+    height = [piece[-1] for piece in pieces]
+    assert 100 < len(pieces) < 4001
+    assert all(b >= a for a, b in pairwise(height))
+    assert "time [s]" in words
+
+
+def test_a_coarse_curve_is_smooth_between_its_instants(chromium, tmp_path):
+    """A parabola is a Bezier curve whose control points are where its tangents meet."""
+    pieces, _ = curve_of(chromium, tmp_path, 5)
+    assert [piece[0] for piece in pieces] == ["m", "b", "b", "b", "b"]
+    y = [pieces[0][-1], *(piece[-1] for piece in pieces[1:])]
+    drop = (y[-1] - y[0]) / 16.0  # of the first quarter, in pixels
+    for k, (_, _, first, _, second, _, _) in enumerate(pieces[1:]):
+        slopes = 2.0 * drop * k, 2.0 * drop * (k + 1)  # pixels a quarter of a second
+        assert first == pytest.approx(y[k] + slopes[0] / 3.0, abs=1e-3)
+        assert second == pytest.approx(y[k + 1] - slopes[1] / 3.0, abs=1e-3)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import dap3d_core as dap
 from dap3d_core.exchange.gltf import write_gltf
 from dap3d_core.exchange.moving import MovingScene
-from dap3d_core.exchange.solids import solid, spring
+from dap3d_core.view.solids import solid, spring
 from dap3d_core.result import ResultError
 from dap3d_core.view.marks import SOLIDS
 

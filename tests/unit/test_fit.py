@@ -380,7 +380,8 @@ def test_a_fit_is_drawn(tmp_path):
     assert len(ax.figure.axes) == 6
     points, curve = ax.lines
     assert points.get_ydata() == pytest.approx(data["mass.r.x"])
-    assert curve.get_xdata() == pytest.approx(fit.result.t)
+    every = (len(curve.get_xdata()) - 1) // (len(fit.result.t) - 1)  # smooth between instants
+    assert curve.get_xdata()[::every] == pytest.approx(fit.result.t)
     assert [a.get_ylabel() for a in ax.figure.axes][1] == "residual\n[m]"
     assert len(dap.plot(fit, "mass.rd.x").figure.axes) == 2
     pyplot.close("all")

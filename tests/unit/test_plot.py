@@ -16,6 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from support.plain import in_another_process
 from unit.test_result import circling, drifting, model_of, result_of
 
+import dap3d_core as dap
 from dap3d_core.plot import FORMATS, plot, save_plot, show_plot
 from dap3d_core.plot.drawing import draw, gather, height_of
 from dap3d_core.result import ResultError, UnknownNameError
@@ -45,7 +46,10 @@ def test_a_curve_over_time_with_units(result):
     ax = plot(result, "bob.r.x")
     ((name, data),) = lines(ax).items()
     assert name == "bob.r.x"
-    np.testing.assert_array_equal(data, np.stack([result.t, result.r[:, 0, 0]], axis=1))
+    every = (len(data) - 1) // (len(result.t) - 1)  # places between instants as well
+    np.testing.assert_allclose(
+        data[::every], np.stack([result.t, result.r[:, 0, 0]], axis=1), rtol=1e-15, atol=1e-15
+    )
     assert ax.get_xlabel() == "time [s]"
     assert ax.get_ylabel() == "position of bob, x [m]"
     assert ax.get_legend() is None
@@ -77,7 +81,9 @@ def test_units_share_a_figure_in_panels_below_one_another(result):
 
 def test_one_quantity_over_another(result):
     ax = plot(result, "bob.r.y", x="bob.r.x")
-    np.testing.assert_array_equal(lines(ax)["bob.r.y"], result.r[:, 0, :2])
+    data = lines(ax)["bob.r.y"]
+    every = (len(data) - 1) // (len(result.t) - 1)
+    np.testing.assert_allclose(data[::every], result.r[:, 0, :2], rtol=1e-15, atol=1e-15)
     assert ax.get_xlabel() == "position of bob, x [m]"
 
 
@@ -98,14 +104,64 @@ def test_every_axis_has_a_unit(result, x):
     axes = first.figure.axes
     assert len(axes) == 4
     for label in (axes[-1].get_xlabel(), *(ax.get_ylabel() for ax in axes)):
-        assert re.search(r"\[[^]]+\]$", label), label
+        assert re.search(r"\[[^]]+\]$", label) or label.endswith("(SI\xa0units)"), label
+
+
+def test_curves_between_instants_follow_the_rates():
+    """A fall is a parabola, which cubics through positions and velocities are exactly."""
+    scene = dap.Scene(name="fall")
+    scene.add_body("stone", r_dot=[2.0, 0.0, 1.0])
+    scene.add_force("weight")
+    fall = dap.simulate(scene, t_end=1.0, dt=0.25)
+    g = 9.81
+    over_time = lines(plot(fall, "stone.r.z"))["stone.r.z"]
+    assert len(over_time) > 100
+    t = over_time[:, 0]
+    np.testing.assert_allclose(over_time[:, 1], t - 0.5 * g * t**2, atol=1e-12)
+    path = lines(plot(fall, "stone.r.z", x="stone.r.x"))["stone.r.z"]
+    t = path[:, 0] / 2.0
+    np.testing.assert_allclose(path[:, 1], t - 0.5 * g * t**2, atol=1e-12)
+    rates = lines(plot(fall, "stone.rd.z"))["stone.rd.z"]
+    np.testing.assert_allclose(rates[:, 1], 1.0 - g * rates[:, 0], atol=1e-12)
+    assert len(lines(plot(fall, "stone.rdd.z"))["stone.rdd.z"]) == len(fall.t)  # no rate is known
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ([-43.0, -43.0 - 4e-9], r"×10⁻⁹ − 43"),
+        ([1e9, 3e9], r"×10⁹"),
+        ([0.0, 1.0], ""),
+        ([43.0, 43.0 + 2e-14], ""),
+    ],
+)
+def test_an_axis_says_what_its_numbers_are(values, words):
+    """Not 1e-9-4.3e1; and rounding is no curve."""
+    from dap3d_core.plot.ticks import PlainOffset, show_rounding_flat
+
+    axes = matplotlib.figure.Figure().subplots()
+    axes.plot([0.0, 1.0], values)
+    axes.yaxis.set_major_formatter(PlainOffset())
+    show_rounding_flat(axes)
+    axes.figure.draw_without_rendering()
+    assert axes.yaxis.get_offset_text().get_text() == words
+
+
+def test_a_unit_stays_on_one_line(result):
+    """A bracket on each of two lines is no unit."""
+    ax = plot(result, "J1.moment_body", "J1.moment_at_point")
+    label = ax.get_ylabel()
+    assert label.splitlines()[-1].endswith("[N\xa0m]")
 
 
 def test_several_runs_in_one_figure(result):
     """One quantity is named by its run; several by both. Each run over its own instants."""
     other = circling(nt=5)[0]
     ax = plot({"fine": result, "coarse": other}, "bob.r.x")
-    assert {name: len(data) for name, data in lines(ax).items()} == {"fine": 21, "coarse": 5}
+    assert {name: len(data) for name, data in lines(ax).items()} == {
+        "fine": 20 * 29 + 1,
+        "coarse": 4 * 120 + 1,
+    }
     assert ax.get_ylabel() == "position of bob, x [m]"
     assert ax.figure.get_suptitle() == "circling"
     both = plot({"fine": result, "coarse": other}, "bob.r", "work")

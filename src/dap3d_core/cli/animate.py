@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 @click.option(
     "--fit", is_flag=True, help="Frame the whole motion, whatever limits the scene gives."
 )
+@click.option("--model", metavar="MODEL", help="The model in whose folder meshes lie.")
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 @click.option("-q", "--quiet", is_flag=True, help="Print what went wrong alone.")
@@ -63,9 +64,9 @@ def animate(
 ) -> int:
     """Draw the motion of a RESULT as a stick figure: a GIF, an MP4 or a snapshot.
 
-    Lines run from the mass centre of each body to its points and to the animation points of the
-    scene; springs are dashed. The limits of the scene's [animation] frame the picture, else the
-    motion does. No display is needed; an MP4 needs the program ffmpeg.
+    Bodies with shapes are drawn by them; of others lines run from the mass centre to the points and
+    to the animation points of the scene; springs are dashed. The limits of the scene's [animation]
+    frame the picture, else the motion does. No display is needed; an MP4 needs the program ffmpeg.
 
     \b
     dap3d animate fourbar3.nc

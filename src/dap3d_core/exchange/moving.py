@@ -3,7 +3,6 @@
 import attrs
 import numpy as np
 
-from dap3d_core.exchange.solids import Triangles, solid, spring
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.kinematics import to_global
 from dap3d_core.result import Result
@@ -13,6 +12,7 @@ from dap3d_core.view.geometry import elements_of, notes_of, scene_geometry
 from dap3d_core.view.marks import Mark, Span, turned_to
 from dap3d_core.view.motion import Motion
 from dap3d_core.view.shapes import Line
+from dap3d_core.view.solids import Triangles, solid, spring
 
 #: Colour of what has none that can be read, as parts of 255.
 GREY = (154, 163, 173)

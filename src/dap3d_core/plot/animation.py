@@ -76,13 +76,15 @@ def animate(
     view: str | None = None,
     at: float | None = None,
     fit: bool = False,
+    model: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     force: bool = False,
 ) -> Film:
     """Draw the motion of a result as a stick figure into a file; needs no display.
 
-    Lines run from the mass centre of each body to its points, animation points included; springs
-    are dashed, points that a joint keeps apart (a massless link) joined by a thin line.
+    Bodies with shapes are drawn by them. Of others lines run from the mass centre to their points,
+    animation points included; springs are dashed, points that a joint keeps apart (a massless link)
+    joined by a thin line.
 
     Args:
         result: what is drawn.
@@ -95,6 +97,7 @@ def animate(
             default along the axis across a plane motion, else from the side and above.
         at: time of a snapshot, s; by default the first instant.
         fit: frame the whole motion, whatever limits the scene's [animation] gives.
+        model: the model (a name, a folder, a file) in whose folder meshes of shapes lie.
         progress: called as progress(done, frames).
         force: whether an existing file is overwritten.
 
@@ -108,7 +111,7 @@ def animate(
     target = Path(path)
     suffix = target.suffix.lower()
     _check(result, target, fps, speed, size, at)
-    stage, notes = _set_up(result, view, size, fit=fit)
+    stage, notes = _set_up(result, view, size, model, fit=fit)
     duration = float(result.t[-1] - result.t[0])
     speed, times = speed or usual_speed(duration), _instant(result, at)
     if suffix in FILMS:
@@ -126,16 +129,22 @@ def animate(
 
 
 def _set_up(
-    result: Result, view: str | None, size: tuple[int, int], *, fit: bool
+    result: Result,
+    view: str | None,
+    size: tuple[int, int],
+    model: str | os.PathLike[str] | None,
+    *,
+    fit: bool,
 ) -> tuple[Stage, tuple[str, ...]]:
     """The stage, and what is to be said of what it shows."""
-    sticks = sticks_of(result)
+    sticks = sticks_of(result, model)
     extent = sticks.extent(result, np.eye(3))
     camera = camera_of(view, extent)
     limits = with_margin(extent) if sticks.limits is None or fit else sticks.limits
     seen = shown(camera, limits, sticks.extent(result, camera.axes))
     stage = Stage(sticks, camera, limits, seen, size, result.record.title)
-    return stage, (BEYOND,) if leaves(limits, extent, camera) else ()
+    notes = () if sticks.shapes is None else sticks.shapes.notes
+    return stage, (*notes, BEYOND) if leaves(limits, extent, camera) else notes
 
 
 def _frames(

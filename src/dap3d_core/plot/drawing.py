@@ -4,10 +4,13 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dap3d_core.model.groups import Floats
+from dap3d_core.plot.cubics import cubics
+from dap3d_core.plot.ticks import PlainOffset, show_rounding_flat
 from dap3d_core.result import Quantity, Result, UnknownNameError, find
 
 if TYPE_CHECKING:
@@ -27,13 +30,31 @@ LETTERS = 8.0
 
 
 class Curve(NamedTuple):
-    """One line: its name in the legend, its place (nt,), (nt,), whose it is."""
+    """One line.
+
+    Attributes:
+        name: in the legend.
+        t: (nt,) reported instants, s.
+        x, values: (nt,) where it runs.
+        x_rate, rate: (nt,) their derivatives in time, None where they are not known.
+        quantity, run: whose it is.
+    """
 
     name: str
+    t: Floats
     x: Floats
     values: Floats
+    x_rate: Floats | None
+    rate: Floats | None
     quantity: Quantity
     run: int
+
+    @property
+    def smooth(self) -> tuple[Floats, Floats]:
+        """Places and values, between instants by cubics where both rates are known."""
+        if self.x_rate is None or self.rate is None:
+            return self.x, self.values
+        return cubics(self.t, self.x, self.x_rate), cubics(self.t, self.values, self.rate)
 
 
 class Panel(NamedTuple):
@@ -133,7 +154,7 @@ def gather(
             unit = there[k].unit
             alone = there[k].values.ndim == 1 and [q.unit for q in there].count(unit) == 1
             curves = panels.setdefault(unit, Panel(unit, [])).curves
-            curves.extend(_curves(there[k], along.values, number, name, alone=alone))
+            curves.extend(_curves(runs[name], along, there[k], number, name, alone=alone))
     titles = list(dict.fromkeys(_title_of(run) for run in runs.values()))
     return Drawing(over, list(panels.values()), titles[0] if len(titles) == 1 else "")
 
@@ -163,14 +184,32 @@ def _title_of(result: Result) -> str:
 
 
 def _curves(
-    quantity: Quantity, x: Floats, number: int, run: str, *, alone: bool
+    result: Result, over: Quantity, quantity: Quantity, number: int, run: str, *, alone: bool
 ) -> Iterable[Curve]:
     """The curves of a quantity of a run; ``alone`` in its panel, it is named by its run."""
     names = [f"{quantity.name}.{c}" for c in quantity.components] or [quantity.name]
-    columns = quantity.values.reshape(len(x), -1).T
-    for name, values in zip(names, columns, strict=True):
+    columns = quantity.values.reshape(len(result.t), -1).T
+    x_rate, rate = _rate(result, over), _rate(result, quantity)
+    rates = [None] * len(columns) if rate is None else rate.reshape(len(result.t), -1).T
+    for name, values, own in zip(names, columns, rates, strict=True):
         words = run if alone and run else ", ".join(word for word in (name, run) if word)
-        yield Curve(words, x, values, quantity, number)
+        yield Curve(words, result.t, over.values, values, x_rate, own, quantity, number)
+
+
+def smooth(result: Result, quantity: Quantity) -> tuple[Floats, Floats]:
+    """Times and values of one number, between instants by cubics where its rate is known."""
+    rate = _rate(result, quantity)
+    if rate is None:
+        return result.t, quantity.values
+    ones = np.ones(len(result.t))
+    return cubics(result.t, result.t, ones), cubics(result.t, quantity.values, rate)
+
+
+def _rate(result: Result, quantity: Quantity) -> Floats | None:
+    """The derivative of a quantity in time, None where it is not known."""
+    if quantity.name == "t":
+        return np.ones(len(result.t))
+    return find(result, quantity.rate).values if quantity.rate else None
 
 
 def height_of(drawing: Drawing) -> float:
@@ -216,11 +255,10 @@ def draw_panel(ax: Axes, drawing: Drawing, panel: Panel, height: float) -> None:
     """
     several = len({curve.run for curve in panel.curves}) > 1
     for k, curve in enumerate(panel.curves):
-        single = len(curve.x) == 1
+        single = len(curve.t) == 1
         dash = curve.run if several else k // len(PALETTE)
         ax.plot(
-            curve.x,
-            curve.values,
+            *curve.smooth,
             color=PALETTE[k % len(PALETTE)],
             linestyle="none" if single else DASHES[dash % len(DASHES)],
             marker=MARKERS[k % len(MARKERS)] if single else "o" if drawing.x.name != "t" else "",
@@ -230,6 +268,9 @@ def draw_panel(ax: Axes, drawing: Drawing, panel: Panel, height: float) -> None:
             linewidth=1.4,
             label=shown_text(curve.name),
         )
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_formatter(PlainOffset())
+    show_rounding_flat(ax)
     ax.set_ylabel(wrapped(_y_label(panel), 15 * height), fontsize=LETTERS)
 
 
@@ -249,7 +290,15 @@ def _y_label(panel: Panel) -> str:
 
 def with_unit(words: str, unit: str) -> str:
     """Words and the unit, [1] for numbers without one."""
-    return shown_text(f"{words} [{unit.replace('^2', '²')}]".strip())
+    return shown_text(f"{words} {unit_text(unit)}".strip())
+
+
+def unit_text(unit: str) -> str:
+    """A unit as figures show it, in brackets; lines are not broken within."""
+    if unit == "SI":  # it depends on the row
+        return "(SI\N{NO-BREAK SPACE}units)"
+    shown = unit.replace("^2", "²").replace("^3", "³").replace(" ", "\N{NO-BREAK SPACE}")
+    return f"[{shown}]"
 
 
 def shown_text(words: str) -> str:
@@ -257,7 +306,8 @@ def shown_text(words: str) -> str:
 
     What no font draws, such as a control character, is left out.
     """
-    words = "".join(c if c.isprintable() else " " for c in words).replace("$", r"\$")
+    kept = "\N{NO-BREAK SPACE}"
+    words = "".join(c if c.isprintable() or c == kept else " " for c in words).replace("$", r"\$")
     return f" {words}" if words.startswith("_") else words
 
 

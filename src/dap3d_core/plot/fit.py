@@ -8,8 +8,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dap3d_core.plot.drawing import LETTERS, PALETTE, WIDTH, shown_text, with_unit, wrapped
+from dap3d_core.plot.drawing import (
+    LETTERS,
+    PALETTE,
+    WIDTH,
+    shown_text,
+    smooth,
+    unit_text,
+    with_unit,
+    wrapped,
+)
 from dap3d_core.plot.saving import save_figure
+from dap3d_core.plot.ticks import PlainOffset
 from dap3d_core.result import find
 from dap3d_core.result.errors import unknown
 from dap3d_core.study.fit_result import Fit
@@ -74,7 +84,7 @@ def draw_fit(figure: Figure, fit: Fit, outputs: Sequence[str]) -> list[Axes]:
                  "markeredgewidth": 0.0, "alpha": 0.7}  # fmt: skip
         sigma = fit.sigma.get(name)
         above.plot(fit.t, fit.measured[name], label="measured", **point)
-        above.plot(fit.result.t, curve.values, color=PALETTE[0], linewidth=1.2, label="fitted")
+        above.plot(*smooth(fit.result, curve), color=PALETTE[0], linewidth=1.2, label="fitted")
         above.set_ylabel(wrapped(with_unit(curve.label, curve.unit), 15 * CURVE_HEIGHT),
                          fontsize=LETTERS)  # fmt: skip
         if sigma is None:
@@ -82,7 +92,7 @@ def draw_fit(figure: Figure, fit: Fit, outputs: Sequence[str]) -> list[Axes]:
         else:
             below.errorbar(fit.t, fit.residuals[name], sigma, elinewidth=0.5, **point)
         below.axhline(0.0, color=PALETTE[0], linewidth=1.0)
-        below.set_ylabel(f"residual\n[{curve.unit}]", fontsize=LETTERS)
+        below.set_ylabel(f"residual\n{unit_text(curve.unit)}", fontsize=LETTERS)
         reach = np.abs(fit.residuals[name]) + (0.0 if sigma is None else sigma)
         if (reach > 0.0).any():
             limit = 1.15 * np.nanmax(reach)
@@ -92,6 +102,7 @@ def draw_fit(figure: Figure, fit: Fit, outputs: Sequence[str]) -> list[Axes]:
             ax.spines[["top", "right"]].set_visible(False)
             ax.tick_params(labelsize=LETTERS)
             ax.yaxis.get_offset_text().set_fontsize(LETTERS)
+            ax.yaxis.set_major_formatter(PlainOffset())
             ax.ticklabel_format(axis="y", scilimits=(-3, 4))
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=LETTERS,
                    frameon=False, borderaxespad=0.2, handlelength=1.8)  # fmt: skip

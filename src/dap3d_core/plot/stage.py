@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import LineCollection, PathCollection
+from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
@@ -71,8 +71,14 @@ class Stage:
         self._shadows = None if camera.plane else self._lines(SHADOW, 1.6, zorder=1)
         self._links = self._lines(DARK, 1.2, zorder=2)
         self._springs = self._lines(DARK, 1.2, zorder=2, linestyle=DASHED)
+        self._solids = self._add(PolyCollection([], zorder=2.2, linewidths=0.3))
+        self.ax.add_collection(self._solids, autolim=False)
         self._sticks = self._lines("black", 2.0, zorder=3, capstyle="round")
         self._dots = self._marks("o", DOT, zorder=4)
+        shaped = sticks.shapes.bodies if sticks.shapes is not None else ()
+        self._bare = np.array(
+            [k not in shaped for k in range(1, len(sticks.names) + 1)], dtype=bool
+        )
         self._centres = {
             m: self._marks(m, MARKER, zorder=5) for m in dict.fromkeys(sticks.markers) if self._few
         }
@@ -98,13 +104,18 @@ class Stage:
         order = np.argsort(depth[lines].mean(axis=1), kind="stable")
         self._sticks.set_segments(list(flat[lines[order]]))
         self._sticks.set_color(self._colors[lines[order, 0]])
+        if sticks.shapes is not None:
+            corners, colors = sticks.shapes.seen(r, p, self.camera)
+            self._solids.set_verts(list(corners))
+            self._solids.set_facecolor(colors)
+            self._solids.set_edgecolor(colors)  # no seams between neighbours
         self._links.set_segments(list(flat[sticks.links]))
         self._springs.set_segments(list(flat[sticks.springs]))
         self._dots.set_offsets(flat[sticks.points])
         self._dots.set_facecolor(list(self._colors[sticks.body[sticks.points] - 1]))
         shapes = np.array(sticks.markers)
         for shape, marks in self._centres.items():
-            which = np.flatnonzero(shapes == shape)
+            which = np.flatnonzero((shapes == shape) & self._bare)
             marks.set_offsets(flat[which])
             marks.set_edgecolor(list(self._colors[which]))
         if self._shadows is not None:

@@ -1,17 +1,22 @@
 """The stick figure of a result: lines from the mass centre of each body to its points."""
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
-from matplotlib.colors import is_color_like
+from matplotlib.colors import is_color_like, to_hex
 
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.kinematics import euler_rates, split, to_global
+from dap3d_core.plot.cubics import cubic
 from dap3d_core.plot.drawing import MARKERS, PALETTE
 from dap3d_core.result import Result
-from dap3d_core.scene import Scene, SceneError, parse
+from dap3d_core.scene import Scene, SceneError, load, parse
+
+if TYPE_CHECKING:
+    from dap3d_core.plot.shaded import Shapes
 
 #: Usual names of colours -> the shade of that hue in which colour-blind readers can tell it apart.
 SHADES = {
@@ -37,6 +42,7 @@ class Sticks:
         points: places of the points that belong to bodies.
         anchors: places of points of the ground.
         springs, links: (q, 2) pairs of places: ends of force elements; points that joints couple.
+        shapes: of the scene, in place of the lines and markers of their bodies; None without.
         limits: (3, 2) of the axes as the scene gives them, m, or None.
     """
 
@@ -49,6 +55,7 @@ class Sticks:
     anchors: Integers
     springs: Integers
     links: Integers
+    shapes: "Shapes | None"
     limits: Floats | None
 
     @property
@@ -65,6 +72,15 @@ class Sticks:
         out[..., moving, :] = r[..., b, :] + to_global(p[..., b, :], self.local[moving])
         return out
 
+    @property
+    def _framed(self) -> "Sticks":
+        """The same with places where the shapes end."""
+        if self.shapes is None:
+            return self
+        ends = self.shapes.corners
+        body = np.concatenate([self.body, self.shapes.body[ends]])
+        return attrs.evolve(self, body=body, local=np.vstack([self.local, self.shapes.local[ends]]))
+
     def extent(self, result: Result, directions: Floats) -> Floats:
         """(d, 2) least and largest of all places over the reported instants, m.
 
@@ -73,18 +89,25 @@ class Sticks:
             directions: (3, d) unit vectors along which they are measured.
         """
         n, found = result.subject.body_count, []
-        count = max(1, BLOCK // (3 * len(self.body)))
+        count = max(1, BLOCK // (3 * len(self._framed.body)))
         for start in range(0, len(result.t), count):
             r, p, _, _ = split(result.u[start : start + count], n)
-            all_of_them = self.positions(r, p).reshape(-1, 3) @ directions
+            all_of_them = self._framed.positions(r, p).reshape(-1, 3) @ directions
             found.append([all_of_them.min(axis=0), all_of_them.max(axis=0)])
         return np.stack([np.min(found, axis=(0, 1)), np.max(found, axis=(0, 1))], axis=1)
 
 
-def sticks_of(result: Result) -> Sticks:
-    """The stick figure of a result, from its points and from the scene in it."""
+def sticks_of(result: Result, model: str | os.PathLike[str] | None = None) -> Sticks:
+    """The stick figure of a result, from its points and from the scene in it.
+
+    Args:
+        result: whose.
+        model: in whose folder meshes of shapes lie, where they are drawn.
+    """
     subject = result.subject
     scene = _scene(result.scene_text)
+    if model is not None:
+        scene.path = load(model).path
     n = subject.body_count
     body = [*range(1, n + 1), *(int(b) for b in subject.point_body)]
     local = [*np.zeros((n, 3)), *subject.point_local]
@@ -99,16 +122,23 @@ def sticks_of(result: Result) -> Sticks:
     springs, links = (_places(pairs[kind], place) for kind in ("forces", "joints"))
     found = np.array(body)
     colors = _colors(scene, subject.body_names)
+    shapes = None
+    if scene.shapes:
+        from dap3d_core.plot.shaded import shapes_of
+
+        shapes = shapes_of(scene, subject.body_names, [to_hex(color) for color in colors])
+    bare = np.isin(found, [] if shapes is None else [*shapes.bodies], invert=True)
     return Sticks(
         names=subject.body_names,
         colors=colors,
         markers=tuple(MARKERS[k % len(MARKERS)] for k in range(n)),
         body=found,
         local=np.array(local, dtype=float).reshape(-1, 3),
-        points=np.flatnonzero((found > 0) & (np.arange(len(found)) >= n)),
+        points=np.flatnonzero((found > 0) & (np.arange(len(found)) >= n) & bare),
         anchors=np.flatnonzero(found == 0),
         springs=springs,
         links=links,
+        shapes=shapes,
         limits=_limits(scene.animation.limits),
     )
 
@@ -170,12 +200,5 @@ def pose_at(result: Result, t: float) -> tuple[Floats, Floats]:
         return r[0], p[0]
     h = float(times[k + 1] - times[k])
     a = min(max((t - float(times[k])) / h, 0.0), 1.0)
-    turned = _cubic(a, h, p, euler_rates(p, w))
-    return _cubic(a, h, r, rd), turned / np.linalg.norm(turned, axis=-1, keepdims=True)
-
-
-def _cubic(a: float, h: float, x: Floats, x_dot: Floats) -> Floats:
-    """The cubic through both ends, a part of the way along: x, x_dot (2, ...)."""
-    s, b = a * a * (3.0 - 2.0 * a), a * (1.0 - a)
-    found: Floats = (1.0 - s) * x[0] + s * x[1] + b * h * ((1.0 - a) * x_dot[0] - a * x_dot[1])
-    return found
+    turned = cubic(a, h, p, euler_rates(p, w))
+    return cubic(a, h, r, rd), turned / np.linalg.norm(turned, axis=-1, keepdims=True)

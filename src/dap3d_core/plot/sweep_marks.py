@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.plot.drawing import LETTERS, columns_of, shown_text
+from dap3d_core.plot.drawing import LETTERS, columns_of, shown_text, unit_text
 from dap3d_core.plot.sweep_table import DONE, Column
 from dap3d_core.study import PointStatus
 
@@ -124,15 +124,14 @@ def name_bar(bar: Any, column: Column, height: float) -> None:
 
 def with_unit(column: Column) -> str:
     """What stands at an axis."""
-    unit = column.unit.replace("^2", "²")
-    return shown_text(f"{column.label} [{unit}]".strip() if unit else column.label)
+    return shown_text(f"{column.label} {unit_text(column.unit)}" if column.unit else column.label)
 
 
 def folded(words: str, room: int) -> str:
     """Words on lines of so many characters; names break behind a dot, a colon or an underline."""
     room = max(12, room)
     lines = [""]
-    for part in re.findall(r"[^\s._:]*[\s._:]?", words):
+    for part in re.findall(r"[^ ._:]*[ ._:]?", words):
         pieces = [part[k : k + room] for k in range(0, len(part), room)]
         for piece in pieces:
             if len((lines[-1] + piece).rstrip()) > room and lines[-1]:

@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.plot.drawing import LETTERS, shown_text
+from dap3d_core.plot.drawing import LETTERS, shown_text, unit_text
 from dap3d_core.plot.sweep_marks import (
     FATES,
     LINE_COLORS,
@@ -87,7 +87,7 @@ class Parallel(Panel):
             ax.plot([place, place], [level, level - 0.07], color="0.2", linewidth=0.9, zorder=4)
             ax.text(place, level - 0.1, f"{value:.4g}", ha="center", va="top", bbox=box, zorder=5,
                     fontsize=LETTERS - 1.0)  # fmt: skip
-        words = column.name if not column.unit else f"{column.name} [{column.unit}]"
+        words = f"{column.name} {unit_text(column.unit)}" if column.unit else column.name
         ax.text(0.0, level + 0.09, cut(shown_text(words), int(16 * width)), ha="left", va="bottom",
                 bbox=box, zorder=5, fontsize=LETTERS)  # fmt: skip
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.model.groups import Floats
+from dap3d_core.plot.drawing import unit_text
 from dap3d_core.registry.spelling import nearest
 from dap3d_core.result import UnknownNameError
 from dap3d_core.result.layout import SWEEP
@@ -236,7 +237,7 @@ def _cut(
 
 def _unit(data: "xarray.Dataset", name: str) -> str:
     unit = data[name].attrs.get("units", "")
-    return f" {unit}" if unit not in ("", "1") else ""
+    return f" {unit_text(unit)[1:-1]}" if unit not in ("", "1") else ""
 
 
 def unknown(what: str, name: str, known: Sequence[str]) -> UnknownNameError:

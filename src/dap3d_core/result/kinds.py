@@ -48,12 +48,14 @@ class Kind(NamedTuple):
         unit: SI unit, "1" for none, "SI" where it depends on the row.
         components: names of the columns; empty for a number or for rows.
         values: (nt,) or (nt, components) of an owner.
+        rate: the quantity that is its derivative in time, "" where none is.
     """
 
     words: str
     unit: str
     components: tuple[str, ...]
     values: "Callable[[Result, Owner], Floats]"
+    rate: str = ""
 
 
 def _body_axes(result: "Result", vectors: Floats, body: int) -> Floats:
@@ -111,12 +113,16 @@ def _multipliers(result: "Result", owner: Owner) -> Floats:
 
 
 BODY = {
-    "r": Kind("position", "m", AXES, lambda s, o: s.r[:, o.place]),
+    "r": Kind("position", "m", AXES, lambda s, o: s.r[:, o.place], "rd"),
     "p": Kind("Euler parameters", "1", EULER, lambda s, o: s.p[:, o.place]),
-    "rd": Kind("velocity", "m/s", AXES, lambda s, o: s.rd[:, o.place]),
-    "w": Kind("angular velocity", "rad/s", AXES, lambda s, o: s.w[:, o.place]),
+    "rd": Kind("velocity", "m/s", AXES, lambda s, o: s.rd[:, o.place], "rdd"),
+    "w": Kind("angular velocity", "rad/s", AXES, lambda s, o: s.w[:, o.place], "wd"),
     "wp": Kind(
-        "angular velocity in body axes", "rad/s", AXES, lambda s, o: _body_axes(s, s.w, o.place)
+        "angular velocity in body axes",
+        "rad/s",
+        AXES,
+        lambda s, o: _body_axes(s, s.w, o.place),
+        "wpd",
     ),
     "rdd": Kind("acceleration", "m/s^2", AXES, lambda s, o: accelerations(s.v_dot)[0][:, o.place]),
     "wd": Kind(
@@ -130,8 +136,8 @@ BODY = {
     ),
 }
 POINT = {
-    "r": Kind("position", "m", AXES, _point(0)),
-    "v": Kind("velocity", "m/s", AXES, _point(1)),
+    "r": Kind("position", "m", AXES, _point(0), "v"),
+    "v": Kind("velocity", "m/s", AXES, _point(1), "a"),
     "a": Kind("acceleration", "m/s^2", AXES, _point(2)),
 }
 #: What the arrays of points are called (spec 10): the point is meant where a body has its name.
@@ -151,7 +157,7 @@ JOINT = {
 FORCE = {
     part: Kind(words, unit, AXES, _action(part)) for part, (words, unit) in ACTIONS.items()
 } | {
-    "length": Kind("length", "m", (), _of_element("length")),
+    "length": Kind("length", "m", (), _of_element("length"), "length_rate"),
     "length_rate": Kind("rate of the length", "m/s", (), _of_element("length_rate")),
     "tension": Kind("tension", "N", (), _of_element("tension")),
     "energy": Kind("potential energy", "J", (), _of_element("energy")),

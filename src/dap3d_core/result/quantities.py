@@ -29,6 +29,7 @@ class Quantity(NamedTuple):
         unit: SI unit, "1" for none, "SI" where it depends on the row.
         components: names of the columns; empty for (nt,).
         owner: "body", "point", "joint" or "force"; "" for a quantity of the whole.
+        rate: name of the quantity that is its derivative in time, "" where none is.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Quantity(NamedTuple):
     unit: str
     components: tuple[str, ...]
     owner: str = ""
+    rate: str = ""
 
 
 def find(result: "Result", name: str) -> Quantity:
@@ -82,17 +84,19 @@ def _read(
         return None
     columns = _components(result, owner, attribute)
     label = f"{meant.words} of {owner.shown}"
+    rate = f"{owner.shown}.{meant.rate}" if meant.rate else ""
     if not component:
         values = meant.values(result, owner)
-        return Quantity(name, values, meant.words, label, meant.unit, columns, owner.kind)
+        return Quantity(name, values, meant.words, label, meant.unit, columns, owner.kind, rate)
     label = f"{label}, {component}"
     if component == NORM and meant.components is AXES:
-        values = np.linalg.norm(meant.values(result, owner), axis=1)
+        values, rate = np.linalg.norm(meant.values(result, owner), axis=1), ""
     elif component in columns:
         values = meant.values(result, owner)[:, columns.index(component)]
+        rate = f"{rate}.{component}" if rate else ""
     else:
         return None
-    return Quantity(name, values, meant.words, label, meant.unit, (), owner.kind)
+    return Quantity(name, values, meant.words, label, meant.unit, (), owner.kind, rate)
 
 
 def _components(result: "Result", owner: Owner, attribute: str) -> tuple[str, ...]:

@@ -70,6 +70,7 @@ def _series(result: Result, name: str) -> dict[str, Any]:
         "unit": found.unit,
         "components": list(found.components),
         "values": packed(found.values, "<f8"),
+        "rates": packed(find(result, found.rate).values, "<f8") if found.rate else None,
     }
 
 

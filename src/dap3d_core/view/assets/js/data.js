@@ -42,7 +42,7 @@ function niceBelow(x) {
   return power;
 }
 
-const unitText = (unit) => (unit === "1" ? "" : unit.replace("^2", "\u00b2"));
+const unitText = (unit) => ({ 1: "", SI: "SI units" })[unit] ?? unit.replaceAll("^2", "\u00b2").replaceAll("^3", "\u00b3");
 
 // Okabe and Ito (2008); the first colours are the most different ones.
 const PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"];

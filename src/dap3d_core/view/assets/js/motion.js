@@ -55,22 +55,25 @@ class Motion {
   // Weights of frames in the cubic Hermite curve whose slopes are central differences.
   #weights(f, s) {
     if (s === 0) return [[f, 1]];
-    const { t, frames } = this;
+    const { t } = this;
     const step = t[f + 1] - t[f];
     const found = new Map();
     const add = (frame, weight) => found.set(frame, (found.get(frame) ?? 0) + weight);
     add(f, 1 + s * s * (2 * s - 3));
     add(f + 1, s * s * (3 - 2 * s));
-    const slope = (k, weight) => {
-      let a = Math.max(k - 1, 0), b = Math.min(k + 1, frames - 1);
-      if (!(t[b] > t[k])) b = k; // an event reports an instant twice: the slope is one-sided there
-      if (!(t[k] > t[a])) a = k;
-      const span = t[b] - t[a];
-      if (span > 0) { add(b, weight * step / span); add(a, -weight * step / span); }
-    };
-    slope(f, s * (1 - s) * (1 - s));
-    slope(f + 1, s * s * (s - 1));
+    for (const [frame, weight] of this.slope(f)) add(frame, s * (1 - s) * (1 - s) * step * weight);
+    for (const [frame, weight] of this.slope(f + 1)) add(frame, s * s * (s - 1) * step * weight);
     return [...found];
+  }
+
+  // Weights of frames in the slope at one of them: the central difference.
+  slope(k) {
+    const { t, frames } = this;
+    let a = Math.max(k - 1, 0), b = Math.min(k + 1, frames - 1);
+    if (!(t[b] > t[k])) b = k; // an event reports an instant twice: the slope is one-sided there
+    if (!(t[k] > t[a])) a = k;
+    const span = t[b] - t[a];
+    return span > 0 ? [[b, 1 / span], [a, -1 / span]] : [];
   }
 
   // The path (3 numbers a frame) of a point of a body at the reported instants.

@@ -1,6 +1,6 @@
 // Curves over time beside the scene, one panel a unit, with a cursor at the present instant.
 
-const LEFT = 46, RIGHT = 6, TOP = 6, BOTTOM = 18;
+const LEFT = 46, RIGHT = 6, TOP = 6, BOTTOM = 32;
 
 class Plots {
   constructor(box, choice, catalogue, motion, seek) {
@@ -63,7 +63,7 @@ class Plots {
   }
 
   #keys(panel) {
-    panel.curves = panel.quantities.flatMap((q) => q.values().map((values, k) => ({ q, values, name: q.parts.length ? `${q.name}.${q.parts[k]}` : q.name })));
+    panel.curves = panel.quantities.flatMap((q) => q.values().map((values, k) => ({ q, values, rates: q.rates?.()[k], name: q.parts.length ? `${q.name}.${q.parts[k]}` : q.name })));
     panel.keys.replaceChildren(...panel.curves.map((curve, k) => {
       curve.color = PALETTE[k % PALETTE.length];
       curve.dash = [[], [6, 3], [2, 2]][Math.floor(k / PALETTE.length) % 3];
@@ -97,7 +97,8 @@ class Plots {
     for (const v of ticks(low, high, 5)) { rule(g, LEFT, y(v), width - RIGHT, y(v)); g.fillText(short(v), LEFT - 5, y(v)); }
     g.textBaseline = "alphabetic";
     g.textAlign = "center";
-    for (const t of ticks(start, end, 5)) { rule(g, x(t), TOP, x(t), height - BOTTOM); g.fillText(short(t), Math.min(x(t), width - 12), height - 4); }
+    for (const t of ticks(start, end, 5)) { rule(g, x(t), TOP, x(t), height - BOTTOM); g.fillText(short(t), Math.min(x(t), width - 12), height - 18); }
+    g.fillText("time [s]", (LEFT + width - RIGHT) / 2, height - 4);
     g.lineWidth = 1.4;
     g.lineJoin = "round";
     g.save();
@@ -122,8 +123,7 @@ class Plots {
       if (!panel.drawn) continue;
       panel.cursor.style.left = `${LEFT + share * (panel.drawn - LEFT - RIGHT)}px`;
       for (const curve of panel.curves) {
-        const next = part > 0 ? curve.values[frame + 1] : 0;
-        const value = curve.values[frame] * (1 - part) + next * part;
+        const value = valueAt(curve, this.motion.t, frame, part);
         curve.now.textContent = short(Math.abs(value) < panel.smallest ? 0 : value);
       }
     }
@@ -157,26 +157,50 @@ function rule(g, x0, y0, x1, y1) {
   g.stroke();
 }
 
-// Many instants in one column of pixels: its least and its largest value say all that is seen.
-function stroke(g, { values, color, dash }, t, x, y, width) {
+// The value of a curve a part of the way from one instant to the next: by a cubic where its rate is known.
+function valueAt({ values, rates }, t, n, part) {
+  if (!(part > 0)) return values[n];
+  const straight = values[n] * (1 - part) + values[n + 1] * part;
+  if (!rates) return straight;
+  const h = t[n + 1] - t[n], rise = values[n + 1] - values[n];
+  return straight + part * (1 - part) * ((1 - part) * (h * rates[n] - rise) - part * (h * rates[n + 1] - rise));
+}
+
+// Of many instants in one column of pixels the first and the last, the least and the largest value say
+// all that is seen, in the order in which they come: other instants are left out.
+function seen(values, column) {
+  const kept = [];
+  let first = 0;
+  for (let n = 1; n <= values.length; n++) {
+    if (n < values.length && column(n) === column(first)) continue;
+    let low = first, high = first;
+    for (let k = first; k < n; k++) {
+      if (values[k] < values[low]) low = k;
+      if (values[k] > values[high]) high = k;
+    }
+    kept.push(...[...new Set([first, low, high, n - 1])].sort((a, b) => a - b));
+    first = n;
+  }
+  return kept;
+}
+
+function stroke(g, { values, rates, color, dash }, t, x, y, width) {
   g.strokeStyle = color;
   g.setLineDash(dash);
   g.beginPath();
-  const thin = values.length > 3 * width;
-  let column = null, low = 0, high = 0, pen = false;
-  const line = (px, py) => { if (pen) g.lineTo(px, py); else g.moveTo(px, py); pen = true; };
-  for (let n = 0; n < values.length; n++) {
-    if (!Number.isFinite(values[n])) { pen = false; continue; }
+  const dense = values.length > 3 * width;
+  const places = dense ? seen(values, (n) => (Number.isFinite(values[n]) ? Math.floor(x(t[n])) : NaN)) : values.keys();
+  let before = -1;
+  for (const n of places) {
+    if (!Number.isFinite(values[n])) { before = -1; continue; }
     const px = x(t[n]), py = y(values[n]);
-    if (!thin) { line(px, py); continue; }
-    const now = Math.floor(px);
-    if (now !== column) {
-      if (column !== null) { line(column, low); line(column, high); }
-      column = now; low = high = py;
-    }
-    low = Math.min(low, py); high = Math.max(high, py);
+    if (before < 0) g.moveTo(px, py);
+    else if (rates && !dense) {
+      const third = (t[n] - t[before]) / 3; // the cubic through both ends with their rates
+      g.bezierCurveTo(x(t[before] + third), y(values[before] + third * rates[before]), x(t[n] - third), y(values[n] - third * rates[n]), px, py);
+    } else g.lineTo(px, py);
+    before = n;
   }
-  if (thin && column !== null) { line(column, low); line(column, high); }
   g.stroke();
   if (values.length === 1) { g.fillStyle = color; g.fillRect(x(t[0]) - 2, y(values[0]) - 2, 4, 4); }
   g.setLineDash([]);

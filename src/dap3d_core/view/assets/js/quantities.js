@@ -5,12 +5,13 @@ function catalogue(data, motion, arrows) {
   const add = (one) => { if (!found.has(one.name)) found.set(one.name, one); };
   for (const s of data.series) {
     add({ name: s.name, unit: s.unit, label: s.label, group: data.asked.includes(s.name) ? "Asked for" : "Energy",
-      parts: s.components, values: lazy(() => columns(float64(s.values), s.components.length || 1)) });
+      parts: s.components, values: lazy(() => columns(float64(s.values), s.components.length || 1)),
+      rates: s.rates && lazy(() => columns(float64(s.rates), s.components.length || 1)) });
   }
   data.bodies.forEach((body, k) => add({ name: `${body.name}.r`, unit: "m", label: `position of ${body.name}`, group: "Position of a body",
-    parts: ["x", "y", "z"], values: lazy(() => columns(Float64Array.from(motion.path(k + 1, [0, 0, 0])), 3)) }));
+    parts: ["x", "y", "z"], ...course(motion, k + 1, [0, 0, 0]) }));
   data.points.filter((p) => p.body > 0).forEach((p) => add({ name: `${p.name}.r`, unit: "m", label: `position of ${p.name}`, group: "Position of a point",
-    parts: ["x", "y", "z"], values: lazy(() => columns(Float64Array.from(motion.path(p.body, p.at)), 3)) }));
+    parts: ["x", "y", "z"], ...course(motion, p.body, p.at) }));
   for (const group of Object.values(arrows.groups)) {
     for (const item of group.items) {
       const name = `${item.name}.${item.what}.norm`;
@@ -19,6 +20,12 @@ function catalogue(data, motion, arrows) {
     }
   }
   return found;
+}
+
+// Where a point is at the instants, and its velocity by the slopes between which the scene moves.
+function course(motion, body, at) {
+  const values = lazy(() => columns(Float64Array.from(motion.path(body, at)), 3));
+  return { values, rates: lazy(() => values().map((one) => one.map((_, n) => motion.slope(n).reduce((sum, [f, w]) => sum + w * one[f], 0)))) };
 }
 
 function lazy(compute) {

@@ -1,0 +1,99 @@
+"""Shapes of bodies in films and snapshots: triangles, shaded, the nearest drawn last."""
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+from matplotlib.colors import to_rgb
+
+from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.model.kinematics import to_global
+from dap3d_core.plot.camera import Camera
+from dap3d_core.scene.description import Scene
+from dap3d_core.view.shapes import Drawn, drawn
+from dap3d_core.view.solids import solid
+
+#: Shapes of more triangles are not drawn: every picture of a film draws all of them.
+MOST_TRIANGLES = 30_000
+#: The darkest face of a shape, as part of its colour; where light comes from beside the viewer.
+DARKEST, BESIDE = 0.55, (0.3, 0.5)
+
+
+@attrs.frozen(eq=False)
+class Shapes:
+    """Triangles fixed in bodies.
+
+    Attributes:
+        body: (k,) body of each vertex, 0 for ground.
+        local: (k, 3) vertices in the axes of the body, m.
+        triangles: (q, 3) places of vertices.
+        colors: (q, 3) red, green, blue from 0 to 1.
+        bodies: indices of bodies that have a shape.
+        notes: what is not drawn, and why.
+    """
+
+    body: Integers
+    local: Floats
+    triangles: Integers
+    colors: Floats
+    bodies: frozenset[int]
+    notes: tuple[str, ...]
+
+    @property
+    def corners(self) -> Integers:
+        """Places of the vertices that bound each body's shapes, for the frame of the picture."""
+        found = []
+        for k in np.unique(self.body):
+            places = np.flatnonzero(self.body == k)
+            ends = self.local[places]
+            found += [places[ends.argmin(axis=0)], places[ends.argmax(axis=0)]]
+        return np.unique(np.concatenate(found)) if found else np.zeros(0, dtype=np.int64)
+
+    def seen(self, r: Floats, p: Floats, camera: Camera) -> tuple[Floats, Floats]:
+        """Triangles (q, 3, 2) in the picture, from back to front, and their colours (q, 3)."""
+        places = self.local.copy()
+        moving = self.body > 0
+        on = self.body[moving] - 1
+        places[moving] = r[on] + to_global(p[on], self.local[moving])
+        corners = places[self.triangles]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.linalg.norm(normal, axis=1)
+        light = camera.towards + BESIDE[0] * camera.right + BESIDE[1] * camera.up
+        bright = np.abs(normal @ (light / np.linalg.norm(light))) / np.where(length, length, 1.0)
+        order = np.argsort(camera.depth(corners).mean(axis=1), kind="stable")
+        shade = DARKEST + (1.0 - DARKEST) * bright[order, None]
+        return camera.project(corners[order]), self.colors[order] * shade
+
+
+def shapes_of(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Shapes:
+    """The shapes of a scene; arguments as ``view.shapes.drawn`` has them."""
+    found: Drawn = drawn(scene, names, colors)
+    notes = list(found.notes)
+    pieces = []
+    for mark in found.marks:
+        form = solid(mark.kind)
+        local = np.asarray(mark.at) + to_global(mark.q, form.vertices * mark.size)
+        pieces.append((mark.body, local, form.triangles, mark.color))
+    for mesh in found.meshes:
+        local = np.asarray(mesh.at) + to_global(mesh.q, mesh.vertices * mesh.scale)
+        pieces.append((mesh.body, local, mesh.triangles, mesh.color))
+    if sum(len(piece[2]) for piece in pieces) > MOST_TRIANGLES:
+        notes.append(
+            f"shapes of more than {MOST_TRIANGLES} triangles in all are not drawn; dap3d view and "
+            "dap3d export show them"
+        )
+        pieces = []
+    starts = np.cumsum([0, *(len(piece[1]) for piece in pieces)])
+    nothing = np.zeros((0, 3))
+    return Shapes(
+        body=np.repeat([piece[0] for piece in pieces], np.diff(starts)).astype(np.int64),
+        local=np.concatenate([nothing, *(piece[1] for piece in pieces)]),
+        triangles=np.concatenate(
+            [nothing, *(piece[2] + start for piece, start in zip(pieces, starts, strict=False))]
+        ).astype(np.int64),
+        colors=np.concatenate(
+            [nothing, *(np.tile(to_rgb(piece[3]), (len(piece[2]), 1)) for piece in pieces)]
+        ),
+        bodies=frozenset(piece[0] for piece in pieces),
+        notes=tuple(notes),
+    )
