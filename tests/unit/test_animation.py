@@ -20,9 +20,11 @@ from unit.test_result import (
     result_of,
 )
 
+import dap3d_core as dap
 from dap3d_core.plot import animate
 from dap3d_core.plot.animation import frame_times, usual_speed
 from dap3d_core.plot.camera import camera_of, shown, with_margin
+from dap3d_core.plot.shaded import shapes_of
 from dap3d_core.plot.stage import Stage
 from dap3d_core.plot.sticks import SHADES, pose_at, sticks_of
 from dap3d_core.result import ResultError
@@ -258,6 +260,65 @@ def test_what_is_drawn_is_where_the_body_is(result, tmp_path):
         extent = np.ptp(places, axis=0)  # from H, on the axis, to P
         scale = drawn.max() / extent.max()
         np.testing.assert_allclose(drawn, extent * scale, atol=22)  # the marker's size in pixels
+
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
+
+
+def shaped(folder):
+    """A body with a red box to the left and a mesh, blue, to the right; one without a shape."""
+    (folder / "square.obj").write_text(SQUARE)
+    scene = Scene(name="shaped")
+    scene.add_body("a", r=[0.0, 0.0, 0.0])
+    scene.add_body("b", r=[0.0, 2.0, 0.0])
+    scene.add_shape("box", "box", body="a", size=[1.0, 1.0, 0.5], at=[-2.0, 0, 0], color="#d62728")
+    scene.add_shape("mesh", "square", body="a", file="square.obj", at=[2.0, 0, 0], color="#0000ff")
+    scene.save(folder / "scene.toml")
+    return dap.simulate(scene, t_end=0.0, dt=1.0)
+
+
+def hues(path):
+    """Places (columns, rows) of the pixels of a hue, the letters of the legend left out."""
+    pixels = matplotlib.image.imread(path)[:380, :, :3]
+    red, green, blue = pixels[..., 0], pixels[..., 1], pixels[..., 2]
+    return {
+        "red": np.nonzero((red > 0.4) & (blue < 0.3 * red) & (green < 0.3 * red)),
+        "blue": np.nonzero((blue > 0.4) & (red < 0.2 * blue) & (green < 0.2 * blue)),
+    }
+
+
+def test_shapes_are_drawn_where_they_are(tmp_path):
+    """Seen from above both are squares with edges of 1 m, their middles 4.5 m apart."""
+    result = shaped(tmp_path)
+    film = animate(result, tmp_path / "a.png", view="z", size=(600, 480), model=tmp_path)
+    assert film.notes == ()
+    found = hues(film.path)
+    (rows, columns), (_, beyond) = found["red"], found["blue"]
+    metre = (beyond.mean() - columns.mean()) / 4.5  # in pixels, from the middle of each
+    assert metre > 60.0
+    for extent in (np.ptp(rows), np.ptp(columns), np.ptp(beyond)):
+        assert extent == pytest.approx(metre, abs=4)  # the width of the lines at both edges
+    assert len(rows) > 0.97 * metre**2  # it is filled
+
+
+def test_meshes_that_are_not_at_hand_are_told(tmp_path):
+    film = animate(shaped(tmp_path), tmp_path / "a.png")
+    assert ["square" in note and "--model" in note for note in film.notes] == [True]
+
+
+def test_what_is_in_front_hides_what_is_behind():
+    """Of two boxes one over the other the upper one is seen, also where the lower one is large."""
+    scene = Scene(name="pile")
+    scene.add_body("a")
+    scene.add_shape("box", "floor", body="a", size=[9.0, 9.0, 0.2], color="#ff0000")
+    scene.add_shape("box", "roof", body="a", size=[0.5, 0.5, 0.2], at=[4.0, 4.0, 0.5],
+                    color="#0000ff")  # fmt: skip
+    shapes = shapes_of(scene, ["a"], ["#000000"])
+    camera = camera_of("z", np.zeros((3, 2)))
+    corners, colors = shapes.seen(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]]), camera)
+    over = np.all(np.abs(corners.mean(axis=1) - [4.0, 4.0]) < 0.2, axis=1)
+    last = np.flatnonzero(over)[-1]
+    assert colors[last, 2] > colors[last, 0]
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 import dap3d_core as dap
 from dap3d_core.exchange.gltf import write_gltf
 from dap3d_core.exchange.moving import MovingScene
-from dap3d_core.view.solids import solid, spring
 from dap3d_core.result import ResultError
 from dap3d_core.view.marks import SOLIDS
+from dap3d_core.view.solids import solid, spring
 
 #: A pyramid that no symmetry maps to itself: its vertices tell its pose.
 PYRAMID = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"

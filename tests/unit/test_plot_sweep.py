@@ -216,6 +216,26 @@ def test_parallel_coordinates_join_the_values_of_a_point():
     assert all(f"{name} [kg]" in shown for name in (MASS, LENGTH, K))
 
 
+def test_of_many_points_quantiles_and_counts_are_drawn():
+    """A thousand lines are a carpet: medians of the fifths, their middle halves, and histograms."""
+    data = samples(500, (MASS, LENGTH))
+    ax = dap.plot(data, "bob.r.z:min")
+    output = data["bob.r.z:min"].values
+    bounds = np.quantile(output, [0.2, 0.4, 0.6, 0.8])
+    fifth = np.searchsorted(bounds, output, side="right")
+    medians = [line for line in ax.lines if line.get_marker() == "o"]
+    assert len(medians) == 5
+    for row, name in enumerate((MASS, LENGTH, "bob.r.z:min")):
+        values = data[name].values
+        at = (values - values.min()) / (values.max() - values.min())
+        expected = [np.median(at[fifth == k]) for k in range(5)]
+        drawn = [line.get_xdata()[row] for line in medians]
+        np.testing.assert_allclose(drawn, expected, atol=1e-12)
+    bars = np.array([bar.get_height() for bar in ax.patches]).reshape(3, -1)
+    counts, _ = np.histogram(data[MASS].values, bars.shape[1])
+    np.testing.assert_allclose(bars[0] / bars[0].max(), counts / counts.max(), atol=1e-12)
+
+
 def test_outputs_without_values_do_not_hide_the_others():
     """Colours are of the first output that has any; a band is of stopped runs if all stopped."""
     data = samples(20, (MASS, K))

@@ -13,15 +13,17 @@ from support.scenes import scene_for
 from unit.test_result import model_of, result_of, rows_of
 
 import dap3d_core as dap
-from dap3d_core.interface import Joint, Point, Vector, point, vector
+from dap3d_core.interface import Body, Force, Joint, Point, Vector, body, point, vector
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels import dot, sub
+from dap3d_core.model import build_model
 from dap3d_core.model.kinematics import to_global
 from dap3d_core.registry import load_registry
 from dap3d_core.result import ResultError, UnknownNameError
+from dap3d_core.scene import check
 from dap3d_core.view.bodies import inertia_ellipsoid
 from dap3d_core.view.camera import stage
-from dap3d_core.view.colors import CYCLE, colors
+from dap3d_core.view.colors import CYCLE, chains_of, colors
 from dap3d_core.view.geometry import elements_of, geometry_of
 from dap3d_core.view.marks import turned_to
 from dap3d_core.view.motion import Extent, chosen
@@ -216,8 +218,6 @@ def test_every_installed_type_is_drawn_with_finite_sizes(kind, keyword, ground):
 
 
 def test_types_of_third_parties_are_drawn_by_what_they_declare():
-    from dap3d_core.model import build_model
-    from dap3d_core.scene import check
     from dap3d_core.view.elements import joints_of
 
     scene = dap.Scene()
@@ -254,6 +254,52 @@ def test_colours_are_those_of_the_scene_or_differ():
     assert found[0] == "#1f77b4"
     assert found[2] == "#123456"
     assert [found[k] for k in (1, 3, 4, 5)] == list(CYCLE[:4])
+
+
+def test_of_many_bodies_a_chain_has_one_hue():
+    """Fifty links in six colours in turn say nothing; light tells the first from the last."""
+    chain = [(k, k + 1) for k in range(1, 50)]
+    found = colors([""] * 50, chain)
+    levels = np.array([[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in found], dtype=float)
+    depth = 255.0 - levels  # all of one hue: in one ratio
+    np.testing.assert_allclose(
+        depth / depth[:, :1], np.tile(depth[0] / depth[0, 0], (50, 1)), atol=0.02
+    )
+    assert (np.diff(levels.sum(axis=1)) > 0.0).all()
+    two = colors([""] * 20, [(k, k + 1) for k in range(1, 20) if k != 10])
+    assert two[0] == CYCLE[0]
+    assert two[10] == CYCLE[1]
+    assert len(set(two)) == 20
+    star = colors(["", "#123456", *[""] * 10], [(1, k) for k in range(2, 13)])
+    assert star[1] == "#123456"
+    assert chains_of(3, [(1, 2)]) == [[1, 2], [3]]
+
+
+def test_a_contact_is_no_rod():
+    """A force between bodies whose type declares no place on them does not join them."""
+
+    class Contact(Force):
+        keyword = "touch"
+        body_i: Body = body()
+        body_j: Body = body()
+
+        def wrench(r_i, r_j):
+            return ((sub(r_j, r_i), (0.0, 0.0, 0.0)), (sub(r_i, r_j), (0.0, 0.0, 0.0)))
+
+    scene = dap.Scene(name="balls")
+    for name, x in (("a", 0.0), ("b", 5.0)):
+        scene.add_body(name, r=[x, 0.0, 0.0])
+        scene.add_shape("sphere", f"s{name}", body=name, radius=1.0)
+    scene.add_force("touch", "t", body_i="a", body_j="b")
+    model = build_model(check(scene, registry_of(Contact)))
+    u = np.zeros((1, 26))
+    u[0, [3, 10]], u[0, 7] = 1.0, 5.0
+    result = result_of(
+        scene, rows_of(model, np.zeros(1), u, np.zeros((1, 12)), np.zeros((1, 0))), model
+    )
+    found = geometry_of(result, scene, elements_of(result))
+    assert found["spans"] == []
+    assert {mark[0] for mark in found["marks"]} == {"shapes"}
 
 
 def test_up_is_against_gravity_and_planar_motion_is_seen_squarely():

@@ -82,9 +82,8 @@ def animate(
 ) -> Film:
     """Draw the motion of a result as a stick figure into a file; needs no display.
 
-    Bodies with shapes are drawn by them. Of others lines run from the mass centre to their points,
-    animation points included; springs are dashed, points that a joint keeps apart (a massless link)
-    joined by a thin line.
+    Bodies with shapes are drawn by them, others by lines from their mass centres to their points;
+    springs are dashed, points that a joint keeps apart (a massless link) joined by a thin line.
 
     Args:
         result: what is drawn.

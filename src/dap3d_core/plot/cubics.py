@@ -8,7 +8,7 @@ from dap3d_core.model.groups import Floats
 PLACES = 600
 
 
-def cubic(a: float, h: float, x: Floats, x_dot: Floats) -> Floats:
+def cubic(a: float, h: "float | Floats", x: Floats, x_dot: Floats) -> Floats:
     """The cubic through both ends, a part of the way along: x, x_dot (2, ...), step h, s."""
     s, b = a * a * (3.0 - 2.0 * a), a * (1.0 - a)
     found: Floats = (1.0 - s) * x[0] + s * x[1] + b * h * ((1.0 - a) * x_dot[0] - a * x_dot[1])

@@ -1,6 +1,7 @@
 """Shapes of bodies in films and snapshots: triangles, shaded, the nearest drawn last."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import attrs
 import numpy as np
@@ -15,6 +16,9 @@ from dap3d_core.view.solids import solid
 
 #: Shapes of more triangles are not drawn: every picture of a film draws all of them.
 MOST_TRIANGLES = 30_000
+#: Longer edges, as parts of the largest shape, are divided: the middle of a large triangle says
+#: little of what it hides.
+LONGEST = 0.12
 #: The darkest face of a shape, as part of its colour; where light comes from beside the viewer.
 DARKEST, BESIDE = 0.55, (0.3, 0.5)
 
@@ -28,7 +32,7 @@ class Shapes:
         local: (k, 3) vertices in the axes of the body, m.
         triangles: (q, 3) places of vertices.
         colors: (q, 3) red, green, blue from 0 to 1.
-        bodies: indices of bodies that have a shape.
+        hues: index of a body that has a shape -> colour of its first one.
         notes: what is not drawn, and why.
     """
 
@@ -36,7 +40,7 @@ class Shapes:
     local: Floats
     triangles: Integers
     colors: Floats
-    bodies: frozenset[int]
+    hues: dict[int, str]
     notes: tuple[str, ...]
 
     @property
@@ -77,6 +81,8 @@ def shapes_of(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Shap
     for mesh in found.meshes:
         local = np.asarray(mesh.at) + to_global(mesh.q, mesh.vertices * mesh.scale)
         pieces.append((mesh.body, local, mesh.triangles, mesh.color))
+    pieces = [(body, *_divided(local, triangles, _size(pieces)), hue)
+              for body, local, triangles, hue in pieces]  # fmt: skip
     if sum(len(piece[2]) for piece in pieces) > MOST_TRIANGLES:
         notes.append(
             f"shapes of more than {MOST_TRIANGLES} triangles in all are not drawn; dap3d view and "
@@ -94,6 +100,26 @@ def shapes_of(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Shap
         colors=np.concatenate(
             [nothing, *(np.tile(to_rgb(piece[3]), (len(piece[2]), 1)) for piece in pieces)]
         ),
-        bodies=frozenset(piece[0] for piece in pieces),
+        hues={piece[0]: piece[3] for piece in reversed(pieces)},
         notes=tuple(notes),
     )
+
+
+def _size(pieces: Sequence[Any]) -> float:
+    """The largest extent of a shape, m."""
+    return max(float(np.max(np.ptp(local, axis=0))) for _, local, _, _ in pieces)
+
+
+def _divided(local: Floats, triangles: Integers, size: float) -> tuple[Floats, Integers]:
+    """Triangles whose edges are short: each long one becomes four, some times."""
+    corners = local[triangles]
+    for _ in range(4):
+        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+        long = edges.max(axis=1) > LONGEST * size
+        if not long.any() or 3 * long.sum() + len(corners) > MOST_TRIANGLES:
+            break
+        a, b, c = corners[long].swapaxes(0, 1)
+        d, e, f = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+        four = [np.stack(t, axis=1) for t in ((a, d, f), (d, b, e), (f, e, c), (d, e, f))]
+        corners = np.concatenate([corners[~long], *four])
+    return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)

@@ -63,6 +63,7 @@ class Stage:
         self.figure = Figure(figsize=(WIDTH, WIDTH), dpi=dpi)
         self.canvas: Any = FigureCanvasAgg(self.figure)
         self._still: Any = None
+        self._room = 0.0
         self.ax = self._axes(shown, size[1] / dpi)
         self._colors = np.array(sticks.colors, dtype=object)
         if not camera.plane:
@@ -71,11 +72,11 @@ class Stage:
         self._shadows = None if camera.plane else self._lines(SHADOW, 1.6, zorder=1)
         self._links = self._lines(DARK, 1.2, zorder=2)
         self._springs = self._lines(DARK, 1.2, zorder=2, linestyle=DASHED)
-        self._solids = self._add(PolyCollection([], zorder=2.2, linewidths=0.3))
+        self._solids = self._add(PolyCollection([], zorder=2.2, linewidths=0.6))
         self.ax.add_collection(self._solids, autolim=False)
         self._sticks = self._lines("black", 2.0, zorder=3, capstyle="round")
         self._dots = self._marks("o", DOT, zorder=4)
-        shaped = sticks.shapes.bodies if sticks.shapes is not None else ()
+        shaped = sticks.shapes.hues if sticks.shapes is not None else ()
         self._bare = np.array(
             [k not in shaped for k in range(1, len(sticks.names) + 1)], dtype=bool
         )
@@ -118,12 +119,26 @@ class Stage:
             which = np.flatnonzero((shapes == shape) & self._bare)
             marks.set_offsets(flat[which])
             marks.set_edgecolor(list(self._colors[which]))
+        self._make_room(flat[: len(sticks.names)][self._bare])
         if self._shadows is not None:
             on_floor = places.copy()
             on_floor[:, 2] = self.limits[2, 0]
             both = np.concatenate([lines, sticks.links, sticks.springs])
             self._shadows.set_segments(list(self.camera.project(on_floor)[both]))
         self._time.set_text(words)
+
+    def _make_room(self, centres: Floats) -> None:
+        """Make markers as small as their usual distance in the first picture asks for."""
+        if self._room or len(centres) < 2:
+            return
+        apart = np.linalg.norm(centres[:, None] - centres, axis=2)
+        np.fill_diagonal(apart, np.inf)
+        box, (x0, x1) = self.ax.get_position(), self.ax.get_xlim()
+        points = 72.0 * WIDTH * box.width / (x1 - x0)  # in one metre
+        self._room = float(np.median(apart.min(axis=0))) * points
+        for marks in (*self._centres.values(), self._dots):
+            area = marks.get_sizes()
+            marks.set_sizes(area * np.clip(self._room**2 / (3.0 * MARKER), SMALLER**4, 1.0))
 
     def pixels(self) -> Any:
         """The picture as it stands, (height, width, 4) bytes; good until the next call."""
@@ -204,8 +219,13 @@ class Stage:
         if not self._few:
             return [], []
         handles: list[Any] = []
-        for color, marker in zip(sticks.colors, sticks.markers, strict=True):
-            line = Line2D([], [], color=color, linewidth=2.0)
+        shaped = sticks.shapes.hues if sticks.shapes is not None else ()
+        for k, (color, marker) in enumerate(zip(sticks.colors, sticks.markers, strict=True), 1):
+            width = 6.0 if k in shaped else 2.0
+            line = Line2D([], [], color=color, linewidth=width, solid_capstyle="butt")
+            if k in shaped:
+                handles.append(line)
+                continue
             centre = Line2D([], [], color=color, marker=marker, markersize=5.0, linewidth=0,
                             markerfacecolor="white", markeredgewidth=1.3)  # fmt: skip
             handles.append((line, centre))

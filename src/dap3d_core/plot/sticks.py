@@ -121,13 +121,15 @@ def sticks_of(result: Result, model: str | os.PathLike[str] | None = None) -> St
             local.append(np.zeros(3))
     springs, links = (_places(pairs[kind], place) for kind in ("forces", "joints"))
     found = np.array(body)
-    colors = _colors(scene, subject.body_names)
+    pairs_of_bodies = [(body[a], body[b]) for a, b in links if body[a] and body[b]]
+    colors = _colors(scene, subject.body_names, pairs_of_bodies)
     shapes = None
     if scene.shapes:
         from dap3d_core.plot.shaded import shapes_of
 
         shapes = shapes_of(scene, subject.body_names, [to_hex(color) for color in colors])
-    bare = np.isin(found, [] if shapes is None else [*shapes.bodies], invert=True)
+        colors = tuple(shapes.hues.get(k, color) for k, color in enumerate(colors, 1))
+    bare = np.isin(found, [] if shapes is None else [*shapes.hues], invert=True)
     return Sticks(
         names=subject.body_names,
         colors=colors,
@@ -177,14 +179,23 @@ def _places(pairs: Sequence[tuple[str, str]], place: Mapping[str, int]) -> Integ
     return np.array(found, dtype=np.int64).reshape(-1, 2)
 
 
-def _colors(scene: Scene, names: Sequence[str]) -> tuple[str, ...]:
-    """The scene's colours, usual names in shades of the palette; the palette in turn elsewhere."""
+def _colors(
+    scene: Scene, names: Sequence[str], joined: Sequence[tuple[int, int]]
+) -> tuple[str, ...]:
+    """The scene's colours, usual names in shades of the palette; the palette in turn elsewhere.
+
+    Of more bodies than it has colours those of a chain of joints have one hue, as in pages.
+    """
     found = []
-    for k, name in enumerate(names):
+    for name in names:
         given: Any = scene.bodies[name].color if name in scene.bodies else None
         shade = SHADES.get(str(given).removeprefix("tab:"), given)
-        found.append(shade if is_color_like(shade) else PALETTE[k % len(PALETTE)])
-    return tuple(found)
+        found.append(shade if is_color_like(shade) else "")
+    if len(names) <= len(PALETTE):
+        return tuple(color or PALETTE[k] for k, color in enumerate(found))
+    from dap3d_core.view.colors import colors
+
+    return tuple(colors([color and to_hex(color) for color in found], joined))
 
 
 def pose_at(result: Result, t: float) -> tuple[Floats, Floats]:

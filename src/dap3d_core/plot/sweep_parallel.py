@@ -3,6 +3,7 @@
 import attrs
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
@@ -24,10 +25,14 @@ from dap3d_core.plot.sweep_marks import (
 )
 from dap3d_core.plot.sweep_table import Column
 
+#: More lines hide one another: quantiles are drawn in their place, and bars of so many.
+MOST_LINES, BARS, HIGHEST = 200, 30, 0.42
+FIFTHS = "medians and middle halves of its fifths; bars: how many points"
+
 
 @attrs.frozen(eq=False)
 class Parallel(Panel):
-    """Parallel coordinates: an axis for each number and output, a line for each point.
+    """Parallel coordinates: an axis for each number and output, a line for each of some points.
 
     The axes lie below one another, so that long names can be read and many axes fit.
 
@@ -53,31 +58,28 @@ class Parallel(Panel):
         scales = [_Scale.of(column) for column in self.columns]
         places = np.stack([s.at(c.values) for s, c in zip(scales, self.columns, strict=True)])
         levels = -np.arange(len(self.columns), dtype=float)
-        count = places.shape[1]
+        many = places.shape[1] > MOST_LINES
         there = np.isfinite(first.values)
-        strength = float(np.clip((120.0 / count) ** 0.5, 0.2, 0.9))
         for fate, here in fate_of(self.status, ~there):
             color = FATES[fate][2]
-            ax.add_collection(_strokes(places[:, here], levels, color, 0.6))
+            if not many:
+                ax.add_collection(_strokes(places[:, here], levels, color, 0.6))
             fates.add(Line2D([], [], color=color, linewidth=1.0, linestyle="--",
                              label=told(fate, here)))  # fmt: skip
-        order = np.argsort(first.values[there], kind="stable")
-        lines = _strokes(places[:, there][:, order], levels, None, strength)
-        lines.set(cmap=LINE_COLORS, norm=norm_of(first.values))
-        lines.set_array(first.values[there][order])
-        ax.add_collection(lines)
-        lines.set_rasterized(count > 300)
+        paint = _fifths if many else _lines
+        colored = paint(ax, places[:, there], levels, first.values[there])
         ax.set(xlim=(-0.03, 1.03), ylim=(levels[-1] - 0.5, 0.55))
         ax.axis("off")
         for column, scale, level in zip(self.columns, scales, levels, strict=True):
             self._axis(ax, column, scale, level, size[0])
-        bar = ax.figure.colorbar(lines, ax=ax, location="bottom", pad=0.0, aspect=40)
+        bar = ax.figure.colorbar(colored, ax=ax, location="bottom", pad=0.0, aspect=40)
         if bar.solids is not None:
             bar.solids.set_alpha(1.0)
         bar.locator = MaxNLocator(max(2, int(1.1 * size[0])))
         bar.update_ticks()
         bar.ax.tick_params(labelsize=LETTERS)
-        bar.set_label(folded(with_unit(first), int(17 * size[0])), fontsize=LETTERS)
+        label = f"{with_unit(first)}; {FIFTHS}" if many else with_unit(first)
+        bar.set_label(folded(label, int(17 * size[0])), fontsize=LETTERS)
 
     def _axis(self, ax: Axes, column: Column, scale: "_Scale", level: float, width: float) -> None:
         ax.plot([0.0, 1.0], [level, level], color="0.2", linewidth=0.9, zorder=4)
@@ -90,6 +92,38 @@ class Parallel(Panel):
         words = f"{column.name} {unit_text(column.unit)}" if column.unit else column.name
         ax.text(0.0, level + 0.09, cut(shown_text(words), int(16 * width)), ha="left", va="bottom",
                 bbox=box, zorder=5, fontsize=LETTERS)  # fmt: skip
+
+
+def _lines(ax: Axes, places: Floats, levels: Floats, values: Floats) -> ScalarMappable:
+    """A line for each point, coloured by a value (n,)."""
+    order = np.argsort(values, kind="stable")
+    strength = float(np.clip((120.0 / max(1, len(values))) ** 0.5, 0.2, 0.9))
+    lines = _strokes(places[:, order], levels, None, strength)
+    lines.set(cmap=LINE_COLORS, norm=norm_of(values))
+    lines.set_array(values[order])
+    ax.add_collection(lines)
+    return lines
+
+
+def _fifths(ax: Axes, places: Floats, levels: Floats, values: Floats) -> ScalarMappable:
+    """Of many points how they are spread along each axis, and quantiles of fifths by a value (n,).
+
+    A line goes through the medians of each fifth, a band holds the middle half of its points.
+    """
+    colors = ScalarMappable(norm_of(values), LINE_COLORS)
+    bounds = np.quantile(values, [0.2, 0.4, 0.6, 0.8])
+    fifth = np.searchsorted(bounds, values, side="right")
+    for level, row in zip(levels, places, strict=True):
+        counts, edges = np.histogram(row[np.isfinite(row)], BARS, (0.0, 1.0))
+        ax.bar(edges[:-1], HIGHEST * counts / max(1, counts.max()), 1.0 / BARS, bottom=level,
+               align="edge", color="0.82", zorder=1)  # fmt: skip
+    for group in np.unique(fifth):
+        mine = fifth == group
+        color = colors.to_rgba(np.median(values[mine]))
+        low, middle, high = np.nanquantile(places[:, mine], [0.25, 0.5, 0.75], axis=1)
+        ax.fill_betweenx(levels, low, high, color=color, alpha=0.13, linewidth=0.0, zorder=2)
+        ax.plot(middle, levels, color=color, linewidth=1.6, marker="o", markersize=3.0, zorder=3)
+    return colors
 
 
 def _strokes(places: Floats, levels: Floats, color: str | None, strength: float) -> LineCollection:
