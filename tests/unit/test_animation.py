@@ -292,6 +292,8 @@ def test_shapes_are_drawn_where_they_are(tmp_path):
     result = shaped(tmp_path)
     film = animate(result, tmp_path / "a.png", view="z", size=(600, 480), model=tmp_path)
     assert film.notes == ()
+    shapes = sticks_of(result, tmp_path).shapes
+    assert set(shapes.hues) == {1}
     found = hues(film.path)
     (rows, columns), (_, beyond) = found["red"], found["blue"]
     metre = (beyond.mean() - columns.mean()) / 4.5  # in pixels, from the middle of each
@@ -304,6 +306,34 @@ def test_shapes_are_drawn_where_they_are(tmp_path):
 def test_meshes_that_are_not_at_hand_are_told(tmp_path):
     film = animate(shaped(tmp_path), tmp_path / "a.png")
     assert ["square" in note and "--model" in note for note in film.notes] == [True]
+
+
+def test_a_line_is_drawn_in_its_colour(tmp_path):
+    scene = Scene(name="line")
+    scene.add_body("a")
+    scene.add_shape("line", "l", body="a", points=[[0, 0, 0], [1, 0, 0], [1, 1, 0]],
+                    color="#0000ff")  # fmt: skip
+    film = animate(dap.simulate(scene, t_end=0.0, dt=1.0), tmp_path / "a.png", view="z")
+    pixels = matplotlib.image.imread(film.path)[..., :3]
+    assert ((pixels[..., 2] > 0.4) & (pixels[..., 0] < 0.2)).sum() > 50
+
+
+def test_bodies_in_one_place_keep_their_markers():
+    """Markers shrink once, for want of room, and not from picture to picture."""
+    scene = Scene(name="pile")
+    for name in "abc":
+        scene.add_body(name)
+    result = dap.simulate(scene, t_end=0.0, dt=1.0)
+    sticks = sticks_of(result)
+    camera = camera_of("z", np.zeros((3, 2)))
+    limits = np.array([[-1.0, 1.0]] * 3)
+    stage = Stage(sticks, camera, limits, limits[:2], (400, 400), "")
+    sizes = []
+    for _ in range(3):
+        stage.place(*pose_at(result, 0.0), "")
+        sizes.append([float(marks.get_sizes()[0]) for marks in stage._centres.values()])
+    assert sizes[0] == sizes[2]
+    assert min(sizes[0]) > 3.0
 
 
 def test_what_is_in_front_hides_what_is_behind():

@@ -83,6 +83,11 @@ def shapes_of(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Shap
         pieces.append((mesh.body, local, mesh.triangles, mesh.color))
     pieces = [(body, *_divided(local, triangles, _size(pieces)), hue)
               for body, local, triangles, hue in pieces]  # fmt: skip
+    for line in found.lines:  # triangles without an area, of which their edges are seen
+        k = np.arange(len(line.points) - 1)
+        pieces.append(
+            (line.body, np.array(line.points), np.stack([k, k + 1, k + 1], axis=1), line.color)
+        )
     if sum(len(piece[2]) for piece in pieces) > MOST_TRIANGLES:
         notes.append(
             f"shapes of more than {MOST_TRIANGLES} triangles in all are not drawn; dap3d view and "

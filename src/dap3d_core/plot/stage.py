@@ -63,7 +63,7 @@ class Stage:
         self.figure = Figure(figsize=(WIDTH, WIDTH), dpi=dpi)
         self.canvas: Any = FigureCanvasAgg(self.figure)
         self._still: Any = None
-        self._room = 0.0
+        self._has_room = not self._few
         self.ax = self._axes(shown, size[1] / dpi)
         self._colors = np.array(sticks.colors, dtype=object)
         if not camera.plane:
@@ -129,16 +129,17 @@ class Stage:
 
     def _make_room(self, centres: Floats) -> None:
         """Make markers as small as their usual distance in the first picture asks for."""
-        if self._room or len(centres) < 2:
+        if self._has_room or len(centres) < 2:
             return
+        self._has_room = True
         apart = np.linalg.norm(centres[:, None] - centres, axis=2)
         np.fill_diagonal(apart, np.inf)
         box, (x0, x1) = self.ax.get_position(), self.ax.get_xlim()
         points = 72.0 * WIDTH * box.width / (x1 - x0)  # in one metre
-        self._room = float(np.median(apart.min(axis=0))) * points
+        room = float(np.median(apart.min(axis=0))) * points
         for marks in (*self._centres.values(), self._dots):
             area = marks.get_sizes()
-            marks.set_sizes(area * np.clip(self._room**2 / (3.0 * MARKER), SMALLER**4, 1.0))
+            marks.set_sizes(area * np.clip(room**2 / (3.0 * MARKER), SMALLER**4, 1.0))
 
     def pixels(self) -> Any:
         """The picture as it stands, (height, width, 4) bytes; good until the next call."""
