@@ -30,6 +30,7 @@ from dap3d_core.plot.sticks import SHADES, pose_at, sticks_of
 from dap3d_core.result import ResultError
 from dap3d_core.scene import Scene
 from dap3d_core.scene.description import AnimationPoint
+from dap3d_core.view.shapes import GROUND_COLOR
 
 SPACE = np.array([[0.0, 1.0], [0.0, 2.0], [0.0, 3.0]])
 
@@ -316,6 +317,16 @@ def test_a_line_is_drawn_in_its_colour(tmp_path):
     film = animate(dap.simulate(scene, t_end=0.0, dt=1.0), tmp_path / "a.png", view="z")
     pixels = matplotlib.image.imread(film.path)[..., :3]
     assert ((pixels[..., 2] > 0.4) & (pixels[..., 0] < 0.2)).sum() > 50
+
+
+def test_a_colour_that_is_none_is_grey(tmp_path):
+    """A scene may write any word there; pages leave it to the browser."""
+    scene = Scene(name="odd")
+    scene.add_body("a")
+    scene.add_shape("box", "box", body="a", size=[1.0, 1.0, 1.0], color="nocolour")
+    result = dap.simulate(scene, t_end=0.0, dt=1.0)
+    assert animate(result, tmp_path / "a.png").frames == 1
+    assert sticks_of(result).colors == (GROUND_COLOR,)
 
 
 def test_bodies_in_one_place_keep_their_markers():

@@ -5,13 +5,13 @@ from typing import Any
 
 import attrs
 import numpy as np
-from matplotlib.colors import to_rgb
+from matplotlib.colors import is_color_like, to_hex, to_rgb
 
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.kinematics import to_global
 from dap3d_core.plot.camera import Camera
 from dap3d_core.scene.description import Scene
-from dap3d_core.view.shapes import Drawn, drawn
+from dap3d_core.view.shapes import GROUND_COLOR, Drawn, drawn
 from dap3d_core.view.solids import solid
 
 #: Shapes of more triangles are not drawn: every picture of a film draws all of them.
@@ -103,11 +103,16 @@ def shapes_of(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Shap
             [nothing, *(piece[2] + start for piece, start in zip(pieces, starts, strict=False))]
         ).astype(np.int64),
         colors=np.concatenate(
-            [nothing, *(np.tile(to_rgb(piece[3]), (len(piece[2]), 1)) for piece in pieces)]
+            [nothing, *(np.tile(_rgb(piece[3]), (len(piece[2]), 1)) for piece in pieces)]
         ),
-        hues={piece[0]: piece[3] for piece in reversed(pieces)},
+        hues={piece[0]: to_hex(_rgb(piece[3])) for piece in reversed(pieces)},
         notes=tuple(notes),
     )
+
+
+def _rgb(color: str) -> tuple[float, float, float]:
+    """Red, green, blue of a colour; grey for a word that is none."""
+    return to_rgb(color) if is_color_like(color) else to_rgb(GROUND_COLOR)
 
 
 def _size(pieces: Sequence[Any]) -> float:

@@ -180,7 +180,11 @@ def _mesh(folder: Path | None, name: str) -> tuple[Floats, Any] | str:
     except Exception as error:  # a broken file makes a reader fail in any way
         return f"{name} cannot be read: {error or type(error).__name__}"
     if not len(triangles) or not np.all(np.isfinite(vertices)):
-        return f"{name} holds no triangles" if not len(triangles) else f"{name} holds no numbers"
+        return (
+            f"{name} holds no triangles; is it a mesh?"
+            if not len(triangles)
+            else f"{name} holds no numbers"
+        )
     if len(triangles) > MOST_TRIANGLES:
         return f"{name} has {len(triangles)} triangles; at most {MOST_TRIANGLES} are drawn"
     return vertices, triangles
