@@ -4,7 +4,6 @@ import importlib
 import shutil
 import sys
 
-import numpy as np
 import pytest
 from support import problems
 

@@ -166,6 +166,17 @@ def global_accelerations(metric: Floats, force: Floats, out: Floats) -> None:
 
 
 @compiled_inside
+def largest_weighted(values: Floats, weights: Floats) -> float:
+    """Largest magnitude of values times weights; NaN where one is NaN."""
+    found = 0.0
+    for k in range(values.shape[0]):
+        size = abs(values[k]) * weights[k]
+        if not size <= found:
+            found = size
+    return found
+
+
+@compiled_inside
 def largest(values: Floats) -> float:
     """Largest magnitude; NaN where one is NaN."""
     found = 0.0

@@ -30,9 +30,12 @@ KINDS = (
 VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, SWITCH = range(len(KINDS))
 
 # Places in ``settings``: projection tolerances of position and velocity, a scratch number, how
-# often the multipliers did not settle with friction, the numbers of the penalty formulation, and
-# how often a pose was singular where something was reported.
-TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SINGULAR, SETTINGS = range(9)
+# often the multipliers did not settle with friction, the numbers of the penalty formulation, how
+# often a pose was singular where something was reported, the length that tolerances speak of
+# (Model.length), 1.0 where pivots are those of equal masses.
+(
+    TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SINGULAR, LENGTH, EVEN, SETTINGS
+) = range(11)  # fmt: skip
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
@@ -81,6 +84,7 @@ class System(LoopArrays):
     x: Floats  # (rows,) right-hand side, then -lambda; between these, what regularises the rows
     D: Floats  # blocks of the Jacobian
     K: Floats  # blocks of what remains to be factored
+    weight: Floats  # (rows,) from a row's residual to one in m: 1 in scenes of ordinary size
     smallest: Floats  # (rows,) a pivot not above this is singular
     settings: Floats  # (SETTINGS,) see above
     friction: Floats  # where joints rub: two of the size of ``force``, three of the size of ``x``

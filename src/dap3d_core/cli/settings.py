@@ -22,6 +22,28 @@ SETTINGS = {
     "correct_metric": "--correct-metric",
 }
 
+
+class _Tolerance(click.ParamType):  # type: ignore[type-arg]
+    """A number, or numbers by quantity."""
+
+    name = "tolerance"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """As ``Simulation.atol`` takes it."""
+        if not isinstance(value, str):
+            return value
+        try:
+            if "=" not in value:
+                return float(value)
+            pairs = (part.partition("=") for part in value.split(","))
+            return {name.strip(): float(number) for name, _, number in pairs}
+        except ValueError:
+            self.fail(f"{value!r} is neither a number nor numbers by quantity (r=1e-12,v=1e-9)",
+                      param, ctx)  # fmt: skip
+
+
+ATOL = _Tolerance()
+
 SETTING_OPTIONS = (
     click.option("--t-end", type=float, metavar="S",
                  help="Final time in s; 0 solves once at t = 0."),
@@ -31,7 +53,8 @@ SETTING_OPTIONS = (
     click.option("--integrator", metavar="NAME",
                  help="dop853, dopri5, adams, radau for stiff scenes, or rk4 with --step."),
     click.option("--rtol", type=float, metavar="X", help="Relative tolerance."),
-    click.option("--atol", type=float, metavar="X", help="Absolute tolerance."),
+    click.option("--atol", type=ATOL, metavar="X",
+                 help="Absolute tolerance: a number, or r=1e-12,p=1e-10,v=1e-12,w=1e-10 or some."),
     click.option("--step", type=float, metavar="S",
                  help="Fixed step in s, without error control."),
     click.option("--correct/--no-correct", default=None,

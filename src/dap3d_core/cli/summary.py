@@ -92,13 +92,19 @@ def integrator(found: dict[str, Any]) -> str:
     if settings.get("step"):
         control = f"steps of {settings['step']:g} s"
     elif settings.get("rtol") is not None:
-        control = f"rtol {settings['rtol']:g}, atol {settings['atol']:g}"
+        control = f"rtol {settings['rtol']:g}, atol {_atol(settings['atol'])}"
     else:
         control = ""
     words = ", ".join(w for w in (str(found["integrator"]), control) if w)
     if found["rows"]:
         words += ", projected" if settings.get("project") else ", not projected"
     return words
+
+
+def _atol(atol: Any) -> str:
+    if isinstance(atol, dict):
+        return ", ".join(f"{name} = {value:g}" for name, value in atol.items())
+    return f"{atol:g}"
 
 
 def simulated(found: dict[str, Any]) -> str:

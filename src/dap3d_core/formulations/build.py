@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.system import KINDS, Floats, Integers, System
+from dap3d_core.assembly.system import EVEN, KINDS, LENGTH, Floats, Integers, System
 from dap3d_core.interface.compiling import compiled_loop
 from dap3d_core.interface.writer import stride
 from dap3d_core.kernels.gather import BODY_WIDTH, JP, MASS, A, P
@@ -15,6 +15,11 @@ from dap3d_core.model import Group, Model
 
 #: Usual alpha, Omega (1/s), mu of the penalty formulation (spec 9).
 PENALTY = (1e7, 10.0, 1.0)
+
+
+#: Ratio of masses from which on a pivot falls by as much when a light body turns round a heavy one
+#: as it does near a singular pose.
+UNEVEN = 1e3
 
 
 def build_loops(
@@ -79,8 +84,11 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         x=np.zeros(plan.row_size),
         D=np.zeros(plan.block_size),
         K=np.zeros(plan.matrix_size),
+        weight=np.ones(plan.row_size),
         smallest=np.zeros(plan.row_size),
-        settings=np.array([1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0]),
+        settings=np.array(
+            [1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model)]
+        ),
         friction=np.zeros(12 * (n + 1) + 3 * plan.row_size if model.friction else 0),
         idx=idx,
         groups=groups,
@@ -126,6 +134,7 @@ def load_numbers(
     system.body[1:, MASS] = other.mass
     system.body[1:, JP : JP + 9] = other.Jp.reshape(-1, 9)
     set_metric(system.metric, other.mass, other.Jp)
+    system.settings[[LENGTH, EVEN]] = other.length, masses_differ(other)
     return [(kind, twins[id(group)]) for kind, group in what]
 
 
@@ -149,6 +158,13 @@ def _twins(model: Model, other: Model) -> dict[int, Group]:
 
 def _all_groups(model: Model) -> tuple[Group, ...]:
     return (*model.functions, *model.forces, *model.joints, *model.friction)
+
+
+def masses_differ(model: Model) -> float:
+    """1.0 where a pivot would tell of the masses and not of the pose (UNEVEN), else 0.0."""
+    if not model.body_count:
+        return 0.0
+    return float(np.max(model.mass) > UNEVEN * np.min(model.mass))
 
 
 def set_metric(metric: Floats, mass: Floats, Jp: Floats) -> None:

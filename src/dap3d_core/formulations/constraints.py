@@ -12,7 +12,7 @@ from typing import Any
 
 from dap3d_core.assembly.evaluate import (
     call_kinds,
-    largest,
+    largest_weighted,
     place,
     place_bodies,
     scale_forces,
@@ -22,6 +22,8 @@ from dap3d_core.assembly.evaluate import (
 from dap3d_core.assembly.system import (
     ACCELERATION,
     ENERGY,
+    EVEN,
+    LENGTH,
     POSITION,
     SCRATCH,
     TOLERANCE_C,
@@ -31,7 +33,13 @@ from dap3d_core.assembly.system import (
     Floats,
     System,
 )
-from dap3d_core.formulations.moves import change_velocity, move, normalise, size_of
+from dap3d_core.formulations.moves import (
+    change_velocity,
+    move,
+    normalise,
+    size_of_positions,
+    size_of_velocities,
+)
 from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
 from dap3d_core.linear.blocks import (
     assemble,
@@ -66,6 +74,21 @@ def linearise(t: float, system: System, loops: Any) -> None:
     D = system.D
     call_kinds(ACCELERATION, ACCELERATION, t, system, loops, D, system.gamma, system.nu)
     scale_blocks(system.blocks, D, system.metric)
+
+
+@compiled_into
+def linearise_evenly(t: float, system: System, loops: Any) -> None:
+    """As ``linearise``, but as if all masses were one, and all inertias, in units of the scene.
+
+    A pose is singular whatever the masses; but a pivot falls as well where a joint turns away from
+    a light body that gave way to it, and only a heavy one is left.
+    """
+    D, blocks, length = system.D, system.blocks, system.settings[LENGTH]
+    call_kinds(ACCELERATION, ACCELERATION, t, system, loops, D, system.gamma, system.nu)
+    for q in range(blocks.shape[0]):
+        for r in range(blocks[q, 2]):
+            for c in range(3):
+                D[blocks[q, 0] + 6 * r + c] *= length
 
 
 @compiled_into
@@ -120,22 +143,32 @@ def power_of_drivers(system: System) -> float:
 
 @compiled_inside
 def residuals(t: float, system: System, loops: Any) -> float:
-    """Position-level residuals (zero where a row has none) into C; returns the largest size."""
+    """Position-level residuals (zero where a row has none) into C; returns the largest, in m."""
     C = system.C
     zero(C)
     call_kinds(POSITION, POSITION, t, system, loops, C, C, C)
-    return largest(C)
+    return largest_weighted(C, system.weight)
 
 
 @compiled_inside
 def velocity_residuals(system: System) -> float:
-    """D v - nu into C, with D^ as it stands; returns the largest magnitude."""
+    """D v - nu into C, with D^ as it stands; returns the largest, in m/s."""
     C = system.C
     scale_velocities(system.body, system.metric, system.force)
     for k in range(C.shape[0]):
         C[k] = -system.nu[k]
     add_product(system.blocks, system.D, system.force, C)
-    return largest(C)
+    return largest_weighted(C, system.weight)
+
+
+@compiled_inside
+def acceleration_residual(system: System) -> float:
+    """D a - gamma into C, with a in ``force``; returns the largest, in m/s^2."""
+    C = system.C
+    for k in range(C.shape[0]):
+        C[k] = -system.gamma[k]
+    add_product(system.blocks, system.D, system.force, C)
+    return largest_weighted(C, system.weight)
 
 
 @compiled
@@ -180,7 +213,7 @@ def project_onto(
     if not linear:
         place(t, y, system, loops)
     worst = residuals(t, system, loops)
-    limit = system.settings[TOLERANCE_C] * size_of(y, 0, n, 7, 3)
+    limit = system.settings[TOLERANCE_C] * size_of_positions(y, n, system.settings[LENGTH])
     if not worst <= limit:
         if not linear:
             linearise(t, system, loops)
@@ -205,8 +238,17 @@ def project_onto(
     if not factored:
         factorise_anyway(system, part)
     project_velocities(y, out, system, part, stale)
-    if pivot_lengths(system.nodes, system.K, system.smallest, out[4:]) > 0 and out[1] == 0.0:
+    if is_poor(t, system, loops, part, out[4:]) and out[1] == 0.0:
         out[1] = 2.0
+
+
+@compiled_into
+def is_poor(t: float, system: System, loops: Any, part: float | None, lengths: Floats) -> bool:
+    """Whether the pose is close to a singular one; D^ and its factors may be others after that."""
+    if system.settings[EVEN] != 0.0:
+        linearise_evenly(t, system, loops)
+        factorise(system, part)
+    return pivot_lengths(system.nodes, system.K, system.smallest, lengths) > 0
 
 
 @compiled_into
@@ -219,14 +261,14 @@ def project_velocities(
     """
     n = system.metric.shape[0] - 1
     worst = velocity_residuals(system)
-    limit = system.settings[TOLERANCE_V] * size_of(y, 7 * n, n, 6, 6)
+    limit = system.settings[TOLERANCE_V] * size_of_velocities(y, n, system.settings[LENGTH])
     if not worst <= limit:
         for _ in range(PASSES):
             before = worst
             correct(system)
             change_velocity(y, system.metric, system.force)
             add_product(system.blocks, system.D, system.force, system.C)
-            worst = largest(system.C)
+            worst = largest_weighted(system.C, system.weight)
             if not worst > limit or not (stale or worst < 0.5 * before):
                 break
             if stale and not worst < SLOW * before:
@@ -244,12 +286,9 @@ def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
 
     That is the potential energy and the largest residuals of position, velocity and acceleration.
     """
-    value, C = system.settings[SCRATCH : SCRATCH + 1], system.C
+    value = system.settings[SCRATCH : SCRATCH + 1]
     last = out.shape[0] - 4
-    for k in range(C.shape[0]):
-        C[k] = -system.gamma[k]
-    add_product(system.blocks, system.D, system.force, C)
-    out[last + 3] = largest(C)
+    out[last + 3] = acceleration_residual(system)
     out[last + 2] = velocity_residuals(system)
     out[last + 1] = residuals(t, system, loops)
     value[0] = 0.0

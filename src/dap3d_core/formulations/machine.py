@@ -13,6 +13,7 @@ from dap3d_core.assembly.system import (
     ACCELERATION,
     ALPHA,
     ANGLE,
+    EVEN,
     MU,
     OMEGA,
     POSITION,
@@ -61,6 +62,31 @@ class Rows:
         from scipy.sparse import csr_array
 
         return csr_array((self.value, (self.row, self.column)), shape=self.shape)
+
+
+def scaled_rows(rows: Rows, length: float) -> tuple[Rows, Floats]:
+    """Rows whose gradients have unit length, of displacements in units of a length, m; and lengths.
+
+    Neither depends on the units of the scene. A row without gradient stays as it is.
+
+    Args:
+        rows: those of a model.
+        length: a length of the scene, m.
+
+    Returns:
+        the rows, whose columns belong to (r / length, rotation in rad), and (rows,) the lengths of
+        their gradients before.
+    """
+    value = np.where(rows.column % 6 < 3, length, 1.0) * rows.value
+    gradient = np.sqrt(np.bincount(rows.row, value**2, minlength=rows.shape[0]))
+    gradient[gradient == 0.0] = 1.0
+    return attrs.evolve(
+        rows,
+        C=rows.C / gradient,
+        nu=rows.nu / gradient,
+        gamma=rows.gamma / gradient,
+        value=value / gradient[rows.row],
+    ), gradient
 
 
 @attrs.frozen(eq=False)
@@ -124,6 +150,7 @@ class Machine:
         self.loops, self.what = build_loops(model, LOOPS[method], announce)
         self.system: System = build_system(model, self.plan, self.what)
         self.start_functions()
+        self._weigh_rows()
         self.report_size = 6 * model.body_count + model.row_count + 4
         self.length_count = len(self.plan.nodes) - 1
 
@@ -168,6 +195,7 @@ class Machine:
         self.what = load_numbers(self.system, self.model, model, self.what)
         self.model = model
         self.start_functions()
+        self._weigh_rows()
 
     @AS_COMPILED
     def start(self, t: float, u: ArrayLike) -> None:
@@ -306,10 +334,16 @@ class Machine:
     @AS_COMPILED
     def pivots(self, t: float) -> Floats:
         """(rows,) pivots of the formulation's factors at the bodies as placed; model's order."""
-        from dap3d_core.formulations.constraints import PART, factorise, linearise
+        from dap3d_core.formulations.constraints import (
+            PART,
+            factorise,
+            linearise,
+            linearise_evenly,
+        )
 
         s = self.system
-        linearise(float(t), s, self.loops)
+        place = linearise_evenly if s.settings[EVEN] else linearise
+        place(float(t), s, self.loops)
         factorise(s, None if self.method == "standard" else PART)
         inverse = np.ones(self.plan.row_size)
         for size, first, diagonal, *_ in self.plan.nodes[:-1]:
@@ -328,6 +362,20 @@ class Machine:
         row, column, place = self.pattern
         shape = (self.model.row_count, 6 * self.model.body_count)
         return Rows(s.C[s.row], s.nu[s.row], s.gamma[s.row], row, column, s.D[place], shape)
+
+    def _weigh_rows(self) -> None:
+        """Weights of the rows, of residuals in m; in scenes of ordinary size they stay as they are.
+
+        A row's residual is its length in m times that of its gradient there, of displacements in
+        units of the scene's length and rotations in rad, be it an equation of lengths, of their
+        squares or of directions.
+        """
+        model = self.model
+        self.system.weight[:] = 1.0
+        if model.length != 1.0 and model.row_count:
+            gradients = scaled_rows(self.rows(0.0, model.u0), model.length)[1]
+            good = np.where(np.isfinite(gradients), gradients, 1.0)
+            self.system.weight[self.system.row] = model.length / good
 
     def _place(self, t: float, u: ArrayLike) -> None:
         s = self.system
@@ -356,4 +404,4 @@ class Machine:
         return row, column, place
 
 
-__all__ = ["Machine", "Rows"]
+__all__ = ["Machine", "Rows", "scaled_rows"]

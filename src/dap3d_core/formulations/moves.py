@@ -60,10 +60,21 @@ def change_velocity(y: Floats, metric: Floats, force: Floats) -> None:
 
 
 @compiled_inside
-def size_of(y: Floats, first: int, count: int, period: int, part: int) -> float:
-    """1 + the largest magnitude in the first ``part`` of each ``period``: scale of a tolerance."""
+def size_of_positions(y: Floats, n: int, length: float) -> float:
+    """The length of the scene and the largest coordinate of n bodies: scale of a tolerance, m."""
     found = 0.0
-    for b in range(count):
-        for c in range(part):
-            found = max(found, abs(y[first + period * b + c]))
-    return 1.0 + found
+    for b in range(n):
+        for c in range(7 * b, 7 * b + 3):
+            found = max(found, abs(y[c]))
+    return length + found
+
+
+@compiled_inside
+def size_of_velocities(y: Floats, n: int, length: float) -> float:
+    """The same of velocities, m/s: of a radian that length."""
+    found = 0.0
+    for b in range(n):
+        f = 7 * n + 6 * b
+        for c in range(3):
+            found = max(found, abs(y[f + c]), length * abs(y[f + 3 + c]))
+    return length + found

@@ -14,9 +14,11 @@ solved by the block LDL^T of linear/blocks.py. Needs independent rows.
 from typing import Any
 
 from dap3d_core.assembly.evaluate import global_accelerations, rates
-from dap3d_core.assembly.system import SINGULAR, Floats, System
+from dap3d_core.assembly.system import LENGTH, SINGULAR, Floats, System
 from dap3d_core.formulations import lsq
 from dap3d_core.formulations.constraints import (
+    acceleration_residual,
+    correct,
     factorise,
     gather_forces,
     linearise,
@@ -29,6 +31,9 @@ from dap3d_core.formulations.constraints import (
 from dap3d_core.formulations.friction import solve_rubbing
 from dap3d_core.kernels.cache import compiled, compiled_into
 from dap3d_core.linear.blocks import have_pivots
+
+#: What is left of the rows, as a part of the largest acceleration, from which on it is solved for.
+ROUGH = 1e-12
 
 
 @compiled_into
@@ -47,6 +52,29 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     factorise(system, None)
     power += solve_rubbing(t, system, loops, solve)
     return power + power_of_drivers(system)
+
+
+@compiled_into
+def refine(system: System, out: Floats) -> None:
+    """Solve once more for what accelerations and multipliers leave of the rows, where that is much.
+
+    Where reactions are large beside the accelerations that they leave, or masses differ, rounding
+    of the solution shows in the rows. They stand in ``force`` and out, and are replaced there.
+    """
+    force, n, length = system.force, system.metric.shape[0] - 1, system.settings[LENGTH]
+    size = length
+    for k in range(6 * n):
+        size = max(size, abs(out[k]) * (1.0 if k % 6 < 3 else length))
+    if not acceleration_residual(system) > ROUGH * size:
+        return
+    for k in range(6 * n):
+        out[k] = force[6 + k]
+    correct(system)
+    for k in range(6 * n):
+        force[6 + k] += out[k]
+    for k in range(system.row.shape[0]):
+        out[6 * n + k] -= system.x[system.row[k]]
+    global_accelerations(system.metric, force, out)
 
 
 @compiled
@@ -72,4 +100,5 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
         system.settings[SINGULAR] += 1.0
     global_accelerations(system.metric, system.force, out)
     report_multipliers(system, out)
+    refine(system, out)
     report_levels(t, out, system, loops)

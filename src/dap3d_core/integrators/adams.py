@@ -38,13 +38,14 @@ from dap3d_core.integrators.combination import all_finite, scaled_largest
 from dap3d_core.integrators.control import LARGEST, STRETCH, first_step, step_floor
 from dap3d_core.integrators.method import Floats
 from dap3d_core.integrators.reporting import may_step, project_state
+from dap3d_core.integrators.rounding import note_failure, watch_rounding
 from dap3d_core.integrators.work import (
-    ATOL,
     ERROR_SIZE,
     FRESH,
     LIMIT,
     NEXT,
     NOT_FINITE,
+    OTHER,
     OUTCOME,
     REJECTED,
     RHS,
@@ -79,8 +80,10 @@ def advance_adams(
     real, integer = work.real, work.integer
     limit = integer[RHS] + budget
     while may_step(work, state_at, limit, project, report, system, loops):
-        steps = integer[STEPS]
+        steps, rejected = integer[STEPS], integer[REJECTED]
+        h = real[H]
         step(work, rhs, project, system, loops)
+        watch_rounding(work, work.differences[0], h, rejected, rhs, system, loops)
         if integer[WATCHED] != 0 and integer[STEPS] > steps:
             functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
 
@@ -104,7 +107,9 @@ def begin(work: AdamsWork, rhs: Function, system: Any, loops: Any) -> None:
         return
     if real[H] == 0.0:
         scratch = work.state[SCRATCH]
-        real[H] = first_step(real, integer, times, y, f, scratch, rhs, system, loops)
+        real[H] = first_step(
+            real, integer, times, y, f, scratch, work.tolerance, rhs, system, loops
+        )
         for i in range(y.size):
             f[1, i] = 0.0
     for j in range(ROWS):
@@ -131,7 +136,7 @@ def step(work: AdamsWork, rhs: Function, project: Function, system: Any, loops: 
     rhs(t1, trial, rates, system, loops)
     for i in range(trial.size):
         change[i] = rates[i] - change[i]  # Phi_k at t1
-    sizes = differences_at(work, k)
+    sizes = differences_at(work, k, h)
     error = h * abs(table[G_ROW, k - 1] - table[G_ROW, k]) * sizes[0]
     here, below, lower = compare_orders(table, h, k, sizes)
     if error <= 1.0:
@@ -144,6 +149,7 @@ def step(work: AdamsWork, rhs: Function, project: Function, system: Any, loops: 
         else:
             fail(work, t1, h, 1, 0.1, failure)
     elif error <= LARGEST:
+        note_failure(real, integer, error, h, integer[FAILURES] != 0)
         integer[FAILURES] += 1
         factor = SLOWEST
         if integer[FAILURES] > PATIENCE:
@@ -208,8 +214,13 @@ def plan(work: AdamsWork, h: float, k: int, here: float, below: float, lower: bo
         order, error = k - 1, below
     elif integer[EQUAL] > k:
         y = work.state[Y]
-        size, rtol, atol = integer[ERROR_SIZE], real[RTOL], real[ATOL]
-        above = h * work.table[CONSTANT, k + 1] * scaled_largest(f[k + 1], y, y, size, rtol, atol)
+        highest = work.state[OTHER]
+        for i in range(y.size):
+            highest[i] = h * f[k + 1, i]
+        size = integer[ERROR_SIZE]
+        above = work.table[CONSTANT, k + 1] * scaled_largest(
+            highest, y, y, size, real[RTOL], work.tolerance, h
+        )
         if k > 1 and below <= min(here, above):
             order, error = k - 1, below
         elif k < HIGHEST and above < (here if k > 1 else 0.5 * here):

@@ -16,11 +16,12 @@ import numpy as np
 
 from dap3d_core.integrators.method import Floats, Integers
 from dap3d_core.integrators.work import (
-    ATOL,
+    ABSOLUTE,
     ERROR_SIZE,
     FRESH,
     INTEGERS,
     MOST_COUNTED,
+    NOISE,
     RTOL,
     SCRATCH,
     TRIAL,
@@ -73,7 +74,17 @@ class AdamsWork(Arrays):
     types: ClassVar[dict[str, Any]] = {
         "integer": INTEGER_VECTOR,
         **dict.fromkeys(
-            ("state", "rows", "differences", "scaled", "table", "switches", "crossings"), MATRIX
+            (
+                "state",
+                "rows",
+                "differences",
+                "scaled",
+                "table",
+                "switches",
+                "crossings",
+                "tolerance",
+            ),
+            MATRIX,
         ),
     }
 
@@ -87,6 +98,7 @@ class AdamsWork(Arrays):
     table: Floats  # (TABLE_ROWS, ROWS + HIGHEST)
     switches: Floats  # (SWITCH_ROWS, 0): none are located
     crossings: Floats  # (0, 3)
+    tolerance: Floats  # (TOLERANCES, n) as in ``Work``
 
 
 def make_table() -> Floats:
@@ -163,19 +175,23 @@ def predict(work: AdamsWork, h: float, k: int) -> None:
 
 
 @compiled_inside
-def differences_at(work: AdamsWork, k: int) -> tuple[float, float, float]:
-    """Scaled sizes of Phi_k, Phi_(k-1), Phi_(k-2) at the prediction; NaN where a number is none."""
+def differences_at(work: AdamsWork, k: int, h: float) -> tuple[float, float, float]:
+    """Scaled sizes of Phi_k, Phi_(k-1), Phi_(k-2) at the prediction; NaN where a number is none.
+
+    What of them is rounding (rounding.py) is not counted.
+    """
     real, size, star = work.real, work.integer[ERROR_SIZE], work.scaled
     y, trial, change = work.state[Y], work.state[TRIAL], work.state[SCRATCH]
-    rtol, atol, last, before = real[RTOL], real[ATOL], k - 1, max(k - 2, 0)
+    rtol, tolerance, last, before = real[RTOL], work.tolerance, k - 1, max(k - 2, 0)
     zero, one, two = 0.0, 0.0, 0.0
     for i in range(size):
         a, b = abs(y[i]), abs(trial[i])
-        scale = 1.0 / (atol + rtol * (a if a > b else b))
+        noise, wide = tolerance[NOISE, i], tolerance[ABSOLUTE, i] + rtol * (a if a > b else b)
+        scale = 1.0 / (h * noise if h * noise > wide else wide)
         d0 = change[i]
         d1 = d0 + star[last, i]
-        d2 = abs(d1 + star[before, i]) * scale
-        d0, d1 = abs(d0) * scale, abs(d1) * scale
+        d2 = (abs(d1 + star[before, i]) - noise) * scale
+        d0, d1 = (abs(d0) - noise) * scale, (abs(d1) - noise) * scale
         if not d0 <= zero:
             zero = d0
         if d1 > one:

@@ -18,7 +18,6 @@ from dap3d_core.integrators.adams_formulas import (
     make_table,
 )
 from dap3d_core.integrators.integration import (
-    SMALLEST_ATOL,
     Integration,
     check_control,
     check_sizes,
@@ -27,6 +26,7 @@ from dap3d_core.integrators.integration import (
 )
 from dap3d_core.integrators.method import Floats, Integers
 from dap3d_core.integrators.restoring import restored
+from dap3d_core.integrators.rounding import tolerance_of
 from dap3d_core.integrators.work import Function
 
 
@@ -60,7 +60,7 @@ class AdamsIntegration(Integration):
         times: ArrayLike,
         *,
         rtol: float = 1e-8,
-        atol: float = 1e-10,
+        atol: ArrayLike = 1e-10,
         step: float | None = None,
         first_step: float | None = None,
         project_on: bool = False,
@@ -82,7 +82,7 @@ class AdamsIntegration(Integration):
         error_size = y.size if error_size is None else error_size
         check_sizes(error_size, y.size, buffer_rows)
         real = np.zeros(at.LENGTHS + length_count)
-        real[at.RTOL], real[at.ATOL] = rtol, max(atol, SMALLEST_ATOL)
+        real[at.RTOL] = rtol
         real[at.H], real[at.T] = first_step or 0.0, instants[0]
         integer = np.zeros(ADAMS_INTEGERS, dtype=np.int64)
         integer[at.ORDER], integer[at.ERROR_SIZE] = 2, error_size  # a first step of order 1
@@ -102,6 +102,7 @@ class AdamsIntegration(Integration):
             table=make_table(),
             switches=switches,
             crossings=crossings,
+            tolerance=tolerance_of(y.size, atol),
         )
         self.work = cast(Any, self._work)  # its first arrays are those of Integration
 

@@ -5,6 +5,7 @@ and writes its result a few times only; the terms come from ``method.combination
 """
 
 from dap3d_core.integrators.method import GROUP, GROUPS, TERMS, Floats
+from dap3d_core.integrators.work import ABSOLUTE, NOISE
 from dap3d_core.kernels.cache import compiled_inside
 
 #: Larger numbers leave double precision in products such as m v^2: they end a run before an energy
@@ -49,12 +50,28 @@ def all_finite(x: Floats) -> bool:
 
 
 @compiled_inside
-def scaled_largest(x: Floats, y0: Floats, y1: Floats, size: int, rtol: float, atol: float) -> float:
-    """``max |x_i| / (atol + rtol max(|y0_i|, |y1_i|))`` over i < ``size``; NaN if one is NaN."""
+def scaled_largest(
+    x: Floats,
+    y0: Floats,
+    y1: Floats,
+    size: int,
+    rtol: float,
+    tolerance: Floats,
+    h: float,
+    least: float = 0.0,
+) -> float:
+    """``max |x_i| / (atol_i + rtol max(|y0_i|, |y1_i|))`` over i < ``size``; NaN if one is NaN.
+
+    What of x_i is rounding of a step h (rounding.py) is not counted, and the rest is compared with
+    no less than that; atol_i is ``least`` or more.
+    """
     largest = 0.0
     for i in range(size):
         a, b = abs(y0[i]), abs(y1[i])
-        ratio = abs(x[i]) / (atol + rtol * (a if a > b else b))
+        atol = tolerance[ABSOLUTE, i]
+        scale = (atol if atol > least else least) + rtol * (a if a > b else b)
+        noise = h * tolerance[NOISE, i]
+        ratio = (abs(x[i]) - noise) / (noise if noise > scale else scale)
         if not ratio <= largest:
             largest = ratio
     return largest

@@ -13,7 +13,6 @@ from typing import Any
 from dap3d_core.integrators.combination import combine, scaled_largest
 from dap3d_core.integrators.method import Floats, Integers
 from dap3d_core.integrators.work import (
-    ATOL,
     BETA,
     DENSE,
     ERROR_OLD,
@@ -61,16 +60,17 @@ def first_step(
     y: Floats,
     k: Floats,
     y1: Floats,
+    tolerance: Floats,
     rhs: Function,
     system: Any,
     loops: Any,
 ) -> float:
     """Starting step of HNW II.4: an Euler step guesses the second derivative. One call of rhs."""
-    size, rtol, atol = integer[ERROR_SIZE], real[RTOL], real[ATOL]
+    size, rtol = integer[ERROR_SIZE], real[RTOL]
     f, f1, floor = k[0], k[1], step_floor(real, times)
     t, t_end = real[T], times[-1]
-    d0 = scaled_largest(y, y, y, size, rtol, atol)
-    d1 = scaled_largest(f, y, y, size, rtol, atol)
+    d0 = scaled_largest(y, y, y, size, rtol, tolerance, 0.0)
+    d1 = scaled_largest(f, y, y, size, rtol, tolerance, 0.0)
     h = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
     h = max(min(h, t_end - t), floor)
     for i in range(y.size):
@@ -79,7 +79,7 @@ def first_step(
     rhs(min(t + h, t_end), y1, f1, system, loops)
     for i in range(y.size):
         f1[i] -= f[i]
-    d2 = scaled_largest(f1, y, y, size, rtol, atol) / h
+    d2 = scaled_largest(f1, y, y, size, rtol, tolerance, 0.0) / h
     if not d2 <= LARGEST:
         return h
     largest = max(d1, d2)
@@ -116,7 +116,13 @@ def end_of_step(real: Floats, integer: Integers, times: Floats) -> float:
 
 @compiled_inside
 def error_norm(
-    real: Floats, integer: Integers, state: Floats, k: Floats, table: Floats, h: float
+    real: Floats,
+    integer: Integers,
+    state: Floats,
+    k: Floats,
+    table: Floats,
+    tolerance: Floats,
+    h: float,
 ) -> float:
     """Largest scaled error of the first components; 1 is just good enough.
 
@@ -124,15 +130,15 @@ def error_norm(
     the mean would hide the error of the one that moves. Two estimates are combined as in HNW II.5:
     |e5|^2 / sqrt(|e5|^2 + 0.01 |e3|^2).
     """
-    size, rtol, atol = integer[ERROR_SIZE], real[RTOL], real[ATOL]
+    size, rtol = integer[ERROR_SIZE], real[RTOL]
     y, trial, error = state[Y], state[TRIAL], state[SCRATCH]
     first = k.shape[0]
     combine(error, 0.0, y, h, table, first, k)
-    main = scaled_largest(error, y, trial, size, rtol, atol)
+    main = scaled_largest(error, y, trial, size, rtol, tolerance, h)
     if integer[ERRORS] == 1:
         return main
     combine(error, 0.0, y, h, table, first + 1, k)
-    return joined(main, scaled_largest(error, y, trial, size, rtol, atol))
+    return joined(main, scaled_largest(error, y, trial, size, rtol, tolerance, h))
 
 
 @compiled_inside

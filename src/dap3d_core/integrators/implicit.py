@@ -26,6 +26,7 @@ from dap3d_core.integrators.radau_method import ORDER, radau_method
 from dap3d_core.integrators.radau_parts import radau_parts
 from dap3d_core.integrators.radau_work import RadauWork
 from dap3d_core.integrators.restoring import check_alike, check_pivots, restored
+from dap3d_core.integrators.rounding import SMALLEST_ATOL
 from dap3d_core.linear.lu_plan import LuPlan, make_lu_plan
 
 
@@ -99,7 +100,7 @@ class RadauIntegration(Integration):
         times: ArrayLike,
         *,
         rtol: float = 1e-8,
-        atol: float = 1e-10,
+        atol: ArrayLike = 1e-10,
         step: float | None = None,
         first_step: float | None = None,
         project_on: bool = False,
@@ -120,7 +121,8 @@ class RadauIntegration(Integration):
         self._work = _make_work(machine, lu, y, instants, buffer_rows, report_size, ends)
         self.work = cast(Any, self._work)  # its first arrays are those of Integration
         real, own, integer = self._work.real, self._work.own, self._work.integer
-        real[work.RTOL], real[work.ATOL] = estimate_tolerances(rtol, atol)
+        real[work.RTOL], absolute = estimate_tolerances(rtol, atol)
+        self._work.tolerance[work.ABSOLUTE] = absolute
         real[work.STEP], real[work.H] = step or 0.0, first_step or 0.0
         real[work.T] = instants[0]
         own[at.FACCON] = own[at.ERROR_ACCEPTED] = 1.0
@@ -187,11 +189,11 @@ class RadauIntegration(Integration):
         return last[0, row].copy(), last[1, row].copy()
 
 
-def estimate_tolerances(rtol: float, atol: float) -> tuple[float, float]:
+def estimate_tolerances(rtol: float, atol: ArrayLike) -> tuple[float, Any]:
     """Tolerances of the error estimate, which is of order 3, for those of the result (RADAU5)."""
-    leading = rtol if rtol > 0.0 else atol
+    leading = rtol if rtol > 0.0 else np.max(atol)
     factor = 0.1 * leading ** (2.0 / 3.0) / leading
-    return rtol * factor, max(atol * factor, 1e-290)
+    return rtol * factor, np.maximum(np.multiply(atol, factor), SMALLEST_ATOL)
 
 
 def _make_work(
@@ -215,6 +217,7 @@ def _make_work(
         rows=np.empty((buffer_rows, 1 + n + report_size)),
         switches=switches,
         crossings=crossings,
+        tolerance=np.zeros((work.TOLERANCES, n)),
         Z=np.zeros((3, n)),
         Z_old=np.zeros((3, n)),
         F=np.zeros((3, n)),

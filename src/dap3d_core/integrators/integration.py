@@ -12,6 +12,7 @@ from dap3d_core.integrators import work as at
 from dap3d_core.integrators.control import FLOOR
 from dap3d_core.integrators.method import Floats, Integers, Method, combinations
 from dap3d_core.integrators.restoring import Restorable
+from dap3d_core.integrators.rounding import tolerance_of
 from dap3d_core.integrators.runge_kutta import advance
 from dap3d_core.integrators.work import Function, Status, Work
 from dap3d_core.kernels.beside import wait_for_what_is_beside
@@ -19,9 +20,6 @@ from dap3d_core.kernels.cache import jit_is_on
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.second_thread import SecondThread
-
-#: Least scale of an error: at atol = 0 a component that is exactly zero is not divided by zero.
-SMALLEST_ATOL = 1e-290
 
 
 class Statistics(NamedTuple):
@@ -52,7 +50,8 @@ class Integration(Restorable):
     times
         (nt,) increasing reporting times; the first is t0, the last t_end.
     rtol, atol
-        Tolerances: the error of a step is measured by ``atol + rtol max(|y0|, |y1|)``.
+        Tolerances: the error of a step is measured by ``atol + rtol max(|y0|, |y1|)``; atol is one
+        number, or one for each component.
     step
         Fixed step, without error control: equal steps, none longer. A method with dense output
         takes them from t0 to t_end, one without (rk4, which needs ``step``) from reporting time to
@@ -99,7 +98,7 @@ class Integration(Restorable):
         times: ArrayLike,
         *,
         rtol: float = 1e-8,
-        atol: float = 1e-10,
+        atol: ArrayLike = 1e-10,
         step: float | None = None,
         first_step: float | None = None,
         project_on: bool = False,
@@ -123,7 +122,7 @@ class Integration(Restorable):
         of_method, counts = _facts(method)
         real = np.zeros(at.LENGTHS + length_count)
         real[: at.LENGTHS] = of_method
-        real[at.RTOL], real[at.ATOL] = rtol, max(atol, SMALLEST_ATOL)
+        real[at.RTOL] = rtol
         real[at.STEP], real[at.H] = step or 0.0, first_step or 0.0
         real[at.T] = instants[0]
         integer = counts.copy()
@@ -146,6 +145,7 @@ class Integration(Restorable):
             lengths=np.full((2, length_count), np.nan),
             switches=switches,
             crossings=crossings,
+            tolerance=tolerance_of(y.size, atol),
         )
 
     def compile(self) -> None:
@@ -276,6 +276,11 @@ class Integration(Restorable):
         return slope
 
     @property
+    def most_work(self) -> float:
+        """The largest magnitude of the last component at an accepted state."""
+        return float(self.work.real[at.MOST_WORK])
+
+    @property
     def stiff_at(self) -> float | None:
         """Since when the scene is stiff for this method, where that was noticed (stiffness.py)."""
         found = float(self.work.real[at.STIFF_AT])
@@ -363,7 +368,7 @@ def check_sizes(error_size: int, size: int, buffer_rows: int) -> None:
 def check_control(
     method: Method,
     rtol: float,
-    atol: float,
+    atol: ArrayLike,
     times: Floats,
     *,
     step: float | None,
@@ -380,7 +385,9 @@ def check_control(
         raise ValueError(
             f"{method.name} does not choose its step: give step, or take an adaptive method"
         )
-    if step is None and not (0.0 <= rtol < np.inf and 0.0 <= atol < np.inf and rtol + atol > 0.0):
+    least_atol, most_atol = float(np.min(atol)), float(np.max(atol))
+    good = 0.0 <= rtol < np.inf and 0.0 <= least_atol <= most_atol < np.inf
+    if step is None and not (good and rtol + most_atol > 0.0):
         raise ValueError(
-            f"rtol is {rtol} and atol {atol}; they must be finite, not negative, not both zero"
+            f"rtol is {rtol} and atol {least_atol}: finite, not negative, not both zero"
         )

@@ -137,8 +137,9 @@ def start(work: RadauWork, rhs: Function, project: Function, system: System, loo
     integer[ACCEPTED] = 0
     if real[STEP] == 0.0 and real[H] == 0.0:
         real[H] = first_step(
-            real, integer, work.times, y, work.k, work.state[SCRATCH], rhs, system, loops
-        )
+            real, integer, work.times, y, work.k, work.state[SCRATCH], work.tolerance, rhs, system,
+            loops,
+        )  # fmt: skip
 
 
 @compiled_inside

@@ -45,7 +45,7 @@ from dap3d_core.integrators.radau_work import (
     RadauWork,
 )
 from dap3d_core.integrators.work import (
-    ATOL,
+    ABSOLUTE,
     ERROR_SIZE,
     LAST_REJECTED,
     RHS,
@@ -241,7 +241,7 @@ def size_of_multipliers(h: float, change: Floats, work: RadauWork, system: Syste
     zero(force)
     add_transposed(system.blocks, system.D, change[1], h, force)
     add_velocity(system.metric, force, out[7 * n :])
-    return scaled_largest(out, y, y, work.integer[ERROR_SIZE], real[RTOL], real[ATOL])
+    return scaled_largest(out, y, y, work.integer[ERROR_SIZE], real[RTOL], work.tolerance, h)
 
 
 @compiled_inside
@@ -253,7 +253,9 @@ def change_stages(h: float, work: RadauWork, system: System) -> float:
     """
     real, y, worst = work.real, work.state[Y], 0.0
     for i in range(3):
-        size = scaled_largest(work.R[i], y, y, work.integer[ERROR_SIZE], real[RTOL], real[ATOL])
+        size = scaled_largest(
+            work.R[i], y, y, work.integer[ERROR_SIZE], real[RTOL], work.tolerance, h
+        )
         other = 0.0
         if work.own[PART] == 0.0:
             other = size_of_multipliers(h, work.G[i], work, system)
@@ -270,15 +272,16 @@ def change_stages(h: float, work: RadauWork, system: System) -> float:
 @compiled_inside
 def newton_limit(work: RadauWork) -> float:
     """Norm of a change at which the iteration ends (HW IV.8), not below what rounding allows."""
-    y, rtol, atol = work.state[Y], work.real[RTOL], work.real[ATOL]
+    y, rtol = work.state[Y], work.real[RTOL]
     n = (y.shape[0] - 1) // 13
     limit = min(0.03, math.sqrt(rtol))
     first = 0
     for count in (7 * n, 6 * n):
         top = 0.0
-        low = LARGEST
+        low = atol = LARGEST
         for k in range(first, first + count):
             top, low = max(top, abs(y[k])), min(low, abs(y[k]))
+            atol = min(atol, work.tolerance[ABSOLUTE, k])
         if count > 0:
             limit = max(limit, ROUNDINGS * ROUNDING * top / (atol + rtol * low))
         first += count
@@ -370,7 +373,7 @@ def estimate_error(
             zero(work.G[0, r])
         solve_first(h, work, system, matrix)
         error = scaled_largest(work.R[0], y, work.state[TRIAL], work.integer[ERROR_SIZE],
-                               real[RTOL], real[ATOL])  # fmt: skip
+                               real[RTOL], work.tolerance, h)  # fmt: skip
         if not error >= 1.0:
             return error
     return error

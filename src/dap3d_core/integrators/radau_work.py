@@ -49,7 +49,8 @@ class RadauWork(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(("integer", "pivots", "pivotsc"), INTEGER_VECTOR),
-        **dict.fromkeys(("state", "k", "terms", "rows", "switches", "crossings", "Z", "Z_old",
+        **dict.fromkeys(("state", "k", "terms", "rows", "switches", "crossings", "tolerance",
+                         "Z", "Z_old",
                          "F", "R", "x", "along"), MATRIX),
         **dict.fromkeys(("multipliers", "last_multipliers", "G", "frames"), TENSOR),
         **dict.fromkeys(("xc", "alongc", "Kc"), COMPLEX_VECTOR),
@@ -66,6 +67,7 @@ class RadauWork(Arrays):
     rows: Floats  # (capacity, 1 + n + report_size)
     switches: Floats  # as in work.Work
     crossings: Floats
+    tolerance: Floats
     Z: Floats  # (3, n) stages less the state
     Z_old: Floats  # (3, n) of the last accepted step
     F: Floats  # (3, n) rates at the stages

@@ -14,6 +14,7 @@ from dap3d_core.integrators.work import (
     H_DENSE,
     LEAVE,
     LIMIT,
+    MOST_WORK,
     NEXT,
     NOT_FINITE,
     OUTCOME,
@@ -103,6 +104,8 @@ def may_step(
         elif integer[LEAVE] != 0 and real[STIFF_AT] < real[T]:
             integer[STATUS] = STIFF
         else:
+            work_done = abs(work.state[Y, work.state.shape[1] - 1])
+            real[MOST_WORK] = max(real[MOST_WORK], work_done)
             return integer[RHS] <= limit and real[T] < real[LIMIT]
     return False
 

@@ -43,6 +43,9 @@ class Restorable:
         check_crossings(new["crossings"], int(integer[at.CROSSINGS]), self.work)
         if not np.isfinite(new["state"][at.Y]).all():
             raise ValueError("its state is not finite")
+        noise = new["tolerance"][at.NOISE]
+        if not (np.isfinite(noise) & (noise >= 0.0)).all():
+            raise ValueError("tolerance: no rounding can be so large")
         for name, array in self.all_arrays():
             if array.flags.writeable:
                 array[...] = new[name]
@@ -54,6 +57,7 @@ class Restorable:
             "integer": at.INTEGER_SETTINGS,
             "switches": (at.ENDS,),
             "table": range(len(array)),
+            "tolerance": (at.ABSOLUTE,),
         }
         return restored(name, array, found, own.get(name, ()))
 

@@ -41,11 +41,11 @@ from dap3d_core.integrators.reporting import (
     may_step,
     project_state,
 )
+from dap3d_core.integrators.rounding import note_failure, watch_rounding
 from dap3d_core.integrators.stiffness import watch_stiffness
 from dap3d_core.integrators.switches import end_is_across, next_length, sample, settle
 from dap3d_core.integrators.work import (
     ACROSS,
-    ATOL,
     CALM,
     DENSE,
     ERROR_SIZE,
@@ -55,6 +55,7 @@ from dap3d_core.integrators.work import (
     FACTOR_MIN,
     FRESH,
     H_DENSE,
+    LAST_REJECTED,
     LENGTHS,
     LIMIT,
     NEXT,
@@ -63,6 +64,7 @@ from dap3d_core.integrators.work import (
     OUTCOME,
     POOR,
     PROJECT_ON,
+    REJECTED,
     RHS,
     RTOL,
     RUNNING,
@@ -115,8 +117,10 @@ def advance(
     watch = functions[4] if integer[SWITCHES] != 0 else rhs
     limit = integer[RHS] + budget
     while may_step(work, dense_state, limit, project, report, system, loops):
-        steps = integer[STEPS]
+        steps, rejected = integer[STEPS], integer[REJECTED]
+        h = real[H]
         step(work, rhs, project, watch, system, loops)
+        watch_rounding(work, work.k[0], h, rejected, rhs, system, loops)
         if integer[WATCHED] != 0 and integer[STEPS] > steps:
             functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
 
@@ -126,28 +130,27 @@ def step(
     work: Work, rhs: Function, project: Function, watch: Function, system: Any, loops: Any
 ) -> None:
     """Try one step: accept it, reject it, or stop the run."""
-    real, integer, times, k = work.real, work.integer, work.times, work.k
-    t, y = real[T], work.state[Y]
+    real, integer, times, k, y = work.real, work.integer, work.times, work.k, work.state[Y]
     if integer[FRESH] == 0:
         integer[RHS] += 1
-        rhs(t, y, k[0], system, loops)
+        rhs(real[T], y, k[0], system, loops)
         integer[FRESH] = 1
         if not all_finite(k[0]):
-            real[T_STOP], integer[STATUS] = t, NOT_FINITE
+            real[T_STOP], integer[STATUS] = real[T], NOT_FINITE
             return
     adaptive = real[STEP] == 0.0
     if adaptive and real[H] == 0.0:
-        scratch = work.state[SCRATCH]
-        real[H] = first_step(real, integer, times, y, k, scratch, rhs, system, loops)
+        real[H] = first_step(real, integer, times, y, k, work.state[SCRATCH], work.tolerance, rhs,
+                             system, loops)  # fmt: skip
     end = t1 = end_of_step(real, integer, times)
-    longest = t1 - t
+    longest = t1 - real[T]
     h = aim(work.lengths, real[CALM], longest) if adaptive else longest
     if integer[SWITCHES] != 0 or real[LIMIT] < t1:
         h = min(h, next_length(work, t1, k[0], project, watch, system, loops))
         if h == 0.0:
             return
     if h < longest:
-        t1 = t + h
+        t1 = real[T] + h
     near = integer[PROJECT_ON] != 0 and is_near(work.lengths, longest)
     if not take_stages(work, t1, h, near, rhs, project, watch, system, loops):
         return
@@ -155,7 +158,7 @@ def step(
     if adaptive and near:
         error = kept_error(work, t1, h, project, system, loops)
     elif adaptive:
-        error = error_norm(real, integer, work.state, k, work.table, h)
+        error = error_norm(real, integer, work.state, k, work.table, work.tolerance, h)
     if near and error > 1.0 and is_rounding(real, work.lengths, h, error):
         error = 1.0
     if error <= 1.0:
@@ -178,6 +181,7 @@ def step(
             reject(real, integer, times, t1, h * RETREAT, failure)
     elif error <= LARGEST:
         factor = max(real[FACTOR_MIN], real[SAFETY] / error ** real[EXPONENT])
+        note_failure(real, integer, error, h, integer[LAST_REJECTED] != 0)
         reject(real, integer, times, t1, h * factor, STEP_FLOOR)
     else:
         reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)
@@ -241,20 +245,24 @@ def kept_error(
     y, trial, result, other = (work.state[Y], work.state[TRIAL], work.state[SCRATCH],
                                work.state[OTHER])  # fmt: skip
     on_constraints(work, t1, trial, project, system, loops)
-    for i in range(other.size):
-        other[i] = result[i] - trial[i]
-    jump = scaled_largest(other, y, result, integer[ERROR_SIZE], JUMP, JUMP)
+    jump = 0.0
+    for i in range(integer[ERROR_SIZE]):
+        ratio = abs(result[i] - trial[i]) / (JUMP * (1.0 + max(abs(y[i]), abs(result[i]))))
+        if not ratio <= jump:
+            jump = ratio
     if not jump <= 1.0:
         return jump
-    atol, main = real[ATOL], 0.0
+    least, main = 0.0, 0.0
     for i in range(integer[ERROR_SIZE]):
-        atol = max(atol, BLURRED * abs(y[i]))
+        least = max(least, BLURRED * abs(y[i]))
     for e in range(integer[ERRORS]):
         combine(other, 1.0, trial, -h, table, k.shape[0] + e, k)
         project_state(real, integer, t1, other, project, system, loops)
         for i in range(other.size):
             other[i] -= result[i]
-        size = scaled_largest(other, y, result, integer[ERROR_SIZE], real[RTOL], atol)
+        size = scaled_largest(
+            other, y, result, integer[ERROR_SIZE], real[RTOL], work.tolerance, h, least
+        )
         main = size if e == 0 else joined(main, size)
     return main
 
@@ -351,7 +359,7 @@ def is_within_error(work: Work) -> bool:
     for i in range(other.size):
         other[i] -= trial[i]
     size = work.integer[ERROR_SIZE]
-    return scaled_largest(other, y, trial, size, real[RTOL], real[ATOL]) <= 1.0
+    return scaled_largest(other, y, trial, size, real[RTOL], work.tolerance, 0.0) <= 1.0
 
 
 @compiled_inside

@@ -7,7 +7,9 @@ measure alone, h |lambda| at the boundary of the region of stability, takes fast
 tolerances for stiff, and misses stiff scenes at tight ones. Here a step looks stiff where the
 component decays, f(y1) - f(g) pointing against y1 - g, by more than half in a step: such a motion
 is over after a few steps. Where it is still there after many, errors alone make it, and its error,
-not that of the motion that is seen, limits the steps. Oscillations do not point so.
+not that of the motion that is seen, limits the steps. Of an undamped oscillation rates dwarf
+positions, so that the two are always nearly parallel, but it grows as often as it decays: a step in
+which the component grows clears the scene.
 """
 
 from dap3d_core.integrators.combination import combine
@@ -56,8 +58,10 @@ def watch_stiffness(work: Work, h: float) -> None:
         upper += change * change
         lower += apart * apart
         along += change * apart
-    decays = along < 0.0 and along * along > PARALLEL * upper * lower
-    if decays and upper > LEAST**2 * lower:
+    marked = along * along > PARALLEL * upper * lower and upper > LEAST**2 * lower
+    if marked and along > 0.0:
+        integer[STIFF_STEPS] = integer[CALM_STEPS] = 0
+    elif marked:
         integer[STIFF_STEPS] += 1
         integer[CALM_STEPS] = 0
         if integer[STIFF_STEPS] >= STIFF:

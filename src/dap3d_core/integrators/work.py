@@ -36,15 +36,18 @@ PROJECTION_FAILED, SWITCHED = int(Status.PROJECTION_FAILED), int(Status.SWITCHED
 CHATTERED, STIFF = int(Status.CHATTERED), int(Status.STIFF)
 
 # Places in ``real``. Settings; a STEP of 0 lets the error choose it. CALM, SAFETY: see Method.
-RTOL, ATOL, STEP, EXPONENT, BETA, FACTOR_MIN, FACTOR_MAX, CALM, SAFETY = range(9)
+RTOL, STEP, EXPONENT, BETA, FACTOR_MIN, FACTOR_MAX, CALM, SAFETY = range(8)
 # What changes: time, next step, error of the last accepted step, start and length of the step that
 # the dense output belongs to, start of the present run of equal steps, time of what stopped
 # the run, error of the last step that was to go across a singular state; the instant that the next
 # step may not go beyond, its greatest length since one met the other side of a switch; when the
-# scene was found stiff; and what project gives: four numbers, then lengths.
+# scene was found stiff; the largest magnitude of the last component, which is the work done, at an
+# accepted state; error per length of the last step that failed; and what project gives: four
+# numbers, then lengths.
 (
-    T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, ACROSS, LIMIT, CUT, STIFF_AT, OUTCOME
-) = range(9, 21)  # fmt: skip
+    T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, ACROSS, LIMIT, CUT, STIFF_AT, MOST_WORK,
+    FAILED_RATE, OUTCOME
+) = range(8, 22)  # fmt: skip
 LENGTHS = OUTCOME + 4
 #: Places in ``real`` and ``integer`` that never change in the course of a run.
 REAL_SETTINGS = range(T)
@@ -60,11 +63,14 @@ STEPS, REJECTED, RHS, PROJECTIONS, REPORTS, POOR = range(15, 21)
 SWITCHES, LOOKED, CUTS, ENDING, CULPRIT, CROSSINGS = range(21, 27)
 # LATE_STAGE: see Method; whether the run ends where the scene becomes stiff; steps that looked so,
 # and those in a row that did not since (stiffness.py). STALLS: steps in a row towards a crossing,
-# so short that the switch did not change by a bit.
-LATE_STAGE, LEAVE, STIFF_STEPS, CALM_STEPS, STALLS, INTEGERS = range(27, 33)
+# so short that the switch did not change by a bit. ROUNDED: whether rounding makes a part of the
+# errors is to be looked at (1), or is so (2).
+LATE_STAGE, LEAVE, STIFF_STEPS, CALM_STEPS, STALLS, ROUNDED, INTEGERS = range(27, 34)
 INTEGER_SETTINGS = (*range(STATUS), SWITCHES, LATE_STAGE, LEAVE)
 # Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch.
 Y, TRIAL, SCRATCH, OTHER, STATES = range(5)
+# Rows of ``tolerance``: absolute tolerance; change of dy/dt by the rounding of y (rounding.py).
+ABSOLUTE, NOISE, TOLERANCES = range(3)
 # Rows of ``switches``: value, side (the sign that it keeps; 0: none yet), rate and bend (change of
 # the rate in time) at t; value and rate at the trial state; value at a sample; whether it ends the
 # run; since when its changes are counted, and how many there were.
@@ -79,10 +85,9 @@ class Work(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         "integer": INTEGER_VECTOR,
-        **dict.fromkeys(
-            ("state", "k", "terms", "rows", "table", "lengths", "switches", "crossings"), MATRIX
-        ),
-    }
+        **dict.fromkeys(("state", "k", "terms", "rows", "table", "lengths", "switches",
+                         "crossings", "tolerance"), MATRIX),
+    }  # fmt: skip
 
     real: Floats  # (LENGTHS + m,) m lengths that project gives
     integer: Integers  # (INTEGERS,)
@@ -95,6 +100,7 @@ class Work(Arrays):
     lengths: Floats  # (2, m) at t, and their rates over the last step (crossing.py)
     switches: Floats  # (SWITCH_ROWS, q) of q switches of the model (switches.py)
     crossings: Floats  # (LOGGED, 3) where they changed their sign; no row without switches
+    tolerance: Floats  # (TOLERANCES, n)
 
 
 #: Nothing is counted beyond: a count, and twice that, are exact in double precision.
@@ -119,6 +125,7 @@ def allowed_integers(work: Any, found: Integers) -> dict[int, Container[int]]:
         NEXT: range(instants if running else instants + 1),
         ROW: (0,),
         **dict.fromkeys((FRESH, LAST_REJECTED, LOOKED), (0, 1)),
+        ROUNDED: (0, 1, 2),
         GAP_STEPS: range(most_steps + 1),
         GAP_STEP: range(steps + 1),
         ENDING: {0, Status.ENDED, *by_switch},
@@ -140,5 +147,5 @@ def allowed_reals(work: Any) -> dict[int, tuple[float, float]]:
         **dict.fromkeys((T_DENSE, GAP_START, T_STOP), (0.0, last)),
         **dict.fromkeys((H, H_DENSE, ERROR_OLD, ACROSS), (0.0, largest)),
         LIMIT: (math.inf, math.inf),
-        **dict.fromkeys((CUT, STIFF_AT), (0.0, math.inf)),
+        **dict.fromkeys((CUT, STIFF_AT, MOST_WORK, FAILED_RATE), (0.0, math.inf)),
     }

@@ -12,8 +12,15 @@ import numpy as np
 
 from dap3d_core.interface.checks import BodyPose, pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
-from dap3d_core.model.kinematics import read_only
+from dap3d_core.model.kinematics import read_only, to_global
 from dap3d_core.scene import Checked, Instance
+
+#: Sizes, m, of ordinary scenes: their tolerances are in metres as they are.
+ORDINARY = 0.03, 30.0
+#: An extent beyond is none: a radius of gyration of masses that are no masses.
+WIDEST = 1e20
+#: Points nearer than this part of their distance from the origin are one but for rounding.
+EXTENT = 1e-12
 
 
 @attrs.frozen(eq=False)
@@ -95,9 +102,33 @@ class Model:
 
     @cached_property
     def size(self) -> float:
-        """A length of the model, m: its extent, or one metre where it has none."""
+        """How far from the origin the model reaches, m; at the origin alone, its extent."""
         points = np.vstack([self.r, self.point_local])
-        return float(np.max(np.abs(points), initial=0.0)) or 1.0
+        return float(np.max(np.abs(points), initial=0.0)) or self.extent
+
+    @cached_property
+    def extent(self) -> float:
+        """A length of the model, m, wherever it lies: the diagonal of the box about its points.
+
+        Of one point its largest radius of gyration; one metre where there is no body.
+        """
+        if not self.body_count:
+            return 1.0
+        poses = np.vstack([[1.0, 0.0, 0.0, 0.0], self.p])[self.point_body]
+        places = np.vstack([np.zeros(3), self.r])[self.point_body]
+        points = np.vstack([self.r, places + to_global(poses, self.point_local)])
+        extent = float(np.linalg.norm(np.max(points, axis=0) - np.min(points, axis=0)))
+        if extent > EXTENT * float(np.max(np.abs(points))):
+            return extent
+        gyration = np.linalg.norm(self.Jp, ord=2, axis=(1, 2)) / self.mass
+        return float(np.sqrt(np.max(gyration)))
+
+    @cached_property
+    def length(self) -> float:
+        """The length, m, that tolerances speak of: 1 in ordinary scenes, else a power of ten."""
+        if ORDINARY[0] <= self.extent <= ORDINARY[1] or not 1 / WIDEST < self.extent < WIDEST:
+            return 1.0
+        return float(10.0 ** np.round(np.log10(self.extent)))
 
     def row_owner(self, row: int) -> str:
         """Name of the joint that a constraint row belongs to."""

@@ -25,9 +25,11 @@ class Course:
         kinetic: (nt,) kinetic energy, J.
         speed, spin: (nt,) sums over the bodies of m |r_dot|, kg m/s, and of |J| |omega|, kg m^2/s.
         off_unit: (nt,) largest deviation of Euler parameters from unit length.
-        far, orbit: (nt,) sums of m (|r| + |r_dot|), SI, and of m |r| |r_dot|, kg m^2/s.
+        reaction: (nt,) sum of the magnitudes of all multipliers, SI.
+        far, orbit: (nt,) sums of m |r|, kg m, and of m |r| |r_dot|, kg m^2/s.
         linear, angular: (nt, 3) momenta, kg m/s, kg m^2/s about the origin.
-        sizes: largest magnitude of a coordinate (m), a velocity and an acceleration (SI).
+        sizes: largest magnitude of a coordinate, a velocity and an acceleration, those of angles
+            times the length that tolerances speak of (m, m/s, m/s^2).
 
     ``far``, ``orbit``, ``linear`` and ``angular`` only of an isolated system, else (0,).
     """
@@ -42,6 +44,7 @@ class Course:
     speed: Floats
     spin: Floats
     off_unit: Floats
+    reaction: Floats
     far: Floats
     orbit: Floats
     linear: Floats
@@ -49,16 +52,17 @@ class Course:
     sizes: tuple[float, float, float]
 
 
-def course_of(subject: Subject, arrays: "Arrays | FileArrays") -> Course:
+def course_of(subject: Subject, arrays: "Arrays | FileArrays", length: float = 1.0) -> Course:
     """The course of a run."""
     found: dict[str, list[Floats]] = {}
     sizes = np.zeros(3)
     for block in arrays.blocks():
         for name, values in _numbers(subject, block).items():
             found.setdefault(name, []).append(values)
-        speeds = block.u[:, 7 * subject.body_count :]
+        arms = np.tile(np.repeat([1.0, length], 3), subject.body_count)
+        speeds = arms * block.u[:, 7 * subject.body_count :]
         r = split(block.u, subject.body_count)[0]
-        sizes = np.maximum(sizes, [_largest(a) for a in (r, speeds, block.v_dot)])
+        sizes = np.maximum(sizes, [_largest(a) for a in (r, speeds, arms * block.v_dot)])
     whole = {name: np.concatenate(values) for name, values in found.items()}
     nothing = {name: np.zeros(0) for name in ("far", "orbit", "linear", "angular")}
     return Course(**(nothing | whole), sizes=(float(sizes[0]), float(sizes[1]), float(sizes[2])))
@@ -80,10 +84,11 @@ def _numbers(subject: Subject, block: Arrays) -> dict[str, Floats]:
         "speed": fast @ subject.mass,
         "spin": np.linalg.norm(w, axis=2) @ inertia,
         "off_unit": off.max(axis=1, initial=0.0),
+        "reaction": np.abs(block.Lam).sum(axis=1),
     }
     if subject.is_isolated:
         far = np.linalg.norm(r, axis=2)
-        found |= {"far": (far + fast) @ subject.mass, "orbit": (far * fast) @ subject.mass}
+        found |= {"far": far @ subject.mass, "orbit": (far * fast) @ subject.mass}
         found |= dict(zip(("linear", "angular"), momentum(subject, block.u), strict=True))
     return found
 

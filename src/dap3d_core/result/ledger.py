@@ -2,8 +2,8 @@
 
 Error control keeps the error of each step below ``atol + rtol |y|``. The errors of many steps add
 up; a run is called good while they come to no more than LOOSE times that. A run of fixed steps has
-no tolerance: its entries have no limit, they inform. Drift is not accuracy: a small entry does not
-prove a right result, a large one proves a wrong one.
+no tolerance: it is called good while what should be conserved is so to FIXED. Drift is not
+accuracy: a small entry does not prove a right result, a large one proves a wrong one.
 """
 
 import attrs
@@ -18,6 +18,8 @@ from dap3d_core.result.subject import Subject
 
 #: How many steps' worth of error a run may gather.
 LOOSE = 1e3
+#: What a run of fixed steps may be off by, as an estimate of its error may (estimate.py).
+FIXED = 1e-3
 #: Relative rounding error of sums over a run.
 ROUNDING = 1e-12
 #: Residual, relative to 1 + largest magnitude, up to which a projection counts as converged
@@ -67,7 +69,7 @@ def ledger_of(subject: Subject, arrays: Arrays | FileArrays, record: Record) -> 
     """
     if not len(arrays):
         return {}
-    course = course_of(subject, arrays)
+    course = course_of(subject, arrays, record.length)
     entries = {"energy": _energy(subject, course, record)}
     if subject.has_potential and _is_conservative(subject, course, record):
         entries["total energy"] = _total_energy(subject, course, record)
@@ -78,16 +80,18 @@ def ledger_of(subject: Subject, arrays: Arrays | FileArrays, record: Record) -> 
     return entries
 
 
-def _relative_limit(record: Record) -> float | None:
+def _relative_limit(record: Record) -> float:
     """LOOSE rtol, and rounding."""
     control = record.tolerances
-    return None if control is None else LOOSE * control[0] + ROUNDING
+    return FIXED if control is None else LOOSE * control[0] + ROUNDING
 
 
-def _floor(record: Record) -> float:
-    """Magnitude below which error control is absolute, not relative: atol / rtol; 0 without it."""
+def _floors(record: Record) -> dict[str, float]:
+    """Magnitudes below which error control is absolute, not relative: atol / rtol; 0 without it."""
     control = record.tolerances
-    return 0.0 if control is None else control[1] / control[0]
+    if control is None:
+        return dict.fromkeys("rpvw", 0.0)
+    return {name: atol / control[0] for name, atol in control[1].items()}
 
 
 def _energy_scale(subject: Subject, course: Course, record: Record) -> float:
@@ -95,17 +99,21 @@ def _energy_scale(subject: Subject, course: Course, record: Record) -> float:
 
     Below a speed of atol / rtol error control is absolute: an error atol of the speed v is one of
     m v atol in the energy, to which m v (atol / rtol) is the scale, and without a speed it is one
-    of m atol^2. A system that hangs at rest has rounding errors of its potential for energy; they
-    are given the share that ROUNDING is of the limit.
+    of m atol^2. A system at rest has rounding errors of its potential for energy, and of what the
+    reactions do along what the constraints leave open; they are given the share that ROUNDING is of
+    the limit. The potential alone would not do: its zero is anybody's choice.
+
+    Work is done between the reported instants, too: the record has the most at accepted steps.
     """
-    floor, limit = _floor(record), _relative_limit(record)
-    kinetic = np.max(course.kinetic + floor * (course.speed + course.spin))
-    rounding = 0.0
-    if limit is not None and record.tolerances is not None:
-        at_rest = record.tolerances[1] ** 2 * (subject.mass.sum() + _inertia(subject))
-        rounding = (ROUNDING * _largest(course.potential_energy) + at_rest) / limit
-    work = _largest(course.work - course.work[0])
-    return max(float(kinetic), work, rounding, float(np.finfo(float).tiny))
+    floors, limit = _floors(record), _relative_limit(record)
+    kinetic = np.max(course.kinetic + floors["v"] * course.speed + floors["w"] * course.spin)
+    at_rest = ROUNDING * _largest(course.potential_energy)
+    at_rest += PROJECTED * (record.length + course.sizes[0]) * _largest(course.reaction)
+    if record.tolerances is not None:
+        atol = record.tolerances[1]
+        at_rest += atol["v"] ** 2 * subject.mass.sum() + atol["w"] ** 2 * _inertia(subject)
+    work = max(_largest(course.work - course.work[0]), float(record.settings.get("most_work", 0.0)))
+    return max(float(kinetic), work, at_rest / limit, float(np.finfo(float).tiny))
 
 
 def _inertia(subject: Subject) -> float:
@@ -150,10 +158,11 @@ def _total_energy(subject: Subject, course: Course, record: Record) -> Entry:
 
 def _momentum(subject: Subject, course: Course, record: Record) -> Entry:
     """Drift of linear and angular momentum, relative to the momenta of the bodies added up."""
-    floor = _floor(record)  # of coordinates and velocities alike, to first order
+    floors = _floors(record)
+    far = floors["v"] * course.far + floors["r"] * course.speed
     scales = (
-        np.max(course.speed) + floor * subject.mass.sum(),
-        np.max(course.orbit + floor * course.far + course.spin) + floor * _inertia(subject),
+        np.max(course.speed) + floors["v"] * subject.mass.sum(),
+        np.max(course.orbit + far + course.spin) + floors["w"] * _inertia(subject),
     )
     drifts = []
     for values, scale in zip((course.linear, course.angular), scales, strict=True):
@@ -172,8 +181,11 @@ def _constraints(subject: Subject, course: Course, record: Record) -> dict[str, 
     Position and velocity: with projection as far as a projection may leave them, else what errors
     of steps come to. Acceleration: the equations solved for it, at any tolerance.
     """
-    sizes = [1.0 + size for size in course.sizes]
-    limits = [*(_state_limit(record, size) for size in sizes[:2]), SOLVED * sizes[2]]
+    sizes = [record.length + size for size in course.sizes]
+    limits: list[float | None] = [
+        *(_state_limit(record, size, q) for size, q in zip(sizes[:2], "rv", strict=True)),
+        SOLVED * sizes[2],
+    ]
     if record.method == "penalty":
         limits[2] = None  # its springs give way, by lambda / alpha
     found = {}
@@ -189,17 +201,17 @@ def _constraints(subject: Subject, course: Course, record: Record) -> dict[str, 
     return found
 
 
-def _state_limit(record: Record, size: float) -> float | None:
+def _state_limit(record: Record, size: float, quantity: str) -> float:
     if record.projected:
         return PROJECTED * size
     control = record.tolerances
-    return None if control is None else LOOSE * (control[0] * size + control[1])
+    return FIXED * size if control is None else LOOSE * (control[0] * size + control[1][quantity])
 
 
 def _quaternion(course: Course, record: Record) -> Entry:
     """Euler parameters are normalised by projection; without it their length drifts."""
     worst, when = _worst(course.off_unit, course.t)
-    limit = UNIT_LENGTH if record.projected else _state_limit(record, 1.0)
+    limit = UNIT_LENGTH if record.projected else _state_limit(record, 1.0, "p")
     text = f"largest deviation of Euler parameters from unit length, at t = {when:g} s"
     return _entry(worst, limit, "1", text)
 

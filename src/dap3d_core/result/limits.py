@@ -122,13 +122,19 @@ def _is_plain(value: Any, depth: int = 3) -> bool:
 
 
 def _are_settings(value: Any) -> bool:
-    numbers = ("t_end", "dt", "rtol", "atol", "step")
+    numbers = ("t_end", "dt", "rtol", "step")
     return (
         isinstance(value, dict)
         and _is_plain(value)
         and all(value.get(n) is None or is_number(value[n]) for n in numbers)
+        and _is_tolerance(value.get("atol"))
         and type(value.get("rank", 0)) is int
     )
+
+
+def _is_tolerance(value: Any) -> bool:
+    """One number, one for each quantity, or none."""
+    return value is None or is_number(value) or (_are_numbers(value) and set(value) == set("rpvw"))
 
 
 def _are_numbers(value: Any) -> bool:

@@ -130,11 +130,18 @@ class Record:
             return ()
 
     @property
-    def tolerances(self) -> tuple[float, float] | None:
-        """(rtol, atol) that controlled the steps; None for steps of fixed size."""
+    def tolerances(self) -> tuple[float, dict[str, float]] | None:
+        """rtol, and atol of r, p, v and w, that controlled the steps; None for fixed steps."""
         rtol, atol = self.settings.get("rtol"), self.settings.get("atol")
         fixed = self.integrator == "rk4" or self.settings.get("step") is not None
-        return None if fixed or not rtol else (float(rtol), float(atol or 0.0))
+        if fixed or not rtol:
+            return None
+        return float(rtol), atol if isinstance(atol, dict) else dict.fromkeys("rpvw", atol or 0.0)
+
+    @property
+    def length(self) -> float:
+        """The length, m, that tolerances speak of (Model.length)."""
+        return float(self.settings.get("length", 1.0))
 
     @property
     def projected(self) -> bool:

@@ -109,7 +109,7 @@ class Simulation:
         dt: reporting step, s; None where the scene leaves it open.
         method: formulation, or "auto".
         integrator: method of integration.
-        rtol, atol: relative and absolute tolerance of a step.
+        rtol, atol: relative and absolute tolerance of a step; atol of all, or by quantity.
         step: step of an integrator with fixed steps, s, or None.
         correct: whether initial positions and velocities are corrected to fulfil the constraints.
         project: whether states are projected on the constraints along the run.
@@ -123,7 +123,7 @@ class Simulation:
     method: Any = attrs.field(default="auto", converter=plain)
     integrator: Any = attrs.field(default="dop853", converter=plain)
     rtol: Any = attrs.field(default=1e-8, converter=plain)
-    atol: Any = attrs.field(default=1e-10, converter=plain)
+    atol: Any = attrs.field(default=None, converter=plain)
     step: Any = attrs.field(default=None, converter=plain)
     correct: Any = attrs.field(default=True, converter=plain)
     project: Any = attrs.field(default=True, converter=plain)

@@ -1,6 +1,6 @@
 """The settings of a run: [simulation] of a scene file, or what a script or command line gives."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from dap3d_core.registry.spelling import nearest
@@ -17,6 +17,9 @@ CORRECT_METRICS = ("unit", "mass")
 FIXED_STEP = ("rk4",)
 #: Integrators that take no step.
 NO_STEP = ("adams",)
+#: Absolute tolerances that are taken where none are given, SI, and what may have one of its own.
+USUAL_ATOL = 1e-10
+QUANTITIES = ("r", "p", "v", "w")
 #: Relative tolerances below are beyond double precision.
 SMALLEST_RTOL = 1e-14
 #: Times that are shorter, s, leave double precision in products and quotients.
@@ -33,13 +36,27 @@ def _time(value: Any, *, positive: bool = True) -> Any:
     return Fault(f"should be {'' if positive else '0 or '}at least {SHORTEST_TIME:g}")
 
 
+def _tolerance(value: Any) -> Any:
+    """An absolute tolerance: a number, or a table of some by quantity."""
+    if not isinstance(value, Mapping):
+        return bounded(number_of(value), minimum=0.0)
+    for name, part in value.items():
+        if name not in QUANTITIES:
+            words = f"has no quantity {name!r}: r (m), p, v (m/s), w (rad/s)"
+            return Fault(words, nearest=nearest(str(name), QUANTITIES) or "")
+        number = bounded(number_of(part), minimum=0.0)
+        if isinstance(number, Fault):
+            return Fault(f"{name} {number.what}", number.remedy, number.nearest)
+    return value
+
+
 _READ: dict[str, Callable[[Any], Any]] = {
     "t_end": lambda v: _time(v, positive=False),
     "dt": _time,
     "method": lambda v: word_of(v, METHODS),
     "integrator": lambda v: word_of(v, INTEGRATORS),
     "rtol": lambda v: bounded(number_of(v), minimum=SMALLEST_RTOL, maximum=1.0),
-    "atol": lambda v: bounded(number_of(v), minimum=0.0),
+    "atol": lambda v: _tolerance(v),
     "step": _time,
     "correct": truth_of,
     "project": truth_of,
@@ -49,7 +66,7 @@ _READ: dict[str, Callable[[Any], Any]] = {
     "mu": lambda v: bounded(number_of(v), positive=True),
 }
 #: Settings that may be left open.
-OPEN = ("t_end", "dt", "step")
+OPEN = ("t_end", "dt", "atol", "step")
 
 
 def check_simulation(simulation: Simulation, body_names: Collection[str]) -> None:
@@ -155,7 +172,9 @@ def header_mistakes(scene: Scene) -> list[tuple[Key, Mistake]]:
 
 def notes_of(simulation: Simulation) -> list[str]:
     """What looks odd in settings that are allowed."""
-    if simulation.atol == 0.0 and type(simulation.atol) in (int, float):
+    atol = simulation.atol
+    parts = atol.values() if isinstance(atol, Mapping) else [atol]
+    if any(part == 0.0 and type(part) in (int, float) for part in parts):
         return ["simulation.atol = 0: a quantity that is zero is then asked for without any error"]
     return []
 

@@ -22,6 +22,7 @@ from dap3d_core.scene.settings import notes_of
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.implicit import EXPLICIT
+from dap3d_core.simulation.tolerances import atol_vector, resolved_atol
 
 Floats = NDArray[np.float64]
 
@@ -106,7 +107,7 @@ def integration_options(machine: Machine, settings: Simulation) -> dict[str, Any
     """What any integration takes from a machine and the settings of a run."""
     return {
         "rtol": settings.rtol,
-        "atol": settings.atol,
+        "atol": atol_vector(resolved_atol(settings.atol, machine), machine.model.body_count),
         "step": settings.step,
         "project_on": settings.project,
         "error_size": 13 * machine.model.body_count,  # the work does not steer the step

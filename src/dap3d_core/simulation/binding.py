@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.machine import Machine, Rows
 from dap3d_core.linear.rank import DENSE_ROWS
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial import FIT, correct_positions, displaced, model_size
+from dap3d_core.simulation.initial import FIT, correct_positions, displaced, fit_of, model_size
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class Binding:
 
 
 def bindings(machine: Machine, rows: Rows, u: Floats, t: float) -> tuple[Binding, ...]:
-    """Joints that bind at a state u (13 n,), whose rows these are.
+    """Joints that bind at a state u (13 n,), whose rows these are, scaled.
 
     Sought among up to DENSE_ROWS rows; those of the position level alone are tried.
     """
@@ -63,7 +63,7 @@ def bindings(machine: Machine, rows: Rows, u: Floats, t: float) -> tuple[Binding
     if model.row_count > DENSE_ROWS:
         return ()
     left, values, right = np.linalg.svd(rows.dense(), full_matrices=False)
-    fit = FIT * min(1.0, model_size(machine))
+    fit = fit_of(model)
     found = []
     for k in np.flatnonzero((values > fit) & (values < HELD * values[0])):
         if any(_leads_away(machine, u, t, sign * right[k]) for sign in (1.0, -1.0)):
@@ -78,7 +78,7 @@ def bindings(machine: Machine, rows: Rows, u: Floats, t: float) -> tuple[Binding
 def _leads_away(machine: Machine, u: Floats, t: float, direction: Floats) -> bool:
     """Whether the joints can be closed at another pose in this direction (6 n,)."""
     n, size = machine.model.body_count, model_size(machine)
-    step = direction.reshape(n, 6)
+    step = direction.reshape(n, 6) * np.repeat([machine.model.length, 1.0], 3)
     extent = max(
         float(np.max(np.linalg.norm(step[:, :3], axis=1))) / (SHIFT * size),
         float(np.max(np.linalg.norm(step[:, 3:], axis=1))) / TURN,

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.machine import Machine, scaled_rows
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial import (
     correct_positions,
@@ -87,7 +87,8 @@ def redundancy_elsewhere(
     for k in range(count):
         other = _other_pose(machine, u, t, np.random.default_rng(k))
         if other is not None:
-            ranks.append(rank_of(machine, finite_rows(machine, t, other)).rank)
+            rows_there = finite_rows(machine, t, other)
+            ranks.append(rank_of(machine, scaled_rows(rows_there, machine.model.length)[0]).rank)
     if not ranks:
         return Elsewhere((), None, None)
     redundant = rows - max(ranks)

@@ -1,9 +1,9 @@
 """Initial conditions brought onto the constraints, at position and at velocity level (spec 8).
 
 The change is the least one: of all that fulfil the linear equations D x = residual the one whose
-sum of squares is the smallest, of displacements in m and rotations in rad as they are (metric
-"unit", the manual's), or weighted by masses and inertias (metric "mass"): a heavy body then stays
-nearly where it is.
+sum of squares is the smallest, of displacements in m (in units of ``Model.length`` where the scene
+is not of ordinary size) and rotations in rad as they are (metric "unit", the manual's), or weighted
+by masses and inertias (metric "mass"): a heavy body then stays nearly where it is.
 """
 
 from collections.abc import Collection
@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from dap3d_core.assembly.system import System
 from dap3d_core.formulations.build import set_metric
-from dap3d_core.formulations.machine import Machine, Rows
+from dap3d_core.formulations.machine import Machine, Rows, scaled_rows
 from dap3d_core.linear.plan import Integers
 from dap3d_core.linear.rank import DENSE_ROWS, factor_independent
+from dap3d_core.model import Model
 from dap3d_core.model.kinematics import join, split
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Body, Scene
@@ -82,11 +83,21 @@ def finite_rows(machine: Machine, t: float, u: Floats) -> Rows:
 
 
 def violation(machine: Machine, u: Floats, t: float = 0.0) -> tuple[float, float]:
-    """Largest residuals |C| and |D v - nu| of a state u (13 n,)."""
+    """Largest residuals |C| and |D v - nu| of a state u (13 n,).
+
+    In the units of the rows; in m and m/s where the scene is not of ordinary size (Model.length).
+    """
     if not machine.model.row_count:
         return 0.0, 0.0
     rows = finite_rows(machine, t, u)
-    return _largest(rows.C), _largest(_velocity_residual(rows, u))
+    weight = weights_of(machine)
+    return _largest(weight * rows.C), _largest(weight * _velocity_residual(rows, u))
+
+
+def weights_of(machine: Machine) -> Floats:
+    """(rows,) weights of the residuals of the model's rows (System.weight)."""
+    weight: Floats = machine.system.weight[machine.system.row]
+    return weight
 
 
 def correct_initial(
@@ -133,19 +144,20 @@ def correction_notes(initial: Initial, machine: Machine, scene: Scene) -> list[s
     """
     notes = []
     position, velocity = initial.violation
-    if position > TOLERANCE:
+    tolerance = TOLERANCE * machine.model.length
+    if position > tolerance:
         mark = INFORMATION if position <= ROUNDING * model_size(machine) else ""
         notes.append(
             f"{mark}initial positions corrected in {initial.passes} passes: "
             f"|C| {position:.2g} -> {initial.residual[0]:.2g}; "
             f"bodies moved by up to {initial.moved:.2g} m and {initial.turned:.2g} rad"
         )
-    if initial.residual[0] > TOLERANCE:
+    if initial.residual[0] > tolerance:
         notes.append(
             f"redundant joints do not fit together: {initial.residual[0]:.2g} of their positions "
             f"stays open. Below {FIT:g} the run goes on as if they fitted"
         )
-    if velocity > TOLERANCE:
+    if velocity > tolerance:
         speed = _largest(machine.model.u0[7 * machine.model.body_count :])
         usual = attrs.fields(Body)
         open_ = all(
@@ -169,11 +181,13 @@ def correct_positions(
         AssemblyError: the residual does not vanish.
     """
     size, limit, before = model_size(machine), 1.0, np.inf
+    length, weight = machine.model.length, weights_of(machine)
+    fit = length * fit_of(machine.model)
     for passes in range(MOST_PASSES + 1):
         rows = finite_rows(machine, t, u)
-        worst = _largest(rows.C)
-        stands = worst > 0.5 * before and worst <= FIT * min(1.0, size)
-        if worst <= TOLERANCE or stands:
+        worst = _largest(weight * rows.C)
+        stands = worst > 0.5 * before and worst <= fit
+        if worst <= TOLERANCE * length or stands:
             return u, passes
         before = worst
         if passes == MOST_PASSES:
@@ -202,6 +216,11 @@ def least_change(
     """
     if machine.model.row_count > DENSE_ROWS:
         return _sparse_least_change(machine, residual, t, held, metric)
+    length = machine.model.length
+    if length != 1.0:  # rows of very different units
+        gradient = scaled_rows(rows, length)[1]
+        rows = attrs.evolve(rows, value=rows.value / gradient[rows.row])
+        residual = residual / gradient
     D = rows.dense()
     if held is None:
         held = np.zeros(0, dtype=np.int64)
@@ -214,11 +233,15 @@ def least_change(
     if metric == "mass":
         block[:, :, :3] *= scale
         block[:, :, 3:] = np.einsum("mbr,brc->mbc", block[:, :, 3:], frame)
+    else:
+        block[:, :, :3] *= length
     solution: Floats = np.asarray(np.linalg.lstsq(D, residual, rcond=RCOND)[0], dtype=np.float64)
     change = solution.reshape(-1, 6)
     change[held - 1] = 0.0  # rounding
     if metric == "mass":
         change[:] = unscaled(change, scale, frame)
+    else:
+        change[:, :3] *= length
     return solution
 
 
@@ -244,7 +267,8 @@ def _sparse_least_change(
     n = machine.model.body_count
     try:
         if metric == "unit":
-            set_metric(system.metric, np.ones(n), np.tile(np.eye(3), (n, 1, 1)))
+            light = np.full(n, machine.model.length**-2)
+            set_metric(system.metric, light, np.tile(np.eye(3), (n, 1, 1)))
             system.metric[1:, 7:16] = system.body[1:, 3:12]
         if held is not None:
             system.metric[held] = 0.0
@@ -289,6 +313,11 @@ def _velocity_residual(rows: Rows, u: Floats) -> Floats:
     return np.bincount(rows.row, rows.value * v[rows.column], minlength=rows.shape[0]) - rows.nu
 
 
+def fit_of(model: Model) -> float:
+    """What counts as closed, as a part of the scene's length (FIT)."""
+    return FIT * min(1.0, model.size / model.length)
+
+
 def model_size(machine: Machine) -> float:
     """A length of the model, m."""
     return machine.model.size
@@ -308,13 +337,14 @@ def _failure(
     machine: Machine, rows: Rows, passes: int, held: Integers, *, is_far: bool
 ) -> AssemblyError:
     """Why it failed: the joints that are open, the worst first, in lines of at most 80 columns."""
-    model, C = machine.model, rows.C
+    model, C = machine.model, weights_of(machine) * rows.C
+    tolerance = TOLERANCE * model.length
     worst = np.array([_largest(C[a:b]) for a, b in pairwise(model.joint_start)])
-    still_open = [int(k) for k in np.argsort(-worst, kind="stable") if worst[k] > TOLERANCE]
+    still_open = [int(k) for k in np.argsort(-worst, kind="stable") if worst[k] > tolerance]
     types = {int(k): group.keyword for group in model.joints for k in group.members}
     lines = [f"  {'joint':30} {'type':10} {'residual':>9}  rows"]
     for k in still_open[:MOST_JOINTS]:
-        open_rows = np.flatnonzero(np.abs(C[slice(*model.joint_start[k : k + 2])]) > TOLERANCE) + 1
+        open_rows = np.flatnonzero(np.abs(C[slice(*model.joint_start[k : k + 2])]) > tolerance) + 1
         words = ", ".join(map(str, open_rows))
         name = f"{_cut(model.joint_names[k], 30):30} {_cut(types[k], 10):10}"
         lines.append(f"  {name} {worst[k]:9.3g}  {_cut(words, 25)}")
@@ -343,8 +373,9 @@ def _failure(
 
 def _without_gradient(machine: Machine, rows: Rows) -> str:
     """The first open row that no change of the pose affects to first order, in words; else ""."""
-    length = np.bincount(rows.row, rows.value**2, minlength=rows.shape[0]) ** 0.5
-    stuck = np.flatnonzero((np.abs(rows.C) > TOLERANCE) & (length < FLAT))
+    weight, unit = weights_of(machine), machine.model.length
+    length = weight * np.bincount(rows.row, rows.value**2, minlength=rows.shape[0]) ** 0.5
+    stuck = np.flatnonzero((weight * np.abs(rows.C) > TOLERANCE * unit) & (length < FLAT * unit))
     if not len(stuck):
         return ""
     k = int(np.searchsorted(machine.model.joint_start, stuck[0], side="right")) - 1

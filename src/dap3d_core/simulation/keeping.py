@@ -61,6 +61,8 @@ class Keeper:
         self._parts: list[Arrays] = []
         self._bytes = 0
         self._writer: ResultWriter | None = None
+        #: (13 n,) the least and the largest value of each component so far.
+        self.low, self.high = (np.full(compiled.model.u0.size, x) for x in (np.inf, -np.inf))
         self._began = math.inf  # when the first rows came
 
     def take(self, rows: Floats, record: Callable[[], Record]) -> None:
@@ -71,6 +73,9 @@ class Keeper:
         """The same for arrays."""
         self._began = min(self._began, time.perf_counter())
         self.count += len(arrays)
+        if len(arrays):
+            self.low = np.minimum(self.low, np.min(arrays.u, axis=0))
+            self.high = np.maximum(self.high, np.max(arrays.u, axis=0))
         self._bytes += 8 * len(arrays) * arrays.width
         large = self._bytes > LARGE
         if self._writer is None:

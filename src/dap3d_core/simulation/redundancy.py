@@ -7,11 +7,11 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.machine import Machine, Rows
+from dap3d_core.formulations.machine import Machine, Rows, scaled_rows
 from dap3d_core.linear.rank import DENSE_ROWS, WEIGHT, Dependency, Rank, dense_rank, sparse_rank
 from dap3d_core.model import Model
 from dap3d_core.simulation.binding import Binding, bindings
-from dap3d_core.simulation.initial import FIT, finite_rows, model_size
+from dap3d_core.simulation.initial import finite_rows, fit_of
 from dap3d_core.simulation.singular_start import SingularStart, singular_start
 
 Floats = NDArray[np.float64]
@@ -212,16 +212,16 @@ def redundancy_of(machine: Machine, u: Floats, t: float = 0.0) -> Redundancy:
     model = machine.model
     if not model.row_count:
         return Redundancy(Rank(0, 6 * model.body_count, 0, 0.0, "svd"))
-    rows = finite_rows(machine, t, u)
+    rows, gradient = scaled_rows(finite_rows(machine, t, u), model.length)
     rank = rank_of(machine, rows)
     involved = sorted({k for d in rank.dependencies for k, _ in _by_joint(model, d.rows)})
     binding = bindings(machine, rows, u, t) if rank.redundant else ()
     return Redundancy(
         rank,
         tuple(model.joint_names[k] for k in involved),
-        max((float(np.linalg.norm(_gap(d, rows.nu))) for d in rank.dependencies), default=0.0),
+        max((_size(d, rows.nu, gradient) for d in rank.dependencies), default=0.0),
         _groups(model, rank.dependencies),
-        tuple(_contradictions(model, rank.dependencies, rows, u)),
+        tuple(_contradictions(model, rank.dependencies, rows, gradient, u)),
         binding,
         singular_start(machine, u, rank, t) if rank.redundant and not binding else None,
         model,
@@ -230,16 +230,17 @@ def redundancy_of(machine: Machine, u: Floats, t: float = 0.0) -> Redundancy:
 
 
 def rank_of(machine: Machine, rows: Rows) -> Rank:
-    """Rank of the rows that ``machine`` has just evaluated.
+    """Rank of the rows that ``machine`` has just evaluated, scaled (``scaled_rows``).
 
     Singular values below FIT count as zero: joints are put together to no more than that, and an
     opening tilts rows that would depend on each other by as much.
     """
-    model, blur = machine.model, FIT * min(1.0, model_size(machine))
+    model, blur = machine.model, fit_of(machine.model)
     if model.row_count <= DENSE_ROWS:
         return dense_rank(rows.dense(), blur)
-    system = machine.system
-    return sparse_rank(machine.plan, system.D, system.row, 6 * model.body_count, blur)
+    D = machine.system.D.copy()
+    D[machine.pattern[2]] = rows.value
+    return sparse_rank(machine.plan, D, machine.system.row, 6 * model.body_count, blur)
 
 
 def _by_joint(model: Model, rows: Any) -> list[tuple[int, Any]]:
@@ -273,28 +274,36 @@ def _gap(dependency: Dependency, side: Floats) -> Floats:
     return gap
 
 
+def _size(dependency: Dependency, side: Floats, gradient: Floats) -> float:
+    """Length of what no motion can fulfil, in units of the rows."""
+    return float(np.linalg.norm(_gap(dependency, side)) * np.max(gradient[dependency.rows]))
+
+
 def _contradictions(
-    model: Model, dependencies: Sequence[Dependency], rows: Rows, u: Floats
+    model: Model, dependencies: Sequence[Dependency], rows: Rows, gradient: Floats, u: Floats
 ) -> list[Contradiction]:
     """At each level, where the one below leaves it a meaning."""
     found: list[Contradiction] = []
     if not dependencies:
         return found
-    v = u[-rows.shape[1] :]
+    v = u[-rows.shape[1] :] / np.tile(np.repeat([model.length, 1.0], 3), model.body_count)
     off = np.bincount(rows.row, rows.value * v[rows.column], minlength=rows.shape[0]) - rows.nu
     moving_along = float(np.max(np.abs(off))) <= MOVING_ALONG * max(1.0, float(np.max(np.abs(v))))
     for dependency in dependencies:
-        open_ = _judged(model, dependency, rows.C, "position")
-        if open_ and open_.size > 0.5 * np.linalg.norm(rows.C[dependency.rows]):
+        open_ = _judged(model, dependency, rows.C, gradient, "position")
+        gap = np.linalg.norm(_gap(dependency, rows.C))
+        if open_ and gap > 0.5 * np.linalg.norm(rows.C[dependency.rows]):
             found.append(open_)
-        level = _judged(model, dependency, rows.nu, "velocity")
+        level = _judged(model, dependency, rows.nu, gradient, "velocity")
         if not level and moving_along and not open_:
-            level = _judged(model, dependency, rows.gamma, "acceleration")
+            level = _judged(model, dependency, rows.gamma, gradient, "acceleration")
         found += [level] if level else []
     return found
 
 
-def _judged(model: Model, dependency: Dependency, side: Floats, level: str) -> Contradiction | None:
+def _judged(
+    model: Model, dependency: Dependency, side: Floats, gradient: Floats, level: str
+) -> Contradiction | None:
     gap = _gap(dependency, side)
     size, limit = float(np.linalg.norm(gap)), CONSISTENT * max(1.0, float(np.max(np.abs(side))))
     if size <= limit:
@@ -302,4 +311,4 @@ def _judged(model: Model, dependency: Dependency, side: Floats, level: str) -> C
     missed = np.abs(gap @ dependency.combinations)
     chosen = dependency.rows[missed > 0.01 * np.max(missed)]
     names = tuple(model.joint_names[k] for k, _ in _by_joint(model, chosen))
-    return Contradiction(level, names, size)
+    return Contradiction(level, names, _size(dependency, side, gradient))

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+import attrs
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +14,7 @@ from dap3d_core.integrators import METHODS, Integration, Status, make_adams
 from dap3d_core.integrators.integration import Statistics as Counts
 from dap3d_core.integrators.singular import begin_singular
 from dap3d_core.kernels.cache import driver_is_cached
-from dap3d_core.result import Occurrence, Record, Result, ResultError, Statistics
+from dap3d_core.result import INFORMATION, Occurrence, Record, Result, ResultError, Statistics
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.asked import (
     explicit_options,
@@ -40,6 +41,7 @@ from dap3d_core.simulation.second_run import Again, add_error
 from dap3d_core.simulation.singular_start import SingularStart
 from dap3d_core.simulation.standing import Observer, Standing
 from dap3d_core.simulation.start import Start, start_notes
+from dap3d_core.simulation.tolerances import atol_notes, motion_notes, resolved_atol, rounding_notes
 from dap3d_core.simulation.watcher import Watcher
 
 if TYPE_CHECKING:
@@ -75,10 +77,15 @@ class Run:
         self.announce = announce
         self.compiled = compiled
         self.machine = compiled.machine
-        self.settings = settings
+        used = resolved_atol(settings.atol, self.machine)
+        self.settings = attrs.evolve(settings, atol=used)
         self.times = report_times(settings.t_end, settings.dt)
         self.notes = [*compiled.notes, *settings_notes(compiled, settings)]
         self.notes.append(f"method {compiled.method}: {compiled.reason}")
+        if settings.step is None:
+            self.notes += [
+                INFORMATION + note for note in atol_notes(settings.atol, used, self.machine)
+            ]
         self.keeper: Keeper | None = None
         self.saver: Saver | None = None
         #: Whether the run stands between two chunks, and nothing is half done.
@@ -337,6 +344,10 @@ class Run:
                 "accelerations open there, and those reported, with their multipliers, are not "
                 "determined"
             )
+        if self.settings.step is None and self.keeper is not None and self.keeper.count:
+            keeper, model = self.keeper, self.machine.model
+            notes += motion_notes(keeper.low, keeper.high, self.settings)
+            notes += rounding_notes(self.runs, model.body_names)
         notes += event_notes(self.runs, self._events())
         return notes + stiffness_notes(self.runs, self.settings.integrator)
 
@@ -373,6 +384,8 @@ class Run:
                 "dt": self.settings.dt,
                 "rtol": self.settings.rtol,
                 "atol": self.settings.atol,
+                "length": self.machine.model.length,
+                "most_work": max((run.most_work for run in self.runs), default=0.0),
                 "step": self.settings.step,
                 "project": bool(self.settings.project),
                 "correct": bool(self.settings.correct),

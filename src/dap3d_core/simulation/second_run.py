@@ -12,6 +12,7 @@ from dap3d_core.result.estimate import MEANINGLESS
 from dap3d_core.scene import SceneError, Simulation
 from dap3d_core.scene.settings import SMALLEST_RTOL
 from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.tolerances import tighter, words_of
 
 #: The second run's tolerances are those of the first divided by this.
 TIGHTER = 10.0
@@ -31,7 +32,7 @@ def finer(settings: Simulation) -> Simulation | None:
     rtol = float(settings.rtol)
     if rtol / TIGHTER < SMALLEST_RTOL:
         return None
-    return attrs.evolve(settings, rtol=rtol / TIGHTER, atol=float(settings.atol) / TIGHTER)
+    return attrs.evolve(settings, rtol=rtol / TIGHTER, atol=tighter(settings.atol, TIGHTER))
 
 
 def add_error(
@@ -54,14 +55,14 @@ def add_error(
         BaseException: whatever ends the second run from outside (Ctrl-C, an exception of
             ``progress``); it carries the first result as ``.result``.
     """
-    tighter = finer(settings)
-    if tighter is None:
+    finer_settings = finer(settings)
+    if finer_settings is None:
         note = f"its error was not estimated: rtol {settings.rtol:g} cannot be made any tighter"
         _amend(result, output, note)
         return
-    words = _words(tighter)
+    words = _words(finer_settings)
     try:
-        second = again(tighter, _first_step(result, tighter))
+        second = again(finer_settings, _first_step(result, finer_settings))
     except (SimulationError, SceneError) as error:
         _amend(result, output, f"its error was not estimated: in a second run at {words}, {error}")
         return
@@ -96,7 +97,7 @@ def _first_step(result: Result, settings: Simulation) -> float | None:
 def _words(settings: Any) -> str:
     if settings.step is not None:
         return f"steps of {settings.step:g} s"
-    return f"rtol {settings.rtol:g}, atol {settings.atol:g}"
+    return f"rtol {settings.rtol:g}, atol {words_of(settings.atol)}"
 
 
 def _lost(result: Result) -> list[str]:

@@ -25,6 +25,7 @@ from dap3d_core.integrators.work import (
     LAST_REJECTED,
     LIMIT,
     LOOKED,
+    NOISE,
     RHS,
     ROW,
     RUNNING,
@@ -123,6 +124,8 @@ def put_back(points: Points, p: int, work: Work) -> None:
         copy_into(work.switches[k], points.first_switches[k])
     for k in range(work.lengths.shape[0]):
         copy_into(work.lengths[k], points.first_lengths[k])
+    for i in range(work.tolerance.shape[1]):
+        work.tolerance[NOISE, i] = 0.0
     copy_into(work.state[Y], points.y0[p])
 
 

@@ -35,7 +35,7 @@ Integers = NDArray[np.int64]
 
 #: Right-hand sides after which a compiled call comes back, so that Ctrl-C is answered.
 CALL = 200_000
-#: Constants of the metric in which displacements are measured in m and rad.
+#: Constants of the metric in which displacements are measured in m (Model.length) and rad.
 UNIT = np.array([1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
 
 _DRIVE = (Work.type_of(), list_type(STEP_TYPE), System.type_of(), LOOP_LIST, INTEGER)
@@ -100,6 +100,9 @@ class Runs:
         )
         self.stops = np.array(stops, dtype=float).reshape(-1, 2)
         self._metric = machine.system.metric.copy()
+        unit = UNIT.copy()
+        unit[0] = machine.model.length
+        self._unit = unit
         work = self.integration.work
         self.first: dict[str, Any] = {
             "first_real": work.real.copy(),
@@ -138,7 +141,7 @@ class Runs:
             table=np.ascontiguousarray(table, dtype=float),
             y0=np.array(y0, dtype=float),
             metric=self._metric,
-            unit=UNIT,
+            unit=self._unit,
             stops=self.stops,
             starting=self._told,
             rows=np.empty((count * nt, width)),

@@ -12,6 +12,8 @@ from typing import Any
 from dap3d_core.assembly.evaluate import call_kinds, place, place_bodies
 from dap3d_core.assembly.system import (
     ANGLE,
+    EVEN,
+    LENGTH,
     SCRATCH,
     UNSETTLED,
     Floats,
@@ -22,6 +24,7 @@ from dap3d_core.formulations.constraints import (
     correct,
     factorise,
     linearise,
+    linearise_evenly,
     residuals,
     velocity_residuals,
 )
@@ -137,7 +140,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
     As ``correct_initial`` for independent rows. out: see above; OPEN is 1 where positions did not
     close; from STARTING on, as an argument, 1 for each row that has no position level.
     """
-    size, before = out[SIZE], 1e300
+    size, length, before = out[SIZE], system.settings[LENGTH], 1e300
     out[OPEN], out[NEWTON] = 1.0, 0.0
     place(t, y, system, loops)
     worst = residuals(t, system, loops)
@@ -145,8 +148,8 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
     out[C_BEFORE], out[V_BEFORE] = worst, velocity_residuals(system)
     for passes in range(MOST_PASSES + 1):
         worst = residuals(t, system, loops)
-        stands = worst > 0.5 * before and worst <= FIT * min(1.0, size)
-        if worst <= TOLERANCE or stands:
+        stands = worst > 0.5 * before and worst <= FIT * min(length, size)
+        if worst <= TOLERANCE * length or stands:
             out[OPEN] = 0.0
             break
         before = worst
@@ -155,7 +158,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         linearise(t, system, loops)
         factor_positions(system, out[STARTING:])
         correct(system)
-        shorten(system, MOST_SHIFT * size)
+        shorten(system, MOST_SHIFT * size / length)
         move(y, system.metric, system.force)
         place_with_spin(y, system)
         out[NEWTON] += 1.0
@@ -187,7 +190,10 @@ def watch_pivots(t: float, system: System, loops: Any, part: float | None) -> No
     smallest, nodes, K = system.smallest, system.nodes, system.K
     for k in range(smallest.shape[0]):
         smallest[k] = 0.0
-    linearise(t, system, loops)
+    if system.settings[EVEN] != 0.0:
+        linearise_evenly(t, system, loops)
+    else:
+        linearise(t, system, loops)
     factorise(system, part)
     for k in range(nodes.shape[0] - 1):
         size, first, diagonal = nodes[k, 0], nodes[k, 1], nodes[k, 2]

@@ -1,0 +1,205 @@
+"""The same mechanism in other units, far away, or with very unequal masses: the same answers."""
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+
+#: Gravity in the scene of metres, m/s^2.
+GRAVITY = 9.81
+
+
+def parallelogram(length, time=1.0, at=(0.0, 0.0, 0.0)):
+    """A hinged parallelogram of links of one ``length``, whose unit of time is ``time``."""
+    half = 0.5 * length
+    scene = dap.Scene(name="parallelogram")
+    inertia = [length**2 / 600.0, length**2 / 12.0, length**2 / 12.0]
+    speed, p = length / time, [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]
+    for name, x in (("left", 0.0), ("right", length)):
+        scene.add_body(name, mass=1.0, Jp=inertia, r=np.add(at, [x, half, 0.0]).tolist(), p=p,
+                       r_dot=[0.5 * speed, 0.0, 0.0], w=[0.0, 0.0, -1.0 / time])  # fmt: skip
+    scene.add_body("coupler", mass=1.0, Jp=inertia, r=np.add(at, [half, length, 0.0]).tolist(),
+                   r_dot=[speed, 0.0, 0.0])  # fmt: skip
+    for name in ("left", "right", "coupler"):
+        for end, x in (("P", -half), ("Q", half)):
+            scene.add_point(f"{name}_{end}", body=name, sPp=[x, 0.0, 0.0])
+    for name, x in (("left", 0.0), ("right", length)):
+        scene.add_point(f"foot_{name}", body="ground", sPp=np.add(at, [x, 0.0, 0.0]).tolist())
+        scene.add_joint("rev", f"pin_{name}", P_i=f"{name}_P", P_j=f"foot_{name}", a_i=f"{name}.z",
+                        a_j="ground.z")  # fmt: skip
+    for name, end in (("left", "P"), ("right", "Q")):
+        scene.add_joint("rev", f"top_{name}", P_i=f"{name}_Q", P_j=f"coupler_{end}",
+                        a_i=f"{name}.z", a_j="coupler.z")  # fmt: skip
+    gravity = GRAVITY * length / time**2
+    scene.add_force("weight", "weight", gravity=gravity, wgt=[0.0, -1.0, 0.0])
+    return scene
+
+
+@pytest.fixture(scope="module")
+def in_metres():
+    return dap.simulate(parallelogram(1.0), t_end=1.0, dt=0.1)
+
+
+@pytest.mark.parametrize(
+    ("length", "time"), [(1e3, 1.0), (1e-3, 1.0), (1e-6, 1e-3), (1e6, 1e3), (1e-9, 1.0)]
+)
+def test_units_change_neither_verdict_nor_motion(in_metres, length, time):
+    """Rank, shared joints, ledger; motion to what the tolerances allow (rtol 1e-8, some 100 steps,
+    errors that grow tenfold on the way)."""
+    result = dap.simulate(parallelogram(length, time), t_end=time, dt=0.1 * time)
+    ours, theirs = (dap.compile(parallelogram(*s)).redundancy() for s in ((length, time), (1.0,)))
+    assert (ours.rank.rank, ours.joints) == (theirs.rank.rank, theirs.joints)
+    assert not ours.bindings
+    assert not ours.contradictions
+    assert result.method == in_metres.method
+    assert all(entry.ok for entry in result.ledger.values()), result.ledger
+    np.testing.assert_allclose(result.r / length, in_metres.r, atol=1e-5)
+    np.testing.assert_allclose(result.w * time, in_metres.w, atol=1e-5)
+
+
+def test_a_scene_of_ordinary_size_keeps_its_tolerances(in_metres):
+    assert in_metres.settings["atol"] == 1e-10
+    assert dap.simulate(parallelogram(1e3), t_end=0.1).settings["atol"] == {
+        "r": 1e-7, "p": 1e-10, "v": 1e-7, "w": 1e-10
+    }  # fmt: skip
+
+
+def test_the_extent_of_a_scene_does_not_depend_on_where_it_stands():
+    here, there = (dap.compile(parallelogram(1.0, at=at)).model for at in ((0, 0, 0), (1e6, 0, 0)))
+    assert there.extent == pytest.approx(here.extent, rel=1e-9)
+
+
+def seismometer(amplitude):
+    scene = dap.Scene(name="seismometer")
+    scene.add_body("m", mass=1.0, Jp=[0.1, 0.1, 0.1], r=[1.0 + amplitude, 0.0, 0.0])
+    scene.add_force("ptp", "s", P_i="m.O", P_j="ground.O", k=(2.0 * np.pi) ** 2, l0=1.0)
+    return scene
+
+
+def test_a_motion_below_the_tolerances_is_told_and_resolved_by_others():
+    """x - 1 = A cos(2 pi t), A = 1 nm. The spring's length is known to 2e-16 m, some 1e-7 of A,
+    which adds up along 20 periods."""
+    coarse = dap.simulate(seismometer(1e-9), t_end=2.0)
+    assert any("hardly resolved" in note for note in coarse.notes)
+    assert not any("hardly resolved" in n for n in dap.simulate(seismometer(0.1), t_end=2.0).notes)
+    fine = dap.simulate(seismometer(1e-9), t_end=2.0, rtol=1e-13, atol={"r": 1e-16, "v": 1e-15})
+    wanted = 1e-9 * np.cos(2.0 * np.pi * fine.t)
+    np.testing.assert_allclose(fine.r[:, 0, 0] - 1.0, wanted, atol=2e-11)
+
+
+def test_atol_by_quantity_is_the_same_as_one_number(in_metres):
+    """A table of equal tolerances gives the same bits as the number; what is left out is usual."""
+    scene, each = parallelogram(1.0), dict.fromkeys("rpvw", 1e-7)
+    one, four, some = (
+        dap.simulate(scene, t_end=0.5, atol=atol) for atol in (1e-7, each, {"w": 1e-9})
+    )
+    assert np.array_equal(one.u, four.u)
+    assert some.settings["atol"] == dict.fromkeys("rpv", 1e-10) | {"w": 1e-9}
+
+
+def thin_rod(inertia):
+    """A rod on a ball joint, let go level, that swings about the vertical as well."""
+    scene = dap.Scene(name="rod")
+    scene.add_body("rod", mass=1.0, Jp=[inertia, 1.0 / 12.0, 1.0 / 12.0], r=[0.5, 0.0, 0.0],
+                   p=[np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0], r_dot=[0.0, 1.0, -0.5],
+                   w=[0.0, 1.0, 2.0])  # fmt: skip
+    scene.add_point("end", body="rod", sPp=[-0.5, 0.0, 0.0])
+    scene.add_joint("sph", "A", P_i="end", P_j="ground.O")
+    scene.add_force("weight", "weight")
+    return scene
+
+
+@pytest.mark.parametrize(("integrator", "factor"), [("dop853", 3), ("adams", 6)])
+def test_rounding_over_a_small_inertia_does_not_drive_the_steps(integrator, factor):
+    """Steps of a rod of 1e-12 kg m^2 about its axis are nearly those of 1e-7, whose motion is the
+    same but for that part, 1e-6 of 1/12; the high differences of adams have more of the noise.
+    Without a remedy they are a thousand times as many."""
+    thin, thick = (dap.simulate(thin_rod(J), t_end=2.0, integrator=integrator)
+                   for J in (1e-12, 1e-7))  # fmt: skip
+    assert thin.stats.steps < factor * thick.stats.steps
+    assert thin.ledger["energy"].ok
+    np.testing.assert_allclose(thin.r, thick.r, atol=1e-5)
+
+
+def test_two_bodies_far_from_the_origin():
+    """Their relative motion is that near the origin, to what rounding of 1.5e-8 m leaves: each of
+    some hundred steps adds k h^2 / m times that to it, and the spring multiplies it tenfold."""
+
+    def scene(x):
+        found = dap.Scene(name="pair")
+        found.add_body("a", mass=1.0, Jp=[0.1, 0.1, 0.1], r=[x, 0.0, 0.0])
+        found.add_body("b", mass=2.0, Jp=[0.1, 0.1, 0.1], r=[x + 1.25, 0.0, 0.0],
+                       r_dot=[0.0, 2.0, 0.0])  # fmt: skip
+        found.add_force("ptp", "s", P_i="a.O", P_j="b.O", k=100.0, l0=1.0)
+        return found
+
+    near, far = (dap.simulate(scene(x), t_end=5.0, dt=0.1) for x in (0.0, 1e8))
+    assert far.stats.rhs < 5 * near.stats.rhs
+    assert any("limited by rounding" in note for note in far.notes)
+    apart = [result.r[:, 1] - result.r[:, 0] for result in (near, far)]
+    np.testing.assert_allclose(apart[0], apart[1], atol=1e-4)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "adams"])
+def test_a_light_cart_under_a_heavy_bob_is_not_singular(integrator):
+    """The bob on a massless rod under a cart of no mass falls straight down below it: a cart that
+    gives way to it along the track keeps its kinetic and potential energy."""
+    scene = dap.Scene(name="cart")
+    scene.add_body("cart", mass=1e-6, Jp=[1e-6, 1e-6, 1e-6])
+    scene.add_body("bob", mass=1.0, Jp=[1.0, 1.0, 1.0], r=[1.0, 0.0, 0.0])
+    scene.add_joint("tran", "track", P_i="cart.O", P_j="ground.O", a_j="ground.x")
+    scene.add_joint("sph-sph", "pole", P_i="cart.O", P_j="bob.O")
+    scene.add_force("weight", "weight")
+    result = dap.simulate(scene, t_end=1.0, dt=0.01, integrator=integrator)
+    assert result.status == "done"
+    assert all(entry.ok for entry in result.ledger.values())
+
+
+def test_a_rod_held_still_is_right_at_any_height():
+    """Neither the zero of the potential nor rounding makes a fault of a scene that cannot move."""
+    for z in (0.0, 1.0, 1e3):
+        scene = dap.Scene(name="held")
+        scene.add_body("rod", mass=1.0, Jp=[0.1, 0.1, 0.05], r=[0.5, 0.0, z])
+        scene.add_point("A", body="rod", sPp=[-0.5, 0.0, 0.0])
+        scene.add_point("G", body="ground", sPp=[0.0, 0.0, z])
+        scene.add_vector("axis", body="rod", sp=[0.0, 1.0, 0.0])
+        scene.add_force("weight", "weight")
+        scene.add_joint("rev", "hinge", P_i="A", P_j="G", a_i="axis", a_j="ground.y")
+        scene.add_joint("rel-rot", "lock", body_i="rod", a_j="ground.y")
+        ledger = dap.simulate(scene, t_end=0.2, dt=0.02).ledger
+        assert all(entry.ok for entry in ledger.values()), (z, ledger["energy"])
+
+
+@pytest.mark.parametrize("duration", [0.03, 1e-6])
+def test_work_between_two_reports_is_a_scale_of_the_energy(duration):
+    """An arm that a driver turns by one radian between two reports, at rest at both."""
+    scene = dap.Scene(name="pulse")
+    scene.add_body("arm", mass=1.0, Jp=[0.1, 0.1, 0.1])
+    scene.add_joint("rev", "pin", P_i="arm.O", P_j="ground.O", a_i="arm.z", a_j="ground.z")
+    scene.add_function("step", "move", x_start=0.5123, x_end=0.5123 + duration, f_start=0.0,
+                       f_end=-1.0)  # fmt: skip
+    scene.add_joint("rel-rot", "motor", body_i="arm", body_j="ground", a_j="ground.z",
+                    function="move")  # fmt: skip
+    entry = dap.simulate(scene, t_end=1.0, dt=0.1).ledger["energy"]
+    assert entry.ok, entry
+
+
+def test_fixed_steps_that_are_too_long_are_not_called_right():
+    """rk4 at 20 steps a period keeps the energy of a swing; at 4 it loses a part of it."""
+    scene = dap.Scene(name="swing")
+    scene.add_body("m", mass=1.0, Jp=[0.1, 0.1, 0.1], r=[1.5, 0.0, 0.0])
+    scene.add_force("ptp", "s", P_i="m.O", P_j="ground.O", k=(2.0 * np.pi) ** 2, l0=1.0)
+    for step, right in ((0.01, True), (0.25, False)):
+        result = dap.simulate(scene, t_end=5.0, dt=0.5, integrator="rk4", step=step)
+        assert result.ledger["energy"].ok is right, result.ledger["energy"]
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "dopri5", "auto"])
+def test_an_undamped_oscillation_is_not_stiff(integrator):
+    """Two atoms on a spring of 1e6 N/m: nothing in them dies away."""
+    scene = dap.Scene(name="molecule")
+    for name, x in (("a", 0.0), ("b", 1.01)):
+        scene.add_body(name, mass=1.0, Jp=[0.1, 0.1, 0.1], r=[x, 0.0, 0.0])
+    scene.add_force("ptp", "bond", P_i="a.O", P_j="b.O", k=1e6, l0=1.0)
+    result = dap.simulate(scene, t_end=1.0, dt=0.1, integrator=integrator)
+    assert not any("stiff" in note or "radau" in note for note in result.notes), result.notes
