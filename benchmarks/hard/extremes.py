@@ -23,7 +23,6 @@ ROUNDED = (
     "rounding of w^2 = 1e10 rad/s^2 in a step of 1e-5 s is 1e-11 rad/s, and 1e-13 is asked for: "
     "steps shrink, 20 s do not suffice"
 )
-NO_SWITCH = "refuses scenes in which a law changes: it does not locate where"
 
 
 def _spun(result):
@@ -75,7 +74,7 @@ def _flat(lean, floor):
         partial(scenes.flat_disk, lean), 10.0 * turn, turn / 20.0, partial(_leaning, lean),
         "e of the axis' horizontal part and the height, as parts of the lean; 200 instants",
         "steady rolling: Omega^2 = m g R / (J_t sin a)",
-        (*EXPLICIT, Try("adams", why=NO_SWITCH)), "tests/verification/test_disk.py", floor=floor,
+        EXPLICIT, "tests/verification/test_disk.py", floor=floor,
     )  # fmt: skip
 
 
@@ -103,7 +102,7 @@ EXTREMES = (
         scenes.bounces, 3.854, 0.01, _bounces,
         "e of the instants of all touches and leavings",
         "parabolas and damped sines, joined at each touch",
-        (*EXPLICIT, Try("adams", why=NO_SWITCH)), HERE,
+        EXPLICIT, HERE,
         loose=1e4,  # a late instant has the errors of all the contacts before
     ),
     Case(

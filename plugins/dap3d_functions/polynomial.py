@@ -8,7 +8,7 @@ interface_version = 1
 class Polynomial(Function):
     """f = c1 + c2 x + c3 x^2, for every x (manual: type ``a``; spec 7)."""
 
-    keyword = "a"
+    keyword, smooth = "a", True
     coeff: tuple = vec3(doc="c1, c2, c3")
 
     def value(x, coeff):

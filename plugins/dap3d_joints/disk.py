@@ -28,8 +28,9 @@ class Disk(Joint):
         J     = [u^T, (s x u)^T], for row z u = k
         gamma = -u . (w x s_dot) - u_dot . v_c
 
-    lambda of row z is the load that the ground carries; where it is negative the ground pulls, and
-    a real disk would lift off. Friction acts along the free directions of v_c, mu max(lambda_z, 0).
+    lambda of row z is the load that the ground carries; where it is negative the ground pulls: a
+    real disk would lift off, and the run gets a note. Friction acts along the free directions of
+    v_c, mu max(lambda_z, 0).
     """
 
     keyword, rows, holonomic = "disk", 3, (False, False, True)
@@ -37,6 +38,8 @@ class Disk(Joint):
         "the disk lies down (sine of the angle between disk and ground below its `lying`), "
         "so its point of contact is undefined"
     )
+    unilateral = (2,)
+    unilateral_words = "the ground pulls the disk down, which would lift off"
     body_i: Body = body(doc="the disk; its origin is the centre, its y axis the disk's axis")
     slip: str = choice(
         ("z", "nz", "tz", "xyz"),
@@ -83,7 +86,7 @@ class Disk(Joint):
 class Sliding(Disk, slip="z"):
     """The disk touches the ground and slides freely: row z."""
 
-    rows, holonomic = 1, True
+    rows, holonomic, unilateral = 1, True, (0,)
 
     def J(A_i, radius):
         _, _, s = contact(A_i, radius)
@@ -103,7 +106,7 @@ class Sliding(Disk, slip="z"):
 class NoLateralSlip(Disk, slip="nz"):
     """The disk slides along its track alone: rows z and n."""
 
-    rows, holonomic = 2, (True, False)
+    rows, holonomic, unilateral = 2, (True, False), (0,)
 
     def J(A_i, radius):
         _, n, s = contact(A_i, radius)
@@ -125,7 +128,7 @@ class NoLateralSlip(Disk, slip="nz"):
 class NoLongitudinalSlip(Disk, slip="tz"):
     """The disk rolls along its track and slides across it: rows z and t."""
 
-    rows, holonomic = 2, (True, False)
+    rows, holonomic, unilateral = 2, (True, False), (0,)
 
     def J(A_i, radius):
         t, _, s = contact(A_i, radius)

@@ -71,6 +71,42 @@ def test_a_number_that_comes_and_goes_within_a_step(compiled):
     assert [e.t for e in result.events] == pytest.approx([0.3 - root, 0.3 + root], abs=1e-13)
 
 
+@pytest.mark.parametrize("frequency", [2.0, 50.0])
+@pytest.mark.parametrize("settings", [{}, {"direction": 1}, {"every": 1e-3}])
+def test_every_change_of_sign_of_a_fast_function_is_found(compiled, frequency, settings):
+    """Free flight is five steps; the function swings tens of times in one."""
+    w = 2.0 * np.pi * frequency
+
+    def wave(t, state):
+        return np.sin(w * t + 0.3)
+
+    events = [dap.Event(wave, **settings)]
+    result = dap.simulate(compiled, t_end=1.0, dt=1.0, events=events)
+    roots = (np.pi * np.arange(1, 2 * frequency + 1) - 0.3) / w
+    roots = roots[1::2] if settings.get("direction") else roots
+    assert [e.t for e in result.events] == pytest.approx(roots[roots < 1.0], abs=1e-14)
+    assert not any("too fast" in note for note in result.notes)
+
+
+def test_what_is_too_fast_to_be_followed_is_noted(compiled):
+    """It nears its level ever faster; a jump that stays on one side is followed, and is cheap."""
+    calls = []
+
+    def chirp(t, state):
+        return 1.5 + np.sin(1e6 * t * t)
+
+    def jump(t, state):
+        calls.append(t)
+        return 1.0 if t < 0.37 else 0.5
+
+    result = dap.simulate(compiled, t_end=1.0, events=[dap.Event(chirp, name="chirp")])
+    (note,) = [n for n in result.notes if "too fast" in n]
+    assert note.startswith("event chirp: from t = 0.0")
+    result = dap.simulate(compiled, t_end=1.0, events=[dap.Event(jump)])
+    assert not any("too fast" in n for n in result.notes)
+    assert len(calls) < 1000
+
+
 def test_an_event_changes_a_force_for_this_run_alone(compiled):
     """A stiff spring is switched on at x = 0.4: energy then says how much it did."""
 
@@ -131,6 +167,7 @@ def test_events_that_make_no_sense(compiled):
         ({"below": 1.0, "direction": 1}, "direction of its own"),
         ({"direction": 2}, "should be -1, 0 or 1"),
         ({"action": "halt"}, "'stop', 'record' or a function"),
+        ({"every": 0.0}, "positive number of seconds"),
     ):
         with pytest.raises(ValueError, match=words):
             dap.Event("stone.r.z", **given)

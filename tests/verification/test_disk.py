@@ -151,3 +151,23 @@ def test_a_disk_that_falls_over_ends_the_run():
     assert np.linalg.norm(result.w[:, 0], axis=1) == pytest.approx(
         np.sqrt(np.maximum(square, 0.0)), abs=1e-6
     )  # at rest the root turns 1e-13 of sine into 1e-6
+
+
+@pytest.mark.parametrize("slip", ["z", "xyz", "nz"])
+def test_a_disk_that_the_ground_pulls_down_is_noted(slip):
+    """A spring to a heavy body that rises at 1 m/s lifts by 10 t N: m g from t = 1.962 s on."""
+    scene = disk(slip)
+    del scene.forces["gravity"]
+    scene.add_force("f", "load", body_i="coin", f=(0.0, 0.0, -MASS * G))
+    scene.add_body("bird", mass=1e9, Jp=(1.0, 1.0, 1.0), r=(0, 0, 9.0), r_dot=(0.0, 0.0, 1.0))
+    scene.add_force("ptp", "lift", P_i="coin.O", P_j="bird.O", k=10.0, l0=9.0 - RADIUS)
+    result = dap.simulate(scene, t_end=3.0, dt=0.1)
+    (note,) = [n for n in result.notes if "multiplier is negative" in n]
+    assert note.startswith("joint ground contact (disk")
+    assert "from t = 2 s on" in note  # the first report after 1.962 s
+    assert f"at least {MASS * G - 30.0:.6g}, at t = 3 s" in note
+    assert "the ground pulls the disk down" in note
+    carried = dap.simulate(scene, t_end=1.9, dt=0.1)
+    assert not any("multiplier" in n for n in carried.notes)
+    swept = dap.sweep(scene, {"forces.lift.k": [1.0, 10.0]}, outputs=["coin.r.z"], t_end=3.0)
+    assert ["multiplier is negative" in str(n) for n in swept["note"].values] == [False, True]

@@ -25,17 +25,26 @@ FORCES, JOINTS, PIECES = range(3)
 
 #: The order of the group loops in the list: all loops of one kind stand together.
 KINDS = (
-    "value", "wrench", "energy", "acceleration", "position", "friction", "angle", "switch"
+    "value", "wrench", "energy", "acceleration", "position", "friction", "angle", "turned",
+    "switch", "knot"
 )  # fmt: skip
-VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, SWITCH = range(len(KINDS))
+(
+    VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, TURNED, SWITCH, KNOT
+) = range(len(KINDS))  # fmt: skip
+
+# What a switch does where it becomes negative, or changes its sign: the run ends; the integration
+# begins anew; the same, and nobody is told.
+ENDS, BEGINS, UNSEEN = 1, 0, -1
 
 # Places in ``settings``: projection tolerances of position and velocity, a scratch number, how
 # often the multipliers did not settle with friction, the numbers of the penalty formulation, how
 # often a pose was singular where something was reported, the length that tolerances speak of
-# (Model.length), 1.0 where pivots are those of equal masses.
+# (Model.length), 1.0 where pivots are those of equal masses, and how often the turns of an angle
+# were in doubt.
 (
-    TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SINGULAR, LENGTH, EVEN, SETTINGS
-) = range(11)  # fmt: skip
+    TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SINGULAR, LENGTH, EVEN,
+    DOUBTFUL, SETTINGS
+) = range(12)  # fmt: skip
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
@@ -102,7 +111,7 @@ class System(LoopArrays):
 
 
 #: What a run changes and goes on from: ``par`` holds the turns of angles and the numbers that an
-#: event has set, ``settings`` a count. All else is constant, found at the start of a run
+#: event has set, ``settings`` counts. All else is constant, found at the start of a run
 #: (``smallest``), or scratch: a right-hand side, projection, report or stage writes what it reads,
 #: factors too. A projection may use those of the right-hand side before it: both are of one step.
 #: No iteration begins with what another left, so that equal states have equal rates.

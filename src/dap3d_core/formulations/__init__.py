@@ -6,7 +6,7 @@ from typing import Any
 from dap3d_core.assembly.system import step_functions
 
 #: Group loops of every formulation, and those of joints; each is there where the scene needs it.
-_ALL = ("value", "wrench", "energy", "angle", "switch")
+_ALL = ("value", "wrench", "energy", "angle", "turned", "switch", "knot")
 _WITH_JOINTS = (*_ALL, "acceleration", "position", "friction")
 
 #: Formulation -> the kinds of group loops that it calls.

@@ -87,7 +87,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         weight=np.ones(plan.row_size),
         smallest=np.zeros(plan.row_size),
         settings=np.array(
-            [1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model)]
+            [1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model), 0.0]
         ),
         friction=np.zeros(12 * (n + 1) + 3 * plan.row_size if model.friction else 0),
         idx=idx,

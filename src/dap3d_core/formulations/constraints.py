@@ -28,6 +28,7 @@ from dap3d_core.assembly.system import (
     SCRATCH,
     TOLERANCE_C,
     TOLERANCE_V,
+    TURNED,
     VALUE,
     WRENCH,
     Floats,
@@ -282,9 +283,10 @@ def project_velocities(
 
 @compiled_inside
 def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
-    """Energy and residuals into the last four of out, with the accelerations in ``force``.
+    """Angles, energy and residuals into the end of out, with the accelerations in ``force``.
 
-    That is the potential energy and the largest residuals of position, velocity and acceleration.
+    The last four are the potential energy and the largest residuals of position, velocity and
+    acceleration; before them stand the angles whose turns are counted.
     """
     value = system.settings[SCRATCH : SCRATCH + 1]
     last = out.shape[0] - 4
@@ -294,6 +296,9 @@ def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
     value[0] = 0.0
     call_kinds(ENERGY, ENERGY, t, system, loops, value, value, value)
     out[last] = value[0]
+    value[0] = 0.0
+    angles = out[6 * (system.body.shape[0] - 1) + system.row.shape[0] :]
+    call_kinds(TURNED, TURNED, t, system, loops, angles, value, value)
 
 
 @compiled_inside

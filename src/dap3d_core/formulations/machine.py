@@ -13,11 +13,15 @@ from dap3d_core.assembly.system import (
     ACCELERATION,
     ALPHA,
     ANGLE,
+    BEGINS,
+    DOUBTFUL,
+    ENDS,
     EVEN,
     MU,
     OMEGA,
     POSITION,
     SINGULAR,
+    UNSEEN,
     UNSETTLED,
     VALUE,
     WRENCH,
@@ -27,79 +31,30 @@ from dap3d_core.assembly.system import (
 )
 from dap3d_core.formulations import IN_HALVES, LOOPS, REPORT, RHS, functions_of
 from dap3d_core.formulations.build import build_loops, build_system, load_numbers
+from dap3d_core.formulations.rows import Rows, scaled_rows
+from dap3d_core.interface.binding import is_knots
+from dap3d_core.interface.layout import ANGLE_WIDTH
 from dap3d_core.linear.blocks import LESS, POOR
 from dap3d_core.linear.plan import Plan, make_plan
 from dap3d_core.model import Group, Model
 from dap3d_core.model.kinematics import split, to_body, to_global, to_integrated
-
-
-@attrs.frozen
-class Rows:
-    """The constraint rows of a model at one state, in the order of the model.
-
-    Attributes:
-        C: (rows,) position-level residuals, zero where a row has none.
-        nu, gamma: (rows,) right-hand sides of the velocity and acceleration level.
-        row, column, value: the Jacobian's entries, (rows, 6 n), in no particular order.
-    """
-
-    C: Floats
-    nu: Floats
-    gamma: Floats
-    row: Integers
-    column: Integers
-    value: Floats
-    shape: tuple[int, int]
-
-    def dense(self) -> Floats:
-        """The Jacobian D (rows, 6 n)."""
-        D = np.zeros(self.shape)
-        D[self.row, self.column] = self.value
-        return D
-
-    def sparse(self) -> Any:
-        """The Jacobian D (rows, 6 n) as a scipy CSR array."""
-        from scipy.sparse import csr_array
-
-        return csr_array((self.value, (self.row, self.column)), shape=self.shape)
-
-
-def scaled_rows(rows: Rows, length: float) -> tuple[Rows, Floats]:
-    """Rows whose gradients have unit length, of displacements in units of a length, m; and lengths.
-
-    Neither depends on the units of the scene. A row without gradient stays as it is.
-
-    Args:
-        rows: those of a model.
-        length: a length of the scene, m.
-
-    Returns:
-        the rows, whose columns belong to (r / length, rotation in rad), and (rows,) the lengths of
-        their gradients before.
-    """
-    value = np.where(rows.column % 6 < 3, length, 1.0) * rows.value
-    gradient = np.sqrt(np.bincount(rows.row, value**2, minlength=rows.shape[0]))
-    gradient[gradient == 0.0] = 1.0
-    return attrs.evolve(
-        rows,
-        C=rows.C / gradient,
-        nu=rows.nu / gradient,
-        gamma=rows.gamma / gradient,
-        value=value / gradient[rows.row],
-    ), gradient
+from dap3d_core.model.knots import narrowest
 
 
 @attrs.frozen(eq=False)
 class Switch:
-    """One number whose sign an element watches.
+    """One number whose sign is watched.
 
     Attributes:
         group, place: whose it is: an instance of a group.
+        kind: "switch": the element's own; "knot": the distance of an argument from where the
+            function that the element is given takes another form.
         is_one_of_several, part: where the kernel gives a tuple, which of its numbers.
     """
 
     group: Group
     place: int
+    kind: str
     is_one_of_several: bool
     part: int
 
@@ -107,7 +62,17 @@ class Switch:
     def words(self) -> str:
         """Why the run ends where it becomes negative; "" where it starts anew there."""
         type_: Any = self.group.examined.type
-        return str(type_.switch_words)
+        return str(type_.switch_words) if self.kind == "switch" else ""
+
+    @property
+    def band(self) -> float:
+        """How far beyond a knot an argument may be until it is said to have passed it."""
+        if self.kind == "switch":
+            return 0.0
+        row, numbers = self.group.numbers[self.place], self.group.examined.layout.numbers
+        own = [place for name, place in numbers.items() if is_knots(name)]
+        knots = [row[at : at + count] for at, (count,) in own]
+        return NEAR_KNOT * min(map(narrowest, knots))
 
     def name(self, model: Model) -> str:
         """The element's name; with the number's place, from 1, where there are several."""
@@ -117,6 +82,8 @@ class Switch:
         return f"{name} [{self.part + 1}]" if self.is_one_of_several else name
 
 
+#: The part of the narrowest range between two knots that counts as at the knot.
+NEAR_KNOT = 1e-6
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
 AS_COMPILED = np.errstate(all="ignore")
 #: A row whose pivot is below this many times what regularises it depends on other rows.
@@ -151,7 +118,7 @@ class Machine:
         self.system: System = build_system(model, self.plan, self.what)
         self.start_functions()
         self._weigh_rows()
-        self.report_size = 6 * model.body_count + model.row_count + 4
+        self.report_size = 6 * model.body_count + model.row_count + model.angle_count + 4
         self.length_count = len(self.plan.nodes) - 1
 
     @property
@@ -164,17 +131,18 @@ class Machine:
     def switches(self) -> tuple[Switch, ...]:
         """The switches of the model's elements, in the order in which ``watch`` gives them."""
         return tuple(
-            Switch(group, k, len(group.examined.outputs["switch"]) > 1, part)
+            Switch(group, k, kind, len(group.examined.outputs[kind]) > 1, part)
             for kind, group in self.what
-            if kind == "switch"
+            if kind in ("switch", "knot")
             for k in range(group.count)
-            for part in range(len(group.examined.outputs["switch"]))
+            for part in range(len(group.examined.outputs[kind]))
         )
 
     @property
-    def ending(self) -> Any:
-        """(switches,) whether each ends the run where it becomes negative."""
-        return np.array([bool(s.words) for s in self.switches], dtype=bool)
+    def ending(self) -> Floats:
+        """(2, switches) what each does, and its band, as an integration takes it."""
+        does = [ENDS if s.words else UNSEEN if s.kind == "knot" else BEGINS for s in self.switches]
+        return np.array([does, [s.band for s in self.switches]], dtype=float).reshape(2, -1)
 
     @property
     def unsettled(self) -> int:
@@ -186,6 +154,11 @@ class Machine:
         """How often since the start a pose was singular where something was reported."""
         return int(self.system.settings[SINGULAR])
 
+    @property
+    def doubtful_turns(self) -> int:
+        """How often since the start a step was too long to count the turns of an angle safely."""
+        return int(self.system.settings[DOUBTFUL])
+
     def load(self, model: Model) -> None:
         """Evaluate another model of the same structure from here on; nothing is compiled.
 
@@ -194,6 +167,7 @@ class Machine:
         """
         self.what = load_numbers(self.system, self.model, model, self.what)
         self.model = model
+        self.__dict__.pop("switches", None)  # they name groups
         self.start_functions()
         self._weigh_rows()
 
@@ -204,7 +178,7 @@ class Machine:
             self.system.par[places] = 0.0
         self._place(t, u)
         s = self.system
-        s.settings[[UNSETTLED, SINGULAR]] = 0.0
+        s.settings[[UNSETTLED, SINGULAR, DOUBTFUL]] = 0.0
         self._call(ANGLE, t, s.force, s.force, s.force)
 
     def turn_places(self) -> Iterator[slice]:
@@ -213,7 +187,8 @@ class Machine:
             if kind == "angle":
                 p0, width = int(self.system.groups[q, 1]), group.examined.layout.par_width
                 for offset in group.examined.layout.angles.values():
-                    yield slice(p0 + offset, p0 + width * group.count, width)
+                    for k in range(offset, offset + ANGLE_WIDTH):
+                        yield slice(p0 + k, p0 + width * group.count, width)
 
     @AS_COMPILED
     def start_functions(self, t: float = 0.0) -> None:
@@ -287,7 +262,8 @@ class Machine:
     def report(self, t: float, u: ArrayLike) -> Floats:
         """What a run reports at a state, (report_size,).
 
-        v_dot, lambda, potential energy and the largest residuals of the three levels.
+        v_dot, lambda, angles whose turns are counted, potential energy and the largest residuals of
+        the three levels.
         """
         out = np.zeros(self.report_size)
         self.functions[REPORT](float(t), self.integrated(u), out, self.system, self.loops)
@@ -404,4 +380,4 @@ class Machine:
         return row, column, place
 
 
-__all__ = ["Machine", "Rows", "scaled_rows"]
+__all__ = ["Machine"]

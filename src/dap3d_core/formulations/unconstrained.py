@@ -13,7 +13,15 @@ from dap3d_core.assembly.evaluate import (
     scale_forces,
     zero,
 )
-from dap3d_core.assembly.system import ENERGY, VALUE, WRENCH, Floats, System
+from dap3d_core.assembly.system import (
+    ENERGY,
+    SCRATCH,
+    TURNED,
+    VALUE,
+    WRENCH,
+    Floats,
+    System,
+)
 from dap3d_core.formulations.moves import normalise
 from dap3d_core.kernels.cache import compiled, compiled_inside
 
@@ -45,12 +53,14 @@ def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> Non
 
 @compiled
 def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """v_dot (6 n, global axes), potential energy, and zeros for the three levels of constraints."""
-    value = system.settings[2:3]
-    last = 6 * (system.body.shape[0] - 1)
+    """v_dot (6 n, global axes), angles, potential energy, zeros for the levels of constraints."""
+    value = system.settings[SCRATCH : SCRATCH + 1]
+    last = out.shape[0] - 4
     accelerate(t, y, system, loops)
     global_accelerations(system.metric, system.force, out)
     value[0] = 0.0
     call_kinds(ENERGY, ENERGY, t, system, loops, value, value, value)
     out[last] = value[0]
-    out[last + 1] = out[last + 2] = out[last + 3] = 0.0
+    out[last + 1] = out[last + 2] = out[last + 3] = value[0] = 0.0
+    angles = out[6 * (system.body.shape[0] - 1) :]
+    call_kinds(TURNED, TURNED, t, system, loops, angles, value, value)

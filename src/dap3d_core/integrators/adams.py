@@ -34,15 +34,23 @@ from dap3d_core.integrators.adams_formulas import (
     interpolate,
     predict,
 )
-from dap3d_core.integrators.combination import all_finite, scaled_largest
-from dap3d_core.integrators.control import LARGEST, STRETCH, first_step, step_floor
+from dap3d_core.integrators.combination import all_finite, scaled_beyond, scaled_largest
+from dap3d_core.integrators.control import (
+    EPSILON,
+    LARGEST,
+    STRETCH,
+    first_step,
+    step_floor,
+)
 from dap3d_core.integrators.method import Floats
 from dap3d_core.integrators.reporting import may_step, project_state
 from dap3d_core.integrators.rounding import note_failure, watch_rounding
+from dap3d_core.integrators.switches import end_is_across, next_length, sample, settle
 from dap3d_core.integrators.work import (
     ERROR_SIZE,
     FRESH,
     LIMIT,
+    LONGEST,
     NEXT,
     NOT_FINITE,
     OTHER,
@@ -55,6 +63,7 @@ from dap3d_core.integrators.work import (
     STATUS,
     STEP_FLOOR,
     STEPS,
+    SWITCHES,
     T_STOP,
     TRIAL,
     WATCHED,
@@ -78,11 +87,11 @@ def advance_adams(
     """Go on as ``runge_kutta.advance`` does; functions and budget as there."""
     rhs, project, report = functions[0], functions[1], functions[2]
     real, integer = work.real, work.integer
+    watch = functions[4] if integer[SWITCHES] != 0 else rhs
     limit = integer[RHS] + budget
     while may_step(work, state_at, limit, project, report, system, loops):
-        steps, rejected = integer[STEPS], integer[REJECTED]
-        h = real[H]
-        step(work, rhs, project, system, loops)
+        steps, rejected, h = integer[STEPS], integer[REJECTED], real[H]
+        step(work, rhs, project, watch, system, loops)
         watch_rounding(work, work.differences[0], h, rejected, rhs, system, loops)
         if integer[WATCHED] != 0 and integer[STEPS] > steps:
             functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
@@ -110,15 +119,17 @@ def begin(work: AdamsWork, rhs: Function, system: Any, loops: Any) -> None:
         real[H] = first_step(
             real, integer, times, y, f, scratch, work.tolerance, rhs, system, loops
         )
-        for i in range(y.size):
-            f[1, i] = 0.0
+    for i in range(y.size):
+        f[1, i] = 0.0
     for j in range(ROWS):
         work.table[PSI, j] = j * real[H]
     integer[ORDER_NOW], integer[STARTING], integer[EQUAL] = 1, 1, 0
 
 
 @compiled_inside
-def step(work: AdamsWork, rhs: Function, project: Function, system: Any, loops: Any) -> None:
+def step(
+    work: AdamsWork, rhs: Function, project: Function, watch: Function, system: Any, loops: Any
+) -> None:
     """Try one step: accept it, reject it, or stop the run."""
     real, integer, times = work.real, work.integer, work.times
     if integer[FRESH] == 0:
@@ -126,11 +137,20 @@ def step(work: AdamsWork, rhs: Function, project: Function, system: Any, loops: 
         if integer[STATUS] != RUNNING:
             return
     t, t_end, k = real[T], times[-1], integer[ORDER_NOW]
-    t1 = min(t_end if t + STRETCH * real[H] >= t_end else t + real[H], real[LIMIT])
+    h = min(real[H], real[LONGEST])
+    end = t_end if t + STRETCH * h >= t_end else t + h
+    t1 = min(end, real[LIMIT])
     h = t1 - t
+    if integer[SWITCHES] != 0:
+        h = min(h, next_length(work, end, work.differences[0], project, watch, system, loops))
+        if h == 0.0:
+            return
+        t1 = t1 if h == t1 - t else t + h
     coefficients(work, h, k)
     predict(work, h, k)
     trial, table = work.state[TRIAL], work.table
+    if integer[SWITCHES] != 0 and sample(work, t1, trial, watch, system, loops):
+        return
     rates, change = work.scaled[ROWS - 1], work.state[SCRATCH]
     integer[RHS] += 1
     rhs(t1, trial, rates, system, loops)
@@ -139,13 +159,20 @@ def step(work: AdamsWork, rhs: Function, project: Function, system: Any, loops: 
     sizes = differences_at(work, k, h)
     error = h * abs(table[G_ROW, k - 1] - table[G_ROW, k]) * sizes[0]
     here, below, lower = compare_orders(table, h, k, sizes)
+    if 1.0 < error <= LARGEST and h * SLOWEST < step_floor(real, times):
+        doubt, size, f0 = EPSILON * max(abs(t), abs(t1)), integer[ERROR_SIZE], work.differences[0]
+        found = scaled_beyond(
+            change, work.state[Y], trial, f0, rates, doubt, size, real[RTOL], work.tolerance
+        )
+        error = min(error, error * (found / sizes[0]))
     if error <= 1.0:
         g = h * table[G_ROW, k]
         for i in range(trial.size):
             trial[i] += g * change[i]
         failure = project_state(real, integer, t1, trial, project, system, loops)
         if failure == RUNNING:
-            accept(work, t1, k, here, below, lower, rhs, system, loops)
+            if find_rates(work, t1, rhs, watch, system, loops):
+                accept(work, t1, k, here, below, lower)
         else:
             fail(work, t1, h, 1, 0.1, failure)
     elif error <= LARGEST:
@@ -161,31 +188,31 @@ def step(work: AdamsWork, rhs: Function, project: Function, system: Any, loops: 
 
 
 @compiled_inside
-def accept(
-    work: AdamsWork,
-    t1: float,
-    k: int,
-    here: float,
-    below: float,
-    lower: bool,
-    rhs: Function,
-    system: Any,
-    loops: Any,
-) -> None:
-    """Make the trial state the state; its rates and differences; order and length of what comes."""
+def find_rates(
+    work: AdamsWork, t1: float, rhs: Function, watch: Function, system: Any, loops: Any
+) -> bool:
+    """The rates at the trial state; False where they are not finite, or it lies across a switch."""
+    real, integer, rates = work.real, work.integer, work.scaled[ROWS - 1]
+    trial, total, watched = work.state[TRIAL], work.state[SCRATCH], integer[SWITCHES] != 0
+    for i in range(trial.size):
+        total[i] = rates[i] - total[i]  # the sum of Phi*_j again
+    if watched or t1 < work.times[-1] or work.times[work.integer[NEXT]] < t1:
+        integer[RHS] += 1
+        rhs(t1, trial, rates, system, loops)
+        if not all_finite(rates):
+            real[T_STOP], integer[STATUS] = t1, NOT_FINITE
+            return False
+    return not (watched and end_is_across(work, t1, rates, watch, system, loops))
+
+
+@compiled_inside
+def accept(work: AdamsWork, t1: float, k: int, here: float, below: float, lower: bool) -> None:
+    """Make the trial state the state; its differences; order and length of what comes."""
     real, integer, star, f = work.real, work.integer, work.scaled, work.differences
     y, trial, total, rates = work.state[Y], work.state[TRIAL], work.state[SCRATCH], star[ROWS - 1]
     h = t1 - real[T]
     for i in range(y.size):
-        total[i] = rates[i] - total[i]  # the sum of Phi*_j again
         y[i] = trial[i]
-    if t1 < work.times[-1] or work.times[work.integer[NEXT]] < t1:
-        integer[RHS] += 1
-        rhs(t1, y, rates, system, loops)
-        if not all_finite(rates):
-            real[T_STOP], integer[STATUS] = t1, NOT_FINITE
-            return
-    for i in range(y.size):
         difference = rates[i] - total[i]
         f[k, i], f[k + 1, i] = difference, difference - star[k, i]
     for j in range(k - 1, -1, -1):
@@ -199,6 +226,7 @@ def accept(
     integer[EQUAL] += 1
     integer[FAILURES], integer[ORDER_LAST] = 0, k
     plan(work, h, k, here, below, lower)
+    settle(work, h, h, t1)
 
 
 @compiled_inside

@@ -96,9 +96,9 @@ class AdamsWork(Arrays):
     differences: Floats  # (ROWS, n) Phi_j at t, HNW (III.5.8)
     scaled: Floats  # (ROWS, n) Phi*_j = beta_j Phi_j; in the last row the rates at the prediction
     table: Floats  # (TABLE_ROWS, ROWS + HIGHEST)
-    switches: Floats  # (SWITCH_ROWS, 0): none are located
-    crossings: Floats  # (0, 3)
-    tolerance: Floats  # (TOLERANCES, n) as in ``Work``
+    switches: Floats  # as in ``Work``
+    crossings: Floats
+    tolerance: Floats
 
 
 def make_table() -> Floats:

@@ -17,13 +17,12 @@ from dap3d_core.integrators.adams_formulas import (
     allowed_adams_integers,
     make_table,
 )
-from dap3d_core.integrators.integration import (
-    Integration,
+from dap3d_core.integrators.checks import (
     check_control,
     check_sizes,
     check_state_and_times,
-    switches_of,
 )
+from dap3d_core.integrators.integration import Integration, switches_of
 from dap3d_core.integrators.method import Floats, Integers
 from dap3d_core.integrators.restoring import restored
 from dap3d_core.integrators.rounding import tolerance_of
@@ -36,9 +35,8 @@ class AdamsIntegration(Integration):
     Parameters
     ----------
     functions, system, loops, y0, times, rtol, atol, first_step, project_on, error_size,
-    report_size, buffer_rows, length_count, watched
-        As for ``Integration``; steps near singular states are not placed, and there are no
-        switches.
+    report_size, buffer_rows, length_count, watched, ends
+        As for ``Integration``; steps near singular states are not placed.
     step
         Must be None: order and step are chosen together.
 
@@ -69,6 +67,7 @@ class AdamsIntegration(Integration):
         buffer_rows: int = 256,
         length_count: int = 0,
         watched: bool = False,
+        ends: ArrayLike = (),
     ) -> None:
         if step is not None:
             raise ValueError(
@@ -87,8 +86,8 @@ class AdamsIntegration(Integration):
         integer = np.zeros(ADAMS_INTEGERS, dtype=np.int64)
         integer[at.ORDER], integer[at.ERROR_SIZE] = 2, error_size  # a first step of order 1
         integer[at.PROJECT_ON], integer[at.WATCHED] = project_on, watched
-        real[[at.LIMIT, at.CUT]] = np.inf
-        switches, crossings = switches_of(integer, ())
+        real[[at.LIMIT, at.CUT, at.LONGEST]] = np.inf
+        switches, crossings = switches_of(integer, ends)
         state = np.zeros((at.STATES, y.size))
         state[at.Y] = y
         self._work = AdamsWork(

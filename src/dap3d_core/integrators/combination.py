@@ -78,6 +78,22 @@ def scaled_largest(
 
 
 @compiled_inside
+def scaled_beyond(
+    x: Floats, y0: Floats, y1: Floats, f0: Floats, f1: Floats, dt: float, size: int, rtol: float,
+    tolerance: Floats,
+) -> float:  # fmt: skip
+    """As ``scaled_largest``; rates f0, f1 make dt max(|f0_i|, |f1_i|) of a doubt dt of time."""
+    largest = 0.0
+    for i in range(size):
+        doubt = dt * max(abs(f0[i]), abs(f1[i]))
+        scale = tolerance[ABSOLUTE, i] + rtol * max(abs(y0[i]), abs(y1[i]))
+        ratio = abs(x[i]) / (scale + doubt)
+        if not ratio <= largest:
+            largest = ratio
+    return largest
+
+
+@compiled_inside
 def interpolate(out: Floats, terms: Floats, theta: float) -> None:
     """Dense output at ``t + theta h`` out of its terms r (rows):
 

@@ -10,7 +10,7 @@ their codes DOPRI5 and DOP853.
 import math
 from typing import Any
 
-from dap3d_core.integrators.combination import combine, scaled_largest
+from dap3d_core.integrators.combination import combine, scaled_beyond, scaled_largest
 from dap3d_core.integrators.method import Floats, Integers
 from dap3d_core.integrators.work import (
     BETA,
@@ -25,6 +25,7 @@ from dap3d_core.integrators.work import (
     GAP_STEP,
     GAP_STEPS,
     LAST_REJECTED,
+    LONGEST,
     NEXT,
     ORDER,
     REJECTED,
@@ -46,7 +47,8 @@ from dap3d_core.integrators.work import (
 from dap3d_core.kernels.cache import compiled_inside
 
 #: A step is never shorter than this part of the time or of the whole span, sixteen roundings.
-FLOOR = 16.0 * 2.220446049250313e-16
+EPSILON = 2.220446049250313e-16
+FLOOR = 16.0 * EPSILON
 LARGEST = 1.7976931348623157e308
 #: The last step is stretched by at most this factor, to end at t_end.
 STRETCH = 1.01
@@ -100,7 +102,8 @@ def end_of_step(real: Floats, integer: Integers, times: Floats) -> float:
     """The time at which the step that comes next ends."""
     t, t_end, fixed = real[T], times[-1], real[STEP]
     if fixed == 0.0:
-        return t_end if t + STRETCH * real[H] >= t_end else t + real[H]
+        h = min(real[H], real[LONGEST])
+        return t_end if t + STRETCH * h >= t_end else t + h
     target = t_end if integer[DENSE] != 0 else times[integer[NEXT]]
     if integer[GAP_STEP] == integer[GAP_STEPS]:
         real[GAP_START] = t
@@ -142,12 +145,34 @@ def error_norm(
 
 
 @compiled_inside
+def beyond_rounding(
+    real: Floats, integer: Integers, state: Floats, k: Floats, table: Floats, tolerance: Floats,
+    h: float,
+) -> float:  # fmt: skip
+    """As ``error_norm``, of what is more than the rounding of time makes of the rates."""
+    size, rtol, first = integer[ERROR_SIZE], real[RTOL], k.shape[0]
+    y, trial, error, last = state[Y], state[TRIAL], state[SCRATCH], k[integer[STAGES] - 1]
+    main, rounding = 0.0, EPSILON * max(abs(real[T]), abs(real[T] + h))
+    for e in range(integer[ERRORS]):
+        combine(error, 0.0, y, h, table, first + e, k)
+        found = scaled_beyond(error, y, trial, k[0], last, rounding, size, rtol, tolerance)
+        main = found if e == 0 else joined(main, found)
+    return main
+
+
+@compiled_inside
 def joined(main: float, other: float) -> float:
     """One error from the estimates of order 5 and 3."""
     total = main * main + 0.01 * other * other
     if total == 0.0:
         return 0.0
     return main * main / math.sqrt(total)
+
+
+@compiled_inside
+def shrinkage(real: Floats, error: float) -> float:
+    """The factor on a step whose error was too large."""
+    return max(real[FACTOR_MIN], real[SAFETY] / error ** real[EXPONENT])
 
 
 @compiled_inside

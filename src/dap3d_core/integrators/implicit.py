@@ -13,13 +13,8 @@ from dap3d_core.formulations.stage import Matrix
 from dap3d_core.formulations.tangent_tables import coupled_bodies, make_tangent
 from dap3d_core.integrators import radau_work as at
 from dap3d_core.integrators import work
-from dap3d_core.integrators.integration import (
-    Integration,
-    check_control,
-    check_sizes,
-    check_state_and_times,
-    switches_of,
-)
+from dap3d_core.integrators.checks import check_control, check_sizes, check_state_and_times
+from dap3d_core.integrators.integration import Integration, switches_of
 from dap3d_core.integrators.method import Integers
 from dap3d_core.integrators.radau import advance
 from dap3d_core.integrators.radau_method import ORDER, radau_method
@@ -142,6 +137,10 @@ class RadauIntegration(Integration):
             self.tangent, self.matrix, budget,
         )  # fmt: skip
 
+    def _project(self) -> bool:
+        """Nothing: it starts anew on the constraints by itself."""
+        return True
+
     def state_arrays(self) -> list[Any]:
         """As ``Integration.state_arrays``."""
         matrix = self.matrix
@@ -204,7 +203,7 @@ def _make_work(
     state[work.Y] = y
     real = np.zeros(work.LENGTHS + machine.length_count)
     integer = np.zeros(at.RADAU_INTEGERS, dtype=np.int64)
-    real[[work.LIMIT, work.CUT]] = np.inf
+    real[[work.LIMIT, work.CUT, work.LONGEST]] = np.inf
     switches, crossings = switches_of(integer, ends)
     return RadauWork(
         real=real,

@@ -8,9 +8,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dap3d_core.assembly.system import UNSEEN
 from dap3d_core.integrators import work as at
-from dap3d_core.integrators.control import FLOOR
+from dap3d_core.integrators.checks import (
+    check_control,
+    check_sizes,
+    check_state_and_times,
+)
 from dap3d_core.integrators.method import Floats, Integers, Method, combinations
+from dap3d_core.integrators.reporting import FAILED
 from dap3d_core.integrators.restoring import Restorable
 from dap3d_core.integrators.rounding import tolerance_of
 from dap3d_core.integrators.runge_kutta import advance
@@ -73,8 +79,9 @@ class Integration(Restorable):
     watched
         Whether the fourth function is called with each accepted state.
     ends
-        (q,) for each switch that the fifth function gives, whether it ends the run where it becomes
-        negative; else the integration starts anew where it changes its sign (switches.py).
+        (2, q) for each switch that the fifth function gives, what it does: the run ENDS where it
+        becomes negative; the integration BEGINS anew where it changes its sign (switches.py), which
+        is noted down, or UNSEEN. And how far beyond zero it may be until that is so.
 
     Raises
     ------
@@ -191,8 +198,8 @@ class Integration(Restorable):
         """The time that the next step may not go over.
 
         Where the right-hand side may jump steps end just before and go on just behind, so that none
-        has samples of both sides; the state stays, which is right to the rounding of time. Fixed
-        steps end on their grid, and on what jumps.
+        has samples of both sides; the state stays, which is right to the rounding of time, but for
+        what the constraints make of it there. Fixed steps end on their grid, and on what jumps.
         """
         real, is_adaptive = self.work.real, self.work.real[at.STEP] == 0.0
         for t, jumps in self.stops[bisect_left(self.stops, (self.t, False)) :]:
@@ -206,7 +213,27 @@ class Integration(Restorable):
                     return t
                 real[at.T] = np.nextafter(t, np.inf)
                 self.restart()
+                if not self._project():
+                    return t
         return np.inf
+
+    def _project(self) -> bool:
+        """Bring the state onto its constraints where they have moved, if that is on.
+
+        Whether the run goes on.
+        """
+        functions, system, loops = self._arguments
+        real, integer = self.work.real, self.work.integer
+        if integer[at.PROJECT_ON] == 0:
+            return True
+        outcome = real[at.OUTCOME :]
+        outcome[:2] = 0.0
+        integer[at.PROJECTIONS] += 1
+        with np.errstate(all="ignore"):  # as compiled code does
+            functions[1](self.t, self.work.state[at.Y], outcome, system, loops)
+        if outcome[1] == FAILED:
+            real[at.T_STOP], integer[at.STATUS] = self.t, Status.PROJECTION_FAILED
+        return bool(outcome[1] != FAILED)
 
     def advance_to(self, limit: float) -> Status:
         """Try one step, or what stands in its place, that ends at time ``limit`` at the latest."""
@@ -323,12 +350,13 @@ class Integration(Restorable):
 
 def switches_of(integer: Integers, ends: ArrayLike) -> tuple[Floats, Floats]:
     """Arrays of the switches (ends: as ``Integration`` has it), none looked at so far."""
-    given = np.asarray(ends, dtype=np.float64)
-    integer[at.SWITCHES] = given.size
-    switches = np.zeros((at.SWITCH_ROWS, given.size))
-    if given.size:
-        switches[at.ENDS] = given
-    return switches, np.zeros((at.LOGGED if given.size else 0, 3))
+    given = np.asarray(ends, dtype=np.float64).reshape(2, -1)
+    count = integer[at.SWITCHES] = given.shape[1]
+    switches = np.zeros((at.SWITCH_ROWS, count))
+    if count:
+        switches[[at.DOES, at.BAND]] = given
+        integer[at.SAMPLED] = np.count_nonzero(given[0] != UNSEEN)
+    return switches, np.zeros((at.LOGGED if count else 0, 3))
 
 
 @cache
@@ -338,56 +366,10 @@ def _facts(method: Method) -> tuple[Floats, Integers]:
     real[at.EXPONENT], real[at.BETA] = method.exponent, method.beta
     real[at.FACTOR_MIN], real[at.FACTOR_MAX] = method.factor_min, method.factor_max
     real[at.ERROR_OLD], real[at.CALM], real[at.SAFETY] = 1e-4, method.calm, method.safety
-    real[[at.LIMIT, at.CUT, at.STIFF_AT]] = np.inf
+    real[[at.LIMIT, at.CUT, at.STIFF_AT, at.LONGEST]] = np.inf
     integer = np.zeros(at.INTEGERS, dtype=np.int64)
     integer[at.STAGES], integer[at.ORDER] = method.stages, method.order
     integer[at.ERRORS], integer[at.DENSE] = len(method.e), method.dense
     integer[at.ERROR_USES_RESULT] = method.error_uses_result
     integer[at.LATE_STAGE] = method.late_stage
     return real, integer
-
-
-def check_state_and_times(y: Floats, times: Floats) -> None:
-    """ValueError for states and times that make no sense."""
-    if y.ndim != 1 or not np.isfinite(y).all():
-        raise ValueError("y0 must be one vector of finite numbers")
-    if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
-        raise ValueError("times must be one vector of finite numbers, t0 first")
-    if not (times[1:] > times[:-1]).all():
-        raise ValueError("reporting times must increase")
-
-
-def check_sizes(error_size: int, size: int, buffer_rows: int) -> None:
-    """ValueError for more components that steer the step than there are, or no room for a row."""
-    if not 0 <= error_size <= size:
-        raise ValueError(f"error_size is {error_size}, but y has {size} components")
-    if buffer_rows < 1:
-        raise ValueError(f"buffer_rows is {buffer_rows}; at least one row must fit")
-
-
-def check_control(
-    method: Method,
-    rtol: float,
-    atol: ArrayLike,
-    times: Floats,
-    *,
-    step: float | None,
-    first_step: float | None,
-) -> None:
-    """ValueError for tolerances and steps that make no sense."""
-    least = FLOOR * max(abs(times[0]), abs(times[-1]), times[-1] - times[0])
-    for name, value in (("step", step), ("first_step", first_step)):
-        if value is not None and not least < value < np.inf:
-            raise ValueError(
-                f"{name} is {value}; it must be finite and above {least:.1e}, the rounding of time"
-            )
-    if step is None and not method.adaptive:
-        raise ValueError(
-            f"{method.name} does not choose its step: give step, or take an adaptive method"
-        )
-    least_atol, most_atol = float(np.min(atol)), float(np.max(atol))
-    good = 0.0 <= rtol < np.inf and 0.0 <= least_atol <= most_atol < np.inf
-    if step is None and not (good and rtol + most_atol > 0.0):
-        raise ValueError(
-            f"rtol is {rtol} and atol {least_atol}: finite, not negative, not both zero"
-        )

@@ -55,7 +55,7 @@ class Restorable:
         own = {
             "real": at.REAL_SETTINGS,
             "integer": at.INTEGER_SETTINGS,
-            "switches": (at.ENDS,),
+            "switches": (at.DOES, at.BAND),
             "table": range(len(array)),
             "tolerance": (at.ABSOLUTE,),
         }

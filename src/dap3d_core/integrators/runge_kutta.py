@@ -27,11 +27,14 @@ from dap3d_core.integrators.combination import all_finite, combine, copy, scaled
 from dap3d_core.integrators.control import (
     LARGEST,
     accept,
+    beyond_rounding,
     end_of_step,
     error_norm,
     first_step,
     joined,
     reject,
+    shrinkage,
+    step_floor,
 )
 from dap3d_core.integrators.crossing import aim, is_near, look_ahead, look_back, singular_ahead
 from dap3d_core.integrators.method import ABSCISSA, Floats, Integers
@@ -51,8 +54,6 @@ from dap3d_core.integrators.work import (
     ERROR_SIZE,
     ERROR_USES_RESULT,
     ERRORS,
-    EXPONENT,
-    FACTOR_MIN,
     FRESH,
     H_DENSE,
     LAST_REJECTED,
@@ -68,7 +69,6 @@ from dap3d_core.integrators.work import (
     RHS,
     RTOL,
     RUNNING,
-    SAFETY,
     SCRATCH,
     STAGES,
     STATUS,
@@ -159,8 +159,8 @@ def step(
         error = kept_error(work, t1, h, project, system, loops)
     elif adaptive:
         error = error_norm(real, integer, work.state, k, work.table, work.tolerance, h)
-    if near and error > 1.0 and is_rounding(real, work.lengths, h, error):
-        error = 1.0
+    if 1.0 < error <= LARGEST:
+        error = judged(work, near, h, error)
     if error <= 1.0:
         failure = land(work, t1, near, rhs, project, watch, system, loops)
         if failure == ACROSS_A_SWITCH:
@@ -180,11 +180,23 @@ def step(
         else:
             reject(real, integer, times, t1, h * RETREAT, failure)
     elif error <= LARGEST:
-        factor = max(real[FACTOR_MIN], real[SAFETY] / error ** real[EXPONENT])
         note_failure(real, integer, error, h, integer[LAST_REJECTED] != 0)
-        reject(real, integer, times, t1, h * factor, STEP_FLOOR)
+        reject(real, integer, times, t1, h * shrinkage(real, error), STEP_FLOOR)
     else:
         reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)
+
+
+@compiled_inside
+def judged(work: Work, near: bool, h: float, error: float) -> float:
+    """The error of a step that is too large, but for what a shorter step could not do better."""
+    real, integer = work.real, work.integer
+    if near:
+        return 1.0 if is_rounding(real, work.lengths, h, error) else error
+    if h * shrinkage(real, error) < step_floor(real, work.times):
+        return min(
+            error, beyond_rounding(real, integer, work.state, work.k, work.table, work.tolerance, h)
+        )
+    return error
 
 
 @compiled_inside

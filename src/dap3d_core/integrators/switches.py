@@ -22,19 +22,30 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.integrators.control import FLOOR
+from dap3d_core.assembly.system import ENDS, UNSEEN
+from dap3d_core.integrators.control import EPSILON, FLOOR
 from dap3d_core.integrators.method import Floats
 from dap3d_core.integrators.reporting import project_state
+from dap3d_core.integrators.switch_values import (
+    evaluate,
+    find_rates,
+    is_across,
+    leaves,
+    log,
+    look,
+    span,
+    usual_step,
+)
 from dap3d_core.integrators.work import (
+    BAND,
     BEND,
     CHATTERED,
     COUNT,
-    CROSSINGS,
     CULPRIT,
     CUT,
     CUTS,
+    DOES,
     ENDING,
-    ENDS,
     ERROR_OLD,
     FOUND,
     FOUND_RATE,
@@ -42,14 +53,13 @@ from dap3d_core.integrators.work import (
     GAP_STEP,
     LAST_REJECTED,
     LIMIT,
-    LOGGED,
     LOOKED,
     NEXT,
-    OTHER,
     RATE,
     REJECTED,
     RUNNING,
     SAMPLE,
+    SAMPLED,
     SIDE,
     SINCE,
     STALLS,
@@ -72,8 +82,6 @@ from dap3d_core.kernels.cache import compiled_inside
 #: A crossing this part of a usual step away is reached by an Euler step: its error is of the order
 #: of the square.
 SHORT = 1e-9
-#: Part of a usual step over which rates are found by differences, and the least part of the time.
-DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-8
 #: The least part of the way to a crossing that is left for the next step, and the greatest.
 SPARE, MOST_SPARE = 1e-4, 0.05
 #: How often an Euler step towards a crossing that is nearer than rounding is doubled at most.
@@ -83,7 +91,6 @@ SUSPICIONS = 8
 #: A switch that changes its sign more often than this while time goes on by less than this part of
 #: the run chatters.
 CHATTER, CHATTER_SPAN = 100, 1e-6
-EPSILON = 2.220446049250313e-16
 
 
 @compiled_inside
@@ -114,49 +121,6 @@ def next_length(
 
 
 @compiled_inside
-def span(work: Work) -> float:
-    """The time, s, whose rounding bounds what can be told apart."""
-    return max(abs(work.real[T]), work.times[-1] - work.times[0])
-
-
-@compiled_inside
-def usual_step(work: Work) -> float:
-    """The step that the motion asks for."""
-    return work.real[STEP] if work.real[STEP] != 0.0 else work.real[H]
-
-
-@compiled_inside
-def look(work: Work, slope: Floats, watch: Function, system: Any, loops: Any) -> None:
-    """Values, sides and rates at the state; the run ends where it should have ended before."""
-    real, integer, s = work.real, work.integer, work.switches
-    y, now = work.state[Y], s[VALUE]
-    watch(real[T], y, now, system, loops)
-    for k in range(s.shape[1]):
-        if s[SIDE, k] == 0.0:
-            s[SIDE, k] = np.sign(s[VALUE, k])
-        s[BEND, k] = 0.0
-        if s[ENDS, k] != 0.0 and s[SIDE, k] < 0.0:
-            integer[ENDING], integer[CULPRIT] = SWITCHED, k
-            log(work, k, real[T])
-    find_rates(work, real[T], y, slope, now, s[RATE], watch, system, loops)
-    integer[LOOKED] = 1
-
-
-@compiled_inside
-def find_rates(
-    work: Work, t: float, y: Floats, slope: Floats, values: Floats, out: Floats, watch: Function,
-    system: Any, loops: Any,
-) -> None:  # fmt: skip
-    """Rates of the switches along the slope, by a difference."""
-    h, x = max(DIFFERENCE * usual_step(work), LEAST_DIFFERENCE * span(work)), work.state[OTHER]
-    for i in range(y.shape[0]):
-        x[i] = y[i] + h * slope[i]
-    watch(t + h, x, out, system, loops)
-    for k in range(out.shape[0]):
-        out[k] = (out[k] - values[k]) / h
-
-
-@compiled_inside
 def time_to_zero(value: float, rate: float, bend: float) -> float:
     """First t > 0 with value + rate t + bend t^2 / 2 = 0, for value >= 0; infinite if none."""
     if value <= 0.0:
@@ -179,6 +143,8 @@ def reach(work: Work, h: float) -> float:
         if side == 0.0:
             continue
         value, rate, bend = side * s[VALUE, k], side * s[RATE, k], side * s[BEND, k]
+        if value < 2.0 * s[BAND, k]:
+            continue  # it may be at rest there, and its rate is rounding
         left = time_to_zero(value, rate, bend)
         if left < longest:
             doubt = 0.5 * left * bend / rate if rate < 0.0 else 1.0
@@ -187,28 +153,19 @@ def reach(work: Work, h: float) -> float:
 
 
 @compiled_inside
-def is_across(s: Floats, row: int) -> bool:
-    """Whether a switch, in a row of values, is on the other side than at the start of the step."""
-    found = 0
-    for k in range(s.shape[1]):
-        found |= s[row, k] * s[SIDE, k] < 0.0
-    return found != 0
-
-
-@compiled_inside
-def leaves(s: Floats, row: int) -> bool:
-    """Whether a switch is on the other side, or zero: then it is not known which law holds."""
-    found = 0
-    for k in range(s.shape[1]):
-        found |= (s[SIDE, k] != 0.0) & (s[row, k] * s[SIDE, k] <= 0.0)
-    return found != 0
-
-
-@compiled_inside
 def sample(work: Work, t: float, x: Floats, watch: Function, system: Any, loops: Any) -> bool:
-    """Whether a state within a step lies across; then the step is cut."""
-    watch(t, x, work.switches[SAMPLE], system, loops)
-    if not leaves(work.switches, SAMPLE):
+    """Whether a state within a step lies across; then the step is cut.
+
+    Not of what is UNSEEN: where a function takes another form it is smooth: a step may mix both.
+    """
+    if work.integer[SAMPLED] == 0:
+        return False
+    evaluate(work, t, x, SAMPLE, watch, system, loops)
+    s = work.switches
+    for k in range(s.shape[1]):
+        if s[DOES, k] == UNSEEN:
+            s[SAMPLE, k] = s[SIDE, k]
+    if not leaves(s, SAMPLE):
         return False
     shorten(work, SAMPLE, t - work.real[T])
     return True
@@ -240,11 +197,11 @@ def end_is_across(
     Then the step is cut.
     """
     s, trial, h = work.switches, work.state[TRIAL], t1 - work.real[T]
-    watch(t1, trial, s[FOUND], system, loops)
+    evaluate(work, t1, trial, FOUND, watch, system, loops)
     if leaves(s, FOUND):
         shorten(work, FOUND, h)
         return True
-    find_rates(work, t1, trial, slope, s[FOUND], s[FOUND_RATE], watch, system, loops)
+    find_rates(work, t1, trial, slope, FOUND, FOUND_RATE, watch, system, loops)
     if work.integer[CUTS] >= SUSPICIONS:
         return False
     part = 1.0
@@ -300,6 +257,7 @@ def settle(work: Work, h: float, longest: float, end: float) -> None:
         s[VALUE, k], s[RATE, k] = s[FOUND, k], s[FOUND_RATE, k]
         if s[SIDE, k] == 0.0:
             s[SIDE, k] = np.sign(s[FOUND, k])
+            s[VALUE, k] += s[SIDE, k] * s[BAND, k]
     real[CUT], integer[CUTS] = np.inf, 0
     integer[STALLS] = integer[STALLS] + 1 if stalled else 0
 
@@ -360,7 +318,7 @@ def go_on(
         trial[i] = y[i] + h * slope[i]
     failure = project_state(work.real, work.integer, t, trial, project, system, loops)
     if failure == RUNNING and work.integer[SWITCHES] != 0:
-        watch(t, trial, work.switches[FOUND], system, loops)
+        evaluate(work, t, trial, FOUND, watch, system, loops)
     return failure
 
 
@@ -373,23 +331,13 @@ def take_notice(work: Work, t: float) -> None:
             continue
         s[SIDE, k] = -s[SIDE, k]
         log(work, k, t)
-        if s[ENDS, k] != 0.0 and s[SIDE, k] < 0.0:
+        if s[DOES, k] == ENDS and s[SIDE, k] < 0.0:
             integer[ENDING], integer[CULPRIT] = SWITCHED, k
         if s[COUNT, k] == 0.0 or t - s[SINCE, k] > CHATTER_SPAN * (work.times[-1] - work.times[0]):
             s[SINCE, k], s[COUNT, k] = t, 0.0
         s[COUNT, k] += 1.0
         if s[COUNT, k] > CHATTER and integer[ENDING] == 0:
             integer[ENDING], integer[CULPRIT] = CHATTERED, k
-
-
-@compiled_inside
-def log(work: Work, k: int, t: float) -> None:
-    """Note that a switch changed its sign."""
-    count = work.integer[CROSSINGS]
-    if count < LOGGED:
-        row = work.crossings[count]
-        row[0], row[1], row[2] = t, k, work.switches[SIDE, k]
-    work.integer[CROSSINGS] = count + 1
 
 
 @compiled_inside

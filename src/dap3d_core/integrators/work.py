@@ -42,15 +42,15 @@ RTOL, STEP, EXPONENT, BETA, FACTOR_MIN, FACTOR_MAX, CALM, SAFETY = range(8)
 # the run, error of the last step that was to go across a singular state; the instant that the next
 # step may not go beyond, its greatest length since one met the other side of a switch; when the
 # scene was found stiff; the largest magnitude of the last component, which is the work done, at an
-# accepted state; error per length of the last step that failed; and what project gives: four
-# numbers, then lengths.
+# accepted state; error per length of the last step that failed; the longest step that error control
+# may take; and what project gives: four numbers, then lengths.
 (
     T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, ACROSS, LIMIT, CUT, STIFF_AT, MOST_WORK,
-    FAILED_RATE, OUTCOME
-) = range(8, 22)  # fmt: skip
+    FAILED_RATE, LONGEST, OUTCOME
+) = range(8, 23)  # fmt: skip
 LENGTHS = OUTCOME + 4
 #: Places in ``real`` and ``integer`` that never change in the course of a run.
-REAL_SETTINGS = range(T)
+REAL_SETTINGS = (*range(T), LONGEST)
 # Places in ``integer``. Settings.
 STAGES, ORDER, ERROR_SIZE, ERRORS, ERROR_USES_RESULT, DENSE, PROJECT_ON, WATCHED = range(8)
 # What changes. POOR: landings in a row that project called poor. FRESH: k[0] is f(t, y).
@@ -64,17 +64,20 @@ SWITCHES, LOOKED, CUTS, ENDING, CULPRIT, CROSSINGS = range(21, 27)
 # LATE_STAGE: see Method; whether the run ends where the scene becomes stiff; steps that looked so,
 # and those in a row that did not since (stiffness.py). STALLS: steps in a row towards a crossing,
 # so short that the switch did not change by a bit. ROUNDED: whether rounding makes a part of the
-# errors is to be looked at (1), or is so (2).
-LATE_STAGE, LEAVE, STIFF_STEPS, CALM_STEPS, STALLS, ROUNDED, INTEGERS = range(27, 34)
-INTEGER_SETTINGS = (*range(STATUS), SWITCHES, LATE_STAGE, LEAVE)
+# errors is to be looked at (1), or is so (2). SAMPLED: switches that stages have to keep to.
+LATE_STAGE, LEAVE, STIFF_STEPS, CALM_STEPS, STALLS, ROUNDED, SAMPLED, INTEGERS = range(27, 35)
+INTEGER_SETTINGS = (*range(STATUS), SWITCHES, LATE_STAGE, LEAVE, SAMPLED)
 # Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch.
 Y, TRIAL, SCRATCH, OTHER, STATES = range(5)
 # Rows of ``tolerance``: absolute tolerance; change of dy/dt by the rounding of y (rounding.py).
 ABSOLUTE, NOISE, TOLERANCES = range(3)
 # Rows of ``switches``: value, side (the sign that it keeps; 0: none yet), rate and bend (change of
-# the rate in time) at t; value and rate at the trial state; value at a sample; whether it ends the
-# run; since when its changes are counted, and how many there were.
-VALUE, SIDE, RATE, BEND, FOUND, FOUND_RATE, SAMPLE, ENDS, SINCE, COUNT, SWITCH_ROWS = range(11)
+# the rate in time) at t; value and rate at the trial state; value at a sample; what it does
+# (assembly.system); how far beyond zero it is left on its side; since when its changes are counted,
+# and how many there were.
+VALUE, SIDE, RATE, BEND, FOUND, FOUND_RATE, SAMPLE, DOES, BAND, SINCE, COUNT, SWITCH_ROWS = range(
+    12
+)
 #: Rows of ``crossings``, the first ones of a run: time, which switch, to which side.
 LOGGED = 1000
 

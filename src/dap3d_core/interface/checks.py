@@ -292,6 +292,10 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
         rows, mask = type_.rows, type_.holonomic
         if not isinstance(rows, int) or rows < 1:
             raise PluginError(f"{who} declares rows = {rows!r}; a joint has one row or more")
+        if not all(isinstance(k, int) and 0 <= k < rows for k in type_.unilateral):
+            raise PluginError(
+                f"{who}.unilateral names rows, 0 to {rows - 1}; it is {type_.unilateral!r}"
+            )
         if not isinstance(mask, bool) and len(mask) != rows:
             raise PluginError(f"{who}.holonomic needs one truth value for each of its {rows} rows")
         if derivable and type_.velocity_rows():

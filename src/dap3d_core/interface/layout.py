@@ -9,6 +9,8 @@ from dap3d_core.interface.fields import slot_of, specs_of
 from dap3d_core.interface.types import TypeBase
 
 SLOTS = ("i", "j", "k")
+#: Numbers that an angle takes: itself, its rate and the time, at the last accepted step.
+ANGLE_WIDTH = 3
 
 #: A constant or a field in the numbers of an instance: where it begins, its shape.
 Place = tuple[int, tuple[int, ...]]
@@ -25,7 +27,7 @@ class Layout:
         constants: names that ``prepare`` returns.
         numbers: name -> (offset in ``par``, shape) of what is stored for each instance.
         tables: name -> (offset of its place and its number of rows, columns).
-        angles: name -> offset of the angle at the last accepted step.
+        angles: name -> offset of the angle at the last accepted step, its rate and the time there.
         par_width: numbers an instance takes.
     """
 
@@ -99,7 +101,7 @@ def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> Layout:
             functions.append(name)
         elif spec.kind == "angle":
             angles[name] = width
-            width += 1
+            width += ANGLE_WIDTH
     kept = tuple(name for name in constants if name not in tables)
     for name in kept:
         numbers[name] = width, shape_of(constants[name])

@@ -118,7 +118,7 @@ def _offer_field(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
     if spec.kind == "point" and (slot := slot_of(name)):
         _offer_point(offer, name, slot, layout)
     elif spec.kind == "vector" and spec.ground:
-        offer(name, (3,), _stored(layout, name), doc="vector fixed in ground")
+        offer(name, (3,), stored(layout, name), doc="vector fixed in ground")
     elif spec.kind == "vector":
         _offer_vector(offer, name, slot_of(name) if name not in layout.others else name, layout)
     elif spec.kind == "vector2":
@@ -131,7 +131,7 @@ def _offer_field(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
         offer(f"{name}_dot", (3,), "sub(x_v_P_j, x_v_P_i)", ("v_P_i", "v_P_j"), True, rate)
     elif spec.kind in ("number", "vec3", "matrix"):
         doc = f"{spec.doc or name}{f', {spec.unit}' if spec.unit else ''}"
-        offer(name, layout.numbers[name][1], _stored(layout, name), doc=doc)
+        offer(name, layout.numbers[name][1], stored(layout, name), doc=doc)
     elif spec.kind == "function":
         _offer_function(offer, name, spec, layout)
     elif spec.kind == "table":
@@ -162,8 +162,9 @@ def _offer_function(offer: Callable[..., None], name: str, spec: FieldSpec, layo
 
 def _offer_angle(offer: Callable[..., None], name: str, spec: FieldSpec, layout: Layout) -> None:
     u, v, k = spec.axes
-    at, axes = f"par[p1 + {layout.angles[name]}]", f"x_{u}, x_{v}, x_{k}"
-    code = f"unwound(angle_about({axes}), {at})"
+    at, axes = layout.angles[name], f"x_{u}, x_{v}, x_{k}"
+    ahead = f"par[p1 + {at}] + par[p1 + {at + 1}] * (t - par[p1 + {at + 2}])"
+    code = f"unwound(angle_about({axes}), {ahead})"
     one, other = slot_of(u), slot_of(v)
     # its rate is that of the formula; theta_dot is it where both bodies turn about k alone
     turning = ", ".join(f"cross(W_{slot_of(a)}, x_{a})" for a in spec.axes)
@@ -176,7 +177,7 @@ def _offer_angle(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
 
 
 def _offer_point(offer: Callable[..., None], name: str, s: str, layout: Layout) -> None:
-    arm, rate, local = f"s_{name}", f"s_{name}_dot", _stored(layout, name)
+    arm, rate, local = f"s_{name}", f"s_{name}_dot", stored(layout, name)
     place, speed = f"position of {name}, m", f"velocity of {name}, m/s"
     turns = {"rate": f"cross(W_{s}, x_{arm})", "rate_name": rate}
     moves = {"rate": f"add(V_{s}, cross(W_{s}, x_{arm}))", "rate_name": f"v_{name}"}
@@ -190,7 +191,7 @@ def _offer_point(offer: Callable[..., None], name: str, s: str, layout: Layout) 
 
 def _offer_vector(offer: Callable[..., None], name: str, s: str | None, layout: Layout) -> None:
     """A vector fixed in the body of slot s, or in a body of its own where s is its own name."""
-    local = _stored(layout, name)
+    local = stored(layout, name)
     needs: tuple[str, ...] = ()
     if s in layout.slots:
         turned, turning, needs = f"x_A_{s}", f"x_w_{s}", (f"A_{s}", f"w_{s}")
@@ -210,10 +211,11 @@ def _offer_constant(offer: Callable[..., None], name: str, layout: Layout) -> No
     if shape == (3,) and slot in layout.slots:
         _offer_vector(offer, name, slot, layout)
     else:
-        offer(name, shape, _stored(layout, name), doc="constant found by prepare")
+        offer(name, shape, stored(layout, name), doc="constant found by prepare")
 
 
-def _stored(layout: Layout, name: str) -> str:
+def stored(layout: Layout, name: str) -> str:
+    """Expression for a number of an instance."""
     offset, shape = layout.numbers[name]
     if shape == ():
         return f"par[p1 + {offset}]"

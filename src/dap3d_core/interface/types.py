@@ -80,6 +80,9 @@ class Joint(TypeBase):
         holonomic: True, False, or one truth value a row: which rows exist at position level.
         drives: whether it prescribes a freedom that other joints leave; where there are none
             between its bodies a scene gets a note.
+        unilateral: rows, from 0, whose multiplier is not negative in what the type stands for: a
+            ground that carries and does not pull. A run where one is gets a note with the instant.
+        unilateral_words: what it means that one is negative; stands in that note.
     """
 
     kind = "joint"
@@ -88,6 +91,8 @@ class Joint(TypeBase):
     rows: ClassVar[int] = 0
     holonomic: ClassVar[bool | tuple[bool, ...]] = True
     drives: ClassVar[bool] = False
+    unilateral: ClassVar[tuple[int, ...]] = ()
+    unilateral_words: ClassVar[str] = ""
 
     @classmethod
     def position_rows(cls) -> tuple[int, ...]:
@@ -144,11 +149,19 @@ class Function(TypeBase):
     """A function of one variable: ``value(x, ...)`` returns (f, f', f'', f''').
 
     One that returns f alone has the others derived (derivation.py). No step of a run goes over an
-    argument that ``breaks`` names: a change that is shorter than a step is not missed.
+    argument that ``breaks`` names, be it a time or an elongation: a change that is shorter than a
+    step is not missed.
+
+    Attributes:
+        keyword: the word that names the type in a scene.
+        smooth: whether it has one form everywhere, which nothing could divide. Of a function of
+            another argument than time that neither says so nor has ``breaks`` a run notes that its
+            steps may pass over what it does.
     """
 
     kind = "function"
     kernel_names = ("value",)
+    smooth: ClassVar[bool] = False
 
     def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
         """Constants of this instance, found once (coefficients of a polynomial)."""

@@ -5,7 +5,7 @@ functions, the bodies of its vectors of no slot, then for a joint the place of i
 row vectors and for each slot the place of its block in D; its numbers stand in ``par`` from ``p1``.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from dap3d_core.interface.checks import Examined
 from dap3d_core.interface.namespace import in_order, parameters
@@ -23,6 +23,8 @@ LOOP_KINDS = {
     "friction": ("friction",),
     "switch": ("switch",),
     "angle": (),  # the angles of the type's fields, as they stand at an accepted step
+    "turned": (),  # the same angles, to be reported
+    "knot": ("knot",),  # as switches; of functions of an argument (binding.py)
 }
 
 
@@ -39,7 +41,8 @@ def write(examined: Examined, what: str) -> Loop | None:
     kernels = {n: k for n, k in examined.kernels.items() if n in LOOP_KINDS[what]}
     layout = examined.layout
     wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
-    wanted += layout.angles if what == "angle" else ()
+    if what in ("angle", "turned"):
+        wanted += [one for name in layout.angles for one in (name, f"{name}_dot")]
     if not kernels and not wanted:
         return None
     lines = [f"b0 = i0 + q * {stride(examined)}"]
@@ -51,13 +54,32 @@ def write(examined: Examined, what: str) -> Loop | None:
         lines.append(f"row = idx[b0 + {layout.integers}]")
     lines += [f"x_{q.name} = {q.code}" for q in in_order(examined.names, wanted) if q.code]
     if what == "angle":
-        lines += [f"par[p1 + {at}] = x_{name}" for name, at in layout.angles.items()]
+        for name, at in layout.angles.items():
+            lines += _remember(name, at)
+    elif what == "turned":
+        lines += _one_behind_the_other([f"x_{name}" for name in layout.angles])
     for name, kernel in kernels.items():
         arguments = ", ".join(f"x_{n}" for n in parameters(kernel))
         lines.append(f"out = kernel_{name}({arguments})")
         lines += _store(examined, name)
     title = f"{examined.type.keyword}{examined.given}: {', '.join(kernels) or what}"
     return Loop(title, {f"kernel_{n}": k for n, k in kernels.items()}, lines)
+
+
+def _remember(name: str, at: int) -> Iterable[str]:
+    """Keep an angle, its rate and the time; count in out1 where its turns are in doubt."""
+    change = f"x_{name}_dot - par[p1 + {at + 1}]"
+    yield f"out1[0] += doubtful({change}, t - par[p1 + {at + 2}])"
+    for k, value in enumerate((f"x_{name}", f"x_{name}_dot", "t")):
+        yield f"par[p1 + {at + k}] = {value}"
+
+
+def _one_behind_the_other(values: Sequence[str]) -> Iterable[str]:
+    """Values of all instances and groups, in their order; out2 counts the place."""
+    yield "place = int(out2[0]) & NATURAL"
+    for k, value in enumerate(values):
+        yield f"out1[place + {k}] = {value}"
+    yield f"out2[0] += {len(values)}.0"
 
 
 def _store(examined: Examined, kernel: str) -> Iterable[str]:
@@ -87,11 +109,8 @@ def _store(examined: Examined, kernel: str) -> Iterable[str]:
                 yield f"out1[d + {k}] += {paths[6 * n + k]}"
     elif kernel == "energy":
         yield f"out1[0] += {paths[0]}"
-    elif kernel == "switch":
-        yield "place = int(out2[0]) & NATURAL"  # they stand one behind the other
-        for k, path in enumerate(paths):
-            yield f"out1[place + {k}] = {path}"
-        yield f"out2[0] += {len(paths)}.0"
+    elif kernel in ("switch", "knot"):
+        yield from _one_behind_the_other(paths)
     else:
         yield "row = idx[b0]"
         for k, path in enumerate(paths):

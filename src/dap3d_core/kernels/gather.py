@@ -31,6 +31,7 @@ __all__ = [
     "matrix_in",
     "rotate",
     "sub",
+    "doubtful",
     "unwound",
     "vector_at",
     "vector_in",
@@ -71,3 +72,9 @@ def angle_about(u, v, k):
 def unwound(angle, last):
     """The angle, whole turns added, that lies within half a turn of the last one."""
     return angle + TURN * np.rint((last - angle).real / TURN)
+
+
+@inlined
+def doubtful(change, elapsed):
+    """1 where a rate has changed by so much within a step that a turn may be miscounted, else 0."""
+    return 1.0 if abs(change) * elapsed > 0.5 * TURN else 0.0

@@ -65,7 +65,7 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
         announce: called with the loop's name before it is compiled anew.
     """
     text = source_of(loop)
-    gathering = (gather.vector_at, gather.matrix_at, gather.unwound)
+    gathering = (gather.vector_at, gather.matrix_at, gather.unwound, gather.doubtful)
     kernels = loop.kernels.values()
     key = digest(text, *identities(*kernels), *sources(*kernels, *gathering))
     with _building:

@@ -18,6 +18,7 @@ from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.layout import shape_of, size
 from dap3d_core.interface.namespace import parameters
 from dap3d_core.interface.types import TypeBase
+from dap3d_core.model.knots import knots_of
 from dap3d_core.scene import Instance
 
 Integers = NDArray[np.int64]
@@ -199,6 +200,7 @@ class Grouping:
         """The type with its functions known, their numbers behind its own, their tables."""
         types = {field: f.examined for field, f in functions[0].items()}
         tables: list[tuple[int, int, Floats]] = []
+        counts: dict[str, int] = {}
         for field, given in types.items():
             column = [of_instance[field] for of_instance in functions]
             try:
@@ -208,8 +210,10 @@ class Grouping:
                     *[(members[k], f"function {column[k].name}: {w}") for k, w in error.faults]
                 ) from error
             tables += [(k, numbers.shape[1] + offset, rows) for k, offset, rows in found]
-            numbers = np.hstack([numbers, more])
-        return bind_functions(examined, types), numbers, tables
+            knots = knots_of(column)
+            counts[field] = knots.shape[1]
+            numbers = np.hstack([numbers, more, knots])
+        return bind_functions(examined, types, counts), numbers, tables
 
     def _numbers(
         self, examined: Examined, instances: list[Instance], members: Sequence[int]

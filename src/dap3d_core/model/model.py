@@ -80,6 +80,26 @@ class Model:
         return int(self.joint_start[-1])
 
     @cached_property
+    def angle_count(self) -> int:
+        """Number of angles whose turns are counted."""
+        return sum(g.count * len(g.examined.layout.angles) for g in self.acting)
+
+    def angles_of(self, group: Group, places: Integers) -> Integers:
+        """(k, angles) where those of instances of a group stand among all that are reported."""
+        first, width = 0, len(group.examined.layout.angles)
+        for other in self.acting:
+            if other is group:
+                break
+            first += other.count * len(other.examined.layout.angles)
+        found: Integers = first + width * np.asarray(places)[:, None] + np.arange(width)
+        return found
+
+    @property
+    def acting(self) -> tuple[Group, ...]:
+        """Groups of what may have angles, in the order of the loops (formulations/build.py)."""
+        return (*self.forces, *self.joints)
+
+    @cached_property
     def irc(self) -> Integers:
         """(n,) index in u of the first coordinate of each body (r, then p)."""
         return read_only(7 * np.arange(self.body_count, dtype=np.int64))

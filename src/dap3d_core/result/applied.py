@@ -10,7 +10,7 @@ from dap3d_core.interface.fields import specs_of
 from dap3d_core.model.groups import Floats, Group
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.motion import motion_of
-from dap3d_core.result.reactions import Reaction, actions_of, placed
+from dap3d_core.result.reactions import Angles, Reaction, actions_of, placed
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.machine import Machine
@@ -38,7 +38,13 @@ class Applied:
 
 @np.errstate(all="ignore")  # as compiled code does
 def applied(
-    machine: "Machine", t: Floats, u: Floats, v_dot: Floats, name: str, element: int
+    machine: "Machine",
+    t: Floats,
+    u: Floats,
+    v_dot: Floats,
+    name: str,
+    element: int,
+    angles: Floats | None,
 ) -> Applied:
     """Evaluate a force element.
 
@@ -49,6 +55,8 @@ def applied(
         v_dot: (nt, 6 n) accelerations.
         name: what it is called, for the error.
         element: its place among the forces of the model.
+        angles: (nt, k) angles as ``Arrays`` has them; None where they are not known: they are then
+            counted from one instant to the next.
 
     Raises:
         UnknownNameError: the element acts on every body or in a joint: it has no bodies of its own.
@@ -58,7 +66,10 @@ def applied(
     force, energy = np.zeros_like(machine.system.force), np.zeros(1)
     out, potential = np.zeros((len(t), len(bodies), 6)), np.zeros(len(t))
     for k, time in placed(machine, t, u):
-        own.call("angle", time, force)
+        if angles is None:
+            own.call("angle", time, force)
+        else:
+            own.angles.set(angles[k])
         force[:] = energy[:] = 0.0
         own.call("wrench", time, force)
         own.call("energy", time, energy)
@@ -104,23 +115,21 @@ def _along(
 
 
 class _OwnElement:
-    """The loops over one force element, with numbers of its own.
-
-    Angles among these are counted from the start again, from one reported instant to the next.
-    """
+    """The loops over one force element, with numbers of its own."""
 
     def __init__(self, machine: "Machine", group: Group, place: int) -> None:
         from dap3d_core.interface.writer import stride
 
-        s, layout = machine.system, group.examined.layout
+        s = machine.system
         self._machine = machine
         self._loops = {kind: q for q, (kind, g) in enumerate(machine.what) if g is group}
-        self._groups, width = s.groups.copy(), layout.par_width
+        self._groups, width = s.groups.copy(), group.examined.layout.par_width
         first = s.groups[self._loops["wrench"], 1] + place * width
         numbers = s.par[first : first + width].copy()
-        for at in layout.angles.values():
-            numbers[at] = 0.0
         self._par = np.concatenate([s.par, numbers])  # tables keep their places
+        own = self._par[len(s.par) :].reshape(1, width)
+        self.angles = Angles(machine.model, group, np.array([place]), own)
+        self.angles.set(np.zeros(machine.model.angle_count))
         for q in self._loops.values():
             self._groups[q] = s.groups[q, 0] + place * stride(group.examined), len(s.par), 1
 

@@ -44,6 +44,7 @@ COLUMNS = (
     Column("position_residual", "", "SI", "largest |C| of the constraint rows"),
     Column("velocity_residual", "", "SI", "largest |D v - nu| of the constraint rows"),
     Column("acceleration_residual", "", "SI", "largest |D v_dot - gamma| of the constraint rows"),
+    Column("angles", "angle", "rad", "angles of forces and joints that count whole turns"),
 )
 
 
@@ -59,6 +60,7 @@ class Arrays:
         work: (nt,) J, done on the system by forces and drivers.
         potential_energy: (nt,) J.
         position_residual, velocity_residual, acceleration_residual: (nt,) largest magnitude.
+        angles: (nt, k) of k angles whose turns are counted, rad, as ``Model.angles_of`` has them.
         u_error: (nt, 13 n) estimated error of u (estimate.py); None where none was asked for.
     """
 
@@ -71,6 +73,7 @@ class Arrays:
     position_residual: Floats
     velocity_residual: Floats
     acceleration_residual: Floats
+    angles: Floats
     u_error: Floats | None = None
 
     def __attrs_post_init__(self) -> None:
@@ -104,8 +107,8 @@ class Arrays:
 
     @property
     def width(self) -> int:
-        """Numbers of u, v_dot and Lam at an instant."""
-        return sum(a.shape[1] for a in (self.u, self.v_dot, self.Lam))
+        """Numbers of u, v_dot, Lam and angles at an instant."""
+        return sum(a.shape[1] for a in (self.u, self.v_dot, self.Lam, self.angles))
 
     def with_error(self, u_error: Floats) -> "Arrays":
         """The same with an estimate of the error of u."""
@@ -133,12 +136,14 @@ def block_rows(count: int, width: int) -> Iterator[slice]:
 def column_sizes(subject: Subject) -> dict[str, int]:
     """Length of each dimension that a column may have besides time."""
     n = subject.body_count
-    return {"state": 13 * n, "velocity": 6 * n, "row": subject.row_count}
+    return {
+        "state": 13 * n, "velocity": 6 * n, "row": subject.row_count, "angle": subject.angle_count
+    }  # fmt: skip
 
 
 def row_width(subject: Subject) -> int:
     """Numbers in a row as the integrator delivers it."""
-    return 1 + (13 * subject.body_count + 1) + 6 * subject.body_count + subject.row_count + 4
+    return 2 + 19 * subject.body_count + subject.row_count + subject.angle_count + 4
 
 
 def _states(y: Floats, n: int) -> Floats:
@@ -156,7 +161,7 @@ def arrays_of(rows: Floats, subject: Subject) -> Arrays:
 
     Args:
         rows: (nt, row_width): t; the integrated state (angular velocity in body axes, work last);
-            v_dot; lambda; potential energy; largest residuals of the three levels.
+            v_dot; lambda; angles; potential energy; largest residuals of the three levels.
         subject: whose rows they are.
 
     Raises:
@@ -166,13 +171,8 @@ def arrays_of(rows: Floats, subject: Subject) -> Arrays:
     width = row_width(subject)
     if rows.ndim != 2 or rows.shape[1] != width:
         raise ValueError(f"rows should have the shape (nt, {width}), not {rows.shape}")
-    n, m = subject.body_count, subject.row_count
-    t, y, v_dot, Lam, last = np.split(rows, np.cumsum([1, 13 * n + 1, 6 * n, m]), axis=1)
-    return Arrays(
-        t[:, 0].copy(),
-        _states(y, n),
-        v_dot.copy(),
-        Lam.copy(),
-        y[:, -1].copy(),
-        *(last[:, k].copy() for k in range(4)),
-    )
+    n, m, k = subject.body_count, subject.row_count, subject.angle_count
+    parts = np.split(rows, np.cumsum([1, 13 * n + 1, 6 * n, m, k]), axis=1)
+    t, y, v_dot, Lam, angles, last = parts
+    columns = (t[:, 0], _states(y, n), v_dot, Lam, y[:, -1], *last.T, angles)
+    return arrays_from(np.array(column) for column in columns)

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from dap3d_core.interface.layout import ANGLE_WIDTH
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats, Group, Integers
 from dap3d_core.model.kinematics import read_only, split, to_body, to_global
 
 if TYPE_CHECKING:
-    from dap3d_core.formulations.machine import Machine, Rows
+    from dap3d_core.formulations.machine import Machine
+    from dap3d_core.formulations.rows import Rows
 
 #: With more constraint rows than this the Jacobian is a list of sparse arrays.
 DENSE_ROWS = 1000
@@ -85,7 +87,12 @@ def jacobians(machine: "Machine", t: Floats, u: Floats) -> Any:
 
 @np.errstate(all="ignore")  # as compiled code does
 def reactions(
-    machine: "Machine", t: Floats, u: Floats, Lam: Floats, joints: Collection[int]
+    machine: "Machine",
+    t: Floats,
+    u: Floats,
+    Lam: Floats,
+    joints: Collection[int],
+    angles: Floats | None = None,
 ) -> dict[int, dict[str, Reaction]]:
     """What joints exert on each of their bodies: D_slot^T lambda (spec 2).
 
@@ -95,6 +102,7 @@ def reactions(
         u: (nt, 13 n) states.
         Lam: (nt, m) multipliers, m rows in the order of the model.
         joints: places of the joints in the model.
+        angles: (nt, k) angles as ``Arrays`` has them; None where they are not known.
 
     Returns:
         For each joint a reaction for each slot, by its letter.
@@ -103,6 +111,8 @@ def reactions(
     found = [np.empty((len(t), *loop.shape)) for loop in loops]
     for k, time in placed(machine, t, u):
         for loop, out in zip(loops, found, strict=True):
+            if angles is not None:
+                loop.angles.set(angles[k])
             out[k] = loop.wrenches(time, Lam[k])
     return {
         int(joint): actions_of(machine.model, u, loop.group, place, out[:, n])
@@ -137,6 +147,21 @@ def actions_of(
         force, moment = read_only(wrenches[:, n, :3]), read_only(wrenches[:, n, 3:])
         found[slot] = Reaction(names[body], force, moment, turned, local)
     return found
+
+
+class Angles:
+    """The angles of instances of a group among numbers of their own: they are set, not counted."""
+
+    def __init__(self, model: Model, group: Group, places: Integers, numbers: Floats) -> None:
+        """Args: whose; their (k, par_width) numbers, which setting changes."""
+        self._numbers, self._columns = numbers, model.angles_of(group, places)
+        self._at = list(group.examined.layout.angles.values())
+
+    def set(self, angles: Floats) -> None:
+        """Let them be as reported at an instant, (all angles of the model,)."""
+        for column, at in zip(self._columns.T, self._at, strict=True):
+            self._numbers[:, at : at + ANGLE_WIDTH] = 0.0
+            self._numbers[:, at] = angles[column]
 
 
 def _own_loops(machine: "Machine", joints: Integers) -> list["_OwnLoop"]:
@@ -174,6 +199,8 @@ class _OwnLoop:
         self._idx = idx.ravel()
         par = s.par[p0 : p0 + group.count * numbers].reshape(group.count, numbers)
         self._par = np.concatenate([s.par, par[places].ravel()])  # tables keep their places
+        own = self._par[len(s.par) :].reshape(count, numbers)
+        self.angles = Angles(model, group, places, own)
         self._group = np.array([0, len(s.par), count])
         self._D = np.zeros((count, slots, rows, 6))
         self._gamma, self._nu = np.zeros(count * rows), np.zeros(count * rows)

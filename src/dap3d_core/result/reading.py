@@ -153,6 +153,8 @@ def _subject(dataset: Any, found: dict[str, Any]) -> Subject:
             shape = [0, *(3 for _ in constant.dimensions[1:])]
             kind = "i8" if constant.name in ("joint_rows", "point_body") else "f8"
             parts[constant.name] = np.zeros(shape, dtype=kind)
+    if "angle" in dataset.dimensions:
+        parts["angle_count"] = len(dataset.dimensions["angle"])
     for flag in ("has_potential", "is_isolated"):
         parts[flag] = bool(found[flag])
     return Subject(**parts)

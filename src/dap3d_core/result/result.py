@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
+import attrs
+
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats
 from dap3d_core.result.applied import Applied, applied
@@ -279,7 +281,8 @@ class Result(Kinematics):
 
     def _find_reactions(self, joints: list[int]) -> None:
         if joints:
-            found = reactions(self.machine, self.t, self.u, self.Lam, joints)
+            angles = self._angles()
+            found = reactions(self.machine, self.t, self.u, self.Lam, joints, angles)
             names = self.subject.joint_names
             self._reactions |= {names[joint]: one for joint, one in found.items()}
 
@@ -314,8 +317,23 @@ class Result(Kinematics):
             )
         if name not in self._applied:
             place = self.model.force_names.index(name)
-            self._applied[name] = applied(self.machine, self.t, self.u, self.v_dot, name, place)
+            self._applied[name] = applied(
+                self.machine, self.t, self.u, self.v_dot, name, place, self._angles()
+            )
         return self._applied[name]
+
+    def _angles(self) -> Floats | None:
+        """(nt, k) the angles whose turns are counted; None where an older file has none of them."""
+        if self.subject.angle_count == self.model.angle_count:
+            return self.arrays.angles
+        note = (
+            "the file holds no turns of angles, for an older dap3d wrote it: they are counted from "
+            "one reported instant to the next, and wrong where a body turns by more than half a "
+            "turn between two; run the scene anew"
+        )
+        if note not in self.record.notes:
+            self.record = attrs.evolve(self.record, notes=(*self.record.notes, note))
+        return None
 
     # ------------------------------------------------------------------ the whole
 

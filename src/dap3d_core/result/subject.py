@@ -24,6 +24,7 @@ class Subject:
         has_potential: whether every force has a potential (which a damper part still may not).
         is_isolated: whether nothing outside acts on the bodies, so that momentum is conserved:
             no force, and no joint with ground or with a single body.
+        angle_count: number of angles of forces and joints whose turns are counted.
     """
 
     body_names: tuple[str, ...]
@@ -36,6 +37,7 @@ class Subject:
     point_local: Floats
     has_potential: bool
     is_isolated: bool
+    angle_count: int = 0
 
     @property
     def body_count(self) -> int:
@@ -91,4 +93,5 @@ def subject_of(model: Model) -> Subject:
         has_potential=all("energy" in g.examined.type.kernels() for g in model.forces),
         is_isolated=not model.forces
         and all(len(slots) > 1 and 0 not in slots for slots in model.joint_slots),
+        angle_count=model.angle_count,
     )

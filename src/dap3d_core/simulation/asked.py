@@ -125,18 +125,12 @@ def refuse_adams(machine: Machine) -> None:
     """Adams methods look at many past states, which must lie on one smooth motion.
 
     Raises:
-        SimulationError: with method penalty projected states do not; with switches none are
-            located.
+        SimulationError: with method penalty projected states do not.
     """
     if machine.method == "penalty":
         raise SimulationError(
             "integrator adams does not fit method penalty, whose accelerations leave the "
             "constraints; use method standard, lsq or auto, or integrator dop853"
-        )
-    if len(machine.ending):
-        raise SimulationError(
-            "integrator adams does not locate where forces or joints change their law, and the "
-            "scene has such; use integrator dop853, dopri5 or radau"
         )
 
 

@@ -13,7 +13,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.machine import Machine, Rows
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.rows import Rows
 from dap3d_core.linear.rank import DENSE_ROWS
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial import FIT, correct_positions, displaced, fit_of, model_size

@@ -40,6 +40,7 @@ from dap3d_core.simulation.redundancy import Redundancy, redundancy_of
 from dap3d_core.simulation.sources import types_of
 from dap3d_core.simulation.start import Start, find_start
 from dap3d_core.simulation.state import state_of, time_of
+from dap3d_core.simulation.unseen import notes_on_laws
 
 Floats = NDArray[np.float64]
 Announce = Callable[[str], None]
@@ -131,6 +132,7 @@ class CompiledModel:
             *self.checked.notes,
             *self.model.notes,
             *notes_on_drivers(self.checked),
+            *notes_on_laws(self.checked),
             *(f"{INFORMATION}{note}" for note in cache_notes()),
         ]
         self._redundancy: Redundancy | None = None

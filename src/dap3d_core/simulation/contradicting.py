@@ -8,7 +8,8 @@ moment's rounding, so that the joints are put together a little later, too.
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.machine import Machine, Rows
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.rows import Rows
 from dap3d_core.model import Model
 from dap3d_core.model.kinematics import from_integrated
 from dap3d_core.simulation.binding import HELD

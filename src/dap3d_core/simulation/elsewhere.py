@@ -9,7 +9,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.machine import Machine, scaled_rows
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.rows import scaled_rows
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial import (
     correct_positions,

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from dap3d_core.formulations.friction import PASSES
 from dap3d_core.formulations.machine import Machine
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.switches import CHATTER
@@ -15,6 +16,29 @@ REASONS = {
     Status.NOT_FINITE: "a number came up that is beyond 1e+100, infinite or not a number",
     Status.PROJECTION_FAILED: "the state could not be projected onto the constraints",
 }
+
+
+def doubts(machine: Machine, rhs: int) -> list[str]:
+    """Notes on what was computed less surely than all else; rhs: evaluations of the run."""
+    notes = []
+    if count := machine.unsettled:
+        notes.append(
+            f"friction: the multipliers did not settle in {PASSES} passes, {count} times of {rhs} "
+            "or more; the last ones were used. Motion there is uncertain: a high mu may lock the "
+            "joint by itself"
+        )
+    if count := machine.singular_reports:
+        notes.append(
+            f"{count} times a pose was singular where it was reported: the rows leave "
+            "accelerations open there, and those reported, with their multipliers, are not "
+            "determined"
+        )
+    if count := machine.doubtful_turns:
+        notes.append(
+            f"turns of angles: the rate of turn changed so much within a step, {count} times, "
+            "that whole turns may be miscounted; give a tighter rtol, or a shorter step"
+        )
+    return notes
 
 
 def why_stopped(machine: Machine, integration: Integration, rank: int) -> str:

@@ -35,10 +35,11 @@ class Event:
             a function is called with the ``Instant`` there, and may change numbers of forces
             (``Instant.set``).
         name: what it is called in the result; made from the rest where it is left out.
+        every: s, the largest distance of two looks at it; by default as its values ask for it.
 
     Raises:
-        ValueError: several levels, one that is no finite number, or an action or direction that
-            does not exist.
+        ValueError: several levels, one that is no finite number, an action or direction that does
+            not exist, or an ``every`` that is no positive time.
         TypeError: ``of`` is neither a name nor a function.
     """
 
@@ -49,6 +50,7 @@ class Event:
     direction: int = attrs.field(default=0, kw_only=True)
     action: str | Callable[["Instant"], object] = attrs.field(default="record", kw_only=True)
     name: str = attrs.field(default="", kw_only=True)
+    every: float | None = attrs.field(default=None, kw_only=True)
 
     def __attrs_post_init__(self) -> None:
         given = [n for n in ("below", "above", "at") if getattr(self, n) is not None]
@@ -60,6 +62,8 @@ class Event:
             raise TypeError(f"{words}, not {of!r}")
         if not _is_number(self.level):
             raise ValueError(f"the level of an event is a finite number, not {self.level!r}")
+        if self.every is not None and not (_is_number(self.every) and self.every > 0.0):
+            raise ValueError(f"every is {self.every!r}; it should be a positive number of seconds")
         if self.direction not in (-1, 0, 1):
             raise ValueError(f"direction is {self.direction!r}; it should be -1, 0 or 1")
         if self.direction and self.sense != self.direction:

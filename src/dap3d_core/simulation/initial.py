@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from dap3d_core.assembly.system import System
 from dap3d_core.formulations.build import set_metric
-from dap3d_core.formulations.machine import Machine, Rows, scaled_rows
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.rows import Rows, scaled_rows
 from dap3d_core.linear.plan import Integers
 from dap3d_core.linear.rank import DENSE_ROWS, factor_independent
 from dap3d_core.model import Model

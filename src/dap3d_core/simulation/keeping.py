@@ -17,6 +17,7 @@ from dap3d_core.result.on_file import LARGE, FileArrays
 from dap3d_core.result.reading import arrays_in
 from dap3d_core.result.subject import subject_of
 from dap3d_core.simulation.compiled import CompiledModel
+from dap3d_core.simulation.pulling import Pulling
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +32,7 @@ class Keeper:
         run: the identity that its files carry.
         output: the file that is wanted in the end, or None.
         count: instants reported so far.
+        pulling: multipliers that must not be negative, and were.
     """
 
     def __init__(
@@ -59,6 +61,7 @@ class Keeper:
         self._compiled, self._most, self._force = compiled, most, force
         self._subject = subject_of(compiled.model)
         self._parts: list[Arrays] = []
+        self.pulling = Pulling(compiled.model)
         self._bytes = 0
         self._writer: ResultWriter | None = None
         #: (13 n,) the least and the largest value of each component so far.
@@ -76,6 +79,7 @@ class Keeper:
         if len(arrays):
             self.low = np.minimum(self.low, np.min(arrays.u, axis=0))
             self.high = np.maximum(self.high, np.max(arrays.u, axis=0))
+        self.pulling.look(arrays)
         self._bytes += 8 * len(arrays) * arrays.width
         large = self._bytes > LARGE
         if self._writer is None:

@@ -2,16 +2,13 @@
 
 from collections.abc import Iterable
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.machine import Machine
-from dap3d_core.interface import PluginError
-from dap3d_core.interface.checks import where_is
-from dap3d_core.interface.fields import specs_of
 from dap3d_core.model import Model
+from dap3d_core.model.knots import breaks_of
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Checked, Instance, Simulation
 
@@ -89,7 +86,7 @@ def stops_of(checked: Checked, model: Model, t_end: float) -> list[tuple[float, 
 
 
 def _breaks_of(functions: Iterable[Instance], t_end: float) -> list[float]:
-    return sorted({float(t) for f in functions for t in _breaks(f) if 0.0 < t < t_end})
+    return sorted({float(t) for f in functions for t in breaks_of(f) if 0.0 < t < t_end})
 
 
 def _stops(breaks: list[float]) -> list[tuple[float, bool]]:
@@ -102,16 +99,3 @@ def _instants(breaks: list[float], t_end: float) -> list[float]:
     corners = [0.0, *breaks[:STRETCHES], t_end]
     inner = [a + part * (b - a) for a, b in pairwise(corners) for part in BETWEEN]
     return [*corners, *inner, *(t_end * (GOLDEN * np.arange(1, SAMPLES) % 1.0)).tolist()]
-
-
-def _breaks(function: Instance) -> list[float]:
-    """What ``breaks`` of its type says of a function, finite numbers."""
-    type_: Any = function.examined.type
-    fields = specs_of(type_)
-    thing = type_(**{n: v for n, v in function.values.items() if n in fields})
-    try:
-        found = np.asarray(thing.breaks(), dtype=float).ravel()
-    except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
-        raise PluginError(f"{where_is(type_)}.breaks failed: {reason}") from error
-    return [float(t) for t in found[np.isfinite(found)]]

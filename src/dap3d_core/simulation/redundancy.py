@@ -7,7 +7,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.machine import Machine, Rows, scaled_rows
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.rows import Rows, scaled_rows
 from dap3d_core.linear.rank import DENSE_ROWS, WEIGHT, Dependency, Rank, dense_rank, sparse_rank
 from dap3d_core.model import Model
 from dap3d_core.simulation.binding import Binding, bindings

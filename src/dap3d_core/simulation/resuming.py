@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.system import UNSETTLED
+from dap3d_core.assembly.system import DOUBTFUL, UNSETTLED
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.restoring import check_alike, restored
 from dap3d_core.integrators.work import MOST_COUNTED, NEXT
@@ -312,9 +312,10 @@ def restore_system(run: Run, stored: Mapping[str, Any]) -> None:
     new = restored("system.par", par, stored.get("system.par"), np.flatnonzero(~changes))
     counts: Any = stored.get("system.settings")
     check_alike("system.settings", counts, settings)
-    if not (np.isfinite(new).all() and 0.0 <= counts[UNSETTLED] <= MOST_COUNTED):
+    own = counts[[UNSETTLED, DOUBTFUL]]
+    if not (np.isfinite(new).all() and ((own >= 0.0) & (own <= MOST_COUNTED)).all()):
         raise ValueError("the numbers of its forces, turns or counts are not finite")
-    par[:], settings[UNSETTLED] = new, counts[UNSETTLED]
+    par[:], settings[[UNSETTLED, DOUBTFUL]] = new, own
 
 
 def check_position(run: Run, rows: int) -> None:

@@ -9,10 +9,10 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.friction import PASSES
 from dap3d_core.integrators import METHODS, Integration, Status, make_adams
 from dap3d_core.integrators.integration import Statistics as Counts
 from dap3d_core.integrators.singular import begin_singular
+from dap3d_core.integrators.work import LONGEST
 from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import INFORMATION, Occurrence, Record, Result, ResultError, Statistics
 from dap3d_core.scene import Mistake, SceneError, Simulation
@@ -26,7 +26,7 @@ from dap3d_core.simulation.asked import (
 )
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.elsewhere import redundancy_elsewhere
-from dap3d_core.simulation.ending import event_notes, occurrences, why_stopped
+from dap3d_core.simulation.ending import doubts, event_notes, occurrences, why_stopped
 from dap3d_core.simulation.errors import RedundantError, SimulationError
 from dap3d_core.simulation.event import Event
 from dap3d_core.simulation.implicit import (
@@ -37,7 +37,7 @@ from dap3d_core.simulation.implicit import (
 )
 from dap3d_core.simulation.keeping import Keeper
 from dap3d_core.simulation.room import check_room, row_width
-from dap3d_core.simulation.second_run import Again, add_error
+from dap3d_core.simulation.second_run import Again, StepLimits, add_error, halved
 from dap3d_core.simulation.singular_start import SingularStart
 from dap3d_core.simulation.standing import Observer, Standing
 from dap3d_core.simulation.start import Start, start_notes
@@ -93,7 +93,8 @@ class Run:
         self.started = self.compile_time = 0.0
         self.singular: SingularStart | None = None
         self.rank = 0
-        self.first_step: float | None = None
+        #: Of a second run, which is to be finer than the first everywhere.
+        self.limits: StepLimits | None = None
         self.watcher = Watcher(compiled, events) if events else None
         self.watch, end = watch, float(self.times[-1])
         self.observer = None if watch is None else Observer(self.machine.model, end, watch)
@@ -186,10 +187,10 @@ class Run:
     def _again(self, progress: Progress | None) -> Again:
         """Makes a run with other settings and another first step, in memory."""
 
-        def again(settings: Simulation, first_step: float | None) -> Result:
+        def again(settings: Simulation, limits: StepLimits | None) -> Result:
             events = self.watcher.events if self.watcher else ()
             run = Run(self.compiled, settings, self.announce, events, self.watch)
-            run.first_step = first_step
+            run.limits = limits
             return run.go(progress, None, force=False)
 
         return again
@@ -239,7 +240,7 @@ class Run:
         y0 = machine.integrated(u0)
         width = 1 + len(y0) + machine.report_size
         self.options = options = integration_options(machine, settings) | {
-            "first_step": self.first_step,
+            "first_step": None if self.limits is None else self.limits.first,
             "buffer_rows": max(1, min(len(self.times), BUFFER_NUMBERS // width)),
         }
         try:
@@ -249,7 +250,6 @@ class Run:
             problem = machine.functions, machine.system, machine.loops, y0, self.times
             if settings.integrator == "adams":
                 refuse_adams(machine)
-                del options["ends"]
                 return make_adams(*problem, **options)
             name = settings.integrator
             if name == "auto":
@@ -259,7 +259,7 @@ class Run:
         except ValueError as error:
             raise SceneError([Mistake("step", settings.step, str(error))]) from error
         if singular is not None:
-            first = singular.first_step * (1.0 if self.first_step is None else AGAIN)
+            first = singular.first_step * (1.0 if self.limits is None else AGAIN)
             begin_singular(integration.work, machine.rates(0.0, u0, singular.acceleration), first)
         return integration
 
@@ -268,6 +268,9 @@ class Run:
         if self.announce is not None and not driver_is_cached("integrators"):
             self.announce("the integrator")
         integration.stops = self.compiled.pace(float(self.times[-1])).stops
+        if self.limits is not None:
+            integration.stops = halved(integration.stops)
+            integration.work.real[LONGEST] = self.limits.longest
         before = time.perf_counter()
         integration.compile()
         spent = time.perf_counter() - before
@@ -331,23 +334,14 @@ class Run:
 
     def _closing_notes(self) -> list[str]:
         """What is only told of a run that has come to an end."""
-        notes = []
-        if count := self.machine.unsettled:
-            notes.append(
-                f"friction: the multipliers did not settle in {PASSES} passes, {count} times of "
-                f"{self._statistics().rhs} or more; the last ones were used. Motion there is "
-                "uncertain: a high mu may lock the joint by itself"
-            )
-        if count := self.machine.singular_reports:
-            notes.append(
-                f"{count} times a pose was singular where it was reported: the rows leave "
-                "accelerations open there, and those reported, with their multipliers, are not "
-                "determined"
-            )
+        notes = doubts(self.machine, self._statistics().rhs)
         if self.settings.step is None and self.keeper is not None and self.keeper.count:
             keeper, model = self.keeper, self.machine.model
             notes += motion_notes(keeper.low, keeper.high, self.settings)
             notes += rounding_notes(self.runs, model.body_names)
+        if self.keeper is not None:
+            notes += self.keeper.pulling.notes()
+        notes += self.watcher.notes() if self.watcher else []
         notes += event_notes(self.runs, self._events())
         return notes + stiffness_notes(self.runs, self.settings.integrator)
 

@@ -1,8 +1,9 @@
 """The error of a run, estimated by a second one: tolerances ten times tighter, or half the step."""
 
 import os
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -21,8 +22,20 @@ TIGHTER = 10.0
 #: with equal steps, and their equal errors would not show in the difference.
 FIRST_STEP = 0.01
 
-#: Makes a run with other settings, and another first step (s) where steps are controlled.
-Again = Callable[[Simulation, float | None], Result]
+
+class StepLimits(NamedTuple):
+    """Limits on the steps of a second run, s: the first, and the longest.
+
+    Where a state is below the tolerances steps grow as far as they may, in both runs, and errors
+    that are the same in both do not show.
+    """
+
+    first: float
+    longest: float
+
+
+#: Makes a run with other settings, and with limits on its steps where these are controlled.
+Again = Callable[[Simulation, StepLimits | None], Result]
 
 
 def finer(settings: Simulation) -> Simulation | None:
@@ -62,7 +75,7 @@ def add_error(
         return
     words = _words(finer_settings)
     try:
-        second = again(finer_settings, _first_step(result, finer_settings))
+        second = again(finer_settings, _limits(result, finer_settings))
     except (SimulationError, SceneError) as error:
         _amend(result, output, f"its error was not estimated: in a second run at {words}, {error}")
         return
@@ -88,10 +101,19 @@ def _same_instants(result: Result, second: Result) -> bool:
     return bool(np.all(np.abs(result.t - second.t) <= 1e-3 * spacing))
 
 
-def _first_step(result: Result, settings: Simulation) -> float | None:
+def _limits(result: Result, settings: Simulation) -> StepLimits | None:
     if settings.step is not None or not result.stats.steps:
         return None
-    return FIRST_STEP * float(result.t[-1] - result.t[0]) / result.stats.steps
+    mean = float(result.t[-1] - result.t[0]) / result.stats.steps
+    return StepLimits(FIRST_STEP * mean, mean)
+
+
+def halved(stops: Sequence[tuple[float, bool]]) -> list[tuple[float, bool]]:
+    """Instants that no step goes over, and others in between: a step of the first run between two
+    of them is at least two of the second.
+    """
+    between = [(0.5 * (a + b), False) for (a, _), (b, _) in pairwise(stops)]
+    return sorted([*stops, *between])
 
 
 def _words(settings: Any) -> str:

@@ -20,7 +20,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.machine import Machine, Rows
+from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.rows import Rows
 from dap3d_core.linear.rank import DENSE_ROWS, Rank
 from dap3d_core.model.kinematics import split
 from dap3d_core.simulation.initial import (

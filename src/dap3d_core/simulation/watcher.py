@@ -5,7 +5,8 @@ the number that is watched passes its level there, to the last digit of time. So
 step (its error, the constraints) holds of the state at an event.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import attrs
@@ -13,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.assembly.system import KEPT
+from dap3d_core.formulations import RHS
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.result.limits import are_events, is_number
 from dap3d_core.result.occurrence import Occurrence
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.event import Event, Instant, Numbers, checked_events
+from dap3d_core.simulation.sampling import Sampler
 
 Floats = NDArray[np.float64]
 
-#: Where within a step interpolated states are looked at: an event may come and go.
-INSIDE = (0.25, 0.5, 0.75)
 EPSILON = float(np.finfo(float).eps)
 
 
@@ -38,6 +39,7 @@ class Watcher:
         self.compiled, self.events = compiled, checked_events(events)
         self.numbers = Numbers(compiled)
         self.occurrences: list[Occurrence] = []
+        self._samplers = [Sampler(event.every) for event in self.events]
         self._values: list[float] = []
         self._sides: list[float] = []
 
@@ -48,6 +50,7 @@ class Watcher:
             "occurrences": [attrs.asdict(one) for one in self.occurrences],
             "values": self._values,
             "sides": self._sides,
+            "samplers": [sampler.state() for sampler in self._samplers],
         }
 
     def restore(self, found: Mapping[str, Any]) -> None:
@@ -65,6 +68,11 @@ class Watcher:
             raise ValueError("what events have found is damaged")
         self.occurrences = [Occurrence(**one) for one in found["occurrences"]]
         self._values, self._sides = list(values), list(sides)
+        states: Any = found.get("samplers")
+        if not (isinstance(states, list) and len(states) == len(self.events)):
+            raise ValueError("what is known of how events change is damaged")
+        for sampler, state in zip(self._samplers, states, strict=True):
+            sampler.restore(state)
         if any(one.changes for one in self.occurrences):
             self.numbers.given = self.compiled.machine.system.par.copy()
 
@@ -72,6 +80,16 @@ class Watcher:
     def changed_forces(self) -> set[str]:
         """Names of the forces whose numbers events have changed."""
         return {force for one in self.occurrences for force in one.changes}
+
+    def notes(self) -> list[str]:
+        """Which events changed faster than they could be looked at."""
+        return [
+            f"event {event.title}: from t = {sampler.lost:.6g} s on it changed too fast to be "
+            "followed, at some times at least: it may have passed its level unseen. Let it change "
+            "more slowly, or give a shorter step"
+            for event, sampler in zip(self.events, self._samplers, strict=True)
+            if sampler.lost is not None
+        ]
 
     def advance(self, integration: Integration, budget: int) -> Status:
         """As ``Integration.advance``, step by step."""
@@ -88,7 +106,7 @@ class Watcher:
     def _step(self, integration: Integration) -> None:
         arrays = self._arrays(integration)
         saved = [array.copy() for array in arrays]
-        t, y, slope = integration.t, integration.y, integration.slope
+        t, y, slope = integration.t, integration.y, self._slope(integration)
 
         def go_to(end: float) -> Instant:
             """Make the step again, to another end."""
@@ -102,9 +120,11 @@ class Watcher:
         if integration.t == t:
             return
         here = self._instant(integration)
-        ahead = self._ahead(integration, here, t, y, slope)
-        if ahead:
-            here = go_to(min(self._locate(go_to, t, k, end) for k, end in ahead))
+        within = self._within(integration, here, t, y, slope)
+        found = {k: self._ahead(k, values) for k, values in enumerate(within)}
+        ends = [self._end(go_to, t, k, *ahead) for k, ahead in found.items() if ahead]
+        if ends:
+            here = go_to(min(ends))
         self._take_notice(integration, here)
 
     def _arrays(self, integration: Integration) -> list[Any]:
@@ -122,28 +142,58 @@ class Watcher:
         """Whether a number has passed its level since the last step; that it may be zero counts."""
         return self._sides[k] != 0.0 and value * self._sides[k] <= 0.0
 
-    def _ahead(
-        self, integration: Integration, here: Instant, t: float, y: Floats, slope: Floats | None
-    ) -> list[tuple[int, float]]:
-        """Events within the step from t: (which, a time in the step at which it is past)."""
-        past = [self._is_past(k, value) for k, value in enumerate(self._all(here))]
-        found = [
-            (k, here.t)
-            for k, event in enumerate(self.events)
-            if past[k] and event.sense * self._sides[k] <= 0.0
-        ]
-        last = integration.slope
-        if slope is None or last is None or all(past):
-            return found
-        h = here.t - t
-        for part in INSIDE:
-            middle = hermite(part, h, y, slope, integration.y, last)
-            instant = Instant(self.compiled, t + part * h, middle, self.numbers)
-            for k, event in enumerate(self.events):
-                if not past[k] and self._is_past(k, event.value(instant)):
-                    past[k] = True
-                    found.append((k, instant.t))
+    def _slope(self, integration: Integration) -> Floats:
+        """dy/dt where the integration stands."""
+        slope = integration.slope
+        if slope is not None:
+            return slope
+        machine, found = self.compiled.machine, np.zeros_like(integration.y)
+        with np.errstate(all="ignore"):  # as compiled code does
+            machine.functions[RHS](
+                integration.t, integration.y, found, machine.system, machine.loops
+            )
         return found
+
+    def _within(
+        self, integration: Integration, here: Instant, t: float, y: Floats, slope: Floats
+    ) -> list[Iterator[tuple[float, float]]]:
+        """For each event instants within the step from t, and its values there, in order."""
+        end, last, h = integration.y, self._slope(integration), here.t - t
+        known: dict[float, Instant] = {here.t: here}
+
+        def instant(time: float) -> Instant:
+            if time not in known:
+                between = hermite((time - t) / h, h, y, slope, end, last)
+                known[time] = Instant(self.compiled, time, between, self.numbers)
+            return known[time]
+
+        def value(event: Event, time: float) -> float:
+            return event.value(instant(time))
+
+        return [
+            sampler.look(partial(value, event), t, first, here.t)
+            for event, sampler, first in zip(self.events, self._samplers, self._values, strict=True)
+        ]
+
+    def _ahead(self, k: int, values: Iterator[tuple[float, float]]) -> tuple[float, bool] | None:
+        """A time in the step at which event k is past, and whether in its direction.
+
+        One in the other direction is told where the event comes after it in the same step.
+        """
+        side, passed = self._sides[k], None
+        for time, value in values:
+            if side == 0.0 or value * side > 0.0:
+                continue
+            if self.events[k].sense * side <= 0.0:
+                return (time, True) if passed is None else (passed, False)
+            side, passed = -side, time
+        return None
+
+    def _end(
+        self, go_to: Callable[[float], Instant], start: float, k: int, end: float, sought: bool
+    ) -> float:
+        """Where a step is to end for event k."""
+        return self._locate(go_to, start, k, end) if sought else end
 
     def _locate(self, go_to: Callable[[float], Instant], start: float, k: int, end: float) -> float:
         """The first time after ``start`` at which event k is past, to the last digits."""

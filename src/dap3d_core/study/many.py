@@ -15,7 +15,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.assembly.system import UNSETTLED, System
+from dap3d_core.assembly.system import DOUBTFUL, UNSETTLED, System
+from dap3d_core.integrators.reporting import project_state
 from dap3d_core.integrators.work import (
     CUT,
     CUTS,
@@ -26,6 +27,7 @@ from dap3d_core.integrators.work import (
     LIMIT,
     LOOKED,
     NOISE,
+    PROJECT_ON,
     RHS,
     ROW,
     RUNNING,
@@ -193,6 +195,12 @@ def next_stop(
                 return t
             real[T] = np.nextafter(t, np.inf)
             restart(work)
+            if work.integer[PROJECT_ON] != 0:
+                work.integer[STATUS] = project_state(
+                    real, work.integer, real[T], work.state[Y], functions[1], system, loops
+                )
+                if work.integer[STATUS] != RUNNING:
+                    return t
     return np.inf
 
 
@@ -237,6 +245,6 @@ def run_points(
                 copy_into(points.rows[p * nt + k], work.rows[k])
             found[p, ENDED], found[p, ROWS] = integer[STATUS], integer[ROW]
             found[p, TAKEN], found[p, CALLS] = integer[STEPS], integer[RHS]
-            found[p, LOOSE] = system.settings[UNSETTLED]
+            found[p, LOOSE] = system.settings[UNSETTLED] + system.settings[DOUBTFUL]
             at[POINT] += 1
             at[BEGUN] = 0

@@ -43,7 +43,7 @@ class Modelling:
         """Args: what was compiled, a machine of it that nobody else uses, and what varies."""
         self._compiled, self._machine, self._numbers = compiled, machine, numbers
         self._t_end = t_end
-        self._stops = compiled.pace(t_end).stops
+        self._stops, self._ending = compiled.pace(t_end).stops, machine.ending
         settings = compiled.scene.simulation
         self._asked = (bool(settings.correct), settings.hold, str(settings.correct_metric))
         self._rank = compiled.start(*self._asked).redundancy.rank.rank
@@ -75,6 +75,8 @@ class Modelling:
         if found.rank.rank != self._rank or not found.is_plain:
             return None
         if stops_of(checked, model, self._t_end) != self._stops:
+            return None
+        if not np.array_equal(machine.ending, self._ending):
             return None
         if undefined_directions(checked.scene, model, start.u, model_size(machine)):
             return None

@@ -105,6 +105,7 @@ class Lanes:
         """Args: a machine of the model, one of ``packed(model, count)``, how many copies."""
         self.count = count
         self._n, self._rows = one.model.body_count, one.model.row_count
+        self._angles = [g.count * len(g.examined.layout.angles) for g in one.model.acting]
         self._par = _places_of_par(one, many, count)
         self._sizes = (one.system.par.size, one.system.body.size)
         self._first = (many.system.par.size, many.system.par.size + many.system.body.size)
@@ -139,7 +140,7 @@ class Lanes:
         """
         k, nt, _ = rows.shape
         n, m, count = self._n, self._rows, self.count
-        out = np.full((k, count, nt, 1 + 13 * n + 1 + 6 * n + m + 4), np.nan)
+        out = np.full((k, count, nt, 1 + 13 * n + 1 + 6 * n + m + sum(self._angles) + 4), np.nan)
         out[..., 0] = rows[:, None, :, 0]
         source, target = 1, 1
         for width in (7 * n, 6 * n):
@@ -147,7 +148,7 @@ class Lanes:
             out[..., target : target + width] = part.transpose(0, 2, 1, 3)
             source, target = source + width * count, target + width
         source, target = source + 1, target + 1
-        for width in (6 * n, m):
+        for width in (6 * n, m, *self._angles):
             part = rows[:, :, source : source + width * count].reshape(k, nt, count, width)
             out[..., target : target + width] = part.transpose(0, 2, 1, 3)
             source, target = source + width * count, target + width

@@ -17,6 +17,7 @@ from dap3d_core.formulations.build import set_metric
 from dap3d_core.formulations.machine import Machine
 from dap3d_core.interface.checks import pose
 from dap3d_core.interface.fields import FieldSpec, specs_of
+from dap3d_core.interface.layout import ANGLE_WIDTH
 from dap3d_core.interface.poses import BodyPose
 from dap3d_core.interface.types import Function
 from dap3d_core.kernels.gather import BODY_WIDTH, JP, MASS
@@ -342,5 +343,6 @@ def _turn_counters(machine: Machine) -> Integers:
         if kind == "angle":
             first, width = int(machine.system.groups[q, 1]), group.examined.layout.par_width
             offsets = group.examined.layout.angles.values()
-            found += [first + offset + width * np.arange(group.count) for offset in offsets]
+            every = [offset + k for offset in offsets for k in range(ANGLE_WIDTH)]
+            found += [first + at + width * np.arange(group.count) for at in every]
     return np.concatenate(found)

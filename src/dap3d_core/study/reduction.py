@@ -81,10 +81,9 @@ class Reduction:
         if not all(self.of_rows.values()):
             return False
         model = self._compiled.model
-        machine, n, m = self._compiled.machine, model.body_count, model.row_count
-        rows = np.random.default_rng(0).random((1, 3, 2 + 19 * n + m + 4))
+        machine, n = self._compiled.machine, model.body_count
+        rows = np.random.default_rng(0).random((1, 3, 2 + 13 * n + machine.report_size))
         rows[..., 1 + 13 * n] = rows[..., -4:] = np.nan
-        assert rows.shape[-1] == 2 + 13 * n + machine.report_size
         found = self.reduce(rows, np.arange(3.0))
         return all(bool(np.all(np.isfinite(values))) for values in found.values())
 

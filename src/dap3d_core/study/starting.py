@@ -12,6 +12,7 @@ from typing import Any
 from dap3d_core.assembly.evaluate import call_kinds, place, place_bodies
 from dap3d_core.assembly.system import (
     ANGLE,
+    DOUBTFUL,
     EVEN,
     LENGTH,
     SCRATCH,
@@ -180,7 +181,7 @@ def remember(t: float, y: Floats, system: System, loops: Any) -> None:
     place(t, y, system, loops)
     for k in range(F.shape[0]):
         F[k, 4] = F[k, 0]
-    system.settings[UNSETTLED] = 0.0
+    system.settings[UNSETTLED] = system.settings[DOUBTFUL] = 0.0
     call_kinds(ANGLE, ANGLE, t, system, loops, unused, unused, unused)
 
 

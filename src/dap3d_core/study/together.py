@@ -10,6 +10,7 @@ from dap3d_core.result import INFORMATION
 from dap3d_core.scene import SceneError
 from dap3d_core.simulation import AssemblyError
 from dap3d_core.simulation.initial import ROUNDING, Initial, correction_notes, distance
+from dap3d_core.simulation.pulling import Pulling
 from dap3d_core.simulation.start import Start
 from dap3d_core.study import many, starting
 from dap3d_core.study.modelling import Modelling
@@ -58,6 +59,7 @@ class Together:
         self._modelling = Modelling(compiled, machine, ensemble.numbers, end)
         self._runs = Runs(machine, settings, ensemble.times, compiled.pace(end).stops)
         self._size = self._runs.size
+        self._pulling = Pulling(compiled.model)
         self._places: Places | None = None
         self._packs: Packs | None = None
         with contextlib.suppress(NotCopiedError):
@@ -73,7 +75,9 @@ class Together:
             which, found = self._run_copied(values)
         else:
             which, found = self._run_modelled(values, notes, part.start)
+        first = 2 + 19 * self._ensemble.compiled.model.body_count
         good = found.done & (found.numbers[:, many.LOOSE] == 0.0)
+        good &= ~self._pulling.among(found.rows[..., first:])  # these are run alone, and noted
         which, rows = which[good], found.rows[good]
         self._note(found, good, which, notes, part.start)
         batch.status[places[which]] = DONE

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.interface.checks import ATTEMPTS, Examined, prepared, set_ends, where_is
 from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.interface.layout import size
+from dap3d_core.interface.layout import ANGLE_WIDTH, size
 from dap3d_core.interface.poses import BodyPose, pose
 from dap3d_core.interface.samples import numbers, random_field
 from dap3d_core.interface.writer import LOOP_KINDS, write
@@ -248,7 +248,8 @@ def _numbers(examined: Examined, values: Mapping[str, Any], rng: random.Random) 
         par[offset], par[offset + 1] = float(len(par)), float(len(rows) // columns)
         par += rows
     for offset in layout.angles.values():
-        par[offset] = rng.uniform(-10.0, 10.0)  # turns that were counted before
+        # turns that were counted before, and no rate there
+        par[offset : offset + ANGLE_WIDTH] = rng.uniform(-10.0, 10.0), 0.0, 0.0
     return par
 
 

@@ -232,7 +232,7 @@ def _given(examined: Examined, values: Mapping[str, Any]) -> Examined:
     One by whose absence no variant is told from another is always there.
     """
     there = {f: examine(Cubic) for f in examined.argument_functions if values.get(f, True)}
-    return bind_functions(examined, there) if there else examined
+    return bind_functions(examined, there, dict.fromkeys(there, 0)) if there else examined
 
 
 def own_values(examined: Examined) -> dict[str, Any] | None:

@@ -1,0 +1,64 @@
+"""Where functions take another form: what ``breaks`` of their types says."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.interface.checks import PluginError, where_is
+from dap3d_core.interface.fields import specs_of
+from dap3d_core.interface.types import Function
+from dap3d_core.scene import Instance
+
+Floats = NDArray[np.float64]
+
+#: Where the knots of a function without any stand, beside functions that have some.
+FAR = 1e100
+
+
+def breaks_of(function: Instance) -> Floats:
+    """Arguments at which a function takes another form, as its type says: finite numbers.
+
+    Raises:
+        PluginError: ``breaks`` of the type failed.
+    """
+    type_: Any = function.examined.type
+    fields = specs_of(type_)
+    thing = type_(**{n: v for n, v in function.values.items() if n in fields})
+    try:
+        found = np.asarray(thing.breaks(), dtype=float).ravel()
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise PluginError(f"{where_is(type_)}.breaks failed: {reason}") from error
+    finite: Floats = found[np.isfinite(found)]
+    return finite
+
+
+def breaks_are_told(function: Instance) -> bool:
+    """Whether the type of a function says where it takes another form, or that it never does."""
+    type_: Any = function.examined.type
+    return bool(type_.smooth) or type_.breaks is not Function.breaks
+
+
+def knots_of(functions: Sequence[Instance]) -> Floats:
+    """(functions, k) their breaks, in order; the last one again where another function has more.
+
+    Of a function without any, among others that have some, they are FAR away.
+    """
+    found = [np.unique(breaks_of(function)) for function in functions]
+    count = max(map(len, found))
+    knots = np.full((len(found), count), FAR)
+    for row, own in zip(knots, found, strict=True):
+        if len(own):
+            row[:] = own[-1]
+            row[: len(own)] = own
+    return knots
+
+
+def narrowest(knots: Floats) -> float:
+    """The least distance of two knots that differ; of a single one its own size."""
+    own = np.unique(knots[knots < FAR])
+    if len(own) > 1:
+        return float(np.min(np.diff(own)))
+    return float(np.max(np.abs(own), initial=0.0))

@@ -1,0 +1,105 @@
+"""Angles that count whole turns: between reports, in files, sweeps and checkpoints; long steps.
+
+The wheel is wound up by 100 rad/s: x = 100 sin t, 16 turns and back, 1.6 turns between two reports.
+"""
+
+import attrs
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+from dap3d_core.result import Result
+
+SPEED, STIFFNESS = 100.0, 1.0
+
+
+def winding(speed=SPEED, **simulation):
+    """A wheel of 1 kg m^2 on a spring of 1 N m/rad that counts turns."""
+    scene = dap.Scene(name="winding")
+    scene.add_body("wheel", mass=1.0, Jp=(1.0, 1.0, 1.0), w=(0.0, 0.0, speed))
+    scene.add_joint("rev", "pin", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
+    scene.add_force("rot_sda", "spring", v_i="wheel.x", v_j="ground.x", axis="ground.z",
+                    k=STIFFNESS, turns=True)  # fmt: skip
+    scene.simulation = attrs.evolve(scene.simulation, t_end=3.0, dt=0.1, **simulation)
+    return scene
+
+
+def check(result, tolerance=1e-4):
+    """Energy and moment of the spring are those of the wheel wound up by 100 sin t."""
+    wound = SPEED * np.sin(result.t)
+    spring = result.force("spring")
+    np.testing.assert_allclose(spring.energy, 0.5 * STIFFNESS * wound**2, atol=100.0 * tolerance)
+    np.testing.assert_allclose(spring.energy, result.energy.potential, atol=1e-9)
+    np.testing.assert_allclose(spring.on["i"].moment[:, 2], -STIFFNESS * wound, atol=tolerance)
+
+
+def test_a_spring_between_two_reports_winds_up(tmp_path):
+    """Also from a file, and from the arrays that a data set has."""
+    result = dap.simulate(winding())
+    check(result)
+    result.save(tmp_path / "run.nc")
+    check(dap.open(tmp_path / "run.nc"))
+    angles = result.to_xarray()["angles"]
+    assert angles.dims == ("time", "angle")
+    assert angles.attrs["units"] == "rad"
+    np.testing.assert_allclose(angles[:, 0], -SPEED * np.sin(result.t), atol=1e-4)
+
+
+def test_a_file_of_an_older_program_has_no_turns_and_says_so(tmp_path):
+    result = dap.simulate(winding(), dt=0.02)  # less than half a turn between two
+    older = Result.of_parts(
+        attrs.evolve(result.subject, angle_count=0),
+        attrs.evolve(result.arrays, angles=np.zeros((len(result.t), 0))),
+        result.record,
+        lambda: None,
+    )
+    older.save(tmp_path / "older.nc")
+    read = dap.open(tmp_path / "older.nc")
+    check(read)
+    assert sum("holds no turns" in note for note in read.notes) == 1
+
+
+def test_a_resumed_run_keeps_its_turns(tmp_path):
+    class Enough(Exception):
+        pass
+
+    def stop(t, t_end):
+        if t > 1.4:
+            raise Enough
+
+    path = tmp_path / "run.nc"
+    with pytest.raises(Enough):
+        dap.simulate(winding(), dt=0.001, output=path, checkpoint=np.inf, progress=stop)
+    check(dap.resume(tmp_path / "run.nc.checkpoint"))
+
+
+@pytest.mark.parametrize("pack", [1, 4])
+def test_the_points_of_a_sweep_keep_their_turns(pack):
+    def moment(result):
+        return float(result.force("spring").on["i"].moment[-1, 2])
+
+    stiffness = np.array([0.5, 1.0, 1.5, 2.0])
+    found = dap.sweep(
+        winding(), {"forces.spring.k": stiffness}, outputs={"last": moment}, pack=pack
+    )
+    w = np.sqrt(stiffness)
+    np.testing.assert_allclose(found["last"], -SPEED * w * np.sin(3.0 * w), atol=1e-3)
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4])
+def test_long_steps_do_not_lose_turns(rtol):
+    """At loose tolerances a step turns the wheel by more than half a turn.
+
+    A turn that is lost changes the speed by 2 pi k / J for the time of a step, some 1 rad/s each.
+    """
+    result = dap.simulate(winding(), integrator="dop853", rtol=rtol, atol=rtol / 100.0)
+    assert 3.0 * 2.0 / np.pi * SPEED / result.stats.steps > np.pi / 2.0
+    np.testing.assert_allclose(result.w[:, 0, 2], SPEED * np.cos(result.t), atol=SPEED * 100 * rtol)
+
+
+def test_turns_that_may_be_lost_are_noted():
+    """Fixed steps in which the rate changes by more than a turn per step."""
+    result = dap.simulate(winding(1000.0), integrator="dop853", step=0.1)
+    assert any(note.startswith("turns of angles:") for note in result.notes)
+    quiet = dap.simulate(winding(), t_end=1.0)
+    assert not any("turns of angles" in note for note in quiet.notes)
