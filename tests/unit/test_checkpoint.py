@@ -139,7 +139,7 @@ def test_the_model_s_own_types_are_resumed_where_they_are_allowed(tmp_path):
     with pytest.raises(CheckpointError, match=r"ball-contact.*--model FOLDER --allow-code"):
         dap.resume(checkpoint)
     text = (folder / "plugin.py").read_text()
-    (folder / "plugin.py").write_text(f"{text}\n# another formula\n")
+    (folder / "plugin.py").write_text(f"{text}\nEXTRA = 1\n")
     with pytest.raises(CheckpointError, match=r"formulas of force ball-contact have changed"):
         dap.resume(checkpoint, model=folder, allow_code=True)
     (folder / "plugin.py").write_text(text)

@@ -59,7 +59,7 @@ KEYS: dict[str, Form] = {
 _HEADER = "checkpoint.json"
 #: What readers of archives and arrays raise for damaged ones.
 _UNREADABLE = (
-    zipfile.BadZipFile, NotImplementedError, EOFError, ValueError, OSError, MemoryError, KeyError,
+    zipfile.BadZipFile, RuntimeError, EOFError, ValueError, OSError, MemoryError, KeyError,
 )  # fmt: skip
 _ZIP = b"PK\x03\x04"
 #: A header with the scene's text is larger than a scene may be, but not by much.

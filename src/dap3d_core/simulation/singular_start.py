@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.machine import Machine
-from dap3d_core.formulations.rows import Rows
+from dap3d_core.formulations.rows import Rows, scaled_rows
 from dap3d_core.linear.rank import DENSE_ROWS, Rank
 from dap3d_core.model.kinematics import split
 from dap3d_core.simulation.initial import (
@@ -123,10 +123,12 @@ def _loses_rank(machine: Machine, u: Floats, rank: Rank, t: float) -> bool:
     free = wish - least_change(machine, rows, flow, t)
     if np.linalg.norm(free) <= NONE * np.linalg.norm(wish):
         return False
-    quadratic = _quadratic(machine, still, free, t)
+    gradient = scaled_rows(rows, machine.model.length)[1]  # dependencies are those of scaled rows
+    quadratic = _quadratic(machine, still, free, t) / gradient
     gaps = [d.combinations @ quadratic[d.rows] for d in rank.dependencies]
     worst = max(float(np.max(np.abs(gap))) for gap in gaps)
-    return worst > FULFILLED * _size(machine, rows, free)
+    scaled = attrs.evolve(rows, value=rows.value / gradient[rows.row])
+    return worst > FULFILLED * _size(machine, scaled, free)
 
 
 def _quadratic(machine: Machine, still: Floats, v: Floats, t: float) -> Floats:
