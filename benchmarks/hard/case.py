@@ -64,7 +64,6 @@ class Case:
         loose: a run passes whose error is at most this many times its rtol (with a fixed step,
             1e-8): 1e3, as in the ledger, and more where the motion itself multiplies errors.
         floor: what the reference leaves out, or to how many digits it is known.
-        beyond: entry of the ledger that is beyond its limit though the run passes, or "ok".
         slow: whether its first try takes longer than a test may that is run each time.
     """
 
@@ -81,7 +80,6 @@ class Case:
     test: str
     loose: float = 1e3
     floor: float = 0.0
-    beyond: str = "ok"
     slow: bool = False
 
     def limit(self, attempt: Try) -> float:

@@ -74,7 +74,6 @@ SCALES = (
         (Try(), Try(settings=TIGHT, why=ROUNDED), Try("dopri5"), Try("adams"),
          Try("radau"), Try("rk4", settings={"step": 1e-3}),
          Try(method="lsq", why=REGULARISED), Try(method="penalty", why=REGULARISED)), HERE,
-        beyond="acceleration",  # see ROUNDED
     ),
     Case(
         "light on heavy", "1 kg hanging on a cart of 1e9 kg",

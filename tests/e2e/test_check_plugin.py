@@ -73,7 +73,7 @@ def test_a_type_that_cannot_be_loaded_is_wrong(dap3d):
     said = " ".join(done.stdout.split())
     assert "NameError" in said
     line = next(k for k, x in enumerate(SPRING.splitlines(), 1) if "dot(d, d), d)" in x)
-    assert f"rubber.py:{line}]" in said.replace("rubber.py: ", "rubber.py:").replace("- ", "-")
+    assert f"rubber.py:{line}]" in said.replace(" ", "")  # a long path is broken over lines
     assert "1 of 1 type cannot be loaded" in said
     assert "wrong formulas" not in said
 

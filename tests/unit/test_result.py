@@ -30,12 +30,15 @@ def about_z(angle):
     return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
 
 
-def rows_of(model, t, u, v_dot, Lam, work=0.0, potential=0.0, residuals=(0.0, 0.0, 0.0)):
+def rows_of(
+    model, t, u, v_dot, Lam, work=0.0, potential=0.0, residuals=(0.0, 0.0, 0.0), angles=None
+):
     """Rows as the integrator delivers them."""
+    angles = np.zeros((len(t), model.angle_count)) if angles is None else angles
     last = np.tile([0.0, *residuals], (len(t), 1))
     last[:, 0] = potential
     y = to_integrated(u, model.body_count, work)
-    return np.hstack([t[:, None], y, v_dot, Lam, last])
+    return np.hstack([t[:, None], y, v_dot, Lam, angles, last])
 
 
 def result_of(scene, rows, model=None, method="standard", **more):

@@ -150,7 +150,7 @@ def test_turns_are_counted_again_from_the_start():
     angle = 8 * np.pi * t  # a fifth of a turn and less from one instant to the next
     u = np.zeros((41, 13))
     u[:, 3:7] = about_z(angle)[:, 0]
-    rows = rows_of(model, t, u, np.zeros((41, 6)), np.zeros((41, 0)))
+    rows = rows_of(model, t, u, np.zeros((41, 6)), np.zeros((41, 0)), angles=-angle[:, None])
     result = result_of(scene, rows, model, "unconstrained")
     for _ in range(2):  # what a first evaluation counted does not enter a second
         found = result.force("coil")

@@ -39,12 +39,10 @@ def titles(pairs):
 
 @pytest.mark.parametrize(("case", "attempt"), FIRST)
 def test_the_defaults_pass_every_case(case, attempt):
-    """Error within the case's limit, and every entry of the ledger within its own, but for one:
-    the accelerations of 1 kg that holds 1e9 kg, which are rounded by 1e-6 of themselves."""
+    """Error within the case's limit, and every entry of the ledger within its own."""
     result = case.simulate(attempt)
     assert case.error(result) <= case.limit(attempt)
-    beyond = [name for name, entry in result.ledger.items() if entry.ok is False]
-    assert (beyond or ["ok"]) == [case.beyond]
+    assert [name for name, entry in result.ledger.items() if entry.ok is False] == []
 
 
 @pytest.mark.slow

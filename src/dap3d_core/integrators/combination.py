@@ -11,6 +11,8 @@ from dap3d_core.kernels.cache import compiled_inside
 #: Larger numbers leave double precision in products such as m v^2: they end a run before an energy
 #: of it becomes infinite. What a scene may give has the same bound (scene/values.py).
 _LARGEST = 1e100
+#: Beyond this magnitude a state is close to a pole, not in a short transition.
+POLE = 1e12
 
 
 @compiled_inside
@@ -82,8 +84,15 @@ def scaled_beyond(
     x: Floats, y0: Floats, y1: Floats, f0: Floats, f1: Floats, dt: float, size: int, rtol: float,
     tolerance: Floats,
 ) -> float:  # fmt: skip
-    """As ``scaled_largest``; rates f0, f1 make dt max(|f0_i|, |f1_i|) of a doubt dt of time."""
-    largest = 0.0
+    """As ``scaled_largest``; rates f0, f1 make dt max(|f0_i|, |f1_i|) of a doubt dt of time.
+
+    Close to a pole that excuses nothing.
+    """
+    largest, most = 0.0, 0.0
+    for i in range(size):
+        most = max(most, abs(y0[i]), abs(y1[i]))
+    if most > POLE:
+        dt = 0.0
     for i in range(size):
         doubt = dt * max(abs(f0[i]), abs(f1[i]))
         scale = tolerance[ABSOLUTE, i] + rtol * max(abs(y0[i]), abs(y1[i]))

@@ -12,8 +12,8 @@ from dap3d_core.scene import Checked
 
 #: Words of kernels that choose between formulas.
 CHOOSING = (where, lookup)
-#: Kernels that make a law.
-LAWS = ("wrench", "energy", "C", "gamma")
+#: Kernels that make the law of a force.
+LAWS = ("wrench", "energy")
 
 
 def notes_on_laws(checked: Checked) -> list[str]:
@@ -34,9 +34,9 @@ def notes_on_laws(checked: Checked) -> list[str]:
         if not breaks_are_told(functions[name])
     ]
     by_type: dict[Any, list[str]] = {}
-    for element in elements:
+    for element in checked.forces:
         by_type.setdefault(element.examined.type, []).append(element.name)
-    examined = {element.examined.type: element.examined for element in elements}
+    examined = {force.examined.type: force.examined for force in checked.forces}
     return [*found, *_branching(by_type, examined)]
 
 
