@@ -51,7 +51,7 @@ verify: $(VENV)/.installed-docs  ## the slow verification alone
 	@$(PYTHON) -m pytest -n auto --dist loadfile --no-loadscope-reorder -m slow
 
 unit-nojit: $(VENV)/.installed-test  ## quick unit tests with kernels as plain Python, and their coverage
-	@NUMBA_DISABLE_JIT=1 $(PYTHON) -m pytest -n auto -m "not slow" --cov --cov-report=term tests/unit
+	@DAP3D_PLAIN=1 $(PYTHON) -m pytest -n auto -m "not slow" --cov --cov-report=term tests/unit
 
 # All checks run, also after one has failed; the last line says which.
 lint: $(VENV)/.installed-dev  ## format, lint, types, floors, sizes

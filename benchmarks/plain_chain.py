@@ -6,12 +6,11 @@ extents. It knows that the chain is a chain; the framework has to find out.
 """
 
 import numpy as np
-from numba import njit
 
-OPTIONS = {"fastmath": {"contract"}, "error_model": "numpy", "cache": True}
+from dap3d_core.kernels.cache import compiled
 
 
-@njit(**OPTIONS)
+@compiled
 def rhs(u, du, n, mass, J, A, w, f, s, D, S, x, gravity):
     """du/dt of u = (r, p of each body; v, omega of each body), all in global components."""
     for b in range(n):
@@ -105,13 +104,13 @@ def rhs(u, du, n, mass, J, A, w, f, s, D, S, x, gravity):
                     for e in range(6):
                         t += D[36 * j + 18 + 6 * r + e] * D[36 * j - 36 + 6 * c + e]
                     S[o + 9 + 3 * r + c] = t
-            q = o - 18
+            before = o - 18
             for r in range(3):
                 for c in range(3):
                     t = S[o + 9 + 3 * r + c]
                     for e in range(c):
-                        t -= S[o + 9 + 3 * r + e] * S[q + 3 * c + e]
-                    S[o + 9 + 3 * r + c] = t * S[q + 4 * c]
+                        t -= S[o + 9 + 3 * r + e] * S[before + 3 * c + e]
+                    S[o + 9 + 3 * r + c] = t * S[before + 4 * c]
             for r in range(3):
                 for c in range(r + 1):
                     for e in range(3):
@@ -169,7 +168,7 @@ def rhs(u, du, n, mass, J, A, w, f, s, D, S, x, gravity):
         du[k + 6] = e2 * w0 - e1 * w1 + e0 * w2
 
 
-@njit(**OPTIONS)
+@compiled
 def repeat(count, u, du, n, mass, J, A, w, f, s, D, S, x, gravity):
     """Call ``rhs`` count times."""
     for _ in range(count):

@@ -5,15 +5,14 @@ The mark is a chain written by hand.
 
 import importlib.util
 import sys
-import tempfile
 from functools import cache
 
 import numpy as np
 import plain_chain
 import scenes
-from numba import config, njit
 from timing import median_seconds
 
+from dap3d_core.kernels.cache import compiled
 from dap3d_core.simulation import CompiledModel
 
 SIZES = (1, 8, 64, 1000, 100_000)
@@ -21,7 +20,7 @@ SIZES = (1, 8, 64, 1000, 100_000)
 WORK = 100_000
 
 
-@njit
+@compiled
 def repeat(functions, count, y, out, system, loops):
     """Call the right-hand side of a formulation count times."""
     rhs = functions[0]
@@ -49,13 +48,10 @@ def plain(n):
 
 @cache
 def loaded(path):
-    """The module at a path; what it compiles is not kept, least of all beside it."""
+    """The module at a path."""
     spec = importlib.util.spec_from_file_location("prototype", path)
     module = sys.modules["prototype"] = importlib.util.module_from_spec(spec)
-    before = config.CACHE_DIR
-    with tempfile.TemporaryDirectory() as config.CACHE_DIR:
-        spec.loader.exec_module(module)
-    config.CACHE_DIR = before
+    spec.loader.exec_module(module)
     return module
 
 

@@ -1,7 +1,7 @@
 """All benchmarks, as tables and as JSON.
 
 ``make bench``, or ``python benchmarks/run.py [--only NAME ...] [-o FILE]``. scale_long and
-streaming, some minutes, two_threads and study are run only when they are named. With ``--docs`` the
+streaming, some minutes, two_threads, study and start are run only when they are named. With ``--docs``
 figures of hard_cases, long_time, chaos, flips and hinges go to docs/hard-cases.md as well;
 ``--only hard`` is all of these.
 """
@@ -24,12 +24,13 @@ import hard.flips
 import hard.hinges
 import hard.long_time
 import kernels
-import numba
+import llvmlite
 import numpy
 import points
 import projection
 import right_hand_side
 import scale
+import start
 import streaming
 import study
 import two_threads
@@ -38,7 +39,7 @@ from rich.console import Console
 from rich.table import Table
 
 #: What is run only when it is named.
-NAMED = ("scale_long", "two_threads", "streaming", "study")
+NAMED = ("scale_long", "two_threads", "streaming", "study", "start")
 #: Columns that a table has at most beside its first.
 COLUMNS = 8
 #: Columns that every table of one title has, and those of sentences, which stand below.
@@ -91,6 +92,7 @@ def main():
         "dop853_on_a_chain": whole_runs.dop853_on_a_chain,
         "large": whole_runs.large,
         "start_up": whole_runs.start_up,
+        "start": start.measure,
         "scale": scale.measure,
         "scale_long": scale.long_chain,
         "two_threads": two_threads.measure,
@@ -116,7 +118,7 @@ def main():
     versions = {
         "python": platform.python_version(),
         "numpy": numpy.__version__,
-        "numba": numba.__version__,
+        "llvmlite": llvmlite.__version__,
     }
     path = Path(arguments.output)
     path.write_text(json.dumps({"versions": versions, **found}, indent=1))

@@ -11,12 +11,12 @@ import time
 import loops
 import numpy as np
 import scenes
-from numba import njit
 
 import dap3d_core as dap
 from dap3d_core import formulations
 from dap3d_core.formulations.machine import Machine
 from dap3d_core.formulations.second_thread import SecondThread
+from dap3d_core.kernels.cache import compiled
 from dap3d_core.simulation import CompiledModel
 
 #: Scenes, and the length of a run in s.
@@ -39,7 +39,7 @@ class Always(SecondThread):
         return True
 
 
-@njit(nogil=True)
+@compiled
 def repeat(functions, count, y, out, system, loops):
     """Call the right-hand side of a formulation count times."""
     rhs = functions[0]

@@ -17,7 +17,8 @@ class Harmonic(Function):
 
     def value(x, amplitude, frequency, phase, offset):
         s, c = amplitude * sin(frequency * x + phase), amplitude * cos(frequency * x + phase)
-        return offset + s, frequency * c, -(frequency**2) * s, -(frequency**3) * c
+        square = frequency * frequency
+        return offset + s, frequency * c, -square * s, -square * frequency * c
 
 
 @hookimpl

@@ -74,11 +74,11 @@ class SmoothHump(Function):
         u = (x - x_start) / D
         inside = where(u < 0.0, 0.0, where(u > 1.0, 0.0, 1.0))
         u = where(u < 0.0, 0.0, where(u > 1.0, 1.0, u))
-        f = u**3 * (q3 + u * (q4 + u * (q5 + u * (q6 + u * q7))))
-        f_1 = u**2 * (3.0 * q3 + u * (4.0 * q4 + u * (5.0 * q5 + u * (6.0 * q6 + u * 7.0 * q7))))
+        f = u * u * u * (q3 + u * (q4 + u * (q5 + u * (q6 + u * q7))))
+        f_1 = u * u * (3.0 * q3 + u * (4.0 * q4 + u * (5.0 * q5 + u * (6.0 * q6 + u * 7.0 * q7))))
         f_2 = u * (6.0 * q3 + u * (12.0 * q4 + u * (20.0 * q5 + u * (30.0 * q6 + u * 42.0 * q7))))
         f_3 = 6.0 * q3 + u * (24.0 * q4 + u * (60.0 * q5 + u * (120.0 * q6 + u * 210.0 * q7)))
-        return f_start + f, inside * f_1 / D, inside * f_2 / D**2, inside * f_3 / D**3
+        return f_start + f, inside * f_1 / D, inside * f_2 / (D * D), inside * f_3 / (D * D * D)
 
 
 @hookimpl

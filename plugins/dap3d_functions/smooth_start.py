@@ -35,10 +35,10 @@ class SmoothStart(Function):
         beyond = where(u > 1.0, x - x_end, 0.0)
         u = where(u < 0.0, 0.0, where(u > 1.0, 1.0, u))
         v = u * (1.0 - u)
-        f = f_start + fp_end * (D * u**4 * (2.5 + u * (u - 3.0)) + beyond)
-        f_dot = fp_end * u**3 * (10.0 + u * (6.0 * u - 15.0))
+        f = f_start + fp_end * (D * u * u * u * u * (2.5 + u * (u - 3.0)) + beyond)
+        f_dot = fp_end * u * u * u * (10.0 + u * (6.0 * u - 15.0))
         f_ddot = 30.0 * fp_end / D * v * v
-        f_dddot = 60.0 * fp_end / D**2 * v * (1.0 - 2.0 * u)
+        f_dddot = 60.0 * fp_end / (D * D) * v * (1.0 - 2.0 * u)
         return f, f_dot, f_ddot, f_dddot
 
 

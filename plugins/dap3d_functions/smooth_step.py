@@ -36,8 +36,8 @@ class SmoothStep(Function):
         v = u * (1.0 - u)
         f = f_start + h * u * u * u * (10.0 + u * (6.0 * u - 15.0))
         f_dot = 30.0 * h / D * v * v
-        f_ddot = 60.0 * h / D**2 * v * (1.0 - 2.0 * u)
-        f_dddot = inside * 60.0 * h / D**3 * (1.0 - 6.0 * v)
+        f_ddot = 60.0 * h / (D * D) * v * (1.0 - 2.0 * u)
+        f_dddot = inside * 60.0 * h / (D * D * D) * (1.0 - 6.0 * v)
         return f, f_dot, f_ddot, f_dddot
 
 

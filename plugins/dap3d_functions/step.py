@@ -38,8 +38,8 @@ class Step(Function):
         u = where(u < 0.0, 0.0, where(u > 1.0, 1.0, u))
         f = f_start + h * u * u * (3.0 - 2.0 * u)
         f_dot = 6.0 * h / D * u * (1.0 - u)
-        f_ddot = inside * 6.0 * h / D**2 * (1.0 - 2.0 * u)
-        return f, f_dot, f_ddot, -inside * 12.0 * h / D**3
+        f_ddot = inside * 6.0 * h / (D * D) * (1.0 - 2.0 * u)
+        return f, f_dot, f_ddot, -inside * 12.0 * h / (D * D * D)
 
 
 @hookimpl

@@ -16,7 +16,15 @@ COMMAND = [str(Path(sys.executable).with_name("dap3d"))]
 
 def environment(**variables):
     """What a user's shell has: no width, no settings of test tools."""
-    dropped = ("NUMBA_", "COVERAGE_", "COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR", "DAP3D_BLOCK")
+    dropped = (
+        "COVERAGE_",
+        "COLUMNS",
+        "LINES",
+        "NO_COLOR",
+        "FORCE_COLOR",
+        "DAP3D_PLAIN",
+        "DAP3D_BLOCK",
+    )
     kept = {k: v for k, v in os.environ.items() if not k.startswith(dropped)}
     return kept | {k: str(v) for k, v in variables.items()}
 

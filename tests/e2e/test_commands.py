@@ -174,7 +174,7 @@ def test_info_says_what_a_file_holds(dap3d, result):
     assert found["settings"]["rtol"] == 1e-8
     assert found["ledger"].keys() == result.ledger.keys()
     shown = dap3d("info", "pen1.nc").stdout
-    for words in ("cone", "J1", "numba", "energy", "dop853", "project on"):
+    for words in ("cone", "J1", "llvmlite", "energy", "dop853", "project on"):
         assert words in shown
 
 

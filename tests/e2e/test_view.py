@@ -99,7 +99,7 @@ def test_the_page_opens_from_disk_and_asks_for_nothing(opened):
     assert opened.run("performance.getEntriesByType('resource').length") == 0
     opened.page.click("[data-tab=run]")
     shown = opened.page.inner_text("#tab-run").lower()
-    for words in ("ledger", "energy", "dop853", "rtol", "numba", "three.js"):
+    for words in ("ledger", "energy", "dop853", "rtol", "llvmlite", "three.js"):
         assert words in shown
     opened.page.click("[data-tab=source]")
     assert "[joints.J1]" in opened.page.inner_text("#tab-source")

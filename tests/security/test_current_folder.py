@@ -1,14 +1,14 @@
 """The current folder may be that of a stranger's model: no file in it governs what dap3d does.
 
-But for the files that a command names. matplotlib and numba read settings files there when they are
-imported, so each test is a process of its own.
+But for the files that a command names. matplotlib reads a settings file there when it is imported, so
+each test is a process of its own.
 """
 
 import os
 
 import pytest
 from support.falling import SCENE
-from support.process import run, start
+from support.process import run
 
 import dap3d_core as dap
 
@@ -59,32 +59,6 @@ def test_names_are_no_tex_whatever_the_users_own_settings(folder):
     path = f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}"
     assert run(PLOT, cwd=folder, MPLCONFIGDIR=folder / "config", PATH=path).endswith("True")
     assert not list(folder.rglob("tex-was-here"))
-
-
-@pytest.mark.parametrize("settings", ["disable_jit: 1\nopt: abc\n", "- no\n- table\n"])
-def test_settings_of_the_compiler_are_not_read(tmp_path, settings):
-    """Neither as numba is imported nor later, in the folder of that time."""
-    script = """
-import warnings; warnings.simplefilter("error")
-import os
-from dap3d_core.kernels.cache import compiled_in, jit_is_on
-os.chdir("later")
-def twice(x): return 2.0 * x
-print(jit_is_on(), compiled_in(None, "", twice)(2.0), jit_is_on())
-"""
-    (tmp_path / "later").mkdir()
-    for place in (tmp_path, tmp_path / "later"):
-        (place / ".numba_config.yaml").write_text(settings)
-    assert run(script, cwd=tmp_path) == "True 4.0 True"
-
-
-def test_a_variable_that_numba_cannot_read_is_told_in_a_sentence(tmp_path):
-    """It is ignored; numba's own warning is a traceback."""
-    process = start("import dap3d_core.kernels", cwd=tmp_path, NUMBA_NUM_THREADS="abc")
-    out, err = process.communicate(timeout=100)
-    assert (process.returncode, out) == (0, "")
-    assert "NUMBA_NUM_THREADS is ignored: numba cannot read its value 'abc'" in err
-    assert "Traceback" not in err
 
 
 def test_a_script_that_has_set_matplotlib_up_keeps_it(folder):

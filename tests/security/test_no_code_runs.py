@@ -78,7 +78,7 @@ def watched(folder, jobs):
         folder / "cache",
         cwd=folder / "model",
         JOBS=json.dumps(jobs),
-        NUMBA_DISABLE_JIT=1,
+        DAP3D_PLAIN=1,
         MPLBACKEND="Agg",
         PYTHONDONTWRITEBYTECODE=1,
         PYTHONSAFEPATH=1,  # as for the installed program: no modules from the present folder
@@ -169,7 +169,7 @@ ALLOWED = {
     ("kernels/written.py", "exec"): "loop modules",
     ("registry/loading.py", "exec"): "plugin.py, once it is allowed",
     ("testing/element.py", "exec"): "loop modules",
-    ("kernels/beside.py", "subprocess"): "Python itself, to compile beside",
+    ("kernels/compiler/units.py", "subprocess"): "Python itself, to compile beside",
     ("plot/encoding.py", "subprocess"): "ffmpeg, without a shell",
     ("simulation/checkpoint.py", "allow_pickle"): "switched off",
     ("study/cluster.py", "cloudpickle"): "a study, by its user, to the workers that he names",
@@ -207,6 +207,6 @@ def test_a_folder_of_ours_is_never_searched_for_modules(folder):
     import subprocess
 
     done = subprocess.run([command, "check", "."], cwd=folder / "model", capture_output=True,
-                          text=True, env=environment(NUMBA_DISABLE_JIT=1), timeout=120)  # fmt: skip
+                          text=True, env=environment(DAP3D_PLAIN=1), timeout=120)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert not (folder / "trapped").exists()

@@ -79,7 +79,7 @@ from dap3d_core.kernels.cache import cache_folder
 scene = dap.Scene(); scene.add_body("b", mass=1.0, Jp=(1.0, 1.0, 1.0))
 print(json.dumps([str(cache_folder()), dap.compile(scene).notes]))
 """
-    told = run(script, cache, XDG_CACHE_HOME=home, NUMBA_DISABLE_JIT=1)
+    told = run(script, cache, XDG_CACHE_HOME=home, DAP3D_PLAIN=1)
     taken, notes = json.loads(told.splitlines()[-1])
     assert taken == str(home / "dap3d")
     assert stat.S_IMODE((home / "dap3d").stat().st_mode) == 0o700

@@ -8,24 +8,10 @@ share). The static order relies on that.
 
 import numpy as np
 
-from dap3d_core.kernels.cache import compiled_in, jit_is_on
+from dap3d_core.kernels.cache import jit_is_on
 from dap3d_core.linear.blocks import assemble, factor
 from dap3d_core.linear.plan import make_plan
-from dap3d_core.linear.saddle import add_product, solve_saddle
-
-
-def _solve(blocks, hubs, nodes, columns, D, K, x, g):
-    solve_saddle(blocks, hubs, nodes, columns, D, K, x, g)
-
-
-def _product(blocks, D, g, out):
-    add_product(blocks, D, g, out)
-
-
-#: What compiled code alone may call, with a door to Python.
-solve_from_python = compiled_in(None, "", _solve)
-product_from_python = compiled_in(None, "", _product)
-
+from dap3d_core.linear.saddle import solve_saddle
 
 # ------------------------------------------------------------------ graphs
 
@@ -216,7 +202,7 @@ class Case:
         plan = self.plan
         x, force = np.zeros(plan.row_size), np.concatenate([np.zeros(6), g])
         x[self.places] = gamma
-        solve_from_python(plan.blocks, plan.hubs, plan.nodes, plan.columns, self.D, K, x, force)
+        solve_saddle(plan.blocks, plan.hubs, plan.nodes, plan.columns, self.D, K, x, force)
         return force[6:], -x[self.places]
 
 

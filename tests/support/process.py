@@ -8,7 +8,7 @@ from pathlib import Path
 
 def environment(cache=None, **variables):
     """The environment of a child process, with its own cache of compiled code."""
-    ours = ("DAP3D_", "NUMBA_", "COVERAGE_")
+    ours = ("DAP3D_", "COVERAGE_")
     env = {k: v for k, v in os.environ.items() if not k.startswith(ours)}
     if cache is not None:
         env["DAP3D_CACHE_DIR"] = str(cache)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numba import njit
 from scipy.integrate import solve_ivp
 from unit import test_integrators_problems as toys
 from unit.test_integrators_problems import finish, kepler, kepler_f, kepler_orbit, slope
@@ -10,6 +9,7 @@ from unit.test_integrators_problems import finish, kepler, kepler_f, kepler_orbi
 from dap3d_core.integrators import Status
 from dap3d_core.integrators import adams_formulas as adams
 from dap3d_core.integrators.adams_integration import AdamsIntegration
+from dap3d_core.kernels.cache import compiled
 from dap3d_core.kernels.lists import loop_list
 
 
@@ -24,7 +24,7 @@ def start(rhs, y0, times, project=toys.no_constraint, report=toys.plain_report, 
 # ------------------------------------------------------------------ formulas
 
 
-@njit
+@compiled
 def predicted(work, h, k):
     adams.coefficients(work, h, k)
     adams.predict(work, h, k)

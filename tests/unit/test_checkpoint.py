@@ -366,9 +366,9 @@ def test_a_newer_checkpoint_is_refused(copied):
 
 def test_other_versions_are_noted(copied):
     versions = read_checkpoint(copied).header["versions"]
-    rewritten(copied, versions=versions | {"numba": "0.1"})
+    rewritten(copied, versions=versions | {"llvmlite": "0.1"})
     found = dap.resume(copied)
-    assert found.notes[-1].startswith("the checkpoint was made with numba 0.1")
+    assert found.notes[-1].startswith("the checkpoint was made with llvmlite 0.1")
     assert "digits may differ" in found.notes[-1]
 
 

@@ -13,7 +13,7 @@ import dap3d_core as dap
 from dap3d_core import formulations
 from dap3d_core.formulations.machine import Machine
 from dap3d_core.formulations.second_thread import SecondThread, threads_allowed
-from dap3d_core.kernels.cache import compiled_in, jit_is_on
+from dap3d_core.kernels.cache import compiled, jit_is_on
 from dap3d_core.kernels.lists import LOOP, loop_list
 from dap3d_core.linear.halving import FIRST, SECOND, TOP
 from dap3d_core.linear.plan import make_plan
@@ -258,7 +258,7 @@ def test_what_the_second_thread_raises_comes_out(large):
         if i0 == limit:
             raise ValueError("not in my half")
 
-    loop = compiled_in(None, "", fails)
+    loop = compiled(fails)
     loop.compile(LOOP)
     loops = loop_list([loop] * len(machine.what))
     y = machine.integrated(machine.model.u0)

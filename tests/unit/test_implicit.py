@@ -15,24 +15,18 @@ from dap3d_core.integrators import Status
 from dap3d_core.integrators.implicit import RadauIntegration, estimate_tolerances
 from dap3d_core.integrators.radau_method import radau_method
 from dap3d_core.integrators.radau_newton import factorise_both, find_tangent, solve_first
-from dap3d_core.kernels.cache import compiled_in, jit_is_on
+from dap3d_core.kernels.cache import compiled, jit_is_on
 from dap3d_core.linear.lu import factor_lu, solve_lu
 from dap3d_core.linear.lu_plan import make_lu_plan
 from dap3d_core.linear.ordering import order_nodes
 
-# What compiled code alone may call, with a door to Python.
 
-
-def door(function):
-    return compiled_in(None, "", function)
-
-
-@door
+@compiled
 def evaluate(t, y, multipliers, held, out, rows, system, loops):
     evaluate_stage(t, y, multipliers, held, out, rows, system, loops)
 
 
-@door
+@compiled
 def solve_at(t, h, y, multipliers, work, system, loops, matrix):
     """The change that belongs to the residual in R[0], G[0], in the axes of y."""
     evaluate_stage(t, y, multipliers, matrix.held, work.R[1], work.G[1], system, loops)
@@ -40,7 +34,7 @@ def solve_at(t, h, y, multipliers, work, system, loops, matrix):
     solve_first(h, work, system, matrix)
 
 
-@door
+@compiled
 def factor_and_solve(nodes, columns, updates, K, pivots, x):
     found = factor_lu(nodes, columns, updates, K, pivots)
     solve_lu(nodes, columns, K, pivots, x)

@@ -318,7 +318,7 @@ def reference_rows():
 
 @pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 def test_plain_python_gives_the_same_numbers():
-    """With NUMBA_DISABLE_JIT=1 the same sources run and agree to rounding."""
+    """With DAP3D_PLAIN=1 the same sources run and agree to rounding."""
     code = (
         "import json, runpy, sys\n"
         "names = runpy.run_path(sys.argv[1], run_name='plain')\n"
@@ -326,6 +326,6 @@ def test_plain_python_gives_the_same_numbers():
     )
     command = [sys.executable, "-c", code, __file__]
     paths = [str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
-    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(paths)}
+    environment = os.environ | {"DAP3D_PLAIN": "1", "PYTHONPATH": os.pathsep.join(paths)}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     assert np.allclose(json.loads(done.stdout), reference_rows(), rtol=1e-12, atol=1e-13)

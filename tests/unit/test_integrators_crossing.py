@@ -3,28 +3,10 @@
 import numpy as np
 import pytest
 from support import redundant
-from support.graphs import compiled_in
 
 import dap3d_core as dap
 from dap3d_core.integrators import METHODS, Integration, Status
-from dap3d_core.integrators import crossing as compiled
-from dap3d_core.integrators.crossing import NOW, RATE
-
-
-def _aim(lengths, calm, h):
-    return compiled.aim(lengths, calm, h)
-
-
-def _is_near(lengths, h):
-    return compiled.is_near(lengths, h)
-
-
-def _look_back(lengths, found, h):
-    compiled.look_back(lengths, found, h)
-
-
-#: What compiled code alone may call, with a door to Python.
-aim, is_near, look_back = (compiled_in(None, "", f) for f in (_aim, _is_near, _look_back))
+from dap3d_core.integrators.crossing import NOW, RATE, aim, is_near, look_back
 
 
 def lengths_of(*pairs):

@@ -1,12 +1,15 @@
 """Problems with known answers for the tests of the integrators; the answers are checked here."""
 
+import math
+from functools import cache
+
 import numpy as np
 import pytest
-from numba import njit
 
 from dap3d_core.assembly.system import System, step_functions
 from dap3d_core.integrators import METHODS, Integration, Status
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.cache import compiled
+from dap3d_core.kernels.compiler.types import DTYPES, Array
 from dap3d_core.kernels.lists import loop_list
 
 # The system is an empty one of the core, whose integrators are compiled for it already; its
@@ -30,13 +33,13 @@ def kepler(t, y, out, system, loops):
 def time_dependent(t, y, out, system, loops):
     """y = exp(sin t) by two roads."""
     system.force[0] += 1
-    out[0] = y[0] * np.cos(t)
-    out[1] = np.exp(np.sin(t)) * np.cos(t)
+    out[0] = y[0] * math.cos(t)
+    out[1] = math.exp(math.sin(t)) * math.cos(t)
 
 
 def nan_after_one(t, y, out, system, loops):
     system.force[0] += 1
-    out[0] = np.cos(t) if t <= 1.0 else np.nan
+    out[0] = math.cos(t) if t <= 1.0 else np.nan
 
 
 def blow_up(t, y, out, system, loops):
@@ -79,22 +82,19 @@ def report_until_one(t, y, out, system, loops):
     out[0] = 1.0 if t < 1.0 else np.inf
 
 
-_compiled = {}
+compile_once = cache(compiled)
 
 
 def first_class(*functions):
     """The list of functions that an integrator takes."""
-    for function in functions if jit_is_on() else ():
-        if function not in _compiled:
-            _compiled[function] = njit(error_model="numpy")(function)
-    return step_functions(*(_compiled.get(function, function) for function in functions))
+    return step_functions(*(compile_once(function) for function in functions))
 
 
 def counting(calls):
     """A system without bodies that counts calls."""
     empty = {
-        name: None if dtype is None else np.zeros((0,) * type_.ndim, dtype)
-        for name, type_, dtype in System.type_of().expected
+        name: np.zeros((0,) * type_.ndim, DTYPES[type_.item]) if isinstance(type_, Array) else None
+        for name, type_ in System.type_of().members
     }
     return System(**empty | {"force": calls})
 

@@ -10,9 +10,7 @@ from support.process import REPOSITORY, run, start
 
 from dap3d_core.kernels.cache import jit_is_on
 
-pytestmark = pytest.mark.skipif(
-    not jit_is_on(), reason="nothing is compiled with NUMBA_DISABLE_JIT=1"
-)
+pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled with DAP3D_PLAIN=1")
 
 #: A force type whose kernel calls a helper in another module, and that calls one in a third.
 PLUGIN = """
@@ -27,16 +25,12 @@ class Push(Force):
 """
 HELPER = """
 from dap3d_core.kernels import scale
-from dap3d_core.kernels.inline import inlined
 import constants
 STRENGTH = {strength}
-@inlined
 def push(mass):
     return scale(mass * STRENGTH + constants.offset(), (1.0, 0.0, 0.0))
 """
 CONSTANTS = """
-from dap3d_core.kernels.inline import inlined
-@inlined
 def offset():
     return {offset}
 """

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from support.graphs import GRAPHS, RANDOM, check_solution, full_case, product_from_python
+from support.graphs import GRAPHS, RANDOM, check_solution, full_case
 
-from dap3d_core.linear.saddle import scale_blocks
+from dap3d_core.linear.saddle import add_product, scale_blocks
 
 EPS = np.finfo(float).eps
 all_graphs = pytest.mark.parametrize("name", [*GRAPHS, *RANDOM])
@@ -56,7 +56,7 @@ def test_product_with_the_jacobian(name):
     rng = np.random.default_rng(2)
     a, before = rng.normal(size=6 * case.n), rng.normal(size=case.plan.row_size)
     out = before.copy()
-    product_from_python(case.plan.blocks, case.D, np.concatenate([np.zeros(6), a]), out)
+    add_product(case.plan.blocks, case.D, np.concatenate([np.zeros(6), a]), out)
     wanted = before[case.places] + case.dense @ a
     assert out[case.places] == pytest.approx(wanted, abs=1e-13 * (1 + np.abs(case.dense).sum()))
 
@@ -73,7 +73,7 @@ def test_scaled_blocks_are_those_of_the_scaled_jacobian():
         scaling[at + 3 : at + 6, at + 3 : at + 6] = case.metric[b, 7:].reshape(3, 3)
     scale_blocks(case.plan.blocks, case.D, case.metric)
     a, out = rng.normal(size=6 * case.n), np.zeros(case.plan.row_size)
-    product_from_python(case.plan.blocks, case.D, np.concatenate([np.zeros(6), a]), out)
+    add_product(case.plan.blocks, case.D, np.concatenate([np.zeros(6), a]), out)
     assert out[case.places] == pytest.approx(case.dense @ (scaling @ a), abs=1e-12)
 
 

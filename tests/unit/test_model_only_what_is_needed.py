@@ -7,7 +7,7 @@ from support.process import run
 pytestmark = in_another_process
 
 MODULES = "import sys; print(' '.join(m for m in sys.modules))"
-HEAVY = {"numpy", "scipy", "numba", "matplotlib", "netCDF4", "xarray"}
+HEAVY = {"numpy", "scipy", "llvmlite", "matplotlib", "netCDF4", "xarray"}
 
 
 def imported(script):
@@ -22,7 +22,7 @@ def test_importing_the_package_imports_nothing_heavy():
 
 
 def test_the_command_help_imports_nothing_heavy():
-    """``dap3d --help`` answers without numpy, scipy, numba and matplotlib."""
+    """``dap3d --help`` answers without numpy, scipy, llvmlite and matplotlib."""
     script = (
         "from dap3d_core.cli import main\ntry:\n    main(['--help'])\nexcept SystemExit:\n    pass"
     )

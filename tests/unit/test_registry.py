@@ -413,7 +413,7 @@ def test_finding_types_imports_nothing_heavy_and_no_plugin():
     import sys
     from dap3d_core.registry import load_registry
     assert "sph" in load_registry().keywords("joint")
-    heavy = ["numpy", "scipy", "numba", "matplotlib", "rich", "click", "dap3d_joints"]
+    heavy = ["numpy", "scipy", "llvmlite", "matplotlib", "rich", "click", "dap3d_joints"]
     print([m for m in heavy if m in sys.modules])
     """
     answer = subprocess.run(

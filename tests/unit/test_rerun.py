@@ -85,12 +85,12 @@ def test_what_cannot_be_made_again_is_refused():
 
 def test_other_versions_are_told():
     first = dap.simulate(problems.pendulum(), **SHORT)
-    versions = first.versions | {"numba": "0.1"}
+    versions = first.versions | {"llvmlite": "0.1"}
     first.record = attrs.evolve(first.record, known_versions=versions)
     found = dap.rerun(first)
     assert found.equal
-    assert list(found.versions) == ["numba"]
-    assert found.versions["numba"][0] == "0.1"
+    assert list(found.versions) == ["llvmlite"]
+    assert found.versions["llvmlite"][0] == "0.1"
 
 
 DIGEST = """

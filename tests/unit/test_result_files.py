@@ -32,7 +32,7 @@ ABOUT = dict(
     status="interrupted",
     notes=["Newton's note: Δ|C| = 1e-9", 'a "second"'],
     stats=Statistics(steps=3, rejected=1, rhs=40, projections=4, wall_time_s=0.25),
-    versions={"dap3d": "0.1", "numpy": "2", "numba": "0", "python": "3"},
+    versions={"dap3d": "0.1", "numpy": "2", "llvmlite": "0", "python": "3"},
 )
 
 

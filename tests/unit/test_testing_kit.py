@@ -70,7 +70,7 @@ def test_samples_on_the_manifold():
 
 @pytest.mark.parametrize("type_", [Spherical, Weight, Polynomial])
 def test_one_type_of_each_kind(type_):
-    """Nothing is wrong; where numba is off, the one check that needs it says so."""
+    """Nothing is wrong; where nothing is compiled, the one check that needs it says so."""
     report = check_type(type_, poses=2)
     assert report.ok, str(report)
     states = {outcome.check: outcome.state for outcome in report.outcomes}

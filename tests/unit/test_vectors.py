@@ -11,13 +11,22 @@ from hypothesis import strategies as st
 
 from dap3d_core import kernels
 from dap3d_core.kernels import (
+    abs,
+    acos,
     add,
+    asin,
     atan2,
     cos,
     cross,
     dot,
+    exp,
     eye,
+    floor,
     hstack,
+    hypot,
+    log,
+    maximum,
+    minimum,
     neg,
     norm2,
     normals,
@@ -31,7 +40,9 @@ from dap3d_core.kernels import (
     tanh,
     where,
 )
-from dap3d_core.kernels.cache import compiled_in, jit_is_on
+from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.lists import LoopArrays, call_loop, loop_list
+from dap3d_core.kernels.loops import Loop, build
 
 number = st.floats(-1e3, 1e3, allow_subnormal=False)
 vec = st.tuples(number, number, number)
@@ -279,6 +290,11 @@ def formula(a0, a1, a2, b0, b1, b2):
         atan2(b0, b1),
         where(a0 > b0, a1, b1),
         where(a0 < b0, a2, b2),
+        minimum(a0, b0) + maximum(a1, b1),
+        hypot(a0, b0) + abs(a1 - b1),
+        exp(0.3 * a0) * log(1.0 + b0 * b0),
+        asin(tanh(a0)) + acos(tanh(b0)),
+        floor(3.0 * a0),
     )
 
 
@@ -290,14 +306,40 @@ def test_the_formula_uses_every_word():
     assert all(inspect.getdoc(getattr(kernels, word)) for word in kernels.__all__)
 
 
-@pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled with NUMBA_DISABLE_JIT=1")
+@pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled with DAP3D_PLAIN=1")
 def test_compiled_words_are_the_plain_ones():
-    """Compiled code may fuse a product and a sum: each number differs by some roundings of its
-    terms at most, and NaN is NaN."""
-    fast = compiled_in(None, "", formula)
-    for values in np.random.default_rng(1).normal(size=(20, 6)).tolist():
-        assert fast(*values) == pytest.approx(formula(*values), rel=1e-14, abs=1e-14)
-    for values in [(-1.0, math.inf, 0.0, 0.0, 0.0, 0.0), (math.nan, 1.0, 2.0, 3.0, 4.0, 5.0)]:
+    """In all bits; NaN is NaN."""
+    count = len(formula(*(6 * [0.5])))
+    lines = ["out = kernel_formula(par[0], par[1], par[2], par[3], par[4], par[5])"]
+    lines += [f"out1[{k}] = out[{k}]" for k in range(count)]
+    loops = loop_list([build(Loop("words", {"kernel_formula": formula}, lines))])
+    found, wanted = np.zeros(count), np.zeros(count)
+    edges = [(-1.0, math.inf, 0.0, 0.0, 0.0, 0.0), (math.nan, 1.0, 2.0, 3.0, 4.0, 5.0)]
+    for values in [*np.random.default_rng(1).normal(size=(50, 6)), *map(np.array, edges)]:
+        arrays = LoopArrays(body=np.zeros((1, 32)), F=np.zeros((1, 5)), par=values,
+                            idx=np.zeros(1, dtype=np.int64))  # fmt: skip
+        call_loop(loops, 0, 0.0, arrays, (0, 0, 1), found, found, found)
         with np.errstate(all="ignore"):
-            wanted = formula(*(np.float64(v) for v in values))
-        assert fast(*values) == pytest.approx(wanted, rel=1e-14, nan_ok=True)
+            wanted[:] = formula(*values)
+        np.testing.assert_array_equal(found, wanted)
+
+
+@pytest.mark.parametrize(("function", "x", "y"), [(exp, 1e4, math.inf), (log, 0.0, -math.inf),
+                                                  (floor, -math.inf, -math.inf)])  # fmt: skip
+def test_beyond_the_largest_number_it_is_infinite(function, x, y):
+    """As in compiled code; Python's own functions raise."""
+    assert function(x) == y
+    assert math.isnan(log(-1.0))
+    assert math.isnan(acos(2.0))
+
+
+def test_words_have_the_derivative_of_the_complex_step():
+    """Against a central difference, exact to 1e-9 at this step."""
+
+    def f(x):
+        angles = asin(0.5 * x) - 2.0 * acos(0.5 * x)
+        return abs(x - 2.0) * maximum(x, 0.5) * minimum(x, 3.0) + hypot(x, 2.0) + exp(-x) + angles
+
+    h = 1e-5
+    slope = (f(0.7 + h) - f(0.7 - h)) / (2.0 * h)
+    assert f(complex(0.7, 1e-30)).imag / 1e-30 == pytest.approx(slope, rel=1e-8)

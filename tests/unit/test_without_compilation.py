@@ -1,4 +1,4 @@
-"""With ``NUMBA_DISABLE_JIT=1`` the same sources run as plain Python and give the same numbers."""
+"""With ``DAP3D_PLAIN=1`` the same sources run as plain Python and give the same numbers."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_plain_python_gives_the_numbers_of_compiled_code(model, integrator):
     That is some hundred roundings, and the condition of the constraints.
     """
     script = SCRIPT.format(model=model, integrator=integrator)
-    compiled, plain = (run(script, NUMBA_DISABLE_JIT=off).split("\n") for off in (0, 1))
+    compiled, plain = (run(script, DAP3D_PLAIN=off).split("\n") for off in (0, 1))
     for a, b in zip(compiled, plain, strict=True):
         a, b = np.array(a.split(), dtype=float), np.array(b.split(), dtype=float)
         assert a == pytest.approx(b, abs=1e-11 * (1.0 + np.max(np.abs(a), initial=0.0)))

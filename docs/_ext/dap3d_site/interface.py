@@ -17,7 +17,8 @@ CLASSES = ("Joint", "Force", "Function")
 WORDS = {
     "Vectors": ("add", "sub", "neg", "scale", "dot", "cross", "norm2", "rotate"),
     "Matrices and rows": ("skew", "eye", "row", "hstack"),
-    "Mathematics": ("sqrt", "sin", "cos", "tanh", "atan2"),
+    "Mathematics": ("sqrt", "sin", "cos", "tanh", "asin", "acos", "atan2", "exp", "log", "hypot",
+                    "abs", "floor", "minimum", "maximum"),  # fmt: skip
     "Branches and tables": ("where", "lookup"),
     "For `prepare`": ("normals",),
 }

@@ -29,7 +29,8 @@ VARIABLES = {
     ),
     "DAP3D_BLOCK": "distributions whose types are left out, or `NAME:KEYWORD` of single types, "
     "separated by commas",
-    "NUMBA_DISABLE_JIT": "1: kernels run as plain Python, to look into them; slowly",
+    "DAP3D_CPU": "processor that code is compiled for, as LLVM names it; by default this one",
+    "DAP3D_PLAIN": "1: kernels run as plain Python, to look into them; slowly",
     "NO_COLOR": "any value: no colours in the terminal",
     "MPLBACKEND": "how `dap.plot` draws: `Agg` without a screen",
 }

@@ -7,6 +7,8 @@ bodies; work.
 
 from typing import Any
 
+import numpy as np
+
 from dap3d_core.assembly.system import VALUE, Floats, System
 from dap3d_core.kernels.by_address import pointer
 from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
@@ -20,7 +22,7 @@ def place_some(first: int, last: int, y: Floats, body: Floats, metric: Floats) -
         c, f = 7 * (b - 1), 7 * n + 6 * (b - 1)
         s, k = body[b], metric[b]
         e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
-        h = 1.0 / (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3) ** 0.5
+        h = 1.0 / np.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
         e0, e1, e2, e3 = e0 * h, e1 * h, e2 * h, e3 * h
         a00 = 1.0 - 2.0 * (e2 * e2 + e3 * e3)
         a01 = 2.0 * (e1 * e2 - e0 * e3)

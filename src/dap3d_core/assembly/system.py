@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.kernels.by_address import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays
-from dap3d_core.kernels.cache import compiled, jit_is_on
-from dap3d_core.kernels.lists import List, LoopArrays, fill, function_type, step_signature
+from dap3d_core.kernels.cache import table_of
+from dap3d_core.kernels.compiler.types import Table
+from dap3d_core.kernels.lists import LoopArrays, step_signature
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -118,22 +119,9 @@ class System(LoopArrays):
 KEPT = ("par", "settings")
 
 STEP = step_signature(System.type_of())
-STEP_TYPE = function_type(STEP)
-
-
-@compiled
-def _empty() -> Any:
-    return List.empty_list(STEP_TYPE)
-
-
-@compiled
-def _append(functions: Any, function: Any) -> None:
-    functions.append(function)
+STEPS = Table(STEP)
 
 
 def step_functions(*functions: Any) -> Any:
-    """A formulation's functions (t, y, out, system, loops) as the list that an integrator takes."""
-    if jit_is_on():
-        for function in functions:
-            function.compile(STEP)
-    return fill(_empty, _append, STEP_TYPE, functions)
+    """A formulation's functions (t, y, out, system, loops) as an integrator takes them."""
+    return table_of(STEP, functions)

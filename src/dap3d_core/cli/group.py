@@ -1,6 +1,6 @@
 """The group ``dap3d``: its commands, and what all of them have in common.
 
-Nothing here imports numpy, scipy, numba, matplotlib, netCDF4 or rich: commands do, when they run.
+Nothing here imports numpy, scipy, llvmlite, matplotlib, netCDF4 or rich: commands do that.
 """
 
 import sys

@@ -75,7 +75,6 @@ def run(
     import dap3d_core as dap
     from dap3d_core.cli.files import writable
     from dap3d_core.cli.outcome import tell
-    from dap3d_core.integrators import ahead
 
     if model is None:
         model, scene, force = _ask(ctx, given, output, force=force)
@@ -86,7 +85,6 @@ def run(
     found: list[CompiledModel] = []
 
     def prepare(announce: "Announce") -> "CompiledModel":
-        ahead.start(given["integrator"] or str(scene.simulation.integrator))
         method = given["method"]
         found.append(dap.compile(scene, method=method, allow_code=allow_code, announce=announce))
         return found[0]

@@ -28,10 +28,10 @@ def build_loops(
     """The compiled group loops of a model, only of the kinds asked for, and what they run over.
 
     Returns:
-        (typed list of loops, [(kind, group)] in the order of the list).
+        (table of loops, [(kind, group)] in the order of the list).
 
     Raises:
-        PluginError: numba cannot compile the kernels of a type.
+        PluginError: the kernels of a type cannot be compiled.
     """
     loops, what = [], []
     for kind in KINDS:

@@ -94,7 +94,7 @@ def take_least(system: System) -> None:
             given[k] = 0.0
         n[k] = given[k]
     e, seen = LEAST_PART * longest, np.inf
-    while seen > TAKEN * longest**0.5 * largest(given) and e > SMALLEST * longest:
+    while seen > TAKEN * np.sqrt(longest) * largest(given) and e > SMALLEST * longest:
         seen = keep_unseen(system, n, e)
         e *= SMALLER
     for k in range(x.shape[0]):

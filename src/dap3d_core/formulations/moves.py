@@ -1,5 +1,7 @@
 """Changes of a state: displacements, changes of velocity, in the bodies' scaled coordinates."""
 
+import numpy as np
+
 from dap3d_core.assembly.system import Floats
 from dap3d_core.kernels.cache import compiled_inside
 
@@ -10,7 +12,7 @@ def normalise(y: Floats, n: int) -> None:
     for b in range(n):
         c = 7 * b + 3
         e0, e1, e2, e3 = y[c], y[c + 1], y[c + 2], y[c + 3]
-        h = 1.0 / (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3) ** 0.5
+        h = 1.0 / np.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
         for d in range(c, c + 4):
             y[d] *= h
 

@@ -55,7 +55,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     place(t, y, system, loops)
     linearise(t, system, loops)
     residuals(t, system, loops)
-    stiffness, damping = settings[OMEGA] ** 2, 2.0 * settings[MU] * settings[OMEGA]
+    stiffness, damping = settings[OMEGA] * settings[OMEGA], 2.0 * settings[MU] * settings[OMEGA]
     for k in range(x.shape[0]):
         x[k] = system.gamma[k] - stiffness * C[k]
     velocity_residuals(system)

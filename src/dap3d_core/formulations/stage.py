@@ -199,9 +199,9 @@ def fill_matrix(s: Any, K: Any, blocks: Integers, matrix: Matrix, tangent: Tange
     for j in range(matrix.joint_place.shape[0]):
         d, m, f = matrix.joint_place[j, 0], matrix.joint_place[j, 1], matrix.joint_place[j, 2]
         for r in range(m):
-            e = matrix.compliance[f + r] / s
-            K[d + r * (2 * m + 1)] = -e if matrix.held[f + r] != 0 else -1.0
-            K[d + (m + r) * (2 * m + 1)] = -e
+            given = matrix.compliance[f + r] / s
+            K[d + r * (2 * m + 1)] = -given if matrix.held[f + r] != 0 else -1.0
+            K[d + (m + r) * (2 * m + 1)] = -given
 
 
 @compiled_inside

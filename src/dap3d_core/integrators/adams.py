@@ -12,6 +12,7 @@ whose notation this is written) and III.7.
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -180,7 +181,7 @@ def step(
         integer[FAILURES] += 1
         factor = SLOWEST
         if integer[FAILURES] > PATIENCE:
-            factor = max(0.1, min(SLOWEST, (PLANNED / here) ** 0.5))
+            factor = max(0.1, min(SLOWEST, math.sqrt(PLANNED / here)))
         order = k - 1 if lower else k
         fail(work, t1, h, 1 if integer[FAILURES] >= PATIENCE else order, factor, STEP_FLOOR)
     else:

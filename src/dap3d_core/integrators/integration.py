@@ -21,7 +21,6 @@ from dap3d_core.integrators.restoring import Restorable
 from dap3d_core.integrators.rounding import tolerance_of
 from dap3d_core.integrators.runge_kutta import advance
 from dap3d_core.integrators.work import Function, Status, Work
-from dap3d_core.kernels.beside import wait_for_what_is_beside
 from dap3d_core.kernels.cache import jit_is_on
 
 if TYPE_CHECKING:
@@ -157,7 +156,6 @@ class Integration(Restorable):
 
     def compile(self) -> None:
         """Compile what ``advance`` needs, or load it, without doing a step."""
-        wait_for_what_is_beside()
         status = int(self.work.integer[at.STATUS])
         self.work.integer[at.STATUS] = Status.FINISHED
         self._advance(0)

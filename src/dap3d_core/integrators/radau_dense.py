@@ -107,7 +107,7 @@ def prepare_dense(h: float, work: RadauWork) -> None:
             continue
         r2 = h * state[SLOPE, k] - rise
         r3 = rise - h * state[TRIAL_SLOPE, k] - r2
-        square = (q * (1.0 + q)) ** 2
+        square = q * (1.0 + q) * (q * (1.0 + q))
         # the cubic through both ends, and its slope, at the start of the step before
         value = y - q * (rise + (1.0 + q) * (r2 - q * r3))
         slope = rise + (1.0 + 2.0 * q) * r2 - (2.0 + 3.0 * q) * q * r3

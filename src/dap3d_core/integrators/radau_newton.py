@@ -11,6 +11,8 @@ tangent. Norms are the largest scaled component, as in control.py.
 import math
 from typing import Any
 
+import numpy as np
+
 from dap3d_core.assembly.evaluate import place, zero
 from dap3d_core.assembly.system import Floats, System
 from dap3d_core.formulations.constraints import linearise
@@ -103,6 +105,12 @@ def find_tangent(
     return 0.0 if differentiate(at, system.x, system, loops, tangent) else math.nan
 
 
+@compiled_inside
+def pole(poles: Floats, h: float) -> Any:
+    """The complex pole of a step h, 1/s; numpy's, whose arithmetic compiled code has."""
+    return np.complex128(complex(poles[1] / h, poles[2] / h))
+
+
 @compiled
 def factorise_both(
     t: float,
@@ -118,7 +126,7 @@ def factorise_both(
     work.integer[FACTORISATIONS] += 1
     work.own[H_FACTORED] = h
     fill_matrix(poles[0] / h, work.K, system.blocks, matrix, tangent)
-    fill_matrix(complex(poles[1], poles[2]) / h, work.Kc, system.blocks, matrix, tangent)
+    fill_matrix(pole(poles, h), work.Kc, system.blocks, matrix, tangent)
     nodes, columns, updates = matrix.nodes, matrix.columns, matrix.updates
     regular = factor_lu(nodes, columns, updates, work.K, work.pivots)
     if regular and factor_lu(nodes, columns, updates, work.Kc, work.pivotsc):
@@ -190,7 +198,7 @@ def unite(T: Floats, real: Floats, pair: Any, x: Floats) -> None:
 def solve_stages(h: float, work: RadauWork, system: System, matrix: Matrix) -> None:
     """R, G from the residuals of the three stages to the changes."""
     x, along, poles = work.x, work.along, work.method.poles
-    s, sc = poles[0] / h, complex(poles[1], poles[2]) / h
+    s, sc = poles[0] / h, pole(poles, h)
     for i in range(3):
         scale_residual(work.R[i], work.G[i], system.blocks, system.metric, matrix, work.frames[i],
                        x[i], along[i])  # fmt: skip

@@ -17,32 +17,18 @@ from dap3d_core.integrators.radau_newton import (
     find_tangent,
 )
 from dap3d_core.integrators.radau_work import RadauWork
-from dap3d_core.kernels.cache import compiled, jit_is_on
-from dap3d_core.kernels.lists import LOOP_LIST, List, fill, function_type, number_signature
+from dap3d_core.kernels.cache import table_of
+from dap3d_core.kernels.lists import LOOP_LIST, number_signature
 
 PART = number_signature(
     RadauWork.type_of(), System.type_of(), LOOP_LIST, Tangent.type_of(), Matrix.type_of()
 )
-PART_TYPE = function_type(PART)
-
-
-@compiled
-def _empty() -> Any:
-    return List.empty_list(PART_TYPE)
-
-
-@compiled
-def _append(parts: Any, part: Any) -> None:
-    parts.append(part)
 
 
 def radau_parts() -> Any:
-    """find_tangent, factorise_both, find_stages, estimate_error, find_slope as a typed list.
+    """find_tangent, factorise_both, find_stages, estimate_error, find_slope as a table.
 
     Each is called as part(t, h, work, system, loops, tangent, matrix).
     """
     parts = (find_tangent, factorise_both, find_stages, estimate_error, find_slope)
-    if jit_is_on():
-        for part in parts:
-            part.compile(PART)
-    return fill(_empty, _append, PART_TYPE, parts)
+    return table_of(PART, parts)

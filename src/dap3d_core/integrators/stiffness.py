@@ -58,7 +58,7 @@ def watch_stiffness(work: Work, h: float) -> None:
         upper += change * change
         lower += apart * apart
         along += change * apart
-    marked = along * along > PARALLEL * upper * lower and upper > LEAST**2 * lower
+    marked = along * along > PARALLEL * upper * lower and upper > LEAST * LEAST * lower
     if marked and along > 0.0:
         integer[STIFF_STEPS] = integer[CALM_STEPS] = 0
     elif marked:

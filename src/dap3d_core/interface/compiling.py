@@ -1,4 +1,4 @@
-"""The group loops of a type, compiled; what numba does not take is an error with its reason."""
+"""The group loops of a type, compiled; what cannot be is an error with its reason."""
 
 import inspect
 from collections.abc import Callable
@@ -8,7 +8,6 @@ from dap3d_core.interface.binding import bind_friction
 from dap3d_core.interface.checks import Examined, PluginError, where_is
 from dap3d_core.interface.writer import LOOP_KINDS, write
 from dap3d_core.kernels.loops import build
-from dap3d_core.kernels.reasons import why_not_compiled
 
 
 def compiled_loop(
@@ -22,7 +21,7 @@ def compiled_loop(
         announce: called with the loop's name before it is compiled anew.
 
     Raises:
-        PluginError: numba cannot compile it; names file, type, kernels, numba's reason and remedy.
+        PluginError: it cannot be compiled; names file, type, kernels, line, reason and remedy.
     """
     loop = write(examined, what)
     if loop is None:
@@ -31,9 +30,9 @@ def compiled_loop(
         return build(loop, announce)
     except Exception as error:
         raise PluginError(
-            f"{where_is(examined.type)}: numba cannot compile its kernels ({loop.name}): "
-            f"{why_not_compiled(error, loop.kernels.values())}. A kernel is plain: tuples of "
-            "numbers, the words of dap3d_core.kernels, where() for branches"
+            f"{where_is(examined.type)}: its kernels cannot be compiled ({loop.name}): {error}. "
+            "A kernel is plain: tuples of numbers, the words of dap3d_core.kernels, where() for "
+            "branches"
         ) from error
 
 
@@ -44,7 +43,7 @@ def compile_all(examined: Examined) -> None:
     that a scene gives.
 
     Raises:
-        PluginError: numba cannot compile one of them.
+        PluginError: one of them cannot be compiled.
     """
     if not examined.argument_functions or not _calls_functions(examined):
         for what in LOOP_KINDS:

@@ -49,7 +49,7 @@ def derive(
     Raises:
         CannotDeriveError: says why, and what to do.
     """
-    # here, for with the first of them comes numba, which finding types by keyword does not need
+    # here, for finding types by keyword does not need the compiler
     from dap3d_core.kernels import written
     from dap3d_core.kernels.cache import digest, identities, sources
 

@@ -76,7 +76,7 @@ def _remember(name: str, at: int) -> Iterable[str]:
 
 def _one_behind_the_other(values: Sequence[str]) -> Iterable[str]:
     """Values of all instances and groups, in their order; out2 counts the place."""
-    yield "place = int(out2[0]) & NATURAL"
+    yield "place = whole(out2[0])"
     for k, value in enumerate(values):
         yield f"out1[place + {k}] = {value}"
     yield f"out2[0] += {len(values)}.0"
@@ -88,7 +88,7 @@ def _store(examined: Examined, kernel: str) -> Iterable[str]:
     if kernel == "J":
         assert issubclass(type_, Joint)
         for n in range(len(layout.slots)):
-            yield f"d = idx[b0 + {first_block + n}] & NATURAL"
+            yield f"d = idx[b0 + {first_block + n}]"
             for k in range(6 * type_.rows):
                 yield f"out1[d + {k}] = {paths[6 * type_.rows * n + k]}"
     elif kernel == "C":
@@ -104,7 +104,7 @@ def _store(examined: Examined, kernel: str) -> Iterable[str]:
             yield f"{'out2' if kernel == 'gamma' else 'out3'}[row + {k}] = {path}"
     elif kernel in ("wrench", "friction"):
         for n, s in enumerate(layout.slots):
-            yield f"d = 6 * b_{s} & NATURAL"
+            yield f"d = 6 * b_{s}"
             for k in range(6):
                 yield f"out1[d + {k}] += {paths[6 * n + k]}"
     elif kernel == "energy":

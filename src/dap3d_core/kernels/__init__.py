@@ -4,8 +4,23 @@ A plugin imports from here only the words of its formulas; ``compiled``, the loo
 serve the core.
 """
 
-from dap3d_core.kernels import compiler_settings  # noqa: F401  it imports numba first  # isort: split
-from dap3d_core.kernels.mathematics import atan2, cos, sin, sqrt, tanh, where
+from dap3d_core.kernels.mathematics import (
+    abs,
+    acos,
+    asin,
+    atan2,
+    cos,
+    exp,
+    floor,
+    hypot,
+    log,
+    maximum,
+    minimum,
+    sin,
+    sqrt,
+    tanh,
+    where,
+)
 from dap3d_core.kernels.tables import lookup
 from dap3d_core.kernels.vectors import (
     add,
@@ -24,14 +39,23 @@ from dap3d_core.kernels.vectors import (
 )
 
 __all__ = [
+    "abs",
+    "acos",
     "add",
+    "asin",
     "atan2",
     "cos",
     "cross",
     "dot",
+    "exp",
     "eye",
+    "floor",
     "hstack",
+    "hypot",
+    "log",
     "lookup",
+    "maximum",
+    "minimum",
     "neg",
     "norm2",
     "normals",

@@ -1,43 +1,42 @@
-"""Where compiled code is kept, and under which digest.
+"""The compiled functions of the core; where compiled code is kept, and under which digest.
 
-numba's own cache looks at one source file only: a function that calls a helper of another file
-would go on giving the old number after the helper changed. So compiled code lives in folders named
-by a digest of *all* the sources that went into it; a change anywhere leads to another folder
-(docs/decisions/0001).
+Object files are named by a digest of *all* the sources that went into them: a change anywhere makes
+another file (docs/decisions/0001, 0026).
 """
 
+import functools
 import hashlib
+import inspect
 import os
 import sys
 import tempfile
 import threading
 import types
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from typing import Any
 
-import numba
-from numba import config, njit
-
-from dap3d_core.kernels.sealed_files import SealedCache
+from dap3d_core.kernels.compiler import objects
+from dap3d_core.kernels.compiler.functions import Program
+from dap3d_core.kernels.compiler.types import BOOL, FLOAT, INT, NOTHING, Scalar, Signature
+from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, type_of
 from dap3d_core.kernels.trusted import distrust
-
-#: How the core and the group loops are compiled: no bounds checks, IEEE division, nothing
-#: reassociated.
-OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 
 #: Floors of the core that hold compiled code, low to high: a function depends on its own floor and
 #: those below.
 COMPILED_FLOORS = ("kernels", "assembly", "linear", "formulations", "integrators", "study")
 
-#: numba takes the folder of its cache from one setting of the process. Nothing is imported while
-#: this is held.
-_folder_of_numba = threading.Lock()
+_RESULTS = {type_.name: type_ for type_ in (NOTHING, BOOL, INT, FLOAT)}
+_units: dict[str, Unit] = {}
+#: Held while a unit is made, which several threads may ask for at once.
+_making = threading.RLock()
 
 
 def jit_is_on() -> bool:
-    """Whether kernels are compiled; ``NUMBA_DISABLE_JIT=1`` runs them as plain Python."""
-    return not config.DISABLE_JIT
+    """Whether kernels are compiled; ``DAP3D_PLAIN=1`` runs them as plain Python."""
+    return os.environ.get("DAP3D_PLAIN", "0") in ("", "0")
 
 
 def cache_folder() -> Path | None:
@@ -82,9 +81,9 @@ def _candidates():
 
 
 def digest(*parts: str | bytes) -> str:
-    """Digest of sources and of what else decides the code made from them (Python, numba)."""
+    """Digest of sources and of the Python that reads them."""
     seal = hashlib.sha256()
-    for part in (*parts, numba.__version__, f"{sys.version_info[:2]}", "sealed files"):
+    for part in (*parts, f"{sys.version_info[:2]}"):
         seal.update(part.encode() if isinstance(part, str) else part)
         seal.update(b"\0")
     return seal.hexdigest()[:20]
@@ -95,68 +94,113 @@ def driver_digest(floor: str) -> str:
     """Digest of all sources that decide what the compiled code of a floor of the core computes."""
     root = Path(__file__).parents[1]
     below = COMPILED_FLOORS[: COMPILED_FLOORS.index(floor) + 1]
-    files = sorted(f for name in below for f in (root / name).glob("*.py"))
+    files = sorted(f for name in below for f in (root / name).rglob("*.py"))
     return digest(*(part for f in files for part in (f.name, f.read_bytes())))
+
+
+class Compiled:
+    """A function of the core, compiled for the types that it is called with.
+
+    Attributes:
+        is_inlined: whether it is put into its callers, once more for each constant that they give.
+    """
+
+    def __init__(self, function: Callable[..., Any], is_inlined: bool = False) -> None:
+        functools.update_wrapper(self, function)
+        self.is_inlined = is_inlined
+        self._parameters = list(inspect.signature(function).parameters.values())
+        self._entries: dict[Any, Entry] = {}
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the code for the types of these arguments."""
+        for parameter in self._parameters[len(arguments) :]:
+            arguments += (parameter.default,)
+        key = tuple([type_of(a) for a in arguments])
+        entry = self._entries.get(key)
+        return (self.compile(key) if entry is None else entry)(*arguments)
+
+    def compile(self, given: Sequence[Any]) -> Entry:
+        """The function for types of its arguments, from the cache or compiled now."""
+        key = tuple(given)
+        if key not in self._entries:
+            pairs = zip(key, self._parameters, strict=True)
+            exact = tuple(FLOAT if t == INT and p.annotation is float else t for t, p in pairs)
+            [self._entries[key]] = entries_of([self], exact)
+        return self._entries[key]
+
+
+def entries_of(functions: Sequence[Any], arguments: tuple[Any, ...]) -> list[Entry]:
+    """Functions for types of their arguments, as one unit of compiled code."""
+    plain = [inspect.unwrap(f) for f in functions]
+    parts = [f"{f.__module__}.{f.__qualname__}" for f in plain]
+    key = digest(repr(arguments), *parts, *_origin(plain), objects.identity())
+    name = f"{plain[0].__module__.split('.')[-1]}.{plain[0].__name__}-{key}"
+
+    def write() -> tuple[str, list[str]]:
+        program = Program()
+        found = [program.export(f, arguments, _symbol(name, k)) for k, f in enumerate(functions)]
+        return program.module(), [_name_of(s.result) for s in found]
+
+    with _making:
+        if name not in _units:
+            _units[name] = Unit(name, len(plain), write, cache_folder())
+        unit = _units[name]
+    signatures = [Signature(arguments, _RESULTS[r]) for r in unit.results]
+    return [Entry(unit, k, s) for k, s in enumerate(signatures)]
+
+
+def _symbol(name: str, k: int) -> str:
+    return f"{name.replace('-', '_')}_{k}"
+
+
+def _name_of(result: Scalar) -> str:
+    if getattr(result, "name", "") not in _RESULTS:
+        raise TypeError(f"a function that Python calls returns {result}; it may return one number")
+    return result.name
+
+
+def table_of(signature: Signature, functions: Sequence[Any]) -> Any:
+    """Functions of one signature as compiled code calls them: by their addresses.
+
+    Where kernels run as plain Python it is a list.
+    """
+    if not jit_is_on():
+        return list(functions)
+    entries: dict[Any, Entry] = {f: f for f in functions if isinstance(f, Entry)}
+    rest = [f for f in functions if f not in entries]
+    for module in dict.fromkeys(f.__module__ for f in rest):
+        here = [f for f in rest if f.__module__ == module]
+        entries.update(zip(here, entries_of(here, signature.arguments), strict=True))
+    return Functions(signature, [entries[f] for f in functions])
 
 
 def compiled(function):
     """Compile a function of the core at its first call, and keep the code for the next process."""
-    return compiled_in(cache_folder(), _driver_folder(function), function)
+    return Compiled(function) if jit_is_on() else function
 
 
-def compiled_inside(function):
-    """The same for a function that compiled code alone calls.
-
-    It compiles faster, for it has no door to Python; called from there it would crash the process.
-    """
-    options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return compiled_in(cache_folder(), _driver_folder(function), function, **options)
+#: The same for a function that compiled code alone calls.
+compiled_inside = compiled
 
 
 def compiled_into(function):
-    """The same for a function that is put into its callers before they are compiled.
-
-    For parts of a right-hand side that hand on a tuple of many arrays: as calls, four of them cost
-    as much as the physics of one body.
-    """
-    return compiled_in(cache_folder(), _driver_folder(function), function, inline="always")
+    """The same for a function that is put into its callers, with the constants that they give."""
+    return Compiled(function, is_inlined=True) if jit_is_on() else function
 
 
-def driver_is_cached(floor: str) -> bool:
-    """Whether compiled code of a floor of the core is there from an earlier process."""
-    folder = cache_folder()
-    return folder is not None and any((folder / f"{floor}-{driver_digest(floor)}").glob("*/*.nbc"))
-
-
-def _driver_folder(function) -> str:
-    floor = function.__module__.split(".")[1]
-    return f"{floor}-{driver_digest(floor)}"
-
-
-def compiled_in(folder: Path | None, name: str, function, **options):
-    """Compile with the cache in ``folder/name``; without a folder for this process alone."""
-    if not jit_is_on():
-        return function
-    compiled_function = njit(**OPTIONS, **options)(function)
-    if folder is None:
-        return compiled_function
-    with _folder_of_numba:
-        before, config.CACHE_DIR = config.CACHE_DIR, str(folder / name)
-        try:
-            kept = SealedCache(function)
-        except RuntimeError:  # numba found no folder that can be written
-            return compiled_function
-        finally:
-            config.CACHE_DIR = before
-    if Path(kept.cache_path).is_relative_to(folder / name):  # not another folder of numba's choice
-        compiled_function._cache = kept
-    return compiled_function
+def _origin(functions: Sequence[Any]) -> list[str | bytes]:
+    """What decides the code of functions: a digest of floors of the core, or their sources."""
+    floors = {f.__module__.split(".")[1] if f.__module__.startswith("dap3d_core.") else ""
+              for f in functions}  # fmt: skip
+    if floors <= set(COMPILED_FLOORS):
+        return [driver_digest(floor) for floor in sorted(floors)]
+    return [*identities(*functions), *sources(*functions)]
 
 
 def reached(*functions) -> tuple[list, list[str]]:
     """The functions that these call, themselves included, and values of the constants they read.
 
-    Follows names from function to function through their modules' globals; numpy, numba and the
+    Follows names from function to function through their modules' globals; numpy and the
     standard library are left out.
     """
     found: dict[object, None] = {}
@@ -164,13 +208,13 @@ def reached(*functions) -> tuple[list, list[str]]:
     todo = list(functions)
     while todo:
         function = todo.pop()
-        function = getattr(function, "py_func", function)
+        function = inspect.unwrap(function)
         if function in found:
             continue
         found[function] = None
         for name, value in _named_values(function):
-            if isinstance(value, types.FunctionType) or hasattr(value, "py_func"):
-                if _is_ours(getattr(value, "py_func", value).__code__.co_filename):
+            if isinstance(value, (types.FunctionType, Compiled)):
+                if is_an_authors(inspect.unwrap(value).__code__.co_filename):
                     todo.append(value)
             elif isinstance(value, (bool, int, float, complex, str, tuple)):
                 constants.append(f"{function.__qualname__}.{name}={value!r}")
@@ -210,18 +254,21 @@ def _named_values(function):
         if name in function.__globals__:
             outside[name] = function.__globals__[name]
     for name, value in list(outside.items()):
-        if isinstance(value, types.ModuleType) and _is_ours(getattr(value, "__file__", None) or ""):
+        if isinstance(value, types.ModuleType) and is_an_authors(
+            getattr(value, "__file__", None) or ""
+        ):
             outside |= {f"{name}.{n}": getattr(value, n) for n in names if hasattr(value, n)}
     return sorted(outside.items())
 
 
 @cache
-def _is_ours(filename: str) -> bool:
+def is_an_authors(filename: str) -> bool:
+    """Whether a file is of the core or of a package of types, and not of Python or numpy."""
     standard = Path(os.__file__).parent
     path = Path(filename)
     if not filename.endswith(".py"):
         return False
-    if path.is_relative_to(Path(numba.__file__).parent) or "numpy" in path.parts:
+    if "numpy" in path.parts:
         return False
     return not (path.is_relative_to(standard) and "site-packages" not in path.parts)
 

@@ -1,19 +1,13 @@
-"""Typed lists of first-class functions: what the driver did not know when it was compiled.
+"""Tables of functions by their addresses: what the driver did not know when it was compiled."""
 
-A typed list filled from Python would be compiled anew in each process (0.3 s); these are made by
-two cached functions of known signature. Where kernels run as plain Python the list is a plain list.
-"""
-
-import threading
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 import attrs
-from numba import float64, int64, types
-from numba.typed import List
 
 from dap3d_core.kernels.by_address import INTEGERS, MATRIX, VECTOR, Arrays, pointer
-from dap3d_core.kernels.cache import compiled, jit_is_on
+from dap3d_core.kernels.cache import compiled, table_of
+from dap3d_core.kernels.compiler.types import FLOAT, INT, Numbers, Signature, Table
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
@@ -28,74 +22,32 @@ class LoopArrays(Arrays):
     par: Any  # numbers of all instances
 
 
-_OUT = types.CPointer(float64)
+_OUT = Numbers()
 #: Signature of every group loop (loops.py).
-LOOP = types.void(float64, LoopArrays.type_of(), int64, int64, int64, _OUT, _OUT, _OUT)
-LOOP_TYPE = types.FunctionType(LOOP)
-LOOP_LIST = types.ListType(LOOP_TYPE)
+LOOP = Signature((FLOAT, LoopArrays.type_of(), INT, INT, INT, _OUT, _OUT, _OUT))
+LOOP_LIST = Table(LOOP)
 #: A Python integer as an argument.
-INTEGER = int64
+INTEGER = INT
 
 
-def procedure_signature(*arguments: Any) -> Any:
+def procedure_signature(*arguments: Any) -> Signature:
     """Signature of a function of these arguments that returns nothing."""
-    return types.void(*arguments)
+    return Signature(arguments)
 
 
-def step_signature(system: Any) -> Any:
+def step_signature(system: Any) -> Signature:
     """Signature of a formulation's functions: (t, y, out, system, loops)."""
-    return procedure_signature(float64, VECTOR, VECTOR, system, LOOP_LIST)
+    return procedure_signature(FLOAT, VECTOR, VECTOR, system, LOOP_LIST)
 
 
-def number_signature(*arguments: Any) -> Any:
+def number_signature(*arguments: Any) -> Signature:
     """Signature of a function of two numbers and these arguments that returns a number."""
-    return types.float64(float64, float64, *arguments)
+    return Signature((FLOAT, FLOAT, *arguments), FLOAT)
 
 
-def function_type(signature: Any) -> Any:
-    """The type of a first-class function of a signature."""
-    return types.FunctionType(signature)
-
-
-def list_type(item: Any) -> Any:
-    """The type of a typed list."""
-    return types.ListType(item)
-
-
-#: Held while the two functions that make a list are compiled.
-_preparing = threading.Lock()
-
-
-def fill(
-    empty: Callable[[], Any], append: Callable[..., None], item: Any, functions: Sequence[Callable]
-) -> Any:
-    """A typed list of functions, by ``empty`` and ``append`` compiled for this item type alone."""
-    if not jit_is_on():
-        return list(functions)
-    with _preparing:
-        if not empty.signatures:
-            empty.compile(types.ListType(item)())
-            append.compile(types.void(types.ListType(item), item))
-            append.disable_compile()  # else each function's own type would be compiled for
-    result = empty()
-    for function in functions:
-        append(result, function)
-    return result
-
-
-@compiled
-def _empty():
-    return List.empty_list(LOOP_TYPE)
-
-
-@compiled
-def _append(loops, loop):
-    loops.append(loop)
-
-
-def loop_list(loops: Sequence[Callable]) -> Any:
-    """Group loops as the one list that the driver takes as an argument of its own."""
-    return fill(_empty, _append, LOOP_TYPE, loops)
+def loop_list(loops: Sequence[Callable[..., Any]]) -> Any:
+    """Group loops as the one table that the driver takes as an argument of its own."""
+    return table_of(LOOP, loops)
 
 
 @compiled
@@ -105,21 +57,3 @@ def call_loop(
     """Call one group loop, with arrays and a group (i0, p0, count) of the caller's."""
     loop = loops[q]
     loop(t, arrays, group[0], group[1], group[2], pointer(out1), pointer(out2), pointer(out3))
-
-
-__all__ = [
-    "INTEGER",
-    "LOOP",
-    "LOOP_LIST",
-    "LOOP_TYPE",
-    "List",
-    "LoopArrays",
-    "call_loop",
-    "fill",
-    "function_type",
-    "list_type",
-    "loop_list",
-    "number_signature",
-    "procedure_signature",
-    "step_signature",
-]

@@ -13,21 +13,15 @@ one list and is never recompiled for a new type:
 
 import threading
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from dap3d_core.kernels import gather, written
-from dap3d_core.kernels.cache import (
-    cache_folder,
-    compiled_in,
-    digest,
-    identities,
-    jit_is_on,
-    reached,
-    sources,
-)
-from dap3d_core.kernels.inline import inlined
-from dap3d_core.kernels.lists import LOOP
+from dap3d_core.kernels import gather, tables, written
+from dap3d_core.kernels.cache import cache_folder, digest, identities, jit_is_on, sources
+from dap3d_core.kernels.compiler import objects
+from dap3d_core.kernels.compiler.trace import trace
+from dap3d_core.kernels.compiler.units import Entry, Unit
+from dap3d_core.kernels.lists import LOOP, LoopArrays
+from dap3d_core.kernels.outside import refuse_what_is_outside
 
 
 class Loop(NamedTuple):
@@ -63,33 +57,46 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
     Args:
         loop: what to build.
         announce: called with the loop's name before it is compiled anew.
+
+    Raises:
+        CompileError: a kernel does what only numbers can; names its line, and what to do.
     """
     text = source_of(loop)
     gathering = (gather.vector_at, gather.matrix_at, gather.unwound, gather.doubtful)
+    gathering += (tables.lookup,)
     kernels = loop.kernels.values()
-    key = digest(text, *identities(*kernels), *sources(*kernels, *gathering))
+    name = f"loop-{digest(text, *identities(*kernels), *sources(*kernels, *gathering))}"
     with _building:
-        if key not in _built:
-            _built[key] = _build(loop, text, f"loop-{key}", announce)
-        return _built[key]
+        if name not in _built:
+            _built[name] = _build(loop, text, name, announce)
+        return _built[name]
 
 
 def _build(loop: Loop, text: str, name: str, announce: Callable[[str], None] | None) -> Callable:
-    folder = cache_folder()
-    path = written.write(name, text) if jit_is_on() else None
-    namespace = written.load(path, name, text)
-    namespace.update(loop.kernels)
-    for plain in reached(*loop.kernels.values())[0]:  # kernels and the author's own helpers
-        inlined(plain)
-    function = compiled_in(None if path is None else folder, name, namespace["loop"])
-    if jit_is_on():
-        if announce is not None and not _is_cached(folder, name):
+    def python() -> dict[str, Any]:
+        namespace = written.load(None, name, text)
+        namespace.update(loop.kernels)
+        return namespace
+
+    if not jit_is_on():
+        return python()["loop"]
+
+    def write() -> tuple[str, list[Any]]:
+        if announce is not None:
             announce(loop.name)
-        function.compile(LOOP)
-        if not function.stats.cache_hits:
-            compiled_here.append(loop.name)
-    return function
+        refuse_what_is_outside(*loop.kernels.values())
+        compiled_here.append(loop.name)
+        return trace(symbol, python(), _members()), ["None"]
+
+    full = f"{name}-{digest(objects.identity())}"
+    symbol = f"{full.replace('-', '_')}_0"
+    return Entry(Unit(full, 1, write, cache_folder(), at_once=True), 0, LOOP)
 
 
-def _is_cached(folder: Path | None, name: str) -> bool:
-    return folder is not None and any((folder / name).glob("*/*.nbc"))
+def _members() -> dict[str, tuple[int, str, int]]:
+    """Of each array: its first word in the table, LLVM's type of its items, width of its rows."""
+    found, first = {}, 0
+    for name, type_ in LoopArrays.type_of().members:
+        found[name] = (first, type_.item.words[0], {"body": gather.BODY_WIDTH, "F": 5}.get(name, 0))
+        first += len(type_.words)
+    return found

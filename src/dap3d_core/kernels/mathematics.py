@@ -1,22 +1,26 @@
 """Scalar mathematics for kernels: one name for floats, complex numbers, sympy and compiled code.
 
-Outside their domain the functions give NaN, as compiled code does; a run stops at the first NaN and
-names its source.
+Outside their domain the functions give what IEEE arithmetic gives, as compiled code does; a run
+stops at the first NaN and names its source.
 """
 
 import cmath
 import math
+from collections.abc import Callable
+from typing import Any
 
-from numba.extending import overload
-
-from dap3d_core.kernels.inline import INLINE_OPTIONS
+from dap3d_core.kernels.compiler.words import word
 
 
 def _symbolic(x):
-    return hasattr(x, "free_symbols")
+    return hasattr(x, "free_symbols") or hasattr(x, "words")
 
 
-def _sympy():
+def _library(*numbers: Any) -> Any:
+    """What has the words for symbolic numbers: sympy's, or those of a trace."""
+    for x in numbers:
+        if hasattr(x, "words"):
+            return x.words
     import sympy  # only reached with a sympy argument, so it is there
 
     return sympy
@@ -31,26 +35,22 @@ def _like(x, value):
     return type(x)(value) if isinstance(x, (float, complex)) else value
 
 
-def _generic(name):
+def _generic(name: str, outside: Callable[[float], float] = lambda x: math.nan) -> Any:
     real, other = getattr(math, name), getattr(cmath, name)
 
+    @word(name)
     def function(x):
         if isinstance(x, complex):
             return _like(x, other(x))
         if _symbolic(x):
-            return getattr(_sympy(), name)(x)
+            return getattr(_library(x), name)(x)
         try:
             return _like(x, real(x))
-        except ValueError:
-            return _like(x, math.nan)
+        except (ValueError, OverflowError):
+            return _like(x, outside(x))
 
     function.__name__ = function.__qualname__ = name
     function.__doc__ = f"{name}(x) of a number (float, complex or sympy)."
-
-    @overload(function, jit_options=INLINE_OPTIONS)
-    def compiled(x):
-        return lambda x: real(x)
-
     return function
 
 
@@ -58,32 +58,63 @@ sqrt = _generic("sqrt")
 sin = _generic("sin")
 cos = _generic("cos")
 tanh = _generic("tanh")
+asin = _generic("asin")
+acos = _generic("acos")
+exp = _generic("exp", lambda x: math.inf)
+log = _generic("log", lambda x: -math.inf if x == 0.0 else math.nan)
 
 
+@word("atan2")
 def atan2(y, x):
     """Angle of the point (x, y) in (-pi, pi]; complex: its first-order continuation."""
     if isinstance(y, complex) or isinstance(x, complex):
-        square = x.real**2 + y.real**2
+        square = x.real * x.real + y.real * y.real
         slope = (x.real * y.imag - y.real * x.imag) / square if square else math.nan
         return _like(x + y, complex(math.atan2(y.real, x.real), slope))
     if _symbolic(y) or _symbolic(x):
-        return _sympy().atan2(y, x)
+        return _library(y, x).atan2(y, x)
     return _like(x + y, math.atan2(y, x))
-
-
-@overload(atan2, jit_options=INLINE_OPTIONS)
-def _compiled_atan2(y, x):
-    return lambda y, x: math.atan2(y, x)
 
 
 def where(condition, a, b):
     """``a`` where the condition holds, else ``b``: a kernel's branch. Both are evaluated."""
+    if hasattr(condition, "words"):
+        return condition.words.where(condition, a, b)
     if _symbolic(condition):
-        sympy = _sympy()
+        sympy = _library()
         return sympy.Piecewise((a, condition), (b, True))
     return a if condition else b
 
 
-@overload(where, jit_options=INLINE_OPTIONS)
-def _compiled_where(condition, a, b):
-    return lambda condition, a, b: a if condition else b
+def _order(x):
+    """What a number is compared by: complex numbers of derivative checks by their real parts."""
+    return x.real if isinstance(x, complex) else x
+
+
+def minimum(a, b):
+    """The lesser of two numbers; the second one where they are not ordered."""
+    return where(_order(a) < _order(b), a, b)
+
+
+def maximum(a, b):
+    """The greater of two numbers; the second one where they are not ordered."""
+    return where(_order(a) > _order(b), a, b)
+
+
+def abs(x):
+    """The magnitude of a number; complex: its first-order continuation."""
+    return where(_order(x) < 0.0, -x, x + 0.0)
+
+
+def hypot(x, y):
+    """The length of (x, y)."""
+    return sqrt(x * x + y * y)
+
+
+def floor(x):
+    """The whole number at or below x, as a float."""
+    if isinstance(x, complex):
+        return _like(x, math.floor(x.real))
+    if _symbolic(x):
+        return _library(x).floor(x)
+    return _like(x, math.floor(x)) if math.isfinite(x) else x

@@ -4,11 +4,6 @@ A table stands in an instance's numbers as (array, place, rows, sample of a row)
 the array from the place on, the first number of each row increasing.
 """
 
-from numba.cpython.unsafe.tuple import tuple_setitem
-from numba.extending import overload
-
-from dap3d_core.kernels.inline import INLINE_OPTIONS
-
 
 def lookup(table, x):
     """The row of a table that x belongs to: the last one whose first number is not above x.
@@ -16,9 +11,12 @@ def lookup(table, x):
     Before the first row, the first one. Returns the row's numbers, a tuple.
     """
     array, place, rows, sample = table
-    if hasattr(x, "free_symbols"):
+    if hasattr(array, "words"):  # while it is compiled
+        at = array.words.row_of(_row, array, place, rows, len(sample), x)
+    elif hasattr(x, "free_symbols"):
         raise TypeError("a table has no symbolic rows")
-    at = _row(array, int(place), int(rows), len(sample), getattr(x, "real", x))
+    else:
+        at = _row(array, int(place), int(rows), len(sample), getattr(x, "real", x))
     return tuple(array[at + k] for k in range(len(sample)))
 
 
@@ -31,22 +29,3 @@ def _row(array, place, rows, width, x):
         else:
             high = middle
     return place + low * width
-
-
-@overload(_row, jit_options=INLINE_OPTIONS)
-def _compiled_row(array, place, rows, width, x):
-    return _row
-
-
-@overload(lookup, jit_options=INLINE_OPTIONS)
-def _compiled_lookup(table, x):
-    width = len(table[3])
-
-    def read(table, x):
-        array, place, rows, row = table
-        at = _row(array, int(place), int(rows), width, x)
-        for k in range(width):
-            row = tuple_setitem(row, k, array[at + k])
-        return row
-
-    return read

@@ -4,76 +4,64 @@ Every function here is pure and generic: in compiled code the tuples vanish into
 Python the same source runs with floats, complex numbers (derivatives by complex step) and sympy.
 """
 
-from dap3d_core.kernels.inline import inlined
+from dap3d_core.kernels.mathematics import sqrt
 
 
-@inlined
 def add(a, b):
     """Sum of two 3-vectors."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-@inlined
 def sub(a, b):
     """Difference ``a - b`` of two 3-vectors."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@inlined
 def neg(a):
     """The 3-vector ``-a``."""
     return (-a[0], -a[1], -a[2])
 
 
-@inlined
 def scale(x, a):
     """The 3-vector ``x a`` for a number x."""
     return (x * a[0], x * a[1], x * a[2])
 
 
-@inlined
 def dot(a, b):
     """Scalar product of two 3-vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@inlined
 def cross(a, b):
     """Vector product ``a x b``."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@inlined
 def skew(a):
     """The skew matrix of a 3-vector: ``skew(a) b = a x b``, three rows."""
     return ((0.0, -a[2], a[1]), (a[2], 0.0, -a[0]), (-a[1], a[0], 0.0))
 
 
-@inlined
 def eye(x):
     """``x`` times the 3x3 identity, three rows."""
     return ((x, 0.0, 0.0), (0.0, x, 0.0), (0.0, 0.0, x))
 
 
-@inlined
 def row(a, b):
     """One Jacobian row of six from its translational part a and its rotational part b."""
     return (a[0], a[1], a[2], b[0], b[1], b[2])
 
 
-@inlined
 def hstack(P, Q):
     """Three Jacobian rows of six from a translational and a rotational 3x3 block."""
     return (row(P[0], Q[0]), row(P[1], Q[1]), row(P[2], Q[2]))
 
 
-@inlined
 def rotate(A, s):
     """The 3-vector ``A s``: components of s on the body become global ones."""
     return (dot(A[0], s), dot(A[1], s), dot(A[2], s))
 
 
-@inlined
 def norm2(a):
     """Squared length of a 3-vector."""
     return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
@@ -91,11 +79,11 @@ def normals(a):
     Raises:
         ValueError: the axis has no length.
     """
-    length = norm2(a) ** 0.5
+    length = sqrt(norm2(a))
     if not length > 0.0:
         raise ValueError("an axis needs a length; this one is zero")
     a = scale(1.0 / length, a)
     least = min(range(3), key=lambda k: abs(a[k]))
     n = tuple((1.0 if k == least else 0.0) - a[least] * a[k] for k in range(3))
-    n = scale(1.0 / norm2(n) ** 0.5, n)
+    n = scale(1.0 / sqrt(norm2(n)), n)
     return n, cross(a, n)

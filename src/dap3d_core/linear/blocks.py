@@ -265,7 +265,7 @@ def pivot_lengths(nodes: Integers, K: Floats, smallest: Floats, lengths: Floats)
                 product *= POOR * ratio
         if not product > LESS:
             counted += small
-        lengths[k] = product**0.5 if product > 0.0 else 0.0
+        lengths[k] = np.sqrt(product) if product > 0.0 else 0.0
     return counted
 
 

@@ -64,9 +64,9 @@ def compile_kernels(source: Source, examined: Examined, notes: list[str]) -> Non
     """Compile all kernels of a type that was loaded, as a run would those that its scene needs.
 
     Raises:
-        PluginError: numba cannot compile one; names distribution, module, reason and remedy.
+        PluginError: one cannot be compiled; names distribution, module, reason and remedy.
     """
-    # here, for with it comes numba, which finding types by keyword does not need
+    # here, for finding types by keyword does not need the compiler
     from dap3d_core.interface.compiling import compile_all
 
     with _guard(source, notes):

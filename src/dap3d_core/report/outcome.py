@@ -154,7 +154,7 @@ class Report:
         target_error: the error that was asked for; None where none was.
         status: "done" or "interrupted".
         notes: what to know of the whole.
-        versions: of dap3d, numpy, numba, python.
+        versions: of dap3d, numpy, llvmlite, python.
     """
 
     scene: str

@@ -42,7 +42,7 @@ class Statistics:
 @cache
 def _installed() -> dict[str, str]:
     found = {}
-    for package in ("dap3d", "numpy", "numba"):
+    for package in ("dap3d", "numpy", "llvmlite"):
         try:
             found[package] = version(package)
         except PackageNotFoundError:
@@ -51,7 +51,7 @@ def _installed() -> dict[str, str]:
 
 
 def current_versions() -> dict[str, str]:
-    """Versions of what the numbers depend on: dap3d, numpy, numba, python."""
+    """Versions of what the numbers depend on: dap3d, numpy, llvmlite, python."""
     return dict(_installed())
 
 
@@ -88,7 +88,7 @@ class Record:
         run: by which a checkpoint knows the rows that belong to it; "" where there is none.
         types: where the types of the scene come from (simulation/sources.py): "joint rev" ->
             ``digest``, ``distribution``, ``version``; None where it was not recorded.
-        known_versions: of dap3d, numpy, numba, python; None for those that are installed.
+        known_versions: of dap3d, numpy, llvmlite, python; None for those that are installed.
     """
 
     scene_text: str
@@ -107,7 +107,7 @@ class Record:
 
     @property
     def versions(self) -> dict[str, str]:
-        """Versions of dap3d, numpy, numba and python that made the numbers."""
+        """Versions of dap3d, numpy, llvmlite and python that made the numbers."""
         known = self.known_versions
         return current_versions() if known is None else dict(known)
 

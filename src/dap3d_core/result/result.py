@@ -206,7 +206,7 @@ class Result(Kinematics):
 
     @property
     def versions(self) -> dict[str, str]:
-        """Versions of dap3d, numpy, numba and python that made it."""
+        """Versions of dap3d, numpy, llvmlite and python that made it."""
         return dict(self.record.versions)
 
     @property

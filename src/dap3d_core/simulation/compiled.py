@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dap3d_core.formulations.machine import Machine
-from dap3d_core.kernels.cache import cache_notes, driver_is_cached
+from dap3d_core.kernels.cache import cache_notes
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.result import INFORMATION
@@ -120,8 +120,6 @@ class CompiledModel:
         self._own.stack.append(self.another_machine(announce))
         self.method, self.reason = self.choice(asked)
         self.machine.method = self.method
-        if not driver_is_cached("formulations"):
-            announce(f"the solver ({self.method})")
         # compiled here, and not on the clock of the first run
         try:
             _ = self.machine.second_thread

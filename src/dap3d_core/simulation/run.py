@@ -13,7 +13,6 @@ from dap3d_core.integrators import METHODS, Integration, Status, make_adams
 from dap3d_core.integrators.integration import Statistics as Counts
 from dap3d_core.integrators.singular import begin_singular
 from dap3d_core.integrators.work import LONGEST
-from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import INFORMATION, Occurrence, Record, Result, ResultError, Statistics
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.asked import (
@@ -265,8 +264,6 @@ class Run:
 
     def _begin(self, integration: Integration) -> None:
         """Compile an integrator before the clock of the run goes on; it is the present one then."""
-        if self.announce is not None and not driver_is_cached("integrators"):
-            self.announce("the integrator")
         integration.stops = self.compiled.pace(float(self.times[-1])).stops
         if self.limits is not None:
             integration.stops = halved(integration.stops)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dap3d_core.integrators import METHODS
-from dap3d_core.kernels.cache import driver_is_cached
 from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
@@ -115,8 +114,6 @@ class Ensemble:
         Args:
             announce: called with what has to be compiled anew.
         """
-        if announce is not None and self._together and not driver_is_cached("study"):
-            announce("the driver of many runs")
         self._runner()
 
     def run(self, points: ArrayLike) -> Batch:

@@ -38,7 +38,7 @@ IDENTITY = {
     "seed": "another seed",
     "pack": "packs of another size",
     "types": "other formulas: the file of a type has changed since",
-    "versions": "other versions of dap3d, numpy, numba or python",
+    "versions": "other versions of dap3d, numpy, llvmlite or python",
 }
 
 

@@ -6,22 +6,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.assembly.system import STEP_TYPE, System, step_functions
+from dap3d_core.assembly.system import STEPS, System, step_functions
 from dap3d_core.formulations.machine import Machine
 from dap3d_core.integrators import METHODS, Integration
 from dap3d_core.integrators.runge_kutta import advance
 from dap3d_core.integrators.work import Status, Work
-from dap3d_core.kernels.beside import wait_for_what_is_beside
-from dap3d_core.kernels.cache import compiled, jit_is_on
-from dap3d_core.kernels.lists import (
-    INTEGER,
-    LOOP_LIST,
-    List,
-    fill,
-    function_type,
-    list_type,
-    procedure_signature,
-)
+from dap3d_core.kernels.cache import table_of
+from dap3d_core.kernels.lists import INTEGER, LOOP_LIST, procedure_signature
 from dap3d_core.scene import Simulation
 from dap3d_core.simulation.asked import explicit_options, integration_options
 from dap3d_core.simulation.implicit import EXPLICIT
@@ -38,8 +29,7 @@ CALL = 200_000
 #: Constants of the metric in which displacements are measured in m (Model.length) and rad.
 UNIT = np.array([1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
 
-_DRIVE = (Work.type_of(), list_type(STEP_TYPE), System.type_of(), LOOP_LIST, INTEGER)
-DRIVE_TYPE = function_type(procedure_signature(*_DRIVE))
+_DRIVE = procedure_signature(Work.type_of(), STEPS, System.type_of(), LOOP_LIST, INTEGER)
 
 
 class Found(NamedTuple):
@@ -117,7 +107,6 @@ class Runs:
         self._told[starting.SIZE] = self.size
         without = np.flatnonzero(~machine.model.position_row)
         self._told[starting.STARTING + machine.system.row[without]] = 1.0
-        wait_for_what_is_beside()
         none = np.zeros((0, 0))
         self.run(none, np.zeros(0, dtype=np.int64), y0[None][:0])  # to compile it
 
@@ -171,19 +160,7 @@ def _starting(method: str) -> Any:
     return step_functions(begin, starting.assemble_start)
 
 
-@compiled
-def _empty() -> Any:
-    return List.empty_list(DRIVE_TYPE)
-
-
-@compiled
-def _append(functions: Any, function: Any) -> None:
-    functions.append(function)
-
-
 @cache
 def _drives() -> Any:
     """The integrator, by its address: compiled code that calls it has no copy of it."""
-    if jit_is_on():
-        advance.compile(_DRIVE)
-    return fill(_empty, _append, DRIVE_TYPE, (advance,))
+    return table_of(_DRIVE, (advance,))

@@ -9,6 +9,8 @@ change that brings a state onto its constraints, and what a run remembers of its
 
 from typing import Any
 
+import numpy as np
+
 from dap3d_core.assembly.evaluate import call_kinds, place, place_bodies
 from dap3d_core.assembly.system import (
     ANGLE,
@@ -95,6 +97,12 @@ def smallest_share(system: System) -> float:
     return least
 
 
+@compiled_into
+def length_of(a: Floats) -> float:
+    """The length of a 3-vector."""
+    return np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
 @compiled_inside
 def shorten(system: System, longest_shift: float) -> float:
     """Shorten a displacement in ``force``, of unit metric, so that no body moves too far.
@@ -104,8 +112,8 @@ def shorten(system: System, longest_shift: float) -> float:
     force, shift, turn = system.force, 0.0, 0.0
     for b in range(1, force.shape[0] // 6):
         o = 6 * b
-        shift = max(shift, (force[o] ** 2 + force[o + 1] ** 2 + force[o + 2] ** 2) ** 0.5)
-        turn = max(turn, (force[o + 3] ** 2 + force[o + 4] ** 2 + force[o + 5] ** 2) ** 0.5)
+        shift = max(shift, length_of(force[o : o + 3]))
+        turn = max(turn, length_of(force[o + 3 : o + 6]))
     part = 1.0
     if shift > longest_shift:
         part = longest_shift / shift

@@ -107,7 +107,7 @@ class Kernels:
         """What the kernels of a loop return when they run compiled, by name.
 
         Raises:
-            Exception: numba's, where it cannot compile them.
+            CompileError: they cannot be compiled.
         """
         if kind not in self._compiled:
             loop: Any = write(self.examined, kind)

@@ -11,7 +11,6 @@ import numpy as np
 
 from dap3d_core.interface.writer import LOOP_KINDS
 from dap3d_core.kernels.cache import jit_is_on, reached
-from dap3d_core.kernels.reasons import why_not_compiled
 from dap3d_core.testing.comparing import Comparison, Wrong, left_out
 from dap3d_core.testing.subject import Sample, Subject, UndefinedError
 from dap3d_core.testing.verdict import Outcome
@@ -78,7 +77,7 @@ def _names(subject: Subject) -> tuple[str, ...]:
 def compiled(subject: Subject) -> Outcome:
     """Compiled, the kernels give the numbers of plain Python."""
     if not jit_is_on():
-        return left_out("compiled", subject, "numba is off (NUMBA_DISABLE_JIT)")
+        return left_out("compiled", subject, "nothing is compiled (DAP3D_PLAIN)")
     c = Comparison("compiled", subject, "", "compiled numbers against those of plain Python")
     for kind, kernels in LOOP_KINDS.items():
         owner = subject.friction if kind == "friction" and _rubs(subject) else subject
@@ -92,11 +91,10 @@ def _compare_compiled(c: Comparison, subject: Subject, kind: str) -> None:
         try:
             found = subject.kernels.compiled_values(kind, sample.element, sample.state)
         except Exception as error:
-            reason = why_not_compiled(error, subject.examined.kernels.values())
             c.kernel = kind
             c.fail(
-                f"numba cannot compile the kernels of its loop ({kind}): {reason}; a kernel is "
-                "plain: tuples of numbers, the words of dap3d_core.kernels, where() for branches"
+                f"the kernels of its loop cannot be compiled ({kind}): {error}; a kernel is plain: "
+                "tuples of numbers, the words of dap3d_core.kernels, where() for branches"
             )
             return
         for name, value in found.items():
@@ -171,7 +169,7 @@ def _about_value(name: str, value: Any) -> str:
         return f"it uses {name} of the module {module}, whose answer is not made of its arguments"
     if isinstance(value, tuple):
         return next((w for v in value if (w := _about_value(name, v))), "")
-    if isinstance(value, (*CONSTANTS, types.ModuleType)) or hasattr(value, "py_func"):
+    if isinstance(value, (*CONSTANTS, types.ModuleType)) or hasattr(value, "__wrapped__"):
         return ""
     return (
         f"it reads {name}, a {type(value).__name__} that anyone may change; make it a tuple, or "

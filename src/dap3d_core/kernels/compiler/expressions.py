@@ -1,0 +1,331 @@
+"""Values, arrays and calls of the typed subset of Python to LLVM IR."""
+
+import ast
+import builtins
+import inspect
+import types
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from dap3d_core.kernels.compiler.operations import Operations
+from dap3d_core.kernels.compiler.types import (
+    BOOL,
+    COMPLEX,
+    FLOAT,
+    INT,
+    Array,
+    CompileError,
+    Known,
+    Pointer,
+    Struct,
+    Table,
+    Tuple,
+    Value,
+    bits,
+    constant,
+    group,
+    items_of,
+)
+from dap3d_core.kernels.compiler.words import KNOWN, WORDS
+from dap3d_core.kernels.compiler.writing import name_of
+
+#: What to write instead of expressions that are not in the subset.
+INSTEAD = {
+    "ListComp": "loop over a range, and write into an array",
+    "GeneratorExp": "loop over a range",
+    "SetComp": "loop over a range",
+    "DictComp": "loop over a range",
+    "List": "hand on an array, or a tuple",
+    "Dict": "hand on arrays",
+    "Set": "hand on arrays",
+    "Lambda": "put a function at the top of the module",
+    "JoinedStr": "texts are for Python",
+    "NamedExpr": "assign in a line of its own",
+    "Yield": "write into an array",
+    "Await": "compiled code waits for nothing",
+    "Starred": "name each argument",
+}
+
+
+class Expressions(Operations):
+    """Writes the expressions of a function; statements are in functions.py."""
+
+    program: Any
+    current: dict[str, Any]
+    stored: set[str]
+    arguments: dict[str, Any]
+    load: Callable[..., Value]
+
+    def value(self, node: ast.expr) -> Value:
+        """The value of an expression."""
+        kind = type(node).__name__
+        write = getattr(self, f"_{kind}", None)
+        if write is None:
+            self.refuse(node, f"{kind} is no expression of compiled code",
+                        INSTEAD.get(kind, "see docs/concepts/compiled-python.md"))  # fmt: skip
+        found: Value = write(node)
+        return found
+
+    def _Constant(self, node: ast.Constant) -> Value:
+        found = constant(node.value)
+        if found is None:
+            self.refuse(node, f"{node.value!r} is no number of 64 bits", "take numbers")
+        return found
+
+    def _Tuple(self, node: ast.Tuple) -> Value:
+        return group([self.value(item) for item in node.elts])
+
+    def _Name(self, node: ast.Name) -> Value:
+        name, function = node.id, self.function
+        known = self.arguments.get(name)
+        if isinstance(known, Known) and name not in self.stored:
+            return self._known(node, name, known.value)
+        if name in self.current:
+            return self.load(node, name)
+        if name in self.stored:
+            self.refuse(node, f"{name} has no value yet", "give it one on every way")
+        if name in function.__code__.co_freevars:
+            place = function.__code__.co_freevars.index(name)
+            return self._known(node, name, function.__closure__[place].cell_contents)
+        if name in function.__globals__:
+            return self._known(node, name, function.__globals__[name])
+        if hasattr(builtins, name):
+            return self._known(node, name, getattr(builtins, name))
+        self.refuse(node, f"{name} is not defined", "define or import it")
+
+    def _known(self, node: Any, name: str, value: Any) -> Value:
+        found = constant(value)
+        if found is not None:
+            return found
+        if callable(value) or isinstance(value, types.ModuleType):
+            return Value(Known(value))
+        self.refuse(node, f"{name} is a {type(value).__name__} of the module",
+                    "hand it on as an argument")  # fmt: skip
+
+    def _Attribute(self, node: ast.Attribute) -> Value:
+        value, name = self.value(node.value), node.attr
+        type_ = value.type
+        if isinstance(type_, Known) and isinstance(type_.value, types.ModuleType):
+            if hasattr(type_.value, name):
+                return self._known(node, name, getattr(type_.value, name))
+        elif isinstance(type_, Array) and name == "shape":
+            return group([Value(INT, (w,)) for w in value.words[1:]])
+        elif isinstance(type_, Array) and name == "size":
+            return Value(INT, (self.count_of(value.words[1:]),))
+        elif isinstance(type_, Struct):
+            return self._member(node, value, name)
+        elif type_ in (FLOAT, COMPLEX) and name in ("real", "imag"):
+            words = (*value.words, bits(0.0))
+            return Value(FLOAT, (words[name == "imag"],))
+        self.refuse(node, f"a {name_of(type_)} has no {name} here",
+                    "arrays have shape and size, structs their members")  # fmt: skip
+
+    def count_of(self, lengths: Sequence[str]) -> str:
+        """The product of lengths."""
+        count = lengths[0] if lengths else "1"
+        for length in lengths[1:]:
+            count = self.new(f"mul nsw i64 {count}, {length}")
+        return count
+
+    def _member(self, node: ast.Attribute, value: Value, name: str) -> Value:
+        first = 0
+        for member, type_ in value.type.members:
+            if member == name:
+                break
+            first += len(type_.words)
+        else:
+            self.refuse(node, f"{value.type.name} has no member {name}",
+                        f"it has {', '.join(m for m, _ in value.type.members)}")  # fmt: skip
+        words = []
+        for k, word in enumerate(type_.words):
+            at = self.new(f"getelementptr inbounds i64, ptr {value.word}, i64 {first + k}")
+            words.append(self.new(f"load {word}, ptr {at}, align 8, !invariant.load !0"))
+        return Value(type_, tuple(words))
+
+    # ------------------------------------------------------------------ arrays
+
+    def index(self, node: ast.expr, length: str) -> str:
+        """An index as a word; a constant one below zero counts from the end."""
+        found = self.integer(node, self.value(node))
+        if found.constant is not None and found.constant < 0:
+            return self.new(f"add nsw i64 {length}, {found.constant}")
+        return found.word
+
+    def address(self, array: Value, places: Sequence[ast.expr]) -> str:
+        """Where the part of an array begins that leading indices choose."""
+        lengths = array.words[1:]
+        at = "0"
+        for k, length in enumerate(lengths):
+            if k > 0:
+                at = self.new(f"mul nsw i64 {at}, {length}") if at != "0" else at
+            if k < len(places):
+                index = self.index(places[k], length)
+                at = self.new(f"add nsw i64 {at}, {index}") if at != "0" else index
+        return self.item(array, at)
+
+    def item(self, array: Value, k: str) -> str:
+        """Where the k-th number of an array stands."""
+        item = array.type.item.words
+        kind = f"[{len(item)} x {item[0]}]" if len(item) > 1 else item[0]
+        return self.new(f"getelementptr inbounds {kind}, ptr {array.word}, i64 {k}")
+
+    def word_of(self, place: str, item: Any, k: int) -> str:
+        """Where a word of a number stands, whose first one is at a place."""
+        return (
+            self.new(f"getelementptr inbounds {item.words[0]}, ptr {place}, i64 {k}")
+            if k
+            else place
+        )
+
+    def element(self, node: ast.Subscript) -> tuple[str, Any]:
+        """Where the number stands that an index chooses, and its type."""
+        array, places = self.value(node.value), _parts(node.slice)
+        if not isinstance(array.type, Array):
+            self.refuse(node, f"a {name_of(array.type)} is written into", "only arrays change")
+        if len(places) != array.type.ndim or any(isinstance(p, ast.Slice) for p in places):
+            self.refuse(node, "more than one number is written at once", "write a loop")
+        return self.address(array, places), array.type.item
+
+    def _Subscript(self, node: ast.Subscript) -> Value:
+        value, places = self.value(node.value), _parts(node.slice)
+        type_ = value.type
+        if isinstance(type_, Tuple):
+            return self._tuple_item(node, value)
+        if isinstance(type_, Table):
+            k = self.integer(node.slice, self.value(node.slice)).word
+            at = self.new(f"getelementptr inbounds i64, ptr {value.word}, i64 {k}")
+            return Value(Pointer(type_.signature), (self.new(f"load ptr, ptr {at}"),))
+        if not isinstance(type_, Array) or len(places) > type_.ndim:
+            self.refuse(node, f"a {name_of(type_)} has no such index", "index arrays and tuples")
+        if isinstance(node.slice, ast.Slice):
+            return self._slice(node.slice, value)
+        if any(isinstance(p, ast.Slice) for p in places):
+            self.refuse(node, "a slice that is not of whole rows", "write a loop")
+        at = self.address(value, places)
+        if len(places) < type_.ndim:
+            shape = value.words[1 + len(places) :]
+            return Value(Array(type_.item, type_.ndim - len(places)), (at, *shape))
+        slots = [self.word_of(at, type_.item, k) for k in range(len(type_.item.words))]
+        return self.read_from(slots, type_.item)
+
+    def _tuple_item(self, node: ast.Subscript, value: Value) -> Value:
+        if isinstance(node.slice, ast.Slice):
+            bounds = [node.slice.lower, node.slice.upper, node.slice.step]
+            known = [None if b is None else self.value(b).constant for b in bounds]
+            return group(items_of(value)[slice(*known)])
+        k = self.value(node.slice).constant
+        items = items_of(value)
+        if not isinstance(k, int) or not -len(items) <= k < len(items):
+            self.refuse(node, f"the index of a tuple of {len(items)} is no constant within it",
+                        "take it apart, or take an array")  # fmt: skip
+        return items[k]
+
+    def _slice(self, node: ast.Slice, array: Value) -> Value:
+        """Rows of an array; bounds are cut to its length, as in Python."""
+        if node.step is not None:
+            self.refuse(node.step, "a slice with a step", "write a loop")
+        _, length, *inner = array.words
+
+        def bound(given: ast.expr | None, default: str) -> str:
+            if given is None:
+                return default
+            k = self.index(given, length)
+            inside = self.new(f"icmp slt i64 {k}, {length}")
+            return self.new(f"select i1 {inside}, i64 {k}, i64 {length}")
+
+        first, last = bound(node.lower, "0"), bound(node.upper, length)
+        at = self.item(array, self.count_of([first, *inner]))
+        return Value(array.type, (at, self.new(f"sub nsw i64 {last}, {first}"), *inner))
+
+    # ------------------------------------------------------------------ calls
+
+    def _Call(self, node: ast.Call) -> Value:
+        called = self.value(node.func)
+        if isinstance(called.type, Pointer):
+            return self._through(node, called)
+        if not isinstance(called.type, Known):
+            self.refuse(node, f"a {name_of(called.type)} is called", "call functions")
+        function = called.type.value
+        arguments = [self.value(a) for a in node.args]
+        word = KNOWN.get(_hashable(function)) or getattr(function, "compiled_word", None)
+        if word is not None:
+            if node.keywords:
+                self.refuse(node, f"{word} is called with names", "give its arguments by place")
+            return WORDS[word](self, node, arguments)
+        plain = inspect.unwrap(function)
+        if not isinstance(plain, types.FunctionType) or plain.__module__ in ("numpy", "math"):
+            name = getattr(function, "__qualname__", repr(function))
+            self.refuse(node, f"{name} is not known to compiled code",
+                        "write a function of the subset, or use one of the words")  # fmt: skip
+        return self._call(node, function, plain, arguments)
+
+    def _call(
+        self, node: ast.Call, function: Any, plain: types.FunctionType, arguments: list[Value]
+    ) -> Value:
+        parameters = list(inspect.signature(plain).parameters.values())
+        named = {k.arg: self.value(k.value) for k in node.keywords}
+        if len(arguments) > len(parameters) or set(named) - {p.name for p in parameters}:
+            self.refuse(node, f"{plain.__qualname__} is not called as it is defined",
+                        f"it takes {', '.join(p.name for p in parameters)}")  # fmt: skip
+        for parameter in parameters[len(arguments) :]:
+            given = named.get(parameter.name) or constant(parameter.default)
+            if given is None:
+                self.refuse(node, f"{plain.__qualname__} is called without {parameter.name}",
+                            "give it a value")  # fmt: skip
+            arguments.append(given)
+        is_inlined = getattr(function, "is_inlined", False)
+        types_, words = [], []
+        for parameter, value in zip(parameters, arguments, strict=True):
+            if parameter.annotation is float and value.type in (INT, BOOL):
+                value = self.cast(node, value, FLOAT)
+            if is_inlined and value.constant is not None and value.type in (BOOL, INT, FLOAT):
+                types_.append(Known(value.constant))
+                continue
+            types_.append(value.type)
+            words += [f"{w} {x}" for w, x in zip(value.type.words, value.words, strict=True)]
+        try:
+            name, result = self.program.function(function, types_)
+        except CompileError as error:
+            if "calls itself" in str(error):
+                self.refuse(node, str(error).split(";")[0], "write a loop")
+            raise
+        return self._called(f"@{name}", result, words)
+
+    def _called(self, name: str, result: Any, words: Sequence[str]) -> Value:
+        """A call; the words of its result."""
+        arguments = ", ".join(words)
+        if not result.words:
+            self.line(f"call void {name}({arguments})")
+            return Value(result)
+        if len(result.words) == 1:
+            return Value(result, (self.new(f"call {result.words[0]} {name}({arguments})"),))
+        whole = f"{{{', '.join(result.words)}}}"
+        found = self.new(f"call {whole} {name}({arguments})")
+        parts = (self.new(f"extractvalue {whole} {found}, {k}") for k in range(len(result.words)))
+        return Value(result, tuple(parts))
+
+    def _through(self, node: ast.Call, called: Value) -> Value:
+        """A call by address."""
+        wanted = called.type.signature.arguments
+        if node.keywords or len(node.args) != len(wanted):
+            self.refuse(node, f"{len(node.args)} arguments for a function of {len(wanted)}",
+                        "give each by its place")  # fmt: skip
+        words = []
+        for part, type_ in zip(node.args, wanted, strict=True):
+            value = self.cast(part, self.value(part), type_)
+            words += [f"{'i64' if w == 'i1' else w} {x}"
+                      for w, x in zip(type_.words, value.words, strict=True)]  # fmt: skip
+        return self._called(called.word, called.type.signature.result, words)
+
+
+def _parts(node: ast.expr) -> list[ast.expr]:
+    """The indices in brackets."""
+    return list(node.elts) if isinstance(node, ast.Tuple) else [node]
+
+
+def _hashable(value: Any) -> Any:
+    try:
+        hash(value)
+    except TypeError:
+        return None
+    return value

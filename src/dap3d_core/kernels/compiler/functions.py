@@ -1,0 +1,369 @@
+"""Functions of the typed subset of Python to LLVM IR: their types, variables and statements.
+
+A function is compiled for the types of its arguments. Each variable has a type, found by going over
+the function until none changes any more; each lives in a place in memory, which LLVM turns into
+registers. Where plain Python and this give the same they give the same bits: nothing is contracted,
+nothing reassociated.
+"""
+
+import ast
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from dap3d_core.kernels.compiler.expressions import Expressions
+from dap3d_core.kernels.compiler.types import (
+    BOOL,
+    INT,
+    NOTHING,
+    CompileError,
+    Known,
+    Signature,
+    Tuple,
+    Value,
+    constant,
+    items_of,
+    wider,
+)
+from dap3d_core.kernels.compiler.writing import definition, result_type, stored_names
+
+#: What to write instead of statements that are not in the subset.
+INSTEAD = {
+    "With": "open nothing in compiled code",
+    "Try": "test before, and return a number that says what went wrong",
+    "Raise": "return a number that says what went wrong",
+    "Assert": "return a number that says what went wrong",
+    "FunctionDef": "put the function at the top of its module",
+    "ClassDef": "put the class at the top of its module",
+    "Import": "import at the top of the module",
+    "ImportFrom": "import at the top of the module",
+    "Global": "hand on an array that is written to",
+    "Nonlocal": "hand on an array that is written to",
+    "Delete": "leave the name as it is",
+    "Match": "write if and elif",
+}  # fmt: skip
+
+
+class Program:
+    """Functions that become one module of LLVM IR; each once for each choice of argument types."""
+
+    def __init__(self) -> None:
+        self.text: list[str] = []
+        #: Declarations of functions of LLVM and of the C library.
+        self.needs: dict[str, str] = {}
+        self._done: dict[Any, tuple[str, Any] | None] = {}
+
+    def function(self, function: Any, arguments: Sequence[Any]) -> tuple[str, Any]:
+        """Name and type of the result of a function, compiled for types of its arguments."""
+        inlined = getattr(function, "is_inlined", False)
+        function = inspect.unwrap(function)
+        key = function, tuple(arguments)
+        if key not in self._done:
+            self._done[key] = None
+            name = f"{function.__name__}.{len(self._done)}"
+            compiler = FunctionCompiler(self, function, tuple(arguments), name)
+            self._done[key] = name, compiler.result
+            self.text.append(compiler.finished(inlined))
+        done = self._done[key]
+        if done is None:
+            raise CompileError(f"{function.__qualname__} calls itself; write a loop")
+        return done
+
+    def export(self, function: Any, arguments: Sequence[Any], symbol: str) -> Signature:
+        """Make a function callable from outside under a name; truths are integers there."""
+        name, result = self.function(function, arguments)
+        words = [(w, f"%a{k}") for k, w in enumerate(w for a in arguments for w in a.words)]
+        outside = ", ".join(f"{'i64' if w == 'i1' else w} {x}" for w, x in words)
+        lines = [f"  {x}.b = trunc i64 {x} to i1" for w, x in words if w == "i1"]
+        inside = ", ".join(f"{w} {x}{'.b' if w == 'i1' else ''}" for w, x in words)
+        returned = result_type(result)
+        if returned == "i1":
+            lines += [f"  %r = call i1 @{name}({inside})", "  %i = zext i1 %r to i64"]
+            lines, returned = [*lines, "  ret i64 %i"], "i64"
+        elif returned == "void":
+            lines += [f"  call void @{name}({inside})", "  ret void"]
+        else:
+            lines += [f"  %r = call {returned} @{name}({inside})", f"  ret {returned} %r"]
+        body = "\n".join(lines)
+        self.text.append(f"define {returned} @{symbol}({outside}) nounwind {{\n{body}\n}}\n")
+        return Signature(tuple(arguments), result)
+
+    def module(self) -> str:
+        """The text of the module."""
+        return "\n".join([*self.needs.values(), *self.text, "!0 = !{}", ""])
+
+
+class FunctionCompiler(Expressions):
+    """One function for one choice of argument types."""
+
+    def __init__(
+        self,
+        program: Program,
+        function: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        name: str,
+    ) -> None:
+        self.program, self.function, self.name = program, function, name
+        self.node = definition(function)
+        self.names = [a.arg for a in self.node.args.args]
+        given = self.node.args
+        if given.vararg or given.kwarg or given.kwonlyargs or given.posonlyargs:
+            self.refuse(self.node, "takes more than plain arguments", "name each of them")
+        self.arguments = dict(zip(self.names, arguments, strict=True))
+        self.stored = stored_names(self.node)
+        self.types: dict[Any, Any] = {}
+        self.changes: dict[ast.AST, set[str]] = {}
+        self.result: Any = None
+        for _ in range(10):
+            self.is_settled = True
+            self._write()
+            if self.is_settled:
+                return
+        self.refuse(self.node, "has variables whose types do not settle", "give each one type")
+
+    def finished(self, inlined: bool) -> str:
+        """The text of the function."""
+        parameters = [(w, f"%{n}.{k}.a") for n, t in self.arguments.items()
+                      for k, w in enumerate(t.words)]  # fmt: skip
+        head = ", ".join(f"{w} {x}" for w, x in parameters)
+        attributes = "nounwind inlinehint" if inlined else "nounwind"
+        lines = "\n".join(["entry:", *self.places, *self.lines])
+        return (
+            f"define internal {result_type(self.result)} @{self.name}({head}) {attributes} "
+            f"{{\n{lines}\n}}\n"
+        )
+
+    def _write(self) -> None:
+        self.lines: list[str] = []
+        self.places: list[str] = []
+        self.count = 0
+        self.slots: dict[Any, list[str]] = {}
+        self.current: dict[str, Any] = {}
+        self.loops: list[tuple[str, str]] = []
+        self.is_dead = False
+        for name, type_ in self.arguments.items():
+            if not isinstance(type_, Known):
+                words = tuple(f"%{name}.{k}.a" for k in range(len(type_.words)))
+                self.store(self.node, name, Value(type_, words))
+        self.statements(self.node.body)
+        if not self.is_dead:
+            if self.result not in (None, NOTHING):
+                self.refuse(self.node, "may end without a result", "return one on every way")
+            self.result = NOTHING
+            self.line("ret void")
+
+    def store(self, node: ast.AST, name: str, value: Value) -> None:
+        """Give a value to a variable. A number may be of a wider type; all else makes it another.
+
+        Such a variable has no numbers of an earlier type left.
+        """
+        type_ = value.type
+        family = "number" if wider(type_, INT) else type_
+        if isinstance(type_, Tuple):
+            family = "tuple", len(type_.items)
+        key = name, family
+        before = self.types.setdefault(key, type_)
+        both = wider(before, type_)
+        if both is None:
+            self.refuse(node, f"{name} holds values of several types", "take two names")
+        if both != before:
+            self.types[key], self.is_settled = both, False
+        if key not in self.slots:
+            self.slots[key] = self.place(self.types[key], name)
+        self.current[name] = key
+        self.write_to(self.slots[key], self.cast(node, value, self.types[key]))
+
+    def load(self, node: ast.AST, name: str) -> Value:
+        """The value of a variable."""
+        key = self.current[name]
+        if key is None:
+            self.refuse(node, f"{name} is of another type on another way", "take two names")
+        if isinstance(self.types[key], Known) or self.types[key] == NOTHING:
+            return Value(self.types[key])
+        return self.read_from(self.slots[key], self.types[key])
+
+    # ------------------------------------------------------------------ statements
+
+    def statements(self, nodes: Sequence[ast.stmt]) -> None:
+        """Statements, up to the first that leaves."""
+        for node in nodes:
+            if self.is_dead:
+                return
+            kind = type(node).__name__
+            write = getattr(self, f"_{kind}", None)
+            if write is None:
+                self.refuse(node, f"{kind} is no statement of compiled code",
+                            INSTEAD.get(kind, "see docs/concepts/compiled-python.md"))  # fmt: skip
+            write(node)
+
+    def _Expr(self, node: ast.Expr) -> None:
+        if isinstance(node.value, ast.Constant):  # a docstring
+            return
+        self.value(node.value)
+        if not isinstance(node.value, ast.Call):
+            self.refuse(node, "an expression that does nothing", "give it a name or remove it")
+
+    def _Pass(self, node: ast.Pass) -> None:
+        pass
+
+    def _Return(self, node: ast.Return) -> None:
+        value = Value(NOTHING) if node.value is None else self.value(node.value)
+        before = value.type if self.result is None else self.result
+        self.result = wider(before, value.type)
+        if self.result is None:
+            self.refuse(node, "returns values of several types", "return one type")
+        if self.result != before:
+            self.is_settled = False
+        words = self.cast(node, value, self.result).words
+        type_, whole = result_type(self.result), "undef"
+        if len(words) > 1:
+            for k, (kind, word) in enumerate(zip(self.result.words, words, strict=True)):
+                whole = self.new(f"insertvalue {type_} {whole}, {kind} {word}, {k}")
+        self.line(f"ret {type_} {whole if len(words) > 1 else ''.join(words)}".rstrip())
+        self.is_dead = True
+
+    def _Assign(self, node: ast.Assign) -> None:
+        value = self.value(node.value)
+        for target in node.targets:
+            self._assign(target, value)
+
+    def _AnnAssign(self, node: ast.AnnAssign) -> None:
+        if node.value is not None:
+            self._assign(node.target, self.value(node.value))
+
+    def _assign(self, target: ast.expr, value: Value) -> None:
+        if isinstance(target, ast.Name):
+            self.store(target, target.id, value)
+        elif isinstance(target, ast.Subscript):
+            place, item = self.element(target)
+            for k, x in enumerate(self.cast(target, value, item).words):
+                self.line(f"store {item.words[k]} {x}, ptr {self.word_of(place, item, k)}")
+        elif isinstance(target, (ast.Tuple, ast.List)):
+            if not isinstance(value.type, Tuple) or len(value.type.items) != len(target.elts):
+                self.refuse(target, f"takes {len(target.elts)} values apart that are not there",
+                            "give it a tuple of as many")  # fmt: skip
+            for part, item in zip(target.elts, items_of(value), strict=True):
+                self._assign(part, item)
+        else:
+            self.refuse(target, "a value is given to what is no name and no item",
+                        "only arrays and names change")  # fmt: skip
+
+    def _AugAssign(self, node: ast.AugAssign) -> None:
+        if isinstance(node.target, ast.Name):
+            name = ast.copy_location(ast.Name(node.target.id, ast.Load()), node.target)
+            before = self.value(name)
+            self.store(node, node.target.id,
+                       self.operation(node, node.op, before, self.value(node.value)))  # fmt: skip
+            return
+        if not isinstance(node.target, ast.Subscript):
+            self.refuse(node, "changes what is no name and no item", "only arrays change")
+        place, item = self.element(node.target)
+        places = [self.word_of(place, item, k) for k in range(len(item.words))]
+        before = self.read_from(places, item)
+        after = self.operation(node, node.op, before, self.value(node.value))
+        self.write_to(places, self.cast(node, after, item))
+
+    def _If(self, node: ast.If) -> None:
+        test = self.condition(node.test)
+        if test.constant is not None:
+            self.statements(node.body if test.constant else node.orelse)
+            return
+        one, other, end = self.label(), self.label(), self.label()
+        self.branch(test, one, other)
+        before, ends = dict(self.current), []
+        for label, body in ((one, node.body), (other, node.orelse)):
+            self.current = dict(before)
+            self.start(label)
+            self.statements(body)
+            if not self.is_dead:
+                ends.append(self.current)
+                self.jump(end)
+        self.is_dead = not ends
+        if ends:
+            first, last = ends[0], ends[-1]
+            both = {**first, **last}
+            differ = {n for n in first if n in last and first[n] != last[n]}
+            self.current = {n: None if n in differ else key for n, key in both.items()}
+            self.start(end)
+
+    def _While(self, node: ast.While) -> None:
+        if node.orelse:
+            self.refuse(node, "while with else", "set a number where the loop is left")
+        head, body, end = self.label(), self.label(), self.label()
+        self.jump(head)
+        self.start(head)
+        test = self.condition(node.test)
+        self.branch(test, body, end)
+        self.start(body)
+        self._repeat(node, head, end, None)
+        self.jump(head)
+        self.start(end)
+        if test.constant and not any(isinstance(n, ast.Break) for n in ast.walk(node)):
+            self.line("unreachable")
+            self.is_dead = True
+
+    def _repeat(self, node: ast.For | ast.While, again: str, end: str, k: Value | None) -> None:
+        """The body of a loop; k: what its variable becomes.
+
+        A variable that is of another type at its end is of no type at its start, and behind it.
+        """
+        before, changes = dict(self.current), self.changes.setdefault(node, set())
+        self.current.update(dict.fromkeys(changes))
+        if k is not None and isinstance(node, ast.For):
+            self._assign(node.target, k)
+        self.loops.append((again, end))
+        self.statements(node.body)
+        self.loops.pop()
+        found = {n for n, key in before.items() if self.current[n] != key}
+        if found - changes:
+            changes.update(found)
+            self.is_settled = False
+        self.current.update(dict.fromkeys(changes))
+
+    def _Break(self, node: ast.Break) -> None:
+        self.jump(self.loops[-1][1])
+
+    def _Continue(self, node: ast.Continue) -> None:
+        self.jump(self.loops[-1][0])
+
+    def _For(self, node: ast.For) -> None:
+        if node.orelse:
+            self.refuse(node, "for with else", "set a number where the loop is left")
+        if isinstance(node.iter, ast.Call) and getattr(node.iter.func, "id", "") == "range":
+            self._count(node, node.iter)
+            return
+        over = self.value(node.iter)
+        if not isinstance(over.type, Tuple):
+            self.refuse(node, "a loop over what is no range", "write for k in range(...)")
+        if any(isinstance(n, (ast.Break, ast.Continue)) for n in ast.walk(node)):
+            self.refuse(node, "break or continue in a loop over a tuple", "loop over a range")
+        for item in items_of(over):
+            self._assign(node.target, item)
+            self.statements(node.body)
+
+    def _count(self, node: ast.For, call: ast.Call) -> None:
+        """``for k in range(...)``; what the loop does to k does not change its course."""
+        given = [self.cast(a, self.integer(a, self.value(a)), INT) for a in call.args]
+        first, last = (constant(0), given[0]) if len(given) == 1 else given[:2]
+        step = given[2].constant if len(given) > 2 else 1
+        if not step:
+            self.refuse(node, "the step of a range is no constant", "write a while loop")
+        assert first is not None
+        [counter] = self.place(INT, "for")
+        self.line(f"store i64 {first.word}, ptr {counter}")
+        head, body, again, end = (self.label() for _ in range(4))
+        self.jump(head)
+        self.start(head)
+        k = self.new(f"load i64, ptr {counter}")
+        relation = "slt" if step > 0 else "sgt"
+        test = Value(BOOL, (self.new(f"icmp {relation} i64 {k}, {last.word}"),))
+        self.branch(test, body, end)
+        self.start(body)
+        self._repeat(node, again, end, Value(INT, (k,)))
+        self.jump(again)
+        self.start(again)
+        following = self.new(f"load i64, ptr {counter}")
+        following = self.new(f"add nsw i64 {following}, {step}")
+        self.line(f"store i64 {following}, ptr {counter}")
+        self.jump(head)
+        self.start(end)

@@ -1,0 +1,243 @@
+"""The words of compiled code: functions of Python and of other libraries that it knows."""
+
+import ast
+import builtins
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.kernels.compiler.types import (
+    BOOL,
+    COMPLEX,
+    FLOAT,
+    INT,
+    NOTHING,
+    Array,
+    Value,
+    bits,
+    wider,
+)
+
+#: Exact everywhere: LLVM's own.
+EXACT = ("sqrt", "fabs", "floor", "ceil", "rint")
+#: Of the C library, which plain Python calls as well. LLVM is told that it does not know them, for
+#: what it puts in their place may round otherwise.
+LIBRARY = ("sin", "cos", "tan", "tanh", "exp", "log", "asin", "acos", "atan", "atan2", "pow",
+           "hypot", "nextafter")  # fmt: skip
+#: Functions that compiled code calls by a word.
+KNOWN: dict[Any, str] = {
+    **{getattr(math, n): n for n in LIBRARY if n not in ("hypot", "pow", "nextafter")},
+    math.sqrt: "sqrt", np.sqrt: "sqrt", np.nextafter: "nextafter", np.rint: "rint",
+    math.fabs: "fabs", math.ceil: "ceil", np.sign: "sign", complex: "complex",
+    np.complex128: "complex", **{getattr(builtins, n): n for n in
+    ("abs", "min", "max", "int", "float", "bool", "len")},
+}  # fmt: skip
+
+#: How each is written, by its name.
+WORDS: dict[str, Callable[[Any, Any, list[Value]], Value]] = {}
+
+
+def word(name: str) -> Callable[[Any], Any]:
+    """Let compiled code take a word of this name where it calls a function."""
+
+    def mark(function: Any) -> Any:
+        function.compiled_word = name
+        return function
+
+    return mark
+
+
+def _writes(*names: str) -> Callable[[Any], Any]:
+    def keep(write: Any) -> Any:
+        WORDS.update(dict.fromkeys(names, write))
+        return write
+
+    return keep
+
+
+def declaration(name: str, count: int) -> tuple[str, str]:
+    """LLVM's name of a function of floats, and its declaration."""
+    symbol = f"llvm.{name}.f64" if name in EXACT else name
+    kind = "" if name in EXACT else " nobuiltin nounwind willreturn memory(none)"
+    return symbol, f"declare double @{symbol}({', '.join(['double'] * count)}){kind}"
+
+
+def call_of(name: str, words: Sequence[str]) -> str:
+    """The call of such a function."""
+    attributes = "" if name in EXACT else " nobuiltin nounwind willreturn memory(none)"
+    arguments = ", ".join(f"double {x}" for x in words)
+    return f"call double @{declaration(name, len(words))[0]}({arguments}){attributes}"
+
+
+def function_of(name: str) -> Callable[[Any, Any, list[Value]], Value]:
+    """How a function of floats is written."""
+
+    def write(c: Any, node: Any, values: list[Value]) -> Value:
+        symbol, text = declaration(name, len(values))
+        c.program.needs[symbol] = text
+        words = [c.cast(node, v, FLOAT).word for v in values]
+        return Value(FLOAT, (c.new(call_of(name, words)),))
+
+    return write
+
+
+WORDS.update({name: function_of(name) for name in (*EXACT, *LIBRARY)})
+
+
+@_writes("ceil", "len")
+def _whole(c: Any, node: Any, values: list[Value]) -> Value:
+    if isinstance(values[0].type, Array):
+        return Value(INT, values[0].words[1:2])
+    return c.cast(node, function_of("ceil")(c, node, values), INT)  # type: ignore[no-any-return]
+
+
+@_writes("abs")
+def _abs(c: Any, node: Any, values: list[Value]) -> Value:
+    if values[0].type == COMPLEX:
+        both = [Value(FLOAT, (x,)) for x in values[0].words]
+        return function_of("hypot")(c, node, both)
+    if values[0].type == FLOAT:
+        return function_of("fabs")(c, node, values)
+    x = c.cast(node, values[0], INT)
+    below = c.new(f"icmp slt i64 {x.word}, 0")
+    turned = c.new(f"sub nsw i64 0, {x.word}")
+    return Value(INT, (c.new(f"select i1 {below}, i64 {turned}, i64 {x.word}"),))
+
+
+@_writes("int", "float", "bool")
+def _as(c: Any, node: Any, values: list[Value]) -> Value:
+    type_ = {"int": INT, "float": FLOAT, "bool": BOOL}[node.func.id]
+    return c.cast(node, values[0], type_)  # type: ignore[no-any-return]
+
+
+@_writes("complex")
+def _complex(c: Any, node: Any, values: list[Value]) -> Value:
+    if len(values) == 1:
+        return c.cast(node, values[0], COMPLEX)  # type: ignore[no-any-return]
+    return Value(COMPLEX, tuple(c.cast(node, v, FLOAT).word for v in values))
+
+
+@_writes("min", "max")
+def _extreme(c: Any, node: Any, values: list[Value]) -> Value:
+    """As Python's: a later value is taken only where it compares as better."""
+    if len(values) < 2:
+        c.refuse(node, "min or max of one value", "give it two numbers")
+    order = ast.Gt() if node.func.id == "max" else ast.Lt()
+    best = values[0]
+    for value in values[1:]:
+        better = c.comparison(node, order, value, best)
+        type_ = wider(best.type, value.type)
+        if better.constant is not None:
+            best = c.cast(node, value if better.constant else best, type_)
+            continue
+        a, b = c.cast(node, value, type_), c.cast(node, best, type_)
+        word_ = type_.words[0]
+        text = f"select i1 {better.word}, {word_} {a.word}, {word_} {b.word}"
+        best = Value(type_, (c.new(text),))
+    return best
+
+
+@_writes("sign")
+def _sign(c: Any, node: Any, values: list[Value]) -> Value:
+    x = c.cast(node, values[0], FLOAT).word
+    found = x  # of NaN
+    for relation, value in (("oeq", 0.0), ("olt", -1.0), ("ogt", 1.0)):
+        test = c.new(f"fcmp {relation} double {x}, 0.0")
+        found = c.new(f"select i1 {test}, double {bits(value)}, double {found}")
+    return Value(FLOAT, (found,))
+
+
+def complex_product(c: Any, a: Value, b: Value) -> Value:
+    """(a0 b0 - a1 b1, a0 b1 + a1 b0)."""
+    (a0, a1), (b0, b1) = a.words, b.words
+    p, q, r, s = (c.new(f"fmul double {x}, {y}")
+                  for x, y in ((a0, b0), (a1, b1), (a0, b1), (a1, b0)))  # fmt: skip
+    return Value(COMPLEX, (c.new(f"fsub double {p}, {q}"), c.new(f"fadd double {r}, {s}")))
+
+
+def complex_quotient(c: Any, a: Value, b: Value) -> Value:
+    """Smith's division as numpy does it: by the ratio of the smaller part to the larger one."""
+    (a0, a1), (b0, b1) = a.words, b.words
+    sizes = [function_of("fabs")(c, None, [Value(FLOAT, (x,))]).word for x in (b0, b1)]
+    test = c.new(f"fcmp oge double {sizes[0]}, {sizes[1]}")
+
+    def choose(x: str, y: str) -> str:
+        return c.new(f"select i1 {test}, double {x}, double {y}")  # type: ignore[no-any-return]
+
+    large, small = choose(b0, b1), choose(b1, b0)
+    ratio = c.new(f"fdiv double {small}, {large}")
+    share = c.new(f"fmul double {small}, {ratio}")
+    scale = c.new(f"fdiv double {bits(1.0)}, {c.new(f'fadd double {large}, {share}')}")
+    r0, r1 = c.new(f"fmul double {a0}, {ratio}"), c.new(f"fmul double {a1}, {ratio}")
+    real = choose(c.new(f"fadd double {a0}, {r1}"), c.new(f"fadd double {r0}, {a1}"))
+    imag = choose(c.new(f"fsub double {a1}, {r0}"), c.new(f"fsub double {r1}, {a0}"))
+    both = [c.new(f"fmul double {x}, {scale}") for x in (real, imag)]
+    nothing = c.new(f"fcmp oeq double {c.new(f'fadd double {sizes[0]}, {sizes[1]}')}, 0.0")
+    plain = [c.new(f"fdiv double {x}, {sizes[0]}") for x in (a0, a1)]
+    pairs = zip(plain, both, strict=True)
+    words = [c.new(f"select i1 {nothing}, double {x}, double {y}") for x, y in pairs]
+    return Value(COMPLEX, tuple(words))
+
+
+# ------------------------------------------------------------------ arrays and other threads
+
+
+@_writes("pointer")
+def _pointer(c: Any, node: Any, values: list[Value]) -> Value:
+    first, *lengths = values[0].words
+    return Value(Array(values[0].type.item, 1), (first, c.count_of(lengths)))
+
+
+@_writes("address_of")
+def _address(c: Any, node: Any, values: list[Value]) -> Value:
+    return Value(INT, (c.new(f"ptrtoint ptr {values[0].word} to i64"),))
+
+
+@_writes("vector_at")
+def _vector(c: Any, node: Any, values: list[Value]) -> Value:
+    at = c.new(f"inttoptr i64 {values[0].word} to ptr")
+    return Value(Array(FLOAT, 1), (at, values[1].word))
+
+
+@_writes("load")
+def _load(c: Any, node: Any, values: list[Value]) -> Value:
+    at = c.item(values[0], values[1].word)
+    return Value(INT, (c.new(f"load atomic i64, ptr {at} acquire, align 8"),))
+
+
+@_writes("store")
+def _store(c: Any, node: Any, values: list[Value]) -> Value:
+    at = c.item(values[0], values[1].word)
+    c.line(f"store atomic i64 {values[2].word}, ptr {at} release, align 8")
+    return Value(NOTHING)
+
+
+@_writes("replace")
+def _replace(c: Any, node: Any, values: list[Value]) -> Value:
+    at = c.item(values[0], values[1].word)
+    old, new = values[2].word, values[3].word
+    pair = c.new(f"cmpxchg ptr {at}, i64 {old}, i64 {new} acq_rel acquire, align 8")
+    return Value(BOOL, (c.new(f"extractvalue {{i64, i1}} {pair}, 1"),))
+
+
+@_writes("pause")
+def _pause(c: Any, node: Any, values: list[Value]) -> Value:
+    from dap3d_core.kernels.compiler.objects import processor
+
+    kind = processor().triple.split("-")[0]
+    name, argument = "llvm.x86.sse2.pause", ""
+    if kind in ("aarch64", "arm64"):
+        name, argument = "llvm.aarch64.hint", "i32 1"
+    if kind in ("x86_64", "amd64", "aarch64", "arm64"):
+        c.program.needs[name] = f"declare void @{name}({argument.split(' ')[0]})"
+        c.line(f"call void @{name}({argument})")
+    return Value(NOTHING)
+
+
+@_writes("give_way")
+def _give_way(c: Any, node: Any, values: list[Value]) -> Value:
+    c.program.needs["sched_yield"] = "declare i32 @sched_yield()"
+    c.new("call i32 @sched_yield()")
+    return Value(NOTHING)

@@ -1,0 +1,75 @@
+"""Every group loop of every registered type: plain Python and traced code give the same bits."""
+
+import numpy as np
+import pytest
+from support.at_all_levels import made_of, same_bits
+
+from dap3d_core.interface.binding import bind_friction
+from dap3d_core.interface.compiling import _calls_functions
+from dap3d_core.interface.writer import LOOP_KINDS, write
+from dap3d_core.kernels import written
+from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.compiler.trace import trace
+from dap3d_core.kernels.gather import BODY_WIDTH
+from dap3d_core.kernels.lists import LOOP, LoopArrays
+from dap3d_core.kernels.loops import _members, source_of
+from dap3d_core.registry import load_registry
+
+pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
+BODIES, INSTANCES, TRIALS = 8, 3, 6
+
+
+def loops_of(examined):
+    """Each loop of a type and of its variants, but for those that need a scene's function."""
+    for what in LOOP_KINDS:
+        if what != "friction" and (loop := write(examined, what)) is not None:
+            yield examined, loop
+    if examined.type.kind == "joint" and "friction" in examined.kernels:
+        rubbing = bind_friction(examined)
+        yield rubbing, write(rubbing, "friction")
+    for _, variant in examined.variants:
+        yield from loops_of(variant)
+
+
+def arguments_of(examined, rng):
+    """Random arrays of three instances, with tables where the type has some."""
+    body, F = rng.standard_normal((BODIES, BODY_WIDTH)), rng.standard_normal((BODIES, 5))
+    idx, par = rng.integers(1, BODIES - 1, size=200), rng.standard_normal(600)
+    for offset, _ in examined.layout.tables.values():
+        for q in range(INSTANCES):
+            par[q * examined.layout.par_width + offset :][:2] = 400, 20
+    outs = [rng.standard_normal(600) for _ in range(3)]
+    outs[1][0] = 3.0  # where switches begin
+    return LoopArrays(body=body, F=F, idx=idx, par=par), outs
+
+
+def run(loop, examined, seed):
+    """All that a loop writes."""
+    arrays, outs = arguments_of(examined, np.random.default_rng(seed))
+    with np.errstate(all="ignore"):
+        loop(0.7, arrays, 0, 0, INSTANCES, *outs)
+    return np.concatenate([arrays.par, arrays.F.ravel(), *outs])
+
+
+REGISTRY = load_registry()
+TYPES = [(kind, keyword) for kind in ("joint", "force", "function")
+         for keyword in REGISTRY.keywords(kind)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "keyword"), TYPES)
+def test_traced_loops_have_the_bits_of_plain_python(kind, keyword):
+    for examined, loop in loops_of(REGISTRY.get(kind, keyword)):
+
+        def python(loop=loop):
+            namespace = written.load(None, "tried", source_of(loop))
+            namespace.update(loop.kernels)
+            return namespace
+
+        if examined.argument_functions and _calls_functions(examined):
+            continue  # its code is made with a scene's function
+        text = trace("tried", python(), _members())
+        plain = python()["loop"]
+        for level, traced in made_of(text, "tried", LOOP).items():
+            for seed in range(TRIALS):
+                assert same_bits(run(plain, examined, seed), run(traced, examined, seed)), (
+                    loop.name, level)  # fmt: skip

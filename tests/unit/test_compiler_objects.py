@@ -1,0 +1,165 @@
+"""Object code in files: damaged it is never run, and nothing that happens to files ends a run."""
+
+import ctypes
+import os
+import threading
+
+import numpy as np
+import pytest
+from support.process import run, start
+
+from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.compiler import objects, units
+from dap3d_core.kernels.compiler.functions import Program
+from dap3d_core.kernels.compiler.types import FLOAT, Array, Signature
+from dap3d_core.kernels.compiler.units import Entry, Functions, Unit
+
+pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
+
+
+def doubled(x, out):
+    out[0] = 2.0 * x
+
+
+SIGNATURE = Signature((FLOAT, Array(FLOAT, 1)))
+
+
+def write(symbol="doubled_0"):
+    """As ``Unit`` asks for it."""
+    program = Program()
+    program.export(doubled, SIGNATURE.arguments, symbol)
+    return program.module(), ["None"]
+
+
+def entry_of(folder, **options):
+    return Entry(Unit("doubled", 1, write, folder, **options), 0, SIGNATURE)
+
+
+def answer(entry):
+    out = np.zeros(1)
+    entry(21.0, out)
+    return out[0]
+
+
+@pytest.fixture
+def alone(monkeypatch):
+    """One core: nothing is made beside."""
+    monkeypatch.setattr(units, "_cores", lambda: 1)
+    monkeypatch.setattr(units, "later", units._Later())
+
+
+@pytest.mark.parametrize("damage", ["cut", "changed", "empty", "head", "text"])
+def test_a_damaged_object_is_made_anew_and_noted(tmp_path, alone, damage):
+    entry_of(tmp_path, at_once=True)
+    path = tmp_path / "doubled.o"
+    data = path.read_bytes()
+    path.write_bytes({"cut": data[:-7], "changed": data[:-7] + b"damaged", "empty": b"",
+                      "head": b"x" + data[1:], "text": b"[]\n"}[damage])  # fmt: skip
+    units.made.clear()
+    with pytest.warns(RuntimeWarning, match=r"damaged and is made anew: .*doubled\.o"):
+        assert answer(entry_of(tmp_path, at_once=True)) == 42.0
+    assert units.made == ["doubled"]
+    assert path.read_bytes() == data
+    assert answer(entry_of(tmp_path)) == 42.0
+    assert units.made == ["doubled"]
+
+
+def test_without_a_folder_code_is_in_memory_alone(alone):
+    assert answer(entry_of(None)) == 42.0
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write all")
+def test_a_folder_that_may_only_be_read_does_no_harm(tmp_path, alone):
+    tmp_path.chmod(0o500)
+    assert answer(entry_of(tmp_path, at_once=True)) == 42.0
+
+
+def test_a_full_disk_does_no_harm(tmp_path, alone, monkeypatch):
+    """A file that could not be written whole leaves nothing behind."""
+
+    def full(self, data):
+        with open(self, "wb") as file:
+            file.write(data[:10])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(objects.Path, "write_bytes", full)
+    assert answer(entry_of(tmp_path, at_once=True)) == 42.0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_objects_not_used_for_longest_go_first(tmp_path, monkeypatch):
+    monkeypatch.setattr(objects, "MOST_BYTES", 1000)
+    for k in range(4):
+        objects.keep(tmp_path / f"{k}.o", None, bytes(300))
+        os.utime(tmp_path / f"{k}.o", (k, k))
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["2.o", "3.o"]
+
+
+def test_code_is_made_well_once_it_has_run_for_long(tmp_path, alone, monkeypatch):
+    """On one core; a table then holds the better code, and so do calls from Python."""
+    unit = Unit("doubled", 1, write, tmp_path)
+    entry = Entry(unit, 0, SIGNATURE)
+    table = Functions(SIGNATURE, [entry])
+    assert answer(entry) == 42.0
+    quick = unit.addresses[0]
+    assert not unit.is_good
+    assert list(tmp_path.iterdir()) == []
+    units.later._looked = 0.0
+    units.later.look(unit.cost + 1.0)
+    assert unit.is_good
+    assert table.addresses[0] == unit.addresses[0] != quick
+    kind = ctypes.CFUNCTYPE(None, ctypes.c_double, ctypes.c_void_p, ctypes.c_int64)
+    out = np.zeros(1)
+    kind(int(table.addresses[0]))(1.5, out.ctypes.data, 1)
+    assert out[0] == 3.0
+    assert answer(entry) == 42.0
+    assert (tmp_path / "doubled.o").exists()
+
+
+def test_a_process_beside_makes_code_well(tmp_path, monkeypatch):
+    """Its objects are taken over by the next look after they are there."""
+    monkeypatch.setattr(units, "_cores", lambda: 2)
+    later = units._Later()
+    monkeypatch.setattr(units, "later", later)
+    unit = Unit("doubled", 1, write, tmp_path)
+    entry = Entry(unit, 0, SIGNATURE)
+    later._process.stdin.close()
+    assert later._process.wait(timeout=120) == 0
+    assert [f.name for f in tmp_path.iterdir()] == ["doubled.o"]
+    later._looked = 0.0
+    later.look(0.0)
+    assert unit.is_good
+    assert not later.units
+    assert answer(entry) == 42.0
+
+
+def test_threads_may_ask_for_one_function_at_once(tmp_path, alone):
+    entry, found = entry_of(tmp_path), []
+    threads = [threading.Thread(target=lambda: found.append(answer(entry))) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == [42.0] * 8
+
+
+RUN = """
+import dap3d_core as dap
+r = dap.simulate("pen1", t_end=0.02, dt=0.01)
+print(r.u.tobytes().hex()[:400])
+"""
+
+
+@pytest.mark.slow
+def test_processes_that_race_on_an_empty_cache_have_the_same_bits(tmp_path):
+    racers = [start(RUN, tmp_path / "cache") for _ in range(3)]
+    said = [p.communicate(timeout=300)[0] for p in racers]
+    assert [p.returncode for p in racers] == [0, 0, 0]
+    assert len(set(said)) == 1
+    assert run(RUN, tmp_path / "cache") == said[0].strip()
+
+
+@pytest.mark.parametrize("wrong", [np.zeros(3, dtype=np.float32), np.zeros((3, 3))[:, 0]])
+def test_arrays_that_compiled_code_would_misread_are_refused(wrong):
+    with pytest.raises(TypeError, match="C-contiguous"):
+        units.type_of(wrong)
