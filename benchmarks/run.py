@@ -1,9 +1,9 @@
 """All benchmarks, as tables and as JSON.
 
 ``make bench``, or ``python benchmarks/run.py [--only NAME ...] [-o FILE]``. scale_long and
-streaming, some minutes, two_threads, study and start are run only when they are named. With ``--docs``
-figures of hard_cases, long_time, chaos, flips and hinges go to docs/hard-cases.md as well;
-``--only hard`` is all of these.
+streaming, some minutes, two_threads, study and start are run only when they are named. With
+``--docs`` the figures of hard_cases, long_time, chaos, flips and hinges go to docs/hard-cases.md as
+well; ``--only hard`` is all of these.
 """
 
 import argparse

@@ -1,7 +1,8 @@
 """From LLVM IR to object code, kept in files, and into memory.
 
 An object file begins with a line that tells what is in it, and is sealed by a checksum: a damaged
-one is never run. It is written under another name and renamed, for processes may race, and the oldest go when there are many.
+one is never run. It is written under another name and renamed, for processes may race; the oldest
+are removed when there are many.
 """
 
 import contextlib
