@@ -21,7 +21,7 @@ from typing import Any
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.types import BOOL, FLOAT, INT, NOTHING, Scalar, Signature
-from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, type_of
+from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, kind_of, type_of
 from dap3d_core.kernels.trusted import distrust
 
 #: Floors of the core that hold compiled code, low to high: a function depends on its own floor and
@@ -110,14 +110,17 @@ class Compiled:
         self.is_inlined = is_inlined
         self._parameters = list(inspect.signature(function).parameters.values())
         self._entries: dict[Any, Entry] = {}
+        self._quick: dict[Any, Entry] = {}
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the code for the types of these arguments."""
         for parameter in self._parameters[len(arguments) :]:
             arguments += (parameter.default,)
-        key = tuple([type_of(a) for a in arguments])
-        entry = self._entries.get(key)
-        return (self.compile(key) if entry is None else entry)(*arguments)
+        key = tuple([kind_of(a) for a in arguments])
+        entry = self._quick.get(key)
+        if entry is None:
+            entry = self._quick[key] = self.compile([type_of(a) for a in arguments])
+        return entry(*arguments)
 
     def compile(self, given: Sequence[Any]) -> Entry:
         """The function for types of its arguments, from the cache or compiled now."""

@@ -65,7 +65,7 @@ class Struct(_ByAddress):
         return isinstance(other, Struct) and self.members[: len(other.members)] == other.members
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Signature:
     """Types of the arguments and of the result of a function called by address."""
 

@@ -219,17 +219,18 @@ class Entry:
         words = [_C[w] for t in signature.arguments for w in t.words]
         result = signature.result.words
         self._kind = ctypes.CFUNCTYPE(_C[result[0]] if result else None, *words)
+        self._flatten = [_flattens(type_) for type_ in signature.arguments]
         self._address, self._function = 0, None
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call it."""
-        words: list[Any] = []
-        for value, type_ in zip(arguments, self.signature.arguments, strict=True):
-            flatten(value, type_, words)
-        return self.call(words)
+        """Call it.
 
-    def call(self, words: list[Any]) -> Any:
-        """Call it with the words of its arguments."""
+        Raises:
+            TypeError: an argument is not of its type.
+        """
+        words: list[Any] = []
+        for value, flatten in zip(arguments, self._flatten, strict=True):
+            flatten(value, words)
         address = self.unit.addresses[self.k]
         if address != self._address:
             self._address, self._function = address, self._kind(address)
@@ -253,21 +254,45 @@ def address_of(array: Any) -> int:
         return int(array.ctypes.data)
 
 
-def flatten(value: Any, type_: Any, words: list[Any]) -> None:
-    """Add the words of an argument."""
-    if isinstance(type_, (Array, Numbers)):
-        words.append(address_of(value))
-        if isinstance(type_, Array):
+def _flattens(type_: Any) -> Callable[[Any, list[Any]], None]:
+    """What adds the words of an argument of a type to those of others."""
+    if isinstance(type_, Array):
+        dtype, ndim = DTYPES[type_.item], type_.ndim
+
+        def add(value: Any, words: list[Any]) -> None:
+            if value.ndim != ndim or value.dtype != dtype or not value.flags.c_contiguous:
+                raise TypeError(f"{value.dtype} with {value.ndim} indices is no {type_}")
+            words.append(address_of(value))
             words += value.shape
-    elif isinstance(type_, (Struct, Table)):
-        words.append(value.address)
-    elif isinstance(type_, Tuple):
-        for item, item_type in zip(value, type_.items, strict=True):
-            flatten(item, item_type, words)
-    elif type_ in (INT, BOOL):
-        words.append(int(value))
-    elif type_ != NOTHING:
-        words.append(value)
+
+        return add
+    if isinstance(type_, Numbers):
+        return lambda value, words: words.append(address_of(value))
+    if isinstance(type_, (Struct, Table)):
+        return lambda value, words: words.append(value.address)
+    if isinstance(type_, Tuple):
+        inner = [_flattens(item) for item in type_.items]
+
+        def add_each(value: Any, words: list[Any]) -> None:
+            for item, flatten in zip(value, inner, strict=True):
+                flatten(item, words)
+
+        return add_each
+    if type_ in (INT, BOOL):
+        return lambda value, words: words.append(int(value))
+    if type_ == NOTHING:
+        return lambda value, words: None
+    return lambda value, words: words.append(value)
+
+
+def kind_of(value: Any) -> Any:
+    """What tells arguments of different types apart, found quickly."""
+    kind = type(value)
+    if kind is np.ndarray:
+        return value.dtype.char, value.ndim
+    if kind is Functions:
+        return value.signature
+    return tuple([kind_of(item) for item in value]) if kind is tuple else kind
 
 
 _ITEMS = {dtype: item for item, dtype in DTYPES.items()}
