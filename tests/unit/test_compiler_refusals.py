@@ -44,7 +44,7 @@ CASES = {
     "del a": "Delete",
     "match i:\n        case 1: pass": "if and elif",
     "for q in x: pass": "no range",
-    "for q in range(0, 9, i): pass": "no constant",
+    "for q in range(0, 9, 0): pass": "is zero",
     "while a > 0.0: break\n    else: pass": "else",
     "for q in range(3): pass\n    else: pass": "else",
     "y = x[a]": "counts or is an index",

@@ -35,7 +35,8 @@ def refuse_what_is_outside(*kernels: Callable[..., Any]) -> None:
                 line = step.positions.lineno or line if step.positions else line
                 if why := _why(function, step):
                     raise CompileError(
-                        f"it {why}; a kernel is made of its arguments alone (DAP3D_PLAIN=1 runs it as it stands) "
+                        f"it {why}; a kernel is made of its arguments alone (DAP3D_PLAIN=1 "
+                        "runs it as it stands) "
                         f"[{code.co_filename}:{line}]"
                     )
 

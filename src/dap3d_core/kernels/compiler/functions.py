@@ -345,25 +345,28 @@ class FunctionCompiler(Expressions):
         """``for k in range(...)``; what the loop does to k does not change its course."""
         given = [self.cast(a, self.integer(a, self.value(a)), INT) for a in call.args]
         first, last = (constant(0), given[0]) if len(given) == 1 else given[:2]
-        step = given[2].constant if len(given) > 2 else 1
-        if not step:
-            self.refuse(node, "the step of a range is no constant", "write a while loop")
+        step = given[2] if len(given) > 2 else constant(1)
         assert first is not None
+        assert step is not None
+        if step.constant == 0:
+            self.refuse(node, "the step of a range is zero", "take another one")
         [counter] = self.place(INT, "for")
         self.line(f"store i64 {first.word}, ptr {counter}")
         head, body, again, end = (self.label() for _ in range(4))
         self.jump(head)
         self.start(head)
         k = self.new(f"load i64, ptr {counter}")
-        relation = "slt" if step > 0 else "sgt"
-        test = Value(BOOL, (self.new(f"icmp {relation} i64 {k}, {last.word}"),))
+        below = self.new(f"icmp slt i64 {k}, {last.word}")
+        above = self.new(f"icmp sgt i64 {k}, {last.word}")
+        upwards = self.new(f"icmp sgt i64 {step.word}, 0")
+        test = Value(BOOL, (self.new(f"select i1 {upwards}, i1 {below}, i1 {above}"),))
         self.branch(test, body, end)
         self.start(body)
         self._repeat(node, again, end, Value(INT, (k,)))
         self.jump(again)
         self.start(again)
         following = self.new(f"load i64, ptr {counter}")
-        following = self.new(f"add nsw i64 {following}, {step}")
+        following = self.new(f"add nsw i64 {following}, {step.word}")
         self.line(f"store i64 {following}, ptr {counter}")
         self.jump(head)
         self.start(end)
