@@ -10,6 +10,7 @@ from fuzz.acceptable import check_any_scene, check_good_scene
 from fuzz.damage import damaged_scenes
 from fuzz.matlab import check_model, damaged_models
 from fuzz.numbers import changes, check_change
+from fuzz.programs import check_program, sources
 from fuzz.results import check_result, damaged_results
 from fuzz.scenes import scenes
 from fuzz.words import check_command, check_quantity, command_lines, quantity_names
@@ -68,5 +69,6 @@ TARGETS = {
         Target("numbers", changes(), check_change, ".json"),
         Target("quantities", quantity_names(), check_quantity, ".txt"),
         Target("commands", command_lines(), check_command, ".json"),
+        Target("programs", sources(), check_program, ".py"),
     )
 }

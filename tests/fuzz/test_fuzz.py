@@ -19,6 +19,7 @@ COUNTS = {
     "numbers": (10, 150),
     "quantities": (50, 300),
     "commands": (10, 60),
+    "programs": (12, 150),
 }
 
 

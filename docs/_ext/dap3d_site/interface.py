@@ -17,8 +17,8 @@ CLASSES = ("Joint", "Force", "Function")
 WORDS = {
     "Vectors": ("add", "sub", "neg", "scale", "dot", "cross", "norm2", "rotate"),
     "Matrices and rows": ("skew", "eye", "row", "hstack"),
-    "Mathematics": ("sqrt", "sin", "cos", "tanh", "asin", "acos", "atan2", "exp", "log", "hypot",
-                    "abs", "floor", "minimum", "maximum"),  # fmt: skip
+    "Mathematics": ("sqrt", "sin", "cos", "tanh", "asin", "acos", "atan2", "exp", "log", "hypot"),
+    "Parts of numbers": ("abs", "floor", "minimum", "maximum"),
     "Branches and tables": ("where", "lookup"),
     "For `prepare`": ("normals",),
 }
