@@ -144,7 +144,7 @@ def test_a_disk_that_falls_over_ends_the_run():
         dap.simulate(disk("z", lean=0.8), t_end=2.0, dt=0.02, **TIGHT)
     result = caught.value.result
     sine = result.r[:, 0, 2] / RADIUS
-    assert 0.02 < sine[-1] < 0.2
+    assert 0.02 - 1e-12 < sine[-1] < 0.2  # located to rounding
     assert result.r[:, 0, :2] == pytest.approx(0.0, abs=1e-10)
     inertia = ACROSS + MASS * RADIUS**2 * (1.0 - sine**2)
     square = 2.0 * MASS * G * RADIUS * (np.sin(0.8) - sine) / inertia
