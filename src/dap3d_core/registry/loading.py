@@ -206,8 +206,9 @@ def _guard(source: Source, notes: list[str]) -> Iterator[None]:
 
     Ctrl-C stays what it is, and says what it interrupted.
     """
+    folder = os.getcwd()  # that it may be gone is no failure of the plugin's
     try:
-        with _one_at_a_time, _kept_in_place(source, notes):
+        with _one_at_a_time, _kept_in_place(source, folder, notes):
             yield
     except KeyboardInterrupt as error:
         raise KeyboardInterrupt(f"while {_title(source)} was loaded") from error
@@ -225,13 +226,13 @@ def _guard(source: Source, notes: list[str]) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _kept_in_place(source: Source, notes: list[str]) -> Iterator[None]:
-    """Put back what a plugin must not change: stdout, the folder, Ctrl-C, numpy's errors.
+def _kept_in_place(source: Source, folder: str, notes: list[str]) -> Iterator[None]:
+    """Put back what a plugin must not change: stdout, the current folder, Ctrl-C, numpy's errors.
 
     Where modules are looked for is left as the plugin wants it, and told. A copy of the process
     that it forked and left running ends here: both would go on with the command.
     """
-    folder, process, places = os.getcwd(), os.getpid(), list(sys.path)
+    process, places = os.getpid(), list(sys.path)
     interrupt = signal.getsignal(signal.SIGINT)
     numpy: Any = sys.modules.get("numpy")
     state: dict[str, Any] = numpy.geterr() if numpy else {}
