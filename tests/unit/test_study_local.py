@@ -1,5 +1,8 @@
 """The points of a study on the cores of a machine."""
 
+import os
+import subprocess
+import sys
 import threading
 import time
 
@@ -179,3 +182,34 @@ def test_the_environment_limits_threads(monkeypatch):
 def test_what_is_no_number_of_threads_is_refused(ensemble, threads):
     with pytest.raises(dap.SceneError, match=r"threads = .*a whole number from 1"):
         run_here(ensemble, POINTS[:2], np.arange(2), threads=threads)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+def test_a_sweep_in_a_forked_process_after_one_with_threads_ends():
+    """No lock or thread of the parent is missed by the child, at the end of a sweep or within."""
+    script = """
+import os
+import dap3d_core as dap
+
+scene = dap.load("pen1")
+body = next(iter(scene.bodies))
+
+def sweep(**more):
+    data = dap.sweep(scene, {f"bodies.{body}.mass": "1:2:8"}, outputs=["energy.total:end"],
+                     t_end=0.1, threads=2, **more)
+    return float(data["energy.total:end"].sum())
+
+def forked():
+    child = os.fork()
+    if not child:
+        os._exit(sweep() != expected)
+    return child
+
+expected = sweep()
+children = [forked()]
+sweep(progress=lambda done, total: children.append(forked()) if len(children) < 2 else None)
+for child in children:
+    assert os.waitpid(child, 0)[1] == 0
+"""
+    command = [sys.executable, "-W", "ignore", "-c", script]
+    assert subprocess.run(command, timeout=120, check=False).returncode == 0
