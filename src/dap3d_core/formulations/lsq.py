@@ -23,21 +23,14 @@ from dap3d_core.assembly.evaluate import global_accelerations, largest, rates, z
 from dap3d_core.assembly.system import Floats, System
 from dap3d_core.formulations.constraints import (
     PART,
-    factorise,
-    gather_forces,
-    linearise,
-    power_of_drivers,
     project_onto,
     report_levels,
     report_multipliers,
     solve_rows,
 )
-from dap3d_core.formulations.friction import solve_rubbing
+from dap3d_core.formulations.regularised import accelerate
 from dap3d_core.kernels.cache import compiled, compiled_inside
 from dap3d_core.linear.blocks import assemble, factor, regularise, weigh_rows
-
-#: How often the rows are solved.
-SOLVES = 3
 
 #: For the least multipliers: e as part of the longest row's square, and passes at most. More of
 #: them than it takes would gather rounding.
@@ -45,35 +38,6 @@ LEAST_PART, LEAST_SOLVES = 1e-5, 50
 #: What is taken away may change D^T lambda by this part; rows that hold only weakly, like those of
 #: a door that hinges jam, need a smaller e for that, by so much at a time, down to a least one.
 TAKEN, SMALLER, SMALLEST = 1e-9, 1e-2, 1e-12
-
-
-@compiled_inside
-def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
-    """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers."""
-    power = gather_forces(t, y, system, loops)
-    linearise(t, system, loops)
-    factorise(system, PART)
-    power += solve_rubbing(t, system, loops, solve)
-    return power + power_of_drivers(system)
-
-
-@compiled_inside
-def solve(system: System) -> None:
-    """Scaled accelerations from the scaled forces in ``force``, -lambda into ``x``.
-
-    Each pass starts from the accelerations of the one before, so that it solves for what is left.
-    C holds the sum of the passes.
-    """
-    x, C = system.x, system.C
-    zero(C)
-    for _ in range(SOLVES):
-        for k in range(x.shape[0]):
-            x[k] = system.gamma[k]
-        solve_rows(system)
-        for k in range(x.shape[0]):
-            C[k] += x[k]
-    for k in range(x.shape[0]):
-        x[k] = C[k]
 
 
 @compiled_inside

@@ -15,7 +15,7 @@ from typing import Any
 
 from dap3d_core.assembly.evaluate import global_accelerations, rates
 from dap3d_core.assembly.system import LENGTH, SINGULAR, Floats, System
-from dap3d_core.formulations import lsq
+from dap3d_core.formulations import regularised
 from dap3d_core.formulations.constraints import (
     acceleration_residual,
     correct,
@@ -96,7 +96,7 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
     accelerate(t, y, system, loops)
     if not have_pivots(system.nodes, system.K):
-        lsq.accelerate(t, y, system, loops)
+        regularised.accelerate(t, y, system, loops)
         system.settings[SINGULAR] += 1.0
     global_accelerations(system.metric, system.force, out)
     report_multipliers(system, out)

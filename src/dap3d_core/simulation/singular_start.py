@@ -117,6 +117,8 @@ def _loses_rank(machine: Machine, u: Floats, rank: Rank, t: float) -> bool:
     still = u.copy()
     still[7 * n :] = 0.0
     rows = finite_rows(machine, t, still)
+    if not np.bincount(rows.row, rows.value**2, minlength=rows.shape[0]).all():
+        return False  # a row without a gradient is named where the run stops
     wish = np.random.default_rng(0).standard_normal(6 * n)
     flow = rows.value * wish[rows.column]
     flow = np.bincount(rows.row, flow, minlength=rows.shape[0]).astype(float)
