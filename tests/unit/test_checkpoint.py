@@ -15,6 +15,7 @@ from dap3d_core.kernels.cache import jit_is_on
 from dap3d_core.scene import SceneError
 from dap3d_core.simulation import CheckpointError, SimulationError
 from dap3d_core.simulation.checkpoint import (
+    FORMAT,
     Checkpoint,
     path_of,
     read_checkpoint,
@@ -63,6 +64,7 @@ def stiffer():
     ]
 
 
+RADAU = {"integrator": "radau", "t_end": 2.0, "dt": 0.1}
 #: Scene, settings, and where it may be ended, s.
 CASES = {
     "dop853": (problems.pendulum, {}, 0.5),
@@ -75,12 +77,17 @@ CASES = {
     "penalty": (problems.four_bar, {"method": "penalty", "t_end": 0.5}, 0.1),
     "lsq": (mechanisms.door, {}, 0.3),
     "a singular pose": (lambda: dap.load("A02-1"), {"t_end": 1.0, "dt": 0.1}, 0.5),
+    "radau across singular poses": (lambda: dap.load("A02-1"), RADAU, 1.0),
+    "within a crossing of radau": (lambda: dap.load("A02-1"), RADAU, 0.7),
     "turns and friction": (wheel, {"t_end": 1.5, "dt": 0.05}, 0.7),
     "stiff": (lambda: dap.load("A05"), {"integrator": "auto", "t_end": 0.3, "dt": 0.01}, 0.02),
     "a function's breaks": (driven, {}, 0.4),
     "events": (stone, {"t_end": 2.0, "dt": 0.05, "events": stiffer}, 0.35),
 }
-SLOW_IN_PYTHON = ("radau", "stiff", "penalty", "lsq", "a singular pose", "adams", "no projection")
+SLOW_IN_PYTHON = (
+    "radau", "stiff", "penalty", "lsq", "a singular pose", "adams", "no projection",
+    "radau across singular poses", "within a crossing of radau",
+)  # fmt: skip
 
 
 def settings_of(settings):
@@ -360,8 +367,9 @@ def rewritten(path, **changes):
 
 
 def test_a_newer_checkpoint_is_refused(copied):
-    rewritten(copied, format=2, versions={"dap3d": "9.0"})
-    refused(copied, r"dap3d 9\.0 wrote it in format 2, this program reads format 1; install")
+    rewritten(copied, format=FORMAT + 1, versions={"dap3d": "9.0"})
+    words = rf"dap3d 9\.0 wrote it in format {FORMAT + 1}, this program reads format {FORMAT}"
+    refused(copied, f"{words}; install")
 
 
 def test_other_versions_are_noted(copied):

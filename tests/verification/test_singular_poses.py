@@ -140,6 +140,53 @@ def test_the_implicit_integrator_with_redundant_rows(rtol):
     assert result.stats.steps < 400
 
 
+def crossings_of(result):
+    return [note for note in result.notes if "radau met a singular pose" in note]
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("make", [lambda: redundant.four_bars(1), problems.four_bar])
+def test_the_implicit_integrator_is_taken_across(make, rtol):
+    """A02, N = 1, with and without redundant rows: radau stopped at the first or second crossing.
+
+    Ten seconds multiply an error by about 100, and steps of radau may have 5 times the tolerance.
+    """
+    result = dap.simulate(
+        make(), t_end=10.0, dt=0.5, integrator="radau", rtol=rtol, atol=rtol / 100
+    )
+    expected = redundant.four_bars_tip(1, result.t)
+    assert redundant.error_of(tip(result)[1:], expected[1:]) < 1e3 * rtol
+    assert len(crossings_of(result)) == (rtol < 1e-6 or result.method == "lsq")
+    assert result.ledger["position"].ok
+
+
+def test_an_event_within_a_crossing_of_the_implicit_integrator():
+    """Behind the pose, within the step across: there y is what the closed equation says, to the
+    error of the run."""
+    event = dap.Event("crank0.r.y", below=-0.0007, action="stop")
+    result = dap.simulate(
+        redundant.four_bars(1), t_end=2.0, dt=0.1, integrator="radau", rtol=1e-10, atol=1e-12,
+        events=[event],
+    )  # fmt: skip
+    assert crossings_of(result)
+    assert result.status == "stopped"
+    expected = redundant.four_bars_tip(1, result.t[-1:])[0, 1]
+    assert expected == pytest.approx(-0.0014, abs=1e-9)
+
+
+@pytest.mark.parametrize("settings", [{"project": False}, {"step": 0.01}])
+def test_where_the_implicit_integrator_cannot_be_taken_across_the_remedy_is_told(settings):
+    """Steps are not placed about a pose where projection is off, or they are fixed.
+
+    The time of the pose, y = 0, is foretold from the last step to a part of a step (4 m/s, 0.01 s).
+    """
+    with pytest.raises(dap.SimulationError, match="radau cannot cross the singular pose at") as e:
+        dap.simulate(redundant.four_bars(1), t_end=2.0, dt=0.1, integrator="radau", **settings)
+    assert "dop853 and auto can" in str(e.value)
+    t = float(str(e.value).split("pose at t = ")[1].split()[0])
+    assert redundant.four_bars_tip(1, np.array([t]))[0, 1] == pytest.approx(0, abs=1e-2)
+
+
 def test_door_on_two_hinges():
     """10 rows of rank 5: a pendulum, phi'' = (m g l / (J + m l^2)) sin phi with phi from upright,
     let go level: e < 1e-6 over 5 s; the hinges share the load as the least multipliers do."""

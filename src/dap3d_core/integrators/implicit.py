@@ -87,6 +87,7 @@ class RadauIntegration(Integration):
 
     name = "radau"
     adaptive = True
+    implicit = True
 
     def __init__(
         self,

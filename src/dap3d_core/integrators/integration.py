@@ -93,6 +93,8 @@ class Integration(Restorable):
     #: Times in ascending order that no step goes over, and whether the right-hand side may jump
     #: there, so that the integration starts anew.
     stops: Sequence[tuple[float, bool]] = ()
+    #: Whether its formulas are implicit.
+    implicit = False
 
     def __init__(
         self,

@@ -10,6 +10,7 @@ import os
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import attrs
@@ -24,7 +25,7 @@ from dap3d_core.scene import METHODS
 from dap3d_core.simulation.errors import CheckpointError
 
 #: Version of this layout, raised when an older reader would misread it.
-FORMAT = 1
+FORMAT = 2
 PROGRAM = "dap3d checkpoint"
 #: Added to the name of the result file.
 SUFFIX = ".checkpoint"
@@ -43,11 +44,17 @@ def _is_duration(value: Any) -> bool:
     return is_number(value) and value >= 0.0
 
 
+def _are_durations(value: Any) -> bool:
+    return isinstance(value, list) and all(map(_is_duration, value))
+
+
 #: What stands in a header.
 KEYS: dict[str, Form] = {
     **dict.fromkeys(("run", "output", "scene", "driver"), (_is_text, "a text")),
     "method": (lambda value: value in METHODS, f"one of {', '.join(METHODS)}"),
     "integrations": (lambda value: type(value) is int and value in (1, 2), "1 or 2"),
+    "crossed": (_are_durations, "a list of times in seconds"),
+    "until": (lambda value: value is None or _is_duration(value), "a time in seconds, or null"),
     "rows": (is_count, "a count"),
     **dict.fromkeys(("t", "wall_time_s", "compile_time_s"), (_is_duration, "a time in seconds")),
     "settings": (lambda value: isinstance(value, dict), "a table"),
@@ -60,6 +67,7 @@ _HEADER = "checkpoint.json"
 #: What readers of archives and arrays raise for damaged ones.
 _UNREADABLE = (
     zipfile.BadZipFile, RuntimeError, EOFError, ValueError, OSError, MemoryError, KeyError,
+    TokenError,
 )  # fmt: skip
 _ZIP = b"PK\x03\x04"
 #: A header with the scene's text is larger than a scene may be, but not by much.

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dap3d_core.formulations.machine import Machine
-from dap3d_core.integrators import Integration
-from dap3d_core.integrators.work import NEXT
+from dap3d_core.integrators import Integration, Status
+from dap3d_core.integrators import work as at
 from dap3d_core.result import INFORMATION
 from dap3d_core.simulation.errors import SimulationError
 
@@ -45,22 +45,34 @@ def implicit_rest(
     machine: Machine, before: Integration, times: Floats, options: dict[str, Any]
 ) -> Integration:
     """The integration by Radau IIA of what another one has left, from where it stands."""
-    rest = np.concatenate([[before.t], times[times > before.t]])
-    integration = implicit_integration(machine, before.y, rest, options | {"first_step": None})
-    integration.work.integer[NEXT] = 1  # its first instant is no reporting time
+    integration = implicit_integration(machine, before.y, times, options | {"first_step": None})
+    take_over(integration, before)
     return integration
 
 
+def take_over(integration: Integration, before: Integration) -> None:
+    """Let an integration of the same run go on from where another one stands."""
+    real, integer = integration.work.real, integration.work.integer
+    integration.work.state[at.Y] = before.work.state[at.Y]
+    real[at.T], integer[at.NEXT] = before.t, before.work.integer[at.NEXT]
+    real[at.STIFF_AT], integer[at.STATUS] = np.inf, Status.RUNNING
+    real[[at.ACROSS, at.FAILED_RATE]] = 0.0
+    integer[[at.POOR, at.STIFF_STEPS, at.CALM_STEPS, at.STALLS]] = 0
+    if not integration.implicit:
+        integration.work.lengths[:] = np.nan
+    integration.restart()
+
+
+def change_note(t: float) -> str:
+    """Note on where integrator auto has gone on with the implicit one."""
+    return f"{INFORMATION}integrator auto: {EXPLICIT} until t = {t:.6g} s, then radau: {WHY_STIFF}"
+
+
 def stiffness_notes(runs: Sequence[Integration], integrator: str) -> list[str]:
-    """What became of the scene being stiff, where it was; in the order of the integrations."""
+    """That the scene is stiff for the one integration of a run, where it is."""
     t = runs[0].stiff_at
-    if t is None:
+    if t is None or len(runs) > 1:
         return []
-    if len(runs) > 1:
-        return [
-            f"{INFORMATION}integrator auto: {EXPLICIT} until t = {runs[0].t:.6g} s, then radau: "
-            f"{WHY_STIFF}"
-        ]
     used = EXPLICIT if integrator == "auto" else integrator
     return [
         f"{INFORMATION}the scene is stiff from t = {t:.6g} s on: {WHY_STIFF}. {used} takes small "

@@ -24,6 +24,7 @@ from dap3d_core.simulation.checkpoint import Checkpoint, path_of, read_checkpoin
 from dap3d_core.simulation.compiled import CompiledModel
 from dap3d_core.simulation.errors import CheckpointError
 from dap3d_core.simulation.event import Event
+from dap3d_core.simulation.handing_over import begin_other
 from dap3d_core.simulation.opening import why_unmade
 from dap3d_core.simulation.run import Progress, Run
 from dap3d_core.simulation.saving import (
@@ -225,15 +226,19 @@ class Resumption:
         header, stored = self._found.header, self._found.arrays
         self._restore_events(run)
         try:
-            for k in range(header["integrations"]):
-                if k:
-                    if run.runs[0].status is not Status.STIFF:
-                        raise ValueError("its first integration goes on, and there is a second")
-                    run.begin_implicit()
+            if header["integrations"] == 2:
+                begin_other(run)
+                if run.runs[0].implicit != ("0.own" in stored):  # which implicit ones have
+                    run.runs.reverse()
+            for k, integration in enumerate(run.runs):
                 first = f"{k}."
-                run.runs[k].restore(
+                integration.restore(
                     {n.removeprefix(first): a for n, a in stored.items() if n.startswith(first)}
                 )
+            if len(run.runs) > 1 and run.runs[0].status is Status.RUNNING:
+                raise ValueError("its first integration goes on, and there is a second")
+            run.crossed, until = header["crossed"], header["until"]
+            run.until = math.inf if until is None else until
             restore_system(run, stored)
             check_position(run, header["rows"])
         except ValueError as error:
@@ -326,6 +331,6 @@ def check_position(run: Run, rows: int) -> None:
     """
     model, last = run.machine.model, run.runs[-1]
     state_of(from_integrated(last.y[None], model.body_count)[0], model.body_names)
-    reported = sum(one.work.integer[NEXT] for one in run.runs) - (len(run.runs) - 1)
+    reported = last.work.integer[NEXT]
     if rows - reported not in (0, 1):  # an event that ends a run reports its own instant
         raise ValueError(f"{rows} rows are reported of the {reported} that its instants need")

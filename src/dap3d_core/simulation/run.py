@@ -28,12 +28,8 @@ from dap3d_core.simulation.elsewhere import redundancy_elsewhere
 from dap3d_core.simulation.ending import doubts, event_notes, occurrences, why_stopped
 from dap3d_core.simulation.errors import RedundantError, SimulationError
 from dap3d_core.simulation.event import Event
-from dap3d_core.simulation.implicit import (
-    EXPLICIT,
-    implicit_integration,
-    implicit_rest,
-    stiffness_notes,
-)
+from dap3d_core.simulation.handing_over import cannot_cross, crossing_notes, hand_over
+from dap3d_core.simulation.implicit import EXPLICIT, implicit_integration, stiffness_notes
 from dap3d_core.simulation.keeping import Keeper
 from dap3d_core.simulation.room import check_room, row_width
 from dap3d_core.simulation.second_run import Again, StepLimits, add_error, halved
@@ -97,8 +93,12 @@ class Run:
         self.watcher = Watcher(compiled, events) if events else None
         self.watch, end = watch, float(self.times[-1])
         self.observer = None if watch is None else Observer(self.machine.model, end, watch)
-        #: The integrations, one after the other: "auto" may take a second one.
+        #: The integrations, the present one last: "auto" and radau may take a second one.
         self.runs: list[Integration] = []
+        #: Times of singular poses that an explicit integration was to cross for radau, and the
+        #: time at which it leaves the run to radau again.
+        self.crossed: list[float] = []
+        self.until = np.inf
         self.options: dict[str, Any] = {}
 
     def go(
@@ -127,7 +127,7 @@ class Run:
         integration = self._integration(start)
         if self.settings.integrator != "radau":  # which evaluates its stages otherwise
             integration.beside = self.machine.second_thread
-        self._begin(integration)
+        self.begin(integration)
 
     def keep(
         self, output: str | os.PathLike[str] | None, *, force: bool, identity: str = ""
@@ -148,8 +148,7 @@ class Run:
         assert keeper is not None
         try:
             self._advance(progress)
-            if self.runs[-1].status is Status.STIFF:
-                self.begin_implicit()
+            while hand_over(self):
                 self._advance(progress)
         except BaseException as error:
             if isinstance(error, ResultError):  # the disk: what is there stays as it is
@@ -178,10 +177,6 @@ class Run:
         if self.estimate_error:
             add_error(result, self.settings, self._again(progress), keeper.output)
         return result
-
-    def begin_implicit(self) -> None:
-        """Go on with the implicit integrator, where the other one has found the scene stiff."""
-        self._begin(implicit_rest(self.machine, self.runs[-1], self.times, self.options))
 
     def _again(self, progress: Progress | None) -> Again:
         """Makes a run with other settings and another first step, in memory."""
@@ -262,7 +257,7 @@ class Run:
             begin_singular(integration.work, machine.rates(0.0, u0, singular.acceleration), first)
         return integration
 
-    def _begin(self, integration: Integration) -> None:
+    def begin(self, integration: Integration) -> None:
         """Compile an integrator before the clock of the run goes on; it is the present one then."""
         integration.stops = self.compiled.pace(float(self.times[-1])).stops
         if self.limits is not None:
@@ -274,14 +269,20 @@ class Run:
         self.compile_time += spent
         self.started += spent
         self.runs.append(integration)
+        self.look_on()
+
+    def look_on(self) -> None:
+        """Let who watches the run look at its present integration."""
         if self.observer is not None:
-            self.observer.begin(integration)
+            self.observer.begin(self.runs[-1])
 
     def _advance(self, progress: Progress | None) -> None:
         """Advance in chunks whose length in right-hand sides follows the clock."""
         integration = self.runs[-1]
-        budget, t_end = FIRST_CHUNK, float(self.times[-1])
-        while integration.status is Status.RUNNING:
+        # step by step, where it is to end at the first step behind a time
+        budget = FIRST_CHUNK if self.until == np.inf else 0
+        t_end = float(self.times[-1])
+        while integration.status is Status.RUNNING and integration.t < self.until:
             before, clock = integration.statistics.rhs, time.perf_counter()
             self.is_whole = False
             if self.watcher:
@@ -297,7 +298,7 @@ class Run:
                 progress(integration.t, t_end)
             if self.observer is not None:
                 self.observer.look()
-            if done and seconds > 0.0:
+            if done and seconds > 0.0 and self.until == np.inf:
                 budget = int(min(max(1.0, done * CHUNK_SECONDS / seconds), 4.0 * budget, 1e9))
 
     def _take_rows(self) -> None:
@@ -317,6 +318,7 @@ class Run:
     def _stopped(self) -> SimulationError:
         """Why the integration ended early, with what was computed."""
         message = why_stopped(self.machine, self.runs[-1], self.rank)
+        message = cannot_cross(message, self)
         self.notes.append(message)
         result = self._kept("stopped")
         if self.saver is not None:
@@ -340,6 +342,7 @@ class Run:
             notes += self.keeper.pulling.notes()
         notes += self.watcher.notes() if self.watcher else []
         notes += event_notes(self.runs, self._events())
+        notes += crossing_notes(self.crossed)
         return notes + stiffness_notes(self.runs, self.settings.integrator)
 
     def _events(self) -> list[Occurrence]:

@@ -137,6 +137,8 @@ def checkpoint_of(run: "Run") -> Checkpoint:
         "rows": keeper.count,
         "t": run.runs[-1].t,
         "integrations": len(run.runs),
+        "crossed": run.crossed,
+        "until": run.until if math.isfinite(run.until) else None,
         "scene": compiled.scene_text,
         "method": compiled.asked,
         "settings": attrs.asdict(run.settings),

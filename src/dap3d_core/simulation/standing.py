@@ -48,7 +48,8 @@ class Observer:
 
     def begin(self, integration: Integration) -> None:
         """An integration begins, or another one goes on with the run."""
-        self._earlier, self._steps = self._earlier + self._steps, 0
+        steps = integration.statistics.steps  # of one that goes on once more, those it has taken
+        self._earlier, self._steps = self._earlier + self._steps - steps, steps
         self._of, self._t = integration, integration.t
         if self._start is None:
             self._start = self._energies(integration.y)
