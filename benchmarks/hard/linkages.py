@@ -13,7 +13,7 @@ from hard.measures import against_digits, at_all_instants, crank_tip, first_body
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
 SPRINGS = "its joints are springs: accelerations, and so the motion, are off by 1 / alpha"
 DEPENDENT = "refuses dependent rows at the start; lsq, which auto takes, does not"
-UNPLACED = "beyond the limit: errors of its steps grow by the crossings, across which dop853 takes it"
+UNPLACED = "beyond its limit: crossings, which dop853 takes it across, multiply errors of its steps"
 NARROW = "1.3 times the limit: it has no steps placed about the poses"
 OFF = "stages off the constraints by 1e-6 have no acceleration to speak of close to the pose"
 #: What is tried on every case.
