@@ -131,9 +131,9 @@ def test_the_cart_keeps_momentum_and_energy():
 # ---------------------------------------------------------------------------- masses and units
 
 
-@pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6, 1e8])
+@pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6, 1e7, 3e7, 1e8, 1e9])
 def test_different_masses_are_no_singular_pose(ratio):
-    """1 to 1e8 kg hang on a rod of 1 kg: steps as for 1e2 kg, though a pivot is 1/ratio of another
+    """1 to 1e9 kg hang on a rod of 1 kg: steps as for 1e2 kg, though a pivot is 1/ratio of another
     and the small one wanders from row to row as the rod turns. e < 1e3 rtol, and ratio roundings.
     """
     result = dap.simulate(scenes.heavy_bob(ratio), t_end=2.0, dt=0.05)

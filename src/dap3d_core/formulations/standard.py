@@ -14,7 +14,7 @@ solved by the block LDL^T of linear/blocks.py. Needs independent rows.
 from typing import Any
 
 from dap3d_core.assembly.evaluate import global_accelerations, rates
-from dap3d_core.assembly.system import LENGTH, SINGULAR, Floats, System
+from dap3d_core.assembly.system import EVEN, LENGTH, SINGULAR, Floats, System
 from dap3d_core.formulations import regularised
 from dap3d_core.formulations.constraints import (
     acceleration_residual,
@@ -55,6 +55,23 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
 
 
 @compiled_into
+def settle_rows(system: System, kept: Floats) -> float:
+    """Solve once more for what the accelerations in ``force`` leave of the rows.
+
+    kept: (6 n, at least) takes the accelerations of before. -lambda in ``x`` becomes its change, of
+    which the power of drivers is returned.
+    """
+    force, n = system.force, system.metric.shape[0] - 1
+    acceleration_residual(system)
+    for k in range(6 * n):
+        kept[k] = force[6 + k]
+    correct(system)
+    for k in range(6 * n):
+        force[6 + k] += kept[k]
+    return power_of_drivers(system)
+
+
+@compiled_into
 def refine(system: System, out: Floats) -> None:
     """Solve once more for what accelerations and multipliers leave of the rows, where that is much.
 
@@ -67,11 +84,7 @@ def refine(system: System, out: Floats) -> None:
         size = max(size, abs(out[k]) * (1.0 if k % 6 < 3 else length))
     if not acceleration_residual(system) > ROUGH * size:
         return
-    for k in range(6 * n):
-        out[k] = force[6 + k]
-    correct(system)
-    for k in range(6 * n):
-        force[6 + k] += out[k]
+    settle_rows(system, out)
     for k in range(system.row.shape[0]):
         out[6 * n + k] -= system.x[system.row[k]]
     global_accelerations(system.metric, force, out)
@@ -79,8 +92,14 @@ def refine(system: System, out: Floats) -> None:
 
 @compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """dy/dt of a state, the power of forces and drivers last."""
+    """dy/dt of a state, the power of forces and drivers last.
+
+    Where masses differ much, a light body between heavy ones has reactions whose last digits are
+    no rounding of its acceleration any more, but noise that no step can follow.
+    """
     power = accelerate(t, y, system, loops)
+    if system.settings[EVEN] != 0.0:
+        power += settle_rows(system, out)
     rates(y, system.metric, system.force, out)
     out[out.shape[0] - 1] = power
 
