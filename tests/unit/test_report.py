@@ -61,8 +61,9 @@ def test_the_error_of_the_final_position_is_a_distance():
 
 
 def test_trajectories_part_where_they_differ_by_a_thousandth_of_the_size():
-    assert first_parting(states(), states(_0=2.0 + 1.9e-3)) is None
-    assert first_parting(states(), states(_0=2.0 + 2.1e-3)) == 1
+    t = np.array([0.0, 1.0])
+    assert first_parting(t, states(), states(_0=2.0 + 1.9e-3), 1.0) is None
+    assert first_parting(t, states(), states(_0=2.0 + 2.1e-3), 1.0) == 1
 
 
 # ---------------------------------------------------------------------------- ladders

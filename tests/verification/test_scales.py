@@ -203,3 +203,30 @@ def test_an_undamped_oscillation_is_not_stiff(integrator):
     scene.add_force("ptp", "bond", P_i="a.O", P_j="b.O", k=1e6, l0=1.0)
     result = dap.simulate(scene, t_end=1.0, dt=0.1, integrator=integrator)
     assert not any("stiff" in note or "radau" in note for note in result.notes), result.notes
+
+
+@pytest.mark.parametrize(("length", "time"), [(1e-9, 1.0), (1e6, 1e3), (1e-3, 1e-6)])
+def test_units_do_not_change_from_when_on_a_state_means_nothing(length, time):
+    """Steps that are too long: the same error, as a part of the motion, at the same instant."""
+
+    def rough(length, time):
+        scene = parallelogram(length, time)
+        return dap.simulate(scene, t_end=2.0 * time, dt=0.1 * time, integrator="rk4",
+                            step=0.1 * time, estimate_error=True).error  # fmt: skip
+
+    ours, theirs = rough(length, time), rough(1.0, 1.0)
+    assert theirs.meaningless_from > 0.1
+    assert ours.meaningless_from == pytest.approx(time * theirs.meaningless_from, rel=1e-9)
+    np.testing.assert_allclose(ours.relative, theirs.relative, rtol=1e-3, atol=1e-12)
+
+
+def test_a_scene_at_rest_never_loses_its_meaning():
+    """In nm: speeds are rounding, which is no part of the speed that would move anything."""
+    scene = dap.Scene(name="hanging")
+    scene.add_body("m", mass=1.0, Jp=[1e-20] * 3, r=[3e-9, 0.0, 0.0])
+    scene.add_point("P", "m", [-3e-9, 0.0, 0.0])
+    scene.add_point("Q", "m", [0.0, 1e-9, 0.0])
+    scene.add_joint("sph", "hook", P_i="P", P_j="ground.O")
+    scene.add_force("weight", "weight", gravity=9.81e-9, wgt=[1.0, 0.0, 0.0])
+    result = dap.simulate(scene, t_end=1.0, dt=0.1, estimate_error=True)
+    assert result.error.meaningless_from is None

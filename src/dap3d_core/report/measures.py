@@ -9,10 +9,10 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.kinematics import split
-from dap3d_core.result.estimate import SMALLEST_SIZE, difference, largest_norms, sizes_of
+from dap3d_core.result.estimate import difference, largest_norms, least_sizes, sizes_of
 
 #: Components below are compared with this (SI), not with themselves.
-Y_THR = SMALLEST_SIZE
+Y_THR = 1e-3
 #: Two references that differ by more than this part of the size have parted: chaos, or a fault.
 PARTED = 1e-3
 
@@ -30,14 +30,14 @@ def final_position_error(u: Floats, reference: Floats) -> float:
     return float(np.max(np.linalg.norm(r, axis=2), initial=0.0))
 
 
-def first_parting(u: Floats, other: Floats) -> int | None:
+def first_parting(t: Floats, u: Floats, other: Floats, length: float) -> int | None:
     """Place of the first instant at which two trajectories have parted; None where they never do.
 
     They have when a vector r, p, r_dot or w of some body differs by more than ``PARTED`` of the
-    largest such vector of the whole run.
+    largest such vector of the whole run; ``length``, m, is that of the scene (``least_sizes``).
     """
-    sizes = sizes_of(u)
+    sizes, least = sizes_of(u), least_sizes(t, length)
     apart = np.zeros(len(u), dtype=bool)
     for name, off in largest_norms(difference(u, other)).items():
-        apart |= off > PARTED * max(sizes[name], Y_THR)
+        apart |= off > PARTED * max(sizes[name], least[name])
     return int(np.argmax(apart)) if apart.any() else None

@@ -149,7 +149,7 @@ def _reference(
         notes.append("the reference is a single run: its own uncertainty is not known")
     else:
         settings = (setting, second[0])
-        parting = first_parting(result.u, second[1].u)
+        parting = first_parting(result.t, result.u, second[1].u, result.record.length)
         if parting is not None:
             count = max(parting, 1)
             meaningless_from = float(result.t[parting])

@@ -23,8 +23,9 @@ MEANINGLESS = 1e-3
 #: Errors grow exponentially, and not with a power of time, where that line fits them better, over
 #: this many instants and this many powers of ten at least.
 FEWEST, DECADES = 10, 3.0
-#: Sizes below are taken for this one (SI), as in the measure of errors (docs/report.md).
-SMALLEST_SIZE = 1e-3
+#: Sizes below this part of the scene's are taken for that: of its length, of 1, and of the speeds
+#: that move a body by its length, or turn it by 1 rad, in the whole run.
+SMALLEST_PART = 1e-3
 
 
 @attrs.frozen(eq=False)
@@ -35,11 +36,13 @@ class ErrorEstimate:
         t: (nt,) reported instants, s.
         u: (nt, 13 n) errors of the state, none negative, in its order and units.
         size: the largest magnitude over bodies and instants of r (m), p, rd (m/s), w (rad/s).
+        length: m, that tolerances of the scene speak of.
     """
 
     t: Floats
     u: Floats
     size: dict[str, float]
+    length: float = 1.0
 
     @property
     def r(self) -> Floats:
@@ -70,7 +73,7 @@ class ErrorEstimate:
     def meaningless_from(self) -> float | None:
         """The first instant, s, at which an error is beyond 1e-3 of the size of what it belongs to.
 
-        Sizes below 1e-3 (m, 1, m/s, rad/s) count as 1e-3. None where no error is.
+        Sizes below 1e-3 of the scene's (``least_sizes``) count as that. None where no error is.
         """
         lost = self.relative > MEANINGLESS
         return float(self.t[np.argmax(lost)]) if lost.any() else None
@@ -78,9 +81,8 @@ class ErrorEstimate:
     @property
     def relative(self) -> Floats:
         """(nt,) the largest error at each instant, as a part of the size of what it belongs to."""
-        parts = [
-            norms / max(self.size[name], SMALLEST_SIZE) for name, norms in self._norms().items()
-        ]
+        least = least_sizes(self.t, self.length)
+        parts = [norms / max(self.size[name], least[name]) for name, norms in self._norms().items()]
         found: Floats = np.max(parts, axis=0, initial=0.0)
         return found
 
@@ -133,9 +135,22 @@ def sizes_of(u: Floats) -> dict[str, float]:
     return {name: float(np.max(norms, initial=0.0)) for name, norms in largest_norms(u).items()}
 
 
-def estimate_of(t: Floats, u: Floats, u_error: Floats | None) -> ErrorEstimate | None:
+def least_sizes(t: Floats, length: float) -> dict[str, float]:
+    """By symbol r, p, rd, w: below which a magnitude in a run over instants t is as good as zero.
+
+    A part of the scene's length, m, of a unit vector, and of the speeds that make those in the run.
+    """
+    duration = float(t[-1] - t[0]) if len(t) else 0.0
+    rate = 1.0 / duration if duration > 0.0 else np.inf
+    sizes = {"r": length, "p": 1.0, "rd": length * rate, "w": rate}
+    return {name: SMALLEST_PART * size for name, size in sizes.items()}
+
+
+def estimate_of(
+    t: Floats, u: Floats, u_error: Floats | None, length: float
+) -> ErrorEstimate | None:
     """The estimate of a result's arrays; None where none was asked for."""
-    return None if u_error is None else ErrorEstimate(t, u_error, sizes_of(u))
+    return None if u_error is None else ErrorEstimate(t, u_error, sizes_of(u), length)
 
 
 def difference(u: Floats, other: Floats) -> Floats:

@@ -167,7 +167,7 @@ class Result(Kinematics):
 
         None unless asked for (``simulate(..., estimate_error=True)``) and found.
         """
-        return estimate_of(self.t, self.u, self.arrays.u_error)
+        return estimate_of(self.t, self.u, self.arrays.u_error, self.record.length)
 
     @property
     def status(self) -> str:
