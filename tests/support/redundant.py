@@ -60,6 +60,45 @@ def bricard():
     return scene
 
 
+def bennett(turn=1.1):
+    """Three links of lengths 1, 2, 1 m on four revolutes, the fourth link is ground: one freedom.
+
+    By Bennett's condition: sin(twist) over length is the same for all; opposite links are equal.
+    Its closure gives the second angle: tan(turn / 2) tan(second / 2) is a number of the twists.
+    """
+    twists, lengths = (np.pi / 6, np.pi / 2), (1.0, 2.0)
+    ratio = np.sin(0.5 * sum(twists)) / np.sin(0.5 * (twists[1] - twists[0]))
+    second = 2.0 * np.arctan(ratio / np.tan(0.5 * turn))
+    scene = dap.Scene(name="Bennett")
+    place, frame = np.zeros(3), np.eye(3)
+    for k, angle in enumerate((turn, second, -turn)):
+        axis, twist, length = frame[:, 2], twists[k % 2], lengths[k % 2]
+        frame = frame @ rotation(angle, "z")
+        along, frame = frame[:, 0] * length, frame @ rotation(twist, "x")
+        scene.add_body(f"link{k}", mass=1.0, Jp=(0.5, 0.5, 0.5), r=place + 0.5 * along)
+        scene.add_point(f"start{k}", f"link{k}", -0.5 * along)
+        scene.add_point(f"end{k}", f"link{k}", 0.5 * along)
+        scene.add_vector(f"first{k}", f"link{k}", axis)
+        scene.add_vector(f"second{k}", f"link{k}", frame[:, 2])
+        place = place + along
+    scene.add_point("last", "ground", place)
+    scene.add_vector("last_axis", "ground", frame[:, 2])
+    inner = [("ground.O", "ground.z"), ("end0", "second0"), ("end1", "second1")]
+    outer = [(f"start{k}", f"first{k}") for k in range(3)]
+    ends = zip([*outer, ("end2", "second2")], [*inner, ("last", "last_axis")], strict=True)
+    for k, (i, j) in enumerate(ends):
+        scene.add_joint("rev", f"J{k}", P_i=i[0], P_j=j[0], a_i=i[1], a_j=j[1])
+    scene.add_force("weight", "gravity", wgt=(0.3, -1.0, 0.2))
+    return scene
+
+
+def rotation(angle, axis):
+    """The matrix of a turn about x or z."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]] if axis == "x" else
+                    [[c, -s, 0], [s, c, 0], [0, 0, 1]])  # fmt: skip
+
+
 def hinged_door(hinges=2):
     """A door on coaxial hinges (5 rows each, rank 5), its axis level, let go from level rest."""
     scene = dap.Scene(name=f"door on {hinges} hinges")

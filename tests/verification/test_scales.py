@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support import redundant
 
 import dap3d_core as dap
 
@@ -230,3 +231,35 @@ def test_a_scene_at_rest_never_loses_its_meaning():
     scene.add_force("weight", "weight", gravity=9.81e-9, wgt=[1.0, 0.0, 0.0])
     result = dap.simulate(scene, t_end=1.0, dt=0.1, estimate_error=True)
     assert result.error.meaningless_from is None
+
+
+def enlarged(scene, length):
+    """The same bodies, points and weight, all lengths so many times as large."""
+    for body in scene.bodies.values():
+        body.r = tuple(length * np.asarray(body.r))
+        body.Jp = tuple(length**2 * np.asarray(body.Jp))
+    for point in scene.points.values():
+        point.sPp = tuple(length * np.asarray(point.sPp))
+    for force in scene.forces.values():
+        force.fields = {**force.fields, "gravity": length * GRAVITY}
+    return scene
+
+
+@pytest.mark.parametrize("length", [1e-3, 1e3, 1e-6])
+@pytest.mark.parametrize("linkage", [redundant.bricard, redundant.bennett])
+def test_linkages_of_one_freedom_that_no_count_tells_have_it_in_any_units(linkage, length):
+    """Rank, freedom, shared rows, no joint that binds; the motion to what rtol allows."""
+    ours, theirs = (dap.compile(enlarged(linkage(), size)) for size in (length, 1.0))
+    verdicts = [
+        (found.rank.rank, found.rank.dof, found.rank.redundant, found.joints, found.bindings,
+         found.contradictions, found.singular)
+        for found in (ours.redundancy(), theirs.redundancy())
+    ]  # fmt: skip
+    assert verdicts[0] == verdicts[1]
+    assert verdicts[1][1] == 1
+    assert verdicts[1][4:] == ((), (), None)
+    small, ordinary = (dap.simulate(each, t_end=0.5, dt=0.1) for each in (ours, theirs))
+    assert np.ptp(ordinary.r, axis=0).max() > 0.1
+    assert [name for name, entry in small.ledger.items() if entry.ok is False] == []
+    np.testing.assert_allclose(small.r / length, ordinary.r, atol=1e-6)
+    np.testing.assert_allclose(small.w, ordinary.w, atol=1e-5)
