@@ -140,15 +140,31 @@ class Model:
         extent = float(np.linalg.norm(np.max(points, axis=0) - np.min(points, axis=0)))
         if extent > EXTENT * float(np.max(np.abs(points))):
             return extent
-        gyration = np.linalg.norm(self.Jp, ord=2, axis=(1, 2)) / self.mass
-        return float(np.sqrt(np.max(gyration)))
+        return self._gyration
+
+    @cached_property
+    def _gyration(self) -> float:
+        """The largest radius of gyration of a body, m."""
+        return float(np.sqrt(np.max(np.linalg.norm(self.Jp, ord=2, axis=(1, 2)) / self.mass)))
+
+    @cached_property
+    def part_size(self) -> float:
+        """The size of the largest part, m: arm or radius of gyration of a body, up to the extent.
+
+        A chain of a thousand links has errors as one of ten.
+        """
+        if not self.body_count:
+            return self.extent
+        arms = np.linalg.norm(self.point_local[self.point_body > 0], axis=1)
+        return min(self.extent, max(float(np.max(arms, initial=0.0)), self._gyration))
 
     @cached_property
     def length(self) -> float:
         """The length, m, that tolerances speak of: 1 in ordinary scenes, else a power of ten."""
-        if ORDINARY[0] <= self.extent <= ORDINARY[1] or not 1 / WIDEST < self.extent < WIDEST:
+        size = self.part_size
+        if ORDINARY[0] <= size <= ORDINARY[1] or not 1 / WIDEST < size < WIDEST:
             return 1.0
-        return float(10.0 ** np.round(np.log10(self.extent)))
+        return float(10.0 ** np.round(np.log10(size)))
 
     def row_owner(self, row: int) -> str:
         """Name of the joint that a constraint row belongs to."""

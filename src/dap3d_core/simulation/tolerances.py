@@ -55,7 +55,7 @@ def usual_atol(machine: Machine) -> float | dict[str, float]:
 
 def _time_of(machine: Machine) -> float:
     """A time of the scene as given, s, as a power of ten: 1 where nothing moves."""
-    model, size = machine.model, machine.model.extent
+    model, size = machine.model, machine.model.part_size
     _, _, v, w = split(model.u0, model.body_count)
     _, _, a, alpha = split(machine.rhs(0.0, model.u0), model.body_count)
     rates = [_largest(v) / size, _largest(w)]
@@ -151,4 +151,4 @@ def atol_notes(given: Any, used: float | Mapping[str, float], machine: Machine) 
     if machine.model.length == 1.0:
         return []
     words = words_of(used)
-    return [f"atol follows the size of the scene, {machine.model.extent:.2g} m: {words}"]
+    return [f"atol follows the size of the parts, {machine.model.part_size:.2g} m: {words}"]
