@@ -30,6 +30,7 @@ from dap3d_core.integrators.work import (
     RUNNING,
     SCRATCH,
     STATUS,
+    STEP,
     STEPS,
     TOLERANCES,
     Function,
@@ -49,8 +50,9 @@ ROUNDINGS = 6.0
 SAME = 0.5
 #: Rounding above this part of a tolerance counts.
 COUNTS = 0.1
-#: Steps after which it is measured again.
-EVERY = 8
+#: Steps after which it is measured again, and without a reason: control that has settled in the
+#: noise gives none.
+EVERY, PROBE = 8, 96
 
 
 def tolerance_of(size: int, atol: ArrayLike) -> Floats:
@@ -69,7 +71,10 @@ def watch_rounding(
     f: dy/dt at the state. rejected: how many steps had failed before that one.
     """
     real, integer = work.real, work.integer
-    if integer[ROUNDED] == 0 or integer[STATUS] != RUNNING or integer[FRESH] == 0:
+    due = integer[STEPS] % PROBE == 0 and real[STEP] == 0.0 and integer[REJECTED] == rejected
+    if not (integer[ROUNDED] != 0 or (due and integer[STEPS] != 0)):
+        return
+    if integer[STATUS] != RUNNING or integer[FRESH] == 0:
         return
     if integer[ROUNDED] == 2 and integer[REJECTED] == rejected and integer[STEPS] % EVERY != 0:
         return
