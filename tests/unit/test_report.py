@@ -331,11 +331,13 @@ def test_expected_numbers_confirm_the_reference_of_a_scene_that_is_as_read():
 @pytest.mark.parametrize("failing", ["progress", "interrupt"])
 def test_what_was_measured_is_kept_when_it_is_ended_early(failing):
     error = KeyboardInterrupt() if failing == "interrupt" else OSError("told to stop")
-    calls = []
+    calls, measured = [], set()
 
     def progress(done, total, words):
         calls.append((done, total))
-        if words.startswith("standard") and len(calls) > 12:
+        if words.startswith("standard"):
+            measured.add(words)
+        if len(measured) > 2:  # so two settings have come to their end, however slow the machine
             raise error
 
     with pytest.raises(type(error)) as caught:
