@@ -80,6 +80,27 @@ def test_lines_run_from_mass_centres_to_points():
     np.testing.assert_array_equal(sticks.limits, [[-1, 2], [-1, 1], [-1, 3]])
 
 
+def test_a_disk_is_a_circle_with_a_spoke():
+    """About the axis of the disk, where the body is; one with a shape is drawn by that alone."""
+    scene = Scene(name="disk")
+    scene.add_body("coin", r=[0.0, 0.0, 0.5], color="tab:green")
+    scene.add_body("other", r=[3.0, 0.0, 1.0])
+    scene.add_joint("disk", "rolls", body_i="coin", radius=0.5)
+    result = at_rest(scene)
+    sticks = sticks_of(result)
+    segments = sticks.positions(*pose_at(result, 0.0))[sticks.lines]
+    spoke, rim = segments[0], segments[1:]
+    np.testing.assert_allclose(spoke, [[0.0, 0.0, 0.5], [0.5, 0.0, 0.5]])
+    np.testing.assert_allclose(np.hypot(rim[..., 0], rim[..., 2] - 0.5), 0.5)
+    np.testing.assert_array_equal(rim[..., 1], 0.0)
+    edges = np.linalg.norm(rim[:, 1] - rim[:, 0], axis=1)
+    assert edges.sum() == pytest.approx(np.pi, rel=0.01)  # of a polygon of 32 sides
+    extent = sticks.extent(result, np.eye(3))
+    np.testing.assert_allclose(extent, [[-0.5, 3.0], [0.0, 0.0], [0.0, 1.0]], atol=1e-12)
+    scene.add_shape("sphere", "ball", body="coin", radius=0.5)
+    assert not len(sticks_of(at_rest(scene)).rims)
+
+
 def test_every_body_has_a_colour_and_a_marker_of_its_own():
     scene = Scene()
     for k in range(7):

@@ -114,3 +114,26 @@ def test_a_script_is_told_of_the_first_compilation_once(tmp_path, caplog):
     dap.compile(tmp_path, allow_code=True, announce=names.append)
     assert names
     assert len([r for r in caplog.records if r.name == "dap3d"]) == 1
+
+
+def test_a_sweep_is_a_line_at_a_prompt_and_tables_in_a_notebook(tmp_path):
+    """Also from a file, and what is selected of it; what is no sweep any more is xarray's."""
+    scene = dap.Scene(name=HOSTILE)
+    scene.add_body("a", r_dot=[1.0, 0.0, 0.0])
+    vary = {"bodies.a.mass": [1.0, 2.0], "simulation.rtol": [1e-6, 1e-7, 1e-8]}
+    sweep = dap.sweep(
+        scene, vary, outputs=["a.r.x", "a.r.x:series"], output=tmp_path / "a.nc", t_end=0.1, dt=0.1
+    )
+    assert repr(sweep).startswith("<Sweep '<img ")
+    words = "2 x 3 points (bodies.a.mass, simulation.rtol), 6 done; a.r.x, a.r.x:series>"
+    assert repr(sweep).endswith(words)
+    assert "\n" not in repr(sweep)
+    assert "\x1b" not in repr(sweep)
+    shown = Seen(sweep._repr_html_())
+    assert shown.tags <= TAGS
+    assert not shown.names
+    for text in ("bodies.a.mass", "kg", "1e-08", "a.r.x:series", "bodies.a.mass x simulation.rtol"):
+        assert text in shown.text
+    assert "1 x 3 points" in repr(sweep.isel({"bodies.a.mass": [0]}))
+    assert repr(sweep[["a.r.x"]]).startswith("<xarray")
+    assert "xr-" in sweep[["a.r.x"]]._repr_html_()

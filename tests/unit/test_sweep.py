@@ -425,6 +425,25 @@ def test_a_part_is_not_lost_by_beginning_anew(part, one_by_one):
             assert file.read_bytes() == content
 
 
+@pytest.mark.parametrize("options", [{}, {"force": True}, {"resume": True}])
+def test_a_sweep_that_goes_on_keeps_its_part(tmp_path, one_by_one, swept, options):
+    """Another one with its output is refused, whatever it asks for, and takes nothing away."""
+    path = tmp_path / "a.nc"
+    asked = dict(outputs=OUTPUTS, output=path, **TIMES)
+    refused = []
+
+    def progress(done, total):
+        if done == 2:
+            with pytest.raises(ResultError, match="another sweep is writing it now") as error:
+                dap.sweep(spring(), VARY, **asked, **options)
+            refused.append(error)
+
+    found = dap.sweep(spring(), VARY, progress=progress, **asked)
+    assert len(refused) == 1
+    assert found.identical(swept)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.nc"]
+
+
 def test_there_must_be_something_to_go_on_with(tmp_path):
     options = dict(outputs="block.r.x", resume=True, **TIMES)
     with pytest.raises(ResultError, match="without resume the sweep begins anew"):

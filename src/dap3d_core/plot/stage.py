@@ -104,7 +104,7 @@ class Stage:
         lines = sticks.lines
         order = np.argsort(depth[lines].mean(axis=1), kind="stable")
         self._sticks.set_segments(list(flat[lines[order]]))
-        self._sticks.set_color(self._colors[lines[order, 0]])
+        self._sticks.set_color(self._colors[sticks.body[lines[order, 0]] - 1])
         if sticks.shapes is not None:
             corners, colors = sticks.shapes.seen(r, p, self.camera)
             self._solids.set_verts(list(corners))

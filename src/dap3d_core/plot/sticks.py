@@ -27,6 +27,8 @@ SHADES = {
     "b": "#0072B2", "g": "#009E73", "r": "#D55E00", "c": "#56B4E9", "m": "#CC79A7",
     "y": "#E69F00", "k": "#000000",
 }  # fmt: skip
+#: Corners of the circle of a disk; its radius where a scene gives none, m, as its type has it.
+SIDES, RADIUS = 32, 1.0
 #: Numbers of coordinates that are computed at once.
 BLOCK = 1_000_000
 
@@ -42,6 +44,7 @@ class Sticks:
         points: places of the points that belong to bodies.
         anchors: places of points of the ground.
         springs, links: (q, 2) pairs of places: ends of force elements; points that joints couple.
+        rims: (q, 2) pairs of places: the circles of disks that roll, each with a spoke.
         shapes: of the scene, in place of the lines and markers of their bodies; None without.
         limits: (3, 2) of the axes as the scene gives them, m, or None.
     """
@@ -55,13 +58,15 @@ class Sticks:
     anchors: Integers
     springs: Integers
     links: Integers
+    rims: Integers
     shapes: "Shapes | None"
     limits: Floats | None
 
     @property
     def lines(self) -> Integers:
-        """(q, 2) pairs of places: from mass centres to the points of their bodies."""
-        return np.stack([self.body[self.points] - 1, self.points], axis=1)
+        """(q, 2) pairs of places: from mass centres to the points of their bodies; the rims."""
+        spokes = np.stack([self.body[self.points] - 1, self.points], axis=1)
+        return np.concatenate([spokes, self.rims])
 
     def positions(self, r: Floats, p: Floats) -> Floats:
         """Positions (..., k, 3), m, of all places at poses r (..., n, 3), p (..., n, 4)."""
@@ -120,7 +125,6 @@ def sticks_of(result: Result, model: str | os.PathLike[str] | None = None) -> St
             body.append(0)
             local.append(np.zeros(3))
     springs, links = (_places(pairs[kind], place) for kind in ("forces", "joints"))
-    found = np.array(body)
     pairs_of_bodies = [(body[a], body[b]) for a, b in links if body[a] and body[b]]
     colors = _colors(scene, subject.body_names, pairs_of_bodies)
     shapes = None
@@ -129,17 +133,23 @@ def sticks_of(result: Result, model: str | os.PathLike[str] | None = None) -> St
 
         shapes = shapes_of(scene, subject.body_names, [to_hex(color) for color in colors])
         colors = tuple(shapes.hues.get(k, color) for k, color in enumerate(colors, 1))
-    bare = np.isin(found, [] if shapes is None else [*shapes.hues], invert=True)
+    found, shaped = np.array(body), [] if shapes is None else [*shapes.hues]
+    bare = np.isin(found, shaped, invert=True)
+    wheels = [(k, R) for k, R in _wheels(scene, subject.body_names) if k not in shaped]
+    rims = [pair for n, (k, _) in enumerate(wheels) for pair in _rim(k, len(body) + n * SIDES)]
+    around = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
+    circle = np.stack([np.cos(around), 0.0 * around, np.sin(around)], axis=1)
     return Sticks(
         names=subject.body_names,
         colors=colors,
         markers=tuple(MARKERS[k % len(MARKERS)] for k in range(n)),
-        body=found,
-        local=np.array(local, dtype=float).reshape(-1, 3),
+        body=np.array([*body, *(k for k, _ in wheels for _ in circle)]),
+        local=np.vstack([np.reshape(local, (-1, 3)), *(R * circle for _, R in wheels)]),
         points=np.flatnonzero((found > 0) & (np.arange(len(found)) >= n) & bare),
         anchors=np.flatnonzero(found == 0),
         springs=springs,
         links=links,
+        rims=np.array(rims, dtype=np.int64).reshape(-1, 2),
         shapes=shapes,
         limits=_limits(scene.animation.limits),
     )
@@ -172,6 +182,22 @@ def _ends(scene: Scene, kind: str) -> Iterator[tuple[str, str]]:
         P_i, P_j = ends
         if isinstance(P_i, str) and isinstance(P_j, str):
             yield P_i, P_j
+
+
+def _wheels(scene: Scene, names: Sequence[str]) -> Iterator[tuple[int, float]]:
+    """Bodies that joints of the type ``disk`` roll, and their radii, m."""
+    for element in scene.joints.values():
+        body, radius = element.fields.get("body_i"), element.fields.get("radius", RADIUS)
+        is_size = isinstance(radius, int | float) and 0.0 < radius < np.inf
+        if element.type == "disk" and body in names and is_size:
+            yield names.index(body) + 1, float(radius)
+
+
+def _rim(body: int, first: int) -> Iterator[tuple[int, int]]:
+    """Pairs of places of a circle whose places begin at ``first``, with a spoke to its centre."""
+    yield body - 1, first
+    for k in range(SIDES):
+        yield first + k, first + (k + 1) % SIDES
 
 
 def _places(pairs: Sequence[tuple[str, str]], place: Mapping[str, int]) -> Integers:

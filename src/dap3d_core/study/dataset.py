@@ -191,7 +191,7 @@ class InMemory:
 
     def dataset(self) -> "xarray.Dataset":
         """What there is so far."""
-        import xarray
+        from dap3d_core.study.display import Sweep
 
         layout = self.layout
         shape, dimensions = layout.shape, layout.dimensions
@@ -199,7 +199,7 @@ class InMemory:
         variables["status"] = (dimensions, self._status.reshape(shape), ABOUT_STATUS)
         variables["note"] = (dimensions, self._notes.reshape(shape), ABOUT_NOTE)
         coordinates = {c.name: (c.dimensions, c.values, c.about) for c in layout.coordinates}
-        return xarray.Dataset(variables, coordinates, layout.attributes)
+        return Sweep(variables, coordinates, layout.attributes)
 
 
 def open_sweep(path: str | os.PathLike[str]) -> "xarray.Dataset":
@@ -238,6 +238,8 @@ def _opened(file: Path) -> "xarray.Dataset":
     """What a file holds."""
     import xarray
 
+    from dap3d_core.study.display import Sweep
+
     check_seal(file)
     with NETCDF:
         _check(file)
@@ -253,7 +255,9 @@ def _opened(file: Path) -> "xarray.Dataset":
                     found.load()
         except Exception as error:  # whatever a damaged file makes of it
             raise unreadable(file, error) from error
-    return found
+    sweep = Sweep(found.data_vars, found.coords, found.attrs)
+    sweep.set_close(found.close)
+    return sweep
 
 
 def is_sweep(path: str | os.PathLike[str]) -> bool:

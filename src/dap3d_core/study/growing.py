@@ -19,6 +19,7 @@ from dap3d_core.result.files import (
 from dap3d_core.result.netcdf import NETCDF, guarded
 from dap3d_core.result.reading import check_signature, unreadable
 from dap3d_core.result.seal import WHOLE, check_seal, write_seal
+from dap3d_core.study.claim import Claim
 from dap3d_core.study.dataset import Layout, check_format
 from dap3d_core.study.ensemble import Batch, PointStatus
 from dap3d_core.study.in_file import NOTE, boxes, cut, define
@@ -67,8 +68,8 @@ class Growing:
             resume: whether to go on with the part that is there.
 
         Raises:
-            ResultError: the file cannot be written; there is a part and ``resume`` is off; or it
-                is on, and there is none, or one of another sweep.
+            ResultError: the file cannot be written, or another sweep is writing it; there is a part
+                and ``resume`` is off; or it is on, and there is none, or one of another sweep.
         """
         self.layout, self._force = layout, force
         check_utf8("write", output)
@@ -77,12 +78,17 @@ class Growing:
         self._waiting: list[tuple[Integers, Batch]] = []
         self._is_empty = not resume
         self._written = time.monotonic()
-        with NETCDF:
-            if resume:
-                self._status = self._again()
-            else:
-                self._new()
-                self._status = np.zeros(layout.count, dtype=np.int8)
+        self._claim = Claim(self.target)
+        try:
+            with NETCDF:
+                if resume:
+                    self._status = self._again()
+                else:
+                    self._new()
+                    self._status = np.zeros(layout.count, dtype=np.int8)
+        except BaseException:
+            self._claim.release()
+            raise
 
     @property
     def todo(self) -> Integers:
@@ -109,10 +115,11 @@ class Growing:
         Raises:
             ResultError: it cannot be written; or another has the name by now and ``force`` is off.
         """
-        self.leave()
+        self._write(PATIENCE)
         # numbers stand between descriptions here, so the beginning is what a large one is known by
         guarded(self.part, lambda: write_seal(self.part, WHOLE, is_whole=True))
         put_in_place(self.part, self.target, self._force)
+        self._claim.release()
 
     def leave(self) -> None:
         """Write what is left; the part stays where it holds a point.
@@ -120,9 +127,12 @@ class Growing:
         Raises:
             ResultError: it cannot be written.
         """
-        self._write(PATIENCE)
-        if self._is_empty:
-            self.part.unlink(missing_ok=True)
+        try:
+            self._write(PATIENCE)
+            if self._is_empty:
+                self.part.unlink(missing_ok=True)
+        finally:
+            self._claim.release()
 
     def _write(self, patience: float) -> None:
         """Write what was kept, and wait until it is on the disk.

@@ -16,6 +16,7 @@ from dap3d_core.result import Result, ResultError, UnknownNameError, find
 from dap3d_core.result.layout import SWEEP
 from dap3d_core.scene import Mistake, SceneError, load, parse
 from dap3d_core.simulation import CompiledModel, SimulationError, simulate
+from dap3d_core.simulation.sources import digests_of
 from dap3d_core.study import REDUCTIONS, Number, PointStatus, numbers_named, with_values
 from dap3d_core.study.choosing import at_places, evenly
 from dap3d_core.view.camera import stage
@@ -94,6 +95,21 @@ def _names(data: "xarray.Dataset") -> tuple[str, ...]:
     return names
 
 
+def _check_types(data: "xarray.Dataset", compiled: CompiledModel) -> None:
+    """Refuse to run points again with other formulas than those of the outputs beside them."""
+    try:
+        known = dict(json.loads(data.attrs.get("types", "{}")))
+    except (TypeError, ValueError) as error:
+        raise ResultError(f"the sweep does not say which types it used: {error}") from error
+    here = digests_of(compiled.checked)
+    changed = [name for name, digest in known.items() if here.get(name) != digest]
+    if changed:
+        raise ResultError(
+            f"the formulas of {', '.join(changed)} have changed since the sweep: its points cannot "
+            "be run again with them. Bring back the files of these types, or run the sweep again"
+        )
+
+
 class Runs:
     """The scene of a sweep, whose points are run again.
 
@@ -114,6 +130,7 @@ class Runs:
 
         Raises:
             SceneError: the scene cannot be used, as where its types are not allowed.
+            ResultError: formulas of its types have changed since the sweep.
         """
         self.scene = parse(str(data.attrs.get("scene", "")))
         if model is not None:
@@ -126,6 +143,7 @@ class Runs:
             compiled = CompiledModel(self.scene, allow_code=allow_code, announce=announce)
         except SceneError as error:
             raise error if model is not None else SceneError(map(_own, error.mistakes)) from error
+        _check_types(data, compiled)
         self._registry, self._between = compiled.checked.registry, between
         self._numbers: tuple[Number, ...] = numbers_named(compiled.checked, names)
 
