@@ -104,6 +104,21 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     out[out.shape[0] - 1] = power
 
 
+@compiled_into
+def report_accelerations(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """As ``report``, of the accelerations in ``force`` and -lambda in ``x``.
+
+    Where a pivot is zero they are found anew; where they leave much of the rows, refined.
+    """
+    if not have_pivots(system.nodes, system.K):
+        regularised.accelerate(t, y, system, loops)
+        system.settings[SINGULAR] += 1.0
+    global_accelerations(system.metric, system.force, out)
+    report_multipliers(system, out)
+    refine(system, out)
+    report_levels(t, out, system, loops)
+
+
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Move a state onto its constraints; out as in ``project_onto``."""
@@ -114,10 +129,4 @@ def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> Non
 def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
     accelerate(t, y, system, loops)
-    if not have_pivots(system.nodes, system.K):
-        regularised.accelerate(t, y, system, loops)
-        system.settings[SINGULAR] += 1.0
-    global_accelerations(system.metric, system.force, out)
-    report_multipliers(system, out)
-    refine(system, out)
-    report_levels(t, out, system, loops)
+    report_accelerations(t, y, out, system, loops)

@@ -2,11 +2,9 @@
 
 from typing import Any
 
-from dap3d_core.assembly.evaluate import global_accelerations
-from dap3d_core.assembly.system import Floats, System
-from dap3d_core.formulations.constraints import report_levels, report_multipliers
+from dap3d_core.assembly.system import EVEN, Floats, System
 from dap3d_core.formulations.halves import RATES, accelerate, do_both, rates_of_part
-from dap3d_core.formulations.standard import project
+from dap3d_core.formulations.standard import project, report_accelerations, settle_rows
 from dap3d_core.kernels.cache import compiled
 from dap3d_core.linear.halving import TOP
 
@@ -15,6 +13,8 @@ from dap3d_core.linear.halving import TOP
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces and drivers last."""
     power = accelerate(t, y, out, system, loops)
+    if system.settings[EVEN] != 0.0:
+        power += settle_rows(system, out)
     rates_of_part(TOP, y, out, system)
     do_both(RATES, t, y, out, system, loops)
     out[out.shape[0] - 1] = power
@@ -24,9 +24,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
     accelerate(t, y, out, system, loops)
-    global_accelerations(system.metric, system.force, out)
-    report_multipliers(system, out)
-    report_levels(t, out, system, loops)
+    report_accelerations(t, y, out, system, loops)
 
 
 __all__ = ["project", "report", "rhs"]
