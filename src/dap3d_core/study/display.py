@@ -5,14 +5,14 @@ from html import escape
 from typing import Any
 
 import numpy as np
-import xarray
+import xarray  # noqa: TID253, this module is loaded where there is a data set
 
 from dap3d_core.result.layout import SWEEP
 from dap3d_core.scene.display import html_table
 from dap3d_core.study.ensemble import PointStatus
 
 
-class Sweep(xarray.Dataset):
+class Sweep(xarray.Dataset):  # type: ignore[no-untyped-call]
     """An ``xarray.Dataset`` that shows itself as one line, and in a notebook as two tables.
 
     Selections of it are of this class, too. What is no sweep any more, such as sums without
