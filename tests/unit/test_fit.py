@@ -381,7 +381,11 @@ def test_a_fit_is_drawn(tmp_path):
     points, curve = ax.lines
     assert points.get_ydata() == pytest.approx(data["mass.r.x"])
     every = (len(curve.get_xdata()) - 1) // (len(fit.result.t) - 1)  # smooth between instants
+    assert every > 1
     assert curve.get_xdata()[::every] == pytest.approx(fit.result.t)
+    # a cubic is off by h^4 / 384 of the fourth derivative, a straight line by h^2 / 8 of the second
+    between = swing(curve.get_xdata(), k=fit.values["forces.spring.k"])
+    assert curve.get_ydata() == pytest.approx(between, abs=1e-5)
     assert [a.get_ylabel() for a in ax.figure.axes][1] == "residual\n[m]"
     assert len(dap.plot(fit, "mass.rd.x").figure.axes) == 2
     pyplot.close("all")

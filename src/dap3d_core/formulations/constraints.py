@@ -8,6 +8,7 @@ As None it is known when the code is compiled, so that ``standard`` has no line 
 # What a compiled function returns is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+from collections.abc import Callable
 from typing import Any
 
 from dap3d_core.assembly.evaluate import (
@@ -34,6 +35,7 @@ from dap3d_core.assembly.system import (
     Floats,
     System,
 )
+from dap3d_core.formulations.friction import solve_rubbing
 from dap3d_core.formulations.moves import (
     change_velocity,
     move,
@@ -140,6 +142,26 @@ def power_of_drivers(system: System) -> float:
     for k in range(system.x.shape[0]):
         power -= system.x[k] * system.nu[k]
     return power
+
+
+@compiled_into
+def solve_equations(
+    t: float,
+    y: Floats,
+    system: System,
+    loops: Any,
+    part: float | None,
+    solve: Callable[[System], None],
+) -> float:
+    """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers.
+
+    solve: of a formulation, from the scaled forces in ``force``, with the factors of ``part``.
+    """
+    power = gather_forces(t, y, system, loops)
+    linearise(t, system, loops)
+    factorise(system, part)
+    power += solve_rubbing(t, system, loops, solve)
+    return power + power_of_drivers(system)
 
 
 @compiled_inside

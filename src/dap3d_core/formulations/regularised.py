@@ -7,15 +7,7 @@ from typing import Any
 
 from dap3d_core.assembly.evaluate import zero
 from dap3d_core.assembly.system import Floats, System
-from dap3d_core.formulations.constraints import (
-    PART,
-    factorise,
-    gather_forces,
-    linearise,
-    power_of_drivers,
-    solve_rows,
-)
-from dap3d_core.formulations.friction import solve_rubbing
+from dap3d_core.formulations.constraints import PART, solve_equations, solve_rows
 from dap3d_core.kernels.cache import compiled_inside
 
 #: How often the rows are solved.
@@ -25,11 +17,7 @@ SOLVES = 3
 @compiled_inside
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers."""
-    power = gather_forces(t, y, system, loops)
-    linearise(t, system, loops)
-    factorise(system, PART)
-    power += solve_rubbing(t, system, loops, solve)
-    return power + power_of_drivers(system)
+    return solve_equations(t, y, system, loops, PART, solve)
 
 
 @compiled_inside

@@ -19,16 +19,13 @@ from dap3d_core.formulations import regularised
 from dap3d_core.formulations.constraints import (
     acceleration_residual,
     correct,
-    factorise,
-    gather_forces,
-    linearise,
     power_of_drivers,
     project_onto,
     report_levels,
     report_multipliers,
+    solve_equations,
     solve_rows,
 )
-from dap3d_core.formulations.friction import solve_rubbing
 from dap3d_core.kernels.cache import compiled, compiled_into
 from dap3d_core.linear.blocks import have_pivots
 
@@ -42,16 +39,6 @@ def solve(system: System) -> None:
     for k in range(system.x.shape[0]):
         system.x[k] = system.gamma[k]
     solve_rows(system)
-
-
-@compiled_into
-def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
-    """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers."""
-    power = gather_forces(t, y, system, loops)
-    linearise(t, system, loops)
-    factorise(system, None)
-    power += solve_rubbing(t, system, loops, solve)
-    return power + power_of_drivers(system)
 
 
 @compiled_into
@@ -97,7 +84,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     Where masses differ much, a light body between heavy ones has reactions whose last digits are
     no rounding of its acceleration any more, but noise that no step can follow.
     """
-    power = accelerate(t, y, system, loops)
+    power = solve_equations(t, y, system, loops, None, solve)
     if system.settings[EVEN] != 0.0:
         power += settle_rows(system, out)
     rates(y, system.metric, system.force, out)
@@ -128,5 +115,5 @@ def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> Non
 @compiled
 def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
-    accelerate(t, y, system, loops)
+    solve_equations(t, y, system, loops, None, solve)
     report_accelerations(t, y, out, system, loops)
