@@ -299,7 +299,12 @@ def tool_velocity(t):
 
 
 @pytest.mark.parametrize(
-    ("integrator", "settings"), [("dop853", {}), ("radau", {}), ("rk4", {"step": 2e-4})]
+    ("integrator", "settings"),
+    [
+        ("dop853", {}),
+        pytest.param("radau", {}, marks=pytest.mark.slow),
+        pytest.param("rk4", {"step": 2e-4}, marks=pytest.mark.slow),
+    ],
 )
 def test_an_arm_whose_tool_vibrates_at_500_hz(integrator, settings):
     """All changes of sign are found: of a velocity of the tool, and of a clock, at long steps too.
