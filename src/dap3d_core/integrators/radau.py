@@ -23,6 +23,7 @@ from dap3d_core.integrators.control import (
     step_floor,
 )
 from dap3d_core.integrators.method import Integers
+from dap3d_core.integrators.radau_convergence import newton_limit
 from dap3d_core.integrators.radau_dense import prepare_dense
 from dap3d_core.integrators.radau_newton import MOST, SAME_STEP, predict
 from dap3d_core.integrators.radau_work import (
@@ -31,6 +32,7 @@ from dap3d_core.integrators.radau_work import (
     H_ACCEPTED,
     H_FACTORED,
     LAST_ITERATIONS,
+    OF_STATES,
     OLD,
     OLD_SLOPE,
     SLOPE,
@@ -41,6 +43,7 @@ from dap3d_core.integrators.radau_work import (
     RadauWork,
 )
 from dap3d_core.integrators.reporting import dense_state, may_step, project_state
+from dap3d_core.integrators.rounding import note_failure, watch_rounding
 from dap3d_core.integrators.runge_kutta import (
     ACROSS_A_SWITCH,
     ELSEWHERE,
@@ -58,7 +61,9 @@ from dap3d_core.integrators.work import (
     NOT_FINITE,
     OUTCOME,
     POOR,
+    REJECTED,
     RHS,
+    ROUNDED,
     RUNNING,
     SCRATCH,
     STATUS,
@@ -107,11 +112,13 @@ def advance(
     watch = functions[4] if integer[SWITCHES] != 0 else rhs
     limit = integer[RHS] + budget
     while may_step(work, dense_state, limit, project, report, system, loops):
-        steps = integer[STEPS]
+        steps, rejected, h = integer[STEPS], integer[REJECTED], real[H]
         if integer[FRESH] == 0:
             start(work, rhs, project, system, loops)
         else:
             step(work, parts, project, watch, system, loops, tangent, matrix)
+            if integer[ROUNDED] != 0:  # noise that is not looked for stalls the iteration first
+                watch_rounding(work, work.state[SLOPE], h, rejected, rhs, system, loops)
         if integer[WATCHED] != 0 and integer[STEPS] > steps:
             functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
 
@@ -194,6 +201,7 @@ def step(
         else:
             reject(real, integer, times, t1, h * RETREAT, failure)
     elif error <= LARGEST:
+        note_failure(real, integer, error, h, integer[LAST_REJECTED] != 0)
         factor = max(SHRINKAGE, safety(integer) / error**0.25)
         reject(real, integer, times, t1, h * factor, STEP_FLOOR)
         if integer[ACCEPTED] == 0:
@@ -250,6 +258,8 @@ def refuse(work: RadauWork, t1: float, h: float, shorter: float) -> None:
     if not shorter > 0.0:  # NaN
         reject(real, integer, work.times, t1, h * RETREAT, NOT_FINITE)
     elif real[STEP] == 0.0 or not stale:
+        if work.own[OF_STATES] > newton_limit(work):
+            note_failure(real, integer, work.own[OF_STATES], h, integer[LAST_REJECTED] != 0)
         reject(real, integer, work.times, t1, h * shorter, STEP_FLOOR)
 
 

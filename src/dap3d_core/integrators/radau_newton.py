@@ -31,6 +31,13 @@ from dap3d_core.formulations.stage import (
 )
 from dap3d_core.formulations.tangent import Tangent, differentiate
 from dap3d_core.integrators.combination import scaled_largest
+from dap3d_core.integrators.radau_convergence import (
+    SLOWEST,
+    converges,
+    is_settling,
+    is_stalled,
+    newton_limit,
+)
 from dap3d_core.integrators.radau_work import (
     ACCEPTED,
     FACCON,
@@ -40,6 +47,8 @@ from dap3d_core.integrators.radau_work import (
     ITERATIONS,
     JACOBIANS,
     LAST_ITERATIONS,
+    OF_MULTIPLIERS,
+    OF_STATES,
     PART,
     TANGENT_HERE,
     TANGENT_NEEDED,
@@ -47,7 +56,6 @@ from dap3d_core.integrators.radau_work import (
     RadauWork,
 )
 from dap3d_core.integrators.work import (
-    ABSOLUTE,
     ERROR_SIZE,
     LAST_REJECTED,
     RHS,
@@ -63,15 +71,13 @@ from dap3d_core.linear.lu import factor_lu, solve_lu
 ROUNDING = 2.220446049250313e-16
 #: Iterations at most; more where the step is fixed, for a shorter one is no choice there.
 MOST, MOST_FIXED = 10, 40
-#: An iteration that converges slower than this does not; with a fixed step, from this one on.
-SLOWEST, PATIENCE = 0.99, 5
+#: Slow iterations that a fixed step, or multipliers on their way, are left.
+PATIENCE = 5
 #: Factors that belong to a step this near the present one are used for it.
 SAME_STEP = 1e-3
 #: A step whose stages were not found is halved.
 UNFOUND = 0.5
 LARGEST = 1.7976931348623157e308
-#: A change of this many roundings is none; and the loosest limit, as part of the tolerance.
-ROUNDINGS, LOOSEST = 10.0, 0.1
 
 
 @compiled
@@ -259,41 +265,25 @@ def change_stages(h: float, work: RadauWork, system: System) -> float:
     Multipliers do not count where rows are regularised: those that depend on others have a part of
     rounding over what regularises them, new in each iteration, that moves nothing.
     """
-    real, y, worst = work.real, work.state[Y], 0.0
+    real, own, y = work.real, work.own, work.state[Y]
+    own[OF_STATES] = own[OF_MULTIPLIERS] = 0.0
     for i in range(3):
         size = scaled_largest(
             work.R[i], y, y, work.integer[ERROR_SIZE], real[RTOL], work.tolerance, h
         )
-        other = 0.0
-        if work.own[PART] == 0.0:
-            other = size_of_multipliers(h, work.G[i], work, system)
-        if not (size <= worst and other <= worst):
-            worst = max(size, other) if size == size and other == other else math.nan
+        other = size_of_multipliers(h, work.G[i], work, system)
+        if not size <= own[OF_STATES]:
+            own[OF_STATES] = size
+        if not other <= own[OF_MULTIPLIERS]:
+            own[OF_MULTIPLIERS] = other
         for k in range(y.shape[0]):
             work.Z[i, k] += work.R[i, k]
         for r in range(2):
             for k in range(work.G.shape[2]):
                 work.multipliers[i, r, k] += work.G[i, r, k]
-    return worst
-
-
-@compiled_inside
-def newton_limit(work: RadauWork) -> float:
-    """Norm of a change at which the iteration ends (HW IV.8), not below what rounding allows."""
-    y, rtol = work.state[Y], work.real[RTOL]
-    n = (y.shape[0] - 1) // 13
-    limit = min(0.03, math.sqrt(rtol))
-    first = 0
-    for count in (7 * n, 6 * n):
-        top = 0.0
-        low = atol = LARGEST
-        for k in range(first, first + count):
-            top, low = max(top, abs(y[k])), min(low, abs(y[k]))
-            atol = min(atol, work.tolerance[ABSOLUTE, k])
-        if count > 0:
-            limit = max(limit, ROUNDINGS * ROUNDING * top / (atol + rtol * low))
-        first += count
-    return min(limit, LOOSEST)
+    if own[PART] != 0.0 or own[OF_MULTIPLIERS] <= own[OF_STATES]:
+        return own[OF_STATES]
+    return own[OF_MULTIPLIERS]
 
 
 @compiled
@@ -315,7 +305,7 @@ def find_stages(
     own, integer = work.own, work.integer
     limit = newton_limit(work)
     own[FACCON] = max(own[FACCON], ROUNDING) ** 0.8
-    before = ratio_before = 1.0
+    before = ratio_before = states = multipliers = 1.0
     fixed = work.real[STEP] != 0.0
     most = MOST_FIXED if fixed else MOST
     for done in range(1, most + 1):
@@ -326,22 +316,30 @@ def find_stages(
         integer[LAST_ITERATIONS] = done
         if not change <= LARGEST:
             return math.nan
+        if change == 0.0:  # rounding alone, which tells nothing of the rate of convergence
+            return 0.0
         if done > 1:
             ratio = change / before
-            own[THETA] = ratio if done == 2 else math.sqrt(ratio * ratio_before)
+            theta = ratio if done == 2 else math.sqrt(ratio * ratio_before)
             ratio_before = ratio
-            if own[THETA] >= SLOWEST:
+            slow = not converges(theta, change, limit, most - 1 - done)
+            if slow and is_stalled(states, multipliers, limit, work):
+                return 0.0
+            own[THETA] = theta
+            patient = fixed or (slow and is_settling(multipliers, work))
+            if theta >= SLOWEST:
                 if change <= limit:
                     return 0.0
-                if done > PATIENCE or not fixed:
+                if done > PATIENCE or not patient:
                     return UNFOUND
                 own[THETA] = SLOWEST
             own[FACCON] = own[THETA] / (1.0 - own[THETA])
             left = own[FACCON] * change * own[THETA] ** (most - 1 - done) / limit
-            if done < most and left >= 1.0 and not fixed:
+            if done < most and left >= 1.0 and not patient:
                 excess = max(1e-4, min(20.0, left))
                 return 0.8 * excess ** (-1.0 / (3.0 + most - done))
         before = max(change, ROUNDING)
+        states, multipliers = own[OF_STATES], own[OF_MULTIPLIERS]
         if own[FACCON] * change <= limit:
             return 0.0
     return UNFOUND

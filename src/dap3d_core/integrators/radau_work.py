@@ -13,8 +13,10 @@ from dap3d_core.kernels.by_address import INTEGERS as INTEGER_VECTOR
 
 # Places in ``own``. FACCON and THETA: as in HW II, IV.8, (8.10); length of the last accepted step,
 # and of the one the factors belong to; error of the last accepted step; what regularises the rows
-# (0: nothing).
-FACCON, THETA, H_ACCEPTED, H_FACTORED, ERROR_ACCEPTED, PART, OWN = range(7)
+# (0: nothing); norms of the last change of the stages and of their multipliers.
+(
+    FACCON, THETA, H_ACCEPTED, H_FACTORED, ERROR_ACCEPTED, PART, OF_STATES, OF_MULTIPLIERS, OWN
+) = range(9)  # fmt: skip
 # Places in ``integer`` behind those of work.py. TANGENT_NEEDED: before the next step; TANGENT_HERE:
 # the tangent is that of the present state; ACCEPTED: there is a step before; what follows counts.
 (

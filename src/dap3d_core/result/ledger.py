@@ -25,8 +25,10 @@ ROUNDING = 1e-12
 #: Residual, relative to 1 + largest magnitude, up to which a projection counts as converged
 #: (formulations/standard.py: 1e3 times its tolerance 1e-13).
 PROJECTED = 1e-10
-#: Relative residual of solved equations of motion. Rounding and the condition of the system.
+#: Relative residual of solved equations of motion, whose condition is ordinary.
 SOLVED = 1e-9
+#: Roundings in the reactions of a solution, as a part of them: its backward error.
+BACKWARD = 10.0 * float(np.finfo(float).eps)
 #: Deviation of normalised Euler parameters from unit length.
 UNIT_LENGTH = 1e-12
 
@@ -179,12 +181,13 @@ def _constraints(subject: Subject, course: Course, record: Record) -> dict[str, 
     """Largest residuals of the constraints at the three levels.
 
     Position and velocity: with projection as far as a projection may leave them, else what errors
-    of steps come to. Acceleration: the equations solved for it, at any tolerance.
+    of steps come to. Acceleration: the equations solved for it, at any tolerance, and what rounding
+    of the reactions makes of it.
     """
     sizes = [record.length + size for size in course.sizes]
     limits: list[float | None] = [
         *(_state_limit(record, size, q) for size, q in zip(sizes[:2], "rv", strict=True)),
-        SOLVED * sizes[2],
+        SOLVED * sizes[2] + _rounding_of_accelerations(subject, course, record.length),
     ]
     if record.method == "penalty":
         limits[2] = None  # its springs give way, by lambda / alpha
@@ -199,6 +202,23 @@ def _constraints(subject: Subject, course: Course, record: Record) -> dict[str, 
             text = "no constraints"
         found[name] = _entry(worst, limit, "SI", text)
     return found
+
+
+def _rounding_of_accelerations(subject: Subject, course: Course, length: float) -> float:
+    """What rounding of the reactions leaves of D v_dot - gamma, m/s^2.
+
+    The factors L D L^T of the matrix K of the equations of motion give a solution x of an equation
+    that is off by a few roundings: |K x - b| <= c eps |K| |x| (Higham, Accuracy and Stability of
+    Numerical Algorithms, chapters 10 and 11). |K| |x| has the reactions |D^T lambda| in the rows of
+    the bodies; an error of c eps of them is one of c eps |D^T lambda| / m in accelerations, which
+    may be small differences of large reactions. An error of lambda itself of 1e-6 is 1e8 of that.
+
+    A moment turns the lightest body about its second smallest principal axis: the joints of a thin
+    rod have no lever about the first.
+    """
+    second = np.linalg.eigvalsh(subject.Jp)[:, 1] / length**2
+    lightest = float(np.min(np.minimum(subject.mass, second), initial=np.inf))
+    return BACKWARD * _largest(course.reaction) / lightest
 
 
 def _state_limit(record: Record, size: float, quantity: str) -> float:

@@ -36,6 +36,8 @@ NEAR = 0.05
 APART = 1e-6
 #: The implicit integrator takes over again behind this many times the way to the pose.
 BEHIND = 3.0
+#: A length that goes to zero with a higher power of the time left than this is not near zero.
+HIGHEST = 6.0
 #: How an integration ends that does not get through a singular pose.
 FAILURES = (Status.STEP_FLOOR, Status.NOT_FINITE, Status.PROJECTION_FAILED)
 
@@ -104,6 +106,8 @@ def _aim_across(run: "Run", left: float) -> None:
 def lengths_at(machine: Machine, t: float, y: Floats, span: float) -> Floats:
     """(2, m) lengths that projection gives, and their rates, as crossing.py has them.
 
+    A length that goes to zero with a power of the time left is given the mean rate until then.
+
     Args:
         machine: the model.
         t, y: where the motion stands, on the constraints.
@@ -111,8 +115,19 @@ def lengths_at(machine: Machine, t: float, y: Floats, span: float) -> Floats:
     """
     slope, h = np.zeros_like(y), APART * span
     machine.functions[RHS](t, y, slope, machine.system, machine.loops)
-    now, before = _lengths(machine, t, y), _lengths(machine, t - h, y - h * slope)
-    return np.array([now, (now - before) / h])
+    now, before, earlier = (_lengths(machine, t - k * h, y - k * h * slope) for k in range(3))
+    rate = (now - before) / h
+    return np.array([now, rate / _orders(now, rate, (now - 2.0 * before + earlier) / h**2)])
+
+
+@np.errstate(all="ignore")
+def _orders(now: Floats, rate: Floats, bend: Floats) -> Floats:
+    """(m,) powers of the time left with which lengths that fall go to zero: 1, or more.
+
+    As many as the freedoms that a pose opens at once, for c d^k: 1 - now bend / rate^2 = 1 / k.
+    """
+    orders = np.rint(1.0 / (1.0 - now * bend / rate**2))
+    return np.where((rate < 0.0) & (orders > 1.0) & (orders <= HIGHEST), orders, 1.0)
 
 
 def time_left(lengths: Floats, span: float) -> float:

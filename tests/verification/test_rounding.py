@@ -1,0 +1,108 @@
+"""What double precision leaves open: runs go on at rounding, and the ledger knows its size."""
+
+import sys
+
+import attrs
+import numpy as np
+import pytest
+from support import redundant, singular
+from support.process import REPOSITORY
+from support.stewart import stewart
+
+import dap3d_core as dap
+from dap3d_core.result.ledger import ledger_of
+
+sys.path.append(str(REPOSITORY / "benchmarks"))
+
+from hard import scenes
+from hard.scales import SCALES
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    """1e8 N on a platform of 1 g: reactions of 2e9 N, accelerations of 3 m/s^2."""
+    return dap.simulate(stewart(1e-3, 1.0, 1e8), t_end=0.1, dt=0.02, method="lsq")
+
+
+def test_rounding_of_large_reactions_is_no_wrong_acceleration(pressed):
+    """1e9 N known to 16 digits move 1 g by 1e-4 m/s^2. All motion is prescribed: accelerations are
+    those under no load, which standard solves for to 1e-15."""
+    entry = pressed.ledger["acceleration"]
+    assert entry.ok, entry
+    free = dap.simulate(stewart(1e-3, 1.0, 0.0), t_end=0.1, dt=0.02, method="standard")
+    np.testing.assert_allclose(pressed.v_dot[:, :6], free.v_dot[:, :6], atol=1e-4)
+
+
+@pytest.mark.parametrize("row", [0, 40, 71])
+def test_a_multiplier_that_is_off_by_a_millionth_is_found(pressed, row):
+    """Accelerations change by M^-1 D^T of the change; the ledger is given the residual of that."""
+    subject, k = pressed.subject, 2
+    D, change = pressed.Jac[k], np.zeros(subject.row_count)
+    change[row] = 1e-6 * np.abs(pressed.arrays.Lam[k]).max()
+    force = D.T @ change
+    moved = np.zeros_like(force)
+    for b, mass in enumerate(subject.mass):
+        A = _matrix(pressed.p[k, b])
+        moved[6 * b : 6 * b + 3] = force[6 * b : 6 * b + 3] / mass
+        moved[6 * b + 3 : 6 * b + 6] = np.linalg.solve(
+            A @ subject.Jp[b] @ A.T, force[6 * b + 3 : 6 * b + 6]
+        )
+    residual = np.array(pressed.arrays.acceleration_residual)
+    residual[k] = np.abs(D @ moved).max()
+    arrays = attrs.evolve(pressed.arrays, acceleration_residual=residual)
+    assert ledger_of(subject, arrays, pressed.record)["acceleration"].ok is False
+
+
+def _matrix(p):
+    e0, e = p[0], p[1:]
+    cross = np.array([[0.0, -e[2], e[1]], [e[2], 0.0, -e[0]], [-e[1], e[0], 0.0]])
+    return (2 * e0**2 - 1) * np.eye(3) + 2 * (np.outer(e, e) + e0 * cross)
+
+
+def test_lsq_solves_for_a_light_platform_on_heavy_legs():
+    """Legs of 10 t move 1 g: three passes leave 1e-2 of the accelerations, which are prescribed."""
+    heavy, light = (
+        dap.simulate(stewart(1e-3, leg, 0.0), t_end=0.1, dt=0.02, method=method)
+        for leg, method in ((1e4, "lsq"), (1.0, "standard"))
+    )
+    np.testing.assert_allclose(heavy.v_dot, light.v_dot, rtol=1e-6, atol=1e-6)
+    assert heavy.ledger["acceleration"].ok
+
+
+@pytest.mark.parametrize("rtol", [1e-9, 1e-10])
+def test_radau_leaves_a_pose_that_is_singular_in_two_ways(rtol):
+    """Pivots go to zero as the square of the way, and the iteration stalls at rounding behind."""
+    result = dap.simulate(
+        singular.dead_centre(), t_end=2.0, dt=0.02, integrator="radau", rtol=rtol, atol=rtol / 100
+    )
+    t = result.t
+    x = 3.0 - (1.0 - t) ** 2 / 2.0
+    cosine = np.minimum((x * x - 3.0) / (2.0 * x), 1.0)
+    away = np.abs(t - 1.0) > 0.01
+    assert 2.0 * result.r[away, 0, 0] == pytest.approx(cosine[away], abs=1e-9)
+
+
+def test_radau_is_not_held_up_by_multipliers_that_have_yet_to_settle():
+    """Behind a crossing those of redundant rows change by much, the motion hardly: with the norm of
+    states alone steps were halved until 3000 were taken where 200 do at ten times the tolerance."""
+    wide, close = (
+        dap.simulate(redundant.four_bars(1), t_end=5.0, dt=0.1, integrator="radau", rtol=rtol,
+                     atol=rtol / 100)
+        for rtol in (1e-8, 1e-9)
+    )  # fmt: skip
+    assert close.stats.steps < 2.5 * wide.stats.steps
+    np.testing.assert_allclose(close.r, wide.r, atol=1e-5)
+
+
+@pytest.mark.parametrize("ratio", [1e6, 1e9])
+def test_radau_takes_multipliers_as_known_to_their_last_digits(ratio):
+    """Steps of a heavy bob on a rod of 1 kg are those of a light one, whatever rounding its 1e10 N
+    have; the motion is the closed pendulum's."""
+    heavy, light = (
+        dap.simulate(scenes.heavy_bob(r), t_end=5.0, dt=0.05, integrator="radau")
+        for r in (ratio, 1e2)
+    )
+    assert heavy.stats.steps < 2.5 * light.stats.steps
+    if ratio == 1e9:
+        case = next(case for case in SCALES if case.name == "heavy on light")
+        assert case.error(heavy) < 1e-5
