@@ -117,7 +117,7 @@ def advance(
             start(work, rhs, project, system, loops)
         else:
             step(work, parts, project, watch, system, loops, tangent, matrix)
-            if integer[ROUNDED] != 0:  # noise that is not looked for stalls the iteration first
+            if integer[ROUNDED] != 0:  # a step that rounding failed
                 watch_rounding(work, work.state[SLOPE], h, rejected, rhs, system, loops)
         if integer[WATCHED] != 0 and integer[STEPS] > steps:
             functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
@@ -206,8 +206,7 @@ def step(
         reject(real, integer, times, t1, h * factor, STEP_FLOOR)
         if integer[ACCEPTED] == 0:
             real[H] = min(real[H], 0.1 * h)
-        if integer[TANGENT_HERE] == 0:
-            integer[TANGENT_NEEDED] = 1
+        integer[TANGENT_NEEDED] = max(integer[TANGENT_NEEDED], 1 - integer[TANGENT_HERE])
     else:
         reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)
 
