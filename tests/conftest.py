@@ -1,6 +1,11 @@
 """What all tests rely on."""
 
+import os
 import signal
+
+# Tests fill all cores by themselves, and their matrices are small: threads of BLAS would only wait,
+# each at the cost of a core. Set before numpy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # A shell that puts a command into the background lets it ignore Ctrl-C, and so its children.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -1,7 +1,7 @@
 """Studies on a cluster: a real scheduler and real workers, processes of their own."""
 
 import gc
-import importlib
+import importlib.util
 import json
 import os
 import signal
@@ -23,9 +23,11 @@ from dap3d_core.study.cluster import ClusterError, connect, run_on
 from dap3d_core.study.environment import differences, environment_of, with_whole_path
 from dap3d_core.study.local import run_here
 
-distributed = pytest.importorskip("distributed", reason="the extra cluster is not installed")
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.skipif(
+        importlib.util.find_spec("distributed") is None, reason="the extra cluster is not installed"
+    ),
     # of distributed itself: sockets and loops of clusters that are closed
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
@@ -36,6 +38,8 @@ PLACES = np.arange(COUNT)
 
 @contextmanager
 def two_workers():
+    import distributed  # takes a second, which those who run the quick tests need not wait
+
     with (
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
@@ -448,10 +452,12 @@ def another_worker_of(address):
 
 def test_a_client_that_is_closed_meanwhile(client):
     """Nothing can be asked of it, nor be told to it; so is one that was closed before."""
+    from distributed import as_completed
+
     with connect(client.scheduler.address) as mine:
         found = run_on(mine, bob(), POINTS, np.arange(200), chunk=1)
         next(found)
-        watch, silent = cluster._Watch(mine), distributed.as_completed(loop=mine.loop)
+        watch, silent = cluster._Watch(mine), as_completed(loop=mine.loop)
         mine.close()
         with pytest.raises(ClusterError, match=r"the scheduler at .* is gone"):
             collected(found)

@@ -1,5 +1,7 @@
 """Whole runs: plain Python, code made quickly, well, and without FMA have the same bits."""
 
+import json
+
 import pytest
 from support.process import run
 
@@ -7,19 +9,22 @@ from dap3d_core.kernels.cache import jit_is_on
 
 pytestmark = [pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled"), pytest.mark.slow]
 
-#: Says what a run gave. {level}: -1 changes nothing, else the level at which all code is made.
+#: Says what runs gave. {level}: -1 changes nothing, else the level at which all code is made.
 SCRIPT = """
 import hashlib
+import json
 import numpy as np
 import dap3d_core as dap
 from dap3d_core.kernels.compiler import units
 if {level} >= 0:
     units.later.add = lambda unit: None
     units.QUICK = {level}
-result = dap.simulate({model!r}, **{settings!r})
-arrays = result.t, result.u, result.Lam, result.rdd, result.wd
-print(hashlib.sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays)).hexdigest(),
-      result.stats.rhs)
+for model, settings in {cases!r}:
+    result = dap.simulate(model, **settings)
+    energy = result.energy.total
+    arrays = result.t, result.u, result.v_dot, result.Lam, result.rdd, result.wd, energy
+    digest = hashlib.sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays))
+    print(json.dumps([model, settings, digest.hexdigest(), result.stats.rhs]))
 """
 SHORT = {"t_end": 0.03, "dt": 0.01}
 CASES = [
@@ -38,13 +43,22 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("model", "settings"), CASES, ids=lambda x: str(x))
-def test_a_run_has_the_same_bits_however_it_is_compiled(model, settings, tmp_path):
-    def said(level=-1, **environment):
-        script = SCRIPT.format(level=level, model=model, settings=settings)
-        return run(script, tmp_path / f"cache{level}{len(environment)}", **environment)
+def said(cache, level=-1, **environment):
+    """What one process says of all cases; code that several of them need is made once."""
+    script = SCRIPT.format(level=level, cases=CASES)
+    return [json.loads(line) for line in run(script, cache, **environment).splitlines()]
 
-    plain = said(DAP3D_PLAIN=1)
-    assert said(0) == plain
-    assert said(3) == plain
-    assert said(3, DAP3D_CPU="x86-64") == plain
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """What plain Python gives."""
+    found = said(tmp_path_factory.mktemp("cache"), DAP3D_PLAIN=1)
+    assert [(model, settings) for model, settings, *_ in found] == CASES
+    return found
+
+
+@pytest.mark.parametrize(
+    ("level", "environment"), [(0, {}), (3, {}), (3, {"DAP3D_CPU": "x86-64"})], ids=str
+)
+def test_runs_have_the_same_bits_however_they_are_compiled(tmp_path, plain, level, environment):
+    assert said(tmp_path, level, **environment) == plain
