@@ -47,37 +47,56 @@ class CommandLine:
             text=True,
         )
 
-    def __call__(self, *arguments, **variables):
-        """Run a command to its end; never with a traceback."""
+    def process(self, *arguments, **variables):
+        """Run a command to its end, in a process of its own; never with a traceback."""
         process = self.start(*arguments, **variables)
         out, err = process.communicate(timeout=300)
         assert "Traceback" not in err, err
         return subprocess.CompletedProcess(arguments, process.returncode, out, err)
 
 
+class InThisProcess(CommandLine):
+    """Runs ``dap3d`` as a call of its main function: a process takes most of its time to begin."""
+
+    def __init__(self, folder, capfd):
+        super().__init__(folder)
+        self.capfd = capfd
+
+    def __call__(self, *arguments, **variables):
+        """Run a command to its end; never with a traceback."""
+        from dap3d_core.cli import main
+
+        self.capfd.readouterr()
+        with pytest.MonkeyPatch.context() as here:
+            here.chdir(self.folder)
+            given = environment(**variables)
+            for name in os.environ.keys() - given.keys():
+                here.delenv(name)
+            for name, value in given.items():
+                here.setenv(name, value)
+            code = main([str(a) for a in arguments])
+        out, err = self.capfd.readouterr()
+        assert "Traceback" not in err, err
+        return subprocess.CompletedProcess(arguments, code, out, err)
+
+
 @pytest.fixture
-def dap3d(tmp_path):
+def dap3d(tmp_path, capfd):
     """The command line in a folder of its own, ``dap3d.folder``."""
-    return CommandLine(tmp_path)
+    return InThisProcess(tmp_path, capfd)
 
 
 @pytest.fixture
-def refuse(dap3d, monkeypatch, capfd):
-    """Run a command in this process, which is quicker, and see it refused; what it says."""
-    from dap3d_core.cli import main
-
-    monkeypatch.chdir(dap3d.folder)
-    monkeypatch.delenv("COLUMNS", raising=False)
+def refuse(dap3d):
+    """Run a command and see it refused; what it says."""
 
     def call(*arguments):
-        code = main([str(a) for a in arguments])
-        out, err = capfd.readouterr()
-        assert code == 2, (arguments, out, err)
-        assert err
-        assert "Traceback" not in err
-        assert not err.startswith("unexpected")
-        assert out == ""
-        return err
+        done = dap3d(*arguments)
+        assert done.returncode == 2, done
+        assert done.stderr
+        assert not done.stderr.startswith("unexpected")
+        assert done.stdout == ""
+        return done.stderr
 
     return call
 

@@ -85,8 +85,8 @@ CASES = {
     "events": (stone, {"t_end": 2.0, "dt": 0.05, "events": stiffer}, 0.35),
 }
 SLOW_IN_PYTHON = (
-    "radau", "stiff", "penalty", "lsq", "a singular pose", "adams", "no projection",
-    "radau across singular poses", "within a crossing of radau",
+    "dopri5", "rk4", "radau", "stiff", "penalty", "lsq", "a singular pose", "adams",
+    "no projection", "radau across singular poses", "within a crossing of radau",
 )  # fmt: skip
 
 

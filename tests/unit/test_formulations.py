@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import mechanisms, problems, redundant
 from support.own_types import registry_of
-from support.plain import in_another_process
+from support.plain import in_another_process, long_in_plain_python
 from support.process import run
 
 import dap3d_core as dap
@@ -164,6 +164,7 @@ class Sized(Joint):
         return (*scale(size, points), size * n, size * m)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("size", [1e6, 1e-6])
 def test_the_motion_does_not_depend_on_the_size_of_rows(size):
     """lsq, a door on two hinges of which one has its rows multiplied: the same swing after 2 s, to

@@ -308,7 +308,7 @@ def test_a_run_that_takes_too_long_is_ended_and_finer_ones_are_left_out(monkeypa
 
 
 def test_redundant_scenes_refuse_the_standard_method_and_go_on():
-    found = dap.report("A04", quick=True, t_end=0.05, dt=0.05, integrators=["dop853"])
+    found = dap.report("A04", quick=True, t_end=0.02, dt=0.02, integrators=["dop853"])
     assert [each.method for each in found.refused] == ["unconstrained", "standard"]
     assert "redundant" in found.refused[1].reason
     assert {r.method for r in found.runs} == {"penalty", "lsq"}

@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 from support import problems
+from support.plain import long_in_plain_python
 from support.process import start
 
 import dap3d_core as dap
@@ -19,7 +20,7 @@ SHORT = {"t_end": 0.6, "dt": 0.02}
     "settings",
     [
         {},
-        {"method": "lsq", "rtol": 1e-6},
+        pytest.param({"method": "lsq", "rtol": 1e-6}, marks=long_in_plain_python),
         {"integrator": "rk4", "step": 0.01, "project": False},
         {"integrator": "adams", "correct_metric": "mass"},
         {"correct": False, "t_end": 0.1, "dt": None},
