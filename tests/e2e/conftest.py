@@ -1,4 +1,4 @@
-"""The command line as a user has it: processes of their own, in a folder of their own.
+"""The command line as a user has it, in a folder of its own.
 
 The user's cache of compiled code is used, but where a test is about it.
 """
@@ -30,13 +30,13 @@ def environment(**variables):
 
 
 class CommandLine:
-    """Runs ``dap3d`` in a folder."""
+    """Runs ``dap3d`` in a folder, without a traceback."""
 
-    def __init__(self, folder):
-        self.folder = folder
+    def __init__(self, folder, capfd):
+        self.folder, self.capfd = folder, capfd
 
     def start(self, *arguments, **variables):
-        """Start a command and return its process."""
+        """Start a command as a process of its own, where that is the subject."""
         return subprocess.Popen(
             [*COMMAND, *map(str, arguments)],
             cwd=self.folder,
@@ -47,23 +47,8 @@ class CommandLine:
             text=True,
         )
 
-    def process(self, *arguments, **variables):
-        """Run a command to its end, in a process of its own; never with a traceback."""
-        process = self.start(*arguments, **variables)
-        out, err = process.communicate(timeout=300)
-        assert "Traceback" not in err, err
-        return subprocess.CompletedProcess(arguments, process.returncode, out, err)
-
-
-class InThisProcess(CommandLine):
-    """Runs ``dap3d`` as a call of its main function: a process takes most of its time to begin."""
-
-    def __init__(self, folder, capfd):
-        super().__init__(folder)
-        self.capfd = capfd
-
     def __call__(self, *arguments, **variables):
-        """Run a command to its end; never with a traceback."""
+        """Run a command to its end, here: a process takes most of its time to begin."""
         from dap3d_core.cli import main
 
         self.capfd.readouterr()
@@ -83,7 +68,7 @@ class InThisProcess(CommandLine):
 @pytest.fixture
 def dap3d(tmp_path, capfd):
     """The command line in a folder of its own, ``dap3d.folder``."""
-    return InThisProcess(tmp_path, capfd)
+    return CommandLine(tmp_path, capfd)
 
 
 @pytest.fixture
