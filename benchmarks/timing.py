@@ -3,7 +3,7 @@
 import statistics
 import time
 
-from dap3d_core.kernels.compiler.units import later
+from dap3d_core.kernels.compiler.background import optimiser
 
 
 def median_seconds(functions, repeats=7):
@@ -25,6 +25,6 @@ def median_seconds(functions, repeats=7):
 
 def wait_for_good_code():
     """Wait until what was compiled quickly has been compiled well."""
-    while later.units:
+    while optimiser.units:
         time.sleep(0.05)
-        later.look(0.0)
+        optimiser.poll(0.0)

@@ -140,9 +140,9 @@ def nothing_of_the_working_tree_is_reached(outside):
 #: Runs the pendulum and prints its last state, and how many functions were compiled on the way.
 PENDULUM = """
 import dap3d_core as dap
-from dap3d_core.kernels.compiler.units import made
+from dap3d_core.kernels.compiler.units import compiled_units
 result = dap.simulate(dap.load("pen1"), t_end=0.1, dt=0.1)
-print(" ".join(x.hex() for x in result.u[-1].tolist()), len(made))
+print(" ".join(x.hex() for x in result.u[-1].tolist()), len(compiled_units))
 """
 
 

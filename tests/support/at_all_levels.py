@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from dap3d_core.kernels.compiler.functions import Program
-from dap3d_core.kernels.compiler.objects import GOOD, QUICK, load, object_of, processor
+from dap3d_core.kernels.compiler.objects import OPTIMISED, UNOPTIMISED, compile_ir, load, processor
 from dap3d_core.kernels.compiler.units import Entry
 
 _count = count()
@@ -17,9 +17,9 @@ _count = count()
 def targets():
     """Level and processor of each kind of code, by its name."""
     plain = processor()._replace(name="x86-64", features="")
-    found = {"O0": (QUICK, None), "O3": (GOOD, None)}
+    found = {"O0": (UNOPTIMISED, None), "O3": (OPTIMISED, None)}
     if processor().triple.startswith("x86_64"):
-        found["O3 without FMA"] = (GOOD, plain)
+        found["O3 without FMA"] = (OPTIMISED, plain)
     return found
 
 
@@ -27,7 +27,7 @@ def made_of(text, symbol, signature):
     """A function of a module of LLVM IR at all levels, by the level's name."""
     found = {}
     for name, (level, target) in targets().items():
-        unit = SimpleNamespace(addresses=load(object_of(text, level, target), [symbol]))
+        unit = SimpleNamespace(addresses=load(compile_ir(text, level, target), [symbol]))
         found[name] = Entry(unit, 0, signature)
     return found
 

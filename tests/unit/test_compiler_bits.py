@@ -15,10 +15,10 @@ import hashlib
 import json
 import numpy as np
 import dap3d_core as dap
-from dap3d_core.kernels.compiler import units
+from dap3d_core.kernels.compiler import background, objects
 if {level} >= 0:
-    units.later.add = lambda unit: None
-    units.QUICK = {level}
+    background.optimiser.add = lambda unit: None
+    objects.UNOPTIMISED = {level}
 for model, settings in {cases!r}:
     result = dap.simulate(model, **settings)
     energy = result.energy.total

@@ -9,7 +9,7 @@ import pytest
 from support.process import run, start
 
 from dap3d_core.kernels.cache import jit_is_on
-from dap3d_core.kernels.compiler import objects, units
+from dap3d_core.kernels.compiler import background, objects, units
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.types import FLOAT, Array, Signature
 from dap3d_core.kernels.compiler.units import Entry, Functions, Unit
@@ -24,10 +24,10 @@ def doubled(x, out):
 SIGNATURE = Signature((FLOAT, Array(FLOAT, 1)))
 
 
-def write(symbol="doubled_0"):
+def write(symbols):
     """As ``Unit`` asks for it."""
     program = Program()
-    program.export(doubled, SIGNATURE.arguments, symbol)
+    program.export(doubled, SIGNATURE.arguments, *symbols)
     return program.module(), ["None"]
 
 
@@ -43,25 +43,25 @@ def answer(entry):
 
 @pytest.fixture
 def alone(monkeypatch):
-    """One core: nothing is made beside."""
-    monkeypatch.setattr(units, "_cores", lambda: 1)
-    monkeypatch.setattr(units, "later", units._Later())
+    """One core: nothing is compiled in the background."""
+    monkeypatch.setattr(background, "core_count", lambda: 1)
+    monkeypatch.setattr(background, "optimiser", background.Optimiser())
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed", "empty", "head", "text"])
 def test_a_damaged_object_is_made_anew_and_noted(tmp_path, alone, damage):
-    entry_of(tmp_path, at_once=True)
+    entry_of(tmp_path, optimise=True)
     path = tmp_path / "doubled.o"
     data = path.read_bytes()
     path.write_bytes({"cut": data[:-7], "changed": data[:-7] + b"damaged", "empty": b"",
                       "head": b"x" + data[1:], "text": b"[]\n"}[damage])  # fmt: skip
-    units.made.clear()
+    units.compiled_units.clear()
     with pytest.warns(RuntimeWarning, match=r"damaged and is made anew: .*doubled\.o"):
-        assert answer(entry_of(tmp_path, at_once=True)) == 42.0
-    assert units.made == ["doubled"]
+        assert answer(entry_of(tmp_path, optimise=True)) == 42.0
+    assert units.compiled_units == ["doubled"]
     assert path.read_bytes() == data
     assert answer(entry_of(tmp_path)) == 42.0
-    assert units.made == ["doubled"]
+    assert units.compiled_units == ["doubled"]
 
 
 def test_without_a_folder_code_is_in_memory_alone(alone):
@@ -71,7 +71,7 @@ def test_without_a_folder_code_is_in_memory_alone(alone):
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write all")
 def test_a_folder_that_may_only_be_read_does_no_harm(tmp_path, alone):
     tmp_path.chmod(0o500)
-    assert answer(entry_of(tmp_path, at_once=True)) == 42.0
+    assert answer(entry_of(tmp_path, optimise=True)) == 42.0
 
 
 def test_a_full_disk_does_no_harm(tmp_path, alone, monkeypatch):
@@ -83,16 +83,26 @@ def test_a_full_disk_does_no_harm(tmp_path, alone, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(objects.Path, "write_bytes", full)
-    assert answer(entry_of(tmp_path, at_once=True)) == 42.0
+    assert answer(entry_of(tmp_path, optimise=True)) == 42.0
     assert list(tmp_path.iterdir()) == []
 
 
 def test_objects_not_used_for_longest_go_first(tmp_path, monkeypatch):
-    monkeypatch.setattr(objects, "MOST_BYTES", 1000)
+    monkeypatch.setattr(objects, "MAX_BYTES", 1000)
     for k in range(4):
-        objects.keep(tmp_path / f"{k}.o", None, bytes(300))
+        objects.write_object(tmp_path / f"{k}.o", None, bytes(300))
         os.utime(tmp_path / f"{k}.o", (k, k))
     assert sorted(f.name for f in tmp_path.iterdir()) == ["2.o", "3.o"]
+
+
+def test_files_that_killed_processes_left_behind_are_removed(tmp_path):
+    """Not those of processes at work, nor files that are not the compiler's."""
+    for name in ("old.1.ll", ".old.o.ab", ".old.1.ll.ab", "new.2.ll", "notes.txt"):
+        (tmp_path / name).touch()
+        if not name.startswith("new"):
+            os.utime(tmp_path / name, (0, 0))
+    objects.write_object(tmp_path / "a.o", None, b"")
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["a.o", "new.2.ll", "notes.txt"]
 
 
 def test_code_is_made_well_once_it_has_run_for_long(tmp_path, alone, monkeypatch):
@@ -102,11 +112,11 @@ def test_code_is_made_well_once_it_has_run_for_long(tmp_path, alone, monkeypatch
     table = Functions(SIGNATURE, [entry])
     assert answer(entry) == 42.0
     quick = unit.addresses[0]
-    assert not unit.is_good
+    assert not unit.is_optimised
     assert list(tmp_path.iterdir()) == []
-    units.later._looked = 0.0
-    units.later.look(unit.cost + 1.0)
-    assert unit.is_good
+    background.optimiser._polled = 0.0
+    background.optimiser.poll(unit.cost + 1.0)
+    assert unit.is_optimised
     assert table.addresses[0] == unit.addresses[0] != quick
     kind = ctypes.CFUNCTYPE(None, ctypes.c_double, ctypes.c_void_p, ctypes.c_int64)
     out = np.zeros(1)
@@ -118,18 +128,18 @@ def test_code_is_made_well_once_it_has_run_for_long(tmp_path, alone, monkeypatch
 
 def test_a_process_beside_makes_code_well(tmp_path, monkeypatch):
     """Its objects are taken over by the next look after they are there."""
-    monkeypatch.setattr(units, "_cores", lambda: 2)
-    later = units._Later()
-    monkeypatch.setattr(units, "later", later)
+    monkeypatch.setattr(background, "core_count", lambda: 2)
+    optimiser = background.Optimiser()
+    monkeypatch.setattr(background, "optimiser", optimiser)
     unit = Unit("doubled", 1, write, tmp_path)
     entry = Entry(unit, 0, SIGNATURE)
-    later._process.stdin.close()
-    assert later._process.wait(timeout=120) == 0
+    optimiser._process.stdin.close()
+    assert optimiser._process.wait(timeout=120) == 0
     assert [f.name for f in tmp_path.iterdir()] == ["doubled.o"]
-    later._looked = 0.0
-    later.look(0.0)
-    assert unit.is_good
-    assert not later.units
+    optimiser._polled = 0.0
+    optimiser.poll(0.0)
+    assert unit.is_optimised
+    assert not optimiser.units
     assert answer(entry) == 42.0
 
 

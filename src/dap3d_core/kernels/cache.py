@@ -139,10 +139,11 @@ def entries_of(functions: Sequence[Any], arguments: tuple[Any, ...]) -> list[Ent
     key = digest(repr(arguments), *parts, *_origin(plain), objects.identity())
     name = f"{plain[0].__module__.split('.')[-1]}.{plain[0].__name__}-{key}"
 
-    def write() -> tuple[str, list[str]]:
+    def write(symbols: list[str]) -> tuple[str, list[str]]:
         program = Program()
-        found = [program.export(f, arguments, _symbol(name, k)) for k, f in enumerate(functions)]
-        return program.module(), [_name_of(s.result) for s in found]
+        pairs = zip(functions, symbols, strict=True)
+        signatures = [program.export(f, arguments, symbol) for f, symbol in pairs]
+        return program.module(), [_name_of(s.result) for s in signatures]
 
     with _making:
         if name not in _units:
@@ -150,10 +151,6 @@ def entries_of(functions: Sequence[Any], arguments: tuple[Any, ...]) -> list[Ent
         unit = _units[name]
     signatures = [Signature(arguments, _RESULTS[r]) for r in unit.results]
     return [Entry(unit, k, s) for k, s in enumerate(signatures)]
-
-
-def _symbol(name: str, k: int) -> str:
-    return f"{name.replace('-', '_')}_{k}"
 
 
 def _name_of(result: Scalar) -> str:

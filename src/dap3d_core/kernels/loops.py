@@ -81,16 +81,15 @@ def _build(loop: Loop, text: str, name: str, announce: Callable[[str], None] | N
     if not jit_is_on():
         return python()["loop"]
 
-    def write() -> tuple[str, list[Any]]:
+    def write(symbols: list[str]) -> tuple[str, list[Any]]:
         if announce is not None:
             announce(loop.name)
         refuse_what_is_outside(*loop.kernels.values())
         compiled_here.append(loop.name)
-        return trace(symbol, python(), _members()), ["None"]
+        return trace(symbols[0], python(), _members()), ["None"]
 
     full = f"{name}-{digest(objects.identity())}"
-    symbol = f"{full.replace('-', '_')}_0"
-    return Entry(Unit(full, 1, write, cache_folder(), at_once=True), 0, LOOP)
+    return Entry(Unit(full, 1, write, cache_folder(), optimise=True), 0, LOOP)
 
 
 def _members() -> dict[str, tuple[int, str, int]]:

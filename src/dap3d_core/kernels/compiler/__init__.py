@@ -7,9 +7,9 @@
     operations   its operations, comparisons and choices
     words        the functions of other libraries that it knows
     trace        kernels, run once with symbolic numbers
-    objects      from LLVM IR to object code, kept in files, loaded
-    units        object code that is made quickly first and well later; calls into it
-    beside       the process that makes it well
+    objects      from LLVM IR to object code, stored in files, loaded
+    background   the process that optimises while unoptimised code runs
+    units        object files with some functions, and calls from Python into them
 
-docs/concepts/compiled-python.md says what the subset is.
+docs/concepts/compiled-python.md describes the subset.
 """

@@ -1,8 +1,7 @@
-"""From LLVM IR to object code, kept in files, and into memory.
+"""Object code: compiled from LLVM IR, stored in files, loaded into memory.
 
-An object file begins with a line that tells what is in it, and is sealed by a checksum: a damaged
-one is never run. It is written under another name and renamed, for processes may race; the oldest
-are removed when there are many.
+An object file starts with a line of JSON about its code and ends with a checksum: a damaged file
+is never loaded. Files are written under another name and renamed, because processes may race.
 """
 
 import contextlib
@@ -10,6 +9,7 @@ import hashlib
 import json
 import os
 import threading
+import time
 import uuid
 from functools import cache
 from pathlib import Path
@@ -17,17 +17,19 @@ from typing import Any, NamedTuple
 
 from dap3d_core.kernels.sealed_files import sealed, sealed_content
 
-#: Bytes of object files in a folder at most; those not used for longest go first.
-MOST_BYTES = 200_000_000
-#: How well code is made: as it stands, or as well as can be.
-QUICK, GOOD = 0, 3
+#: Maximum size of the object files of a folder; the oldest are removed first.
+MAX_BYTES = 200_000_000
+#: Age in seconds from which a file that a killed process left behind is removed.
+STRAY_AGE = 3600.0
+#: Optimisation levels.
+UNOPTIMISED, OPTIMISED = 0, 3
 _lock = threading.RLock()
-#: Engines of what is loaded; code stays for the life of the process.
-_loaded: list[Any] = []
+#: Execution engines; loaded code stays for the life of the process.
+_engines: list[Any] = []
 
 
 class Processor(NamedTuple):
-    """What code is made for."""
+    """The processor that code is compiled for."""
 
     triple: str
     name: str
@@ -36,7 +38,7 @@ class Processor(NamedTuple):
 
 @cache
 def processor() -> Processor:
-    """This one, or what ``DAP3D_CPU`` names (``x86-64-v2``, say)."""
+    """This processor, or the one that ``DAP3D_CPU`` names (for example ``x86-64-v2``)."""
     llvm = _llvm()
     name = os.environ.get("DAP3D_CPU", "")
     features = "" if name else llvm.get_host_cpu_features().flatten()
@@ -54,51 +56,49 @@ def _llvm() -> Any:
 
 @cache
 def identity() -> str:
-    """What besides sources decides the code: this compiler, LLVM, the processor."""
+    """Everything besides the sources that decides the code: compiler, LLVM and processor."""
     import llvmlite
 
     files = sorted(Path(__file__).parent.glob("*.py"))
-    seal = hashlib.sha256(b"".join(file.read_bytes() for file in files))
-    return f"{llvmlite.__version__} {_llvm().llvm_version_info} {processor()} {seal.hexdigest()}"
+    digest = hashlib.sha256(b"".join(file.read_bytes() for file in files))
+    return f"{llvmlite.__version__} {_llvm().llvm_version_info} {processor()} {digest.hexdigest()}"
 
 
-def machine(level: int, target: Processor | None = None) -> Any:
-    """LLVM's target machine."""
-    target = target or processor()
+def _target_machine(level: int, target: Processor) -> Any:
     return _llvm().Target.from_triple(target.triple).create_target_machine(
         cpu=target.name, features=target.features, opt=level, reloc="static",
         codemodel="jitdefault", jit=True,
     )  # fmt: skip
 
 
-def object_of(text: str, level: int, target: Processor | None = None) -> bytes:
+def compile_ir(text: str, level: int, target: Processor | None = None) -> bytes:
     """Object code of a module of LLVM IR."""
-    llvm, to = _llvm(), machine(level, target)
-    module = llvm.parse_assembly(text)
-    module.triple = (target or processor()).triple
-    module.data_layout = str(to.target_data)
+    llvm, target = _llvm(), target or processor()
+    machine, module = _target_machine(level, target), llvm.parse_assembly(text)
+    module.triple, module.data_layout = target.triple, str(machine.target_data)
     module.verify()
     options = llvm.create_pipeline_tuning_options(speed_level=level)
-    options.loop_vectorization, options.slp_vectorization = level > QUICK, False
-    builder = llvm.create_pass_builder(to, options)
+    options.loop_vectorization, options.slp_vectorization = level > 0, False
+    builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
-    found: bytes = to.emit_object(module)
-    return found
+    code: bytes = machine.emit_object(module)
+    return code
 
 
 def load(code: bytes, symbols: list[str]) -> list[int]:
-    """Put object code into memory; the addresses of its symbols."""
+    """Load object code into memory; returns the addresses of its symbols."""
     llvm = _llvm()
     with _lock:
-        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine(QUICK))
+        machine = _target_machine(UNOPTIMISED, processor())
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
-        _loaded.append(engine)
+        _engines.append(engine)
         return [engine.get_function_address(symbol) for symbol in symbols]
 
 
-def read(path: Path) -> tuple[Any, bytes] | None:
-    """What an object file tells of its code, and the code; None where there is none to be used."""
+def read_object(path: Path) -> tuple[Any, bytes] | None:
+    """The JSON value and the code of an object file; None where there is no usable file."""
     content = sealed_content(path)
     if content is None:
         return None
@@ -106,29 +106,34 @@ def read(path: Path) -> tuple[Any, bytes] | None:
     return json.loads(head), code
 
 
-def keep(path: Path, about: Any, code: bytes) -> None:
-    """Write an object file; where that cannot be, code is kept in memory alone."""
-    write(path, sealed(json.dumps(about).encode() + b"\n" + code))
+def write_object(path: Path, head: Any, code: bytes) -> None:
+    """Write an object file; where that fails, the code stays in memory only."""
+    write_file(path, sealed(json.dumps(head).encode() + b"\n" + code))
     with contextlib.suppress(OSError):
-        _bound(path.parent)
+        _clean(path.parent)
 
 
-def write(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all."""
-    aside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+def write_file(path: Path, data: bytes) -> None:
+    """Write a complete file, or none."""
+    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
     try:
-        aside.write_bytes(data)
-        os.replace(aside, path)
+        temporary.write_bytes(data)
+        os.replace(temporary, path)
     except OSError:
         with contextlib.suppress(OSError):
-            aside.unlink()
+            temporary.unlink()
 
 
-def _bound(folder: Path) -> None:
+def _clean(folder: Path) -> None:
+    """Bound the size of a folder; remove what killed processes left behind."""
+    now = time.time()
+    for stray in (*folder.glob("*.ll"), *folder.glob(".*.o.*"), *folder.glob(".*.ll.*")):
+        if now - stray.stat().st_mtime > STRAY_AGE:
+            stray.unlink(missing_ok=True)
     files = [(f.stat().st_mtime, f.stat().st_size, f) for f in folder.glob("*.o")]
-    left = sum(size for _, size, _ in files) - MOST_BYTES
+    excess = sum(size for _, size, _ in files) - MAX_BYTES
     for _, size, file in sorted(files):
-        if left <= 0:
+        if excess <= 0:
             break
         file.unlink()
-        left -= size
+        excess -= size

@@ -1,0 +1,131 @@
+"""Optimisation in the background: units start with unoptimised code, which is then replaced.
+
+A second process compiles the optimised code and writes it to the cache folder; calls poll for it
+and load it. It reads lines from its standard input: a file of LLVM IR, a tab, the object file to
+write. Without a second core or a cache folder, this process optimises once the unoptimised code
+has run for as long as that takes.
+"""
+
+import atexit
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from dap3d_core.kernels.compiler import objects
+
+#: Seconds between two polls for optimised code.
+POLL_INTERVAL = 0.02
+
+
+class Optimiser:
+    """Replaces the unoptimised code of units by optimised code.
+
+    Attributes:
+        units: those with unoptimised code.
+    """
+
+    def __init__(self) -> None:
+        self.units: list[Any] = []
+        self._lock = threading.Lock()
+        self._process: Any = None
+        self._polled = 0.0
+        self._spent = 0.0
+
+    def add(self, unit: Any) -> None:
+        """Request optimised code for a unit: from the second process, where there can be one."""
+        with self._lock:
+            self.units.append(unit)
+        if unit.path is None or core_count() < 2 or self._has_ended():
+            return
+        path = unit.path.with_name(f"{unit.name}.{os.getpid()}.ll")
+        objects.write_file(path, f"{json.dumps(unit.results)}\n{unit.text}".encode())
+        with contextlib.suppress(OSError, ValueError):
+            self._start()
+            self._process.stdin.write(f"{path}\t{unit.path}\n".encode())
+            self._process.stdin.flush()
+
+    def _has_ended(self) -> bool:
+        return self._process is not None and self._process.poll() is not None
+
+    def _start(self) -> None:
+        if self._process is None:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", __name__], stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+            )  # fmt: skip
+            atexit.register(self._detach)
+
+    def _detach(self) -> None:
+        """Let the second process finish its input after this process has ended."""
+        self._process.stdin.close()
+        self._process.returncode = 0  # nobody waits for it
+
+    def poll(self, seconds: float) -> None:
+        """Load optimised code that has become available.
+
+        Args:
+            seconds: run time of unoptimised code since the last call.
+        """
+        now = time.perf_counter()
+        self._spent += seconds
+        if now - self._polled < POLL_INTERVAL or not self._lock.acquire(blocking=False):
+            return
+        try:
+            self._polled = now
+            for unit in list(self.units):
+                if unit.path is not None and unit.path.exists():
+                    self._replace(unit, objects.read_object(unit.path))
+            if self._process is None or self._has_ended():
+                self._optimise_here()
+        finally:
+            self._lock.release()
+
+    def _replace(self, unit: Any, stored: tuple[Any, bytes] | None) -> None:
+        if stored is not None:
+            unit.replace_code(stored[1])
+            self.units.remove(unit)
+
+    def _optimise_here(self) -> None:
+        if not self.units or self._spent < sum(unit.cost for unit in self.units):
+            return
+        for unit in list(self.units):
+            code = objects.compile_ir(unit.text, objects.OPTIMISED)
+            if unit.path is not None:
+                objects.write_object(unit.path, unit.results, code)
+            self._replace(unit, (unit.results, code))
+        self._spent = 0.0
+
+
+optimiser = Optimiser()
+
+
+def core_count() -> int:
+    """Number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def main() -> None:
+    """Compile the requests on standard input until it ends."""
+    if hasattr(os, "nice"):
+        os.nice(5)
+    for line in sys.stdin:
+        path, target = map(Path, line.rstrip("\n").split("\t"))
+        with contextlib.suppress(OSError, ValueError, RuntimeError):
+            head, _, text = path.read_text(encoding="utf-8").partition("\n")
+            if not target.exists():
+                code = objects.compile_ir(text, objects.OPTIMISED)
+                objects.write_object(target, json.loads(head), code)
+        with contextlib.suppress(OSError):
+            path.unlink()
+
+
+if __name__ == "__main__":
+    main()
