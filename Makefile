@@ -26,7 +26,7 @@ CHECK_PYTHON := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11)
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help run install test test-all verify unit-nojit lint audit format docs bench bench-peers fuzz clean
+.PHONY: help run install test test-all verify unit-nojit no-fma lint audit format docs bench bench-peers fuzz clean
 
 help:  ## show this list
 	@echo "make TARGET, where TARGET is one of"
@@ -52,6 +52,13 @@ verify: $(VENV)/.installed-docs  ## the slow verification alone
 
 unit-nojit: $(VENV)/.installed-test  ## quick unit tests with kernels as plain Python, and their coverage
 	@DAP3D_PLAIN=1 $(PYTHON) -m pytest -n auto -m "not slow" --cov --cov-report=term tests/unit
+
+# Neither compiled code nor the C library may fuse products and sums: an older processor in effect.
+NO_FMA := DAP3D_CPU=x86-64-v2 GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2
+no-fma: $(VENV)/.installed-test  ## tests of compiled bits as on a processor without FMA (x86-64)
+	@if [ "$$(uname -m)" != x86_64 ]; then echo "no-fma: only on x86-64"; exit 0; fi; \
+	$(NO_FMA) $(PYTHON) -m pytest -n auto -m "not slow" \
+	    tests/unit/test_compiler_core.py tests/unit/test_compiler_complex.py
 
 # All checks run, also after one has failed; the last line says which.
 lint: $(VENV)/.installed-dev  ## format, lint, types, floors, sizes

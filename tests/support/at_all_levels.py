@@ -23,13 +23,31 @@ def targets():
     return found
 
 
-def made_of(text, symbol, signature):
-    """A function of a module of LLVM IR at all levels, by the level's name."""
+def all_made_of(text, signatures, levels=None):
+    """Functions of a module of LLVM IR, by level and symbol; signatures: by their symbols."""
     found = {}
-    for name, (level, target) in targets().items():
-        unit = SimpleNamespace(addresses=load(compile_ir(text, level, target), [symbol]))
-        found[name] = Entry(unit, 0, signature)
+    for name in levels or targets():
+        level, target = targets()[name]
+        addresses = load(compile_ir(text, level, target), list(signatures))
+        unit = SimpleNamespace(addresses=addresses, register_slot=addresses_of(addresses))
+        entries = (Entry(unit, k, s) for k, s in enumerate(signatures.values()))
+        found[name] = dict(zip(signatures, entries, strict=True))
     return found
+
+
+def addresses_of(addresses):
+    """What puts an address into a table."""
+
+    def register_slot(table, index, k):
+        table[index] = addresses[k]
+
+    return register_slot
+
+
+def made_of(text, symbol, signature, levels=None):
+    """A function of a module of LLVM IR at all levels, by the level's name."""
+    made = all_made_of(text, {symbol: signature}, levels)
+    return {name: entries[symbol] for name, entries in made.items()}
 
 
 def compiled_at_all_levels(function, types):

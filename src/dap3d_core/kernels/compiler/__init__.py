@@ -1,11 +1,11 @@
-"""The compiler: typed Python functions and traced kernels to machine code, by llvmlite alone.
+"""The compiler: typed Python functions and traced kernels to machine code, by llvmlite.
 
-    types        what values there are, and the machine words that each is made of
-    writing      instructions, blocks, places in memory
-    functions    the typed subset of Python: functions and their statements
-    expressions  its values, arrays and calls
-    operations   its operations, comparisons and choices
-    words        the functions of other libraries that it knows
+    types        types, and the machine words that represent their values
+    writing      syntax trees, instructions, blocks, stack slots, casts
+    functions    the typed subset of Python: functions and statements
+    expressions  names, arrays, calls
+    operations   arithmetic, comparisons, conditional expressions
+    words        known functions of Python, numpy and the C library
     trace        kernels, run once with symbolic numbers
     objects      from LLVM IR to object code, stored in files, loaded
     background   the process that optimises while unoptimised code runs

@@ -1,4 +1,4 @@
-"""Values, arrays and calls of the typed subset of Python to LLVM IR."""
+"""Names, arrays and calls of the typed subset of Python to LLVM IR."""
 
 import ast
 import builtins
@@ -29,7 +29,7 @@ from dap3d_core.kernels.compiler.types import (
 from dap3d_core.kernels.compiler.words import KNOWN, WORDS
 from dap3d_core.kernels.compiler.writing import name_of
 
-#: What to write instead of expressions that are not in the subset.
+#: Remedies for expressions outside the subset.
 INSTEAD = {
     "ListComp": "loop over a range, and write into an array",
     "GeneratorExp": "loop over a range",
@@ -48,7 +48,7 @@ INSTEAD = {
 
 
 class Expressions(Operations):
-    """Writes the expressions of a function; statements are in functions.py."""
+    """Compiles the expressions of a function; statements are in functions.py."""
 
     program: Any
     current: dict[str, Any]
@@ -145,14 +145,14 @@ class Expressions(Operations):
     # ------------------------------------------------------------------ arrays
 
     def index(self, node: ast.expr, length: str) -> str:
-        """An index as a word; a constant one below zero counts from the end."""
+        """The word of an index; a negative constant counts from the end."""
         found = self.integer(node, self.value(node))
         if found.constant is not None and found.constant < 0:
             return self.new(f"add nsw i64 {length}, {found.constant}")
         return found.word
 
     def address(self, array: Value, places: Sequence[ast.expr]) -> str:
-        """Where the part of an array begins that leading indices choose."""
+        """Address of the part of an array that leading indices select."""
         lengths = array.words[1:]
         at = "0"
         for k, length in enumerate(lengths):
@@ -164,13 +164,13 @@ class Expressions(Operations):
         return self.item(array, at)
 
     def item(self, array: Value, k: str) -> str:
-        """Where the k-th number of an array stands."""
+        """Address of the k-th item of an array."""
         item = array.type.item.words
         kind = f"[{len(item)} x {item[0]}]" if len(item) > 1 else item[0]
         return self.new(f"getelementptr inbounds {kind}, ptr {array.word}, i64 {k}")
 
     def word_of(self, place: str, item: Any, k: int) -> str:
-        """Where a word of a number stands, whose first one is at a place."""
+        """Address of the k-th word of an item."""
         return (
             self.new(f"getelementptr inbounds {item.words[0]}, ptr {place}, i64 {k}")
             if k
@@ -178,7 +178,7 @@ class Expressions(Operations):
         )
 
     def element(self, node: ast.Subscript) -> tuple[str, Any]:
-        """Where the number stands that an index chooses, and its type."""
+        """Address and type of the item that an index selects."""
         array, places = self.value(node.value), _parts(node.slice)
         if not isinstance(array.type, Array):
             self.refuse(node, f"a {name_of(array.type)} is written into", "only arrays change")
@@ -221,7 +221,7 @@ class Expressions(Operations):
         return items[k]
 
     def _slice(self, node: ast.Slice, array: Value) -> Value:
-        """Rows of an array; bounds are cut to its length, as in Python."""
+        """Rows of an array; upper bounds are limited to its length, as in Python."""
         if node.step is not None:
             self.refuse(node.step, "a slice with a step", "write a loop")
         _, length, *inner = array.words
@@ -292,7 +292,7 @@ class Expressions(Operations):
         return self._called(f"@{name}", result, words)
 
     def _called(self, name: str, result: Any, words: Sequence[str]) -> Value:
-        """A call; the words of its result."""
+        """Emit a call; returns its result."""
         arguments = ", ".join(words)
         if not result.words:
             self.line(f"call void {name}({arguments})")
@@ -305,7 +305,7 @@ class Expressions(Operations):
         return Value(result, tuple(parts))
 
     def _through(self, node: ast.Call, called: Value) -> Value:
-        """A call by address."""
+        """A call of a function from a table."""
         wanted = called.type.signature.arguments
         if node.keywords or len(node.args) != len(wanted):
             self.refuse(node, f"{len(node.args)} arguments for a function of {len(wanted)}",

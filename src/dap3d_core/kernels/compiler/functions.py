@@ -1,9 +1,8 @@
 """Functions of the typed subset of Python to LLVM IR: their types, variables and statements.
 
-A function is compiled for the types of its arguments. Each variable has a type, found by going over
-the function until none changes any more; each lives in a place in memory, which LLVM turns into
-registers. Where plain Python and this give the same they give the same bits: nothing is contracted,
-nothing reassociated.
+A function is compiled for the types of its arguments. Types of variables are inferred by compiling
+the function until none changes any more. Variables live in stack slots, which LLVM turns into
+registers. Results have the bits of plain Python: nothing is contracted or reassociated.
 """
 
 import ast
@@ -27,7 +26,7 @@ from dap3d_core.kernels.compiler.types import (
 )
 from dap3d_core.kernels.compiler.writing import definition, result_type, stored_names
 
-#: What to write instead of statements that are not in the subset.
+#: Remedies for statements outside the subset.
 INSTEAD = {
     "With": "open nothing in compiled code",
     "Try": "test before, and return a number that says what went wrong",
@@ -45,16 +44,16 @@ INSTEAD = {
 
 
 class Program:
-    """Functions that become one module of LLVM IR; each once for each choice of argument types."""
+    """A module of LLVM IR: each function once for each choice of argument types."""
 
     def __init__(self) -> None:
         self.text: list[str] = []
-        #: Declarations of functions of LLVM and of the C library.
+        #: Declarations of external functions by symbol.
         self.needs: dict[str, str] = {}
         self._done: dict[Any, tuple[str, Any] | None] = {}
 
     def function(self, function: Any, arguments: Sequence[Any]) -> tuple[str, Any]:
-        """Name and type of the result of a function, compiled for types of its arguments."""
+        """Name and result type of a function, compiled for types of its arguments."""
         inlined = getattr(function, "is_inlined", False)
         function = inspect.unwrap(function)
         key = function, tuple(arguments)
@@ -70,7 +69,7 @@ class Program:
         return done
 
     def export(self, function: Any, arguments: Sequence[Any], symbol: str) -> Signature:
-        """Make a function callable from outside under a name; truths are integers there."""
+        """Export a function under a symbol; booleans are integers in its arguments and result."""
         name, result = self.function(function, arguments)
         words = [(w, f"%a{k}") for k, w in enumerate(w for a in arguments for w in a.words)]
         outside = ", ".join(f"{'i64' if w == 'i1' else w} {x}" for w, x in words)
@@ -94,7 +93,7 @@ class Program:
 
 
 class FunctionCompiler(Expressions):
-    """One function for one choice of argument types."""
+    """Compiles one function for one choice of argument types."""
 
     def __init__(
         self,
@@ -153,9 +152,10 @@ class FunctionCompiler(Expressions):
             self.line("ret void")
 
     def store(self, node: ast.AST, name: str, value: Value) -> None:
-        """Give a value to a variable. A number may be of a wider type; all else makes it another.
+        """Assign a value to a variable.
 
-        Such a variable has no numbers of an earlier type left.
+        Numbers share one variable of the widest type; a value of any other type makes it a new
+        variable of the same name.
         """
         type_ = value.type
         family = "number" if wider(type_, INT) else type_
@@ -185,7 +185,7 @@ class FunctionCompiler(Expressions):
     # ------------------------------------------------------------------ statements
 
     def statements(self, nodes: Sequence[ast.stmt]) -> None:
-        """Statements, up to the first that leaves."""
+        """Compile statements, up to the first that ends the block."""
         for node in nodes:
             if self.is_dead:
                 return
@@ -303,9 +303,9 @@ class FunctionCompiler(Expressions):
             self.is_dead = True
 
     def _repeat(self, node: ast.For | ast.While, again: str, end: str, k: Value | None) -> None:
-        """The body of a loop; k: what its variable becomes.
+        """The body of a loop; k: the value of its variable.
 
-        A variable that is of another type at its end is of no type at its start, and behind it.
+        A variable that changes its type in the body has no type at its start and after the loop.
         """
         before, changes = dict(self.current), self.changes.setdefault(node, set())
         self.current.update(dict.fromkeys(changes))
@@ -342,7 +342,7 @@ class FunctionCompiler(Expressions):
             self.statements(node.body)
 
     def _count(self, node: ast.For, call: ast.Call) -> None:
-        """``for k in range(...)``; what the loop does to k does not change its course."""
+        """``for k in range(...)``; assignments to k do not change the count."""
         given = [self.cast(a, self.integer(a, self.value(a)), INT) for a in call.args]
         first, last = (constant(0), given[0]) if len(given) == 1 else given[:2]
         step = given[2] if len(given) > 2 else constant(1)

@@ -1,4 +1,4 @@
-"""Operations of numbers, comparisons and choices to LLVM IR."""
+"""Arithmetic, comparisons and conditional expressions to LLVM IR."""
 
 import ast
 import operator
@@ -48,12 +48,12 @@ LOGIC = {"and", "or", "xor", "shl", "ashr"}
 
 
 class Operations(Writer):
-    """Writes operations; what they are done with is in expressions.py."""
+    """Compiles operations; their operands are compiled in expressions.py."""
 
     value: Callable[[ast.expr], Value]
 
     def condition(self, node: ast.expr) -> Value:
-        """The truth of an expression."""
+        """The truth value of an expression."""
         value = self._both(node, True) if isinstance(node, ast.BoolOp) else self.value(node)
         if value.type not in (BOOL, INT, FLOAT):
             self.refuse(node, f"a {name_of(value.type)} is a condition", "compare numbers")
@@ -86,8 +86,6 @@ class Operations(Writer):
             self.refuse(node, f"no {type(op).__name__} of a {name_of(a.type)} and a "
                         f"{name_of(b.type)}", "take numbers, one by one")  # fmt: skip
         name, python = OPERATORS[type(op)]
-        if name == "pow":
-            return self._power(node, a, b)
         type_ = wider(a.type, b.type)
         if a.constant is not None and b.constant is not None and type_ != COMPLEX:
             try:
@@ -96,6 +94,8 @@ class Operations(Writer):
                 if isinstance(error, CompileError):
                     raise
                 self.refuse(node, str(error), "change the constants")
+        if name == "pow":
+            return self._power(node, a, b)
         if name in LOGIC:
             if type_ not in (BOOL, INT):
                 self.refuse(node, f"bits of a {name_of(type_)}", "take whole numbers")
@@ -116,13 +116,13 @@ class Operations(Writer):
         return Value(FLOAT, (self.new(f"f{name} double {a.word}, {b.word}"),))
 
     def _known_number(self, node: Any, number: Any) -> Value:
-        found = constant(number)
-        if found is None:
+        value = constant(number)
+        if value is None:
             self.refuse(node, "a constant of more than 64 bits", "take a smaller one")
-        return found
+        return value
 
     def _complex(self, name: str, a: Value, b: Value) -> Value:
-        """As numpy's complex numbers."""
+        """An operation of complex numbers, with the rounding of numpy."""
         if name == "mul":
             return complex_product(self, a, b)
         if name == "div":
@@ -138,43 +138,19 @@ class Operations(Writer):
         some = self.new(f"icmp ne i64 {rest}, 0")
         signs = self.new(f"xor i64 {rest}, {b.word}")
         below = self.new(f"icmp slt i64 {signs}, 0")
-        off = self.new(f"and i1 {some}, {below}")  # Python rounds down
-        if name == "mod":
-            other = self.new(f"add i64 {rest}, {b.word}")
-            return Value(INT, (self.new(f"select i1 {off}, i64 {other}, i64 {rest}"),))
-        other = self.new(f"sub i64 {quotient}, 1")
-        return Value(INT, (self.new(f"select i1 {off}, i64 {other}, i64 {quotient}"),))
+        off = self.new(f"and i1 {some}, {below}")  # Python rounds down, C towards zero
+        is_mod = name == "mod"
+        exact = rest if is_mod else quotient
+        other = self.new(f"add i64 {rest}, {b.word}" if is_mod else f"sub i64 {quotient}, 1")
+        return Value(INT, (self.new(f"select i1 {off}, i64 {other}, i64 {exact}"),))
 
     def _power(self, node: Any, a: Value, b: Value) -> Value:
-        """Products for small whole constants, a root for 0.5, else pow of the C library."""
-        n = b.constant
-        if isinstance(n, int) and isinstance(a.constant, int) and 0 <= n < 10_000:
-            return self._known_number(node, a.constant**n)
-        if isinstance(n, int) and abs(n) <= 64 and not isinstance(n, bool) and a.type != BOOL:
-            if n < 0 and a.type == INT:
-                a = self.cast(node, a, FLOAT)
-            result: Value | None = None
-            power, left = a, abs(n)
-            while left:
-                if left & 1:
-                    result = (
-                        power if result is None else self.operation(node, ast.Mult(), result, power)
-                    )
-                left >>= 1
-                if left:
-                    power = self.operation(node, ast.Mult(), power, power)
-            one = constant(1 if a.type == INT else 1.0)
-            assert one is not None
-            result = one if result is None else result
-            return self.operation(node, ast.Div(), one, result) if n < 0 else result
+        """``pow`` of the C library, as in plain Python."""
         if COMPLEX in (a.type, b.type):
             self.refuse(node, "a power of complex numbers", "multiply")
-        if a.type in (INT, BOOL) and b.type in (INT, BOOL) and (n is None or a.constant is None):
-            self.refuse(node, "a whole number to a power that varies", "make one of them a float")
-        x = self.cast(node, a, FLOAT)
-        if n == 0.5:
-            return WORDS["sqrt"](self, node, [x])
-        return WORDS["pow"](self, node, [x, self.cast(node, b, FLOAT)])
+        if FLOAT not in (a.type, b.type):
+            self.refuse(node, "an integer to an integer power", "multiply, or take a float")
+        return WORDS["pow"](self, node, [a, b])
 
     def comparison(self, node: Any, op: ast.cmpop, a: Value, b: Value) -> Value:
         """One comparison."""
@@ -221,7 +197,7 @@ class Operations(Writer):
         return self._both(node, False)
 
     def _both(self, node: ast.BoolOp, is_condition: bool) -> Value:
-        """``and`` or ``or``; of numbers, where it is a condition and no value."""
+        """``and`` or ``or``; operands may be numbers where only their truth is used."""
         decides = isinstance(node.op, ast.Or)
         slots, end = self.place(BOOL, "both"), self.label()
         values = []
@@ -237,12 +213,10 @@ class Operations(Writer):
                 more = self.label()
                 self.branch(value, *((end, more) if decides else (more, end)))
                 self.start(more)
-        if all(v.constant is not None for v in values):
-            self.jump(end)
-            self.start(end)
-            return values[-1]
         self.jump(end)
         self.start(end)
+        if all(v.constant is not None for v in values):
+            return values[-1]
         return self.read_from(slots, BOOL)
 
     def _IfExp(self, node: ast.IfExp) -> Value:

@@ -1,11 +1,10 @@
 """Kernels to LLVM IR by running them once with symbolic numbers.
 
-What Python does on the way (helpers, closures, loops over constants, tuples) is done and gone; what
-is left are the operations on numbers, which are written down as they happen. So a kernel may do
-what Python can, but for a choice that depends on a number: there is no number yet.
+Whatever Python does on the way (helpers, closures, loops over constants, tuples) is gone
+afterwards; the operations on numbers are recorded as they happen. A kernel may do anything that
+Python can, except decide by a number: it has no value yet.
 """
 
-import builtins
 import threading
 import traceback
 from collections.abc import Callable, Mapping
@@ -17,26 +16,26 @@ from dap3d_core.kernels.compiler.types import FLOAT, INT, Array, CompileError, b
 from dap3d_core.kernels.compiler.words import EXACT, LIBRARY, call_of, declaration
 
 _WORDS = "the words of dap3d_core.kernels: sqrt, sin, minimum, ..., where(condition, a, b)"
-#: The trace that runs in this thread.
-_now = threading.local()
+#: The trace of this thread.
+_current = threading.local()
 
 
 class TraceError(TypeError):
-    """What cannot be done with a number that is not there yet, and what to do instead."""
+    """An operation that needs the value of a symbolic number; says what to write instead."""
 
 
 class _MissingError(TraceError, AttributeError):
-    """The same of what is asked for by name, which hasattr asks as well."""
+    """The same for a missing attribute, so that ``hasattr`` works."""
 
 
 def _new(text: str) -> str:
-    lines = _now.lines
+    lines = _current.lines
     lines.append(f"  %v{len(lines)} = {text}")
     return f"%v{len(lines) - 1}"
 
 
-class _NoNumber:
-    """What Python asks of a number, and cannot be told."""
+class _Symbolic:
+    """A value that is known when the code runs: refuses everything that needs it now."""
 
     __slots__ = ("word",)
     __hash__ = None  # type: ignore[assignment]
@@ -44,18 +43,15 @@ class _NoNumber:
     def __init__(self, word: str) -> None:
         self.word = word
 
-    def _refuse(self) -> NoReturn:
+    def _refuse(self, *arguments: Any) -> NoReturn:
         raise TraceError(f"asks for the number itself; use {_WORDS}")
+
+    __float__ = __int__ = __index__ = __complex__ = __len__ = __iter__ = _refuse
+    __round__ = __floor__ = __ceil__ = __trunc__ = _refuse
+    __floordiv__ = __mod__ = __rfloordiv__ = __rmod__ = __divmod__ = _refuse
 
     def __bool__(self) -> NoReturn:
         raise TraceError("branches on a number; use where(condition, a, b)")
-
-    def __float__(self) -> NoReturn:
-        self._refuse()
-
-    __int__ = __index__ = __complex__ = __len__ = __iter__ = __float__  # type: ignore[assignment]
-    __round__ = __floor__ = __ceil__ = __trunc__ = __float__  # type: ignore[assignment]
-    __floordiv__ = __mod__ = __rfloordiv__ = __rmod__ = __divmod__ = __float__  # type: ignore[assignment]
 
     def __getattr__(self, name: str) -> NoReturn:
         raise _MissingError(f"asks a number for {name}; use {_WORDS}")
@@ -63,79 +59,79 @@ class _NoNumber:
     def __getitem__(self, k: Any) -> NoReturn:
         raise TraceError("takes a part of a number; tuples have parts")
 
+    @property
+    def words(self) -> "Words":
+        """The functions of kernels.mathematics for symbolic numbers."""
+        return Words()
 
-class Truth(_NoNumber):
-    """A condition."""
+
+class Condition(_Symbolic):
+    """A symbolic truth value."""
 
     __slots__ = ()
 
-    def _join(self, other: Any, name: str) -> "Truth":
-        if not isinstance(other, (Truth, bool)):
+    def _join(self, other: Any, name: str) -> "Condition":
+        if not isinstance(other, (Condition, bool)):
             raise TraceError(f"joins a condition and a {type(other).__name__}; compare numbers")
-        word = other.word if isinstance(other, Truth) else str(other).lower()
-        return Truth(_new(f"{name} i1 {self.word}, {word}"))
+        word = other.word if isinstance(other, Condition) else str(other).lower()
+        return Condition(_new(f"{name} i1 {self.word}, {word}"))
 
-    def __and__(self, other: Any) -> "Truth":
+    def __and__(self, other: Any) -> "Condition":
         return self._join(other, "and")
 
-    def __or__(self, other: Any) -> "Truth":
+    def __or__(self, other: Any) -> "Condition":
         return self._join(other, "or")
 
-    def __xor__(self, other: Any) -> "Truth":
+    def __xor__(self, other: Any) -> "Condition":
         return self._join(other, "xor")
 
-    def __invert__(self) -> "Truth":
+    def __invert__(self) -> "Condition":
         return self._join(True, "xor")
 
     __rand__, __ror__, __rxor__ = __and__, __or__, __xor__
 
-    @property
-    def words(self) -> "Words":
-        """Words for symbolic numbers."""
-        return Words()
-
 
 def _word(x: Any) -> str:
-    """A number as a word of LLVM."""
+    """The LLVM value of a number, as a double."""
     if isinstance(x, Symbol):
         return x.word
     if isinstance(x, Whole):
         return _new(f"sitofp i64 {x.word} to double")
     try:
-        return bits(builtins.float(x))
+        return bits(float(x))
     except (TypeError, ValueError) as error:
         if isinstance(error, TraceError):
             raise
         raise TraceError(f"a {type(x).__name__} stands where a number must be") from None
 
 
-def _operation(name: str, turned: bool = False) -> Any:
+def _operation(name: str, reflected: bool = False) -> Any:
     def operate(self: "Symbol", other: Any) -> "Symbol":
         if isinstance(other, (tuple, list, str)) or other is None:
             raise TraceError(f"{name[1:]}s a number and a {type(other).__name__}; "
                              "vectors have words: add, sub, scale, dot")  # fmt: skip
-        a, b = (other, self) if turned else (self, other)
+        a, b = (other, self) if reflected else (self, other)
         return Symbol(_new(f"{name} double {_word(a)}, {_word(b)}"))
 
     return operate
 
 
 def _comparison(relation: str) -> Any:
-    def compare(self: "Symbol", other: Any) -> Truth:
-        return Truth(_new(f"fcmp {relation} double {_word(self)}, {_word(other)}"))
+    def compare(self: "Symbol", other: Any) -> Condition:
+        return Condition(_new(f"fcmp {relation} double {_word(self)}, {_word(other)}"))
 
     return compare
 
 
-class Symbol(_NoNumber):
-    """A number to be."""
+class Symbol(_Symbolic):
+    """A symbolic float."""
 
     __slots__ = ()
 
-    __add__, __radd__ = _operation("fadd"), _operation("fadd", turned=True)
-    __sub__, __rsub__ = _operation("fsub"), _operation("fsub", turned=True)
-    __mul__, __rmul__ = _operation("fmul"), _operation("fmul", turned=True)
-    __truediv__, __rtruediv__ = _operation("fdiv"), _operation("fdiv", turned=True)
+    __add__, __radd__ = _operation("fadd"), _operation("fadd", reflected=True)
+    __sub__, __rsub__ = _operation("fsub"), _operation("fsub", reflected=True)
+    __mul__, __rmul__ = _operation("fmul"), _operation("fmul", reflected=True)
+    __truediv__, __rtruediv__ = _operation("fdiv"), _operation("fdiv", reflected=True)
     __lt__, __le__, __gt__, __ge__ = (_comparison(r) for r in ("olt", "ole", "ogt", "oge"))
     __eq__, __ne__ = _comparison("oeq"), _comparison("une")
 
@@ -149,7 +145,7 @@ class Symbol(_NoNumber):
         return Words().fabs(self)
 
     def __pow__(self, n: Any) -> Any:
-        """Products for whole constants, a root for 0.5, else pow of the C library."""
+        """Products for integer constants, a square root for 0.5, else ``pow`` of the C library."""
         if isinstance(n, int) and abs(n) <= 64:
             result, power, left = None, self, abs(n)
             while left:
@@ -166,22 +162,17 @@ class Symbol(_NoNumber):
         return Words().pow(x, self)
 
     def rint(self) -> "Symbol":
-        """The nearest whole number: what numpy.rint asks for."""
+        """The nearest integer, for ``numpy.rint``."""
         return Words().rint(self)
 
     @property
     def real(self) -> "Symbol":
-        """Itself."""
+        """The number itself: conditions of complex numbers compare real parts."""
         return self
 
-    @property
-    def words(self) -> "Words":
-        """Words for symbolic numbers."""
-        return Words()
 
-
-class Whole(_NoNumber):
-    """A place, or a count: whole numbers of the loop, which kernels do not see."""
+class Whole(_Symbolic):
+    """A symbolic integer of the loop, an index or a count; kernels do not see it."""
 
     __slots__ = ()
 
@@ -199,7 +190,7 @@ class Whole(_NoNumber):
 
 
 class Words:
-    """The words of kernels.mathematics and kernels.tables, for symbolic numbers."""
+    """The functions of kernels.mathematics and kernels.tables, for symbolic numbers."""
 
     def __getattr__(self, name: str) -> Callable[..., Symbol]:
         if name not in (*EXACT, *LIBRARY):
@@ -208,34 +199,34 @@ class Words:
         def word(*numbers: Any) -> Symbol:
             words = [_word(x) for x in numbers]
             symbol, text = declaration(name, len(words))
-            _now.program.needs[symbol] = text
+            _current.program.needs[symbol] = text
             return Symbol(_new(call_of(name, words)))
 
         return word
 
-    def where(self, condition: Truth, a: Any, b: Any) -> Any:
-        """``a`` where the condition holds, else ``b``; of tuples each number by itself."""
+    def where(self, condition: Condition, a: Any, b: Any) -> Any:
+        """``a`` where the condition holds, else ``b``; tuples item by item."""
         if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
             return tuple(self.where(condition, x, y) for x, y in zip(a, b, strict=True))
-        if isinstance(a, Truth) and isinstance(b, Truth):
-            return Truth(_new(f"select i1 {condition.word}, i1 {a.word}, i1 {b.word}"))
+        if isinstance(a, Condition) and isinstance(b, Condition):
+            return Condition(_new(f"select i1 {condition.word}, i1 {a.word}, i1 {b.word}"))
         text = f"select i1 {condition.word}, double {_word(a)}, double {_word(b)}"
         return Symbol(_new(text))
 
     def whole(self, x: Any) -> Whole:
-        """A number as a place."""
+        """A float as an integer."""
         return Whole(_new(f"fptosi double {_word(x)} to i64"))
 
     def row_of(self, row: Any, array: "Numbers", place: Any, rows: Any, width: int, x: Any) -> Any:
-        """Where the row of a table begins: by a function of the subset."""
-        name, _ = _now.program.function(row, (Array(FLOAT, 1), INT, INT, INT, FLOAT))
+        """Index at which a row of a table begins, found by a function of the subset."""
+        name, _ = _current.program.function(row, (Array(FLOAT, 1), INT, INT, INT, FLOAT))
         given = (f"ptr {array.base}, i64 0, i64 {self.whole(place).word}, "
                  f"i64 {self.whole(rows).word}, i64 {width}, double {_word(x)}")  # fmt: skip
         return Whole(_new(f"call i64 @{name}({given})"))
 
 
 class Numbers:
-    """An array of a loop: flat, or rows of a known width."""
+    """An array of a loop: one-dimensional, or with rows of a known width."""
 
     words = Words()
 
@@ -255,7 +246,7 @@ class Numbers:
     def __setitem__(self, k: Any, x: Any) -> None:
         word = _word(x)
         at = self._at(k)
-        _now.lines.append(f"  store double {word}, ptr {at}, align 8")
+        _current.lines.append(f"  store double {word}, ptr {at}, align 8")
 
 
 class _Arrays:
@@ -270,13 +261,13 @@ def trace(
     """LLVM IR of a group loop.
 
     Args:
-        symbol: the name of its function.
-        namespace: of the module with its function ``loop`` in Python (kernels/loops.py).
-        members: of each array that it reads: its word in the table, LLVM's type of its items, and
-            the width of its rows (0: it is flat).
+        symbol: name of its function.
+        namespace: of the module with the Python function ``loop`` (kernels/loops.py).
+        members: for each array that it reads: index of its address in the struct, LLVM type of its
+            items, width of its rows (0: one-dimensional).
 
     Raises:
-        CompileError: names the line of the kernel, and what to do.
+        CompileError: with the line of the kernel, and what to write instead.
     """
     program = Program()
     arrays: Any = _Arrays()
@@ -286,19 +277,19 @@ def trace(
                  f"  %{name} = load ptr, ptr %{name}.at, align 8"]  # fmt: skip
         setattr(arrays, name, Numbers(f"%{name}", item, width))
     outputs = [Numbers(f"%out{k}") for k in (1, 2, 3)]
-    before = vars(_now).copy()
-    _now.lines, _now.program = [], program
-    namespace["range"] = lambda count: [Whole("%q")]  # instance q stands for all
+    before = vars(_current).copy()
+    _current.lines, _current.program = [], program
+    namespace["range"] = lambda count: [Whole("%q")]  # one symbolic instance q
     try:
         namespace["loop"](
             Symbol("%t"), arrays, Whole("%i0"), Whole("%p0"), Whole("%count"), *outputs
         )
-        lines = _now.lines
+        lines = _current.lines
     except Exception as error:
         raise CompileError(f"{_reason(error)}{_line_of(error)}") from error
     finally:
-        vars(_now).clear()
-        vars(_now).update(before)
+        vars(_current).clear()
+        vars(_current).update(before)
     program.text.append(
         _FUNCTION.format(symbol=symbol, head="\n".join(head), body="\n".join(lines))
     )
@@ -330,7 +321,7 @@ def _reason(error: BaseException) -> str:
 
 
 def _line_of(error: BaseException) -> str:
-    """The author's line: the last one that is not of this package."""
+    """The line of the kernel: the last one outside this package."""
     ours = Path(__file__).parents[1]
     found = ""
     for frame in traceback.extract_tb(error.__traceback__):

@@ -1,4 +1,4 @@
-"""The types of compiled code, and the machine words that a value of each is made of."""
+"""Types of compiled code, and the machine words that represent their values."""
 
 import struct
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ import numpy as np
 
 
 class CompileError(TypeError):
-    """Python that the compiler does not take: why, what to write instead, file and line."""
+    """Python outside the subset: the reason, what to write instead, file and line."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scalar:
-    """A number, or nothing."""
+    """A number, or None."""
 
     name: str
     words: tuple[str, ...]
@@ -21,15 +21,15 @@ class Scalar:
 
 NOTHING, BOOL, INT = Scalar("None", ()), Scalar("bool", ("i1",)), Scalar("int", ("i64",))
 FLOAT, COMPLEX = Scalar("float", ("double",)), Scalar("complex", ("double", "double"))
-#: Numbers in the order in which one becomes another.
+#: Number types in the order of conversion.
 NUMBERS = (BOOL, INT, FLOAT, COMPLEX)
-#: Items of arrays.
+#: Types of array items.
 DTYPES = {INT: np.dtype(np.int64), FLOAT: np.dtype(float), COMPLEX: np.dtype(complex)}
 
 
 @dataclass(frozen=True)
 class Array:
-    """A C-contiguous array: where its numbers begin, and its shape."""
+    """A C-contiguous array: address of its first item, and shape."""
 
     item: Scalar
     ndim: int
@@ -40,8 +40,9 @@ class Array:
         return ("ptr", *["i64"] * self.ndim)
 
 
-@dataclass(frozen=True)
 class _ByAddress:
+    """Base of types of one address; no dataclass, whose equality a struct would inherit."""
+
     @property
     def words(self) -> tuple[str, ...]:
         """One address."""
@@ -50,24 +51,24 @@ class _ByAddress:
 
 @dataclass(frozen=True)
 class Numbers(_ByAddress):
-    """Where the numbers of an array begin: what a function called by address takes of it."""
+    """Address of the first item of an array, as functions called by address take it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Struct(_ByAddress):
-    """A table of arrays, and of further such tables (kernels/by_address.py)."""
+    """A struct of arrays and further structs (kernels/by_address.py)."""
 
     name: str
     members: tuple[tuple[str, Any], ...]
 
     def begins_with(self, other: Any) -> bool:
-        """Whether this has the members of the other first, so that it can stand for it."""
+        """Whether this struct extends the other: its first members are those of the other."""
         return isinstance(other, Struct) and self.members[: len(other.members)] == other.members
 
 
 @dataclass(frozen=True, eq=False)
 class Signature:
-    """Types of the arguments and of the result of a function called by address."""
+    """Argument and result types of a function called by address."""
 
     arguments: tuple[Any, ...]
     result: Any = NOTHING
@@ -95,20 +96,31 @@ class Tuple:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """Those of its items."""
+        """The words of its items."""
         return tuple(word for item in self.items for word in item.words)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Known:
-    """What is known when code is compiled: a function, a module, a number put into a function."""
+    """A compile-time constant: a function, a module, a number that an inlined function is given."""
 
     value: Any
     words: tuple[str, ...] = ()
 
+    def __eq__(self, other: object) -> bool:
+        """Equality of type and bits: 1, 1.0 and True are different code, and so are 0.0, -0.0."""
+        return isinstance(other, Known) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def _key(self) -> Any:
+        value = bits(self.value) if isinstance(self.value, float) else self.value
+        return type(self.value), value
+
 
 class Value(NamedTuple):
-    """A value while code is written: its type, LLVM's names of its words, the number if known."""
+    """A value in the compiler: type, LLVM names of its words, number if it is a constant."""
 
     type: Any
     words: tuple[str, ...] = ()
@@ -117,17 +129,17 @@ class Value(NamedTuple):
 
     @property
     def word(self) -> str:
-        """The word of a value that has one."""
+        """The word of a value of one word."""
         return self.words[0]
 
 
 def bits(x: float) -> str:
-    """A float as LLVM writes it, exactly."""
+    """A float in the exact notation of LLVM."""
     return f"0x{struct.unpack('>Q', struct.pack('>d', x))[0]:016X}"
 
 
 def constant(value: Any) -> Value | None:
-    """A number, a tuple of numbers or None as a value; None where it is something else."""
+    """A number, a tuple of numbers or None as a value; None for anything else."""
     if value is None:
         return Value(NOTHING)
     if isinstance(value, (bool, np.bool_)):
@@ -159,7 +171,7 @@ def items_of(value: Value) -> tuple[Value, ...]:
 
 
 def wider(one: Any, other: Any) -> Any:
-    """The type that holds values of both; None where there is none."""
+    """The common type of two values; None where there is none."""
     if one == other:
         return one
     if one in NUMBERS and other in NUMBERS:

@@ -1,4 +1,4 @@
-"""The words of compiled code: functions of Python and of other libraries that it knows."""
+"""Functions of Python, numpy and the C library that compiled code may call."""
 
 import ast
 import builtins
@@ -20,13 +20,13 @@ from dap3d_core.kernels.compiler.types import (
     wider,
 )
 
-#: Exact everywhere: LLVM's own.
+#: LLVM intrinsics, exact on every platform.
 EXACT = ("sqrt", "fabs", "floor", "ceil", "rint")
-#: Of the C library, which plain Python calls as well. LLVM is told that it does not know them, for
-#: what it puts in their place may round otherwise.
+#: Functions of the C library, which plain Python calls as well. LLVM must not replace them
+#: (nobuiltin): its own versions may round differently.
 LIBRARY = ("sin", "cos", "tan", "tanh", "exp", "log", "asin", "acos", "atan", "atan2", "pow",
            "hypot", "nextafter")  # fmt: skip
-#: Functions that compiled code calls by a word.
+#: Python functions by the name of their compiled form.
 KNOWN: dict[Any, str] = {
     **{getattr(math, n): n for n in LIBRARY if n not in ("hypot", "pow", "nextafter")},
     math.sqrt: "sqrt", np.sqrt: "sqrt", np.nextafter: "nextafter", np.rint: "rint",
@@ -35,12 +35,12 @@ KNOWN: dict[Any, str] = {
     ("abs", "min", "max", "int", "float", "bool", "len")},
 }  # fmt: skip
 
-#: How each is written, by its name.
+#: Compiled forms: each takes the compiler, the node of the call and the arguments.
 WORDS: dict[str, Callable[[Any, Any, list[Value]], Value]] = {}
 
 
 def word(name: str) -> Callable[[Any], Any]:
-    """Let compiled code take a word of this name where it calls a function."""
+    """Mark a Python function as known to compiled code under a name of ``WORDS``."""
 
     def mark(function: Any) -> Any:
         function.compiled_word = name
@@ -65,14 +65,14 @@ def declaration(name: str, count: int) -> tuple[str, str]:
 
 
 def call_of(name: str, words: Sequence[str]) -> str:
-    """The call of such a function."""
+    """LLVM IR of a call of such a function."""
     attributes = "" if name in EXACT else " nobuiltin nounwind willreturn memory(none)"
     arguments = ", ".join(f"double {x}" for x in words)
     return f"call double @{declaration(name, len(words))[0]}({arguments}){attributes}"
 
 
 def function_of(name: str) -> Callable[[Any, Any, list[Value]], Value]:
-    """How a function of floats is written."""
+    """The compiled form of a function of floats."""
 
     def write(c: Any, node: Any, values: list[Value]) -> Value:
         symbol, text = declaration(name, len(values))
@@ -121,7 +121,7 @@ def _complex(c: Any, node: Any, values: list[Value]) -> Value:
 
 @_writes("min", "max")
 def _extreme(c: Any, node: Any, values: list[Value]) -> Value:
-    """As Python's: a later value is taken only where it compares as better."""
+    """As in Python, a later value is taken only where the comparison holds."""
     if len(values) < 2:
         c.refuse(node, "min or max of one value", "give it two numbers")
     order = ast.Gt() if node.func.id == "max" else ast.Lt()

@@ -1,4 +1,4 @@
-"""What functions are written with: sources, instructions, blocks, places in memory, casts."""
+"""Building blocks of the compiler: syntax trees, instructions, blocks, stack slots, casts."""
 
 import ast
 import contextlib
@@ -31,7 +31,7 @@ from dap3d_core.kernels.compiler.types import (
 
 @cache
 def _definitions(file: str, everywhere: bool) -> dict[int, ast.FunctionDef]:
-    """The functions of a file by their first line, decorators included."""
+    """Functions of a file by their first line, decorators included."""
     tree = ast.parse("".join(linecache.getlines(file)))
     nodes = ast.walk(tree) if everywhere else tree.body
     found = (node for node in nodes if isinstance(node, ast.FunctionDef))
@@ -40,7 +40,7 @@ def _definitions(file: str, everywhere: bool) -> dict[int, ast.FunctionDef]:
 
 @cache
 def stored_names(node: ast.FunctionDef) -> set[str]:
-    """The names that a function gives values to."""
+    """Names that a function assigns to."""
     names = (n for n in ast.walk(node) if isinstance(n, ast.Name))
     return {n.id for n in names if isinstance(n.ctx, ast.Store)}
 
@@ -49,7 +49,7 @@ def definition(function: Callable[..., Any]) -> ast.FunctionDef:
     """The syntax tree of a function.
 
     Raises:
-        CompileError: its source is not to be had.
+        CompileError: its source is not available.
     """
     code = function.__code__
     with contextlib.suppress(SyntaxError):
@@ -63,7 +63,7 @@ def definition(function: Callable[..., Any]) -> ast.FunctionDef:
 
 
 def result_type(type_: Any) -> str:
-    """LLVM's type of a result."""
+    """LLVM type of a result."""
     words: tuple[str, ...] = type_.words
     if len(words) > 1:
         return f"{{{', '.join(words)}}}"
@@ -71,7 +71,7 @@ def result_type(type_: Any) -> str:
 
 
 def name_of(type_: Any) -> str:
-    """A type in words."""
+    """Description of a type for messages."""
     if isinstance(type_, Array):
         return f"array of {type_.item.name}s with {type_.ndim} indices"
     if isinstance(type_, Known):
@@ -80,7 +80,7 @@ def name_of(type_: Any) -> str:
 
 
 class Writer:
-    """Writes the instructions of a function."""
+    """Writes the instructions of one function."""
 
     function: Callable[..., Any]
     lines: list[str]
@@ -89,7 +89,7 @@ class Writer:
     is_dead: bool
 
     def refuse(self, node: Any, why: str, remedy: str) -> NoReturn:
-        """Say what is wrong, what to do, and where."""
+        """Raise a CompileError: what is wrong, what to write instead, file and line."""
         where = f"{self.function.__code__.co_filename}:{node.lineno}"
         raise CompileError(f"{self.function.__qualname__}: {why}; {remedy} [{where}]")
 
@@ -98,20 +98,20 @@ class Writer:
         self.lines.append(f"  {text}")
 
     def new(self, text: str) -> str:
-        """Add an instruction that gives a word; returns its name."""
+        """Add an instruction with a result; returns the name of the result."""
         self.count += 1
         self.lines.append(f"  %t{self.count} = {text}")
         return f"%t{self.count}"
 
     def label(self) -> str:
-        """A new name of a block."""
+        """A new block label."""
         self.count += 1
         return f"L{self.count}"
 
     # ------------------------------------------------------------------ from one type to another
 
     def cast(self, node: Any, value: Value, type_: Any) -> Value:
-        """A value as one of another type."""
+        """A value converted to another type."""
         have = value.type
         if have == type_:
             return value
@@ -151,7 +151,7 @@ class Writer:
         return Value(type_, (self.new(text),))
 
     def integer(self, node: Any, value: Value) -> Value:
-        """A value that must be a whole number."""
+        """A value that must be an integer."""
         if value.type not in (INT, BOOL):
             self.refuse(node, f"a {name_of(value.type)} counts or is an index",
                         "take a whole number, int(x)")  # fmt: skip
@@ -165,19 +165,19 @@ class Writer:
         self.is_dead = False
 
     def jump(self, label: str) -> None:
-        """End a block, if nothing has ended it."""
+        """End a block with a jump, unless it has ended."""
         if not self.is_dead:
             self.line(f"br label %{label}")
         self.is_dead = True
 
     def branch(self, condition: Value, one: str, other: str) -> None:
-        """End a block by a choice."""
+        """End a block with a conditional jump."""
         self.line(f"br i1 {condition.word}, label %{one}, label %{other}")
 
     # ------------------------------------------------------------------ variables
 
     def place(self, type_: Any, name: str) -> list[str]:
-        """A place in memory for each word of a value, zero at first."""
+        """Stack slots for the words of a value, initialised to zero."""
         found = []
         for word in type_.words:
             self.count += 1
@@ -188,11 +188,11 @@ class Writer:
         return found
 
     def write_to(self, slots: list[str], value: Value) -> None:
-        """Put a value into a place."""
+        """Store a value in stack slots."""
         for word, x, slot in zip(value.type.words, value.words, slots, strict=True):
             self.line(f"store {word} {x}, ptr {slot}")
 
     def read_from(self, slots: list[str], type_: Any) -> Value:
-        """The value in a place."""
+        """Load a value from stack slots."""
         pairs = zip(type_.words, slots, strict=True)
         return Value(type_, tuple(self.new(f"load {w}, ptr {s}") for w, s in pairs))

@@ -1,0 +1,272 @@
+"""Calls of the core's compiled functions, recorded in plain Python and repeated as machine code.
+
+Records copies of the arguments of each function at some of its calls, with what plain Python
+returned and left in the arrays. ``differences`` then compiles all recorded functions at every level
+and compares each call in all bits. For a process of its own: it switches the compiler off.
+"""
+
+import importlib
+import os
+import pkgutil
+import sys
+
+import attrs
+import numpy as np
+
+from dap3d_core.assembly.system import Halves
+from dap3d_core.formulations.halves import RESULT, STATE
+from dap3d_core.kernels import cache
+from dap3d_core.kernels.by_address import Arrays, pointer
+from dap3d_core.kernels.cache import COMPILED_FLOORS, Compiled
+from dap3d_core.kernels.compiler.functions import Program
+from dap3d_core.kernels.compiler.trace import trace
+from dap3d_core.kernels.compiler.types import (
+    COMPLEX,
+    FLOAT,
+    INT,
+    NOTHING,
+    Array,
+    CompileError,
+    Known,
+    Signature,
+    Table,
+    Tuple,
+)
+from dap3d_core.kernels.compiler.units import Functions, type_of
+from dap3d_core.kernels.lists import LOOP
+from dap3d_core.kernels.loops import _members
+from support.at_all_levels import all_made_of, function_of, made_of, same_bits
+
+#: The calls of a function that are recorded in each scene, from 1: early ones and some later ones.
+CALLS = {1, 2, 7, 40, 200}
+
+
+class PlainTable(list):
+    """A table of functions in plain Python, with their signature."""
+
+    signature = None
+
+
+class Recorder:
+    """Runs compiled functions as plain Python and records some of their calls."""
+
+    def __init__(self):
+        self.functions = set(all_compiled_functions())
+        self.calls = []
+        self._counts = {}
+        os.environ["DAP3D_PLAIN"] = "1"
+        Compiled.__call__ = lambda function, *arguments: self.call(function, arguments)
+        original = cache.table_of
+
+        def table_of(signature, functions):
+            table = PlainTable(original(signature, functions))
+            table.signature = signature
+            return table
+
+        for module in list(sys.modules.values()):
+            if getattr(module, "table_of", None) is original:
+                module.table_of = table_of
+
+    def call(self, function, arguments):
+        """Call a function as plain Python."""
+        count = self._counts[function] = self._counts.get(function, 0) + 1
+        if count not in CALLS:
+            return function.__wrapped__(*arguments)
+        for parameter in function._parameters[len(arguments) :]:
+            arguments += (parameter.default,)
+        before, memo = copied(arguments, {}), {}
+        result = function.__wrapped__(*arguments)
+        self.calls.append((function, before, copied(arguments, memo), copied(result, memo)))
+        return result
+
+    def record(self, scenario, *arguments, **options):
+        """Record the calls of a scenario; counts start again."""
+        self._counts.clear()
+        scenario(*arguments, **options)
+
+    def missing(self):
+        """Names of compiled functions that were never called."""
+        called = {call[0] for call in self.calls}
+        return sorted(f"{f.__module__}.{f.__name__}" for f in self.functions - called)
+
+
+def all_compiled_functions():
+    """The compiled functions of the core's floors."""
+    for floor in COMPILED_FLOORS:
+        package = importlib.import_module(f"dap3d_core.{floor}")
+        for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            module = importlib.import_module(info.name)
+            yield from (f for f in vars(module).values() if isinstance(f, Compiled))
+
+
+def copied(value, memo):
+    """A deep copy in which arrays share memory as they did."""
+    if id(value) in memo:
+        return memo[id(value)][1]
+    if isinstance(value, np.ndarray):
+        base = value
+        while isinstance(base.base, np.ndarray):
+            base = base.base
+        if not base.flags.c_contiguous or value.size == 0:
+            return value.copy()
+        _, whole = memo.setdefault(id(base), (base, base.copy()))
+        offset = value.ctypes.data - base.ctypes.data
+        return np.ndarray(value.shape, value.dtype, whole, offset, value.strides)
+    if isinstance(value, Arrays):
+        fields = {f.alias: getattr(value, f.name) for f in attrs.fields(type(value)) if f.init}
+        found = type(value)(**{name: copied(member, memo) for name, member in fields.items()})
+        memo[id(value)] = value, found
+        return found
+    return tuple(copied(item, memo) for item in value) if type(value) is tuple else value
+
+
+def arrays_in(value):
+    """All arrays of an argument."""
+    if isinstance(value, np.ndarray):
+        yield value
+    elif isinstance(value, (Arrays, tuple)):
+        for member in value:
+            yield from arrays_in(member)
+
+
+def compiled_type(value, parameter):
+    """The type of a recorded argument."""
+    if isinstance(value, PlainTable):
+        return Table(value.signature)
+    if callable(value) and not isinstance(value, Arrays):
+        return Known(value)
+    if isinstance(value, complex):
+        return COMPLEX
+    type_ = type_of(value)
+    return FLOAT if type_ == INT and parameter.annotation is float else type_
+
+
+def wrapper_of(function, types):
+    """A function of the same arguments that writes the results of a function into an array."""
+    _, result = Program().function(function, types)
+    names = ", ".join(f"a{k}" for k in range(len(types)))
+    given = ", ".join(f"a{k}[0]" if t == COMPLEX else f"a{k}" for k, t in enumerate(types))
+    lines = [f"def f({names}, out):", f"    r = target({given})", "    k = 0"]
+    if result == NOTHING:
+        lines[1:] = [f"    target({given})"]
+    for path, type_ in leaves("r", result):
+        if isinstance(type_, Array):
+            lines += [f"    for q in range({path}.size):", f"        out[k] = pointer({path})[q]",
+                      "        k += 1"]  # fmt: skip
+        else:
+            lines += [f"    out[k] = {path}", "    k += 1"]
+    return function_of("\n".join(lines) + "\n", target=function, pointer=pointer)
+
+
+def leaves(path, type_):
+    """Path and type of each number or array of a result."""
+    if isinstance(type_, Tuple):
+        for k, item in enumerate(type_.items):
+            yield from leaves(f"{path}[{k}]", item)
+    elif type_ != NOTHING:
+        yield path, type_
+
+
+def numbers_of(result):
+    """The numbers of a result, in order."""
+    if isinstance(result, tuple):
+        return [x for item in result for x in numbers_of(item)]
+    return [] if result is None else np.ravel(result).tolist()
+
+
+def exported(program, function, before, index):
+    """Compile a function for recorded arguments: symbol, signature, indices of its arguments."""
+    parameters = function._parameters
+    types = [compiled_type(v, p) for v, p in zip(before, parameters, strict=True)]
+    try:
+        wrapper = wrapper_of(function, types)
+    except CompileError:  # put into its callers with constants, and needs some of them
+        types = [Known(v) if t == INT else t for v, t in zip(before, types, strict=True)]
+        wrapper = wrapper_of(function, types)
+    types = [Array(COMPLEX, 1) if t == COMPLEX else t for t in types]  # C calls take no complex
+    symbol = f"recorded_{index}"
+    program.export(wrapper, (*types, Array(COMPLEX, 1)), symbol)
+    variable = [k for k, t in enumerate(types) if not isinstance(t, Known)]
+    signature = Signature((*(types[k] for k in variable), Array(COMPLEX, 1)))
+    return symbol, signature, variable
+
+
+def differences(calls, levels=None):
+    """Recorded calls that compiled code answers in other bits: functions and levels.
+
+    Args:
+        calls: of a recorder.
+        levels: some of ``targets``; all where it is None.
+    """
+    program, wrappers, signatures, items = Program(), {}, {}, {}
+    for function, before, _, _ in calls:
+        key = function, tuple(map(kind, before))
+        if key not in wrappers:
+            wrappers[key] = exported(program, function, before, len(wrappers))
+            signatures[wrappers[key][0]] = wrappers[key][1]
+        for table in (v for v in before if isinstance(v, PlainTable)):
+            for item in table:
+                if isinstance(item, Compiled) and item not in items:
+                    items[item] = f"item_{len(items)}"
+                    signatures[items[item]] = program.export(
+                        item, table.signature.arguments, items[item]
+                    )
+                elif not isinstance(item, Compiled) and id(item) not in items:
+                    items[id(item)] = item, made_of(loop_text(item), "loop", LOOP, levels)
+    found = set()
+    for level, entries in all_made_of(program.module(), signatures, levels).items():
+
+        def compiled_table(table, level=level, entries=entries):
+            made = (entries[items[f]] if isinstance(f, Compiled) else items[id(f)][1][level]
+                    for f in table)  # fmt: skip
+            return Functions(table.signature, list(made))
+
+        for function, before, after, result in calls:
+            symbol, _, variable = wrappers[function, tuple(map(kind, before))]
+            numbers = np.array(numbers_of(result), dtype=complex)
+            given, out = copied(before, {}), np.zeros(numbers.size, dtype=complex)
+            taken = [given[k] for k in variable]
+            taken = [np.array([v]) if isinstance(v, complex) else v for v in taken]
+            taken = [compiled_table(v) if isinstance(v, PlainTable) else v for v in taken]
+            entries[symbol](*taken, out)
+            pairs = [(numbers, out)]
+            hide_addresses(after)
+            hide_addresses(given)
+            pairs += zip(arrays_in(after), arrays_in(given), strict=True)
+            if not all(same_numbers(one, other) for one, other in pairs):
+                found.add(f"{function.__module__}.{function.__name__} at {level}")
+    return sorted(found)
+
+
+def kind(value):
+    """What tells arguments apart that need another compilation."""
+    if isinstance(value, PlainTable):
+        return value.signature
+    if callable(value) and not isinstance(value, Arrays):
+        return value
+    if isinstance(value, tuple):
+        return tuple(map(kind, value))
+    return (value.dtype.char, value.ndim) if isinstance(value, np.ndarray) else type(value)
+
+
+def hide_addresses(value):
+    """Set the addresses to zero that one thread leaves for the other."""
+    if isinstance(value, Halves):
+        value.mail[[STATE, RESULT]] = 0
+    elif isinstance(value, (Arrays, tuple)):
+        for member in value:
+            hide_addresses(member)
+
+
+def loop_text(loop):
+    """LLVM IR of a group loop."""
+    text = trace("loop", loop.__globals__, _members())
+    del loop.__globals__["range"]  # its plain Python goes on
+    return text
+
+
+def same_numbers(one, other):
+    """Whether arrays are equal in all bits; NaN is NaN."""
+    if one.dtype.kind == "i":
+        return one.tobytes() == other.tobytes()
+    return same_bits(np.ravel(one).view(float), np.ravel(other).view(float))

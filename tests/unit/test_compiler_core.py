@@ -1,0 +1,103 @@
+"""Each compiled function of the core: plain Python and machine code give the same bits.
+
+Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py).
+"""
+
+import json
+
+import pytest
+from support.process import REPOSITORY, run
+
+from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.compiler.types import FLOAT, INT, Known, Struct
+
+pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
+
+#: Repeats the calls of some runs; prints what differs and which functions were not called.
+SCRIPT = """
+import json, sys, warnings
+sys.path[:0] = [{tests!r}, {tests!r} + "/unit"]
+from support.recorded_calls import Recorder, differences
+import numpy as np
+import dap3d_core as dap
+warnings.simplefilter("ignore")
+recorder = Recorder()
+{scenarios}
+print(json.dumps([len(recorder.calls), differences(recorder.calls, {levels}), recorder.missing()]))
+"""
+SHORT = {"t_end": 0.002, "dt": 0.001}
+QUICK = [("pen1", SHORT)]
+RUNS = [
+    *QUICK,
+    ("fourbar3", SHORT),
+    ("fourbar3", SHORT | {"method": "penalty"}),
+    ("fourbar3", SHORT | {"method": "lsq"}),
+    ("pen2", SHORT | {"integrator": "adams"}),
+    ("pen2", SHORT | {"integrator": "radau"}),
+    ("fourbar2", SHORT | {"integrator": "dopri5"}),
+    ("pen1", SHORT | {"integrator": "rk4", "step": 0.0005}),
+    ("bodies2", SHORT),
+    ("ball1", {"t_end": 0.5, "dt": 0.1, "allow_code": True}),
+    ("tri", SHORT),
+]
+#: Friction, packs of points, two halves.
+MORE = """
+from dap3d_core import formulations
+from unit.test_checkpoint import wheel
+from unit.test_halves import SCENES
+from unit.test_study_ensemble import ensemble, pendulum
+from unit.test_study_packs import CASES, in_packs
+
+def pack(make, vary, output, t_end=0.02, **settings):
+    study = ensemble(make(), vary, [output], t_end=t_end, dt=0.01, **settings)
+    low, high = np.array(list(vary.values())).T
+    in_packs(study, 3).run(low + np.random.default_rng(1).random((4, len(vary))) * (high - low))
+
+for integrator in ("dop853", "adams", "radau"):
+    recorder.record(dap.simulate, wheel(), t_end=0.2, dt=0.1, integrator=integrator)
+for case in CASES.values():
+    recorder.record(pack, *case)
+recorder.record(pack, *CASES["functions and their breaks"], t_end=0.6)
+recorder.record(pack, pendulum, {"bodies.bob.mass": (1.0, 3.0)}, "bob.w", method="penalty")
+recorder.record(dap.simulate, "pen1", t_end=0.1, dt=0.1, rtol=1e-13, atol=1e-15)
+recorder.record(dap.simulate, SCENES["everything"](), t_end=1e-4, dt=1e-4, integrator="radau")
+formulations.IN_HALVES["standard"] = (formulations.IN_HALVES["standard"][0], 1)
+recorder.record(dap.simulate, SCENES["everything"](), t_end=4e-4, dt=2e-4)
+"""
+#: Functions that these runs do not call: of dense supernodes, which only large nets have, of the
+#: second thread, which plain Python has not, and of rare events of a run. Whole runs cover them
+#: (test_compiler_bits.py, test_halves.py).
+NOT_CALLED = set()
+
+
+def repeated(runs, more="", levels=None):
+    """Number of calls, those that differ, functions that were not called."""
+    lines = [
+        f"recorder.record(dap.simulate, {model!r}, **{settings!r})" for model, settings in runs
+    ]
+    script = SCRIPT.format(tests=str(REPOSITORY / "tests"), scenarios="\n".join(lines) + more,
+                           levels=levels)  # fmt: skip
+    return json.loads(run(script).splitlines()[-1])
+
+
+def test_calls_of_a_short_run_have_the_bits_of_plain_python():
+    count, different, _ = repeated(QUICK, levels=["O0"])
+    assert count > 100
+    assert different == []
+
+
+@pytest.mark.slow
+def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python():
+    """Unoptimised, optimised, optimised without FMA; functions not called are listed."""
+    count, different, missing = repeated(RUNS, MORE)
+    assert count > 4000
+    assert different == []
+    assert set(missing) == NOT_CALLED
+
+
+def test_types_of_one_shape_are_different_types():
+    """Code for a struct, or for a constant, is never taken for that of another one."""
+    members = (("x", FLOAT), ("n", INT))
+    assert Struct("A", members) != Struct("B", members[::-1])
+    assert len({Known(0), Known(0.0), Known(-0.0), Known(False)}) == 4
+    assert Known(2.0) == Known(2.0)
