@@ -27,7 +27,7 @@ from dap3d_core.kernels.compiler.types import (
     items_of,
 )
 from dap3d_core.kernels.compiler.words import KNOWN, WORDS
-from dap3d_core.kernels.compiler.writing import name_of
+from dap3d_core.kernels.compiler.writing import name_of, result_type
 
 #: Remedies for expressions outside the subset.
 INSTEAD = {
@@ -58,13 +58,8 @@ class Expressions(Operations):
 
     def value(self, node: ast.expr) -> Value:
         """The value of an expression."""
-        kind = type(node).__name__
-        write = getattr(self, f"_{kind}", None)
-        if write is None:
-            self.refuse(node, f"{kind} is no expression of compiled code",
-                        INSTEAD.get(kind, "see docs/concepts/compiled-python.md"))  # fmt: skip
-        found: Value = write(node)
-        return found
+        value: Value = self.compile_node(node, "expression", INSTEAD)
+        return value
 
     def _Constant(self, node: ast.Constant) -> Value:
         found = constant(node.value)
@@ -169,22 +164,20 @@ class Expressions(Operations):
         kind = f"[{len(item)} x {item[0]}]" if len(item) > 1 else item[0]
         return self.new(f"getelementptr inbounds {kind}, ptr {array.word}, i64 {k}")
 
-    def word_of(self, place: str, item: Any, k: int) -> str:
-        """Address of the k-th word of an item."""
-        return (
-            self.new(f"getelementptr inbounds {item.words[0]}, ptr {place}, i64 {k}")
-            if k
-            else place
-        )
+    def slots_at(self, address: str, item: Any) -> list[str]:
+        """Addresses of the words of an item."""
+        more = range(1, len(item.words))
+        step = f"getelementptr inbounds {item.words[0]}, ptr {address}, i64"
+        return [address, *(self.new(f"{step} {k}") for k in more)]
 
-    def element(self, node: ast.Subscript) -> tuple[str, Any]:
-        """Address and type of the item that an index selects."""
+    def element(self, node: ast.Subscript) -> tuple[list[str], Any]:
+        """Addresses of the words, and type, of the item that an index selects."""
         array, places = self.value(node.value), _parts(node.slice)
         if not isinstance(array.type, Array):
             self.refuse(node, f"a {name_of(array.type)} is written into", "only arrays change")
         if len(places) != array.type.ndim or any(isinstance(p, ast.Slice) for p in places):
             self.refuse(node, "more than one number is written at once", "write a loop")
-        return self.address(array, places), array.type.item
+        return self.slots_at(self.address(array, places), array.type.item), array.type.item
 
     def _Subscript(self, node: ast.Subscript) -> Value:
         value, places = self.value(node.value), _parts(node.slice)
@@ -205,14 +198,9 @@ class Expressions(Operations):
         if len(places) < type_.ndim:
             shape = value.words[1 + len(places) :]
             return Value(Array(type_.item, type_.ndim - len(places)), (at, *shape))
-        slots = [self.word_of(at, type_.item, k) for k in range(len(type_.item.words))]
-        return self.read_from(slots, type_.item)
+        return self.read_from(self.slots_at(at, type_.item), type_.item)
 
     def _tuple_item(self, node: ast.Subscript, value: Value) -> Value:
-        if isinstance(node.slice, ast.Slice):
-            bounds = [node.slice.lower, node.slice.upper, node.slice.step]
-            known = [None if b is None else self.value(b).constant for b in bounds]
-            return group(items_of(value)[slice(*known)])
         k = self.value(node.slice).constant
         items = items_of(value)
         if not isinstance(k, int) or not -len(items) <= k < len(items):
@@ -293,15 +281,15 @@ class Expressions(Operations):
 
     def _called(self, name: str, result: Any, words: Sequence[str]) -> Value:
         """Emit a call; returns its result."""
-        arguments = ", ".join(words)
-        if not result.words:
-            self.line(f"call void {name}({arguments})")
+        type_, count = result_type(result), len(result.words)
+        call = f"call {type_} {name}({', '.join(words)})"
+        if count == 0:
+            self.line(call)
             return Value(result)
-        if len(result.words) == 1:
-            return Value(result, (self.new(f"call {result.words[0]} {name}({arguments})"),))
-        whole = f"{{{', '.join(result.words)}}}"
-        found = self.new(f"call {whole} {name}({arguments})")
-        parts = (self.new(f"extractvalue {whole} {found}, {k}") for k in range(len(result.words)))
+        whole = self.new(call)
+        if count == 1:
+            return Value(result, (whole,))
+        parts = (self.new(f"extractvalue {type_} {whole}, {k}") for k in range(count))
         return Value(result, tuple(parts))
 
     def _through(self, node: ast.Call, called: Value) -> Value:

@@ -189,12 +189,7 @@ class FunctionCompiler(Expressions):
         for node in nodes:
             if self.is_dead:
                 return
-            kind = type(node).__name__
-            write = getattr(self, f"_{kind}", None)
-            if write is None:
-                self.refuse(node, f"{kind} is no statement of compiled code",
-                            INSTEAD.get(kind, "see docs/concepts/compiled-python.md"))  # fmt: skip
-            write(node)
+            self.compile_node(node, "statement", INSTEAD)
 
     def _Expr(self, node: ast.Expr) -> None:
         if isinstance(node.value, ast.Constant):  # a docstring
@@ -235,9 +230,8 @@ class FunctionCompiler(Expressions):
         if isinstance(target, ast.Name):
             self.store(target, target.id, value)
         elif isinstance(target, ast.Subscript):
-            place, item = self.element(target)
-            for k, x in enumerate(self.cast(target, value, item).words):
-                self.line(f"store {item.words[k]} {x}, ptr {self.word_of(place, item, k)}")
+            slots, item = self.element(target)
+            self.write_to(slots, self.cast(target, value, item))
         elif isinstance(target, (ast.Tuple, ast.List)):
             if not isinstance(value.type, Tuple) or len(value.type.items) != len(target.elts):
                 self.refuse(target, f"takes {len(target.elts)} values apart that are not there",
@@ -257,11 +251,10 @@ class FunctionCompiler(Expressions):
             return
         if not isinstance(node.target, ast.Subscript):
             self.refuse(node, "changes what is no name and no item", "only arrays change")
-        place, item = self.element(node.target)
-        places = [self.word_of(place, item, k) for k in range(len(item.words))]
-        before = self.read_from(places, item)
+        slots, item = self.element(node.target)
+        before = self.read_from(slots, item)
         after = self.operation(node, node.op, before, self.value(node.value))
-        self.write_to(places, self.cast(node, after, item))
+        self.write_to(slots, self.cast(node, after, item))
 
     def _If(self, node: ast.If) -> None:
         test = self.condition(node.test)

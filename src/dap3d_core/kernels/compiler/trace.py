@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.types import FLOAT, INT, Array, CompileError, bits
-from dap3d_core.kernels.compiler.words import EXACT, LIBRARY, call_of, declaration
+from dap3d_core.kernels.compiler.words import EXACT, LIBRARY, call_of
 
 _WORDS = "the words of dap3d_core.kernels: sqrt, sin, minimum, ..., where(condition, a, b)"
 #: The trace of this thread.
@@ -196,13 +196,9 @@ class Words:
         if name not in (*EXACT, *LIBRARY):
             raise AttributeError(name)
 
-        def word(*numbers: Any) -> Symbol:
-            words = [_word(x) for x in numbers]
-            symbol, text = declaration(name, len(words))
-            _current.program.needs[symbol] = text
-            return Symbol(_new(call_of(name, words)))
-
-        return word
+        return lambda *numbers: Symbol(
+            _new(call_of(_current.program, name, [_word(x) for x in numbers]))
+        )
 
     def where(self, condition: Condition, a: Any, b: Any) -> Any:
         """``a`` where the condition holds, else ``b``; tuples item by item."""

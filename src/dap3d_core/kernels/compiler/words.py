@@ -57,28 +57,21 @@ def _writes(*names: str) -> Callable[[Any], Any]:
     return keep
 
 
-def declaration(name: str, count: int) -> tuple[str, str]:
-    """LLVM's name of a function of floats, and its declaration."""
+def call_of(program: Any, name: str, words: Sequence[str]) -> str:
+    """LLVM IR of a call of a function of floats, which is declared in the program."""
     symbol = f"llvm.{name}.f64" if name in EXACT else name
     kind = "" if name in EXACT else " nobuiltin nounwind willreturn memory(none)"
-    return symbol, f"declare double @{symbol}({', '.join(['double'] * count)}){kind}"
-
-
-def call_of(name: str, words: Sequence[str]) -> str:
-    """LLVM IR of a call of such a function."""
-    attributes = "" if name in EXACT else " nobuiltin nounwind willreturn memory(none)"
-    arguments = ", ".join(f"double {x}" for x in words)
-    return f"call double @{declaration(name, len(words))[0]}({arguments}){attributes}"
+    types = ", ".join(["double"] * len(words))
+    program.needs[symbol] = f"declare double @{symbol}({types}){kind}"
+    return f"call double @{symbol}({', '.join(f'double {x}' for x in words)}){kind}"
 
 
 def function_of(name: str) -> Callable[[Any, Any, list[Value]], Value]:
     """The compiled form of a function of floats."""
 
     def write(c: Any, node: Any, values: list[Value]) -> Value:
-        symbol, text = declaration(name, len(values))
-        c.program.needs[symbol] = text
         words = [c.cast(node, v, FLOAT).word for v in values]
-        return Value(FLOAT, (c.new(call_of(name, words)),))
+        return Value(FLOAT, (c.new(call_of(c.program, name, words)),))
 
     return write
 

@@ -93,6 +93,15 @@ class Writer:
         where = f"{self.function.__code__.co_filename}:{node.lineno}"
         raise CompileError(f"{self.function.__qualname__}: {why}; {remedy} [{where}]")
 
+    def compile_node(self, node: ast.AST, noun: str, remedies: dict[str, str]) -> Any:
+        """Compile a node of the syntax tree by the method that is named after its type."""
+        kind = type(node).__name__
+        method = getattr(self, f"_{kind}", None)
+        if method is None:
+            self.refuse(node, f"{kind} is no {noun} of compiled code",
+                        remedies.get(kind, "see docs/concepts/compiled-python.md"))  # fmt: skip
+        return method(node)
+
     def line(self, text: str) -> None:
         """Add an instruction."""
         self.lines.append(f"  {text}")
