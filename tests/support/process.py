@@ -27,10 +27,10 @@ def start(script, cache=None, *, cwd=None, **variables):
     )
 
 
-def run(script, cache=None, *, cwd=None, **variables):
+def run(script, cache=None, *, cwd=None, timeout=300, **variables):
     """Run a script to its end and return what it printed; its failure is the test's."""
     process = start(script, cache, cwd=cwd, **variables)
-    out, err = process.communicate(timeout=300)
+    out, err = process.communicate(timeout=timeout)
     assert process.returncode == 0, err
     return out.strip()
 

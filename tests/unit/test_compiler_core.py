@@ -40,7 +40,7 @@ RUNS = [
     ("ball1", {"t_end": 0.5, "dt": 0.1, "allow_code": True}),
     ("tri", SHORT),
 ]
-#: Friction, packs of points, two halves.
+#: Friction, packs of points, dense supernodes, two halves.
 MORE = """
 from dap3d_core import formulations
 from unit.test_checkpoint import wheel
@@ -60,13 +60,19 @@ for case in CASES.values():
 recorder.record(pack, *CASES["functions and their breaks"], t_end=0.6)
 recorder.record(pack, pendulum, {"bodies.bob.mass": (1.0, 3.0)}, "bob.w", method="penalty")
 recorder.record(dap.simulate, "pen1", t_end=0.1, dt=0.1, rtol=1e-13, atol=1e-15)
+from dap3d_core.linear import dissection, ordering, supernodes
+from unit import test_linear_nets as nets
+usual = ordering.WIDE, dissection.LEAF, supernodes.ZEROS
+ordering.WIDE, dissection.LEAF, supernodes.ZEROS = 0, 4, 0.3
+recorder.record(lambda: nets.check_solution(
+    nets.Case(nets.NETS["plates"](), np.random.default_rng(1))))
+ordering.WIDE, dissection.LEAF, supernodes.ZEROS = usual
 recorder.record(dap.simulate, SCENES["everything"](), t_end=1e-4, dt=1e-4, integrator="radau")
 formulations.IN_HALVES["standard"] = (formulations.IN_HALVES["standard"][0], 1)
 recorder.record(dap.simulate, SCENES["everything"](), t_end=4e-4, dt=2e-4)
 """
-#: Functions that these runs do not call: of dense supernodes, which only large nets have, of the
-#: second thread, which plain Python has not, and of rare events of a run. Whole runs cover them
-#: (test_compiler_bits.py, test_halves.py).
+#: Functions that these runs do not call: of the second thread, which plain Python has not, and of
+#: rare events of a run. Whole runs cover them (test_compiler_bits.py, test_halves.py).
 NOT_CALLED = {
     f"dap3d_core.{module}.{name}"
     for module, names in {
@@ -83,8 +89,6 @@ NOT_CALLED = {
         "integrators.runge_kutta": "is_rounding kept_error on_constraints",
         "integrators.switches": "shorten",
         "linear.null_space": "solve_each",
-        "linear.panels": "divide factor_diagonal factor_panel gather solve_panel_backwards "
-        "solve_panel_forwards store subtract tile",
     }.items()
     for name in names.split()
 }
@@ -97,7 +101,7 @@ def repeated(runs, more="", levels=None):
     ]
     script = SCRIPT.format(tests=str(REPOSITORY / "tests"), scenarios="\n".join(lines) + more,
                            levels=levels)  # fmt: skip
-    return json.loads(run(script).splitlines()[-1])
+    return json.loads(run(script, timeout=1200).splitlines()[-1])
 
 
 def test_calls_of_a_short_run_have_the_bits_of_plain_python():
