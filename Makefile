@@ -26,7 +26,8 @@ CHECK_PYTHON := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11)
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help run install test test-all verify unit-nojit no-fma lint audit format docs bench bench-peers fuzz clean
+.PHONY: help run install wheel test test-all verify unit-nojit no-fma lint audit format docs bench \
+    bench-peers fuzz clean
 
 help:  ## show this list
 	@echo "make TARGET, where TARGET is one of"
@@ -39,6 +40,9 @@ run: $(VENV)/.installed  ## simulate MODEL (fourbar3), write runs/MODEL.nc and a
 	@$(VENV)/bin/dap3d plot "$(RUN).nc" "$(QUANTITY)" -o "$(RUN).png" --force
 
 install: $(VENV)/.installed  ## put dap3d into .venv, editable (what run, test and lint do themselves)
+
+wheel: $(VENV)/.installed-dev  ## the wheel as it is published, with ready-made objects, into dist
+	@DAP3D_READY_OBJECTS=all $(PYTHON) -m build --wheel
 
 test: $(VENV)/.installed-test  ## the quick tests
 	@$(PYTHON) -m pytest -n auto -m "not slow"

@@ -21,7 +21,13 @@ from typing import Any
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.types import BOOL, FLOAT, INT, NOTHING, Scalar, Signature
-from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, kind_of, type_of
+from dap3d_core.kernels.compiler.units import (
+    Entry,
+    Functions,
+    Unit,
+    kind_of,
+    type_of,
+)
 from dap3d_core.kernels.trusted import distrust
 
 #: Floors of the core that hold compiled code, low to high: a function depends on its own floor and
@@ -82,8 +88,13 @@ def _candidates():
 
 def digest(*parts: str | bytes) -> str:
     """Digest of sources and of the Python that reads them."""
+    return source_digest(*parts, f"{sys.version_info[:2]}")
+
+
+def source_digest(*parts: str | bytes) -> str:
+    """Digest of sources alone."""
     seal = hashlib.sha256()
-    for part in (*parts, f"{sys.version_info[:2]}"):
+    for part in parts:
         seal.update(part.encode() if isinstance(part, str) else part)
         seal.update(b"\0")
     return seal.hexdigest()[:20]
@@ -95,7 +106,24 @@ def driver_digest(floor: str) -> str:
     root = Path(__file__).parents[1]
     below = COMPILED_FLOORS[: COMPILED_FLOORS.index(floor) + 1]
     files = sorted(f for name in below for f in (root / name).rglob("*.py"))
-    return digest(*(part for f in files for part in (f.name, f.read_bytes())))
+    return source_digest(*(part for f in files for part in (f.name, f.read_bytes())))
+
+
+def names_of(label: str, functions: Sequence[Any], *parts: str | bytes) -> tuple[str, str]:
+    """Name of a unit among ready-made objects, and in the cache folder.
+
+    Ready-made objects hold for any Python, LLVM and processor: their digest is of sources and of
+    this compiler. What is in the cache was made by these, maybe of a function whose file has
+    changed since it was loaded: that digest has the function's bytecode as well.
+
+    Args:
+        label: how both begin.
+        functions: what the unit is made of.
+        parts: digests, sources and words that decide the code.
+    """
+    ready = source_digest(*parts, objects.compiler())
+    codes = [function.__code__.co_code for function in functions]
+    return f"{label}-{ready}", f"{label}-{digest(ready, *codes, objects.identity())}"
 
 
 class Compiled:
@@ -136,8 +164,8 @@ def entries_of(functions: Sequence[Any], arguments: tuple[Any, ...]) -> list[Ent
     """Functions for types of their arguments, as one unit of compiled code."""
     plain = [inspect.unwrap(f) for f in functions]
     parts = [f"{f.__module__}.{f.__qualname__}" for f in plain]
-    key = digest(repr(arguments), *parts, *_origin(plain), objects.identity())
-    name = f"{plain[0].__module__.split('.')[-1]}.{plain[0].__name__}-{key}"
+    label = f"{plain[0].__module__.split('.')[-1]}.{plain[0].__name__}"
+    ready_name, name = names_of(label, plain, repr(arguments), *parts, *_origin(plain))
 
     def write(symbols: list[str]) -> tuple[str, list[str]]:
         program = Program()
@@ -147,7 +175,7 @@ def entries_of(functions: Sequence[Any], arguments: tuple[Any, ...]) -> list[Ent
 
     with _making:
         if name not in _units:
-            _units[name] = Unit(name, len(plain), write, cache_folder())
+            _units[name] = Unit(name, len(plain), write, cache_folder(), ready_name=ready_name)
         unit = _units[name]
     signatures = [Signature(arguments, _RESULTS[r]) for r in unit.results]
     return [Entry(unit, k, s) for k, s in enumerate(signatures)]
@@ -194,7 +222,7 @@ def _origin(functions: Sequence[Any]) -> list[str | bytes]:
               for f in functions}  # fmt: skip
     if floors <= set(COMPILED_FLOORS):
         return [driver_digest(floor) for floor in sorted(floors)]
-    return [*identities(*functions), *sources(*functions)]
+    return [*places(*functions), *sources(*functions)]
 
 
 def reached(*functions) -> tuple[list, list[str]]:
@@ -225,21 +253,26 @@ def sources(*functions) -> list[str | bytes]:
     """What decides what these functions compute: source files, constants, and names of modules.
 
     The names, because cached code imports its modules by name: a model's own file has another one
-    in each folder.
+    in each folder. Of the files their own names alone, wherever a package stands.
     """
     found, constants = reached(*functions)
     files: dict[str, bytes] = {}
     for function in found:
         _add_file(files, function.__code__.co_filename)
     modules = sorted({function.__module__ for function in found})
-    contents = (part for path in sorted(files) for part in (Path(path).name, files[path]))
-    return [*constants, *modules, *contents]
+    contents = sorted((Path(path).name, content) for path, content in files.items())
+    return [*constants, *modules, *(part for both in contents for part in both)]
+
+
+def places(*functions) -> list[str]:
+    """Which functions of their files these are: variants of a type stand in one file."""
+    codes = [function.__code__ for function in functions]
+    return [f"{c.co_qualname} {c.co_firstlineno}" for c in codes]
 
 
 def identities(*functions) -> list[str | bytes]:
-    """Which functions of their files these are: variants of a type stand in one file."""
-    codes = [function.__code__ for function in functions]
-    return [*(f"{c.co_qualname} {c.co_firstlineno}" for c in codes), *(c.co_code for c in codes)]
+    """The same, and their bytecode: a file may have changed since it was loaded."""
+    return [*places(*functions), *(function.__code__.co_code for function in functions)]
 
 
 def _named_values(function):

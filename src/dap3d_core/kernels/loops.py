@@ -16,8 +16,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from dap3d_core.kernels import gather, tables, written
-from dap3d_core.kernels.cache import cache_folder, digest, identities, jit_is_on, sources
-from dap3d_core.kernels.compiler import objects
+from dap3d_core.kernels.cache import cache_folder, jit_is_on, names_of, places, sources
 from dap3d_core.kernels.compiler.trace import trace
 from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.lists import LOOP, LoopArrays
@@ -44,7 +43,7 @@ def source_of(loop: Loop) -> str:
     return head + "".join(f"        {line}\n" for line in loop.lines)
 
 
-_built: dict[str, Callable] = {}
+_built: dict[tuple[str, str], Callable] = {}
 #: Held while a loop is built, which several threads may ask for at once.
 _building = threading.Lock()
 #: Names of the loops that this process had to compile (not those it found in the cache).
@@ -65,14 +64,17 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
     gathering = (gather.vector_at, gather.matrix_at, gather.unwound, gather.doubtful)
     gathering += (tables.lookup,)
     kernels = loop.kernels.values()
-    name = f"loop-{digest(text, *identities(*kernels), *sources(*kernels, *gathering))}"
+    parts = (text, repr(_members()), *places(*kernels), *sources(*kernels, *gathering))
+    names = names_of("loop", kernels, *parts)
     with _building:
-        if name not in _built:
-            _built[name] = _build(loop, text, name, announce)
-        return _built[name]
+        if names not in _built:
+            _built[names] = _build(loop, text, *names, announce)
+        return _built[names]
 
 
-def _build(loop: Loop, text: str, name: str, announce: Callable[[str], None] | None) -> Callable:
+def _build(
+    loop: Loop, text: str, ready_name: str, name: str, announce: Callable[[str], None] | None
+) -> Callable:
     def python() -> dict[str, Any]:
         namespace = written.load(None, name, text)
         namespace.update(loop.kernels)
@@ -88,8 +90,8 @@ def _build(loop: Loop, text: str, name: str, announce: Callable[[str], None] | N
         compiled_here.append(loop.name)
         return trace(symbols[0], python(), _members()), ["None"]
 
-    full = f"{name}-{digest(objects.identity())}"
-    return Entry(Unit(full, 1, write, cache_folder(), optimise=True), 0, LOOP)
+    unit = Unit(name, 1, write, cache_folder(), optimise=True, ready_name=ready_name)
+    return Entry(unit, 0, LOOP)
 
 
 def _members() -> dict[str, tuple[int, str, int]]:

@@ -20,6 +20,12 @@ def sealed(content: bytes) -> bytes:
     return content + _SEAL % hashlib.sha256(content).hexdigest().encode()
 
 
+def unsealed(data: bytes) -> bytes | None:
+    """The content of what ``sealed`` gave; None where it is damaged."""
+    content = data[:-_SEAL_SIZE]
+    return content if sealed(content) == data else None
+
+
 def sealed_content(path: str | os.PathLike[str]) -> bytes | None:
     """The content of a sealed file; None where there is none that can be used.
 
@@ -29,8 +35,8 @@ def sealed_content(path: str | os.PathLike[str]) -> bytes | None:
         data = Path(path).read_bytes()
     except OSError:
         return None
-    content = data[:-_SEAL_SIZE]
-    if sealed(content) == data:
+    content = unsealed(data)
+    if content is not None:
         return content
     with suppress(OSError):
         os.unlink(path)

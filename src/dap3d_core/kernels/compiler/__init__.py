@@ -8,6 +8,7 @@
     words        known functions of Python, numpy and the C library
     trace        kernels, run once with symbolic numbers
     objects      from LLVM IR to object code, stored in files, loaded
+    ready        object code that comes with the package
     background   the process that optimises while unoptimised code runs
     units        object files with some functions, and calls from Python into them
 

@@ -46,6 +46,12 @@ def processor() -> Processor:
 
 
 @cache
+def host_features() -> frozenset[str]:
+    """What this processor has, in LLVM's words."""
+    return frozenset(name for name, has in _llvm().get_host_cpu_features().items() if has)
+
+
+@cache
 def _llvm() -> Any:
     import llvmlite.binding as llvm
 
@@ -55,13 +61,18 @@ def _llvm() -> Any:
 
 
 @cache
+def compiler() -> str:
+    """Digest of this compiler's sources."""
+    files = sorted(Path(__file__).parent.glob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+@cache
 def identity() -> str:
     """Everything besides the sources that decides the code: compiler, LLVM and processor."""
     import llvmlite
 
-    files = sorted(Path(__file__).parent.glob("*.py"))
-    digest = hashlib.sha256(b"".join(file.read_bytes() for file in files))
-    return f"{llvmlite.__version__} {_llvm().llvm_version_info} {processor()} {digest.hexdigest()}"
+    return f"{llvmlite.__version__} {_llvm().llvm_version_info} {processor()} {compiler()}"
 
 
 def _target_machine(level: int, target: Processor) -> Any:
@@ -100,15 +111,23 @@ def load(code: bytes, symbols: list[str]) -> list[int]:
 def read_object(path: Path) -> tuple[Any, bytes] | None:
     """The JSON value and the code of an object file; None where there is no usable file."""
     content = sealed_content(path)
-    if content is None:
-        return None
+    return None if content is None else parts(content)
+
+
+def joined(about: Any, code: bytes) -> bytes:
+    """Code and what is told of it, as a file holds them."""
+    return json.dumps(about).encode() + b"\n" + code
+
+
+def parts(content: bytes) -> tuple[Any, bytes]:
+    """What ``joined`` put together."""
     head, _, code = content.partition(b"\n")
     return json.loads(head), code
 
 
 def write_object(path: Path, head: Any, code: bytes) -> None:
     """Write an object file; where that fails, the code stays in memory only."""
-    write_file(path, sealed(json.dumps(head).encode() + b"\n" + code))
+    write_file(path, sealed(joined(head, code)))
     with contextlib.suppress(OSError):
         _clean(path.parent)
 

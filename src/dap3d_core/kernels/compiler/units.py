@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.kernels.compiler import background, objects
+from dap3d_core.kernels.compiler import background, objects, ready
 from dap3d_core.kernels.compiler.types import (
     BOOL,
     DTYPES,
@@ -34,8 +34,16 @@ _C_TYPES = {"double": ctypes.c_double, "i64": ctypes.c_int64, "i1": ctypes.c_int
             "ptr": ctypes.c_void_p}  # fmt: skip
 _address, _from_buffer = ctypes.addressof, ctypes.c_char.from_buffer
 _ITEMS = {dtype: item for item, dtype in DTYPES.items()}
-#: Names of the units that this process compiled rather than loaded from the cache folder.
+#: Names of the units that this process compiled rather than loaded.
 compiled_units: list[str] = []
+#: Of compiled units, by their names among ready-made objects: LLVM IR and results. None where they
+#: are not collected; only tools/ready_objects.py does.
+collected: dict[str, tuple[str, list[Any]]] | None = None
+
+
+def symbols_of(name: str, count: int) -> list[str]:
+    """Symbols of the functions of a unit: NAME_0, NAME_1, ..."""
+    return [f"{name.replace('-', '_')}_{k}" for k in range(count)]
 
 
 class Unit:
@@ -54,6 +62,7 @@ class Unit:
         write: Callable[[list[str]], tuple[str, list[Any]]],
         folder: Path | None,
         optimise: bool = False,
+        ready_name: str = "",
     ) -> None:
         """Args:
         name: contains a digest of everything that decides the code.
@@ -61,17 +70,21 @@ class Unit:
         write: takes the symbols; returns LLVM IR, and JSON values stored with the code.
         folder: holds object files.
         optimise: compile optimised code at once; for short code.
+        ready_name: name among ready-made objects, from which symbols are made as well.
         """
         self.name = name
-        self.symbols = [f"{name.replace('-', '_')}_{k}" for k in range(count)]
+        self.symbols = symbols_of(ready_name or name, count)
         self.path = None if folder is None else folder / f"{name}.o"
         #: Table, index and function of each registered address.
         self._slots: list[tuple[Any, int, int]] = []
         self.text, self.cost = "", 0.0
         stored = None if self.path is None else objects.read_object(self.path)
+        stored = stored or ready.read(ready_name)
         if stored is None:
             compiled_units.append(name)
             self.text, self.results = write(self.symbols)
+            if collected is not None:
+                collected[ready_name] = self.text, self.results
             start = time.perf_counter()
             level = objects.OPTIMISED if optimise else objects.UNOPTIMISED
             code = objects.compile_ir(self.text, level)

@@ -1,0 +1,139 @@
+"""Make the ready-made objects of a wheel: units that most scenes need, for every target.
+
+``python tools/ready_objects.py FOLDER [TARGET ...]`` writes a file for each target. It works on the
+source tree that it stands in, installed or not; it needs attrs, llvmlite, numpy, pluggy and scipy.
+The loops are those of all standard types; the core's units are those that runs of the shipped
+models make, with each method and integrator.
+"""
+
+import concurrent.futures
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+#: What objects may take from their system: the C library, and what LLVM itself calls.
+SYSTEM = {"memcpy", "memmove", "memset", "bzero", "__bzero", "memset_pattern16", "__chkstk"}
+SYSTEM.add("_fltused")  # a mark of Windows, no function
+
+
+def main(arguments: list[str]) -> None:
+    """Write the files."""
+    folder, *names = arguments
+    if folder == "--gather":
+        print(json.dumps(gathered()))
+        return
+    with tempfile.TemporaryDirectory() as scratch:
+        _declare_entry_points(Path(scratch))
+        units = _gathered_alone(Path(scratch))
+    _reach_sources()
+    from dap3d_core.kernels.compiler.ready import TARGETS
+
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    with concurrent.futures.ProcessPoolExecutor(initializer=_reach_sources) as pool:
+        done = {name: pool.submit(pack_of, name, units) for name in names or TARGETS}
+        for name, found in done.items():
+            content, count = found.result()
+            (Path(folder) / f"{name}.pack").write_bytes(content)
+            print(f"{name}: {count} of {len(units)} units, {len(content) / 1e3:.0f} kB")
+
+
+def pack_of(target_name: str, units: dict[str, Any]) -> tuple[bytes, int]:
+    """The content of a target's file and how many units are in it.
+
+    Args:
+        target_name: a key of ``ready.TARGETS``.
+        units: text and results of each unit, by its name.
+
+    A unit that wants what not every such system has is left out, and made where it is needed.
+    """
+    import llvmlite.binding as llvm
+    from object_symbols import symbols_of
+
+    from dap3d_core.kernels.compiler.objects import OPTIMISED, compile_ir
+    from dap3d_core.kernels.compiler.ready import TARGETS, packed
+    from dap3d_core.kernels.compiler.words import EXACT, LIBRARY
+
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    kept = {}
+    for name, (text, results) in units.items():
+        code = compile_ir(text, OPTIMISED, TARGETS[target_name])
+        if symbols_of(code).undefined <= SYSTEM | {*EXACT, *LIBRARY}:
+            kept[name] = results, code
+    return packed(kept), len(kept)
+
+
+def gathered() -> dict[str, Any]:
+    """Text in LLVM IR and results of each unit, by its name; in a process with an empty cache."""
+    import dap3d_core as dap
+    from dap3d_core.interface.compiling import compile_all
+    from dap3d_core.kernels.compiler import units
+    from dap3d_core.scene.settings import FIXED_STEP, INTEGRATORS, METHODS
+
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, set(list(os.sched_getaffinity(0))[:1]))  # nothing is made beside
+    units.collected = {}
+    registry = dap.load_registry()
+    for group, entries in PROJECT["entry-points"].items():
+        for keyword in entries:
+            compile_all(registry.get(group.removeprefix("dap3d.").removesuffix("s"), keyword))
+    for folder in sorted(path.parent for path in (ROOT / "models").glob("*/scene.toml")):
+        scene = dap.load(folder)
+        for integrator in INTEGRATORS:
+            for method in METHODS:
+                step = 1e-3 if integrator in FIXED_STEP else None
+                options = {"method": method, "integrator": integrator, "step": step}
+                # some do not suit a scene
+                with contextlib.suppress(dap.SceneError, dap.SimulationError):
+                    dap.simulate(scene, t_end=2e-3, dt=1e-3, **options)
+    return {name: unit for name, unit in units.collected.items() if "@llvm.x86" not in unit[0]}
+
+
+def _gathered_alone(scratch: Path) -> dict[str, Any]:
+    """What a fresh process gathers, with an empty cache and nothing made beside it."""
+    ours = {k: v for k, v in os.environ.items() if not k.startswith("DAP3D_")}
+    paths = (
+        scratch,
+        ROOT / "src",
+        ROOT / "plugins",
+        *os.environ.get("PYTHONPATH", "").split(os.pathsep),
+    )
+    env = ours | {
+        "DAP3D_CACHE_DIR": str(scratch / "cache"),
+        "PYTHONPATH": os.pathsep.join(str(path) for path in paths if path),
+    }
+    done = subprocess.run(
+        [sys.executable, __file__, "--gather"], env=env, check=False, stdout=subprocess.PIPE
+    )
+    if done.returncode:
+        sys.exit(done.returncode)  # it has said why
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+def _declare_entry_points(folder: Path) -> None:
+    """Let the standard types be found where dap3d is not installed."""
+    version = PROJECT["version"]
+    info = folder / f"dap3d-{version}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: dap3d\nVersion: {version}\n")
+    lines = []
+    for group, entries in PROJECT["entry-points"].items():
+        lines += [f"[{group}]", *(f"{name} = {module}" for name, module in entries.items())]
+    (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+
+
+def _reach_sources() -> None:
+    sys.path[:0] = [str(ROOT / "src"), str(ROOT / "plugins"), str(ROOT / "tools")]
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
