@@ -14,7 +14,7 @@ from pathlib import Path
 from kernels import CALLS, INSTANCES, RUNS, bodies, run
 from timing import median_seconds
 
-from dap3d_core.interface.checks import examine
+from dap3d_core.interface.examine.examine import examine
 from dap3d_core.registry import load_registry
 
 MARK, SECONDS = 1.3, 2.0
@@ -42,8 +42,7 @@ def from_C_alone(type_):
 
 def derivation_seconds(type_):
     """Seconds to derive, write and load the kernels, with an empty cache."""
-    from dap3d_core.interface import printing  # noqa: F401  (sympy is imported beforehand)
-    from dap3d_core.kernels.cache import cache_folder
+    from dap3d_core.kernels.runtime.cache import cache_folder
 
     before = os.environ.get("DAP3D_CACHE_DIR")
     with tempfile.TemporaryDirectory() as folder:

@@ -11,12 +11,12 @@ import attrs
 import numpy as np
 from timing import median_seconds
 
-from dap3d_core.interface.binding import bind_friction, bind_functions
-from dap3d_core.interface.samples import random_pose, random_value
-from dap3d_core.interface.writer import LOOP_KINDS, stride, write
-from dap3d_core.kernels import gather
-from dap3d_core.kernels.lists import LoopArrays, call_loop, loop_list
-from dap3d_core.kernels.loops import build
+from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, stride, write
+from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
+from dap3d_core.interface.examine.random_values import random_pose, random_value
+from dap3d_core.kernels.runtime import loop_support
+from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
+from dap3d_core.kernels.runtime.loop_modules import build
 from dap3d_core.registry import load_registry
 
 #: As many instances as a cache of 256 kB holds, so that other programs cannot slow them down.
@@ -98,12 +98,12 @@ def integers(examined):
 
 def bodies(rng):
     """The body array: poses, velocities and inertias at random."""
-    body = np.array([[random_value((), rng) for _ in range(gather.BODY_WIDTH)]
+    body = np.array([[random_value((), rng) for _ in range(loop_support.BODY_WIDTH)]
                      for _ in range(INSTANCES + 1)])  # fmt: skip
     for one in body:
         pose = random_pose(rng)
-        one[gather.A : gather.A + 9] = np.ravel(pose.A)
-        one[gather.P : gather.P + 4] = pose.p
+        one[loop_support.A : loop_support.A + 9] = np.ravel(pose.A)
+        one[loop_support.P : loop_support.P + 4] = pose.p
     return body
 
 

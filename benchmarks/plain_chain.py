@@ -7,7 +7,7 @@ extents. It knows that the chain is a chain; the framework has to find out.
 
 import numpy as np
 
-from dap3d_core.kernels.cache import compiled
+from dap3d_core.kernels.runtime.cache import compiled
 
 
 @compiled

@@ -10,7 +10,7 @@ import numpy as np
 import scenes
 
 import dap3d_core as dap
-from dap3d_core.integrators.work import Y
+from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.study import Ensemble, Study, outputs_of
 
 ROUNDS, POINTS, PACKS = 9, 320, (4, 8, 16)

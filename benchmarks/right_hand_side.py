@@ -12,7 +12,7 @@ import plain_chain
 import scenes
 from timing import median_seconds
 
-from dap3d_core.kernels.cache import compiled
+from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.simulation import CompiledModel
 
 SIZES = (1, 8, 64, 1000, 100_000)

@@ -14,9 +14,9 @@ import numpy as np
 import scenes
 
 import dap3d_core as dap
-from dap3d_core.linear import ordering
-from dap3d_core.linear.blocks import assemble, factor
-from dap3d_core.linear.plan import make_plan
+from dap3d_core.linear.ldlt.factor import assemble, factor
+from dap3d_core.linear.ldlt.plan import make_plan
+from dap3d_core.linear.ordering import elimination_order
 from dap3d_core.simulation import CompiledModel
 
 SCENES = (
@@ -69,9 +69,9 @@ def least_seconds(function, prepare=lambda: None):
 def planned(model):
     """The plan of a model, and the work of minimum degree alone."""
     arguments = model.body_count, model.joint_slots, model.joint_rows.tolist()
-    wide, ordering.WIDE = ordering.WIDE, sys.maxsize
-    alone = ordering.order_nodes(*arguments)
-    ordering.WIDE = wide
+    wide, elimination_order.WIDE = elimination_order.WIDE, sys.maxsize
+    alone = elimination_order.order_nodes(*arguments)
+    elimination_order.WIDE = wide
     start = time.process_time()
     plan = make_plan(*arguments)
     return plan, time.process_time() - start, alone

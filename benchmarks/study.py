@@ -17,8 +17,8 @@ import scenes
 
 import dap3d_core as dap
 from dap3d_core.study import Ensemble, Study, outputs_of
-from dap3d_core.study.cluster import run_on
-from dap3d_core.study.local import run_here
+from dap3d_core.study.workers.dask_cluster import run_on
+from dap3d_core.study.workers.threads import run_here
 
 #: Seconds of the points of a round, and of all rounds of a case.
 ROUND_SECONDS, SECONDS = 0.5, 30.0

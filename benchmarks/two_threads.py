@@ -14,9 +14,9 @@ import scenes
 
 import dap3d_core as dap
 from dap3d_core import formulations
-from dap3d_core.formulations.machine import Machine
-from dap3d_core.formulations.second_thread import SecondThread
-from dap3d_core.kernels.cache import compiled
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.two_threads.worker_thread import SecondThread
+from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.simulation import CompiledModel
 
 #: Scenes, and the length of a run in s.

@@ -74,9 +74,9 @@ def pack_of(target_name: str, units: dict[str, Any]) -> tuple[bytes, int]:
 def gathered() -> dict[str, Any]:
     """Text in LLVM IR and results of each unit, by its name; in a process with an empty cache."""
     import dap3d_core as dap
-    from dap3d_core.interface.compiling import compile_all
+    from dap3d_core.interface.codegen.compile_loops import compile_all
     from dap3d_core.kernels.compiler import units
-    from dap3d_core.scene.settings import FIXED_STEP, INTEGRATORS, METHODS
+    from dap3d_core.scene.validate.settings import FIXED_STEP, INTEGRATORS, METHODS
 
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, set(list(os.sched_getaffinity(0))[:1]))  # nothing is made beside

@@ -10,7 +10,7 @@ import numpy as np
 from support import double_pendulum, problems
 
 import dap3d_core as dap
-from dap3d_core.result.estimate import MEANINGLESS
+from dap3d_core.result.post.global_error import MEANINGLESS
 
 T_END, DT, DIGITS = 30.0, 0.1, 34
 TRIES = (

@@ -6,7 +6,7 @@ import numpy as np
 import scenes as sizes
 from support import problems
 
-from dap3d_core.model.kinematics import rotation
+from dap3d_core.model.rotations import rotation
 from hard import references, scenes
 from hard.bodies import BODIES_TEST, LEAN
 from hard.case import Case, Try, relative_error

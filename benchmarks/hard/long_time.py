@@ -12,7 +12,7 @@ import numpy as np
 from support import problems
 
 import dap3d_core as dap
-from dap3d_core.model.kinematics import rotation
+from dap3d_core.model.rotations import rotation
 from dap3d_core.scene import Scene
 
 EPS = 2.220446049250313e-16

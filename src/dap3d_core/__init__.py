@@ -29,20 +29,20 @@ if TYPE_CHECKING:
     )
     from dap3d_core.simulation import compile_scene as compile
     from dap3d_core.simulation import open_result as open
-    from dap3d_core.simulation.rerunning import rerun
-    from dap3d_core.simulation.resuming import resume
-    from dap3d_core.study.dataset import open_sweep
-    from dap3d_core.study.fit_result import Fit
-    from dap3d_core.study.fitting import fit
-    from dap3d_core.study.parameters import Parameter
-    from dap3d_core.study.sweep import sweep
+    from dap3d_core.simulation.rerun import rerun
+    from dap3d_core.simulation.resume import resume
+    from dap3d_core.study.fit.fit import fit
+    from dap3d_core.study.fit.fit_parameters import Parameter
+    from dap3d_core.study.fit.fit_result import Fit
+    from dap3d_core.study.sweep.dataset import open_sweep
+    from dap3d_core.study.sweep.sweep import sweep
     from dap3d_core.view import view
 
 _HOMES = {
     "AssemblyError": ("simulation", "AssemblyError"),
     "Event": ("simulation", "Event"),
-    "Fit": ("study.fit_result", "Fit"),
-    "Parameter": ("study.parameters", "Parameter"),
+    "Fit": ("study.fit.fit_result", "Fit"),
+    "Parameter": ("study.fit.fit_parameters", "Parameter"),
     "PluginError": ("interface", "PluginError"),
     "RedundantError": ("simulation", "RedundantError"),
     "Result": ("result", "Result"),
@@ -52,19 +52,19 @@ _HOMES = {
     "animate": ("plot", "animate"),
     "compile": ("simulation", "compile_scene"),
     "export": ("exchange", "export"),
-    "fit": ("study.fitting", "fit"),
+    "fit": ("study.fit.fit", "fit"),
     "import_matlab": ("matlab", "import_matlab"),
     "load": ("scene", "load"),
     "load_registry": ("registry", "load_registry"),
     "open": ("simulation", "open_result"),
-    "open_sweep": ("study.dataset", "open_sweep"),
+    "open_sweep": ("study.sweep.dataset", "open_sweep"),
     "plot": ("plot", "plot"),
     "report": ("report", "report"),
     "shipped_models": ("scene", "shipped_models"),
-    "rerun": ("simulation.rerunning", "rerun"),
-    "resume": ("simulation.resuming", "resume"),
+    "rerun": ("simulation.rerun", "rerun"),
+    "resume": ("simulation.resume", "resume"),
     "simulate": ("simulation", "simulate"),
-    "sweep": ("study.sweep", "sweep"),
+    "sweep": ("study.sweep.sweep", "sweep"),
     "view": ("view", "view"),
 }
 

@@ -303,7 +303,7 @@ def test_a_mistake_is_told_and_changes_nothing(call, folder, words, said):
 
 def main_commands():
     """The commands that take --json."""
-    from dap3d_core.cli.group import dap3d
+    from dap3d_core.cli.app import dap3d
 
     return {
         name for name, command in dap3d.commands.items()
@@ -313,7 +313,7 @@ def main_commands():
 
 def test_every_command_tries_wrong_words():
     tried = {words[0] for words, _ in REFUSED}
-    from dap3d_core.cli.group import dap3d
+    from dap3d_core.cli.app import dap3d
 
     assert set(dap3d.commands) <= tried
     assert set(dap3d.commands) == main_commands()
@@ -429,7 +429,7 @@ def test_a_folder_that_is_read_only_is_refused(folder):
 def test_of_two_that_write_one_file_at_once_one_wins_whole(tmp_path):
     """Many times, for it is a race: the file is that of one of them, the other is told."""
     from dap3d_core.result import ResultError
-    from dap3d_core.result.files import whole_file
+    from dap3d_core.result.file.atomic_write import whole_file
 
     told, texts = [], ["a" * 5000, "b" * 5000]
 
@@ -456,7 +456,7 @@ def test_of_two_that_write_one_file_at_once_one_wins_whole(tmp_path):
 
 def test_of_several_that_overwrite_one_file_at_once_none_disturbs_another(tmp_path):
     """With force each of them succeeds, and the file is always that of one of them, whole."""
-    from dap3d_core.result.files import whole_file
+    from dap3d_core.result.file.atomic_write import whole_file
 
     target, errors, texts = tmp_path / "run.nc", [], [letter * 5000 for letter in "abcd"]
     barrier = threading.Barrier(len(texts))

@@ -21,7 +21,7 @@ import dap3d_core as dap
 from dap3d_core.cli import main
 from dap3d_core.interface import Body, Force, Joint, PluginError, Point, body, number, point
 from dap3d_core.kernels import row, sub
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.testing import check_type
 
 HEAD = """

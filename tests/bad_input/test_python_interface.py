@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import jit_is_on
 
 compiling = pytest.mark.skipif(not jit_is_on(), reason="plain Python takes long for this")
 

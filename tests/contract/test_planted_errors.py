@@ -43,7 +43,7 @@ from dap3d_core.kernels import (
     sub,
     where,
 )
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.testing import check_type, checks_for
 from dap3d_forces.point_to_point import PointToPoint, pull
 from dap3d_functions.harmonic import Harmonic

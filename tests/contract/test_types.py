@@ -10,7 +10,7 @@ import pytest
 from support.motions import Motion, derivative
 from support.scenes import case_names, cases, scene_for
 
-from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model import build_model
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check as checked

@@ -18,10 +18,11 @@ from support.process import REPOSITORY
 from support.studies import POINTS, bob, collected, same
 
 import dap3d_core as dap
-from dap3d_core.study import Ensemble, PointStatus, cluster
-from dap3d_core.study.cluster import ClusterError, connect, run_on
-from dap3d_core.study.environment import differences, environment_of, with_whole_path
-from dap3d_core.study.local import run_here
+from dap3d_core.study import Ensemble, PointStatus
+from dap3d_core.study.workers import dask_cluster
+from dap3d_core.study.workers.dask_cluster import ClusterError, connect, run_on
+from dap3d_core.study.workers.environment import differences, environment_of, with_whole_path
+from dap3d_core.study.workers.threads import run_here
 
 pytestmark = [
     pytest.mark.slow,
@@ -43,8 +44,8 @@ def two_workers():
     with (
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
-        ) as cluster,
-        distributed.Client(cluster) as client,
+        ) as dask_cluster,
+        distributed.Client(dask_cluster) as client,
     ):
         yield client
 
@@ -99,7 +100,9 @@ def test_numbers_are_those_of_one_process(client, alone):
 
     def kept():
         collected(run_on(client, bob(), POINTS, PLACES, chunk=1))
-        found = client.run(lambda: len(sys.modules["dap3d_core.study.cluster"]._ensembles))
+        found = client.run(
+            lambda: len(sys.modules["dap3d_core.study.workers.dask_cluster"]._ensembles)
+        )
         return list(found.values())
 
     wait_until(lambda: kept() == [1, 1], 100.0)  # a worker may have been slow to begin
@@ -406,7 +409,7 @@ def test_an_address_without_a_port_leaves_no_half_made_client():
 def test_workers_and_schedulers_that_are_gone(tmp_path, monkeypatch):
     """No workers at the start, none any more, and a scheduler that dies: each is one sentence."""
     for name, seconds in (("ARRIVAL", 0.5), ("ABSENCE", 0.5), ("LOOK", 0.1)):
-        monkeypatch.setattr(cluster, name, seconds)
+        monkeypatch.setattr(dask_cluster, name, seconds)
     file = tmp_path / "scheduler.json"
     command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--no-dashboard"]
     process = subprocess.Popen(
@@ -428,7 +431,7 @@ def test_workers_and_schedulers_that_are_gone(tmp_path, monkeypatch):
                 client.wait_for_workers(1, timeout=60)
                 found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
                 next(found)
-                monkeypatch.setattr(cluster, "LOOK", 0.0)  # it is asked when it dies
+                monkeypatch.setattr(dask_cluster, "LOOK", 0.0)  # it is asked when it dies
                 process.kill()
                 with pytest.raises(ClusterError, match=f"the scheduler at {address} is gone"):
                     collected(found)
@@ -457,7 +460,7 @@ def test_a_client_that_is_closed_meanwhile(client):
     with connect(client.scheduler.address) as mine:
         found = run_on(mine, bob(), POINTS, np.arange(200), chunk=1)
         next(found)
-        watch, silent = cluster._Watch(mine), as_completed(loop=mine.loop)
+        watch, silent = dask_cluster._Watch(mine), as_completed(loop=mine.loop)
         mine.close()
         with pytest.raises(ClusterError, match=r"the scheduler at .* is gone"):
             collected(found)
@@ -483,9 +486,7 @@ def test_without_dask_there_is_one_sentence(monkeypatch):
 
 def test_dask_is_not_imported_by_a_run():
     """Nor by a study on this machine."""
-    script = (
-        "import sys, dap3d_core.study, dap3d_core.study.local as l; print('dask' in sys.modules"
-    )
+    script = "import sys, dap3d_core.study.workers.threads; print('dask' in sys.modules"
     done = subprocess.run(
         [sys.executable, "-c", f"{script}, 'distributed' in sys.modules)"],
         capture_output=True, text=True, check=True, cwd=REPOSITORY,

@@ -13,7 +13,7 @@ from support.pages import follow
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.model.kinematics import to_global
+from dap3d_core.model.rotations import to_global
 
 pytestmark = pytest.mark.slow  # a browser that draws without a graphics card
 

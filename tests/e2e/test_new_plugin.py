@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 from support.process import environment
 
-from dap3d_core.cli.group import dap3d as group
+from dap3d_core.cli.app import dap3d as group
 from dap3d_core.registry import load_registry
 
 KINDS = ("joint", "force", "function")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.cli import group, main
+from dap3d_core.cli import app, main
 
 from .conftest import COMMAND, environment
 
@@ -187,6 +187,6 @@ def test_ctrl_c_while_options_are_parsed_is_an_interruption(monkeypatch, capfd):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(group.Command, "parse_args", interrupted)
+    monkeypatch.setattr(app.Command, "parse_args", interrupted)
     assert main(["models"]) == 130
     assert capfd.readouterr().err.strip() == "interrupted"

@@ -6,8 +6,8 @@ import sys
 import pytest
 from support.process import REPOSITORY, environment, run
 
-from dap3d_core.kernels.cache import jit_is_on
 from dap3d_core.kernels.compiler import objects, ready
+from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = [
     pytest.mark.slow,

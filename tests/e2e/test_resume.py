@@ -24,10 +24,10 @@ from importlib import import_module
 from pathlib import Path
 
 import dap3d_core as dap
-from dap3d_core.simulation.checkpoint import read_checkpoint
+from dap3d_core.simulation.checkpoint.file import read_checkpoint
 
 import_module("dap3d_core.simulation.run").CHUNK_SECONDS = 1e-3
-import_module("dap3d_core.simulation.keeping").SHORT_SECONDS = 0.05
+import_module("dap3d_core.simulation.output.recorder").SHORT_SECONDS = 0.05
 SETTINGS = {"t_end": 6.0, "dt": 0.02}
 compiled = dap.compile("pen1")
 whole = dap.simulate(compiled, **SETTINGS)
@@ -162,7 +162,7 @@ def test_rerun_says_what_differs(dap3d, monkeypatch, capfd):
 
 
 def test_times_are_written_as_people_do():
-    from dap3d_core.cli.carrying import Seconds
+    from dap3d_core.cli.framework.execute import Seconds
 
     found = [Seconds().convert(text, None, None) for text in ("90", "90s", "5min", "2h", "0.5h")]
     assert np.array_equal(found, [90.0, 90.0, 300.0, 7200.0, 1800.0])

@@ -8,7 +8,7 @@ import pytest
 from support.browser import Opened, browser
 
 import dap3d_core as dap
-from dap3d_core.model.kinematics import to_global
+from dap3d_core.model.rotations import to_global
 
 pytestmark = pytest.mark.slow  # a browser that draws without a graphics card
 

@@ -15,7 +15,7 @@ import numpy as np
 import dap3d_core as dap
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import SceneError, check, parse
-from dap3d_core.scene.lines import lines_of
+from dap3d_core.scene.files.line_numbers import lines_of
 from dap3d_core.simulation import SimulationError
 from fuzz.scenes import events_of
 

@@ -20,9 +20,9 @@ from support.ended import EndedError
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
-from dap3d_core.result.seal import write_seal
+from dap3d_core.result.file.checksum import write_seal
 from dap3d_core.simulation import SimulationError
-from dap3d_core.simulation.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
+from dap3d_core.simulation.checkpoint.file import Checkpoint, read_checkpoint, write_checkpoint
 from fuzz.acceptable import examine_result, strict
 from fuzz.damage import seeds
 from fuzz.results import HANG, SEAL, in_child

@@ -11,8 +11,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 import dap3d_core as dap
-from dap3d_core.model.kinematics import rotation
-from dap3d_core.simulation.event import Event
+from dap3d_core.model.rotations import rotation
+from dap3d_core.simulation.events.event import Event
 
 EVENT = "# event: "
 METHODS = ("auto", "auto", "standard", "penalty", "lsq", "unconstrained")

@@ -15,11 +15,11 @@ from unit.test_result_files import same_bits
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.integrators import work as at
-from dap3d_core.integrators.adams_formulas import EQUAL, FAILURES, ORDER_LAST, ORDER_NOW
-from dap3d_core.integrators.radau_work import ITERATIONS
+from dap3d_core.integrators.adams.formulas import EQUAL, FAILURES, ORDER_LAST, ORDER_NOW
+from dap3d_core.integrators.radau.state import ITERATIONS
+from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.simulation import CheckpointError
-from dap3d_core.simulation.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
+from dap3d_core.simulation.checkpoint.file import Checkpoint, read_checkpoint, write_checkpoint
 
 
 def crafted(run, what, where, value):

@@ -9,7 +9,7 @@ from support.matlab import SMALL, write
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.matlab.statements import MOST_COPIES
+from dap3d_core.matlab.language.interpreter import MOST_COPIES
 from dap3d_core.scene import SceneError
 
 pytest.importorskip("tree_sitter_matlab")

@@ -8,7 +8,7 @@ from io import BytesIO
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.view import shapes
+from dap3d_core.view.scene3d import shapes
 
 pytest.importorskip("trimesh")
 

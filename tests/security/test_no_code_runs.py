@@ -140,20 +140,20 @@ def test_a_models_own_file_is_named_and_not_run(folder):
 
 def test_no_text_of_a_scene_is_in_code_that_is_written(tmp_path):
     """Two scenes that differ in all their texts are run by the very same modules."""
-    from dap3d_core.kernels import loops
+    from dap3d_core.kernels.runtime import loop_modules
 
     plain = [f"b{k}" for k in range(len(hostile.NAMES))]
     dap.compile(dap.load(hostile.write(tmp_path / "a", hostile.text_of_scene(plain, "plain"))))
-    before = set(loops._built)
+    before = set(loop_modules._built)
     dap.compile(dap.load(hostile.write(tmp_path / "b")))
     assert before
-    assert set(loops._built) == before
+    assert set(loop_modules._built) == before
 
 
 def test_what_derives_formulas_has_no_functions_of_python():
     """What is evaluated over symbols is text of the program, without Python's own functions."""
     pytest.importorskip("sympy")
-    from dap3d_core.interface import symbolic
+    from dap3d_core.interface.derive import symbolic
 
     symbols = symbolic.Symbols({}, ())
     assert symbols._evaluated("dot((1, 2, 3), (1, 2, 3))") == [14]
@@ -164,16 +164,19 @@ def test_what_derives_formulas_has_no_functions_of_python():
 
 #: The one place of each, and why it is right.
 ALLOWED = {
-    ("interface/binding.py", "exec"): "the source of a plugin that was imported",
-    ("interface/symbolic.py", "eval"): "expressions of namespace.py",
-    ("kernels/written.py", "exec"): "loop modules",
+    ("interface/codegen/specialise.py", "exec"): "the source of a plugin that was imported",
+    ("interface/derive/symbolic.py", "eval"): "expressions of namespace.py",
+    ("kernels/runtime/generated_modules.py", "exec"): "loop modules",
     ("registry/loading.py", "exec"): "plugin.py, once it is allowed",
-    ("testing/element.py", "exec"): "loop modules",
+    ("testing/samples/random_element.py", "exec"): "loop modules",
     ("kernels/compiler/units.py", "eval"): "calls of compiled functions, by their types",
     ("kernels/compiler/background.py", "subprocess"): "Python itself, to compile beside",
-    ("plot/encoding.py", "subprocess"): "ffmpeg, without a shell",
-    ("simulation/checkpoint.py", "allow_pickle"): "switched off",
-    ("study/cluster.py", "cloudpickle"): "a study, by its user, to the workers that he names",
+    ("plot/film/encoding.py", "subprocess"): "ffmpeg, without a shell",
+    ("simulation/checkpoint/file.py", "allow_pickle"): "switched off",
+    (
+        "study/workers/dask_cluster.py",
+        "cloudpickle",
+    ): "a study, by its user, to the workers that he names",
 }
 DANGEROUS = {"cloudpickle", "pickle", "marshal", "shelve", "dill", "subprocess", "socket",
              "urllib", "http", "ftplib", "xmlrpc", "runpy", "code", "codeop", "pty"}  # fmt: skip

@@ -8,9 +8,9 @@ import pytest
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.plot.sticks import sticks_of
+from dap3d_core.plot.film.stick_figure import sticks_of
 from dap3d_core.result import ResultError
-from dap3d_core.result.limits import ALWAYS, check_attributes, check_shapes
+from dap3d_core.result.file.validate import ALWAYS, check_attributes, check_shapes
 
 netCDF4 = pytest.importorskip("netCDF4")
 
@@ -158,7 +158,7 @@ def test_completion_offers_no_words_that_a_shell_would_run(changed, monkeypatch)
     """Shells put what is offered on the command line as it stands."""
     import click
 
-    from dap3d_core.cli.completion import quantities
+    from dap3d_core.cli.framework.completion import quantities
 
     for name in ("x;touch pwned;", "$(touch pwned)", "`a`", "a b", "'", '"', "|a", "-o=x", ">x"):
         path = changed(lambda d, n=name: d["body"].__setitem__(0, n))

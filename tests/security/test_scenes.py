@@ -8,9 +8,9 @@ import pytest
 
 import dap3d_core as dap
 from dap3d_core.scene import SceneError, check
-from dap3d_core.scene.reading import LARGEST_FILE, MOST_PARTS
-from dap3d_core.scene.shapes import mesh_file
-from dap3d_core.scene.values import Fault
+from dap3d_core.scene.files.read_toml import LARGEST_FILE, MOST_PARTS
+from dap3d_core.scene.validate.coerce_values import Fault
+from dap3d_core.scene.validate.shapes import mesh_file
 
 BODY = "[bodies.b]\nmass = 1.0\nJp = [1.0, 1.0, 1.0]\n"
 #: Seconds of this process that a refusal may take; without the limits these take minutes.

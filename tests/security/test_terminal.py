@@ -84,7 +84,7 @@ def test_mistakes_of_a_scene_are_plain_text(say, tmp_path):
 def test_warnings_of_libraries_are_plain_text(say, monkeypatch):
     import warnings
 
-    import dap3d_core.cli.models as command
+    import dap3d_core.cli.commands.models as command
 
     def warn(folder):
         warnings.warn("glyph \x1b[31m\nno mistakes found", stacklevel=1)

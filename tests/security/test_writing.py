@@ -11,7 +11,7 @@ from support.process import run
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.kernels.trusted import distrust
+from dap3d_core.kernels.runtime.folder_security import distrust
 from dap3d_core.result import ResultError, check_target
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="links and owners as POSIX has them")
@@ -75,7 +75,7 @@ def test_another_folder_is_taken_and_a_note_says_so(tmp_path):
     cache.chmod(0o777)
     script = """
 import dap3d_core as dap, json
-from dap3d_core.kernels.cache import cache_folder
+from dap3d_core.kernels.runtime.cache import cache_folder
 scene = dap.Scene(); scene.add_body("b", mass=1.0, Jp=(1.0, 1.0, 1.0))
 print(json.dumps([str(cache_folder()), dap.compile(scene).notes]))
 """

@@ -13,11 +13,8 @@ import sys
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.system import Halves
-from dap3d_core.formulations.halves import RESULT, STATE
-from dap3d_core.kernels import cache
-from dap3d_core.kernels.by_address import Arrays, pointer
-from dap3d_core.kernels.cache import COMPILED_FLOORS, Compiled
+from dap3d_core.assembly.arrays import Halves
+from dap3d_core.formulations.two_threads.rhs_halves import RESULT, STATE
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.trace import trace
 from dap3d_core.kernels.compiler.types import (
@@ -33,8 +30,11 @@ from dap3d_core.kernels.compiler.types import (
     Tuple,
 )
 from dap3d_core.kernels.compiler.units import Functions, type_of
-from dap3d_core.kernels.lists import LOOP
-from dap3d_core.kernels.loops import _members
+from dap3d_core.kernels.runtime import cache
+from dap3d_core.kernels.runtime.array_struct import Arrays, pointer
+from dap3d_core.kernels.runtime.cache import COMPILED_FLOORS, Compiled
+from dap3d_core.kernels.runtime.function_lists import LOOP
+from dap3d_core.kernels.runtime.loop_modules import _members
 from support.at_all_levels import all_made_of, function_of, made_of, same_bits
 
 #: The calls of a function that are recorded in each scene, from 1: early ones and some later ones.

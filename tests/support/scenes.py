@@ -3,9 +3,9 @@
 import numpy as np
 
 from dap3d_core.interface.fields import slot_of, specs_of
-from dap3d_core.model.kinematics import rotation
+from dap3d_core.model.rotations import rotation
 from dap3d_core.scene import Scene
-from dap3d_core.testing.subject import own_values
+from dap3d_core.testing.samples.sampled_type import own_values
 
 
 def cases(registry, kind):

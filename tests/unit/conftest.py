@@ -2,7 +2,7 @@
 
 from hypothesis import settings
 
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import jit_is_on
 
 if not jit_is_on():
     settings.register_profile("plain Python", max_examples=20)

@@ -7,10 +7,10 @@ from unit import test_integrators_problems as toys
 from unit.test_integrators_problems import finish, kepler, kepler_f, kepler_orbit, slope
 
 from dap3d_core.integrators import Status
-from dap3d_core.integrators import adams_formulas as adams
-from dap3d_core.integrators.adams_integration import AdamsIntegration
-from dap3d_core.kernels.cache import compiled
-from dap3d_core.kernels.lists import loop_list
+from dap3d_core.integrators.adams import formulas as adams
+from dap3d_core.integrators.adams.integration import AdamsIntegration
+from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.runtime.function_lists import loop_list
 
 
 def start(rhs, y0, times, project=toys.no_constraint, report=toys.plain_report, **options):

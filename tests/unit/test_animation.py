@@ -22,15 +22,15 @@ from unit.test_result import (
 
 import dap3d_core as dap
 from dap3d_core.plot import animate
-from dap3d_core.plot.animation import frame_times, usual_speed
-from dap3d_core.plot.camera import camera_of, shown, with_margin
-from dap3d_core.plot.shaded import shapes_of
-from dap3d_core.plot.stage import Stage
-from dap3d_core.plot.sticks import SHADES, pose_at, sticks_of
+from dap3d_core.plot.film.animation import frame_times, usual_speed
+from dap3d_core.plot.film.frame import Stage
+from dap3d_core.plot.film.projection import camera_of, shown, with_margin
+from dap3d_core.plot.film.shaded_solids import shapes_of
+from dap3d_core.plot.film.stick_figure import SHADES, pose_at, sticks_of
 from dap3d_core.result import ResultError
 from dap3d_core.scene import Scene
-from dap3d_core.scene.description import AnimationPoint
-from dap3d_core.view.shapes import GROUND_COLOR
+from dap3d_core.scene.scene import AnimationPoint
+from dap3d_core.view.scene3d.shapes import GROUND_COLOR
 
 SPACE = np.array([[0.0, 1.0], [0.0, 2.0], [0.0, 3.0]])
 
@@ -418,7 +418,7 @@ def test_limits_of_the_scene_that_the_motion_leaves_are_told(tmp_path):
 
 def parts_of(result):
     """Everything of a row but the time."""
-    from dap3d_core.model.kinematics import to_integrated
+    from dap3d_core.model.rotations import to_integrated
 
     y = to_integrated(result.u, result.subject.body_count)
     return y, result.v_dot, result.Lam, np.zeros((len(result.t), 4))

@@ -11,10 +11,10 @@ from support.ended import EndedError, ended_at, leave, shorten_chunks
 from unit.test_result_files import same_bits
 
 import dap3d_core as dap
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.scene import SceneError
 from dap3d_core.simulation import CheckpointError, SimulationError
-from dap3d_core.simulation.checkpoint import (
+from dap3d_core.simulation.checkpoint.file import (
     FORMAT,
     Checkpoint,
     path_of,

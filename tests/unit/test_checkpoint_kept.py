@@ -9,10 +9,10 @@ from support.ended import leave, shorten_chunks
 from unit.test_result_files import same_bits
 
 import dap3d_core as dap
-from dap3d_core.integrators.radau_work import H_FACTORED, TANGENT_NEEDED
-from dap3d_core.integrators.work import H
-from dap3d_core.kernels.cache import jit_is_on
-from dap3d_core.simulation.checkpoint import read_checkpoint
+from dap3d_core.integrators.radau.state import H_FACTORED, TANGENT_NEEDED
+from dap3d_core.integrators.stepping.integration_state import H
+from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.simulation.checkpoint.file import read_checkpoint
 
 RUN = import_module("dap3d_core.simulation.run")
 

@@ -10,12 +10,13 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from dap3d_core.cli import exits, main
-from dap3d_core.cli.failures import report
-from dap3d_core.cli.group import dap3d
-from dap3d_core.cli.rendering import clean, count, plain, seconds, size
-from dap3d_core.cli.settings import SETTINGS
-from dap3d_core.cli.signals import Stopping
+from dap3d_core.cli import main
+from dap3d_core.cli.app import dap3d
+from dap3d_core.cli.console.console import clean, count, plain, seconds, size
+from dap3d_core.cli.framework.error_messages import report
+from dap3d_core.cli.framework.options import SETTINGS
+from dap3d_core.cli.process import exit_codes
+from dap3d_core.cli.process.signals import Stopping
 from dap3d_core.scene import INTEGRATORS, METHODS, Mistake, SceneError, Simulation
 
 COMMANDS = ("run", "resume", "rerun", "sweep", "check", "models", "plugins", "describe",
@@ -32,9 +33,9 @@ def test_every_command_is_there_and_has_help():
 
 
 def test_main_takes_the_words_and_returns_the_exit_code(capsys):
-    assert main(["--version"]) == exits.DONE
+    assert main(["--version"]) == exit_codes.DONE
     assert capsys.readouterr().out.startswith("dap3d, version")
-    assert main(["nothing"]) == exits.REFUSED
+    assert main(["nothing"]) == exit_codes.REFUSED
     assert "there is no command 'nothing'" in capsys.readouterr().err
 
 
@@ -85,8 +86,8 @@ def test_debug_shows_the_traceback():
     ("error", "code"),
     [
         (KeyboardInterrupt(), 130),
-        (exits.Terminated("ended by SIGTERM"), 1),
-        (exits.Refused("no"), 2),
+        (exit_codes.Terminated("ended by SIGTERM"), 1),
+        (exit_codes.Refused("no"), 2),
         (MemoryError(), 1),
         (OSError("disk full"), 1),
     ],
@@ -118,7 +119,7 @@ def test_mistakes_are_told_and_listed():
 def test_a_signal_before_the_run_raises_at_once():
     with pytest.raises(KeyboardInterrupt), Stopping():
         signal.raise_signal(signal.SIGINT)
-    with pytest.raises(exits.Terminated, match="SIGTERM"), Stopping():
+    with pytest.raises(exit_codes.Terminated, match="SIGTERM"), Stopping():
         signal.raise_signal(signal.SIGTERM)
 
 
@@ -126,7 +127,7 @@ def test_during_a_run_it_waits_for_the_end_of_the_chunk_once():
     with Stopping() as stopping:
         stopping.between_chunks()
         signal.raise_signal(signal.SIGTERM)
-        with pytest.raises(exits.Terminated):
+        with pytest.raises(exit_codes.Terminated):
             stopping.between_chunks()
         stopping.between_chunks()  # told once
         signal.raise_signal(signal.SIGINT)

@@ -10,8 +10,8 @@ from support.own_types import registry_of
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.cli.example import example_of
-from dap3d_core.cli.group import dap3d
+from dap3d_core.cli.app import dap3d
+from dap3d_core.cli.commands.describe_example import example_of
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.registry import load_registry
 

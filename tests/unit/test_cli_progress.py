@@ -2,8 +2,8 @@
 
 import pytest
 
-from dap3d_core.cli import progress
-from dap3d_core.cli.progress import (
+from dap3d_core.cli.console import progress
+from dap3d_core.cli.console.progress import (
     ONCE,
     PointsProgress,
     RunProgress,

@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from dap3d_core.cli.exits import Terminated
-from dap3d_core.cli.signals import Stopping
+from dap3d_core.cli.process.exit_codes import Terminated
+from dap3d_core.cli.process.signals import Stopping
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
 

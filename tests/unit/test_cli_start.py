@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from dap3d_core.cli.rendering import output
-from dap3d_core.cli.start import MOST_BODIES, show_start, start_facts
-from dap3d_core.model.kinematics import join
+from dap3d_core.cli.console.console import output
+from dap3d_core.cli.console.initial_state import MOST_BODIES, show_start, start_facts
+from dap3d_core.model.rotations import join
 
 
 def corrected(shifts):

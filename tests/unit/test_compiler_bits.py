@@ -5,7 +5,7 @@ import json
 import pytest
 from support.process import run
 
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = [pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled"), pytest.mark.slow]
 

@@ -8,8 +8,8 @@ import json
 import pytest
 from support.process import REPOSITORY, run
 
-from dap3d_core.kernels.cache import jit_is_on
 from dap3d_core.kernels.compiler.types import FLOAT, INT, Known, Struct
+from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -76,21 +76,21 @@ recorder.record(dap.simulate, SCENES["everything"](), t_end=4e-4, dt=2e-4)
 NOT_CALLED = {
     f"dap3d_core.{module}.{name}"
     for module, names in {
-        "formulations.constraints": "linearise_evenly",
-        "formulations.halves": "wait work_beside",
+        "formulations.common.constraints": "linearise_evenly",
+        "formulations.two_threads.rhs_halves": "wait work_beside",
         "formulations.regularised": "rest",
         "formulations.standard": "settle_rows",
-        "integrators.adams": "fail",
-        "integrators.combination": "scaled_beyond",
-        "integrators.control": "beyond_rounding",
-        "integrators.crossing": "look_ahead",
-        "integrators.radau": "refuse stage_is_across",
-        "integrators.radau_convergence": "is_settling is_stalled",
-        "integrators.reporting": "report_end",
-        "integrators.rounding": "measure_noise",
-        "integrators.runge_kutta": "is_rounding kept_error on_constraints",
-        "integrators.switches": "shorten",
-        "linear.null_space": "solve_each",
+        "integrators.adams.step": "fail",
+        "integrators.stepping.vector_ops": "scaled_beyond",
+        "integrators.stepping.step_control": "beyond_rounding",
+        "integrators.stepping.singular_poses": "look_ahead",
+        "integrators.radau.step": "refuse stage_is_across",
+        "integrators.radau.convergence": "is_settling is_stalled",
+        "integrators.stepping.output": "report_end",
+        "integrators.stepping.rounding": "measure_noise",
+        "integrators.runge_kutta.step": "is_rounding kept_error on_constraints",
+        "integrators.stepping.event_location": "shorten",
+        "linear.rank.null_space": "solve_each",
     }.items()
     for name in names.split()
 }

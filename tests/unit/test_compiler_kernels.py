@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from support.at_all_levels import made_of, same_bits
 
-from dap3d_core.interface.binding import bind_friction
-from dap3d_core.interface.compiling import _calls_functions
-from dap3d_core.interface.writer import LOOP_KINDS, write
-from dap3d_core.kernels import written
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.interface.codegen.compile_loops import _calls_functions
+from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
+from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.kernels.compiler.trace import trace
-from dap3d_core.kernels.gather import BODY_WIDTH
-from dap3d_core.kernels.lists import LOOP, LoopArrays
-from dap3d_core.kernels.loops import _members, source_of
+from dap3d_core.kernels.runtime import generated_modules
+from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.kernels.runtime.function_lists import LOOP, LoopArrays
+from dap3d_core.kernels.runtime.loop_modules import _members, source_of
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.registry import load_registry
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
@@ -61,7 +61,7 @@ def test_traced_loops_have_the_bits_of_plain_python(kind, keyword):
     for examined, loop in loops_of(REGISTRY.get(kind, keyword)):
 
         def python(loop=loop):
-            namespace = written.load(None, "tried", source_of(loop))
+            namespace = generated_modules.load(None, "tried", source_of(loop))
             namespace.update(loop.kernels)
             return namespace
 

@@ -99,7 +99,7 @@ def offered_here(words):
     """What a shell is offered behind words of a command line; the last one is incomplete."""
     from click.shell_completion import ShellComplete
 
-    from dap3d_core.cli.group import dap3d
+    from dap3d_core.cli.app import dap3d
 
     *before, last = words
     return [item.value for item in ShellComplete(dap3d, {}, "dap3d", "_DAP3D").get_completions(

@@ -7,9 +7,9 @@ from html.parser import HTMLParser
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.scene.display import MOST_ROWS
-from dap3d_core.simulation.compiled import log_first_compilation
+from dap3d_core.simulation.compiled_model import log_first_compilation
 
 HOSTILE = "<img src=x onerror=alert(1)>&\"'\n\x1b[31m"
 #: The tags that tables of ours have.

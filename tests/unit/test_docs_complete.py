@@ -17,11 +17,11 @@ from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core import interface, kernels
-from dap3d_core.cli.group import dap3d
+from dap3d_core.cli.app import dap3d
 from dap3d_core.interface import hooks
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.scene import INTEGRATORS, METHODS, Simulation
-from dap3d_core.scene.description import HEADER_KEYS, NAMED, TABLES, Animation, keys_of
+from dap3d_core.scene.scene import HEADER_KEYS, NAMED, TABLES, Animation, keys_of
 
 DOCS = REPOSITORY / "docs"
 #: Members of a class that have docstrings of their own.
@@ -143,8 +143,8 @@ class Three(interface.Force):
 
 def names_of(line="", constants=()):
     """The names of the position and of the velocity level with one more field, or constants."""
-    from dap3d_core.interface.layout import layout_of
-    from dap3d_core.interface.namespace import namespace
+    from dap3d_core.interface.codegen.instance_layout import layout_of
+    from dap3d_core.interface.codegen.kernel_arguments import namespace
 
     members = {"__module__": __name__}
     exec(line, vars(interface) | {}, members)
@@ -169,8 +169,8 @@ def test_the_names_of_each_field_are_those_of_the_sources():
 
 def test_the_names_besides_those_of_fields_are_those_of_the_sources():
     """Of time, of a function's argument, of friction, of what prepare returns; of its bodies."""
-    from dap3d_core.interface.namespace import VELOCITY_KERNELS, friction_names
-    from dap3d_core.interface.poses import BodyPose
+    from dap3d_core.interface.body_pose import BodyPose
+    from dap3d_core.interface.codegen.kernel_arguments import VELOCITY_KERNELS, friction_names
 
     page = (DOCS / "reference" / "names.md").read_text()
     besides = rows_of(page, "where | names")

@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 import dap3d_core as dap
 from dap3d_core.exchange.gltf import write_gltf
-from dap3d_core.exchange.moving import MovingScene
+from dap3d_core.exchange.moving_solids import MovingScene
 from dap3d_core.result import ResultError
-from dap3d_core.view.marks import SOLIDS
-from dap3d_core.view.solids import solid, spring
+from dap3d_core.view.scene3d.primitives import SOLIDS
+from dap3d_core.view.scene3d.solids import solid, spring
 
 #: A pyramid that no symmetry maps to itself: its vertices tell its pose.
 PYRAMID = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
@@ -237,7 +237,7 @@ def test_matlab_finds_every_array_with_its_unit(result, tmp_path):
 
 
 def test_a_table_is_that_of_the_post_processor(result, tmp_path):
-    from dap3d_core.result.table import columns_of, write_csv
+    from dap3d_core.result.quantities.csv_table import columns_of, write_csv
 
     dap.export(result, tmp_path / "a.csv")
     write_csv(result, tmp_path / "b.csv", columns_of(result))

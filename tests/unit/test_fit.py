@@ -5,7 +5,7 @@ import pytest
 import xarray
 
 import dap3d_core as dap
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import jit_is_on
 
 #: Each fit is some 30 runs, which take long where nothing is compiled.
 compiled = pytest.mark.skipif(not jit_is_on(), reason="many runs without compilation")

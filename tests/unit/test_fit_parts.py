@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from dap3d_core.study.determined import Resolution, determine, steadied
-from dap3d_core.study.parameters import Parameter
-from dap3d_core.study.sampling import Sampling, common_step
-from dap3d_core.study.sensitivity import Differences
+from dap3d_core.study.fit.fit_parameters import Parameter
+from dap3d_core.study.fit.identifiability import Resolution, determine, steadied
+from dap3d_core.study.fit.interpolation import Sampling, common_step
+from dap3d_core.study.fit.jacobian import Differences
 
 RESOLUTION = Resolution(1e-6, 1e-12)
 

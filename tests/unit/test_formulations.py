@@ -9,14 +9,14 @@ from support.process import run
 
 import dap3d_core as dap
 from dap3d_core.formulations import PROJECT, RHS
-from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.interface import Joint, Point, Vector, number, point, vector
 from dap3d_core.kernels import cross, dot, eye, hstack, neg, normals, row, scale, skew, sub
 from dap3d_core.model import build_model
-from dap3d_core.model.kinematics import rotation
+from dap3d_core.model.rotations import rotation
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
-from dap3d_core.simulation.initial import correct_initial
+from dap3d_core.simulation.initial.assemble import correct_initial
 
 REDUNDANT = {
     "door": mechanisms.door,

@@ -11,11 +11,11 @@ from support.nets import fourbars, ladder, plate_net, rod_net
 
 import dap3d_core as dap
 from dap3d_core import formulations
-from dap3d_core.formulations.machine import Machine
-from dap3d_core.formulations.second_thread import SecondThread, threads_allowed
-from dap3d_core.kernels.cache import jit_is_on
-from dap3d_core.linear.halving import FIRST, SECOND, TOP
-from dap3d_core.linear.plan import make_plan
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.two_threads.worker_thread import SecondThread, threads_allowed
+from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.linear.ldlt.plan import make_plan
+from dap3d_core.linear.ordering.bisection import FIRST, SECOND, TOP
 from dap3d_core.simulation import CompiledModel
 
 EPS = np.finfo(float).eps

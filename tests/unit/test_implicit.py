@@ -10,15 +10,15 @@ from support.graphs import chain, star
 from support.plain import in_another_process
 
 import dap3d_core as dap
-from dap3d_core.formulations.stage import evaluate_stage, keep_frames
+from dap3d_core.formulations.stabilized_index2.stage_equations import evaluate_stage, keep_frames
 from dap3d_core.integrators import Status
-from dap3d_core.integrators.implicit import RadauIntegration, estimate_tolerances
-from dap3d_core.integrators.radau_method import radau_method
-from dap3d_core.integrators.radau_newton import factorise_both, find_tangent, solve_first
-from dap3d_core.kernels.cache import compiled, jit_is_on
-from dap3d_core.linear.lu import factor_lu, solve_lu
-from dap3d_core.linear.lu_plan import make_lu_plan
-from dap3d_core.linear.ordering import order_nodes
+from dap3d_core.integrators.radau.integration import RadauIntegration, estimate_tolerances
+from dap3d_core.integrators.radau.newton import factorise_both, find_tangent, solve_first
+from dap3d_core.integrators.radau.tableau import radau_method
+from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
+from dap3d_core.linear.lu.factor import factor_lu, solve_lu
+from dap3d_core.linear.lu.plan import make_lu_plan
+from dap3d_core.linear.ordering.elimination_order import order_nodes
 
 
 @compiled
@@ -256,8 +256,9 @@ def test_other_integrators_load_nothing_of_it():
     code = (
         "import sys, dap3d_core as dap\n"
         "dap.simulate('pen1', t_end=0.01, dt=0.01)\n"
-        "for name in ('formulations.tangent', 'formulations.stage', 'linear.lu',\n"
-        "             'integrators.implicit', 'integrators.radau'):\n"
+        "for name in ('formulations.stabilized_index2.jacobian', 'linear.lu.factor',\n"
+        "             'formulations.stabilized_index2.stage_equations',\n"
+        "             'integrators.radau.integration', 'integrators.radau.step'):\n"
         "    assert 'dap3d_core.' + name not in sys.modules, name\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=300)

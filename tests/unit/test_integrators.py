@@ -20,7 +20,7 @@ from unit.test_integrators_problems import (
 )
 
 from dap3d_core.integrators import METHODS
-from dap3d_core.integrators.method import ABSCISSA, GROUP, GROUPS, TERMS, combinations
+from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA, GROUP, GROUPS, TERMS, combinations
 
 # ------------------------------------------------------------------ coefficients
 

@@ -28,7 +28,7 @@ from unit.test_integrators_problems import (
 )
 
 from dap3d_core.integrators import METHODS, Status
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import jit_is_on
 
 # ------------------------------------------------------------------ bookkeeping
 

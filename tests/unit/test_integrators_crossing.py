@@ -6,7 +6,7 @@ from support import redundant
 
 import dap3d_core as dap
 from dap3d_core.integrators import METHODS, Integration, Status
-from dap3d_core.integrators.crossing import NOW, RATE, aim, is_near, look_back
+from dap3d_core.integrators.stepping.singular_poses import NOW, RATE, aim, is_near, look_back
 
 
 def lengths_of(*pairs):

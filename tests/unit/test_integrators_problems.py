@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from dap3d_core.assembly.system import System, step_functions
+from dap3d_core.assembly.arrays import System, step_functions
 from dap3d_core.integrators import METHODS, Integration, Status
-from dap3d_core.kernels.cache import compiled
 from dap3d_core.kernels.compiler.types import DTYPES, Array
-from dap3d_core.kernels.lists import loop_list
+from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.runtime.function_lists import loop_list
 
 # The system is an empty one of the core, whose integrators are compiled for it already; its
 # ``force`` counts the calls of rhs, project and report.

@@ -30,7 +30,7 @@ from support.plain import in_another_process
 from support.process import REPOSITORY, run
 from support.scenes import scene_for
 
-from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.interface import (
     Joint,
     PluginError,
@@ -43,7 +43,7 @@ from dap3d_core.interface import (
 )
 from dap3d_core.kernels import dot
 from dap3d_core.model import build_model
-from dap3d_core.model.kinematics import rotation, split
+from dap3d_core.model.rotations import rotation, split
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import Scene, check
 from dap3d_core.testing import check_type
@@ -259,7 +259,7 @@ def test_sympy_is_imported_for_the_first_derivation_alone(tmp_path):
 
 ANEW = """
 from dap3d_core.interface import examine
-from dap3d_core.kernels.cache import cache_folder
+from dap3d_core.kernels.runtime.cache import cache_folder
 from support.derived_types import {types}
 for type_ in ({types},):
     examine(type_)

@@ -17,11 +17,12 @@ from dap3d_core.interface import (
     point,
     vector,
 )
+from dap3d_core.interface.codegen.loop_source import write
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.interface.writer import write
-from dap3d_core.kernels import add, gather
-from dap3d_core.kernels.lists import LoopArrays, call_loop, loop_list
-from dap3d_core.kernels.loops import build
+from dap3d_core.kernels import add
+from dap3d_core.kernels.runtime import loop_support
+from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
+from dap3d_core.kernels.runtime.loop_modules import build
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -51,9 +52,9 @@ def test_a_vector_may_be_called_v_i():
     rng = np.random.default_rng(4)
     A = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     v, w, s, a = rng.normal(size=(4, 3))
-    one = np.zeros((2, gather.BODY_WIDTH))
-    one[1, gather.A : gather.A + 9] = A.ravel()
-    one[1, gather.V : gather.V + 3], one[1, gather.W : gather.W + 3] = v, w
+    one = np.zeros((2, loop_support.BODY_WIDTH))
+    one[1, loop_support.A : loop_support.A + 9] = A.ravel()
+    one[1, loop_support.V : loop_support.V + 3], one[1, loop_support.W : loop_support.W + 3] = v, w
     par = np.zeros(examined.layout.par_width)
     for name, values in (("P_i", s), ("v_i", a)):
         at = examined.layout.numbers[name][0]
@@ -128,7 +129,7 @@ def test_variants_in_one_file_have_loops_of_their_own():
     ((_, other),) = examined.variants
     for one, sign in ((examined, 1.0), (other, -1.0)):
         out, nothing = np.zeros(12), np.zeros(1)
-        body_array = np.zeros((2, gather.BODY_WIDTH))
+        body_array = np.zeros((2, loop_support.BODY_WIDTH))
         loop = build(write(one, "wrench"))
         arrays = LoopArrays(body=body_array, F=np.zeros((1, 5)), idx=np.array([1]), par=nothing)
         group = np.array([0, 0, 1])

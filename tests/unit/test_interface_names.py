@@ -11,8 +11,8 @@ from support.motions import Motion
 from support.own_types import registry_of
 
 import dap3d_core as dap
+from dap3d_core.assembly.arrays import ENERGY, VALUE, WRENCH
 from dap3d_core.assembly.evaluate import call_kinds, place_bodies
-from dap3d_core.assembly.system import ENERGY, VALUE, WRENCH
 from dap3d_core.interface import (
     Body,
     Force,
@@ -32,7 +32,7 @@ from dap3d_core.interface import (
     vector2,
 )
 from dap3d_core.kernels import row
-from dap3d_core.model.kinematics import split
+from dap3d_core.model.rotations import split
 
 ZERO = (0.0, 0.0, 0.0)
 CLOSE = {"rtol": 1e-13, "atol": 1e-13}

@@ -8,8 +8,8 @@ import pytest
 from support.own_types import registry_of
 
 import dap3d_core as dap
+from dap3d_core.assembly.arrays import ANGLE
 from dap3d_core.assembly.evaluate import call_kinds
-from dap3d_core.assembly.system import ANGLE
 from dap3d_core.interface import (
     Body,
     Force,

@@ -6,8 +6,8 @@ import attrs
 import numpy as np
 import pytest
 
-from dap3d_core.kernels.by_address import INTEGERS, MATRIX, Arrays, pointer
-from dap3d_core.kernels.cache import compiled, jit_is_on
+from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, Arrays, pointer
+from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)

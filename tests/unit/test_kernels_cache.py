@@ -9,7 +9,7 @@ import time
 import pytest
 from support.process import REPOSITORY, run, start
 
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled with DAP3D_PLAIN=1")
 
@@ -39,10 +39,10 @@ EVALUATE = """
 import sys; sys.path.insert(0, ".")
 import numpy as np
 from dap3d_core.interface import examine
-from dap3d_core.interface.writer import write
-from dap3d_core.kernels.gather import BODY_WIDTH, MASS
-from dap3d_core.kernels.lists import LoopArrays, call_loop, loop_list
-from dap3d_core.kernels.loops import build, compiled_here
+from dap3d_core.interface.codegen.loop_source import write
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, MASS
+from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
+from dap3d_core.kernels.runtime.loop_modules import build, compiled_here
 from plugin import Push
 loop = build(write(examine(Push), "wrench"))
 body = np.zeros((2, BODY_WIDTH)); body[1, MASS] = 2.0
@@ -100,7 +100,10 @@ def test_a_cache_that_cannot_be_written_does_no_harm(tmp_path, where):
     blocked.write_text("")
     script = EVALUATE
     if where == "nowhere":
-        script = "import dap3d_core.kernels.cache as c; c._candidates = lambda: iter(())\n" + script
+        script = (
+            "import dap3d_core.kernels.runtime.cache as c; c._candidates = lambda: iter(())\n"
+            + script
+        )
     assert run(script, blocked / "cache", cwd=tmp_path, XDG_CACHE_HOME=blocked).split()[0] == "6.5"
 
 

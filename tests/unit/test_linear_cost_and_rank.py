@@ -16,10 +16,10 @@ from support.graphs import (
     wheel,
 )
 
-from dap3d_core.kernels.cache import jit_is_on
-from dap3d_core.linear import rank
-from dap3d_core.linear.plan import make_plan
-from dap3d_core.linear.rank import dense_rank, sparse_rank
+from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.linear.ldlt.plan import make_plan
+from dap3d_core.linear.rank import rank
+from dap3d_core.linear.rank.rank import dense_rank, sparse_rank
 
 # ------------------------------------------------------------------ what it costs
 

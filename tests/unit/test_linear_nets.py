@@ -10,11 +10,13 @@ from support.graphs import GRAPHS, RANDOM, Case, chain, check_solution, star
 from support.nets import fourbars, ladder, plate_net, rod_net
 
 import dap3d_core as dap
-from dap3d_core.kernels.cache import jit_is_on
-from dap3d_core.linear import dissection, ordering, plan, rank, supernodes
-from dap3d_core.linear.dissection import dissect
-from dap3d_core.linear.ordering import order_nodes
-from dap3d_core.linear.plan import make_plan
+from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.linear.ldlt import plan
+from dap3d_core.linear.ldlt.plan import make_plan
+from dap3d_core.linear.ordering import elimination_order, nested_dissection, supernodes
+from dap3d_core.linear.ordering.elimination_order import order_nodes
+from dap3d_core.linear.ordering.nested_dissection import dissect
+from dap3d_core.linear.rank import rank
 
 EPS = np.finfo(float).eps
 
@@ -43,11 +45,11 @@ def test_the_cheaper_order_is_taken(monkeypatch):
     takes more, minimum degree stays."""
     n, slots, rows = arguments(plate_net(24))
     dissected = order_nodes(n, slots, rows).work
-    monkeypatch.setattr(ordering, "WIDE", 10**9)
+    monkeypatch.setattr(elimination_order, "WIDE", 10**9)
     greedy = order_nodes(n, slots, rows).work
     assert dissected < 0.8 * greedy
-    monkeypatch.setattr(ordering, "WIDE", 0)
-    monkeypatch.setattr(dissection, "dissect", lambda neighbours, weight: range(len(weight)))
+    monkeypatch.setattr(elimination_order, "WIDE", 0)
+    monkeypatch.setattr(nested_dissection, "dissect", lambda neighbours, weight: range(len(weight)))
     assert order_nodes(n, slots, rows).work == greedy
 
 
@@ -70,7 +72,7 @@ def test_separators_separate():
                 fresh = {m for m in neighbours[waiting.pop()] if stage[m] == 0} - leaf
                 leaf |= fresh
                 waiting += fresh
-            assert len(leaf) <= dissection.LEAF
+            assert len(leaf) <= nested_dissection.LEAF
             seen |= leaf
     assert max(stage) >= 3
     top = [k for k, s in enumerate(stage) if s == max(stage)]
@@ -94,7 +96,7 @@ def test_cost_of_a_row_of_loops_is_linear(family):
 @pytest.mark.parametrize("graph", [chain(2000), star(1000)])
 def test_trees_are_not_dissected(graph, monkeypatch):
     """Their fronts are narrow: no other order is tried, no panel made."""
-    monkeypatch.delattr(dissection, "dissect")
+    monkeypatch.delattr(nested_dissection, "dissect")
     assert order_nodes(*arguments(graph)).panels == ()
 
 
@@ -104,8 +106,8 @@ def test_trees_are_not_dissected(graph, monkeypatch):
 @pytest.fixture(params=[0.3, 0.9] if jit_is_on() else [0.3])
 def panels_everywhere(request, monkeypatch):
     """Dissection down to four nodes and panels, whatever the size, many zeros in them."""
-    monkeypatch.setattr(ordering, "WIDE", 0)
-    monkeypatch.setattr(dissection, "LEAF", 4)
+    monkeypatch.setattr(elimination_order, "WIDE", 0)
+    monkeypatch.setattr(nested_dissection, "LEAF", 4)
     monkeypatch.setattr(supernodes, "ZEROS", request.param)
 
 
@@ -150,8 +152,8 @@ def test_random_graphs_are_solved(n, pairs, seed):
         return
     check_solution(case)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ordering, "WIDE", 0)
-        patch.setattr(dissection, "LEAF", 2)
+        patch.setattr(elimination_order, "WIDE", 0)
+        patch.setattr(nested_dissection, "LEAF", 2)
         patch.setattr(supernodes, "ZEROS", 0.9)
         check_solution(Case((n, joints), np.random.default_rng(seed)))
 

@@ -13,12 +13,12 @@ from support.motions import G, Motion
 
 import dap3d_core as dap
 from dap3d_core.formulations import RHS
-from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model import build_model
-from dap3d_core.model.kinematics import join, rotation, split, to_body
+from dap3d_core.model.rotations import join, rotation, split, to_body
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
-from dap3d_core.simulation.initial import correct_initial
+from dap3d_core.simulation.initial.assemble import correct_initial
 
 REFERENCE = Path(__file__).parents[1] / "models" / "reference"
 #: Relative: condition numbers up to 1e5 of matrices that are inverted by another method.

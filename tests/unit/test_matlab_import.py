@@ -10,9 +10,9 @@ from support.matlab import write
 
 from dap3d_core.interface import PluginError
 from dap3d_core.matlab import import_matlab
-from dap3d_core.matlab.bodies import parameters_of, rotation_of
-from dap3d_core.matlab.importing import translate
-from dap3d_core.model.kinematics import rotation
+from dap3d_core.matlab.import_matlab import translate
+from dap3d_core.matlab.translate.bodies import parameters_of, rotation_of
+from dap3d_core.model.rotations import rotation
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import SceneError
 

@@ -7,7 +7,7 @@ import pytest
 from support.matlab import MODELS, SMALL, write
 
 import dap3d_core as dap
-from dap3d_core.matlab.source import LARGEST_FILE
+from dap3d_core.matlab.language.parse import LARGEST_FILE
 from dap3d_core.scene import MISSING, SceneError
 
 

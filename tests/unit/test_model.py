@@ -8,7 +8,7 @@ import dap3d_core as dap
 from dap3d_core.interface import Body, Force, Joint, Vector, body, number, vector
 from dap3d_core.kernels import row
 from dap3d_core.model import build_model
-from dap3d_core.model.kinematics import (
+from dap3d_core.model.rotations import (
     from_integrated,
     join,
     rotation,
@@ -19,7 +19,7 @@ from dap3d_core.model.kinematics import (
 )
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
-from dap3d_core.scene.description import AnimationPoint
+from dap3d_core.scene.scene import AnimationPoint
 
 ZERO = (0.0, 0.0, 0.0)
 

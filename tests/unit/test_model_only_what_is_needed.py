@@ -52,12 +52,8 @@ def test_a_model_loads_only_its_own_types(model, present, absent):
     assert present <= found
     assert not {m for m in found if m.startswith(tuple(absent))}
     assert not found & {"matplotlib", "netCDF4", "xarray", "rich"}
-    for_large = {"halving", "halves", "dividing", "second_thread", "atomic", "standard_in_halves"}
-    assert not {m for m in found if m.split(".")[0] == "dap3d_core"} & {
-        f"dap3d_core.{floor}.{name}"
-        for floor in ("kernels", "linear", "formulations")
-        for name in for_large
-    }
+    for_large = "formulations.two_threads", "kernels.runtime.atomic", "linear.ordering.bisection"
+    assert not {m for m in found if m.removeprefix("dap3d_core.").startswith(for_large)}
     if model == "bodies2":
         assert not {"acceleration", "position"} & set(lines[-2].split())
         assert "dap3d_core.formulations.standard" not in found

@@ -18,7 +18,7 @@ from unit.test_result import circling, drifting, model_of, result_of
 
 import dap3d_core as dap
 from dap3d_core.plot import FORMATS, plot, save_plot, show_plot
-from dap3d_core.plot.drawing import draw, gather, height_of
+from dap3d_core.plot.curves import draw, gather, height_of
 from dap3d_core.result import ResultError, UnknownNameError
 from dap3d_core.scene import Scene
 

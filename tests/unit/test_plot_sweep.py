@@ -10,13 +10,13 @@ from matplotlib.collections import LineCollection, QuadMesh
 
 import dap3d_core as dap
 from dap3d_core.plot import save_plot
-from dap3d_core.plot.sweep_marks import folded
-from dap3d_core.plot.sweep_panels import Band, Heat, Lines, Scatter, Strands, edges
-from dap3d_core.plot.sweep_parallel import Parallel
-from dap3d_core.plot.sweep_table import Column, table_of
-from dap3d_core.plot.sweeps import gather_sweep
+from dap3d_core.plot.sweep.panels import Band, Heat, Lines, Scatter, Strands, edges
+from dap3d_core.plot.sweep.parallel_coordinates import Parallel
+from dap3d_core.plot.sweep.style import folded
+from dap3d_core.plot.sweep.sweep_plot import gather_sweep
+from dap3d_core.plot.sweep.sweep_table import Column, table_of
 from dap3d_core.result import UnknownNameError
-from dap3d_core.study.choosing import evenly
+from dap3d_core.study.sweep.subsample import evenly
 
 matplotlib.use("Agg")
 

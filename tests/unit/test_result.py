@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from support.plain import in_another_process
 
-from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model import build_model
-from dap3d_core.model.kinematics import join, to_global, to_integrated
+from dap3d_core.model.rotations import join, to_global, to_integrated
 from dap3d_core.registry import load_registry
 from dap3d_core.result import Result, ResultError, Statistics, UnknownNameError
 from dap3d_core.scene import Scene, check, load
@@ -221,12 +221,12 @@ def test_jacobian_has_a_row_for_each_constraint_and_vanishes_on_the_motion():
 
 
 def test_jacobian_of_many_rows_is_sparse(monkeypatch):
-    monkeypatch.setattr("dap3d_core.result.reactions.DENSE_ROWS", 2)
+    monkeypatch.setattr("dap3d_core.result.post.reactions.DENSE_ROWS", 2)
     result, _, _ = circling(nt=4)
     dense, _, _ = circling(nt=4)
-    monkeypatch.setattr("dap3d_core.result.reactions.DENSE_ROWS", 3)
+    monkeypatch.setattr("dap3d_core.result.post.reactions.DENSE_ROWS", 3)
     expected = dense.Jac
-    monkeypatch.setattr("dap3d_core.result.reactions.DENSE_ROWS", 2)
+    monkeypatch.setattr("dap3d_core.result.post.reactions.DENSE_ROWS", 2)
     assert len(result.Jac) == 4
     for found, D in zip(result.Jac, expected, strict=True):
         assert found.shape == (3, 6)

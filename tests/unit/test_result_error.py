@@ -10,7 +10,7 @@ from support import problems
 
 import dap3d_core as dap
 from dap3d_core.result import INFORMATION, estimated_error
-from dap3d_core.result.estimate import ErrorEstimate
+from dap3d_core.result.post.global_error import ErrorEstimate
 
 #: The module; the package has a function of its name.
 LOOP = importlib.import_module("dap3d_core.simulation.run")

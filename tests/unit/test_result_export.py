@@ -9,13 +9,13 @@ import xarray
 from unit.test_result import circling, model_of, result_of
 
 from dap3d_core.result import ResultError
-from dap3d_core.result.export import dataset_to_write, selection_of, write_netcdf
-from dap3d_core.result.table import columns_of, jacobian_columns, selected, write_csv
+from dap3d_core.result.quantities.csv_table import columns_of, jacobian_columns, selected, write_csv
+from dap3d_core.result.quantities.netcdf_export import dataset_to_write, selection_of, write_netcdf
 from dap3d_core.scene import Scene
 
 
 def test_a_jacobian_of_many_rows_is_written_by_its_entries(tmp_path, monkeypatch):
-    monkeypatch.setattr("dap3d_core.result.export.DENSE_ROWS", 2)
+    monkeypatch.setattr("dap3d_core.result.quantities.netcdf_export.DENSE_ROWS", 2)
     result, _, _ = circling(nt=4)
     file = tmp_path / "all.nc"
     arrays = write_netcdf(result, file, dataset_to_write(result), jacobian=True, force=False)
@@ -27,7 +27,7 @@ def test_a_jacobian_of_many_rows_is_written_by_its_entries(tmp_path, monkeypatch
 
 
 def test_a_jacobian_of_many_rows_does_not_go_into_a_table(monkeypatch):
-    monkeypatch.setattr("dap3d_core.result.table.DENSE_ROWS", 2)
+    monkeypatch.setattr("dap3d_core.result.quantities.csv_table.DENSE_ROWS", 2)
     with pytest.raises(ResultError, match=r"write a \.nc file"):
         jacobian_columns(circling(nt=4)[0])
 
@@ -36,7 +36,7 @@ def test_a_table_is_written_in_blocks(tmp_path, monkeypatch):
     """The same bytes, whatever the size of a block."""
     result, _, _ = circling()
     for name, size in (("one", 1), ("all", 10**6)):
-        monkeypatch.setattr("dap3d_core.result.table._BLOCK", size)
+        monkeypatch.setattr("dap3d_core.result.quantities.csv_table._BLOCK", size)
         write_csv(result, tmp_path / name, columns_of(result), jacobian_columns(result))
     assert (tmp_path / "one").read_bytes() == (tmp_path / "all").read_bytes()
     assert (tmp_path / "all").read_text().count("\n") == 22
@@ -81,10 +81,10 @@ def test_a_file_that_cannot_be_finished_leaves_nothing(tmp_path, monkeypatch):
     def full(*_, **__):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("dap3d_core.result.export._add_jacobian", full)
+    monkeypatch.setattr("dap3d_core.result.quantities.netcdf_export._add_jacobian", full)
     with pytest.raises(ResultError, match=r"cannot write .*all\.nc: No space left"):
         write_netcdf(result, tmp_path / "all.nc", dataset, jacobian=True, force=False)
-    monkeypatch.setattr("dap3d_core.result.table._write", full)
+    monkeypatch.setattr("dap3d_core.result.quantities.csv_table._write", full)
     with pytest.raises(ResultError, match=r"cannot write .*all\.csv: No space left"):
         write_csv(result, tmp_path / "all.csv", columns_of(result))
     assert list(tmp_path.iterdir()) == []

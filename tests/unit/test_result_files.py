@@ -15,8 +15,8 @@ import pytest
 import xarray
 from unit.test_result import CONTROLLED, circling, circling_scene, drifting, model_of
 
-from dap3d_core.formulations.machine import Machine
-from dap3d_core.model.kinematics import split
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.model.rotations import split
 from dap3d_core.result import (
     Result,
     ResultError,
@@ -26,7 +26,7 @@ from dap3d_core.result import (
 )
 from dap3d_core.result.arrays import COLUMNS, row_width
 from dap3d_core.scene import load
-from dap3d_core.scene.reading import scene_of
+from dap3d_core.scene.files.read_toml import scene_of
 
 ABOUT = dict(
     status="interrupted",
@@ -243,7 +243,7 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
     def fail(*_):
         raise RuntimeError("NetCDF: HDF error")
 
-    monkeypatch.setattr("dap3d_core.result.writing.write_rows", fail)
+    monkeypatch.setattr("dap3d_core.result.file.write.write_rows", fail)
     with pytest.raises(ResultError, match=r"run\.nc: .*is the disk full"):
         result.save(path, force=True)
     assert path.read_bytes() == before

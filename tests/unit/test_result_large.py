@@ -13,10 +13,10 @@ from unit.test_result_files import same_bits
 import dap3d_core as dap
 from dap3d_core.result import arrays as arrays_module
 from dap3d_core.result.arrays import Arrays
-from dap3d_core.result.on_file import FileArrays
+from dap3d_core.result.file.lazy_arrays import FileArrays
 
-KEEPING = import_module("dap3d_core.simulation.keeping")
-READING = import_module("dap3d_core.result.reading")
+KEEPING = import_module("dap3d_core.simulation.output.recorder")
+READING = import_module("dap3d_core.result.open")
 SHORT = {"t_end": 0.6, "dt": 0.01}
 
 

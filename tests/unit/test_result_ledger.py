@@ -13,7 +13,7 @@ from unit.test_result import (
     rows_of,
 )
 
-from dap3d_core.model.kinematics import join, split
+from dap3d_core.model.rotations import join, split
 from dap3d_core.scene import Scene
 
 

@@ -6,12 +6,12 @@ from support.motions import Motion
 from support.scenes import scene_for
 from unit.test_result import ARM, MASS, PIVOT, RATE, about_z, circling, model_of, result_of, rows_of
 
-from dap3d_core.formulations.machine import Machine
-from dap3d_core.model.kinematics import rotation, split
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.model.rotations import rotation, split
 from dap3d_core.registry import load_registry
 from dap3d_core.result import ResultError, UnknownNameError
 from dap3d_core.scene import Scene
-from dap3d_core.simulation.initial import correct_initial
+from dap3d_core.simulation.initial.assemble import correct_initial
 
 REGISTRY = load_registry()
 SEVERAL = [

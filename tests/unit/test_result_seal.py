@@ -10,8 +10,9 @@ from unit.test_result import circling
 from unit.test_result_files import same_bits
 from unit.test_result_writer import grown
 
-from dap3d_core.result import ResultError, open_result, seal
-from dap3d_core.result.seal import check_seal
+from dap3d_core.result import ResultError, open_result
+from dap3d_core.result.file import checksum
+from dap3d_core.result.file.checksum import check_seal
 
 SIZE = 40
 REFUSED = r"cannot read .*: it is (damaged|cut off).*; take another copy of it, or run again$"
@@ -95,7 +96,7 @@ def test_more_bytes_at_the_end_are_refused(good, tmp_path, no_library):
 def test_what_describes_a_growing_file_is_sealed(part, tmp_path, no_library):
     """Its rows are not: they come after the seal."""
     data = part.read_bytes()
-    *_, rows, size, _, _ = seal._LAYOUT.unpack(data[-SIZE:])
+    *_, rows, size, _, _ = checksum._LAYOUT.unpack(data[-SIZE:])
     assert size == len(data) - SIZE
     for at in [*np.random.default_rng(4).integers(48, rows, size=200)]:
         changed = bytearray(data)
@@ -117,15 +118,15 @@ def test_a_growing_file_is_read_at_any_moment(tmp_path):
             assert len(open_result(tmp_path / "copy.nc").t) == first + 50
     assert same_bits(open_result(path), result)
     data = path.read_bytes()
-    *_, rows, size, _, _ = seal._LAYOUT.unpack(data[-SIZE:])
+    *_, rows, size, _, _ = checksum._LAYOUT.unpack(data[-SIZE:])
     assert size - rows >= 8 * 200 * result.arrays.width  # no row lies in what was sealed
 
 
 def test_of_a_large_file_what_describes_it_is_compared(good, tmp_path, monkeypatch):
-    monkeypatch.setattr(seal, "WHOLE", 1000)
+    monkeypatch.setattr(checksum, "WHOLE", 1000)
     assert same_bits(open_result(good), circling(nt=50)[0])
     data = bytearray(good.read_bytes())
-    *_, rows, _, _, _ = seal._LAYOUT.unpack(data[-SIZE:])
+    *_, rows, _, _, _ = checksum._LAYOUT.unpack(data[-SIZE:])
     data[rows + 1000] ^= 1
     open_result(written(tmp_path / "a.nc", data))
     data[rows - 1000] ^= 1

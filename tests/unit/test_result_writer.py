@@ -14,7 +14,7 @@ from unit.test_result_files import noisy, run, same_bits
 
 from dap3d_core.result import Result, ResultError, ResultWriter, open_result
 from dap3d_core.result.arrays import COLUMNS, arrays_of
-from dap3d_core.result.layout import write_rows
+from dap3d_core.result.file.schema import write_rows
 from dap3d_core.scene import load
 
 
@@ -86,7 +86,7 @@ def test_after_a_failed_write_no_later_rows_follow(tmp_path, monkeypatch):
         raise RuntimeError("NetCDF: HDF error")
 
     with monkeypatch.context() as patch:
-        patch.setattr("dap3d_core.result.writing.write_rows", fail)
+        patch.setattr("dap3d_core.result.file.write.write_rows", fail)
         with pytest.raises(ResultError, match="is the disk full"):
             writer.append(result.arrays.part(slice(5, 6)))
     with pytest.raises(ResultError, match="the writer is closed"):
@@ -162,7 +162,7 @@ def test_a_writer_that_cannot_begin_leaves_nothing(tmp_path, monkeypatch):
     def fail(*_):
         raise RuntimeError("NetCDF: HDF error")
 
-    monkeypatch.setattr("dap3d_core.result.writing.define", fail)
+    monkeypatch.setattr("dap3d_core.result.file.write.define", fail)
     with pytest.raises(ResultError, match="is the disk full"):
         grown(tmp_path / "run.nc", result)
     assert os.listdir(tmp_path) == []

@@ -8,9 +8,9 @@ import textwrap
 import pytest
 from support.plain import in_another_process
 
-import dap3d_core.scene.reading as reading
+import dap3d_core.scene.files.read_toml as reading
 from dap3d_core.scene import SceneError, load, shipped_models
-from dap3d_core.scene.reading import group_of
+from dap3d_core.scene.files.read_toml import group_of
 
 TEXT = '[scene]\nname = "small"\n\n[bodies.a]\nmass = 1.0\nJp = [1.0, 1.0, 1.0]\n'
 

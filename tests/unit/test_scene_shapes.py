@@ -4,8 +4,8 @@ import pytest
 
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import Scene, SceneError, check, load, parse
-from dap3d_core.scene.collector import Collector
-from dap3d_core.scene.shapes import SHAPES, mesh_file, read_shapes
+from dap3d_core.scene.validate.mistake_collector import Collector
+from dap3d_core.scene.validate.shapes import SHAPES, mesh_file, read_shapes
 
 GOOD = """\
 [bodies.crank]

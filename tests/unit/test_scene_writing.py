@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import Scene, SceneError, check, load, shipped_models
-from dap3d_core.scene.description import Element, fault_of_name
-from dap3d_core.scene.lines import lines_of
-from dap3d_core.scene.reading import scene_of
+from dap3d_core.scene.files.line_numbers import lines_of
+from dap3d_core.scene.files.read_toml import scene_of
+from dap3d_core.scene.scene import Element, fault_of_name
 
 import tomllib  # isort: skip
 

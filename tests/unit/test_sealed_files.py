@@ -5,7 +5,7 @@ import warnings
 
 import pytest
 
-from dap3d_core.kernels.sealed_files import sealed, sealed_content
+from dap3d_core.kernels.runtime.sealed_files import sealed, sealed_content
 
 
 def test_a_file_gives_back_what_was_written(tmp_path):

@@ -12,10 +12,10 @@ from support.mechanisms import (
 )
 
 import dap3d_core as dap
-from dap3d_core.linear import rank
-from dap3d_core.simulation import redundancy
-from dap3d_core.simulation.elsewhere import redundancy_elsewhere
-from dap3d_core.simulation.initial import correct_initial
+from dap3d_core.linear.rank import rank
+from dap3d_core.simulation.initial.assemble import correct_initial
+from dap3d_core.simulation.redundancy import redundancy
+from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 
 
 def two_doors(gap=0.0):
@@ -136,7 +136,7 @@ def test_what_is_redundant_at_one_pose_alone(rows, monkeypatch):
     """A02 with all links in line: rank 27 of 35 rows, 29 elsewhere (benchmarks A02). Two of the
     eight rows are redundant there alone, six everywhere."""
     if rows == "many":
-        monkeypatch.setattr("dap3d_core.simulation.initial.DENSE_ROWS", 0)
+        monkeypatch.setattr("dap3d_core.simulation.initial.assemble.DENSE_ROWS", 0)
         monkeypatch.setattr(redundancy, "DENSE_ROWS", 0)
     found, elsewhere = elsewhere_of(four_bar_row(2, np.pi / 2))
     assert (found.rank.rank, found.rank.redundant, found.rank.dof) == (27, 8, 3)

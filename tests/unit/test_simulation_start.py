@@ -15,10 +15,11 @@ from support.own_types import registry_of
 import dap3d_core as dap
 from dap3d_core.interface import Function, Joint, Vector2, number, vector2
 from dap3d_core.kernels import cross, dot, neg, row, scale, sqrt, where
-from dap3d_core.model.kinematics import split
+from dap3d_core.model.rotations import split
 from dap3d_core.result import INFORMATION
-from dap3d_core.simulation import initial, redundancy
-from dap3d_core.simulation.initial import correct_initial, violation
+from dap3d_core.simulation.initial import assemble
+from dap3d_core.simulation.initial.assemble import correct_initial, violation
+from dap3d_core.simulation.redundancy import redundancy
 
 
 def corrected(scene, **options):
@@ -30,7 +31,7 @@ def corrected(scene, **options):
 @pytest.fixture
 def many_rows(monkeypatch):
     """Every scene is treated as one of many rows."""
-    for module in (initial, redundancy):
+    for module in (assemble, redundancy):
         monkeypatch.setattr(module, "DENSE_ROWS", 0)
 
 
@@ -47,7 +48,7 @@ def test_rough_four_bar_converges_quadratically(monkeypatch):
     """max |C| before each pass is 1.2e-3, 1.6e-6, 1.3e-12 (spec 8, 14), to the digits printed."""
     residuals = []
     for tolerance in (1.0, 1e-4, 1e-10):
-        monkeypatch.setattr(initial, "TOLERANCE", tolerance)
+        monkeypatch.setattr(assemble, "TOLERANCE", tolerance)
         found = corrected(rough_four_bar())[1]
         residuals.append(found.residual[0])
         assert found.passes == len(residuals) - 1
@@ -58,7 +59,7 @@ def test_rough_four_bar_converges_quadratically(monkeypatch):
 def test_the_first_pass_is_the_least_change(monkeypatch):
     """A pass moves by -pinv(D) C of the position rows: r in metres, rotations in rad, to the second
     order of a rotation of 1e-3."""
-    monkeypatch.setattr(initial, "TOLERANCE", 1e-5)
+    monkeypatch.setattr(assemble, "TOLERANCE", 1e-5)
     machine, found = corrected(rough_four_bar())
     assert found.passes == 1
     u0, n = machine.model.u0, 3
@@ -110,7 +111,7 @@ def test_a_large_turn_is_made_in_limited_passes(angle):
     scene.add_joint("rev", "axle", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
     _, found = corrected(scene)
     assert found.residual[0] <= 1e-10
-    limit = min(angle, np.pi - angle) / initial.MOST_TURN
+    limit = min(angle, np.pi - angle) / assemble.MOST_TURN
     assert max(limit, 2.0) <= found.passes < 15
     assert found.turned == pytest.approx(min(angle, np.pi - angle), abs=1e-9)
     assert found.moved == pytest.approx(7.0, abs=1e-9)
@@ -247,7 +248,7 @@ def test_the_metric_of_many_rows_is_that_of_few(metric, monkeypatch):
     """Bodies of different mass and inertia, turned: the block factorisation weighs as numpy."""
     scene = bent_chain(5)
     _, few = corrected(scene, metric=metric)
-    for module in (initial, redundancy):
+    for module in (assemble, redundancy):
         monkeypatch.setattr(module, "DENSE_ROWS", 0)
     _, many = corrected(scene, metric=metric)
     assert many.u == pytest.approx(few.u, abs=1e-10)
@@ -362,7 +363,7 @@ def test_the_correction_of_many_rows_is_that_of_few(scene, monkeypatch):
     """The block factorisation finds the least change that numpy finds, redundant rows or not: both
     end within 1e-10 of the constraints, after passes that agree to rounding times the condition."""
     _, few = corrected(scene)
-    for module in (initial, redundancy):
+    for module in (assemble, redundancy):
         monkeypatch.setattr(module, "DENSE_ROWS", 0)
     machine, many = corrected(scene)
     metric = machine.system.metric.copy()

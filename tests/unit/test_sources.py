@@ -9,7 +9,7 @@ from support import problems
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError, open_result
-from dap3d_core.simulation.sources import digest_of
+from dap3d_core.simulation.output.type_sources import digest_of
 
 SHORT = {"t_end": 0.1, "dt": 0.02}
 

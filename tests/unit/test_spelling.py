@@ -2,7 +2,7 @@
 
 import pytest
 
-from dap3d_core.registry.spelling import LONGEST, nearest
+from dap3d_core.registry.suggestions import LONGEST, nearest
 
 MANY = [f"left_rear_suspension_{k:05d}" for k in range(50_000)]
 

@@ -9,9 +9,9 @@ from unit.test_checkpoint import driven, stone, wheel
 import dap3d_core as dap
 from dap3d_core.scene import SceneError
 from dap3d_core.study import Ensemble, PointStatus, Study, outputs_of, with_values
-from dap3d_core.study.dependence import dependence_of
-from dap3d_core.study.modelling import Modelling
-from dap3d_core.study.places import Places
+from dap3d_core.study.batch.parameter_map import Places
+from dap3d_core.study.batch.prepare_dependence import dependence_of
+from dap3d_core.study.batch.rebuild import Modelling
 
 DONE, STOPPED, FAILED = PointStatus.DONE, PointStatus.STOPPED, PointStatus.FAILED
 
@@ -237,7 +237,7 @@ def test_poses_that_prepare_reads_are_told():
 
 
 def _poses(checked):
-    from dap3d_core.study.places import _poses
+    from dap3d_core.study.batch.parameter_map import _poses
 
     return _poses(checked)
 

@@ -12,10 +12,11 @@ import pytest
 from support.studies import POINTS, bob, collected, same
 
 import dap3d_core as dap
-from dap3d_core.formulations.second_thread import one_of_many, threads_allowed
-from dap3d_core.kernels.cache import jit_is_on
-from dap3d_core.study import Batch, Ensemble, PointStatus, local
-from dap3d_core.study.local import PATIENCE, Portions, run_here
+from dap3d_core.formulations.two_threads.worker_thread import one_of_many, threads_allowed
+from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.study import Batch, Ensemble, PointStatus
+from dap3d_core.study.workers import threads as local
+from dap3d_core.study.workers.threads import PATIENCE, Portions, run_here
 
 POINTS_COUNT = 24 if jit_is_on() else 4
 

@@ -7,9 +7,9 @@ from unit.test_checkpoint import driven, stone, wheel
 from unit.test_study_ensemble import ensemble, pendulum
 
 import dap3d_core as dap
-from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.study import Ensemble, PointStatus
-from dap3d_core.study.packing import Lanes, packed
+from dap3d_core.study.batch.packed_model import Lanes, packed
 
 
 def in_packs(of, count):

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 import dap3d_core as dap
-from dap3d_core.study.in_file import NOTE, boxes, cut
-from dap3d_core.study.points import DESIGNS, design_of
+from dap3d_core.study.design import DESIGNS, design_of
+from dap3d_core.study.sweep.schema import NOTE, boxes, cut
 
 # ---------------------------------------------------------------------------- grids
 

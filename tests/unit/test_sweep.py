@@ -11,10 +11,11 @@ from support.plain import in_another_process
 from support.process import run
 
 import dap3d_core as dap
-from dap3d_core.cli import sweep_tables
+from dap3d_core.cli.console import sweep_tables
 from dap3d_core.result import ResultError
-from dap3d_core.simulation import room
-from dap3d_core.study import growing, sweep
+from dap3d_core.simulation.output import free_space
+from dap3d_core.study.sweep import file as growing
+from dap3d_core.study.sweep import sweep
 
 #: Rest length and start of the spring below, m.
 LENGTH, START = 1.0, 1.25
@@ -261,7 +262,7 @@ def test_a_large_file_is_read_when_it_is_asked_for(swept, tmp_path, monkeypatch)
     path = tmp_path / "a.nc"
     dap.sweep(spring(), VARY, outputs=OUTPUTS, output=path, **TIMES)
     expected = sweep_tables.sweep_facts(swept)
-    monkeypatch.setattr("dap3d_core.study.dataset.LARGE", 0)
+    monkeypatch.setattr("dap3d_core.study.sweep.dataset.LARGE", 0)
     monkeypatch.setattr(sweep_tables, "LARGE", 1)
     with dap.open_sweep(path) as found:
         assert found["block.r.x"].variable._in_memory is False
@@ -379,17 +380,19 @@ def test_another_sweep_does_not_go_on(part, changes, words):
 
 
 def test_other_versions_do_not_go_on(part, monkeypatch):
-    from dap3d_core.result import record
+    from dap3d_core.result import metadata
 
-    versions = record.current_versions() | {"numpy": "1.0"}
-    monkeypatch.setattr("dap3d_core.study.dataset.current_versions", lambda: versions)
+    versions = metadata.current_versions() | {"numpy": "1.0"}
+    monkeypatch.setattr("dap3d_core.study.sweep.dataset.current_versions", lambda: versions)
     with pytest.raises(ResultError, match="other versions of dap3d, numpy"):
         dap.sweep(spring(), {"forces.spring.k": "4:16"}, resume=True, **part)
 
 
 def test_a_type_that_has_changed_does_not_go_on(part, monkeypatch):
     """By a digest of the file it stands in."""
-    monkeypatch.setattr("dap3d_core.study.dataset.digests_of", lambda compiled: {"force ptp": "x"})
+    monkeypatch.setattr(
+        "dap3d_core.study.sweep.dataset.digests_of", lambda compiled: {"force ptp": "x"}
+    )
     with pytest.raises(ResultError, match="the file of a type has changed since"):
         dap.sweep(spring(), {"forces.spring.k": "4:16"}, resume=True, **part)
 
@@ -488,8 +491,8 @@ def test_mistakes_are_told_together(changes, keys, words):
 
 def test_a_sweep_without_room_is_refused(monkeypatch, tmp_path):
     """In memory and on the disk, with figures; force begins it all the same."""
-    monkeypatch.setattr(room, "_free_memory", lambda: 2**20)
-    monkeypatch.setattr(room, "_free_disk", lambda folder: 2**20)
+    monkeypatch.setattr(free_space, "_free_memory", lambda: 2**20)
+    monkeypatch.setattr(free_space, "_free_disk", lambda folder: 2**20)
     vary = {"forces.spring.k": "1:2:20001"}
     options = dict(outputs="block.r.x:series", t_end=0.1, dt=0.1 / 1000)
     with pytest.raises(dap.SceneError, match=r"20,001 points .* in memory"):

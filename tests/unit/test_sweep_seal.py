@@ -6,8 +6,9 @@ from unit.test_result_seal import REFUSED, SIZE, changed_files, no_library, writ
 from unit.test_sweep import spring
 
 import dap3d_core as dap
-from dap3d_core.result import ResultError, seal
-from dap3d_core.study.dataset import is_sweep
+from dap3d_core.result import ResultError
+from dap3d_core.result.file import checksum
+from dap3d_core.study.sweep.dataset import is_sweep
 
 __all__ = ["no_library"]  # a fixture
 ASKED = {"vary": {"forces.spring.k": [1.0, 4.0]}, "outputs": "block.r.x", "t_end": 0.1}
@@ -31,8 +32,8 @@ def test_a_byte_changed_anywhere_is_refused(good, tmp_path, no_library):
 
 def test_of_a_large_file_the_beginning_is_compared(good, tmp_path, monkeypatch):
     """And of a small one all, whatever it says."""
-    monkeypatch.setattr(seal, "WHOLE", 1000)
-    monkeypatch.setattr("dap3d_core.study.growing.WHOLE", 1000)
+    monkeypatch.setattr(checksum, "WHOLE", 1000)
+    monkeypatch.setattr("dap3d_core.study.sweep.file.WHOLE", 1000)
     dap.sweep(spring(), **ASKED, output=tmp_path / "a.nc")
     assert dap.open_sweep(tmp_path / "a.nc").equals(dap.open_sweep(good))
     data = bytearray((tmp_path / "a.nc").read_bytes())

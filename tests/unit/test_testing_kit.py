@@ -5,12 +5,17 @@ import random
 import numpy as np
 import pytest
 
-from dap3d_core.interface.checks import examine
-from dap3d_core.kernels.cache import jit_is_on
-from dap3d_core.model.kinematics import rotation as rotation_of_a_model
+from dap3d_core.interface.examine.examine import examine
+from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.model.rotations import rotation as rotation_of_a_model
 from dap3d_core.testing import check_type, checks_for
-from dap3d_core.testing.states import Direction, quaternion_product, random_state, rotation
-from dap3d_core.testing.subject import subjects
+from dap3d_core.testing.samples.random_state import (
+    Direction,
+    quaternion_product,
+    random_state,
+    rotation,
+)
+from dap3d_core.testing.samples.sampled_type import subjects
 from dap3d_forces.weight import Weight
 from dap3d_functions.polynomial import Polynomial
 from dap3d_joints.spherical import Spherical

@@ -40,9 +40,9 @@ from dap3d_core.kernels import (
     tanh,
     where,
 )
-from dap3d_core.kernels.cache import jit_is_on
-from dap3d_core.kernels.lists import LoopArrays, call_loop, loop_list
-from dap3d_core.kernels.loops import Loop, build
+from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
+from dap3d_core.kernels.runtime.loop_modules import Loop, build
 
 number = st.floats(-1e3, 1e3, allow_subnormal=False)
 vec = st.tuples(number, number, number)

@@ -17,17 +17,17 @@ from dap3d_core.interface import Body, Force, Joint, Point, Vector, body, point,
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels import dot, sub
 from dap3d_core.model import build_model
-from dap3d_core.model.kinematics import to_global
+from dap3d_core.model.rotations import to_global
 from dap3d_core.registry import load_registry
 from dap3d_core.result import ResultError, UnknownNameError
 from dap3d_core.scene import check
-from dap3d_core.view.bodies import inertia_ellipsoid
-from dap3d_core.view.camera import stage
-from dap3d_core.view.colors import CYCLE, chains_of, colors
-from dap3d_core.view.geometry import elements_of, geometry_of
-from dap3d_core.view.marks import turned_to
-from dap3d_core.view.motion import Extent, chosen
 from dap3d_core.view.page import PROGRAM
+from dap3d_core.view.scene3d.bodies import inertia_ellipsoid
+from dap3d_core.view.scene3d.camera import stage
+from dap3d_core.view.scene3d.colors import CYCLE, chains_of, colors
+from dap3d_core.view.scene3d.primitives import turned_to
+from dap3d_core.view.scene3d.sampled_motion import Extent, chosen
+from dap3d_core.view.scene3d.scene_data import elements_of, geometry_of
 
 TYPES = [
     (row.kind, row.keyword)
@@ -218,7 +218,7 @@ def test_every_installed_type_is_drawn_with_finite_sizes(kind, keyword, ground):
 
 
 def test_types_of_third_parties_are_drawn_by_what_they_declare():
-    from dap3d_core.view.elements import joints_of
+    from dap3d_core.view.scene3d.elements import joints_of
 
     scene = dap.Scene()
     scene.add_body("b")

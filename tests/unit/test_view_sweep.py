@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.kernels.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import ResultError
 from dap3d_core.scene import SceneError
-from dap3d_core.view import sweeps
-from dap3d_core.view.sweeps import Points
+from dap3d_core.view import sweep_page
+from dap3d_core.view.sweep_page import Points
 
 #: Rest length and start of the spring below, m.
 LENGTH, START = 1.0, 1.25
@@ -103,7 +103,7 @@ def test_reports_at_the_end_alone_become_a_motion():
 
 
 def test_of_many_points_some_are_shown_and_the_page_says_so(monkeypatch):
-    monkeypatch.setattr(sweeps, "MOST_POINTS", 6)
+    monkeypatch.setattr(sweep_page, "MOST_POINTS", 6)
     data = swept({MASS: "1~0.1"}, sample=21)
     about = dap.view(data).data["sweep"]
     (slider,) = about["sliders"]
@@ -111,7 +111,7 @@ def test_of_many_points_some_are_shown_and_the_page_says_so(monkeypatch):
     assert slider["of"] == 21
     assert [p["values"][0] for p in about["points"]] == data[MASS].values[::4].tolist()
     assert about["notes"] == ["6 of 21 points of the sweep are on this page, evenly chosen"]
-    monkeypatch.setattr(sweeps, "MOST_CHARACTERS", 10)
+    monkeypatch.setattr(sweep_page, "MOST_CHARACTERS", 10)
     assert len(dap.view(data).data["sweep"]["points"]) == 2
 
 

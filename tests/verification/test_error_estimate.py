@@ -13,8 +13,8 @@ from scipy.integrate import solve_ivp
 from support import problems
 
 import dap3d_core as dap
-from dap3d_core.model.kinematics import split
-from dap3d_core.result.estimate import difference
+from dap3d_core.model.rotations import split
+from dap3d_core.result.post.global_error import difference
 
 #: Scene, and settings where the scene leaves them open or a shorter run will do: A05 is stiff, A02
 #: has no tight run past its singular pose at t = 0.71.

@@ -11,7 +11,7 @@ from support.contact import contact_registry
 
 import dap3d_core as dap
 from dap3d_core.integrators import METHODS, Integration, Status
-from dap3d_core.integrators.work import LOGGED
+from dap3d_core.integrators.stepping.integration_state import LOGGED
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-14}
 G = 9.81

@@ -6,7 +6,7 @@ from support import problems
 
 import dap3d_core as dap
 from dap3d_core.integrators import Status
-from dap3d_core.integrators.implicit import RadauIntegration
+from dap3d_core.integrators.radau.integration import RadauIntegration
 
 G = 9.81
 

@@ -5,7 +5,7 @@ import pytest
 from support import problems
 
 import dap3d_core as dap
-from dap3d_core.model.kinematics import rotation
+from dap3d_core.model.rotations import rotation
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-14}
 STEP = 1e-3

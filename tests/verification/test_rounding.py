@@ -10,7 +10,7 @@ from support.process import REPOSITORY
 from support.stewart import stewart
 
 import dap3d_core as dap
-from dap3d_core.result.ledger import ledger_of
+from dap3d_core.result.post.ledger import ledger_of
 
 sys.path.append(str(REPOSITORY / "benchmarks"))
 

@@ -8,7 +8,7 @@ as Markdown and imports nothing of Sphinx, so that tests can read them without a
 from pathlib import Path
 from typing import Any
 
-import dap3d_core.cli.group  # noqa: F401  the modules of the commands are loaded by way of it
+import dap3d_core.cli.app  # noqa: F401  the modules of the commands are loaded by way of it
 
 
 def setup(app: Any) -> dict[str, Any]:

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from dap3d_core.cli import exits
-from dap3d_core.cli.group import dap3d
+from dap3d_core.cli.app import dap3d
+from dap3d_core.cli.process import exit_codes
 from dap3d_site.markdown import code, fenced, page, table
 
 #: Lines that are set as they stand begin with this mark of click.
@@ -23,7 +23,9 @@ def pages() -> Iterator[tuple[str, str]]:
 def _group() -> Iterator[str]:
     yield prose(dap3d.help)
     yield options(dap3d)
-    codes = [(str(value), name.lower()) for name, value in vars(exits).items() if name.isupper()]
+    codes = [
+        (str(value), name.lower()) for name, value in vars(exit_codes).items() if name.isupper()
+    ]
     yield "Names of the exit codes: " + ", ".join(f"{n} {code(name)}" for n, name in codes) + "."
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.cli.settings import SETTINGS
+from dap3d_core.cli.framework.options import SETTINGS
 from dap3d_core.scene import INTEGRATORS, METHODS, Simulation
-from dap3d_core.scene.settings import CORRECT_METRICS
+from dap3d_core.scene.validate.settings import CORRECT_METRICS
 from dap3d_site.markdown import code, doc_of, page, table
 
 #: What no module of its own says.
@@ -36,6 +36,16 @@ VARIABLES = {
 }
 
 
+#: Modules whose docstrings describe the integrators.
+INTEGRATOR_MODULES = {
+    "dop853": "dap3d_core.integrators.runge_kutta.dop853",
+    "dopri5": "dap3d_core.integrators.runge_kutta.dopri5",
+    "rk4": "dap3d_core.integrators.runge_kutta.rk4",
+    "adams": "dap3d_core.integrators.adams.step",
+    "radau": "dap3d_core.integrators.radau.step",
+}
+
+
 def pages() -> Iterator[tuple[str, str]]:
     """The page of the settings: (path, text)."""
     yield "reference/settings.md", page("Settings of a run", *_parts())
@@ -57,7 +67,7 @@ def _parts() -> Iterator[str]:
     yield "Values of `integrator`."
     for name in INTEGRATORS:
         yield f"### `{name}`"
-        yield AUTO_INTEGRATOR if name == "auto" else _module(f"dap3d_core.integrators.{name}")
+        yield AUTO_INTEGRATOR if name == "auto" else _module(INTEGRATOR_MODULES[name])
     yield "## Environment variables"
     yield table(("variable", "is"), [(code(name), text) for name, text in VARIABLES.items()])
 

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from dap3d_core.cli import describe
+from dap3d_core.cli.commands import describe
 from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.registry import Registry, load_registry
 from dap3d_site.markdown import code, fenced, page, table, toctree

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.system import VALUE, Floats, System
-from dap3d_core.kernels.by_address import pointer
-from dap3d_core.kernels.cache import compiled, compiled_inside, compiled_into
+from dap3d_core.assembly.arrays import VALUE, Floats, System
+from dap3d_core.kernels.runtime.array_struct import pointer
+from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
 
 
 @compiled_into

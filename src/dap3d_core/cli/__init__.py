@@ -14,7 +14,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     import sys
 
     try:  # Ctrl-C may come before anything is loaded
-        from dap3d_core.cli.group import run_line
+        from dap3d_core.cli.app import run_line
 
         return run_line(argv)
     except KeyboardInterrupt:

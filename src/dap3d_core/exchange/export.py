@@ -7,9 +7,9 @@ from pathlib import Path
 import attrs
 
 from dap3d_core.result import Result, ResultError
-from dap3d_core.result.files import whole_file
-from dap3d_core.view.geometry import scene_of
-from dap3d_core.view.motion import chosen, thinned
+from dap3d_core.result.file.atomic_write import whole_file
+from dap3d_core.view.scene3d.sampled_motion import chosen, thinned
+from dap3d_core.view.scene3d.scene_data import scene_of
 
 #: Format -> suffix of its files.
 FORMATS = {"vtk": ".vtkhdf", "gltf": ".glb", "mat": ".mat", "csv": ".csv"}
@@ -113,7 +113,7 @@ def _scene(
 ) -> list[str]:
     """Write the moving scene; returns notes."""
     from dap3d_core.exchange.gltf import write_gltf
-    from dap3d_core.exchange.moving import MovingScene
+    from dap3d_core.exchange.moving_solids import MovingScene
     from dap3d_core.exchange.vtkhdf import point_count, write_vtkhdf
 
     scene = MovingScene.of(result, scene_of(result, model))
@@ -138,9 +138,9 @@ def _arrays(
     progress: Progress | None,
 ) -> list[str]:
     """Write arrays or columns; returns notes."""
-    from dap3d_core.exchange.mat import write_mat
-    from dap3d_core.result.export import why_no_reactions
-    from dap3d_core.result.table import columns_of, write_csv
+    from dap3d_core.exchange.matlab_file import write_mat
+    from dap3d_core.result.quantities.csv_table import columns_of, write_csv
+    from dap3d_core.result.quantities.netcdf_export import why_no_reactions
 
     left_out = why_no_reactions(result)
     if kind == "mat":

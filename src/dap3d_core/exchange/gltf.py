@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.exchange.moving import MovingScene, Part, Polyline, Stretched
+from dap3d_core.exchange.moving_solids import MovingScene, Part, Polyline, Stretched
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.model.kinematics import euler_rates
+from dap3d_core.model.rotations import euler_rates
 from dap3d_core.result import ResultError
-from dap3d_core.result.files import cannot
-from dap3d_core.view.marks import turned_to
-from dap3d_core.view.solids import Triangles
+from dap3d_core.result.file.atomic_write import cannot
+from dap3d_core.view.scene3d.primitives import turned_to
+from dap3d_core.view.scene3d.solids import Triangles
 
 Progress = Callable[[int, int], None]
 

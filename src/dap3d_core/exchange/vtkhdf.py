@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.exchange.moving import MovingScene, Part, Polyline
+from dap3d_core.exchange.moving_solids import MovingScene, Part, Polyline
 from dap3d_core.model.groups import Floats
-from dap3d_core.model.kinematics import rotation
-from dap3d_core.result.netcdf import NETCDF, guarded
-from dap3d_core.view.marks import LAYERS
+from dap3d_core.model.rotations import rotation
+from dap3d_core.result.file.library import NETCDF, guarded
+from dap3d_core.view.scene3d.primitives import LAYERS
 
 Progress = Callable[[int, int], None]
 

@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import Any
 
-from dap3d_core.assembly.system import step_functions
+from dap3d_core.assembly.arrays import step_functions
 
 #: Group loops of every formulation, and those of joints; each is there where the scene needs it.
 _ALL = ("value", "wrench", "energy", "angle", "turned", "switch", "knot")
@@ -35,7 +35,7 @@ def functions_of(method: str, *, turns: bool, switches: bool, halved: bool = Fal
     module: Any = import_module(f"dap3d_core.formulations.{name}")
     functions = [module.rhs, module.project, module.report]
     if turns or switches:
-        from dap3d_core.formulations.accepted import accepted, watch
+        from dap3d_core.formulations.common.switching_functions import accepted, watch
 
         functions += [accepted, watch] if switches else [accepted]
     return step_functions(*functions)

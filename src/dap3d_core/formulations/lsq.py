@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
+from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.evaluate import global_accelerations, largest, rates, zero
-from dap3d_core.assembly.system import Floats, System
-from dap3d_core.formulations.constraints import (
+from dap3d_core.formulations.common.constraints import (
     PART,
     project_onto,
     report_levels,
@@ -29,8 +29,8 @@ from dap3d_core.formulations.constraints import (
     solve_rows,
 )
 from dap3d_core.formulations.regularised import accelerate
-from dap3d_core.kernels.cache import compiled, compiled_inside
-from dap3d_core.linear.blocks import assemble, factor, regularise, weigh_rows
+from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.linear.ldlt.factor import assemble, factor, regularise, weigh_rows
 
 #: For the least multipliers: e as part of the longest row's square, and passes at most. More of
 #: them than it takes would gather rounding.

@@ -5,7 +5,7 @@ Manual: analysis_p; spec 9. With gamma' = gamma - 2 mu Omega (D v - nu) - Omega^
     (M + alpha D^T D) v_dot = g + alpha D^T gamma'        lambda = -alpha (D v_dot - gamma')
 
 which is [I D^^T; D^ -I/alpha] (v_dot; -lambda) = (g; gamma') in the bodies' scaled coordinates,
-solved by the block LDL^T of linear/blocks.py: no product alpha D^T D is formed, of which the
+solved by the block LDL^T of linear/ldlt/factor.py: no product alpha D^T D is formed, of which the
 masses' digits would be lost. Rows may depend on each other. C is zero on rows that have none.
 """
 
@@ -14,6 +14,7 @@ masses' digits would be lost. Rows may depend on each other. C is zero on rows t
 
 from typing import Any
 
+from dap3d_core.assembly.arrays import ALPHA, MU, OMEGA, WRENCH, Floats, System
 from dap3d_core.assembly.evaluate import (
     call_kinds,
     global_accelerations,
@@ -22,8 +23,7 @@ from dap3d_core.assembly.evaluate import (
     scale_forces,
     zero,
 )
-from dap3d_core.assembly.system import ALPHA, MU, OMEGA, WRENCH, Floats, System
-from dap3d_core.formulations.constraints import (
+from dap3d_core.formulations.common.constraints import (
     PART,
     linearise,
     power_of_drivers,
@@ -34,9 +34,9 @@ from dap3d_core.formulations.constraints import (
     solve_rows,
     velocity_residuals,
 )
-from dap3d_core.formulations.friction import solve_rubbing
-from dap3d_core.kernels.cache import compiled, compiled_inside
-from dap3d_core.linear.blocks import assemble, factor, regularise
+from dap3d_core.formulations.common.friction import solve_rubbing
+from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.linear.ldlt.factor import assemble, factor, regularise
 
 
 @compiled_inside

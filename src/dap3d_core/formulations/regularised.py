@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from dap3d_core.assembly.arrays import EVEN, Floats, System
 from dap3d_core.assembly.evaluate import largest_weighted, zero
-from dap3d_core.assembly.system import EVEN, Floats, System
-from dap3d_core.formulations.constraints import PART, solve_equations, solve_rows
-from dap3d_core.kernels.cache import compiled_inside
-from dap3d_core.linear.saddle import add_product
+from dap3d_core.formulations.common.constraints import PART, solve_equations, solve_rows
+from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.linear.ldlt.saddle_point import add_product
 
 #: How often the rows are solved.
 SOLVES = 3

@@ -5,7 +5,7 @@ Manual: analysis_s; spec 9.
     [M  D^T] (v_dot  )   (g    )
     [D   0 ] (-lambda) = (gamma)
 
-solved by the block LDL^T of linear/blocks.py. Needs independent rows.
+solved by the block LDL^T of linear/ldlt/factor.py. Needs independent rows.
 """
 
 # What a compiled function returns is Any to mypy.
@@ -13,10 +13,10 @@ solved by the block LDL^T of linear/blocks.py. Needs independent rows.
 
 from typing import Any
 
+from dap3d_core.assembly.arrays import EVEN, LENGTH, SINGULAR, Floats, System
 from dap3d_core.assembly.evaluate import global_accelerations, rates
-from dap3d_core.assembly.system import EVEN, LENGTH, SINGULAR, Floats, System
 from dap3d_core.formulations import regularised
-from dap3d_core.formulations.constraints import (
+from dap3d_core.formulations.common.constraints import (
     acceleration_residual,
     correct,
     power_of_drivers,
@@ -26,8 +26,8 @@ from dap3d_core.formulations.constraints import (
     solve_equations,
     solve_rows,
 )
-from dap3d_core.kernels.cache import compiled, compiled_into
-from dap3d_core.linear.blocks import have_pivots
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.linear.ldlt.factor import have_pivots
 
 #: What is left of the rows, as a part of the largest acceleration, from which on it is solved for.
 ROUGH = 1e-12

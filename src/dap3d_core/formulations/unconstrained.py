@@ -5,15 +5,7 @@
 
 from typing import Any
 
-from dap3d_core.assembly.evaluate import (
-    call_kinds,
-    global_accelerations,
-    place_bodies,
-    rates,
-    scale_forces,
-    zero,
-)
-from dap3d_core.assembly.system import (
+from dap3d_core.assembly.arrays import (
     ENERGY,
     SCRATCH,
     TURNED,
@@ -22,8 +14,16 @@ from dap3d_core.assembly.system import (
     Floats,
     System,
 )
-from dap3d_core.formulations.moves import normalise
-from dap3d_core.kernels.cache import compiled, compiled_inside
+from dap3d_core.assembly.evaluate import (
+    call_kinds,
+    global_accelerations,
+    place_bodies,
+    rates,
+    scale_forces,
+    zero,
+)
+from dap3d_core.assembly.state_update import normalise
+from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
 
 
 @compiled_inside

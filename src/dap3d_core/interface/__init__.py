@@ -1,6 +1,6 @@
 """What the author of a plugin imports, besides the kernels' words: joints, forces, functions."""
 
-from dap3d_core.interface.checks import PluginError, examine
+from dap3d_core.interface.examine.examine import PluginError, examine
 from dap3d_core.interface.fields import (
     REQUIRED,
     Body,

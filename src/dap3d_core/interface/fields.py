@@ -2,7 +2,7 @@
 
 A field is one line in a type's class: ``P_i: Point = point()``. Its last letter after ``_``, one of
 i, j and k, names the body slot it belongs to. The maker says what the scene may write there;
-``namespace.py`` says which names it offers.
+``codegen/kernel_arguments.py`` says which names it offers.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,8 +1,8 @@
 """What a joint, a force and a function type is: fields, and pure functions of named quantities.
 
 A type is an attrs class. Its functions stand there without ``self``: they are static, and their
-parameter names say what they need, as a pytest test names its fixtures. ``namespace.py`` lists
-these names.
+parameter names say what they need, as a pytest test names its fixtures.
+``codegen/kernel_arguments.py`` lists these names.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -56,8 +56,8 @@ class Joint(TypeBase):
     * ``gamma``  right-hand side of the acceleration level, J v_dot = gamma;
     * ``nu``     right-hand side of the velocity level, J v = nu; zero where not defined.
 
-    ``J`` and ``gamma`` may be left out: they are derived, with ``nu``, from ``C`` (derivation.py)
-    and, for rows of the velocity level alone, from
+    ``J`` and ``gamma`` may be left out: they are derived, with ``nu``, from ``C``
+    (derive/derive.py) and, for rows of the velocity level alone, from
 
     * ``C_dot``  what must vanish there, linear in the velocities: one number a row not in ``C``.
 
@@ -120,9 +120,10 @@ class Force(TypeBase):
 
     Subclasses define ``wrench``, which returns for each body slot a pair (force, moment about the
     mass centre) in global axes, and where there is one ``energy``, the potential in J. A force that
-    defines ``energy`` alone has its gradient for ``wrench``, derived (derivation.py). Variants and
-    ``switch`` are as for joints. A force that defines neither and names one joint, by a ``joint``
-    field, switches on the friction of that joint; with a ``wrench`` it acts by that alone.
+    defines ``energy`` alone has its gradient for ``wrench``, derived (derive/derive.py). Variants
+    and ``switch`` are as for joints. A force that defines neither and names one joint, by a
+    ``joint`` field, switches on the friction of that joint; with a ``wrench`` it acts by that
+    alone.
 
     Attributes:
         keyword: the word that names the type in a scene.
@@ -148,9 +149,9 @@ class Force(TypeBase):
 class Function(TypeBase):
     """A function of one variable: ``value(x, ...)`` returns (f, f', f'', f''').
 
-    One that returns f alone has the others derived (derivation.py). No step of a run goes over an
-    argument that ``breaks`` names, be it a time or an elongation: a change that is shorter than a
-    step is not missed.
+    One that returns f alone has the others derived (derive/derive.py). No step of a run goes over
+    an argument that ``breaks`` names, be it a time or an elongation: a change that is shorter than
+    a step is not missed.
 
     Attributes:
         keyword: the word that names the type in a scene.

@@ -4,7 +4,7 @@ A plugin imports from here only the words of its formulas; ``compiled``, the loo
 serve the core.
 """
 
-from dap3d_core.kernels.mathematics import (
+from dap3d_core.kernels.scalar_math import (
     abs,
     acos,
     asin,
@@ -21,7 +21,7 @@ from dap3d_core.kernels.mathematics import (
     tanh,
     where,
 )
-from dap3d_core.kernels.tables import lookup
+from dap3d_core.kernels.table_lookup import lookup
 from dap3d_core.kernels.vectors import (
     add,
     cross,

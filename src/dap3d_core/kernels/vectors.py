@@ -4,7 +4,7 @@ Every function here is pure and generic: in compiled code the tuples vanish into
 Python the same source runs with floats, complex numbers (derivatives by complex step) and sympy.
 """
 
-from dap3d_core.kernels.mathematics import sqrt
+from dap3d_core.kernels.scalar_math import sqrt
 
 
 def add(a, b):

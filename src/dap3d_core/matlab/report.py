@@ -2,7 +2,7 @@
 
 import attrs
 
-from dap3d_core.matlab.source import Place
+from dap3d_core.matlab.language.parse import Place
 
 
 @attrs.frozen

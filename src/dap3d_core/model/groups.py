@@ -8,15 +8,15 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.interface.binding import (
+from dap3d_core.interface.codegen.instance_layout import shape_of, size
+from dap3d_core.interface.codegen.kernel_arguments import parameters
+from dap3d_core.interface.codegen.specialise import (
     bind_friction,
     bind_functions,
     uncalled,
 )
-from dap3d_core.interface.checks import BodyPose, Examined, prepared
+from dap3d_core.interface.examine.examine import BodyPose, Examined, prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.interface.layout import shape_of, size
-from dap3d_core.interface.namespace import parameters
 from dap3d_core.interface.types import TypeBase
 from dap3d_core.model.knots import knots_of
 from dap3d_core.scene import Instance

@@ -10,9 +10,9 @@ from functools import cached_property
 import attrs
 import numpy as np
 
-from dap3d_core.interface.checks import BodyPose, pose
+from dap3d_core.interface.examine.examine import BodyPose, pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
-from dap3d_core.model.kinematics import read_only, to_global
+from dap3d_core.model.rotations import read_only, to_global
 from dap3d_core.scene import Checked, Instance
 
 #: Sizes, m, of ordinary scenes: their tolerances are in metres as they are.
@@ -96,7 +96,7 @@ class Model:
 
     @property
     def acting(self) -> tuple[Group, ...]:
-        """Groups of what may have angles, in the order of the loops (formulations/build.py)."""
+        """Groups of what may have angles, in the order of the loops (formulations/arrays.py)."""
         return (*self.forces, *self.joints)
 
     @cached_property

@@ -5,9 +5,9 @@ from types import ModuleType
 from typing import Any
 
 from dap3d_core.plot import matplotlib_settings  # noqa: F401  it sets matplotlib up  # isort: split
-from dap3d_core.plot.animation import Film, animate
-from dap3d_core.plot.drawing import WIDTH, plot
-from dap3d_core.plot.saving import FORMATS, save_plot, show_plot
+from dap3d_core.plot.curves import WIDTH, plot
+from dap3d_core.plot.figure import FORMATS, save_plot, show_plot
+from dap3d_core.plot.film.animation import Film, animate
 
 __all__ = ["FORMATS", "WIDTH", "Film", "animate", "plot", "save_plot", "show_plot"]
 

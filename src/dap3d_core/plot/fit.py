@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dap3d_core.plot.drawing import (
+from dap3d_core.plot.curves import (
     LETTERS,
     PALETTE,
     WIDTH,
@@ -18,11 +18,11 @@ from dap3d_core.plot.drawing import (
     with_unit,
     wrapped,
 )
-from dap3d_core.plot.saving import save_figure
+from dap3d_core.plot.figure import save_figure
 from dap3d_core.plot.ticks import PlainOffset
 from dap3d_core.result import find
 from dap3d_core.result.errors import unknown
-from dap3d_core.study.fit_result import Fit
+from dap3d_core.study.fit.fit_result import Fit
 
 #: Inches: of a panel with points and curve, and of the one with residuals below it.
 CURVE_HEIGHT, RESIDUAL_HEIGHT = 1.7, 0.9

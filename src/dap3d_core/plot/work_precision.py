@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from dap3d_core.plot.drawing import DASHES, MARKERS, PALETTE, shown_text
-from dap3d_core.plot.saving import save_figure
+from dap3d_core.plot.curves import DASHES, MARKERS, PALETTE, shown_text
+from dap3d_core.plot.figure import save_figure
 
 #: Inches. Letters of 8 points are still 5 points high where the picture is set 60 mm wide.
 WIDTH, HEIGHT = 3.8, 4.0

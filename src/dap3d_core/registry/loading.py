@@ -18,13 +18,13 @@ from typing import Any
 import pluggy
 
 from dap3d_core.interface import INTERFACE_VERSION, PluginError, hooks
-from dap3d_core.interface.checks import Examined, examine, where_is
+from dap3d_core.interface.examine.examine import Examined, examine, where_is
 from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.interface.types import KINDS, TypeBase
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source
-from dap3d_core.registry.overdue import OverdueError, within
 from dap3d_core.registry.regular_files import read_regular
-from dap3d_core.registry.spelling import nearest
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.time_limit import OverdueError, within
 
 #: Plugins are loaded one at a time: the guard holds things that belong to the whole process.
 _one_at_a_time = threading.RLock()
@@ -67,7 +67,7 @@ def compile_kernels(source: Source, examined: Examined, notes: list[str]) -> Non
         PluginError: one cannot be compiled; names distribution, module, reason and remedy.
     """
     # here, for finding types by keyword does not need the compiler
-    from dap3d_core.interface.compiling import compile_all
+    from dap3d_core.interface.codegen.compile_loops import compile_all
 
     with _guard(source, notes):
         compile_all(examined)

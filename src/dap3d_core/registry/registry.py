@@ -6,13 +6,13 @@ from pathlib import Path
 import attrs
 
 from dap3d_core.interface import PluginError
-from dap3d_core.interface.checks import Examined
+from dap3d_core.interface.examine.examine import Examined
 from dap3d_core.interface.hooks import GROUPS
-from dap3d_core.registry.declared import not_yet_installed
+from dap3d_core.registry.declared_types import not_yet_installed
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover
 from dap3d_core.registry.loading import compile_kernels, load, load_file
-from dap3d_core.registry.overdue import OverdueError
-from dap3d_core.registry.spelling import nearest
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.time_limit import OverdueError
 
 #: Seconds that a plugin may take to load where no scene asks for it: a command that looks at all
 #: types does not wait for one that never ends.

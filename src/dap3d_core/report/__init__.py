@@ -4,12 +4,12 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from dap3d_core.report.bench import Refused
-from dap3d_core.report.making import report
-from dap3d_core.report.outcome import Failed, Report, Run
-from dap3d_core.report.recommending import Recommendation
+from dap3d_core.report.recommend import Recommendation
 from dap3d_core.report.reference import Reference
-from dap3d_core.report.rungs import Setting
+from dap3d_core.report.report import Failed, Report, Run
+from dap3d_core.report.runner import report
+from dap3d_core.report.settings_ladder import Setting
+from dap3d_core.report.timing import Refused
 
 __all__ = [
     "Failed",

@@ -9,9 +9,9 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.report.bench import Bench
-from dap3d_core.report.measures import first_parting, trajectory_error
-from dap3d_core.report.rungs import ADAPTIVE, Setting, controlled
+from dap3d_core.report.error_norms import first_parting, trajectory_error
+from dap3d_core.report.settings_ladder import ADAPTIVE, Setting, controlled
+from dap3d_core.report.timing import Bench
 from dap3d_core.result import Result
 from dap3d_core.scene import Scene, SceneError, load
 from dap3d_core.simulation import SimulationError

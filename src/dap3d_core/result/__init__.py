@@ -1,17 +1,17 @@
 """The result floor: what a run left behind, on disk and in memory; the post-processor's arrays."""
 
 from dap3d_core.result.errors import ResultError, UnknownNameError
-from dap3d_core.result.estimate import ErrorEstimate, estimated_error
-from dap3d_core.result.files import check_target
-from dap3d_core.result.ledger import Entry
-from dap3d_core.result.motion import Energy
-from dap3d_core.result.occurrence import Occurrence
-from dap3d_core.result.quantities import Quantity, find, names_of
-from dap3d_core.result.reactions import Reaction
-from dap3d_core.result.reading import open_result
-from dap3d_core.result.record import INFORMATION, Record, Statistics, current_versions
+from dap3d_core.result.event_record import Occurrence
+from dap3d_core.result.file.atomic_write import check_target
+from dap3d_core.result.file.write import ResultWriter
+from dap3d_core.result.metadata import INFORMATION, Record, Statistics, current_versions
+from dap3d_core.result.open import open_result
+from dap3d_core.result.post.global_error import ErrorEstimate, estimated_error
+from dap3d_core.result.post.ledger import Entry
+from dap3d_core.result.post.point_motion import Energy
+from dap3d_core.result.post.reactions import Reaction
+from dap3d_core.result.quantities.lookup import Quantity, find, names_of
 from dap3d_core.result.result import Result
-from dap3d_core.result.writing import ResultWriter
 
 __all__ = [
     "INFORMATION",

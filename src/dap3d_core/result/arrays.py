@@ -7,8 +7,8 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.model.kinematics import from_integrated
-from dap3d_core.result.subject import Subject
+from dap3d_core.model.rotations import from_integrated
+from dap3d_core.result.model_summary import Subject
 
 
 class Column(NamedTuple):
@@ -61,7 +61,8 @@ class Arrays:
         potential_energy: (nt,) J.
         position_residual, velocity_residual, acceleration_residual: (nt,) largest magnitude.
         angles: (nt, k) of k angles whose turns are counted, rad, as ``Model.angles_of`` has them.
-        u_error: (nt, 13 n) estimated error of u (estimate.py); None where none was asked for.
+        u_error: (nt, 13 n) estimated error of u (post/global_error.py); None where none was asked
+        for.
     """
 
     t: Floats

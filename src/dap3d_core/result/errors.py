@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 
-from dap3d_core.registry.spelling import nearest
+from dap3d_core.registry.suggestions import nearest
 
 #: Up to so many names are listed in a message.
 LISTED = 12

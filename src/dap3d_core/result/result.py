@@ -9,24 +9,24 @@ import attrs
 
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats
-from dap3d_core.result.applied import Applied, applied
 from dap3d_core.result.arrays import COLUMNS, Arrays, arrays_of
 from dap3d_core.result.errors import ResultError, unknown
-from dap3d_core.result.estimate import ErrorEstimate, estimate_of
-from dap3d_core.result.kinematics import Kinematics
-from dap3d_core.result.ledger import Entry, ledger_of
-from dap3d_core.result.motion import Energy, kinetic_energy
-from dap3d_core.result.occurrence import Occurrence
-from dap3d_core.result.on_file import FileArrays
-from dap3d_core.result.quantities import find
-from dap3d_core.result.reactions import Reaction, jacobians, reactions
-from dap3d_core.result.record import Record, Statistics
-from dap3d_core.result.subject import Subject, subject_of
+from dap3d_core.result.event_record import Occurrence
+from dap3d_core.result.file.lazy_arrays import FileArrays
+from dap3d_core.result.metadata import Record, Statistics
+from dap3d_core.result.model_summary import Subject, subject_of
+from dap3d_core.result.post.force_output import Applied, applied
+from dap3d_core.result.post.global_error import ErrorEstimate, estimate_of
+from dap3d_core.result.post.ledger import Entry, ledger_of
+from dap3d_core.result.post.point_motion import Energy, kinetic_energy
+from dap3d_core.result.post.reactions import Reaction, jacobians, reactions
+from dap3d_core.result.quantities.lookup import find
+from dap3d_core.result.quantities.motion_arrays import Kinematics
 
 if TYPE_CHECKING:
     import xarray
 
-    from dap3d_core.formulations.machine import Machine
+    from dap3d_core.formulations.evaluator import Machine
 
 #: A model, and how to get a machine that evaluates it.
 Origin = tuple[Model, "Callable[[], Machine]"]
@@ -344,14 +344,14 @@ class Result(Kinematics):
 
     @cached_property
     def ledger(self) -> dict[str, Entry]:
-        """What should be conserved or zero, and how far it is (ledger.py): entries by name."""
+        """What should be conserved or zero, and how far it is (post/ledger.py): entries by name."""
         return ledger_of(self.subject, self.arrays, self.record)
 
     def quantity(self, name: str) -> Values:
         """A quantity by name, such as ``crank.r.z``, ``P3.v``, ``J1.force.norm``, ``energy.total``.
 
         Args:
-            name: as quantities.py lists them.
+            name: as quantities/lookup.py lists them.
 
         Returns:
             (values, label, unit): (nt,) or (nt, components); what it is in words; SI unit.
@@ -373,13 +373,13 @@ class Result(Kinematics):
         Raises:
             ResultError: the file cannot be written, or exists and ``force`` is off.
         """
-        from dap3d_core.result.writing import save
+        from dap3d_core.result.file.write import save
 
         save(self, path, force)
 
     def to_xarray(self) -> "xarray.Dataset":
-        """All arrays with named dimensions and units, as an xarray.Dataset (dataset.py)."""
-        from dap3d_core.result.dataset import dataset_of
+        """All arrays with named dimensions and units, as an xarray.Dataset."""
+        from dap3d_core.result.quantities.xarray_dataset import dataset_of
 
         return dataset_of(self)
 

@@ -1,9 +1,8 @@
 """What the user described: classes for it, reading and writing scene files, and their check."""
 
-from dap3d_core.scene.checked import Checked, Instance
-from dap3d_core.scene.checking import check
-from dap3d_core.scene.collector import mistake_at
-from dap3d_core.scene.description import (
+from dap3d_core.scene.errors import MISSING, Mistake, SceneError
+from dap3d_core.scene.files.read_toml import load, parse, shipped_models, tables_of
+from dap3d_core.scene.scene import (
     Animation,
     AnimationPoint,
     Body,
@@ -14,9 +13,10 @@ from dap3d_core.scene.description import (
     Vector,
     Vector2,
 )
-from dap3d_core.scene.mistakes import MISSING, Mistake, SceneError
-from dap3d_core.scene.reading import load, parse, shipped_models, tables_of
-from dap3d_core.scene.settings import INTEGRATORS, METHODS, check_simulation
+from dap3d_core.scene.validate.mistake_collector import mistake_at
+from dap3d_core.scene.validate.settings import INTEGRATORS, METHODS, check_simulation
+from dap3d_core.scene.validate.validate import check
+from dap3d_core.scene.validate.validated_scene import Checked, Instance
 
 __all__ = [
     "INTEGRATORS",

@@ -10,12 +10,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.integrators import METHODS, Integration, Status, make_adams
-from dap3d_core.integrators.integration import Statistics as Counts
-from dap3d_core.integrators.singular import begin_singular
-from dap3d_core.integrators.work import LONGEST
+from dap3d_core.integrators.runge_kutta.integration import Statistics as Counts
+from dap3d_core.integrators.stepping.integration_state import LONGEST
+from dap3d_core.integrators.stepping.singular_start import begin_singular
 from dap3d_core.result import INFORMATION, Occurrence, Record, Result, ResultError, Statistics
 from dap3d_core.scene import Mistake, SceneError, Simulation
-from dap3d_core.simulation.asked import (
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.errors import RedundantError, SimulationError
+from dap3d_core.simulation.events.event import Event
+from dap3d_core.simulation.events.locate import Watcher
+from dap3d_core.simulation.failure.termination import doubts, event_notes, occurrences, why_stopped
+from dap3d_core.simulation.handover import cannot_cross, crossing_notes, hand_over
+from dap3d_core.simulation.implicit_run import EXPLICIT, implicit_integration, stiffness_notes
+from dap3d_core.simulation.initial.singular_start import SingularStart
+from dap3d_core.simulation.initial.tolerances import (
+    atol_notes,
+    motion_notes,
+    resolved_atol,
+    rounding_notes,
+)
+from dap3d_core.simulation.initial_state import Start, start_notes
+from dap3d_core.simulation.output.error_estimate import Again, StepLimits, add_error, halved
+from dap3d_core.simulation.output.free_space import check_room, row_width
+from dap3d_core.simulation.output.monitor import Observer, Standing
+from dap3d_core.simulation.output.recorder import Keeper
+from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
+from dap3d_core.simulation.settings import (
     explicit_options,
     integration_options,
     refuse_adams,
@@ -23,24 +43,9 @@ from dap3d_core.simulation.asked import (
     report_times,
     settings_notes,
 )
-from dap3d_core.simulation.compiled import CompiledModel
-from dap3d_core.simulation.elsewhere import redundancy_elsewhere
-from dap3d_core.simulation.ending import doubts, event_notes, occurrences, why_stopped
-from dap3d_core.simulation.errors import RedundantError, SimulationError
-from dap3d_core.simulation.event import Event
-from dap3d_core.simulation.handing_over import cannot_cross, crossing_notes, hand_over
-from dap3d_core.simulation.implicit import EXPLICIT, implicit_integration, stiffness_notes
-from dap3d_core.simulation.keeping import Keeper
-from dap3d_core.simulation.room import check_room, row_width
-from dap3d_core.simulation.second_run import Again, StepLimits, add_error, halved
-from dap3d_core.simulation.singular_start import SingularStart
-from dap3d_core.simulation.standing import Observer, Standing
-from dap3d_core.simulation.start import Start, start_notes
-from dap3d_core.simulation.tolerances import atol_notes, motion_notes, resolved_atol, rounding_notes
-from dap3d_core.simulation.watcher import Watcher
 
 if TYPE_CHECKING:
-    from dap3d_core.simulation.saving import Saver
+    from dap3d_core.simulation.checkpoint.save import Saver
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
@@ -112,7 +117,7 @@ class Run:
         """Run from the start to the end; arguments and errors as of ``simulate``."""
         self.keep(output, force=force)
         if checkpoint is not None:
-            from dap3d_core.simulation.saving import Saver
+            from dap3d_core.simulation.checkpoint.save import Saver
 
             self.saver = Saver(self, checkpoint, force=force)
         self.prepare()

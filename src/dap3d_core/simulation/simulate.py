@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 
 from dap3d_core.result import Result
 from dap3d_core.scene import Scene
-from dap3d_core.simulation.asked import check_checkpoint, compiled_for, settings_of
-from dap3d_core.simulation.compiled import CompiledModel
-from dap3d_core.simulation.event import Event
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.events.event import Event
+from dap3d_core.simulation.output.monitor import Standing
 from dap3d_core.simulation.run import Progress, Run
-from dap3d_core.simulation.standing import Standing
+from dap3d_core.simulation.settings import check_checkpoint, compiled_for, settings_of
 
 
 def simulate(

@@ -1,8 +1,8 @@
 """The study floor: many runs of one scene with other numbers."""
 
-from dap3d_core.study.ensemble import Batch, Ensemble, PointStatus, Study
-from dap3d_core.study.names import Number, all_numbers, names_under, numbers_named, with_values
 from dap3d_core.study.outputs import REDUCTIONS, Output, outputs_of
+from dap3d_core.study.parameters import Number, all_numbers, names_under, numbers_named, with_values
+from dap3d_core.study.study import Batch, Ensemble, PointStatus, Study
 
 __all__ = [
     "REDUCTIONS",

@@ -7,10 +7,10 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.registry.spelling import nearest
+from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result import Result
 from dap3d_core.scene import MISSING, Mistake, SceneError
-from dap3d_core.scene.mistakes import shown
+from dap3d_core.scene.errors import shown
 from dap3d_core.simulation import SimulationError
 
 Floats = NDArray[np.float64]

@@ -6,13 +6,13 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.machine import Machine
+from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model import Model
 from dap3d_core.result import Quantity, Record, Result, ResultError, UnknownNameError, find
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.simulation import CompiledModel
-from dap3d_core.study.names import Number
 from dap3d_core.study.outputs import REDUCTIONS, Output
+from dap3d_core.study.parameters import Number
 
 Floats = NDArray[np.float64]
 

@@ -8,10 +8,11 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.checks import Examined, examine, where_is
-from dap3d_core.testing import forces, functions, joints, plain, purity
-from dap3d_core.testing.subject import Subject, UndefinedError, subjects
-from dap3d_core.testing.verdict import FAILED, LEFT_OUT, Finding, Outcome, Report
+from dap3d_core.interface.examine.examine import Examined, examine, where_is
+from dap3d_core.testing import plain_kernels
+from dap3d_core.testing.checks import forces, functions, joints, purity
+from dap3d_core.testing.findings import FAILED, LEFT_OUT, Finding, Outcome, Report
+from dap3d_core.testing.samples.sampled_type import Subject, UndefinedError, subjects
 
 #: How many random poses on and off the manifold each check takes, and the seed of them.
 POSES, SEED = 4, 1
@@ -122,7 +123,7 @@ def _checks(examined: Examined, poses: int, seed: int) -> list[Check]:
             continue
         found += of_kind[subject.type.kind](subject)
         found.append(Check("purity", subject, "", purity.purity))
-        found.append(Check("plain", subject, "", plain.plain))
+        found.append(Check("plain", subject, "", plain_kernels.plain))
         found.append(Check("compiled", subject, "", purity.compiled))
     return found
 

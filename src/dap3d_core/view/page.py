@@ -13,9 +13,9 @@ from typing import Any
 import attrs
 
 from dap3d_core.result import ResultError
-from dap3d_core.result.files import whole_file
-from dap3d_core.view.data import page_data
-from dap3d_core.view.geometry import scene_of
+from dap3d_core.result.file.atomic_write import whole_file
+from dap3d_core.view.page_data import page_data
+from dap3d_core.view.scene3d.scene_data import scene_of
 
 #: The program of the page, in the order in which its parts build on one another.
 PROGRAM = (
@@ -119,7 +119,7 @@ def view(
         SceneError: there is no such model, or the scene of a sweep cannot be used.
     """
     if hasattr(result, "data_vars"):  # a data set of xarray
-        from dap3d_core.view.sweeps import sweep_data
+        from dap3d_core.view.sweep_page import sweep_data
 
         how: dict[str, Any] = dict(model=model, allow_code=allow_code)
         return View(

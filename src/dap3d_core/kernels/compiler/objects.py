@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dap3d_core.kernels.sealed_files import sealed, sealed_content
+from dap3d_core.kernels.runtime.sealed_files import sealed, sealed_content
 
 #: Maximum size of the object files of a folder; the oldest are removed first.
 MAX_BYTES = 200_000_000

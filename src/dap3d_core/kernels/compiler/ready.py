@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from dap3d_core.kernels.compiler.objects import Processor, host_features, joined, parts, processor
-from dap3d_core.kernels.sealed_files import sealed, unsealed
+from dap3d_core.kernels.runtime.sealed_files import sealed, unsealed
 
 #: Where the files stand in an installed package.
 FOLDER = Path(__file__).parents[2] / "ready_objects"

@@ -258,8 +258,9 @@ def trace(
 
     Args:
         symbol: name of its function.
-        namespace: of the module with the Python function ``loop`` (kernels/loops.py).
-        members: for each array that it reads: index of its address in the struct, LLVM type of its
+        namespace: of the module with the Python function ``loop``
+        (kernels/runtime/loop_modules.py). members: for each array that it reads: index of its
+        address in the struct, LLVM type of its
             items, width of its rows (0: one-dimensional).
 
     Raises:

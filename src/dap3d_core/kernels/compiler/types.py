@@ -56,7 +56,7 @@ class Numbers(_ByAddress):
 
 @dataclass(frozen=True, eq=False)
 class Struct(_ByAddress):
-    """A struct of arrays and further structs (kernels/by_address.py)."""
+    """A struct of arrays and further structs (kernels/runtime/array_struct.py)."""
 
     name: str
     members: tuple[tuple[str, Any], ...]

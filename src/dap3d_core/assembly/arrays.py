@@ -1,0 +1,127 @@
+"""The system: every array that the compiled driver works on.
+
+Made from a model and its elimination plan (formulations/arrays.py). The arrays are handed on by one
+address; the loops are an argument of their own (docs/decisions/0001).
+"""
+
+from typing import Any, ClassVar
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.kernels.compiler.types import Table
+from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays
+from dap3d_core.kernels.runtime.cache import table_of
+from dap3d_core.kernels.runtime.function_lists import LoopArrays, step_signature
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: What is listed part by part in ``Halves``. Runs of bodies; of the blocks of D that are scaled, of
+#: those of a part's rows and of those of a part's bodies; of hubs. Pieces of groups of forces and
+#: of joints.
+BODIES, SCALED, BY_ROWS, BY_BODIES, HUBS, RUNS = range(6)
+FORCES, JOINTS, PIECES = range(3)
+
+#: The order of the group loops in the list: all loops of one kind stand together.
+KINDS = (
+    "value", "wrench", "energy", "acceleration", "position", "friction", "angle", "turned",
+    "switch", "knot"
+)  # fmt: skip
+(
+    VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, TURNED, SWITCH, KNOT
+) = range(len(KINDS))  # fmt: skip
+
+# What a switch does where it becomes negative, or changes its sign: the run ends; the integration
+# begins anew; the same, and nobody is told.
+ENDS, BEGINS, UNSEEN = 1, 0, -1
+
+# Places in ``settings``: projection tolerances of position and velocity, a scratch number, how
+# often the multipliers did not settle with friction, the numbers of the penalty formulation, how
+# often a pose was singular where something was reported, the length that tolerances speak of
+# (Model.length), 1.0 where pivots are those of equal masses, and how often the turns of an angle
+# were in doubt.
+(
+    TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SINGULAR, LENGTH, EVEN,
+    DOUBTFUL, SETTINGS
+) = range(12)  # fmt: skip
+
+
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class Halves(Arrays):
+    """Partition of a large scene into two halves and a top (two_threads/partition.py)."""
+
+    types: ClassVar[dict[str, Any]] = {
+        **dict.fromkeys(("mail", "nodes", "rows", "targets", "matrix"), INTEGERS),
+        **dict.fromkeys(("run_start", "piece_start"), INTEGERS),
+        **dict.fromkeys(("columns", "updates", "runs", "pieces"), INTEGER_MATRIX),
+    }
+
+    mail: Integers  # what the two threads tell each other (formulations/two_threads/rhs_halves.py)
+    numbers: Floats  # the time; powers of each part
+    nodes: Integers  # from here on as in linear.halving.Halves
+    rows: Integers
+    targets: Integers
+    matrix: Integers
+    columns: Integers
+    updates: Integers
+    run_start: Integers  # (RUNS * 3 + 1,) first of the runs of each kind and part
+    runs: Integers  # (k, 2) first, and last + 1, of bodies, blocks of D or hubs
+    piece_start: Integers  # (PIECES * 3 + 1,) first of the pieces of each kind and part
+    pieces: Integers  # (k, 4) a loop's place in the list; i0, p0, count of a run of its instances
+
+
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class System(LoopArrays):
+    """Arrays of the driver. n bodies, ground is 0; rows in the order of the plan."""
+
+    types: ClassVar[dict[str, Any]] = LoopArrays.types | {
+        "metric": MATRIX,
+        **dict.fromkeys(("kinds", "row"), INTEGERS),
+        **dict.fromkeys(
+            ("groups", "blocks", "targets", "contributions", "nodes", "columns", "updates", "hubs"),
+            INTEGER_MATRIX,
+        ),
+        "halves": Halves.type_of(),
+    }
+
+    metric: Floats  # (n+1, 16): 1/sqrt(m); U = L^-T by rows, upper triangle; B = A U by rows
+    force: Floats  # (6 (n+1),) force and moment on each body; then the acceleration
+    gamma: Floats  # (rows,)
+    nu: Floats  # (rows,)
+    C: Floats  # (rows,)
+    x: Floats  # (rows,) right-hand side, then -lambda; between these, what regularises the rows
+    D: Floats  # blocks of the Jacobian
+    K: Floats  # blocks of what remains to be factored
+    weight: Floats  # (rows,) from a row's residual to one in m: 1 in scenes of ordinary size
+    smallest: Floats  # (rows,) a pivot not above this is singular
+    settings: Floats  # (SETTINGS,) see above
+    friction: Floats  # where joints rub: two of the size of ``force``, three of the size of ``x``
+    groups: Integers  # (loops, 3) i0, p0, count
+    kinds: Integers  # (KINDS + 1,) first loop of each kind
+    row: Integers  # (model rows,) place of each constraint row in the row vectors
+    blocks: Integers  # from here on as in linear.Plan
+    targets: Integers
+    contributions: Integers
+    nodes: Integers
+    columns: Integers
+    updates: Integers
+    hubs: Integers
+    halves: Any  # Halves of a large scene, else None: nothing reads it then
+
+
+#: What a run changes and goes on from: ``par`` holds the turns of angles and the numbers that an
+#: event has set, ``settings`` counts. All else is constant, found at the start of a run
+#: (``smallest``), or scratch: a right-hand side, projection, report or stage writes what it reads,
+#: factors too. A projection may use those of the right-hand side before it: both are of one step.
+#: No iteration begins with what another left, so that equal states have equal rates.
+KEPT = ("par", "settings")
+
+STEP = step_signature(System.type_of())
+STEPS = Table(STEP)
+
+
+def step_functions(*functions: Any) -> Any:
+    """A formulation's functions (t, y, out, system, loops) as an integrator takes them."""
+    return table_of(STEP, functions)

@@ -1,0 +1,82 @@
+"""Changes of a state: displacements, changes of velocity, in the bodies' scaled coordinates."""
+
+import numpy as np
+
+from dap3d_core.assembly.arrays import Floats
+from dap3d_core.kernels.runtime.cache import compiled_inside
+
+
+@compiled_inside
+def normalise(y: Floats, n: int) -> None:
+    """Bring the Euler parameters of n bodies to unit length."""
+    for b in range(n):
+        c = 7 * b + 3
+        e0, e1, e2, e3 = y[c], y[c + 1], y[c + 2], y[c + 3]
+        h = 1.0 / np.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
+        for d in range(c, c + 4):
+            y[d] *= h
+
+
+@compiled_inside
+def add_displacement(y: Floats, metric: Floats, force: Floats, out: Floats) -> None:
+    """Add r and p's share of a scaled displacement (or its rate) in ``force``; out may be y."""
+    for b in range(1, metric.shape[0]):
+        c, o, k = 7 * (b - 1), 6 * b, metric[b]
+        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
+        w0 = 0.5 * (k[1] * a0 + k[2] * a1 + k[3] * a2)
+        w1 = 0.5 * (k[4] * a1 + k[5] * a2)
+        w2 = 0.5 * k[6] * a2
+        e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
+        for d in range(3):
+            out[c + d] += k[0] * force[o + d]
+        out[c + 3] += -e1 * w0 - e2 * w1 - e3 * w2
+        out[c + 4] += e0 * w0 - e3 * w1 + e2 * w2
+        out[c + 5] += e3 * w0 + e0 * w1 - e1 * w2
+        out[c + 6] += -e2 * w0 + e1 * w1 + e0 * w2
+
+
+@compiled_inside
+def add_velocity(metric: Floats, force: Floats, out: Floats) -> None:
+    """Add a scaled velocity in ``force`` to the velocities (6 n,)."""
+    for b in range(1, metric.shape[0]):
+        f, o, k = 6 * (b - 1), 6 * b, metric[b]
+        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
+        for d in range(3):
+            out[f + d] += k[0] * force[o + d]
+        out[f + 3] += k[1] * a0 + k[2] * a1 + k[3] * a2
+        out[f + 4] += k[4] * a1 + k[5] * a2
+        out[f + 5] += k[6] * a2
+
+
+@compiled_inside
+def move(y: Floats, metric: Floats, force: Floats) -> None:
+    """Add a scaled displacement: r += dr, p += 1/2 L^T dtheta', of unit length again."""
+    add_displacement(y, metric, force, y)
+    normalise(y, metric.shape[0] - 1)
+
+
+@compiled_inside
+def change_velocity(y: Floats, metric: Floats, force: Floats) -> None:
+    """Add a scaled change of velocity to the velocities."""
+    add_velocity(metric, force, y[7 * (metric.shape[0] - 1) :])
+
+
+@compiled_inside
+def size_of_positions(y: Floats, n: int, length: float) -> float:
+    """The length of the scene and the largest coordinate of n bodies: scale of a tolerance, m."""
+    found = 0.0
+    for b in range(n):
+        for c in range(7 * b, 7 * b + 3):
+            found = max(found, abs(y[c]))
+    return length + found
+
+
+@compiled_inside
+def size_of_velocities(y: Floats, n: int, length: float) -> float:
+    """The same of velocities, m/s: of a radian that length."""
+    found = 0.0
+    for b in range(n):
+        f = 7 * n + 6 * b
+        for c in range(3):
+            found = max(found, abs(y[f + c]), length * abs(y[f + 3 + c]))
+    return length + found

@@ -1,0 +1,1 @@
+"""The commands of `dap3d`, one a file."""

@@ -1,0 +1,165 @@
+"""``dap3d post``: the post-processor's arrays as a table or a file with named dimensions."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dap3d_core.cli.app import Command
+from dap3d_core.cli.framework.completion import quantities as complete_quantities
+from dap3d_core.cli.framework.completion import results as complete_results
+from dap3d_core.cli.process.exit_codes import DONE, Refused
+
+if TYPE_CHECKING:
+    from dap3d_core.result import Result
+
+FORMATS = {".nc": "nc", ".csv": "csv"}
+
+
+@click.command(cls=Command, saves=True, short_help="Compute all arrays of a result.")
+@click.argument("result", shell_complete=complete_results)
+@click.argument("quantities", metavar="[QUANTITY]...", nargs=-1,
+                shell_complete=complete_quantities)  # fmt: skip
+@click.option("-o", "--output", type=click.Path(), metavar="FILE",
+              help="What is written: a .nc or a .csv file; RESULT-post.nc by default.")  # fmt: skip
+@click.option("--format", "kind", type=click.Choice(tuple(FORMATS.values())),
+              help="Form of the file, where its name does not say it.")  # fmt: skip
+@click.option("--select", "selected", metavar="QUANTITY...", multiple=True,
+              shell_complete=complete_quantities,
+              help="These quantities alone.")  # fmt: skip
+@click.option("--jacobian", "--jac", "jacobian", is_flag=True,
+              help="The constraint Jacobian as well.")  # fmt: skip
+@click.option("--model", metavar="MODEL",
+              help="The model whose own types (plugin.py) were used in the run.")  # fmt: skip
+@click.option("--allow-code", is_flag=True, help="Load the types of that model's plugin.py.")
+@click.option("--force", is_flag=True, help="Overwrite an existing file.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+def post(
+    result: str,
+    quantities: tuple[str, ...],
+    *,
+    output: str | None,
+    kind: str | None,
+    selected: tuple[str, ...],
+    jacobian: bool,
+    model: str | None,
+    allow_code: bool,
+    force: bool,
+    as_json: bool,
+) -> int:
+    """Compute the arrays of the manual's post-processor from a RESULT.
+
+    r, p, rd, w, wp, rdd, wd, wpd of the bodies, rP, rPd, rPdd of the points (animation points
+    last), Lam, energies, residuals, the reaction of every joint on each of its bodies in global and
+    in body axes and, with --jacobian, Jac.
+
+    A .csv file has the time and a column for each component with its unit, such as "crank.r.x [m]".
+    A .nc file has the arrays with named dimensions and units.
+
+    \b
+    dap3d post pen1.nc -o pen1.csv
+    dap3d post pen1.nc -o tip.csv --select cone.r.z J1.force.norm
+
+    Quantities are named as for dap3d plot. --json lists what was written: names, shapes, units.
+    """
+    from dap3d_core.cli.console.console import items, messages, print_json, say, size
+    from dap3d_core.cli.console.console import output as output_console
+    from dap3d_core.cli.framework.paths import open_result, refuse_all, writable
+    from dap3d_core.result.quantities.netcdf_export import why_no_reactions
+
+    target, kind = _target(result, output, kind)
+    opened = open_result(result, model=model, allow_code=allow_code)
+    names = tuple(dict.fromkeys((*selected, *quantities)))
+    refuse_all(
+        partial(writable, target, force=force, sources=(Path(result),)),
+        *(partial(opened.quantity, name) for name in names),
+    )
+    left_out = "" if names else why_no_reactions(opened)
+    notes = [f"reactions are left out: {left_out}"] if left_out else []
+    write = _write_table if kind == "csv" else _write_arrays
+    arrays = write(opened, target, names, not left_out, jacobian, force)
+    instants, byte_count = len(opened.t), target.stat().st_size
+    if as_json:
+        about = {"file": str(target), "format": kind, "size_bytes": byte_count}
+        print_json({**about, "instants": instants, "arrays": arrays, "notes": notes})
+        return DONE
+    items(messages(), notes)
+    contents = f"{instants} instants, {len(arrays)} {'columns' if kind == 'csv' else 'arrays'}"
+    say(output_console(), f"{target} written ({size(byte_count)}): {contents}", whole=True)
+    return DONE
+
+
+def _target(result: str, output: str | None, kind: str | None) -> tuple[Path, str]:
+    """The file that is written, and its format."""
+    if output is None:
+        kind = kind or "nc"
+        return Path(f"{Path(result).stem}-post.{kind}"), kind
+    target = Path(output)
+    named = FORMATS.get(target.suffix.lower())
+    if named is None and kind is None:
+        raise Refused(f"cannot write {target}: name a .nc or a .csv file, or give --format")
+    if kind is not None and named not in (None, kind):
+        raise Refused(f"cannot write {target}: --format {kind} and its name differ; leave one out")
+    return target, kind or str(named)
+
+
+def _write_table(
+    result: "Result",
+    target: Path,
+    names: tuple[str, ...],
+    reactions: bool,
+    jacobian: bool,
+    force: bool,
+) -> list[dict[str, Any]]:
+    """Write a CSV table; what its columns are."""
+    from dap3d_core.result.quantities.csv_table import (
+        columns_of,
+        jacobian_columns,
+        selected,
+        write_csv,
+    )
+
+    with _refused():
+        columns = selected(result, names) if names else columns_of(result, reactions)
+        more = jacobian_columns(result) if jacobian else []
+    write_csv(result, target, columns, more, force=force)
+    return [
+        {"name": c.name, "dimensions": ["time"], "shape": [len(result.t)], "unit": c.unit}
+        for c in (*columns, *more)
+    ]
+
+
+def _write_arrays(
+    result: "Result",
+    target: Path,
+    names: tuple[str, ...],
+    reactions: bool,
+    jacobian: bool,
+    force: bool,
+) -> list[dict[str, Any]]:
+    """Write a NetCDF file; what its arrays are."""
+    from dap3d_core.result.quantities.netcdf_export import (
+        dataset_to_write,
+        selection_of,
+        write_netcdf,
+    )
+
+    with _refused():
+        if jacobian and result.subject.row_count:
+            _ = result.machine
+        dataset = selection_of(result, names) if names else dataset_to_write(result, reactions)
+    return write_netcdf(result, target, dataset, jacobian=jacobian, force=force)
+
+
+@contextmanager
+def _refused() -> Iterator[None]:
+    """What cannot be had from a result is a wrong request."""
+    from dap3d_core.result import ResultError, UnknownNameError
+
+    try:
+        yield
+    except (ResultError, UnknownNameError) as error:
+        raise Refused(str(error)) from error

@@ -1,0 +1,87 @@
+"""The manual's questions, asked where ``run`` is given no model; defaults are the scene's."""
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from dap3d_core.cli.console.console import messages, say
+
+
+def ask(given: dict[str, Any]) -> tuple[str, Any]:
+    """Ask for the model and the settings of its run.
+
+    Args:
+        given: settings by name; what an option says is not asked for, answers are put in.
+
+    Returns:
+        The name of the model, and its scene.
+    """
+    model, scene = _ask_model()
+    settings = scene.simulation
+    if given["correct"] is None and scene.joints:
+        question = "Do you want to correct the initial conditions?"
+        given["correct"] = click.confirm(question, default=settings.correct is not False, err=True)
+    if given["t_end"] is None:
+        given["t_end"] = _number("Final time in seconds", settings.t_end, least=0.0)
+    t_end = given["t_end"]
+    if given["dt"] is None and t_end:
+        usual = settings.dt if isinstance(settings.dt, (int, float)) else t_end / 100.0
+        usual = usual if 0.0 < usual <= t_end else t_end / 100.0
+        given["dt"] = _number("Reporting time-step in seconds", usual, above=0.0, most=t_end)
+    if given["method"] is None:
+        given["method"] = _ask_method(str(settings.method))
+    return model, scene
+
+
+def _ask_model() -> tuple[str, Any]:
+    from dap3d_core.scene import SceneError, load, shipped_models
+
+    console = messages()
+    say(console, f"Shipped models: {', '.join(shipped_models()) or 'none'}")
+    while True:
+        model = click.prompt("Which model (a name, a folder or a file)", type=str, err=True)
+        try:
+            return model, load(model)
+        except SceneError as error:
+            say(console, str(error), "red")
+
+
+def _number(
+    question: str, usual: Any, *, least: float | None = None, above: float | None = None,
+    most: float | None = None,
+) -> float:  # fmt: skip
+    """A finite number within its bounds; asked again until it is one."""
+
+    def read(text: Any) -> float:
+        try:
+            value = float(text)
+        except (TypeError, ValueError):
+            raise click.UsageError(f"{text!r} is not a number") from None
+        if value != value or abs(value) == float("inf"):
+            raise click.UsageError("the number must be finite")
+        if (least is not None and value < least) or (above is not None and value <= above):
+            bound = f"at least {least:g}" if above is None else f"above {above:g}"
+            raise click.UsageError(f"the number must be {bound}")
+        if most is not None and value > most:
+            raise click.UsageError(f"the number must be at most {most:g}")
+        return value
+
+    default = f"{usual:g}" if isinstance(usual, (int, float)) else None
+    return float(click.prompt(question, default=default, value_proc=read, err=True))
+
+
+def _ask_method(usual: str) -> str:
+    """The formulation; a first letter will do, as in the manual."""
+    from dap3d_core.scene import METHODS
+
+    def read(text: str) -> str:
+        found = [m for m in METHODS if m.startswith(text.strip().lower())]
+        if text.strip() and len(found) == 1:
+            return found[0]
+        raise click.UsageError(f"one of {', '.join(METHODS)}")
+
+    read_: Callable[[str], str] = read
+    default = usual if usual in METHODS else "auto"
+    question = f"Solution method ({', '.join(METHODS)})"
+    return str(click.prompt(question, default=default, value_proc=read_, err=True))

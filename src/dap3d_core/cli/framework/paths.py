@@ -1,0 +1,141 @@
+"""Files that commands read and write, refused before any work is done."""
+
+import os
+import sys
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dap3d_core.cli.process.exit_codes import Refused
+
+if TYPE_CHECKING:
+    import xarray
+
+    from dap3d_core.result import Result
+
+
+def named_after(model: str, output: str | None, tail: str = "") -> Path:
+    """Where a result goes: MODEL.nc in the current folder if nothing else is said.
+
+    Args:
+        model: as the command was given it.
+        output: what is said.
+        tail: what follows the name of the model.
+    """
+    if output is not None:
+        return Path(output)
+    path = Path(model)
+    if path.is_file():
+        return Path(f"{path.stem}{tail}.nc")
+    return Path(f"{path.resolve().name if path.exists() else path.name}{tail}.nc")
+
+
+def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) -> Path:
+    """A path that can be written to.
+
+    Args:
+        path: what is to be written.
+        force: whether an existing file is overwritten.
+        sources: files that are read, which are never overwritten.
+
+    Raises:
+        Refused: says why, and what to do.
+    """
+    from dap3d_core.result import ResultError
+    from dap3d_core.result.file.atomic_write import cannot, check_target
+
+    try:
+        if not force and path.is_file():
+            raise Refused(f"{path} exists; --force overwrites it, -o writes another file")
+        target = check_target(path, force)
+    except OSError as error:
+        told = error if isinstance(error, ResultError) else cannot("write", path, error)
+        raise Refused(str(told)) from error
+    for source in sources:
+        if source is not None and path.exists() and source.exists() and path.samefile(source):
+            raise Refused(f"{path} is what is read; name another file with -o")
+    if _is_stdout(target):
+        raise Refused(f"{path} is where the words of this command go; name another file with -o")
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        raise Refused(f"cannot write {path}: no permission to write in its folder; use -o")
+    return path
+
+
+def _is_stdout(target: Path) -> bool:
+    """Whether the standard output leads to a file: words written there later would be lost."""
+    try:
+        return os.path.samestat(target.stat(), os.fstat(sys.stdout.fileno()))
+    except (OSError, ValueError):  # one of them does not exist, or is none of the system's
+        return False
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole, in place of what stands there; a link is replaced, never followed.
+
+    Raises:
+        Refused: it cannot be written; says why.
+    """
+    aside = path.with_name(f".{uuid.uuid4().hex}.part")
+    try:
+        try:
+            with aside.open("x", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+            os.replace(aside, path)
+        finally:
+            aside.unlink(missing_ok=True)
+    except OSError as error:
+        raise Refused(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def open_result(path: str, *, model: str | None = None, allow_code: bool = False) -> "Result":
+    """The result in a file.
+
+    Args:
+        path: the file.
+        model: the model whose own types the run used.
+        allow_code: whether they may be loaded.
+
+    Raises:
+        Refused: it cannot be read; says why.
+    """
+    import dap3d_core as dap
+    from dap3d_core.result import ResultError
+
+    try:
+        return dap.open(path, model=model, allow_code=allow_code)
+    except ResultError as error:
+        raise Refused(str(error)) from error
+
+
+def open_sweep(path: str) -> "xarray.Dataset":
+    """The data set of a sweep in a file.
+
+    Raises:
+        Refused: it cannot be read; says why.
+    """
+    import dap3d_core as dap
+    from dap3d_core.result import ResultError
+
+    try:
+        return dap.open_sweep(path)
+    except ResultError as error:
+        raise Refused(str(error)) from error
+
+
+def refuse_all(*checks: Callable[[], object]) -> None:
+    """Make checks, and refuse what any of them refuses: all mistakes at once.
+
+    Raises:
+        Refused: one line for each.
+    """
+    from dap3d_core.result import ResultError, UnknownNameError
+
+    faults: dict[str, None] = {}
+    for check in checks:
+        try:
+            check()
+        except (Refused, ResultError, UnknownNameError, ValueError) as error:
+            faults[str(error)] = None
+    if faults:
+        raise Refused("\n".join(faults))

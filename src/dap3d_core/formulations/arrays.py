@@ -1,0 +1,233 @@
+"""From a model and its elimination plan to the driver's arrays and group loops."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.assembly.arrays import EVEN, KINDS, LENGTH, Floats, Integers, System
+from dap3d_core.interface.codegen.compile_loops import compiled_loop
+from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.kernels.runtime.function_lists import loop_list
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P
+from dap3d_core.linear.ldlt.plan import Plan
+from dap3d_core.model import Group, Model
+
+#: Usual alpha, Omega (1/s), mu of the penalty formulation (spec 9).
+PENALTY = (1e7, 10.0, 1.0)
+
+
+#: Ratio of masses from which on a pivot falls by as much when a light body turns round a heavy one
+#: as it does near a singular pose.
+UNEVEN = 1e3
+
+
+def build_loops(
+    model: Model, kinds: tuple[str, ...], announce: Callable[[str], None] | None = None
+) -> Any:
+    """The compiled group loops of a model, only of the kinds asked for, and what they run over.
+
+    Returns:
+        (table of loops, [(kind, group)] in the order of the list).
+
+    Raises:
+        PluginError: the kernels of a type cannot be compiled.
+    """
+    loops, what = [], []
+    for kind in KINDS:
+        if kind not in kinds:
+            continue
+        for group in _groups_for(model, kind):
+            loop = compiled_loop(group.examined, kind, announce)
+            if loop is not None:
+                loops.append(loop)
+                what.append((kind, group))
+    return loop_list(loops), what
+
+
+def _groups_for(model: Model, kind: str) -> tuple[Group, ...]:
+    if kind == "friction":
+        return model.friction
+    return (*model.functions, *model.forces, *model.joints)
+
+
+def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> System:
+    """Allocate and fill the driver's arrays.
+
+    Args:
+        model: the model.
+        plan: its elimination program.
+        what: the loops as ``build_loops`` returns them.
+    """
+    n = model.body_count
+    body = np.zeros((n + 1, BODY_WIDTH))
+    body[0, A : A + 9 : 4] = body[0, P] = 1.0
+    body[1:, MASS] = model.mass
+    body[1:, JP : JP + 9] = model.Jp.reshape(n, 9)
+    metric = np.zeros((n + 1, 16))
+    set_metric(metric, model.mass, model.Jp)
+    idx, par, groups, starts = _tables(model, plan, what)
+    halves = None
+    if plan.halves is not None:
+        from dap3d_core.formulations.two_threads.partition import divide
+
+        halves = divide(plan, what, groups)
+    return System(
+        body=body,
+        metric=metric,
+        F=np.zeros((model.function_count + 1, 5)),
+        par=par,
+        force=np.zeros(6 * (n + 1)),
+        gamma=np.zeros(plan.row_size),
+        nu=np.zeros(plan.row_size),
+        C=np.zeros(plan.row_size),
+        x=np.zeros(plan.row_size),
+        D=np.zeros(plan.block_size),
+        K=np.zeros(plan.matrix_size),
+        weight=np.ones(plan.row_size),
+        smallest=np.zeros(plan.row_size),
+        settings=np.array(
+            [1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model), 0.0]
+        ),
+        friction=np.zeros(12 * (n + 1) + 3 * plan.row_size if model.friction else 0),
+        idx=idx,
+        groups=groups,
+        kinds=starts,
+        row=rows_of(model, plan),
+        blocks=plan.blocks,
+        targets=plan.targets,
+        contributions=plan.contributions,
+        nodes=plan.nodes,
+        columns=plan.columns,
+        updates=plan.updates,
+        hubs=plan.hubs,
+        halves=halves,
+    )
+
+
+def load_numbers(
+    system: System, model: Model, other: Model, what: list[tuple[str, Group]]
+) -> list[tuple[str, Group]]:
+    """Put the numbers of another model of the same structure into a model's arrays.
+
+    Args:
+        system: made from ``model`` by ``build_system``.
+        model, other: the model that the loops were made for; the one whose numbers are wanted.
+        what: the loops as ``build_loops`` returned them.
+
+    Returns:
+        the same as ``what`` for the other model.
+
+    Raises:
+        ValueError: the structure is another: elements, bodies, functions or sizes of tables.
+    """
+    twins = _twins(model, other)
+    parts, seen, p0 = [], set(), 0
+    for _, group in what:
+        if id(group) not in seen:
+            seen.add(id(group))
+            parts.append(_numbers_of(twins[id(group)], p0))
+            p0 += parts[-1].size
+    if p0 != system.par.size or len(model.mass) != len(other.mass):
+        raise ValueError("models of different structure")
+    system.par[:] = np.concatenate([np.zeros(0), *parts])
+    system.body[1:, MASS] = other.mass
+    system.body[1:, JP : JP + 9] = other.Jp.reshape(-1, 9)
+    set_metric(system.metric, other.mass, other.Jp)
+    system.settings[[LENGTH, EVEN]] = other.length, masses_differ(other)
+    return [(kind, twins[id(group)]) for kind, group in what]
+
+
+def _twins(model: Model, other: Model) -> dict[int, Group]:
+    """Id of each group of a model -> the group of another that stands in its place."""
+    found = {}
+    for mine, theirs in zip(_all_groups(model), _all_groups(other), strict=True):
+        same = (
+            mine.examined.type is theirs.examined.type
+            and mine.numbers.shape == theirs.numbers.shape
+            and all(
+                np.array_equal(getattr(mine, name), getattr(theirs, name))
+                for name in ("members", "bodies", "functions")
+            )
+        )
+        if not same:
+            raise ValueError("models of different structure")
+        found[id(mine)] = theirs
+    return found
+
+
+def _all_groups(model: Model) -> tuple[Group, ...]:
+    return (*model.functions, *model.forces, *model.joints, *model.friction)
+
+
+def masses_differ(model: Model) -> float:
+    """1.0 where a pivot would tell of the masses and not of the pose (UNEVEN), else 0.0."""
+    if not model.body_count:
+        return 0.0
+    return float(np.max(model.mass) > UNEVEN * np.min(model.mass))
+
+
+def set_metric(metric: Floats, mass: Floats, Jp: Floats) -> None:
+    """Fill the metric's constants: 1/sqrt(m), and U = L^-T with J' = L L^T (ground: zero)."""
+    if not len(mass):
+        return
+    metric[1:, 0] = 1.0 / np.sqrt(mass)
+    U = np.linalg.inv(np.linalg.cholesky(Jp)).transpose(0, 2, 1)
+    metric[1:, 1:7] = U[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+
+
+def rows_of(model: Model, plan: Plan) -> Integers:
+    """(rows,) place of each constraint row of the model in the row vectors."""
+    first = np.repeat(plan.joint_row, model.joint_rows)
+    return first + np.arange(model.row_count) - np.repeat(model.joint_start[:-1], model.joint_rows)
+
+
+def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[Any, Any, Any, Any]:
+    """Integers and numbers of all instances; a group that serves two loops stands there once."""
+    idx: list[Integers] = []
+    par: list[Floats] = []
+    at: dict[int, tuple[int, int]] = {}
+    i0 = p0 = 0
+    rows = []
+    for _, group in what:
+        if id(group) not in at:
+            table = _integers_of(group, plan)
+            at[id(group)] = (i0, p0)
+            numbers = _numbers_of(group, p0)
+            idx.append(table.ravel())
+            par.append(numbers)
+            i0, p0 = i0 + table.size, p0 + numbers.size
+        rows.append((*at[id(group)], group.count))
+    kinds = [kind for kind, _ in what]
+    starts = [sum(KINDS.index(k) < n for k in kinds) for n in range(len(KINDS) + 1)]
+    return (
+        np.concatenate([np.zeros(0, dtype=np.int64), *idx]),
+        np.concatenate([np.zeros(0), *par]),
+        np.array(rows, dtype=np.int64).reshape(-1, 3),
+        np.array(starts, dtype=np.int64),
+    )
+
+
+def _numbers_of(group: Group, p0: int) -> Floats:
+    """The numbers of a group, its tables behind them, each table's place put in."""
+    numbers = group.numbers.copy()
+    end = p0 + numbers.size
+    for k, offset, rows in group.tables:
+        numbers[k, offset] = end
+        end += rows.size
+    return np.concatenate([numbers.ravel(), *(rows.ravel() for _, _, rows in group.tables)])
+
+
+def _integers_of(group: Group, plan: Plan) -> Integers:
+    """The rows of ``idx`` of a group, as interface/codegen/loop_source.py lays them out."""
+    kind = group.examined.type.kind
+    parts = [group.bodies, group.functions]
+    if kind == "joint":
+        joints = group.members if group.joints is None else group.joints
+        parts.append(plan.joint_row[joints][:, None])
+        parts.append(np.array([plan.joint_block[m] for m in joints], dtype=np.int64))
+    elif kind == "function":
+        parts.append(1 + group.members[:, None])
+    table = np.ascontiguousarray(np.hstack(parts), dtype=np.int64)
+    assert table.shape[1] == stride(group.examined)
+    return table

@@ -1,0 +1,1 @@
+"""Parts that formulations share: constraint rows, projection, friction, switching functions."""

@@ -1,0 +1,331 @@
+"""What the formulations with joints share: rows, factors, projection onto the constraints, reports.
+
+Each formulation compiles what it uses of them. ``part`` says which matrix is factored: None for
+[I D^^T; D^ 0], which needs independent rows, a number for [I D^^T; D^ -E] with e_i = part |D^_i|^2.
+As None it is known when the code is compiled, so that ``standard`` has no line of the other.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from collections.abc import Callable
+from typing import Any
+
+from dap3d_core.assembly.arrays import (
+    ACCELERATION,
+    ENERGY,
+    EVEN,
+    LENGTH,
+    POSITION,
+    SCRATCH,
+    TOLERANCE_C,
+    TOLERANCE_V,
+    TURNED,
+    VALUE,
+    WRENCH,
+    Floats,
+    System,
+)
+from dap3d_core.assembly.evaluate import (
+    call_kinds,
+    largest_weighted,
+    place,
+    place_bodies,
+    scale_forces,
+    scale_velocities,
+    zero,
+)
+from dap3d_core.assembly.state_update import (
+    change_velocity,
+    move,
+    normalise,
+    size_of_positions,
+    size_of_velocities,
+)
+from dap3d_core.formulations.common.friction import solve_rubbing
+from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
+from dap3d_core.linear.ldlt.factor import (
+    assemble,
+    factor,
+    have_pivots,
+    pivot_lengths,
+    regularise,
+    weigh_rows,
+)
+from dap3d_core.linear.ldlt.saddle_point import add_product, scale_blocks, solve_saddle
+
+#: Newton passes of one projection; the second already stands at rounding.
+PASSES = 5
+
+#: e_i of regularised factors as part of the squared length of row i: far above rounding, and small
+#: enough that two passes leave nothing of a row that is a tenth independent of the others.
+PART = 1e-9
+
+#: Where a pass with the factors of another pose leaves more than this part of the residual, the
+#: next has new ones: with very different masses a small turn changes which body gives way.
+SLOW = 0.1
+
+#: A residual that stays above this many times the tolerance means that the projection did not find
+#: the constraints: with independent rows, and where redundant ones may misfit (by FIT of
+#: simulation/initial/assemble.py).
+LOST, MISFIT = 1e6, 1e8
+
+
+@compiled_into
+def linearise(t: float, system: System, loops: Any) -> None:
+    """D^, gamma and nu of all joints at the bodies as placed."""
+    D = system.D
+    call_kinds(ACCELERATION, ACCELERATION, t, system, loops, D, system.gamma, system.nu)
+    scale_blocks(system.blocks, D, system.metric)
+
+
+@compiled_into
+def linearise_evenly(t: float, system: System, loops: Any) -> None:
+    """As ``linearise``, but as if all masses were one, and all inertias, in units of the scene.
+
+    A pose is singular whatever the masses; but a pivot falls as well where a joint turns away from
+    a light body that gave way to it, and only a heavy one is left.
+    """
+    D, blocks, length = system.D, system.blocks, system.settings[LENGTH]
+    call_kinds(ACCELERATION, ACCELERATION, t, system, loops, D, system.gamma, system.nu)
+    for q in range(blocks.shape[0]):
+        for r in range(blocks[q, 2]):
+            for c in range(3):
+                D[blocks[q, 0] + 6 * r + c] *= length
+
+
+@compiled_into
+def factorise(system: System, part: float | None) -> int:
+    """The factors of D^ as it stands, in K; E, where there is one, is left in x.
+
+    Returns the number of pivots that have become small (``system.smallest``): the pose is near a
+    singular one.
+    """
+    assemble(system.targets, system.contributions, system.D, system.K)
+    if part is not None:
+        weigh_rows(system.blocks, system.D, part, system.x)
+        regularise(system.nodes, system.x, system.K)
+    return factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+
+
+@compiled_into
+def factorise_anyway(system: System, part: float | None) -> None:
+    """The same where the pose may be singular to the last digit: regularised there."""
+    if factorise(system, part) > 0 and part is None and not have_pivots(system.nodes, system.K):
+        factorise(system, PART)
+
+
+@compiled_into
+def gather_forces(t: float, y: Floats, system: System, loops: Any) -> float:
+    """Place the bodies of a state; scaled forces into ``force``; returns the power of the forces.
+
+    Functions of time stand ready after that.
+    """
+    body, metric, force = system.body, system.metric, system.force
+    place_bodies(y, body, metric)
+    zero(force)
+    call_kinds(VALUE, WRENCH, t, system, loops, force, force, force)
+    return scale_forces(body, metric, force)
+
+
+@compiled_into
+def solve_rows(system: System) -> None:
+    """Accelerations from the forces in ``force``, into ``force``; from x = gamma, x = -lambda."""
+    solve_saddle(system.blocks, system.hubs, system.nodes, system.columns, system.D, system.K,
+                 system.x, system.force)  # fmt: skip
+
+
+@compiled_into
+def power_of_drivers(system: System) -> float:
+    """Power of the reactions, with -lambda in ``x``: only moving constraints do work."""
+    power = 0.0
+    for k in range(system.x.shape[0]):
+        power -= system.x[k] * system.nu[k]
+    return power
+
+
+@compiled_into
+def solve_equations(
+    t: float,
+    y: Floats,
+    system: System,
+    loops: Any,
+    part: float | None,
+    solve: Callable[[System], None],
+) -> float:
+    """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers.
+
+    solve: of a formulation, from the scaled forces in ``force``, with the factors of ``part``.
+    """
+    power = gather_forces(t, y, system, loops)
+    linearise(t, system, loops)
+    factorise(system, part)
+    power += solve_rubbing(t, system, loops, solve)
+    return power + power_of_drivers(system)
+
+
+@compiled_inside
+def residuals(t: float, system: System, loops: Any) -> float:
+    """Position-level residuals (zero where a row has none) into C; returns the largest, in m."""
+    C = system.C
+    zero(C)
+    call_kinds(POSITION, POSITION, t, system, loops, C, C, C)
+    return largest_weighted(C, system.weight)
+
+
+@compiled_inside
+def velocity_residuals(system: System) -> float:
+    """D v - nu into C, with D^ as it stands; returns the largest, in m/s."""
+    C = system.C
+    scale_velocities(system.body, system.metric, system.force)
+    for k in range(C.shape[0]):
+        C[k] = -system.nu[k]
+    add_product(system.blocks, system.D, system.force, C)
+    return largest_weighted(C, system.weight)
+
+
+@compiled_inside
+def acceleration_residual(system: System) -> float:
+    """D a - gamma into C, with a in ``force``; returns the largest, in m/s^2."""
+    C = system.C
+    for k in range(C.shape[0]):
+        C[k] = -system.gamma[k]
+    add_product(system.blocks, system.D, system.force, C)
+    return largest_weighted(C, system.weight)
+
+
+@compiled
+def correct(system: System) -> None:
+    """The least scaled change of the bodies that removes the residuals in C, into ``force``."""
+    x, C = system.x, system.C
+    zero(system.force)
+    for k in range(x.shape[0]):
+        x[k] = -C[k]
+    solve_rows(system)
+
+
+@compiled_into
+def project_onto(
+    t: float,
+    y: Floats,
+    out: Floats,
+    system: System,
+    loops: Any,
+    part: float | None,
+    kept: bool,
+) -> None:
+    """Move a state onto its constraints, by the least change in the metric of the masses.
+
+    With regularised factors the passes are those of the proximal method as well: each leaves a
+    ``part`` of what the one before has left.
+
+    out: on entry 1.0 where rhs was evaluated last at this very t and y: D^ stands as it should,
+    and the factors, too, if rhs leaves those of ``part`` (``kept``). Then: 1.0 if y changed beyond
+    rounding; 1.0 if it did not converge, 2.0 if the pose is close to a singular one; largest
+    residuals of position and velocity; lengths (nodes) that go linearly through zero at a singular
+    pose.
+    """
+    metric = system.metric
+    n = metric.shape[0] - 1
+    lost = LOST if part is None else MISFIT
+    linear = out[0] == 1.0
+    factored = linear and kept
+    stale = False
+    out[0] = out[1] = 0.0
+    normalise(y, n)
+    if not linear:
+        place(t, y, system, loops)
+    worst = residuals(t, system, loops)
+    limit = system.settings[TOLERANCE_C] * size_of_positions(y, n, system.settings[LENGTH])
+    if not worst <= limit:
+        if not linear:
+            linearise(t, system, loops)
+        if not factored:
+            factorise_anyway(system, part)
+        for _ in range(PASSES):
+            before = worst
+            correct(system)
+            move(y, metric, system.force)
+            place_bodies(y, system.body, metric)
+            worst = residuals(t, system, loops)
+            if not worst > limit or not worst < 0.5 * before:
+                break
+        linear, factored = False, part is None  # of old factors the null space would be wrong
+        stale = factored
+        out[0] = 1.0
+        if not worst <= lost * limit:
+            out[1] = 1.0
+    out[2] = worst
+    if not linear:
+        linearise(t, system, loops)
+    if not factored:
+        factorise_anyway(system, part)
+    project_velocities(y, out, system, part, stale)
+    if is_poor(t, system, loops, part, out[4:]) and out[1] == 0.0:
+        out[1] = 2.0
+
+
+@compiled_into
+def is_poor(t: float, system: System, loops: Any, part: float | None, lengths: Floats) -> bool:
+    """Whether the pose is close to a singular one; D^ and its factors may be others after that."""
+    if system.settings[EVEN] != 0.0:
+        linearise_evenly(t, system, loops)
+        factorise(system, part)
+    return pivot_lengths(system.nodes, system.K, system.smallest, lengths) > 0
+
+
+@compiled_into
+def project_velocities(
+    y: Floats, out: Floats, system: System, part: float | None, stale: bool
+) -> None:
+    """The velocities' part of ``project_onto``, at D^ of this pose.
+
+    stale: the factors are those of the pose before positions moved.
+    """
+    n = system.metric.shape[0] - 1
+    worst = velocity_residuals(system)
+    limit = system.settings[TOLERANCE_V] * size_of_velocities(y, n, system.settings[LENGTH])
+    if not worst <= limit:
+        for _ in range(PASSES):
+            before = worst
+            correct(system)
+            change_velocity(y, system.metric, system.force)
+            add_product(system.blocks, system.D, system.force, system.C)
+            worst = largest_weighted(system.C, system.weight)
+            if not worst > limit or not (stale or worst < 0.5 * before):
+                break
+            if stale and not worst < SLOW * before:
+                factorise_anyway(system, part)
+                stale = False
+        out[0] = 1.0
+        if not worst <= (LOST if part is None else MISFIT) * limit:
+            out[1] = 1.0
+    out[3] = worst
+
+
+@compiled_inside
+def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
+    """Angles, energy and residuals into the end of out, with the accelerations in ``force``.
+
+    The last four are the potential energy and the largest residuals of position, velocity and
+    acceleration; before them stand the angles whose turns are counted.
+    """
+    value = system.settings[SCRATCH : SCRATCH + 1]
+    last = out.shape[0] - 4
+    out[last + 3] = acceleration_residual(system)
+    out[last + 2] = velocity_residuals(system)
+    out[last + 1] = residuals(t, system, loops)
+    value[0] = 0.0
+    call_kinds(ENERGY, ENERGY, t, system, loops, value, value, value)
+    out[last] = value[0]
+    value[0] = 0.0
+    angles = out[6 * (system.body.shape[0] - 1) + system.row.shape[0] :]
+    call_kinds(TURNED, TURNED, t, system, loops, angles, value, value)
+
+
+@compiled_inside
+def report_multipliers(system: System, out: Floats) -> None:
+    """Multipliers in the order of the model, after the accelerations, from -lambda in ``x``."""
+    first = 6 * (system.body.shape[0] - 1)
+    for k in range(system.row.shape[0]):
+        out[first + k] = -system.x[system.row[k]]

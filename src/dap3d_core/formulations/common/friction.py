@@ -1,0 +1,107 @@
+"""Coulomb friction in joints: forces that depend on the multipliers they change (spec 6.1).
+
+The multipliers are found by a fixed-point iteration, from those without friction: equal states give
+equal accelerations, whatever came before. Each pass is accelerated by one secant step
+(Irons and Tuck, Int. J. Numer. Meth. Engng 1 (1969) 275).
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from collections.abc import Callable
+from typing import Any
+
+from dap3d_core.assembly.arrays import FRICTION, UNSETTLED, System
+from dap3d_core.assembly.evaluate import call_kinds, zero
+from dap3d_core.kernels.runtime.cache import compiled_inside, compiled_into
+
+#: The multipliers have settled where a pass changes them by less than this part of the largest.
+SETTLED = 1e-10
+#: Passes at most; the last one is then used, and counted as not settled.
+PASSES = 25
+
+
+@compiled_inside
+def rubs(system: System) -> bool:
+    """Whether the scene has friction in joints."""
+    return bool(system.kinds[FRICTION + 1] > system.kinds[FRICTION])
+
+
+@compiled_inside
+def keep_applied(system: System) -> None:
+    """Remember the scaled applied forces before they become accelerations."""
+    for k in range(system.force.shape[0]):
+        system.friction[k] = system.force[k]
+
+
+@compiled_inside
+def rub(t: float, system: System, loops: Any) -> float:
+    """Friction for the multipliers in x, added to the scaled applied forces; returns its power."""
+    body, metric, force = system.body, system.metric, system.force
+    size = force.shape[0]
+    applied, rubbing = system.friction[:size], system.friction[size : 2 * size]
+    zero(rubbing)
+    call_kinds(FRICTION, FRICTION, t, system, loops, rubbing, system.x, system.x)
+    power = 0.0
+    for k in range(6):
+        force[k] = 0.0
+    for b in range(1, body.shape[0]):
+        s, k, o = body[b], metric[b], 6 * b
+        for c in range(6):
+            power += rubbing[o + c] * s[12 + c]
+        n0, n1, n2 = rubbing[o + 3], rubbing[o + 4], rubbing[o + 5]
+        for c in range(3):
+            force[o + c] = applied[o + c] + k[0] * rubbing[o + c]
+            turned = k[7 + c] * n0 + k[10 + c] * n1 + k[13 + c] * n2
+            force[o + 3 + c] = applied[o + 3 + c] + turned
+    return power
+
+
+@compiled_inside
+def settle(system: System, passes: int) -> bool:
+    """Whether the multipliers in x have settled; else x becomes what the next pass starts from."""
+    x, rows = system.x, system.x.shape[0]
+    memory = system.friction[2 * system.force.shape[0] :]
+    guess, result, change = memory[:rows], memory[rows : 2 * rows], memory[2 * rows :]
+    if passes == 0:
+        for k in range(x.shape[0]):
+            guess[k] = x[k]
+        return False
+    size = largest_change = upper = lower = 0.0
+    for k in range(x.shape[0]):
+        now = x[k] - guess[k]
+        size = max(size, abs(x[k]))
+        largest_change = max(largest_change, abs(now))
+        if passes > 1:
+            upper += now * (now - change[k])
+            lower += (now - change[k]) * (now - change[k])
+    if not largest_change > SETTLED * size:
+        return True
+    share = upper / lower if lower > 0.0 else 0.0
+    if passes == PASSES:
+        system.settings[UNSETTLED] += 1.0
+        return True
+    for k in range(x.shape[0]):
+        now = x[k] - guess[k]
+        mixed = x[k] - share * (x[k] - result[k]) if passes > 1 else x[k]
+        result[k], change[k], guess[k] = x[k], now, mixed
+        x[k] = mixed
+    return False
+
+
+@compiled_into
+def solve_rubbing(t: float, system: System, loops: Any, solve: Callable[[System], None]) -> float:
+    """``solve`` of a formulation, again until friction and multipliers agree; power of friction.
+
+    solve: scaled accelerations from the scaled forces in ``force``, -lambda into ``x``.
+    """
+    power, passes = 0.0, 0
+    if rubs(system):
+        keep_applied(system)
+    solve(system)
+    if rubs(system):
+        while not settle(system, passes):
+            passes += 1
+            power = rub(t, system, loops)
+            solve(system)
+    return power

@@ -1,0 +1,64 @@
+"""The constraint rows of a model at one state, as Python sees them."""
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.assembly.arrays import Floats, Integers
+
+
+@attrs.frozen
+class Rows:
+    """The constraint rows of a model at one state, in the order of the model.
+
+    Attributes:
+        C: (rows,) position-level residuals, zero where a row has none.
+        nu, gamma: (rows,) right-hand sides of the velocity and acceleration level.
+        row, column, value: the Jacobian's entries, (rows, 6 n), in no particular order.
+    """
+
+    C: Floats
+    nu: Floats
+    gamma: Floats
+    row: Integers
+    column: Integers
+    value: Floats
+    shape: tuple[int, int]
+
+    def dense(self) -> Floats:
+        """The Jacobian D (rows, 6 n)."""
+        D = np.zeros(self.shape)
+        D[self.row, self.column] = self.value
+        return D
+
+    def sparse(self) -> Any:
+        """The Jacobian D (rows, 6 n) as a scipy CSR array."""
+        from scipy.sparse import csr_array
+
+        return csr_array((self.value, (self.row, self.column)), shape=self.shape)
+
+
+def scaled_rows(rows: Rows, length: float) -> tuple[Rows, Floats]:
+    """Rows whose gradients have unit length, of displacements in units of a length, m; and lengths.
+
+    Neither depends on the units of the scene. A row without gradient stays as it is.
+
+    Args:
+        rows: those of a model.
+        length: a length of the scene, m.
+
+    Returns:
+        the rows, whose columns belong to (r / length, rotation in rad), and (rows,) the lengths of
+        their gradients before.
+    """
+    value = np.where(rows.column % 6 < 3, length, 1.0) * rows.value
+    gradient = np.sqrt(np.bincount(rows.row, value**2, minlength=rows.shape[0]))
+    gradient[gradient == 0.0] = 1.0
+    return attrs.evolve(
+        rows,
+        C=rows.C / gradient,
+        nu=rows.nu / gradient,
+        gamma=rows.gamma / gradient,
+        value=value / gradient[rows.row],
+    ), gradient

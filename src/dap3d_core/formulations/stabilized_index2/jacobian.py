@@ -1,0 +1,330 @@
+"""The tangent of the equations of motion, element by element, from the types' own group loops.
+
+One element's loop is called (count 1) with the row of one of its bodies moved along one of twelve
+coordinates, forwards and backwards: positions r, rotations about body axes, velocities r_dot,
+angular velocities in body axes. What it returns differs by the derivative. So every type has a
+tangent, a third party's too, and nothing is compiled for it. The error is some 1e-10 of the largest
+entry (central differences; the step is 6e-6 of the element's size, or rad), which a simplified
+Newton iteration, that reuses its matrix over many steps, does not see.
+
+In the bodies' scaled coordinates (linear/ldlt/factor.py), translations in body axes too, x a
+displacement and v a velocity:
+
+    coupling  d(force + D^T lambda) / d(x, v), blocks of 6 x 12 for pairs of bodies
+    turning   d(D v - nu) / dx, laid out as D
+    rubbing   d(friction) / dlambda, laid out as D (transposed)
+
+In body axes a mechanism that turns as a whole keeps its tangent. What a wrench owes to the body
+axes in which its moment acts is in it; the gyroscopic moment is added in closed form.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+from typing import Any, ClassVar
+
+import attrs
+
+from dap3d_core.assembly.arrays import Floats, Integers, System
+from dap3d_core.assembly.evaluate import largest, zero
+from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, Arrays
+from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.function_lists import call_loop
+
+#: Step of the differences: the cube root of a rounding balances its error with that of the formula.
+PART = 6e-6
+#: Least step of a velocity in m/s (times PART), and least size of an element in m: below the
+#: velocities at which Coulomb friction turns.
+SLOWEST, SMALLEST = 0.1, 1e-4
+#: What an element is.
+WRENCH_ELEMENT, JOINT_ELEMENT, FRICTION_ELEMENT = range(3)
+#: Most body slots of an element (interface/codegen/instance_layout.py).
+SLOTS = 3
+#: Columns of ``elements``.
+LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY = range(9)
+
+
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class Tangent(Arrays):
+    """What the differences need, and what they give."""
+
+    types: ClassVar[dict[str, Any]] = {
+        "elements": INTEGER_MATRIX,
+        "pairs": INTEGERS,
+        "blocks": INTEGER_MATRIX,
+    }
+
+    elements: Integers  # (groups, 9): LOOP, KIND, ...; ROW_AT: where in idx the joint's row stands
+    pairs: Integers  # places in ``coupling`` for the slots (a, b) of each element, -1 for none
+    blocks: Integers  # (pairs, 3) place in ``coupling``, body of the rows, body of the columns
+    coupling: Floats
+    turning: Floats  # (block_size,)
+    rubbing: Floats  # (block_size,)
+    D: Floats  # (block_size,) scratch: an element's own blocks
+    gamma: Floats  # (rows,) scratch
+    nu: Floats  # (rows,) scratch
+    force: Floats  # (6 (n+1),) scratch
+    saved: Floats  # (BODY_WIDTH,) scratch
+    ahead: Floats  # (outputs,) what the element returns with a body moved forwards
+    behind: Floats  # (outputs,) the same backwards
+
+
+@compiled_inside
+def move_body(s: Floats, saved: Floats, c: int, step: float) -> None:
+    """Body row s = ``saved``, moved by ``step`` along coordinate c of 12."""
+    for k in range(s.shape[0]):
+        s[k] = saved[k]
+    if c < 3:
+        s[c] += step
+    elif c < 6:
+        rotate_body(s, saved, c - 3, step)
+    elif c < 9:
+        s[6 + c] += step  # velocities stand from 12
+    else:
+        for k in range(3):
+            s[15 + k] += saved[3 + 3 * k + c - 9] * step
+
+
+@compiled_inside
+def rotate_body(s: Floats, saved: Floats, axis: int, angle: float) -> None:
+    """Turn the body about one of its own axes; it keeps its angular velocity in body axes."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    cosine, sine = math.cos(angle), math.sin(angle)
+    w0 = saved[3] * saved[15] + saved[6] * saved[16] + saved[9] * saved[17]
+    w1 = saved[4] * saved[15] + saved[7] * saved[16] + saved[10] * saved[17]
+    w2 = saved[5] * saved[15] + saved[8] * saved[16] + saved[11] * saved[17]
+    for r in range(3):
+        a, b = saved[3 + 3 * r + i], saved[3 + 3 * r + j]
+        s[3 + 3 * r + i] = cosine * a + sine * b
+        s[3 + 3 * r + j] = cosine * b - sine * a
+        s[15 + r] = s[3 + 3 * r] * w0 + s[4 + 3 * r] * w1 + s[5 + 3 * r] * w2
+    cosine, sine = math.cos(0.5 * angle), math.sin(0.5 * angle)
+    e0, e, ei, ej = saved[18], saved[19 + axis], saved[19 + i], saved[19 + j]
+    s[18] = cosine * e0 - sine * e
+    s[19 + axis] = cosine * e + sine * e0
+    s[19 + i] = cosine * ei + sine * ej
+    s[19 + j] = cosine * ej - sine * ei
+
+
+@compiled_inside
+def call_element(
+    t: float, e: int, q: int, x: Floats, out: Floats, system: System, loops: Any, tangent: Tangent
+) -> None:
+    """One instance q of group e: force and moment (body axes) of each slot, then D v - nu."""
+    row = tangent.elements[e]
+    g, kind, slots = row[LOOP], row[KIND], row[SLOT_COUNT]
+    i0, p0 = system.groups[g, 0] + q * row[STRIDE], system.groups[g, 1] + q * row[WIDTH]
+    body, idx, force, D = system.body, system.idx, tangent.force, tangent.D
+    for n in range(slots):
+        for c in range(6 * idx[i0 + n], 6 * idx[i0 + n] + 6):
+            force[c] = 0.0
+    if kind == JOINT_ELEMENT:
+        call_loop(loops, g, t, system, (i0, p0, 1), D, tangent.gamma, tangent.nu)
+        r0, at = idx[i0 + row[ROW_AT]], i0 + row[ROW_AT] + 1
+        for r in range(row[ROWS]):
+            rate = -tangent.nu[r0 + r]
+            for n in range(slots):
+                b, d = idx[i0 + n], idx[at + n] + 6 * r
+                if b > 0:
+                    for c in range(6):
+                        rate += D[d + c] * body[b, 12 + c]
+                        force[6 * b + c] -= D[d + c] * x[r0 + r]
+            out[6 * slots + r] = rate
+    else:
+        call_loop(loops, g, t, system, (i0, p0, 1), force, x, x)
+    for n in range(slots):
+        b = idx[i0 + n]
+        for c in range(3):
+            out[6 * n + c] = force[6 * b + c]
+            turned = 0.0
+            for k in range(3):
+                turned += body[b, 3 + 3 * k + c] * force[6 * b + 3 + k]
+            out[6 * n + 3 + c] = turned
+
+
+@compiled_inside
+def sizes_of(e: int, q: int, system: System, tangent: Tangent) -> tuple[float, float]:
+    """Extent of an element, m, and its velocity, m/s: what its steps are parts of."""
+    row = tangent.elements[e]
+    i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
+    extent, speed, spin, body, idx = SMALLEST, SLOWEST, 0.0, system.body, system.idx
+    for n in range(row[SLOT_COUNT]):
+        b = idx[i0 + n]
+        if b == 0:
+            continue
+        inertia = body[b, 23] + body[b, 27] + body[b, 31]
+        extent = max(extent, math.sqrt(inertia / body[b, 22]))
+        a = idx[i0] if n > 0 else idx[i0 + min(1, row[SLOT_COUNT] - 1)]
+        for c in range(3):
+            if a != b:
+                extent = max(extent, abs(body[b, c] - body[a, c]))
+            speed, spin = max(speed, abs(body[b, 12 + c])), max(spin, abs(body[b, 15 + c]))
+    return extent, max(speed, extent * spin)
+
+
+@compiled_inside
+def differentiate_element(
+    t: float, e: int, q: int, x: Floats, system: System, loops: Any, tangent: Tangent
+) -> None:
+    """Add the derivatives of one element by the coordinates of each of its bodies, unscaled."""
+    row = tangent.elements[e]
+    kind, slots, rows = row[KIND], row[SLOT_COUNT], row[ROWS]
+    i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
+    first_pair = row[FIRST_PAIR] + q * slots * slots
+    extent, speed = sizes_of(e, q, system, tangent)
+    saved, ahead, behind = tangent.saved, tangent.ahead, tangent.behind
+    for m in range(slots):
+        b = system.idx[i0 + m]
+        if tangent.pairs[first_pair + m * slots + m] < 0:  # ground, or a body met before
+            continue
+        s = system.body[b]
+        for k in range(s.shape[0]):
+            saved[k] = s[k]
+        for c in range(12 if row[VELOCITY] != 0 else 6):
+            scale = extent if c < 3 else 1.0
+            if c >= 6:
+                scale = speed if c < 9 else speed / extent
+            step = PART * scale
+            move_body(s, saved, c, step)
+            call_element(t, e, q, x, ahead, system, loops, tangent)
+            move_body(s, saved, c, -step)
+            call_element(t, e, q, x, behind, system, loops, tangent)
+            half = 0.5 / step
+            for n in range(slots):
+                o = tangent.pairs[first_pair + n * slots + m]
+                if o >= 0:
+                    for k in range(6):
+                        rise = ahead[6 * n + k] - behind[6 * n + k]
+                        tangent.coupling[o + 12 * k + c] += half * rise
+            if kind == JOINT_ELEMENT:
+                d = system.idx[i0 + row[ROW_AT] + 1 + m] + c
+                for r in range(rows):
+                    rise = ahead[6 * slots + r] - behind[6 * slots + r]
+                    tangent.turning[d + 6 * r] += half * rise
+        for k in range(s.shape[0]):
+            s[k] = saved[k]
+
+
+@compiled_inside
+def differentiate_friction(
+    t: float, e: int, q: int, x: Floats, system: System, loops: Any, tangent: Tangent
+) -> None:
+    """Derivatives of the friction of one joint by its multipliers, moments in body axes."""
+    row = tangent.elements[e]
+    i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
+    r0, at, slots = system.idx[i0 + row[ROW_AT]], i0 + row[ROW_AT] + 1, row[SLOT_COUNT]
+    size = 1e-3
+    for r in range(r0, r0 + row[ROWS]):
+        size = max(size, abs(x[r]))
+    step = PART * size
+    for r in range(row[ROWS]):
+        kept = x[r0 + r]
+        x[r0 + r] = kept - step  # x is -lambda
+        call_element(t, e, q, x, tangent.ahead, system, loops, tangent)
+        x[r0 + r] = kept + step
+        call_element(t, e, q, x, tangent.behind, system, loops, tangent)
+        x[r0 + r] = kept
+        for n in range(slots):
+            if system.idx[i0 + n] > 0:
+                for k in range(6):
+                    rise = tangent.ahead[6 * n + k] - tangent.behind[6 * n + k]
+                    tangent.rubbing[system.idx[at + n] + 6 * r + k] += 0.5 / step * rise
+
+
+@compiled_inside
+def turn_to_body(block: Floats, o: int, s: Floats) -> None:
+    """Three numbers at o along the global axes become those along the axes of body row s."""
+    x, y, z = block[o], block[o + 1], block[o + 2]
+    for c in range(3):
+        block[o + c] = x * s[3 + c] + y * s[6 + c] + z * s[9 + c]
+
+
+@compiled_inside
+def scale_columns(block: Floats, o: int, k: Floats, s: Floats) -> None:
+    """Six numbers at o, derivatives by (r, rotation) of a body, become those in scaled ones."""
+    turn_to_body(block, o, s)
+    for c in range(3):
+        block[o + c] *= k[0]
+    x, y, z = block[o + 3], block[o + 4], block[o + 5]
+    block[o + 3] = x * k[1]
+    block[o + 4] = x * k[2] + y * k[4]
+    block[o + 5] = x * k[3] + y * k[5] + z * k[6]
+
+
+@compiled_inside
+def scale_tangent(system: System, tangent: Tangent) -> None:
+    """Rows and columns of the derivatives into the bodies' scaled coordinates."""
+    metric, block = system.metric, tangent.coupling
+    for p in range(tangent.blocks.shape[0]):
+        o, a, b = tangent.blocks[p, 0], tangent.blocks[p, 1], tangent.blocks[p, 2]
+        k, s = metric[a], system.body[a]
+        for r in range(6):
+            scale_columns(block, o + 12 * r, metric[b], system.body[b])
+            scale_columns(block, o + 12 * r + 6, metric[b], system.body[b])
+        for c in range(o, o + 12):
+            x, y, z = block[c], block[c + 12], block[c + 24]
+            for r in range(3):
+                block[c + 12 * r] = k[0] * (x * s[3 + r] + y * s[6 + r] + z * s[9 + r])
+            x, y, z = block[c + 36], block[c + 48], block[c + 60]
+            block[c + 36] = k[1] * x
+            block[c + 48] = k[2] * x + k[4] * y
+            block[c + 60] = k[3] * x + k[5] * y + k[6] * z
+    for q in range(system.blocks.shape[0]):
+        o, b = system.blocks[q, 0], system.blocks[q, 1]
+        for _ in range(system.blocks[q, 2]):
+            scale_columns(tangent.turning, o, metric[b], system.body[b])
+            scale_columns(tangent.rubbing, o, metric[b], system.body[b])
+            o += 6
+
+
+@compiled_inside
+def add_gyroscopic(system: System, tangent: Tangent) -> None:
+    """d(-w' x J' w') / dw' of each body, unscaled, into its own block (the first n of them)."""
+    block = tangent.coupling
+    for b in range(1, system.body.shape[0]):
+        s, o = system.body[b], tangent.blocks[b - 1, 0] + 45
+        w0 = s[3] * s[15] + s[6] * s[16] + s[9] * s[17]
+        w1 = s[4] * s[15] + s[7] * s[16] + s[10] * s[17]
+        w2 = s[5] * s[15] + s[8] * s[16] + s[11] * s[17]
+        for c in range(3):  # J' e_c x w'
+            j0, j1, j2 = s[23 + c], s[26 + c], s[29 + c]
+            block[o + c] += j1 * w2 - j2 * w1
+            block[o + 12 + c] += j2 * w0 - j0 * w2
+            block[o + 24 + c] += j0 * w1 - j1 * w0
+        h0 = s[23] * w0 + s[24] * w1 + s[25] * w2
+        h1 = s[26] * w0 + s[27] * w1 + s[28] * w2
+        h2 = s[29] * w0 + s[30] * w1 + s[31] * w2
+        block[o + 1] -= h2  # J' w' x e_c
+        block[o + 2] += h1
+        block[o + 12] += h2
+        block[o + 14] -= h0
+        block[o + 24] -= h1
+        block[o + 25] += h0
+
+
+@compiled_inside
+def differentiate(t: float, x: Floats, system: System, loops: Any, tangent: Tangent) -> bool:
+    """The tangent at the bodies as placed, functions of time as they stand.
+
+    Args:
+        t: time, s.
+        x: (row_size,) -lambda.
+        system, loops: of the machine.
+        tangent: its outputs are overwritten.
+
+    Returns:
+        whether it is finite.
+    """
+    zero(tangent.coupling)
+    zero(tangent.turning)
+    zero(tangent.rubbing)
+    for e in range(tangent.elements.shape[0]):
+        for q in range(system.groups[tangent.elements[e, LOOP], 2]):
+            differentiate_element(t, e, q, x, system, loops, tangent)
+            if tangent.elements[e, KIND] == FRICTION_ELEMENT:
+                differentiate_friction(t, e, q, x, system, loops, tangent)
+    add_gyroscopic(system, tangent)
+    scale_tangent(system, tangent)
+    worst = largest(tangent.coupling) + largest(tangent.turning) + largest(tangent.rubbing)
+    return worst < math.inf

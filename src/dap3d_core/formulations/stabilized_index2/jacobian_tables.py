@@ -1,0 +1,92 @@
+"""Which element couples which bodies, and where its derivatives stand; made once for a model."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.assembly.arrays import Integers
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.stabilized_index2.jacobian import (
+    FRICTION_ELEMENT,
+    JOINT_ELEMENT,
+    WRENCH_ELEMENT,
+    Tangent,
+)
+from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
+from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
+from dap3d_core.model import Group
+
+_KINDS = {
+    "wrench": WRENCH_ELEMENT, "acceleration": JOINT_ELEMENT, "friction": FRICTION_ELEMENT
+}  # fmt: skip
+#: Numbers of a block of ``coupling``.
+_BLOCK = 72
+
+
+def make_tangent(machine: Machine) -> Tangent:
+    """Tables and arrays of the tangent of a machine's model."""
+    system, plan, n = machine.system, machine.plan, machine.model.body_count
+    place = {(b, b): _BLOCK * (b - 1) for b in range(1, n + 1)}
+    elements: list[tuple[int, ...]] = []
+    pairs: list[Integers] = []
+    count = widest = 0
+    for loop, (kind, group) in enumerate(machine.what):
+        if kind not in _KINDS:
+            continue
+        slots = len(group.examined.layout.slots)
+        rows = int(getattr(group.examined.type, "rows", 0))
+        elements.append((loop, _KINDS[kind], stride(group.examined),
+                         group.examined.layout.par_width, slots, group.examined.layout.integers,
+                         rows, count, int(_sees_velocity(kind, group))))  # fmt: skip
+        pairs.append(_pairs(group.bodies, place))
+        count += pairs[-1].size
+        widest = max(widest, 6 * slots + rows)
+    blocks = [(where, a, b) for (a, b), where in place.items()]
+    return Tangent(
+        elements=np.array(elements, dtype=np.int64).reshape(-1, 9),
+        pairs=np.concatenate([np.zeros(0, dtype=np.int64), *pairs]),
+        blocks=np.array(blocks, dtype=np.int64).reshape(-1, 3),
+        coupling=np.zeros(_BLOCK * len(place)),
+        turning=np.zeros(plan.block_size),
+        rubbing=np.zeros(plan.block_size),
+        D=np.zeros(plan.block_size),
+        gamma=np.zeros(plan.row_size),
+        nu=np.zeros(plan.row_size),
+        force=np.zeros(len(system.force)),
+        saved=np.zeros(BODY_WIDTH),
+        ahead=np.zeros(widest),
+        behind=np.zeros(widest),
+    )
+
+
+def coupled_bodies(tangent: Tangent) -> list[tuple[int, int]]:
+    """Pairs of different bodies that an element couples."""
+    return [(int(a), int(b)) for _, a, b in tangent.blocks if a != b]
+
+
+def _pairs(bodies: Integers, place: dict[tuple[int, int], int]) -> Integers:
+    """(m slots^2,) place of the block of each pair of an element's slots; new ones are added.
+
+    A pair with ground, or with a slot whose body an earlier slot has, has none: -1.
+    """
+    found: list[int] = []
+    for slots in bodies.tolist():
+        there = [b if b and b not in slots[:n] else 0 for n, b in enumerate(slots)]
+        for a in there:
+            found += [
+                place.setdefault((a, b), _BLOCK * len(place)) if a and b else -1 for b in there
+            ]
+    return np.array(found, dtype=np.int64)
+
+
+def _sees_velocity(kind: str, group: Group) -> bool:
+    """Whether the force kernel of a group names a quantity of the velocity level.
+
+    The rate D v - nu of a joint is linear in the velocities: its derivative is D.
+    """
+    if kind == "acceleration":
+        return False
+    wanted: Sequence[Any] = parameters(group.examined.kernels[kind])
+    return any(q.velocity for q in in_order(group.examined.names, wanted))

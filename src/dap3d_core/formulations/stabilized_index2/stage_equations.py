@@ -1,0 +1,304 @@
+"""One stage of an implicit method on the stabilised equations of index 2, and its linear systems.
+
+Gear, Gupta, Leimkuhler (J. Comp. Appl. Math. 12 & 13, 1985): position and velocity constraints both
+hold, and mu, the multipliers of the position level, vanish in the solution:
+
+    q_dot = v + M^-1 D^T mu        M v_dot = g + D^T lambda        C = 0        D v - nu = 0
+
+An implicit stage asks for s z - J z = r with the tangent J, and s real or complex. Unknowns are, in
+the bodies' scaled coordinates, displacement x and velocity v of each body and mu, lambda of each
+joint node. Each stage has them in the axes that its bodies have there, translations too: one
+tangent for all stages would otherwise be wrong by stiffness times the rotation during a step. A
+change of Euler parameters is 1/2 L^T theta' + p n, with n along p: n is eliminated in closed form,
+so that a body has twelve unknowns.
+
+A row without a position level has mu = 0 as its equation.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any, ClassVar
+
+import attrs
+
+from dap3d_core.assembly.arrays import Floats, Integers, System
+from dap3d_core.assembly.evaluate import rates, zero
+from dap3d_core.assembly.state_update import add_displacement
+from dap3d_core.formulations.common.constraints import (
+    gather_forces,
+    linearise,
+    power_of_drivers,
+    residuals,
+    velocity_residuals,
+)
+from dap3d_core.formulations.common.friction import keep_applied, rub, rubs
+from dap3d_core.formulations.stabilized_index2.jacobian import Tangent, turn_to_body
+from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays
+from dap3d_core.kernels.runtime.cache import compiled_inside
+
+
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class Matrix(Arrays):
+    """Where the parts of s - J stand, and what is kept of the state that it belongs to."""
+
+    types: ClassVar[dict[str, Any]] = {
+        **dict.fromkeys(
+            ("nodes", "columns", "updates", "block_place", "joint_place"), INTEGER_MATRIX
+        ),
+        **dict.fromkeys(("body_first", "body_place", "pair_place", "held"), INTEGERS),
+        "spin": MATRIX,
+    }
+
+    nodes: Integers  # of linear.lu_plan.LuPlan, as the next two
+    columns: Integers
+    updates: Integers
+    body_first: Integers  # (n + 1,) first unknown of each body
+    body_place: Integers  # (n + 1,) its diagonal block
+    pair_place: Integers  # (pairs,) block of each pair of Tangent.blocks
+    block_place: Integers  # (b, 3) of each block of D: (joint, body), (body, joint), first unknown
+    joint_place: Integers  # (joint nodes, 3) diagonal block, rows, first row
+    held: Integers  # (row_size,) 1 where a row has a position level
+    spin: Floats  # (n + 1, 15): L^T [w' x] U / 2 by rows; L^T w'; U^T w'
+    D: Floats  # (block_size,)
+    compliance: Floats  # (row_size,) what regularises the rows
+
+
+@compiled_inside
+def add_transposed(blocks: Integers, D: Floats, x: Floats, sign: float, g: Floats) -> None:
+    """G += sign D^T x, in scaled coordinates."""
+    for q in range(blocks.shape[0]):
+        o, b, f = blocks[q, 0], 6 * blocks[q, 1], blocks[q, 3]
+        for r in range(blocks[q, 2]):
+            s = sign * x[f + r]
+            for c in range(6):
+                g[b + c] += D[o + c] * s
+            o += 6
+
+
+@compiled_inside
+def evaluate_stage(
+    t: float,
+    y: Floats,
+    multipliers: Floats,
+    held: Integers,
+    out: Floats,
+    rows: Floats,
+    system: System,
+    loops: Any,
+) -> None:
+    """Right-hand sides of all equations.
+
+    Args:
+        t, y: time, state (13 n + 1,).
+        multipliers: (2, row_size) mu, lambda.
+        held: as in ``Matrix``.
+        out: (13 n + 1,) rates of y, the power last.
+        rows: (2, row_size) residuals of the position and the velocity level.
+        system, loops: of the machine.
+    """
+    x, force, mu = system.x, system.force, multipliers[0]
+    for k in range(x.shape[0]):
+        x[k] = -multipliers[1, k]
+    power = gather_forces(t, y, system, loops)
+    linearise(t, system, loops)
+    if rubs(system):
+        keep_applied(system)
+        power += rub(t, system, loops)
+    add_transposed(system.blocks, system.D, x, -1.0, force)
+    rates(y, system.metric, force, out)
+    out[out.shape[0] - 1] = power + power_of_drivers(system)
+    zero(force)
+    add_transposed(system.blocks, system.D, mu, 1.0, force)
+    add_displacement(y, system.metric, force, out)
+    residuals(t, system, loops)
+    for k in range(x.shape[0]):
+        rows[0, k] = system.C[k] if held[k] != 0 else mu[k]
+    velocity_residuals(system)
+    for k in range(x.shape[0]):
+        rows[1, k] = system.C[k]
+
+
+@compiled_inside
+def keep_state(system: System, matrix: Matrix, part: float) -> None:
+    """Keep what the matrix needs of the bodies as placed and of D^ as it stands."""
+    for q in range(system.blocks.shape[0]):
+        s = system.body[system.blocks[q, 1]]
+        for o in range(system.blocks[q, 0], system.blocks[q, 0] + 6 * system.blocks[q, 2], 6):
+            for c in range(o, o + 6):
+                matrix.D[c] = system.D[c]
+            turn_to_body(matrix.D, o, s)
+    zero(matrix.compliance)
+    for q in range(system.blocks.shape[0] if part > 0.0 else 0):
+        o, f = system.blocks[q, 0], system.blocks[q, 3]
+        for r in range(system.blocks[q, 2]):
+            for c in range(o, o + 6):
+                matrix.compliance[f + r] += part * system.D[c] * system.D[c]
+            o += 6
+    for b in range(1, system.body.shape[0]):
+        s, k, z = system.body[b], system.metric[b], matrix.spin[b]
+        w0 = s[3] * s[15] + s[6] * s[16] + s[9] * s[17]
+        w1 = s[4] * s[15] + s[7] * s[16] + s[10] * s[17]
+        w2 = s[5] * s[15] + s[8] * s[16] + s[11] * s[17]
+        for c in range(3):
+            u0, u1, u2 = k[1 + c], 0.0, 0.0  # column c of U
+            if c > 0:
+                u1 = k[3 + c]
+            if c > 1:
+                u2 = k[6]
+            a0, a1, a2 = w1 * u2 - w2 * u1, w2 * u0 - w0 * u2, w0 * u1 - w1 * u0
+            unscale(k, a0, a1, a2, 0.5, z, c, 3)
+            z[12 + c] = u0 * w0 + u1 * w1 + u2 * w2
+        unscale(k, w0, w1, w2, 1.0, z, 9, 1)
+
+
+@compiled_inside
+def unscale(
+    k: Floats, a0: float, a1: float, a2: float, factor: float, out: Floats, o: int, stride: int
+) -> None:
+    """Factor U^-1 a, into out at o, o + stride, o + 2 stride."""
+    z2 = a2 / k[6]
+    z1 = (a1 - k[5] * z2) / k[4]
+    out[o] = factor * (a0 - k[2] * z1 - k[3] * z2) / k[1]
+    out[o + stride] = factor * z1
+    out[o + 2 * stride] = factor * z2
+
+
+@compiled_inside
+def fill_matrix(s: Any, K: Any, blocks: Integers, matrix: Matrix, tangent: Tangent) -> None:
+    """K = s - J, for real or complex s in 1/s."""
+    for k in range(K.shape[0]):
+        K[k] = 0.0
+    for b in range(1, matrix.body_place.shape[0]):
+        d, z = matrix.body_place[b], matrix.spin[b]
+        for c in range(6):
+            K[d + 13 * c] = s
+            K[d + 12 * c + 6 + c] = -1.0
+            K[d + 13 * (6 + c)] = s
+        for r in range(3):
+            for c in range(3):
+                K[d + 12 * (3 + r) + 3 + c] += z[3 * r + c] + 0.25 / s * (z[9 + r] * z[12 + c])
+    for p in range(matrix.pair_place.shape[0]):
+        o, d = tangent.blocks[p, 0], matrix.pair_place[p] + 72
+        for c in range(72):
+            K[d + c] -= tangent.coupling[o + c]
+    for q in range(blocks.shape[0]):
+        o, m, f = blocks[q, 0], blocks[q, 2], blocks[q, 3]
+        below, right = matrix.block_place[q, 0], matrix.block_place[q, 1]
+        for r in range(m):
+            e = below + 12 * (m + r)
+            for c in range(6):
+                v = matrix.D[o + c]
+                if matrix.held[f + r] != 0:
+                    K[below + 12 * r + c] = -v
+                    K[right + 2 * m * c + r] = -v
+                K[e + c] = -tangent.turning[o + c]
+                K[e + 6 + c] = -v
+                K[right + 2 * m * (6 + c) + m + r] = -v - tangent.rubbing[o + c]
+            o += 6
+    for j in range(matrix.joint_place.shape[0]):
+        d, m, f = matrix.joint_place[j, 0], matrix.joint_place[j, 1], matrix.joint_place[j, 2]
+        for r in range(m):
+            given = matrix.compliance[f + r] / s
+            K[d + r * (2 * m + 1)] = -given if matrix.held[f + r] != 0 else -1.0
+            K[d + (m + r) * (2 * m + 1)] = -given
+
+
+@compiled_inside
+def keep_frames(body: Floats, frames: Floats) -> None:
+    """The axes and Euler parameters of the bodies as placed."""
+    for b in range(1, body.shape[0]):
+        for c in range(9):
+            frames[b, c] = body[b, 3 + c]
+        for c in range(4):
+            frames[b, 9 + c] = body[b, 18 + c]
+
+
+@compiled_inside
+def scale_residual(
+    R: Floats,
+    rows: Floats,
+    blocks: Integers,
+    metric: Floats,
+    matrix: Matrix,
+    frames: Floats,
+    x: Floats,
+    n: Floats,
+) -> None:
+    """Residuals of y (13 n + 1,) and of both levels (2, rows) as right-hand side x.
+
+    n: (bodies + 1,) the parts along the Euler parameters.
+    """
+    count = metric.shape[0] - 1
+    for b in range(1, count + 1):
+        c, f, o = 7 * (b - 1), 7 * count + 6 * (b - 1), matrix.body_first[b]
+        k, e = metric[b], frames[b]
+        for d in range(3):
+            x[o + d] = (e[d] * R[c] + e[3 + d] * R[c + 1] + e[6 + d] * R[c + 2]) / k[0]
+            x[o + 6 + d] = (e[d] * R[f] + e[3 + d] * R[f + 1] + e[6 + d] * R[f + 2]) / k[0]
+        p0, p1, p2, p3 = R[c + 3], R[c + 4], R[c + 5], R[c + 6]
+        t0 = -e[10] * p0 + e[9] * p1 + e[12] * p2 - e[11] * p3
+        t1 = -e[11] * p0 - e[12] * p1 + e[9] * p2 + e[10] * p3
+        t2 = -e[12] * p0 + e[11] * p1 - e[10] * p2 + e[9] * p3
+        n[b] = e[9] * p0 + e[10] * p1 + e[11] * p2 + e[12] * p3
+        unscale(k, t0, t1, t2, 2.0, x, o + 3, 1)
+        unscale(k, R[f + 3], R[f + 4], R[f + 5], 1.0, x, o + 9, 1)
+    for q in range(blocks.shape[0]):
+        m, f, o = blocks[q, 2], blocks[q, 3], matrix.block_place[q, 2]
+        for r in range(m):
+            x[o + r], x[o + m + r] = rows[0, f + r], rows[1, f + r]
+
+
+@compiled_inside
+def couple_length(s: Any, x: Any, n: Any, matrix: Matrix) -> None:
+    """What the eliminated part along p adds to the right-hand side."""
+    for b in range(1, matrix.body_first.shape[0]):
+        o, z = matrix.body_first[b] + 3, matrix.spin[b]
+        for c in range(3):
+            x[o + c] += z[9 + c] * n[b] / s
+
+
+@compiled_inside
+def find_length(s: Any, x: Any, n: Any, matrix: Matrix) -> None:
+    """The part along p from the solution x, into n."""
+    for b in range(1, matrix.body_first.shape[0]):
+        o, z = matrix.body_first[b] + 3, matrix.spin[b]
+        along = z[12] * x[o] + z[13] * x[o + 1] + z[14] * x[o + 2]
+        n[b] = (n[b] - 0.25 * along) / s
+
+
+@compiled_inside
+def unscale_solution(
+    x: Floats,
+    n: Floats,
+    blocks: Integers,
+    metric: Floats,
+    matrix: Matrix,
+    frames: Floats,
+    out: Floats,
+    rows: Floats,
+) -> None:
+    """A solution x as a change of y (13 n + 1,) and of the multipliers (2, rows)."""
+    count = metric.shape[0] - 1
+    for b in range(1, count + 1):
+        c, f, o = 7 * (b - 1), 7 * count + 6 * (b - 1), matrix.body_first[b]
+        k, e, along = metric[b], frames[b], n[b]
+        for d in range(3):
+            g = 3 * d
+            out[c + d] = k[0] * (e[g] * x[o] + e[g + 1] * x[o + 1] + e[g + 2] * x[o + 2])
+            out[f + d] = k[0] * (e[g] * x[o + 6] + e[g + 1] * x[o + 7] + e[g + 2] * x[o + 8])
+        w0 = 0.5 * (k[1] * x[o + 3] + k[2] * x[o + 4] + k[3] * x[o + 5])
+        w1 = 0.5 * (k[4] * x[o + 4] + k[5] * x[o + 5])
+        w2 = 0.5 * k[6] * x[o + 5]
+        out[c + 3] = e[9] * along - e[10] * w0 - e[11] * w1 - e[12] * w2
+        out[c + 4] = e[10] * along + e[9] * w0 - e[12] * w1 + e[11] * w2
+        out[c + 5] = e[11] * along + e[12] * w0 + e[9] * w1 - e[10] * w2
+        out[c + 6] = e[12] * along - e[11] * w0 + e[10] * w1 + e[9] * w2
+        out[f + 3] = k[1] * x[o + 9] + k[2] * x[o + 10] + k[3] * x[o + 11]
+        out[f + 4] = k[4] * x[o + 10] + k[5] * x[o + 11]
+        out[f + 5] = k[6] * x[o + 11]
+    out[out.shape[0] - 1] = 0.0
+    for q in range(blocks.shape[0]):
+        m, f, o = blocks[q, 2], blocks[q, 3], matrix.block_place[q, 2]
+        for r in range(m):
+            rows[0, f + r], rows[1, f + r] = x[o + r], x[o + m + r]

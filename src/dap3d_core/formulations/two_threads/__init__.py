@@ -1,0 +1,1 @@
+"""The standard formulation of one large scene on two threads."""

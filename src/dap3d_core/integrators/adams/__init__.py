@@ -1,0 +1,1 @@
+"""Adams methods of order 1 to 12."""

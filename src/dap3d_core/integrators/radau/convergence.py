@@ -1,0 +1,79 @@
+"""When the iteration of a Radau step has come to its end: at its limit, or at rounding."""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+
+from dap3d_core.integrators.radau.state import (
+    OF_MULTIPLIERS,
+    OF_STATES,
+    PART,
+    TANGENT_HERE,
+    RadauWork,
+)
+from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, RTOL, Y
+from dap3d_core.integrators.stepping.step_control import EPSILON, LARGEST
+from dap3d_core.kernels.runtime.cache import compiled_inside
+
+#: An iteration that converges slower than this does not.
+SLOWEST = 0.99
+#: A change of this many roundings is none; and the loosest limit, as part of the tolerance.
+ROUNDINGS, LOOSEST = 10.0, 0.1
+#: Where multipliers fall by this much in an iteration the stages are yet to follow them.
+SETTLING = 0.1
+#: Changes up to this many limits may be rounding where the iteration stands still, if they are up
+#: to this many roundings: near a singular pose a state is known to one over its distance squared.
+STALLED, MOST_ROUNDINGS = 10.0, 1e6
+
+
+@compiled_inside
+def newton_limit(work: RadauWork) -> float:
+    """Norm of a change at which the iteration ends (HW IV.8), not below what rounding allows."""
+    y, rtol = work.state[Y], work.real[RTOL]
+    n = (y.shape[0] - 1) // 13
+    limit = min(0.03, math.sqrt(rtol))
+    first = 0
+    for count in (7 * n, 6 * n):
+        top = 0.0
+        low = atol = LARGEST
+        for k in range(first, first + count):
+            top, low = max(top, abs(y[k])), min(low, abs(y[k]))
+            atol = min(atol, work.tolerance[ABSOLUTE, k])
+        if count > 0:
+            limit = max(limit, ROUNDINGS * EPSILON * top / (atol + rtol * low))
+        first += count
+    return min(limit, LOOSEST)
+
+
+@compiled_inside
+def converges(theta: float, change: float, limit: float, left: int) -> bool:
+    """Whether ``left`` more iterations at the rate theta come to the limit."""
+    return theta < SLOWEST and theta / (1.0 - theta) * change * theta**left < limit
+
+
+@compiled_inside
+def is_stalled(states: float, multipliers: float, limit: float, work: RadauWork) -> bool:
+    """Whether an iteration that does not converge has come to rounding, as far as the tangent goes.
+
+    Multipliers are known to their own last digits: under large forces, and near a singular pose,
+    these are more than a tolerance allows a state, but move none. States count as found where their
+    last two changes were less than MOST_ROUNDINGS and STALLED times the limit, which still is a
+    third of what a step may be off by (implicit.estimate_tolerances).
+    """
+    own = work.own
+    least = min(STALLED * limit, MOST_ROUNDINGS * EPSILON / work.real[RTOL])
+    return (
+        work.integer[TANGENT_HERE] != 0
+        and max(states, own[OF_STATES]) <= least
+        and own[OF_MULTIPLIERS] > SETTLING * multipliers
+    )
+
+
+@compiled_inside
+def is_settling(multipliers: float, work: RadauWork) -> bool:
+    """Whether multipliers that have no part in the norm still converge, as they do before states.
+
+    Behind a singular pose they change by much where the motion hardly does.
+    """
+    return work.own[PART] != 0.0 and work.own[OF_MULTIPLIERS] < SETTLING * multipliers

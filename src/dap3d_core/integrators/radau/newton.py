@@ -1,0 +1,385 @@
+"""The stages of a Radau step by simplified Newton iteration, and its error estimate.
+
+Source: Hairer, Wanner, Solving Ordinary Differential Equations II (HW), IV.8, VII.4, and their code
+RADAU5. The three stages are decoupled by T into one real and one complex system with the same
+tangent. Norms are the largest scaled component, as in stepping/step_control.py.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.assembly.evaluate import place, zero
+from dap3d_core.assembly.state_update import add_displacement, add_velocity
+from dap3d_core.formulations.common.constraints import linearise
+from dap3d_core.formulations.stabilized_index2.jacobian import Tangent, differentiate
+from dap3d_core.formulations.stabilized_index2.stage_equations import (
+    Matrix,
+    add_transposed,
+    couple_length,
+    evaluate_stage,
+    fill_matrix,
+    find_length,
+    keep_frames,
+    keep_state,
+    scale_residual,
+    unscale_solution,
+)
+from dap3d_core.integrators.radau.convergence import (
+    SLOWEST,
+    converges,
+    is_settling,
+    is_stalled,
+    newton_limit,
+)
+from dap3d_core.integrators.radau.state import (
+    ACCEPTED,
+    FACCON,
+    FACTORISATIONS,
+    H_ACCEPTED,
+    H_FACTORED,
+    ITERATIONS,
+    JACOBIANS,
+    LAST_ITERATIONS,
+    OF_MULTIPLIERS,
+    OF_STATES,
+    PART,
+    TANGENT_HERE,
+    TANGENT_NEEDED,
+    THETA,
+    RadauWork,
+)
+from dap3d_core.integrators.stepping.integration_state import (
+    ERROR_SIZE,
+    LAST_REJECTED,
+    RHS,
+    RTOL,
+    SCRATCH,
+    STEP,
+    TRIAL,
+    Y,
+)
+from dap3d_core.integrators.stepping.vector_ops import scaled_largest
+from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.linear.lu.factor import factor_lu, solve_lu
+
+ROUNDING = 2.220446049250313e-16
+#: Iterations at most; more where the step is fixed, for a shorter one is no choice there.
+MOST, MOST_FIXED = 10, 40
+#: Slow iterations that a fixed step, or multipliers on their way, are left.
+PATIENCE = 5
+#: Factors that belong to a step this near the present one are used for it.
+SAME_STEP = 1e-3
+#: A step whose stages were not found is halved.
+UNFOUND = 0.5
+LARGEST = 1.7976931348623157e308
+
+
+@compiled
+def find_tangent(
+    t: float,
+    h: float,
+    work: RadauWork,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
+) -> float:
+    """The tangent of a step h at t, at its end as predicted; 0, or NaN where it is not finite.
+
+    The directions of stiff elements change during a step, and of its stages the last one counts
+    most: on the governor of A05 the iteration converges 20 times faster than with the tangent at
+    the start of the step, three times faster than with that of its middle.
+    """
+    argument = work.state[SCRATCH]
+    for k in range(argument.shape[0]):
+        argument[k] = work.state[Y, k] + work.Z[2, k]
+    at = t + h if work.integer[ACCEPTED] != 0 else t
+    place(at, argument, system, loops)
+    linearise(at, system, loops)
+    keep_state(system, matrix, work.own[PART])
+    for k in range(system.x.shape[0]):
+        system.x[k] = -work.multipliers[2, 1, k]
+    work.integer[JACOBIANS] += 1
+    work.integer[TANGENT_NEEDED], work.integer[TANGENT_HERE] = 0, 1
+    work.own[H_FACTORED] = 0.0
+    return 0.0 if differentiate(at, system.x, system, loops, tangent) else math.nan
+
+
+@compiled_inside
+def pole(poles: Floats, h: float) -> Any:
+    """The complex pole of a step h, 1/s; numpy's, whose arithmetic compiled code has."""
+    return np.complex128(complex(poles[1] / h, poles[2] / h))
+
+
+@compiled
+def factorise_both(
+    t: float,
+    h: float,
+    work: RadauWork,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
+) -> float:
+    """Factors of the real and the complex system of a step h; 0, or UNFOUND if one is singular."""
+    poles = work.method.poles
+    work.integer[FACTORISATIONS] += 1
+    work.own[H_FACTORED] = h
+    fill_matrix(poles[0] / h, work.K, system.blocks, matrix, tangent)
+    fill_matrix(pole(poles, h), work.Kc, system.blocks, matrix, tangent)
+    nodes, columns, updates = matrix.nodes, matrix.columns, matrix.updates
+    regular = factor_lu(nodes, columns, updates, work.K, work.pivots)
+    if regular and factor_lu(nodes, columns, updates, work.Kc, work.pivotsc):
+        return 0.0
+    return UNFOUND
+
+
+@compiled_inside
+def predict(h: float, work: RadauWork) -> None:
+    """Starting values of the stages: the polynomials of the last step, prolonged (HW IV.8).
+
+    mu is no smooth function: it has the same values at the stages of each step, but for h^3.
+    """
+    c, stages, old, now = work.method.c, work.Z, work.Z_old, work.multipliers
+    if work.integer[ACCEPTED] == 0:
+        for i in range(3):
+            zero(stages[i])
+            for k in range(now.shape[2]):
+                now[i, 0, k], now[i, 1, k] = 0.0, work.last_multipliers[2, 1, k]
+        return
+    ratio, last = h / work.own[H_ACCEPTED], work.last_multipliers
+    for i in range(3):
+        u = 1.0 + c[i] * ratio
+        v0 = (u - c[1]) * (u - 1.0) / ((c[0] - c[1]) * (c[0] - 1.0))
+        v1 = (u - c[0]) * (u - 1.0) / ((c[1] - c[0]) * (c[1] - 1.0))
+        v2 = (u - c[0]) * (u - c[1]) / ((1.0 - c[0]) * (1.0 - c[1]))
+        for k in range(now.shape[2]):
+            now[i, 0, k] = ratio * ratio * ratio * last[i, 0, k]
+            now[i, 1, k] = v0 * last[0, 1, k] + v1 * last[1, 1, k] + v2 * last[2, 1, k]
+        w0 = u * (u - c[1]) * (u - 1.0) / (c[0] * (c[0] - c[1]) * (c[0] - 1.0))
+        w1 = u * (u - c[0]) * (u - 1.0) / (c[1] * (c[1] - c[0]) * (c[1] - 1.0))
+        w2 = u * (u - c[0]) * (u - c[1]) / ((1.0 - c[0]) * (1.0 - c[1])) - 1.0
+        for k in range(stages.shape[1]):
+            stages[i, k] = w0 * old[0, k] + w1 * old[1, k] + w2 * old[2, k]
+
+
+@compiled_inside
+def solve_first(h: float, work: RadauWork, system: System, matrix: Matrix) -> None:
+    """R[0], G[0] from the residual of one equation with the real matrix to the change."""
+    x, along, s = work.x[0], work.along[0], work.method.poles[0] / h
+    scale_residual(work.R[0], work.G[0], system.blocks, system.metric, matrix, work.frames[0],
+                   x, along)  # fmt: skip
+    couple_length(s, x, along, matrix)
+    solve_lu(matrix.nodes, matrix.columns, work.K, work.pivots, x)
+    find_length(s, x, along, matrix)
+    unscale_solution(x, along, system.blocks, system.metric, matrix, work.frames[0], work.R[0],
+                     work.G[0])  # fmt: skip
+
+
+@compiled_inside
+def separate(inverse: Floats, x: Floats, real: Floats, pair: Any) -> None:
+    """T^-1 x for three rows x: its first row, and the other two as one complex row."""
+    for k in range(real.shape[0]):
+        a, b, c = x[0, k], x[1, k], x[2, k]
+        real[k] = inverse[0, 0] * a + inverse[0, 1] * b + inverse[0, 2] * c
+        pair[k] = complex(inverse[1, 0] * a + inverse[1, 1] * b + inverse[1, 2] * c,
+                          inverse[2, 0] * a + inverse[2, 1] * b + inverse[2, 2] * c)  # fmt: skip
+
+
+@compiled_inside
+def unite(T: Floats, real: Floats, pair: Any, x: Floats) -> None:
+    """The inverse of ``separate``."""
+    for i in range(3):
+        for k in range(real.shape[0]):
+            x[i, k] = T[i, 0] * real[k] + T[i, 1] * pair[k].real + T[i, 2] * pair[k].imag
+
+
+@compiled_inside
+def solve_stages(h: float, work: RadauWork, system: System, matrix: Matrix) -> None:
+    """R, G from the residuals of the three stages to the changes."""
+    x, along, poles = work.x, work.along, work.method.poles
+    s, sc = poles[0] / h, pole(poles, h)
+    for i in range(3):
+        scale_residual(work.R[i], work.G[i], system.blocks, system.metric, matrix, work.frames[i],
+                       x[i], along[i])  # fmt: skip
+    separate(work.method.T_inverse, x, work.xr, work.xc)
+    separate(work.method.T_inverse, along, work.alongr, work.alongc)
+    couple_length(s, work.xr, work.alongr, matrix)
+    couple_length(sc, work.xc, work.alongc, matrix)
+    solve_lu(matrix.nodes, matrix.columns, work.K, work.pivots, work.xr)
+    solve_lu(matrix.nodes, matrix.columns, work.Kc, work.pivotsc, work.xc)
+    find_length(s, work.xr, work.alongr, matrix)
+    find_length(sc, work.xc, work.alongc, matrix)
+    unite(work.method.T, work.xr, work.xc, x)
+    unite(work.method.T, work.alongr, work.alongc, along)
+    for i in range(3):
+        unscale_solution(x[i], along[i], system.blocks, system.metric, matrix, work.frames[i],
+                         work.R[i], work.G[i])  # fmt: skip
+
+
+@compiled_inside
+def evaluate_stages(
+    t: float, h: float, work: RadauWork, system: System, loops: Any, matrix: Matrix
+) -> None:
+    """Residuals of the three stages: F - A^-1 Z / h into R, those of the rows into G."""
+    y, argument, c = work.state[Y], work.state[SCRATCH], work.method.c
+    stages, inverse = work.Z, work.method.inverse
+    for i in range(3):
+        for k in range(y.shape[0]):
+            argument[k] = y[k] + stages[i, k]
+        evaluate_stage(t + c[i] * h, argument, work.multipliers[i], matrix.held, work.F[i],
+                       work.G[i], system, loops)  # fmt: skip
+        keep_frames(system.body, work.frames[i])
+        a0, a1, a2 = inverse[i, 0] / h, inverse[i, 1] / h, inverse[i, 2] / h
+        for k in range(y.shape[0]):
+            rate = a0 * stages[0, k] + a1 * stages[1, k] + a2 * stages[2, k]
+            work.R[i, k] = work.F[i, k] - rate
+    work.integer[RHS] += 3
+
+
+@compiled_inside
+def size_of_multipliers(h: float, change: Floats, work: RadauWork, system: System) -> float:
+    """Norm of multipliers (2, R): as changes of y, h M^-1 D^T times them (HW VII.4: index 2)."""
+    real, y, out = work.real, work.state[Y], work.state[SCRATCH]
+    force, n = system.force, system.metric.shape[0] - 1
+    zero(out)
+    zero(force)
+    add_transposed(system.blocks, system.D, change[0], h, force)
+    add_displacement(y, system.metric, force, out)
+    zero(force)
+    add_transposed(system.blocks, system.D, change[1], h, force)
+    add_velocity(system.metric, force, out[7 * n :])
+    return scaled_largest(out, y, y, work.integer[ERROR_SIZE], real[RTOL], work.tolerance, h)
+
+
+@compiled_inside
+def change_stages(h: float, work: RadauWork, system: System) -> float:
+    """Add the changes in R and G to the stages; returns their norm.
+
+    Multipliers do not count where rows are regularised: those that depend on others have a part of
+    rounding over what regularises them, new in each iteration, that moves nothing.
+    """
+    real, own, y = work.real, work.own, work.state[Y]
+    own[OF_STATES] = own[OF_MULTIPLIERS] = 0.0
+    for i in range(3):
+        size = scaled_largest(
+            work.R[i], y, y, work.integer[ERROR_SIZE], real[RTOL], work.tolerance, h
+        )
+        other = size_of_multipliers(h, work.G[i], work, system)
+        if not size <= own[OF_STATES]:
+            own[OF_STATES] = size
+        if not other <= own[OF_MULTIPLIERS]:
+            own[OF_MULTIPLIERS] = other
+        for k in range(y.shape[0]):
+            work.Z[i, k] += work.R[i, k]
+        for r in range(2):
+            for k in range(work.G.shape[2]):
+                work.multipliers[i, r, k] += work.G[i, r, k]
+    if own[PART] != 0.0 or own[OF_MULTIPLIERS] <= own[OF_STATES]:
+        return own[OF_STATES]
+    return own[OF_MULTIPLIERS]
+
+
+@compiled
+def find_stages(
+    t: float,
+    h: float,
+    work: RadauWork,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
+) -> float:
+    """Newton's iteration for the stages of a step h.
+
+    Returns:
+        0 where they are found; else the factor on the step that is to be tried; NaN where a number
+        is not finite.
+    """
+    own, integer = work.own, work.integer
+    limit = newton_limit(work)
+    own[FACCON] = max(own[FACCON], ROUNDING) ** 0.8
+    before = ratio_before = states = multipliers = 1.0
+    fixed = work.real[STEP] != 0.0
+    most = MOST_FIXED if fixed else MOST
+    for done in range(1, most + 1):
+        evaluate_stages(t, h, work, system, loops, matrix)
+        solve_stages(h, work, system, matrix)
+        change = change_stages(h, work, system)
+        integer[ITERATIONS] += 1
+        integer[LAST_ITERATIONS] = done
+        if not change <= LARGEST:
+            return math.nan
+        if change == 0.0:  # rounding alone, which tells nothing of the rate of convergence
+            return 0.0
+        if done > 1:
+            ratio = change / before
+            theta = ratio if done == 2 else math.sqrt(ratio * ratio_before)
+            ratio_before = ratio
+            slow = not converges(theta, change, limit, most - 1 - done)
+            if slow and is_stalled(states, multipliers, limit, work):
+                return 0.0
+            own[THETA] = theta
+            patient = fixed or (slow and is_settling(multipliers, work))
+            if theta >= SLOWEST:
+                if change <= limit:
+                    return 0.0
+                if done > PATIENCE or not patient:
+                    return UNFOUND
+                own[THETA] = SLOWEST
+            own[FACCON] = own[THETA] / (1.0 - own[THETA])
+            left = own[FACCON] * change * own[THETA] ** (most - 1 - done) / limit
+            if done < most and left >= 1.0 and not patient:
+                excess = max(1e-4, min(20.0, left))
+                return 0.8 * excess ** (-1.0 / (3.0 + most - done))
+        before = max(change, ROUNDING)
+        states, multipliers = own[OF_STATES], own[OF_MULTIPLIERS]
+        if own[FACCON] * change <= limit:
+            return 0.0
+    return UNFOUND
+
+
+@compiled
+def estimate_error(
+    t: float,
+    h: float,
+    work: RadauWork,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
+) -> float:
+    """Norm of the error estimate (HW IV.8, (8.19), (8.20)); 1 is just good enough.
+
+    The multipliers steer no step: what a run reports of them comes from the reported state. They
+    are those at the end of the last step: an error of theirs acts along D^T, which the matrix takes
+    away only as far as its own D is that of the state.
+    """
+    again = work.integer[ACCEPTED] == 0 or work.integer[LAST_REJECTED] != 0
+    real, y, argument, e = work.real, work.state[Y], work.state[SCRATCH], work.method.e
+    multipliers, error = work.last_multipliers[2], 0.0
+    zero(multipliers[0])
+    for attempt in range(2 if again else 1):
+        for k in range(y.shape[0]):
+            argument[k] = y[k] + (work.R[0, k] if attempt == 1 else 0.0)
+        evaluate_stage(t, argument, multipliers, matrix.held, work.R[0], work.G[0], system,
+                       loops)  # fmt: skip
+        keep_frames(system.body, work.frames[0])
+        work.integer[RHS] += 1
+        for k in range(y.shape[0]):
+            total = e[0] * work.Z[0, k] + e[1] * work.Z[1, k] + e[2] * work.Z[2, k]
+            work.R[0, k] += total / h
+        for r in range(2):
+            zero(work.G[0, r])
+        solve_first(h, work, system, matrix)
+        error = scaled_largest(work.R[0], y, work.state[TRIAL], work.integer[ERROR_SIZE],
+                               real[RTOL], work.tolerance, h)  # fmt: skip
+        if not error >= 1.0:
+            return error
+    return error

@@ -1,0 +1,350 @@
+"""Radau IIA of order 5 on the stabilised equations of index 2: a compiled loop that can stop.
+
+It works as runge_kutta/step.py does, chunk by chunk, with the same functions and the same arrays;
+what it knows of mechanics is in formulations/stabilized_index2/stage_equations.py and tangent.py.
+Source: Hairer, Wanner, Solving Ordinary Differential Equations II, IV.8, VII.4, and their code
+RADAU5.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from collections.abc import Sequence
+from typing import Any
+
+from dap3d_core.assembly.arrays import System
+from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
+from dap3d_core.formulations.stabilized_index2.stage_equations import Matrix
+from dap3d_core.integrators.radau.convergence import newton_limit
+from dap3d_core.integrators.radau.dense_output import prepare_dense
+from dap3d_core.integrators.radau.newton import MOST, SAME_STEP, predict
+from dap3d_core.integrators.radau.state import (
+    ACCEPTED,
+    ERROR_ACCEPTED,
+    H_ACCEPTED,
+    H_FACTORED,
+    LAST_ITERATIONS,
+    OF_STATES,
+    OLD,
+    OLD_SLOPE,
+    SLOPE,
+    TANGENT_HERE,
+    TANGENT_NEEDED,
+    THETA,
+    TRIAL_SLOPE,
+    RadauWork,
+)
+from dap3d_core.integrators.runge_kutta.step import (
+    ACROSS_A_SWITCH,
+    ELSEWHERE,
+    RETREAT,
+    is_poor,
+)
+from dap3d_core.integrators.runge_kutta.tableau import Integers
+from dap3d_core.integrators.stepping.event_location import (
+    end_is_across,
+    next_length,
+    sample,
+    settle,
+)
+from dap3d_core.integrators.stepping.integration_state import (
+    DENSE,
+    FRESH,
+    GAP_STEP,
+    LAST_REJECTED,
+    LIMIT,
+    NEXT,
+    NOT_FINITE,
+    OUTCOME,
+    POOR,
+    REJECTED,
+    RHS,
+    ROUNDED,
+    RUNNING,
+    SCRATCH,
+    STATUS,
+    STEP,
+    STEP_FLOOR,
+    STEPS,
+    SWITCHES,
+    T_STOP,
+    TRIAL,
+    WATCHED,
+    Function,
+    H,
+    T,
+    Y,
+)
+from dap3d_core.integrators.stepping.output import dense_state, may_step, project_state
+from dap3d_core.integrators.stepping.rounding import note_failure, watch_rounding
+from dap3d_core.integrators.stepping.step_control import (
+    LARGEST,
+    end_of_step,
+    first_step,
+    reject,
+    step_floor,
+)
+from dap3d_core.integrators.stepping.vector_ops import all_finite
+from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+
+#: Of the steps of RADAU5.
+SAFETY = 0.9
+#: A step is not longer than this many of the one before, and not shorter than this part of it.
+GROWTH, SHRINKAGE = 8.0, 0.2
+#: The tangent is kept where the iteration converged faster than this; the step, and with it the
+#: factors, where the next one would be up to this factor longer.
+GOOD_TANGENT, SAME_FACTORS = 1e-3, 1.2
+#: An iteration that converges slower than this is not gone on with.
+HOPELESS = 0.9
+#: Where the step is limited by the iteration its rate is about proportional to h^3. At this rate
+#: iterations for a second of motion are fewest.
+BEST_RATE, RATE_EXPONENT = 0.3, 1.0 / 6.0
+
+
+@compiled
+def advance(
+    work: RadauWork,
+    functions: Sequence[Function],
+    parts: Sequence[Any],
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
+    budget: int,
+) -> None:
+    """Go on until more than ``budget`` stages are evaluated, the rows are full, or the run ends."""
+    rhs, project, report = functions[0], functions[1], functions[2]
+    real, integer = work.real, work.integer
+    watch = functions[4] if integer[SWITCHES] != 0 else rhs
+    limit = integer[RHS] + budget
+    while may_step(work, dense_state, limit, project, report, system, loops):
+        steps, rejected, h = integer[STEPS], integer[REJECTED], real[H]
+        if integer[FRESH] == 0:
+            start(work, rhs, project, system, loops)
+        else:
+            step(work, parts, project, watch, system, loops, tangent, matrix)
+            if integer[ROUNDED] != 0:  # a step that rounding failed
+                watch_rounding(work, work.state[SLOPE], h, rejected, rhs, system, loops)
+        if integer[WATCHED] != 0 and integer[STEPS] > steps:
+            functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
+
+
+@compiled_inside
+def start(work: RadauWork, rhs: Function, project: Function, system: System, loops: Any) -> None:
+    """Where a motion starts: on the constraints, with multipliers that belong to the state."""
+    real, integer, y = work.real, work.integer, work.state[Y]
+    failure = project_state(real, integer, real[T], y, project, system, loops)
+    if failure == RUNNING:
+        integer[RHS] += 1
+        rhs(real[T], y, work.k[0], system, loops)
+        if not all_finite(work.k[0]):
+            failure = NOT_FINITE
+    if failure != RUNNING:
+        real[T_STOP], integer[STATUS] = real[T], failure
+        return
+    for k in range(system.x.shape[0]):
+        work.last_multipliers[2, 1, k] = -system.x[k]
+    for k in range(y.shape[0]):
+        work.state[SLOPE, k] = work.k[0, k]
+    integer[FRESH] = integer[TANGENT_NEEDED] = 1
+    integer[ACCEPTED] = 0
+    if real[STEP] == 0.0 and real[H] == 0.0:
+        real[H] = first_step(
+            real, integer, work.times, y, work.k, work.state[SCRATCH], work.tolerance, rhs, system,
+            loops,
+        )  # fmt: skip
+
+
+@compiled_inside
+def step(
+    work: RadauWork,
+    parts: Sequence[Any],
+    project: Function,
+    watch: Function,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
+) -> None:
+    """Try one step: accept it, reject it, or stop the run."""
+    estimate_error, find_slope = parts[3], parts[4]
+    real, integer, times, state = work.real, work.integer, work.times, work.state
+    adaptive, t = real[STEP] == 0.0, real[T]
+    end = t1 = end_of_step(real, integer, times)
+    longest = h = t1 - t
+    if integer[SWITCHES] != 0 or real[LIMIT] < t1:
+        h = next_length(work, t1, state[SLOPE], project, watch, system, loops)
+        if h == 0.0:
+            return
+        t1 = t1 if h == longest else t + h
+    predict(h, work)
+    shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
+    if shorter > 0.0 and work.own[THETA] < HOPELESS:  # once more, with the tangent at the end
+        integer[TANGENT_NEEDED] = 1
+        shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
+    if shorter != 0.0:
+        refuse(work, t1, h, shorter)
+        return
+    if integer[SWITCHES] != 0 and stage_is_across(work, t, h, watch, system, loops):
+        return
+    for k in range(state.shape[1]):
+        state[TRIAL, k] = state[Y, k] + work.Z[2, k]
+    error = estimate_error(t, h, work, system, loops, tangent, matrix) if adaptive else 0.0
+    if error < 1.0:
+        failure = land(work, t1, h, project, system, loops)
+        if failure == RUNNING:
+            find_slope(t, h, work, system, loops, tangent, matrix)
+            failure = finish(work, t1, h, watch, system, loops)
+        if failure == ACROSS_A_SWITCH:
+            return
+        if failure == RUNNING and adaptive and is_poor(real, integer, times, t1):
+            integer[POOR] += 1
+            reject(real, integer, times, t1, h * ELSEWHERE, STEP_FLOOR)
+        elif failure == RUNNING:
+            integer[POOR] = 0
+            accept(work, t1, h, error)
+            settle(work, h, longest, end)
+        else:
+            reject(real, integer, times, t1, h * RETREAT, failure)
+    elif error <= LARGEST:
+        note_failure(real, integer, error, h, integer[LAST_REJECTED] != 0)
+        factor = max(SHRINKAGE, safety(integer) / error**0.25)
+        reject(real, integer, times, t1, h * factor, STEP_FLOOR)
+        if integer[ACCEPTED] == 0:
+            real[H] = min(real[H], 0.1 * h)
+        integer[TANGENT_NEEDED] = max(integer[TANGENT_NEEDED], 1 - integer[TANGENT_HERE])
+    else:
+        reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)
+
+
+@compiled_inside
+def stage_is_across(
+    work: RadauWork, t: float, h: float, watch: Function, system: System, loops: Any
+) -> bool:
+    """Whether an inner stage lies beyond a switch; then the step is cut."""
+    x = work.state[SCRATCH]
+    for i in range(2):
+        for k in range(x.shape[0]):
+            x[k] = work.state[Y, k] + work.Z[i, k]
+        if sample(work, t + work.method.c[i] * h, x, watch, system, loops):
+            return True
+    return False
+
+
+@compiled_inside
+def iterate(
+    t: float,
+    h: float,
+    work: RadauWork,
+    parts: Sequence[Any],
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: Matrix,
+) -> float:
+    """Find the stages from where they stand, with a new tangent if asked for; as find_stages."""
+    find_tangent, factorise_both, find_stages = parts[0], parts[1], parts[2]
+    wrong = 0.0
+    if work.integer[TANGENT_NEEDED] != 0:
+        wrong = find_tangent(t, h, work, system, loops, tangent, matrix)
+    if wrong == 0.0 and not abs(h - work.own[H_FACTORED]) <= SAME_STEP * h:
+        wrong = factorise_both(t, h, work, system, loops, tangent, matrix)
+    if wrong == 0.0:
+        wrong = find_stages(t, h, work, system, loops, tangent, matrix)
+    return wrong
+
+
+@compiled_inside
+def refuse(work: RadauWork, t1: float, h: float, shorter: float) -> None:
+    """Shorten a step whose stages were not found; a fixed one is tried with a new tangent first."""
+    real, integer = work.real, work.integer
+    stale = integer[TANGENT_HERE] == 0
+    integer[TANGENT_NEEDED] = 1
+    if not shorter > 0.0:  # NaN
+        reject(real, integer, work.times, t1, h * RETREAT, NOT_FINITE)
+    elif real[STEP] == 0.0 or not stale:
+        if work.own[OF_STATES] > newton_limit(work):
+            note_failure(real, integer, work.own[OF_STATES], h, integer[LAST_REJECTED] != 0)
+        reject(real, integer, work.times, t1, h * shorter, STEP_FLOOR)
+
+
+@compiled_inside
+def safety(integer: Integers) -> float:
+    """Safety factor of the next step: smaller where the iteration took long (HW IV.8)."""
+    most = 2.0 * MOST
+    return min(SAFETY, SAFETY * (1.0 + most) / (integer[LAST_ITERATIONS] + most))
+
+
+@compiled_inside
+def land(
+    work: RadauWork, t1: float, h: float, project: Function, system: System, loops: Any
+) -> int:
+    """The work done, and the trial state projected; why that failed, or RUNNING."""
+    real, integer, n = work.real, work.integer, work.state.shape[1]
+    A = work.method.A
+    for i in range(3):  # the work is a quadrature
+        work.Z[i, n - 1] = h * (A[i, 0] * work.F[0, n - 1] + A[i, 1] * work.F[1, n - 1]
+                                + A[i, 2] * work.F[2, n - 1])  # fmt: skip
+    work.state[TRIAL, n - 1] = work.state[Y, n - 1] + work.Z[2, n - 1]
+    return project_state(real, integer, t1, work.state[TRIAL], project, system, loops)
+
+
+@compiled_inside
+def finish(
+    work: RadauWork, t1: float, h: float, watch: Function, system: System, loops: Any
+) -> int:
+    """Prepare dense output where a reporting time lies in the step; RUNNING, or why not."""
+    integer, slope = work.integer, work.state[TRIAL_SLOPE]
+    if not all_finite(slope):
+        return NOT_FINITE
+    if integer[SWITCHES] != 0 and end_is_across(work, t1, slope, watch, system, loops):
+        return ACROSS_A_SWITCH
+    if integer[DENSE] != 0 and work.times[integer[NEXT]] < t1:
+        prepare_dense(h, work)
+    return RUNNING
+
+
+@compiled_inside
+def accept(work: RadauWork, t1: float, h: float, error: float) -> None:
+    """Make the trial state the state; choose the next step (Gustafsson's control, HW IV.8)."""
+    real, own, integer, state = work.real, work.own, work.integer, work.state
+    for k in range(state.shape[1]):
+        state[OLD, k], state[Y, k] = state[Y, k], state[TRIAL, k]
+        state[OLD_SLOPE, k], state[SLOPE, k] = state[SLOPE, k], state[TRIAL_SLOPE, k]
+        for i in range(3):
+            work.Z_old[i, k] = work.Z[i, k]
+    for i in range(3):
+        for r in range(2):
+            for k in range(work.multipliers.shape[2]):
+                work.last_multipliers[i, r, k] = work.multipliers[i, r, k]
+    integer[STEPS] += 1
+    integer[TANGENT_HERE] = 0
+    good = own[THETA] <= GOOD_TANGENT
+    if real[STEP] != 0.0:
+        integer[GAP_STEP] += 1
+    else:
+        choose_next(work, h, error, good)
+    if not good:
+        integer[TANGENT_NEEDED] = 1
+    real[T], own[H_ACCEPTED] = t1, h
+    integer[ACCEPTED], integer[LAST_REJECTED] = 1, 0
+
+
+@compiled_inside
+def choose_next(work: RadauWork, h: float, error: float, good: bool) -> None:
+    """The next step, after an accepted one."""
+    real, own, integer = work.real, work.own, work.integer
+    divisor = error**0.25 / safety(integer)
+    if integer[ACCEPTED] != 0:
+        trend = (error * error / own[ERROR_ACCEPTED]) ** 0.25
+        divisor = max(divisor, own[H_ACCEPTED] / h * trend / SAFETY)
+    if integer[LAST_ITERATIONS] > 1:
+        divisor = max(divisor, (own[THETA] / BEST_RATE) ** RATE_EXPONENT)
+    factor = 1.0 / min(1.0 / SHRINKAGE, max(1.0 / GROWTH, divisor))
+    if integer[LAST_REJECTED] != 0:
+        factor = min(factor, 1.0)
+    own[ERROR_ACCEPTED] = max(error, 0.01)
+    if not (good and 1.0 <= factor <= SAME_FACTORS):
+        real[H] = max(h * factor, step_floor(real, work.times))
+    else:
+        real[H] = h

@@ -1,0 +1,1 @@
+"""Parts that integrators share: state, step control, output, event location, singular poses."""

@@ -1,0 +1,347 @@
+"""Switches of the model: a step ends where one of them changes its sign, and another law begins.
+
+``watch(t, y, out, system, loops)`` gives the switches, numbers that vary smoothly with the state.
+A step is taken only if all its stages and its end lie on the sides from which it started; so no
+step mixes two laws, and the location needs no dense output, which would mix them as well
+(docs/decisions/0011). Near a crossing
+
+1. values and rates at both ends of the last step tell when it will be: the step ends shortly before
+   (``reach``); each such step brings it some thousand times nearer;
+2. an attempt with a sample on the other side is cut to where a parabola through that sample leads
+   (``shorten``); a cubic through both ends tells of a switch that changes its sign twice in a step;
+3. the last bit is an Euler step, so short that its error is below rounding: there the instant is
+   found by bisection, to the last digit of time (``creep``). The state goes to the far side, the
+   integration starts anew; where the switch ends the run, the state stays on the near side.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.assembly.arrays import ENDS, UNSEEN
+from dap3d_core.integrators.runge_kutta.tableau import Floats
+from dap3d_core.integrators.stepping.integration_state import (
+    BAND,
+    BEND,
+    CHATTERED,
+    COUNT,
+    CULPRIT,
+    CUT,
+    CUTS,
+    DOES,
+    ENDING,
+    ERROR_OLD,
+    FOUND,
+    FOUND_RATE,
+    FRESH,
+    GAP_STEP,
+    LAST_REJECTED,
+    LIMIT,
+    LOOKED,
+    NEXT,
+    RATE,
+    REJECTED,
+    RUNNING,
+    SAMPLE,
+    SAMPLED,
+    SIDE,
+    SINCE,
+    STALLS,
+    STATUS,
+    STEP,
+    STEPS,
+    SWITCHED,
+    SWITCHES,
+    T_STOP,
+    TRIAL,
+    VALUE,
+    Function,
+    H,
+    T,
+    Work,
+    Y,
+)
+from dap3d_core.integrators.stepping.output import project_state
+from dap3d_core.integrators.stepping.step_control import EPSILON, FLOOR
+from dap3d_core.integrators.stepping.switch_values import (
+    evaluate,
+    find_rates,
+    is_across,
+    leaves,
+    log,
+    look,
+    span,
+    usual_step,
+)
+from dap3d_core.kernels.runtime.cache import compiled_inside
+
+#: A crossing this part of a usual step away is reached by an Euler step: its error is of the order
+#: of the square.
+SHORT = 1e-9
+#: The least part of the way to a crossing that is left for the next step, and the greatest.
+SPARE, MOST_SPARE = 1e-4, 0.05
+#: How often an Euler step towards a crossing that is nearer than rounding is doubled at most.
+MOST_STALLS = 20
+#: Attempts in a row that may be cut because a cubic, and no sample, tells of two crossings.
+SUSPICIONS = 8
+#: A switch that changes its sign more often than this while time goes on by less than this part of
+#: the run chatters.
+CHATTER, CHATTER_SPAN = 100, 1e-6
+
+
+@compiled_inside
+def next_length(
+    work: Work, end: float, slope: Floats, project: Function, watch: Function, system: Any,
+    loops: Any,
+) -> float:  # fmt: skip
+    """Length of the next step, which may go to time ``end``; 0 where it has been done here.
+
+    slope: dy/dt at the state.
+    """
+    real, integer = work.real, work.integer
+    longest = min(end, real[LIMIT]) - real[T]
+    h = longest
+    if integer[SWITCHES] != 0:
+        if integer[LOOKED] == 0:
+            look(work, slope, watch, system, loops)
+            if integer[ENDING] != 0:
+                return 0.0
+        h = reach(work, h)
+    short = max(SHORT * usual_step(work), 4.0 * FLOOR * span(work))
+    short *= 2.0 ** min(integer[STALLS], MOST_STALLS)
+    if h > short or h == end - real[T]:
+        return h
+    h = min(min(longest, 2.0 * short), work.times[integer[NEXT]] - real[T])
+    creep(work, h, end, slope, project, watch, system, loops)
+    return 0.0
+
+
+@compiled_inside
+def time_to_zero(value: float, rate: float, bend: float) -> float:
+    """First t > 0 with value + rate t + bend t^2 / 2 = 0, for value >= 0; infinite if none."""
+    if value <= 0.0:
+        return 0.0 if rate < 0.0 else np.inf
+    inside = rate * rate - 2.0 * value * bend
+    if inside < 0.0:
+        return np.inf
+    if rate < 0.0:
+        return 2.0 * value / (math.sqrt(inside) - rate)
+    return (rate + math.sqrt(inside)) / -bend if bend < 0.0 else np.inf
+
+
+@compiled_inside
+def reach(work: Work, h: float) -> float:
+    """How far a step of length h may go: it ends shortly before the next crossing."""
+    s, longest = work.switches, h
+    h = min(h, work.real[CUT])
+    for k in range(s.shape[1]):
+        side = s[SIDE, k]
+        if side == 0.0:
+            continue
+        value, rate, bend = side * s[VALUE, k], side * s[RATE, k], side * s[BEND, k]
+        if value < 2.0 * s[BAND, k]:
+            continue  # it may be at rest there, and its rate is rounding
+        left = time_to_zero(value, rate, bend)
+        if left < longest:
+            doubt = 0.5 * left * bend / rate if rate < 0.0 else 1.0
+            h = min(h, left * (1.0 - min(MOST_SPARE, SPARE + doubt * doubt)))
+    return h
+
+
+@compiled_inside
+def sample(work: Work, t: float, x: Floats, watch: Function, system: Any, loops: Any) -> bool:
+    """Whether a state within a step lies across; then the step is cut.
+
+    Not of what is UNSEEN: where a function takes another form it is smooth: a step may mix both.
+    """
+    if work.integer[SAMPLED] == 0:
+        return False
+    evaluate(work, t, x, SAMPLE, watch, system, loops)
+    s = work.switches
+    for k in range(s.shape[1]):
+        if s[DOES, k] == UNSEEN:
+            s[SAMPLE, k] = s[SIDE, k]
+    if not leaves(s, SAMPLE):
+        return False
+    shorten(work, SAMPLE, t - work.real[T])
+    return True
+
+
+@compiled_inside
+def shorten(work: Work, row: int, h: float) -> None:
+    """Cut the next attempt to before the crossing that a sample at h told of."""
+    s, integer = work.switches, work.integer
+    left = h
+    for k in range(s.shape[1]):
+        side, value, found = s[SIDE, k], s[VALUE, k], s[row, k]
+        if side != 0.0 and found * side <= 0.0:
+            rate = s[RATE, k]
+            bend = 2.0 * (found - value - rate * h) / (h * h)
+            left = min(left, time_to_zero(side * value, side * rate, side * bend))
+    integer[CUTS] += 1
+    integer[REJECTED] += 1
+    # samples are as good as the stages they belong to: trusted less from attempt to attempt
+    work.real[CUT] = left * max(0.25, 1.0 - 0.01 * 4.0 ** integer[CUTS])
+
+
+@compiled_inside
+def end_is_across(
+    work: Work, t1: float, slope: Floats, watch: Function, system: Any, loops: Any
+) -> bool:
+    """Whether the trial state, whose dy/dt is ``slope``, lies across, or the motion went there.
+
+    Then the step is cut.
+    """
+    s, trial, h = work.switches, work.state[TRIAL], t1 - work.real[T]
+    evaluate(work, t1, trial, FOUND, watch, system, loops)
+    if leaves(s, FOUND):
+        shorten(work, FOUND, h)
+        return True
+    find_rates(work, t1, trial, slope, FOUND, FOUND_RATE, watch, system, loops)
+    if work.integer[CUTS] >= SUSPICIONS:
+        return False
+    part = 1.0
+    for k in range(s.shape[1]):
+        side = s[SIDE, k]
+        part = min(part, lowest(side * s[VALUE, k], h * side * s[RATE, k], side * s[FOUND, k],
+                                h * side * s[FOUND_RATE, k]))  # fmt: skip
+    if part == 1.0:
+        return False
+    work.integer[CUTS] += 1
+    work.integer[REJECTED] += 1
+    work.real[CUT] = part * h
+    return True
+
+
+@compiled_inside
+def lowest(a: float, b: float, c: float, d: float) -> float:
+    """Where in (0, 1) the cubic with values a, c and slopes b, d at 0, 1 is least and negative.
+
+    1 where it is not.
+    """
+    if not b < 0.0 < d:
+        return 1.0
+    rise = c - a
+    p2, p3 = 3.0 * rise - 2.0 * b - d, b + d - 2.0 * rise
+    inside = p2 * p2 - 3.0 * p3 * b
+    if inside < 0.0 or p2 + math.sqrt(inside) <= 0.0:
+        return 1.0
+    x = -b / (p2 + math.sqrt(inside))
+    if not 0.0 < x < 1.0 or a + x * (b + x * (p2 + x * p3)) >= 0.0:
+        return 1.0
+    return x
+
+
+@compiled_inside
+def settle(work: Work, h: float, longest: float, end: float) -> None:
+    """After a step was accepted: what its end told of switches; if cut, the motion's own step.
+
+    h: its length; longest, end: the length it might have had, and where it would have ended.
+    """
+    real, integer, s = work.real, work.integer, work.switches
+    if h < longest:
+        real[H] = max(real[H], longest)
+    if real[STEP] != 0.0 and real[T] < end:
+        integer[GAP_STEP] -= 1
+    if integer[SWITCHES] == 0:
+        return
+    stalled = 0
+    for k in range(s.shape[1]):
+        stands = (integer[CUTS] > 0) & (s[FOUND, k] == s[VALUE, k])
+        stalled |= stands & (s[SIDE, k] * s[RATE, k] < 0.0)
+        s[BEND, k] = (s[FOUND_RATE, k] - s[RATE, k]) / h
+        s[VALUE, k], s[RATE, k] = s[FOUND, k], s[FOUND_RATE, k]
+        if s[SIDE, k] == 0.0:
+            s[SIDE, k] = np.sign(s[FOUND, k])
+            s[VALUE, k] += s[SIDE, k] * s[BAND, k]
+    real[CUT], integer[CUTS] = np.inf, 0
+    integer[STALLS] = integer[STALLS] + 1 if stalled else 0
+
+
+@compiled_inside
+def creep(
+    work: Work, h: float, end: float, slope: Floats, project: Function, watch: Function,
+    system: Any, loops: Any,
+) -> None:  # fmt: skip
+    """An Euler step of length h, or to the crossing in it: the integration starts anew there."""
+    real, integer, s = work.real, work.integer, work.switches
+    t = real[T]
+    low, high, least = 0.0, h, 1e-3 * EPSILON * span(work)
+    failure = go_on(work, high, slope, project, watch, system, loops)
+    crossed = integer[SWITCHES] != 0 and is_across(s, FOUND)
+    if crossed:
+        middle = 0.5 * high
+        while failure == RUNNING and t + low < t + middle < t + high and high - low > least:
+            failure = go_on(work, middle, slope, project, watch, system, loops)
+            if is_across(s, FOUND):
+                high = middle
+            else:
+                low = middle
+            middle = 0.5 * (low + high)
+        if failure == RUNNING:
+            failure = go_on(work, high, slope, project, watch, system, loops)
+        take_notice(work, t + high)
+        if failure == RUNNING and integer[ENDING] == SWITCHED:
+            high = low
+            failure = go_on(work, high, slope, project, watch, system, loops)
+    if failure != RUNNING:
+        real[T_STOP], integer[STATUS] = t + high, failure
+        return
+    real[T] = t + high
+    for i in range(slope.shape[0]):
+        work.state[Y, i] = work.state[TRIAL, i]
+    integer[STEPS] += 1
+    if real[STEP] != 0.0 and real[T] >= end:
+        integer[GAP_STEP] += 1
+    integer[FRESH] = integer[LOOKED] = integer[CUTS] = 0
+    real[CUT] = np.inf
+    integer[STALLS] = 0 if crossed or integer[STALLS] == 0 else integer[STALLS] + 1
+    for k in range(s.shape[1]):
+        if s[VALUE, k] == 0.0 and s[FOUND, k] == 0.0:
+            s[SIDE, k] = 0.0  # it stays zero: it has no side until it leaves
+    if crossed:
+        forget(work)
+
+
+@compiled_inside
+def go_on(
+    work: Work, h: float, slope: Floats, project: Function, watch: Function, system: Any,
+    loops: Any,
+) -> int:  # fmt: skip
+    """The state after a very short time h, on its constraints, as trial state; its switches."""
+    t, y, trial = work.real[T] + h, work.state[Y], work.state[TRIAL]
+    for i in range(y.shape[0]):
+        trial[i] = y[i] + h * slope[i]
+    failure = project_state(work.real, work.integer, t, trial, project, system, loops)
+    if failure == RUNNING and work.integer[SWITCHES] != 0:
+        evaluate(work, t, trial, FOUND, watch, system, loops)
+    return failure
+
+
+@compiled_inside
+def take_notice(work: Work, t: float) -> None:
+    """Which switches changed their sign at t, and what follows: end, chatter, or another side."""
+    integer, s = work.integer, work.switches
+    for k in range(s.shape[1]):
+        if not s[FOUND, k] * s[SIDE, k] < 0.0:
+            continue
+        s[SIDE, k] = -s[SIDE, k]
+        log(work, k, t)
+        if s[DOES, k] == ENDS and s[SIDE, k] < 0.0:
+            integer[ENDING], integer[CULPRIT] = SWITCHED, k
+        if s[COUNT, k] == 0.0 or t - s[SINCE, k] > CHATTER_SPAN * (work.times[-1] - work.times[0]):
+            s[SINCE, k], s[COUNT, k] = t, 0.0
+        s[COUNT, k] += 1.0
+        if s[COUNT, k] > CHATTER and integer[ENDING] == 0:
+            integer[ENDING], integer[CULPRIT] = CHATTERED, k
+
+
+@compiled_inside
+def forget(work: Work) -> None:
+    """Let the control of the step start anew: what follows is another motion."""
+    work.real[H], work.real[ERROR_OLD] = 0.0, 1e-4
+    work.integer[FRESH] = work.integer[LOOKED] = work.integer[LAST_REJECTED] = 0

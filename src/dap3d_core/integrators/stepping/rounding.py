@@ -1,0 +1,131 @@
+"""Errors of a step that are rounding: no shorter step has less of them per unit of time.
+
+The rates of a state are known no better than they change with its last digits. Where a body is thin
+or far away, or a spring stiff, that is more than a tolerance asks for: a torque that is known to
+1e-16 N m spins a wire of 1e-12 kg m^2 up at 1e-4 rad/s^2. A step that was made shorter and has no
+less error per length is a sign of that: then the change is measured, and what of an error is h
+times that is not counted. Where it is far below the tolerances nothing changes.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dap3d_core.integrators.runge_kutta.tableau import Floats, Integers
+from dap3d_core.integrators.stepping.integration_state import (
+    ABSOLUTE,
+    ERROR_SIZE,
+    FAILED_RATE,
+    FRESH,
+    NOISE,
+    OTHER,
+    REJECTED,
+    RHS,
+    ROUNDED,
+    RTOL,
+    RUNNING,
+    SCRATCH,
+    STATUS,
+    STEP,
+    STEPS,
+    TOLERANCES,
+    Function,
+    T,
+    Y,
+)
+from dap3d_core.kernels.runtime.cache import compiled_inside, compiled_into
+
+#: Least scale of an error: at atol = 0 a component that is exactly zero is not divided by zero.
+SMALLEST_ATOL = 1e-290
+#: A change of the last digit, and how often one is tried.
+DIGIT, SAMPLES = 2.220446049250313e-16, 3
+#: Rounding errors in the estimate of an error, in those of one right-hand side: a sum over stages
+#: whose weights add up to five or so in magnitude, each with several roundings.
+ROUNDINGS = 6.0
+#: Error per length that is left in a shorter step where it is rounding, at least.
+SAME = 0.5
+#: Rounding above this part of a tolerance counts.
+COUNTS = 0.1
+#: Steps after which it is measured again, and without a reason: control that has settled in the
+#: noise gives none.
+EVERY, PROBE = 8, 96
+
+
+def tolerance_of(size: int, atol: ArrayLike) -> Floats:
+    """(TOLERANCES, n) the absolute tolerance of each component; nothing known of its rounding."""
+    tolerance = np.zeros((TOLERANCES, size))
+    tolerance[ABSOLUTE] = np.maximum(atol, SMALLEST_ATOL)
+    return tolerance
+
+
+@compiled_into
+def watch_rounding(
+    work: Any, f: Floats, h: float, rejected: int, rhs: Function, system: Any, loops: Any
+) -> None:
+    """Measure the rounding of the rates where the last step, of length h, gives a reason to.
+
+    f: dy/dt at the state. rejected: how many steps had failed before that one.
+    """
+    real, integer = work.real, work.integer
+    due = integer[STEPS] % PROBE == 0 and real[STEP] == 0.0 and integer[REJECTED] == rejected
+    if not (integer[ROUNDED] != 0 or (due and integer[STEPS] != 0)):
+        return
+    if integer[STATUS] != RUNNING or integer[FRESH] == 0:
+        return
+    if integer[ROUNDED] == 2 and integer[REJECTED] == rejected and integer[STEPS] % EVERY != 0:
+        return
+    tolerance, argument, out = work.tolerance, work.state[SCRATCH], work.state[OTHER]
+    integer[RHS] += SAMPLES + 1
+    measure_noise(real[T], work.state[Y], f, h, tolerance, argument, out, rhs, system, loops)
+    integer[ROUNDED] = 0
+    for i in range(integer[ERROR_SIZE]):
+        scale = tolerance[ABSOLUTE, i] + real[RTOL] * abs(work.state[Y, i])
+        if h * tolerance[NOISE, i] > COUNTS * scale:
+            integer[ROUNDED] = 2
+    if integer[ROUNDED] == 0:
+        for i in range(argument.size):
+            tolerance[NOISE, i] = 0.0
+
+
+@compiled_inside
+def note_failure(real: Floats, integer: Integers, error: float, h: float, again: bool) -> None:
+    """Have an eye on a step of length h that failed; again: the one before it had failed, too."""
+    before, real[FAILED_RATE] = real[FAILED_RATE], error / h
+    if again and error / h > SAME * before:
+        integer[ROUNDED] = max(integer[ROUNDED], 1)
+
+
+@compiled_inside
+def measure_noise(
+    t: float,
+    y: Floats,
+    f: Floats,
+    h: float,
+    tolerance: Floats,
+    argument: Floats,
+    out: Floats,
+    rhs: Function,
+    system: Any,
+    loops: Any,
+) -> None:
+    """How much dy/dt at (t, y), which is f, is uncertain in a step h, into ``tolerance``.
+
+    By the last digits of y, and by what these make of y itself in the step. argument, out: scratch.
+    """
+    noise = tolerance[NOISE]
+    for i in range(y.size):
+        noise[i] = 0.0
+    for sample in range(SAMPLES + 1):
+        for i in range(y.size):
+            up = (i // (1 + sample % SAMPLES)) % 2 == 0
+            argument[i] = y[i] * (1.0 + DIGIT) if up else y[i] * (1.0 - DIGIT)
+            if sample == SAMPLES:
+                argument[i] += h * noise[i]
+        rhs(t, argument, out, system, loops)
+        part = ROUNDINGS if sample < SAMPLES else 1.0
+        for i in range(y.size):
+            noise[i] = max(noise[i], part * abs(out[i] - f[i]))

@@ -1,0 +1,72 @@
+"""Whether an explicit method takes small steps because of motions that have died away.
+
+Two stages at the end of a step, f(g) and f(y1), give h |lambda| = h |f(y1) - f(g)| / |y1 - g| of
+the component that dominates their difference (Hairer, Wanner, Solving Ordinary Differential
+Equations II, IV.2, and their codes DOPRI5 and DOP853, whence the counting of steps, too). Their
+measure alone, h |lambda| at the boundary of the region of stability, takes fast spins at loose
+tolerances for stiff, and misses stiff scenes at tight ones. Here a step looks stiff where the
+component decays, f(y1) - f(g) pointing against y1 - g, by more than half in a step: such a motion
+is over after a few steps. Where it is still there after many, errors alone make it, and its error,
+not that of the motion that is seen, limits the steps. Of an undamped oscillation rates dwarf
+positions, so that the two are always nearly parallel, but it grows as often as it decays: a step in
+which the component grows clears the scene.
+"""
+
+from dap3d_core.integrators.stepping.integration_state import (
+    CALM_STEPS,
+    ERROR_SIZE,
+    LATE_STAGE,
+    OTHER,
+    STAGES,
+    STEPS,
+    STIFF_AT,
+    STIFF_STEPS,
+    TRIAL,
+    T,
+    Work,
+    Y,
+)
+from dap3d_core.integrators.stepping.vector_ops import combine
+from dap3d_core.kernels.runtime.cache import compiled_inside
+
+#: Steps between two looks; every step once one looked stiff.
+EVERY = 20
+#: Steps that look stiff until the scene is called so, and steps in a row that clear it of it.
+STIFF, CLEARED = 15, 6
+#: h |lambda| from which a component that decays looks stiff; squared cosine from which it decays.
+LEAST, PARALLEL = 0.5, 0.96
+
+
+@compiled_inside
+def watch_stiffness(work: Work, h: float) -> None:
+    """Note in STIFF_AT when the scene has become stiff; f at the trial state stands in ``k``.
+
+    The trial state is that of the method, not yet projected.
+    """
+    real, integer = work.real, work.integer
+    late = integer[LATE_STAGE]
+    if late == 0 or real[STIFF_AT] < real[T]:
+        return
+    if integer[STIFF_STEPS] == 0 and integer[STEPS] % EVERY != 0:
+        return
+    other, trial = work.state[OTHER], work.state[TRIAL]
+    combine(other, 1.0, work.state[Y], h, work.table, late, work.k)
+    upper = lower = along = 0.0
+    for i in range(integer[ERROR_SIZE]):
+        change = h * (work.k[integer[STAGES], i] - work.k[late, i])
+        apart = trial[i] - other[i]
+        upper += change * change
+        lower += apart * apart
+        along += change * apart
+    marked = along * along > PARALLEL * upper * lower and upper > LEAST * LEAST * lower
+    if marked and along > 0.0:
+        integer[STIFF_STEPS] = integer[CALM_STEPS] = 0
+    elif marked:
+        integer[STIFF_STEPS] += 1
+        integer[CALM_STEPS] = 0
+        if integer[STIFF_STEPS] >= STIFF:
+            real[STIFF_AT] = real[T]
+    elif integer[STIFF_STEPS] > 0:
+        integer[CALM_STEPS] += 1
+        if integer[CALM_STEPS] >= CLEARED:
+            integer[STIFF_STEPS] = integer[CALM_STEPS] = 0

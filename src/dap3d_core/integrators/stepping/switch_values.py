@@ -1,0 +1,129 @@
+"""The values of switches and their rates at a state; on which side of each the motion is."""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.assembly.arrays import ENDS, UNSEEN
+from dap3d_core.integrators.runge_kutta.tableau import Floats
+from dap3d_core.integrators.stepping.integration_state import (
+    BAND,
+    BEND,
+    CROSSINGS,
+    CULPRIT,
+    DOES,
+    ENDING,
+    LOGGED,
+    LOOKED,
+    OTHER,
+    RATE,
+    SIDE,
+    STEP,
+    SWITCHED,
+    VALUE,
+    Function,
+    H,
+    T,
+    Work,
+    Y,
+)
+from dap3d_core.kernels.runtime.cache import compiled_inside
+
+#: Part of a usual step over which rates are found by differences, and the least part of the time.
+DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-8
+
+
+@compiled_inside
+def evaluate(
+    work: Work, t: float, x: Floats, row: int, watch: Function, system: Any, loops: Any
+) -> None:
+    """The switches at a state, into a row.
+
+    One with a band counts from the far edge of it: what rests where it is zero, to rounding, does
+    not change its side again and again.
+    """
+    s = work.switches
+    watch(t, x, s[row], system, loops)
+    for k in range(s.shape[1]):
+        s[row, k] += s[SIDE, k] * s[BAND, k]
+
+
+@compiled_inside
+def look(work: Work, slope: Floats, watch: Function, system: Any, loops: Any) -> None:
+    """Values, sides and rates at the state; the run ends where it should have ended before."""
+    real, integer, s = work.real, work.integer, work.switches
+    y = work.state[Y]
+    evaluate(work, real[T], y, VALUE, watch, system, loops)
+    for k in range(s.shape[1]):
+        if s[SIDE, k] == 0.0:
+            s[SIDE, k] = np.sign(s[VALUE, k])
+            s[VALUE, k] += s[SIDE, k] * s[BAND, k]
+        s[BEND, k] = 0.0
+        if s[DOES, k] == ENDS and s[SIDE, k] < 0.0:
+            integer[ENDING], integer[CULPRIT] = SWITCHED, k
+            log(work, k, real[T])
+    find_rates(work, real[T], y, slope, VALUE, RATE, watch, system, loops)
+    integer[LOOKED] = 1
+
+
+@compiled_inside
+def find_rates(
+    work: Work, t: float, y: Floats, slope: Floats, row: int, out: int, watch: Function,
+    system: Any, loops: Any,
+) -> None:  # fmt: skip
+    """Rates of the switches along the slope, by a difference, from their values in a row."""
+    h, x, s = (
+        max(DIFFERENCE * usual_step(work), LEAST_DIFFERENCE * span(work)),
+        work.state[OTHER],
+        work.switches,
+    )
+    for i in range(y.shape[0]):
+        x[i] = y[i] + h * slope[i]
+    evaluate(work, t + h, x, out, watch, system, loops)
+    for k in range(s.shape[1]):
+        s[out, k] = (s[out, k] - s[row, k]) / h
+
+
+@compiled_inside
+def is_across(s: Floats, row: int) -> bool:
+    """Whether a switch, in a row of values, is on the other side than at the start of the step."""
+    found = 0
+    for k in range(s.shape[1]):
+        found |= s[row, k] * s[SIDE, k] < 0.0
+    return found != 0
+
+
+@compiled_inside
+def leaves(s: Floats, row: int) -> bool:
+    """Whether a switch is on the other side, or zero: then it is not known which law holds."""
+    found = 0
+    for k in range(s.shape[1]):
+        found |= (s[SIDE, k] != 0.0) & (s[row, k] * s[SIDE, k] <= 0.0)
+    return found != 0
+
+
+@compiled_inside
+def log(work: Work, k: int, t: float) -> None:
+    """Note that a switch changed its sign, where somebody wants to know."""
+    if work.switches[DOES, k] == UNSEEN:
+        return
+    count = work.integer[CROSSINGS]
+    if count < LOGGED:
+        row = work.crossings[count]
+        row[0], row[1], row[2] = t, k, work.switches[SIDE, k]
+    work.integer[CROSSINGS] = count + 1
+
+
+@compiled_inside
+def span(work: Work) -> float:
+    """The time, s, whose rounding bounds what can be told apart."""
+    return max(abs(work.real[T]), work.times[-1] - work.times[0])
+
+
+@compiled_inside
+def usual_step(work: Work) -> float:
+    """The step that the motion asks for."""
+    return work.real[STEP] if work.real[STEP] != 0.0 else work.real[H]

@@ -1,0 +1,61 @@
+"""The group loops of a type, compiled; what cannot be is an error with its reason."""
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
+from dap3d_core.interface.codegen.specialise import bind_friction
+from dap3d_core.interface.examine.examine import Examined, PluginError, where_is
+from dap3d_core.kernels.runtime.loop_modules import build
+
+
+def compiled_loop(
+    examined: Examined, what: str, announce: Callable[[str], None] | None = None
+) -> Any:
+    """The compiled loop of a type for ``what`` (a key of LOOP_KINDS); None where it has none.
+
+    Args:
+        examined: the type.
+        what: what the loop computes.
+        announce: called with the loop's name before it is compiled anew.
+
+    Raises:
+        PluginError: it cannot be compiled; names file, type, kernels, line, reason and remedy.
+    """
+    loop = write(examined, what)
+    if loop is None:
+        return None
+    try:
+        return build(loop, announce)
+    except Exception as error:
+        raise PluginError(
+            f"{where_is(examined.type)}: its kernels cannot be compiled ({loop.name}): {error}. "
+            "A kernel is plain: tuples of numbers, the words of dap3d_core.kernels, where() for "
+            "branches"
+        ) from error
+
+
+def compile_all(examined: Examined) -> None:
+    """Compile all loops of a type and of its variants.
+
+    Kernels that call a function of an argument are left out: they are compiled with the function
+    that a scene gives.
+
+    Raises:
+        PluginError: one of them cannot be compiled.
+    """
+    if not examined.argument_functions or not _calls_functions(examined):
+        for what in LOOP_KINDS:
+            if what != "friction":
+                compiled_loop(examined, what)
+        if examined.type.kind == "joint" and "friction" in examined.kernels:
+            compiled_loop(bind_friction(examined), "friction")
+    for _, variant in examined.variants:
+        compile_all(variant)
+
+
+def _calls_functions(examined: Examined) -> bool:
+    callable_names = {n for n, q in examined.names.items() if q.derivative >= 0}
+    return any(callable_names & set(inspect.signature(k).parameters)
+               for k in examined.kernels.values())  # fmt: skip

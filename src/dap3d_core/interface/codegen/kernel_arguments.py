@@ -1,0 +1,258 @@
+"""Which names a type offers to its kernels, what each holds, and how a group loop computes it.
+
+docs/reference/names.md lists them by field. A field ``v_i`` takes the place of the velocity of that
+name; other names of a body are taken.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from inspect import Parameter, signature
+from typing import Any
+
+import attrs
+
+from dap3d_core.interface.codegen.instance_layout import Layout, size
+from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
+from dap3d_core.interface.types import TypeBase
+
+#: Kernels that may name quantities of the velocity level; all others see positions and time only.
+VELOCITY_KERNELS = ("C_dot", "gamma", "wrench", "friction", "switch")
+#: What a force ``friction`` hands to the kernel ``friction`` of its joint.
+FRICTION_NUMBERS = ("mu", "v_tol", "radius")
+#: Suffixes of a function's value and derivatives.
+DERIVATIVES = ("", "_dot", "_ddot")
+
+
+@attrs.frozen
+class Quantity:
+    """One name: what it is and how a loop finds it.
+
+    Attributes:
+        name: as kernels write it.
+        shape: () number, (3,) vector, (4,) Euler parameters, (3, 3) matrix, (n,) other tuples.
+        velocity: whether it belongs to the velocity level.
+        code: Python expression over the loop's variables and ``needs`` (prefixed by ``x_``).
+        needs: names that must be computed before.
+        doc: what it is, for ``describe``.
+        columns: of a table; 0 for all else.
+        derivative: of a function to be called, which derivative; -1 for all else.
+        rate: its rate of change as an expression over ``needs`` and the velocities ``V_i``, ``W_i``
+            of the bodies: what is derived is derived from it. "" for a constant.
+        rate_name: the name that holds its rate; "" where there is none.
+        motion: of a name of the velocity level that is the rate of no other: what it is, over the
+            same names as a rate.
+        derivable: whether formulas that use it can be derived.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    velocity: bool
+    code: str
+    needs: tuple[str, ...] = ()
+    doc: str = ""
+    columns: int = 0
+    derivative: int = -1
+    rate: str = ""
+    rate_name: str = ""
+    motion: str = ""
+    derivable: bool = True
+
+
+def namespace(type_: type[TypeBase], layout: Layout) -> dict[str, Quantity]:
+    """Every name that the kernels of a type may use, stored as the layout says."""
+    names: dict[str, Quantity] = {}
+
+    def offer(
+        name: str,
+        shape: tuple[int, ...],
+        code: str,
+        needs: Iterable[str] = (),
+        velocity: bool = False,
+        doc: str = "",
+        **more: Any,
+    ) -> None:
+        names[name] = Quantity(name, shape, velocity, code, tuple(needs), doc, **more)
+
+    offer("t", (), "t", doc="time, s", rate="1.0")
+    if type_.kind == "function":
+        offer("x", (), "t", doc="the argument of the function")
+    for s in layout.slots:
+        _offer_body(offer, s)
+    for name, spec in specs_of(type_).items():
+        is_argument = name == "x" and type_.kind == "function"
+        if name not in layout.constants and not is_argument:  # v_i may be a vector, not a velocity
+            _offer_field(offer, name, spec, layout)
+    for name in layout.constants:
+        _offer_constant(offer, name, layout)
+    return names
+
+
+def friction_names(rows: int) -> dict[str, Quantity]:
+    """What the kernel ``friction`` of a joint may name besides; numbers stand behind its own."""
+    reaction = f"({''.join(f'-out2[row + {k}], ' for k in range(rows))})"
+    docs = ("friction coefficient", "velocity below which friction fades, m/s", "of the pin, m")
+    found = {"lam": Quantity("lam", (rows,), True, reaction, doc="its multipliers")}
+    for name, doc in zip(FRICTION_NUMBERS, docs, strict=True):
+        found[name] = Quantity(name, (), False, "", doc=doc)
+    return found
+
+
+def _offer_body(offer: Callable[..., None], s: str) -> None:
+    b = f"b_{s}"
+    place, turn = f"position of body {s}, m", f"rotation matrix of body {s}"
+    moves = {"rate": f"V_{s}", "rate_name": f"v_{s}"}
+    offer(f"r_{s}", (3,), f"vector_at(body, {b}, R)", doc=place, **moves)
+    turned = f"turned(W_{s}, x_A_{s})"
+    offer(f"A_{s}", (3, 3), f"matrix_at(body, {b}, A)", doc=turn, rate=turned)
+    parameters, rate = _tuple(f"body[{b}, P + {{}}]", 4), f"euler_rate(W_{s}, x_p_{s})"
+    offer(f"p_{s}", (4,), parameters, doc=f"Euler parameters of body {s}", rate=rate)
+    speed = f"velocity of body {s}, m/s"
+    offer(f"v_{s}", (3,), f"vector_at(body, {b}, V)", velocity=True, doc=speed)
+    spin = f"angular velocity of body {s}, global, rad/s"
+    offer(f"w_{s}", (3,), f"vector_at(body, {b}, W)", velocity=True, doc=spin)
+    offer(f"mass_{s}", (), f"body[{b}, MASS]", doc=f"mass of body {s}, kg")
+    inertia = f"inertia matrix of body {s} in its axes, kg m^2"
+    offer(f"Jp_{s}", (3, 3), f"matrix_at(body, {b}, JP)", doc=inertia)
+
+
+def _offer_field(offer: Callable[..., None], name: str, spec: FieldSpec, layout: Layout) -> None:
+    if spec.kind == "point" and (slot := slot_of(name)):
+        _offer_point(offer, name, slot, layout)
+    elif spec.kind == "vector" and spec.ground:
+        offer(name, (3,), stored(layout, name), doc="vector fixed in ground")
+    elif spec.kind == "vector":
+        _offer_vector(offer, name, slot_of(name) if name not in layout.others else name, layout)
+    elif spec.kind == "vector2":
+        for end, slot in (("P_i", "i"), ("P_j", "j")):
+            _offer_point(offer, end, slot, layout)
+        between, rate = "vector from P_i to P_j, m", f"rate of {name}, m/s"
+        grows = "sub(add(V_j, cross(W_j, x_s_P_j)), add(V_i, cross(W_i, x_s_P_i)))"
+        rates = {"rate": grows, "rate_name": f"{name}_dot"}
+        offer(name, (3,), "sub(x_r_P_j, x_r_P_i)", ("r_P_i", "r_P_j"), doc=between, **rates)
+        offer(f"{name}_dot", (3,), "sub(x_v_P_j, x_v_P_i)", ("v_P_i", "v_P_j"), True, rate)
+    elif spec.kind in ("number", "vec3", "matrix"):
+        doc = f"{spec.doc or name}{f', {spec.unit}' if spec.unit else ''}"
+        offer(name, layout.numbers[name][1], stored(layout, name), doc=doc)
+    elif spec.kind == "function":
+        _offer_function(offer, name, spec, layout)
+    elif spec.kind == "table":
+        offset, columns = layout.tables[name]
+        sample = f"({'0.0, ' * columns})"
+        code = f"(par, par[p1 + {offset}], par[p1 + {offset + 1}], {sample})"
+        doc = f"{spec.doc or name}, by lookup"
+        offer(name, (4,), code, doc=doc, columns=columns, derivable=False)
+    elif spec.kind == "angle":
+        _offer_angle(offer, name, spec, layout)
+
+
+def _offer_function(offer: Callable[..., None], name: str, spec: FieldSpec, layout: Layout) -> None:
+    f = "f" if name == "function" else name
+    if spec.argument:
+        for order, suffix in enumerate(DERIVATIVES):
+            doc = f"function of {spec.argument}, derivative {order}; to be called"
+            offer(f"{f}{suffix}", (), "", doc=doc, derivative=order)
+        return
+    at = f"idx[b0 + {len(layout.slots) + layout.functions.index(name)}]"
+    for order, suffix in enumerate(DERIVATIVES):
+        doc, code = f"function of time, derivative {order}", f"F[{at}, {order}]"
+        higher = f"{f}{DERIVATIVES[order + 1]}" if order < 2 else ""
+        rates = {"rate": f"x_{higher}", "rate_name": higher} if higher else {"derivable": False}
+        offer(f"{f}{suffix}", (), code, doc=doc, **rates)
+    offer(f"{f}_0", (), f"F[{at}, 4]", doc="its value at t = 0")
+
+
+def _offer_angle(offer: Callable[..., None], name: str, spec: FieldSpec, layout: Layout) -> None:
+    u, v, k = spec.axes
+    at, axes = layout.angles[name], f"x_{u}, x_{v}, x_{k}"
+    ahead = f"par[p1 + {at}] + par[p1 + {at + 1}] * (t - par[p1 + {at + 2}])"
+    code = f"unwound(angle_about({axes}), {ahead})"
+    one, other = slot_of(u), slot_of(v)
+    # its rate is that of the formula; theta_dot is it where both bodies turn about k alone
+    turning = ", ".join(f"cross(W_{slot_of(a)}, x_{a})" for a in spec.axes)
+    rates = {"rate": f"angle_rate({axes}, {turning})", "derivable": slot_of(k) is not None}
+    offer(name, (), code, (u, v, k), doc=f"angle from {u} to {v} about {k}, rad", **rates)
+    rate = f"dot(x_{k}, sub(x_w_{other}, x_w_{one}))"
+    needs = (k, f"w_{one}", f"w_{other}")
+    motion = f"dot(x_{k}, sub(W_{other}, W_{one}))"
+    offer(f"{name}_dot", (), rate, needs, True, f"rate of {name}, rad/s", motion=motion)
+
+
+def _offer_point(offer: Callable[..., None], name: str, s: str, layout: Layout) -> None:
+    arm, rate, local = f"s_{name}", f"s_{name}_dot", stored(layout, name)
+    place, speed = f"position of {name}, m", f"velocity of {name}, m/s"
+    turns = {"rate": f"cross(W_{s}, x_{arm})", "rate_name": rate}
+    moves = {"rate": f"add(V_{s}, cross(W_{s}, x_{arm}))", "rate_name": f"v_{name}"}
+    code, doc = f"rotate(x_A_{s}, {local})", f"arm of {name}, global, m"
+    offer(arm, (3,), code, (f"A_{s}",), doc=doc, **turns)
+    offer(f"r_{name}", (3,), f"add(x_r_{s}, x_{arm})", (f"r_{s}", arm), doc=place, **moves)
+    offer(rate, (3,), f"cross(x_w_{s}, x_{arm})", (f"w_{s}", arm), True, "rate of the arm, m/s")
+    code = f"add(vector_at(body, b_{s}, V), x_{rate})"  # a field may have the name v_i
+    offer(f"v_{name}", (3,), code, (rate,), True, speed)
+
+
+def _offer_vector(offer: Callable[..., None], name: str, s: str | None, layout: Layout) -> None:
+    """A vector fixed in the body of slot s, or in a body of its own where s is its own name."""
+    local = stored(layout, name)
+    needs: tuple[str, ...] = ()
+    if s in layout.slots:
+        turned, turning, needs = f"x_A_{s}", f"x_w_{s}", (f"A_{s}", f"w_{s}")
+        fixed = f"vector fixed in body {s}, global"
+    else:
+        turned, turning = f"matrix_at(body, b_{s}, A)", f"vector_at(body, b_{s}, W)"
+        fixed = "vector fixed in a body of the element, global"
+    turns = {"rate": f"cross(W_{s}, x_{name})", "rate_name": f"{name}_dot"}
+    known = turns if needs else {"derivable": False}
+    offer(name, (3,), f"rotate({turned}, {local})", needs[:1], doc=fixed, **known)
+    rate = f"cross({turning}, x_{name})"
+    offer(f"{name}_dot", (3,), rate, (*needs[1:], name), True, f"rate of {name}, 1/s")
+
+
+def _offer_constant(offer: Callable[..., None], name: str, layout: Layout) -> None:
+    slot, shape = slot_of(name), layout.numbers[name][1]
+    if shape == (3,) and slot in layout.slots:
+        _offer_vector(offer, name, slot, layout)
+    else:
+        offer(name, shape, stored(layout, name), doc="constant found by prepare")
+
+
+def stored(layout: Layout, name: str) -> str:
+    """Expression for a number of an instance."""
+    offset, shape = layout.numbers[name]
+    if shape == ():
+        return f"par[p1 + {offset}]"
+    if shape == (3,):
+        return f"vector_in(par, p1 + {offset})"
+    if shape == (3, 3):
+        return f"matrix_in(par, p1 + {offset})"
+    return _nested(shape, offset)
+
+
+def _nested(shape: tuple[int, ...], offset: int) -> str:
+    if not shape:
+        return f"par[p1 + {offset}]"
+    parts = (_nested(shape[1:], offset + k * size(shape[1:])) for k in range(shape[0]))
+    return f"({', '.join(parts)},)"
+
+
+def _tuple(pattern: str, n: int) -> str:
+    return "(" + "".join(pattern.format(k) + ", " for k in range(n)) + ")"
+
+
+def parameters(kernel: Callable[..., Any]) -> tuple[str, ...]:
+    """The names a kernel asks for."""
+    positional = (Parameter.POSITIONAL_OR_KEYWORD, Parameter.POSITIONAL_ONLY)
+    return tuple(n for n, p in signature(kernel).parameters.items() if p.kind in positional)
+
+
+def in_order(names: Mapping[str, Quantity], wanted: Iterable[str]) -> list[Quantity]:
+    """The wanted quantities and all they need, each after what it needs."""
+    done: dict[str, Quantity] = {}
+
+    def visit(name: str) -> None:
+        if name not in done:
+            for need in names[name].needs:
+                visit(need)
+            done[name] = names[name]
+
+    for name in wanted:
+        visit(name)
+    return list(done.values())

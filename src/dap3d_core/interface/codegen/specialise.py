@@ -1,0 +1,251 @@
+"""Types completed by what a scene gives them: functions of an argument, the friction of a joint.
+
+A kernel that calls ``f(x)`` is compiled once for each type of function it meets: the kernel is
+copied with the function's own kernel in the place of ``f``, and the numbers of the function stand
+behind those of the element (compiled code takes no closure there; docs/decisions/0001).
+"""
+
+import ast
+import inspect
+import textwrap
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import attrs
+
+from dap3d_core.interface.codegen.instance_layout import Layout
+from dap3d_core.interface.codegen.kernel_arguments import (
+    DERIVATIVES,
+    FRICTION_NUMBERS,
+    Quantity,
+    friction_names,
+    in_order,
+    namespace,
+    parameters,
+    stored,
+)
+from dap3d_core.interface.examine.examine import Examined, PluginError, where_is
+
+
+def uncalled(examined: Examined) -> str:
+    """A function that kernels call and that is not known; "" where there is none."""
+    names = {n for kernel in examined.kernels.values() for n in parameters(kernel)}
+    return min((n for n in names if n in examined.names and examined.names[n].derivative >= 0),
+               key=len, default="")  # fmt: skip
+
+
+#: Behind the name of a function: its knots.
+KNOTS = "__knots"
+#: The kernels of which the first that calls a function tells what it is called with.
+CALLING = ("C", "C_dot", "gamma", "wrench")
+
+
+def bind_functions(
+    examined: Examined, functions: Mapping[str, Examined], knots: Mapping[str, int]
+) -> Examined:
+    """A type whose functions of an argument are known.
+
+    Args:
+        examined: the type.
+        functions: function field -> the type of the function given.
+        knots: function field -> number of arguments at which that function takes another form.
+
+    Returns:
+        the type with the numbers of these functions behind its own, in the order of the fields, and
+        the knots of each behind its numbers. Where there are any it has a kernel ``knot``: how far
+        the arguments that the functions are called with are from these.
+
+    Raises:
+        PluginError: a kernel does more with a function than to call it, or has no source.
+    """
+    layout, names = examined.layout, dict(examined.names)
+    calls: dict[str, tuple[_Given, int]] = {}
+    for field, of_argument in functions.items():
+        prefix = "f" if field == "function" else field
+        behind = _behind(of_argument.layout, layout.par_width)
+        value = of_argument.kernels["value"]
+        asked = parameters(value)
+        own = in_order(namespace(of_argument.type, behind), [n for n in asked if n != "x"])
+        names |= {f"{prefix}__{q.name}": attrs.evolve(q, name=f"{prefix}__{q.name}") for q in own}
+        wanted = tuple("x" if n == "x" else f"{prefix}__{n}" for n in asked)
+        given = _Given(f"{prefix}__value", value, wanted, f"{prefix}{KNOTS}", knots[field])
+        calls |= {f"{prefix}{s}": (given, order) for order, s in enumerate(DERIVATIVES)}
+        width = behind.par_width
+        layout = attrs.evolve(layout, par_width=width + given.knot_count)
+        if given.knot_count:
+            shape = (given.knot_count,)
+            numbers = layout.numbers | {given.knots: (width, shape)}
+            layout = attrs.evolve(layout, numbers=numbers)
+            names[given.knots] = Quantity(given.knots, shape, False, stored(layout, given.knots))
+    kernels = {n: _with_functions(examined, n, k, calls) for n, k in examined.kernels.items()}
+    title = f"({', '.join(g.type.keyword for g in functions.values())})"
+    bound = attrs.evolve(examined, layout=layout, names=names, kernels=kernels, given=title)
+    calling = [
+        n for n in CALLING if set(parameters(examined.kernels.get(n, _nothing))) & set(calls)
+    ]
+    if not calling or not any(knots.values()):
+        return bound
+    distances = _Distances(calls)
+    kernel = _with_functions(examined, calling[0], examined.kernels[calling[0]], calls, distances)
+    paths = tuple(f"out[{k}]" for k in range(len(distances.found)))
+    return attrs.evolve(
+        bound, kernels=bound.kernels | {"knot": kernel}, outputs=bound.outputs | {"knot": paths}
+    )
+
+
+def is_knots(name: str) -> bool:
+    """Whether a number of a layout holds the knots of a function."""
+    return name.endswith(KNOTS)
+
+
+def _nothing() -> None:
+    """A kernel that asks for nothing."""
+
+
+@attrs.frozen
+class _Given:
+    """The kernel of a function that is given: its name in the copy, itself, what it is called with.
+
+    That is the argument, ``x``, and the names of its numbers; name and number of its knots.
+    """
+
+    known_as: str
+    value: Callable[..., Any]
+    wanted: tuple[str, ...]
+    knots: str
+    knot_count: int
+
+
+def bind_friction(examined: Examined) -> Examined:
+    """A joint's kernel ``friction`` as an element of its own: mu, v_tol, radius behind its numbers.
+
+    Raises:
+        PluginError: the joint has no such kernel.
+    """
+    kernel = examined.kernels.get("friction")
+    if kernel is None:
+        raise PluginError(f"{where_is(examined.type)} defines no friction")
+    layout, names = examined.layout, dict(examined.names)
+    numbers, width = dict(layout.numbers), layout.par_width
+    for name, quantity in friction_names(examined.type.rows).items():  # type: ignore[attr-defined]
+        if name in FRICTION_NUMBERS and name not in examined.layout.numbers:
+            numbers[name] = width, ()
+            quantity = attrs.evolve(quantity, code=f"par[p1 + {width}]")
+            width += 1
+        names[name] = quantity if name not in examined.layout.numbers else names[name]
+    layout = attrs.evolve(layout, numbers=numbers, par_width=width)
+    return attrs.evolve(examined, layout=layout, names=names, kernels={"friction": kernel})
+
+
+def _behind(layout: Layout, start: int) -> Layout:
+    """A layout whose numbers begin at ``start``."""
+    return attrs.evolve(
+        layout,
+        numbers={n: (start + at, shape) for n, (at, shape) in layout.numbers.items()},
+        tables={n: (start + at, columns) for n, (at, columns) in layout.tables.items()},
+        par_width=start + layout.par_width,
+    )
+
+
+def _with_functions(
+    examined: Examined,
+    name: str,
+    kernel: Callable[..., Any],
+    calls: Mapping[str, tuple[_Given, int]],
+    replaced: "_Calls | None" = None,
+) -> Callable[..., Any]:
+    """The kernel with its calls of functions replaced by calls of the functions' own kernels."""
+    asked = [n for n in parameters(kernel) if n in calls]
+    if not asked:
+        return kernel
+    who = f"{where_is(examined.type)}.{name}"
+    try:
+        lines, first = inspect.getsourcelines(kernel)
+        tree = ast.parse(textwrap.dedent("".join(lines)))
+    except (OSError, TypeError, SyntaxError) as error:
+        raise PluginError(f"{who}: its source cannot be read ({error})") from error
+    ast.increment_lineno(tree, first - 1)
+    definition = tree.body[0]
+    if not isinstance(definition, ast.FunctionDef):
+        raise PluginError(f"{who} is to be written with def, for it calls a function")
+    replaced = _Calls(calls) if replaced is None else replaced
+    replaced.generic_visit(definition)
+    if replaced.other:
+        raise PluginError(f"{who} may only call {', '.join(replaced.other)}, with one argument")
+    kept = [a for a in definition.args.args if a.arg not in asked]
+    used = dict.fromkeys(calls[n][0] for n in asked)
+    numbers = [n for given in used for n in (*given.wanted, *replaced.names(given)) if n != "x"]
+    definition.args.args = [*kept, *(ast.arg(n) for n in numbers)]
+    definition.decorator_list = []
+    plain = kernel.__globals__ | {given.known_as: given.value for given in used}
+    code = compile(ast.fix_missing_locations(tree), kernel.__code__.co_filename, "exec")
+    exec(code, plain)  # the plugin's own source, as importing it did
+    copied: Callable[..., Any] = plain[definition.name]
+    return copied
+
+
+class _Calls(ast.NodeTransformer):
+    """``f(x)`` -> ``f__value(x, numbers...)[0]``."""
+
+    def __init__(self, calls: Mapping[str, tuple[_Given, int]]) -> None:
+        self.calls = calls
+        self.other: list[str] = []
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        name = node.func.id if isinstance(node.func, ast.Name) else ""
+        if name not in self.calls or len(node.args) != 1 or node.keywords:
+            return self.generic_visit(node)
+        given, order = self.calls[name]
+        argument = self.argument(given, self.visit(node.args[0]))
+        arguments = [argument if n == "x" else ast.Name(n, ast.Load()) for n in given.wanted]
+        call = ast.Call(ast.Name(given.known_as, ast.Load()), arguments, [])
+        return ast.copy_location(ast.Subscript(call, ast.Constant(order), ast.Load()), node)
+
+    def argument(self, given: _Given, node: ast.expr) -> ast.expr:
+        """What a function is called with, as it stands in the copy."""
+        return node
+
+    def names(self, given: _Given) -> tuple[str, ...]:
+        """What the copy asks for besides the numbers of a function."""
+        return ()
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        if node.id in self.calls:
+            self.other.append(node.id)
+        return node
+
+
+class _Distances(_Calls):
+    """The same, but the copy returns how far each argument is from each knot of its function."""
+
+    def __init__(self, calls: Mapping[str, tuple[_Given, int]]) -> None:
+        super().__init__(calls)
+        self.found: list[ast.expr] = []
+        self._known: dict[str, str] = {}
+        self._new: list[ast.stmt] = []
+
+    def argument(self, given: _Given, node: ast.expr) -> ast.expr:
+        key = f"{given.known_as}({ast.dump(node)})"
+        if key not in self._known:  # f_dot(x) beside f(x) has the same
+            name = self._known[key] = f"x__{len(self._known)}"
+            self._new.append(ast.Assign([ast.Name(name, ast.Store())], node))
+            for k in range(given.knot_count):
+                knot = ast.Subscript(ast.Name(given.knots, ast.Load()), ast.Constant(k), ast.Load())
+                self.found.append(ast.BinOp(ast.Name(name, ast.Load()), ast.Sub(), knot))
+        return ast.Name(self._known[key], ast.Load())
+
+    def names(self, given: _Given) -> tuple[str, ...]:
+        return (given.knots,) if given.knot_count else ()
+
+    def visit_Assign(self, node: ast.Assign) -> list[ast.AST]:
+        self.generic_visit(node)
+        return [*self._taken(), node]
+
+    def visit_Return(self, node: ast.Return) -> list[ast.AST]:
+        self.generic_visit(node)  # what is called there counts, what comes of it does not
+        return [*self._taken(), ast.Return(ast.Tuple(list(self.found), ast.Load()))]
+
+    def _taken(self) -> list[ast.stmt]:
+        """Assignments of arguments that stand before a line."""
+        taken, self._new = self._new, []
+        return taken

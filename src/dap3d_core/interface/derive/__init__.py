@@ -1,0 +1,1 @@
+"""Derivation of J, gamma and nu from C by symbolic differentiation."""

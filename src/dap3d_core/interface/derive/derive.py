@@ -1,0 +1,105 @@
+"""Formulas that a type leaves out, derived from those that it gives.
+
+A joint that defines ``C`` (and ``C_dot`` for the rows of the velocity level) gets ``J``, ``gamma``
+and ``nu``, a force that defines ``energy`` its ``wrench``, a function whose ``value`` is one number
+its derivatives. What a type writes by hand is kept. The derived kernels are a module in the cache
+folder, with a digest of the type's sources in its name: sympy is needed for the first use alone.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from dap3d_core.interface.codegen.instance_layout import Layout
+from dap3d_core.interface.codegen.kernel_arguments import Quantity
+from dap3d_core.interface.types import Joint, TypeBase
+
+Kernel = Callable[..., Any]
+
+#: Which kernels others are derived from.
+GIVEN = {"joint": ("C", "C_dot"), "force": ("energy",), "function": ("value",)}
+
+
+class CannotDeriveError(ValueError):
+    """A formula is missing and cannot be derived; says why and what to do."""
+
+
+def missing(type_: type[TypeBase], gives_one_number: bool = False) -> tuple[str, ...]:
+    """The kernels to be derived; none where the type defines all that it needs.
+
+    Args:
+        type_: the type.
+        gives_one_number: of a function, whether its ``value`` gives f alone.
+    """
+    there = type_.kernels()
+    if issubclass(type_, Joint):
+        if {"J", "gamma"} <= set(there) or not {"C", "C_dot"} & set(there):
+            return ()
+        return tuple(n for n in ("J", "gamma", "nu") if n not in there)
+    if type_.kind == "force":
+        return ("wrench",) if "energy" in there and "wrench" not in there else ()
+    return ("value",) if gives_one_number else ()
+
+
+def derive(
+    type_: type[TypeBase], layout: Layout, names: Mapping[str, Quantity], wanted: tuple[str, ...]
+) -> dict[str, Kernel]:
+    """The wanted kernels (``missing``), by name; ``nu`` only where it is not zero.
+
+    Raises:
+        CannotDeriveError: says why, and what to do.
+    """
+    # here, for finding types by keyword does not need the compiler
+    from dap3d_core.kernels.runtime import generated_modules
+    from dap3d_core.kernels.runtime.cache import digest, identities, sources
+
+    given = {n: k for n, k in type_.kernels().items() if n in GIVEN[type_.kind]}
+    offered, here = [repr(q) for q in names.values()], Path(__file__)
+    how = [here.with_name(f"{n}.py").read_bytes() for n in ("derive", "symbolic", "kernel_printer")]
+    kernels = given.values()
+    key = digest(*wanted, *offered, *how, *identities(*kernels), *sources(*kernels))
+    name = f"derived-{key}"
+    text = generated_modules.kept(name)
+    if text is None:
+        text = _text(type_, given, layout, names, wanted)
+    path = generated_modules.write(name, text)
+    namespace = generated_modules.load(path, name, text)
+    return {n: namespace[n] for n in wanted if n in namespace}
+
+
+def _text(
+    type_: type[TypeBase],
+    given: Mapping[str, Kernel],
+    layout: Layout,
+    names: Mapping[str, Quantity],
+    wanted: tuple[str, ...],
+) -> str:
+    """The source of the module of derived kernels."""
+    try:
+        from dap3d_core.interface.derive import kernel_printer, symbolic
+    except ImportError as error:
+        raise CannotDeriveError(
+            f"it leaves {', '.join(wanted)} to be derived from {', '.join(given)}, which needs "
+            "sympy; install it with: pip install 'dap3d[derive]'"
+        ) from error
+    symbols = symbolic.Symbols(names, layout.slots)
+    try:
+        if issubclass(type_, Joint):
+            C, C_dot = given.get("C"), given.get("C_dot")
+            found, steps = symbolic.derive_joint(
+                C, C_dot, type_.position_rows(), type_.rows, symbols
+            )
+        elif type_.kind == "force":
+            found, steps = symbolic.derive_wrench(given["energy"], symbols)
+        else:
+            found, steps = symbolic.derive_value(given["value"], symbols)
+        if all(x == 0 for x in symbolic.flat(found.get("nu", 0))):
+            found.pop("nu", None)
+        parts = [kernel_printer.kernel_source(n, found[n], steps, symbols, names)
+                 for n in wanted if n in found]  # fmt: skip
+    except symbolic.DerivationError as error:
+        raise CannotDeriveError(str(error)) from error
+    words = sorted(set().union(*(used for _, used in parts)))
+    title = f'"""{", ".join(wanted)} of {type_.keyword}, derived from {", ".join(given)}."""\n'
+    imports = f"\nfrom dap3d_core.kernels import {', '.join(words)}\n" if words else ""
+    return title + imports + "".join(f"\n\n{source}" for source, _ in parts)

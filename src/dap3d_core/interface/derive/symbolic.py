@@ -1,0 +1,399 @@
+"""Formulas of a type by symbolic differentiation: its pure kernels run with sympy's symbols.
+
+Every name that a kernel may use says in ``Quantity.rate`` how it changes: an arm s_P_i turns with
+its body, W_i x s_P_i. With V_i, W_i the velocities of the bodies this gives, for an equation C,
+
+    phi = dC/dt = J v - nu,    so J is the coefficients of V and W in phi, and nu is -phi at rest;
+    d phi/dt = J v_dot - gamma, so gamma is -d phi/dt with V_dot = W_dot = 0.
+
+Only reached for a type that leaves formulas to be derived, so sympy is imported for it alone.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import attrs
+import sympy
+from sympy.logic.boolalg import Boolean
+
+from dap3d_core.interface.codegen.kernel_arguments import Quantity, parameters
+from dap3d_core.interface.kernel_words import PLAINLY
+from dap3d_core.interface.source_location import line_of
+from dap3d_core.kernels import add, cross, dot, sub
+
+Expression = Any
+Steps = dict[Expression, Expression]
+
+
+class DerivationError(ValueError):
+    """A formula cannot be derived; says why and what to do."""
+
+
+def turned(w: Any, A: Any) -> Any:
+    """Rate of a rotation matrix: the columns turn with the body."""
+    columns = [cross(w, tuple(row[c] for row in A)) for c in range(3)]
+    return tuple(tuple(column[r] for column in columns) for r in range(3))
+
+
+def euler_rate(w: Any, p: Any) -> Any:
+    """Rate of Euler parameters for a global angular velocity (spec 1)."""
+    e0, e = p[0], (p[1], p[2], p[3])
+    half = sympy.Rational(1, 2)
+    turning = add(tuple(e0 * x for x in w), cross(w, e))
+    return (-half * dot(e, w), *(half * x for x in turning))
+
+
+def angle_rate(u: Any, v: Any, k: Any, u_dot: Any, v_dot: Any, k_dot: Any) -> Any:
+    """Rate of the angle from u to v about k (gather.angle_about): of atan2(y, x)."""
+    y, x = dot(k, cross(u, v)), dot(u, v) - dot(u, k) * dot(v, k)
+    y_dot = dot(k_dot, cross(u, v)) + dot(k, add(cross(u_dot, v), cross(u, v_dot)))
+    x_dot = (dot(u_dot, v) + dot(u, v_dot) - (dot(u_dot, k) + dot(u, k_dot)) * dot(v, k)
+             - dot(u, k) * (dot(v_dot, k) + dot(v, k_dot)))  # fmt: skip
+    return (x * y_dot - y * x_dot) / (x**2 + y**2)
+
+
+_WORDS = {"add": add, "sub": sub, "cross": cross, "dot": dot, "turned": turned,
+          "euler_rate": euler_rate, "angle_rate": angle_rate}  # fmt: skip
+
+
+def flat(value: Any) -> list[Expression]:
+    """The numbers of a nested tuple, in order."""
+    if isinstance(value, (tuple, list)):
+        return [x for part in value for x in flat(part)]
+    return [sympy.sympify(value)]
+
+
+@attrs.frozen
+class Program:
+    """Expressions with common parts in steps: derivatives of steps are steps, so nothing swells.
+
+    Attributes:
+        steps: symbol -> expression over the symbols before it.
+        results: expressions over all of them.
+        fresh: gives symbols for further steps; numbered from zero in each derivation, for the
+            order of a sum depends on names.
+    """
+
+    steps: dict[Expression, Expression]
+    results: list[Expression]
+    fresh: Iterator[Expression]
+
+    @classmethod
+    def of(cls, results: Sequence[Expression], fresh: Iterator[Expression]) -> "Program":
+        """With a step for what occurs more than once, and for each argument of a function."""
+        common, reduced = sympy.cse(results, symbols=fresh)
+        steps: dict[Expression, Expression] = {}
+        known: dict[Expression, Expression] = {}
+
+        def named(x: Expression) -> Expression:
+            if x.is_Atom:
+                return x
+            if x not in known:
+                known[x] = next(fresh)
+                steps[known[x]] = x
+            return known[x]
+
+        def split(x: Expression) -> Expression:
+            if x.is_Atom or isinstance(x, (sympy.Piecewise, Boolean)):
+                return x
+            arguments = [split(a) for a in x.args]
+            if isinstance(x, sympy.Function) or (x.is_Pow and not x.exp.is_Integer):
+                arguments = [named(a) for a in arguments]
+            return x.func(*arguments)
+
+        for symbol, expression in common:
+            steps[symbol] = split(expression)
+        return cls(steps, [split(x) for x in reduced], fresh)
+
+    def gradient(self, result: int) -> tuple["Program", dict[Expression, Expression]]:
+        """Derivatives of one result by the symbols that are no steps (reverse accumulation).
+
+        Returns:
+            the program with what they need, and the derivatives by symbol.
+        """
+        steps = dict(self.steps)
+        found: dict[Expression, list[Expression]] = {}
+
+        def give(expression: Expression, weight: Expression) -> None:
+            for s in sorted(expression.free_symbols, key=str):
+                found.setdefault(s, []).append(weight * _diff(expression, s))
+
+        give(self.results[result], sympy.Integer(1))
+        for symbol, expression in reversed(self.steps.items()):
+            weight = sympy.Add(*found.pop(symbol, ()))
+            if not weight.is_Atom:
+                step = next(self.fresh)
+                steps[step], weight = weight, step
+            if weight != 0:
+                give(expression, weight)
+        program = attrs.evolve(self, steps=steps)
+        return program, {s: sympy.Add(*x) for s, x in found.items()}
+
+    def plain(self, result: int) -> Expression:
+        """One result without steps."""
+        known: dict[Expression, Expression] = {}
+        for symbol, expression in self.steps.items():
+            known[symbol] = expression.xreplace(known)
+        return self.results[result].xreplace(known)
+
+
+def _diff(expression: Expression, symbol: Expression) -> Expression:
+    """Derivative; a step's (of a sign, a branch) is zero where it is defined."""
+    return sympy.diff(expression, symbol).replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
+
+
+class Symbols(Mapping[str, Any]):
+    """The named quantities of a type as symbols, and how each changes in time.
+
+    As a mapping it holds what the rates are written with: ``x_NAME``, and the velocities ``V_i``
+    and ``W_i`` of the bodies.
+    """
+
+    def __init__(self, names: Mapping[str, Quantity], slots: Sequence[str]) -> None:
+        self.names = names
+        self.owner: dict[Expression, tuple[str, int]] = {}
+        self._values: dict[str, Any] = {}
+        self._rates: dict[str, list[Expression]] = {}
+        self._steps: dict[Expression, Expression] = {}
+        self.fresh = sympy.numbered_symbols("step", real=True)
+        self.velocities = {f"{v.upper()}_{s}": self._velocity(f"{v}_{s}")
+                           for s in slots for v in ("v", "w")}  # fmt: skip
+        self.basic = [x for s in slots for v in ("V", "W") for x in self.velocities[f"{v}_{s}"]]
+        #: names of the velocity level, and what they are in the velocities of the bodies
+        self.motions = {q.name: q.motion for q in names.values() if q.motion} | {
+            q.rate_name: q.rate
+            for q in names.values()
+            if q.rate_name in names and names[q.rate_name].velocity
+        }
+
+    def __getitem__(self, key: str) -> Any:
+        if key in self.velocities:
+            return self.velocities[key]
+        if not key.startswith("x_"):
+            raise KeyError(key)
+        return self.value(key[2:])
+
+    def __iter__(self) -> Any:
+        return iter([*self.velocities, *(f"x_{name}" for name in self.names)])
+
+    def __len__(self) -> int:
+        return len(self.velocities) + len(self.names)
+
+    def _velocity(self, name: str) -> Any:
+        """Three symbols, which a kernel can name unless a field has taken the name."""
+        if self.names[name].velocity:
+            return self.value(name)
+        return tuple(sympy.Dummy(f"{name}[{k}]", real=True) for k in range(3))
+
+    def value(self, name: str) -> Any:
+        """What a kernel is given for a name: symbols in tuples, or a function to be called."""
+        if name not in self._values:
+            quantity = self.names[name]
+            if quantity.derivative >= 0:
+                self._values[name] = self._function(name)
+            elif quantity.columns:
+                raise DerivationError(
+                    f"{name} is a table, and what a table gives cannot be differentiated; "
+                    "write the missing formulas by hand"
+                )
+            else:
+                value = self._values[name] = _symbols(name, quantity.shape)
+                self.owner |= {s: (name, k) for k, s in enumerate(flat(value))}
+        return self._values[name]
+
+    def _function(self, name: str) -> Any:
+        """A function of an argument: sympy differentiates it into the next name."""
+        orders = ("", "_dot", "_ddot")
+        order = self.names[name].derivative
+        higher = f"{name.removesuffix(orders[order])}{orders[order + 1]}" if order < 2 else ""
+
+        def fdiff(self_: Any, argindex: int = 1) -> Any:
+            if not higher:
+                raise DerivationError(f"the derivative of {name} has no name; write it by hand")
+            return self.value(higher)(*self_.args)
+
+        members = {"fdiff": fdiff, "nargs": 1, "is_real": True}
+        return type(name, (sympy.Function,), members)
+
+    def rate(self, name: str) -> list[Expression]:
+        """The rates of a quantity's numbers, in the velocities of the bodies and in time."""
+        if name not in self._rates:
+            quantity = self.names[name]
+            if not quantity.derivable:
+                raise DerivationError(
+                    f"how {name} changes is not known here; write the missing formulas by hand"
+                )
+            zero = [sympy.Integer(0)] * len(flat(self.value(name)))
+            self._rates[name] = self._evaluated(quantity.rate) if quantity.rate else zero
+        return self._rates[name]
+
+    def _evaluated(self, code: str) -> list[Expression]:
+        """The numbers of an expression of ``Quantity``, over symbols: text of the program."""
+        return [exact(x) for x in flat(eval(code, {"__builtins__": {}, **_WORDS}, self))]
+
+    def d_dt(self, program: Program) -> Program:
+        """Rates of a program's results, at V_dot = W_dot = 0; named rates stand by their names."""
+        steps = dict(program.steps)
+        for symbol, expression in program.steps.items():
+            if symbol not in self._steps:
+                rate = self._d_dt(expression)
+                if not rate.is_Atom:
+                    step = next(self.fresh)
+                    steps[step], rate = rate, step
+                self._steps[symbol] = rate
+        return Program(steps, [self._d_dt(x) for x in program.results], self.fresh)
+
+    def _d_dt(self, expression: Expression) -> Expression:
+        symbols = sorted(expression.free_symbols, key=str)
+        return sympy.Add(*(_diff(expression, s) * self._dot(s) for s in symbols))
+
+    def _dot(self, symbol: Expression) -> Expression:
+        if symbol in self._steps:
+            return self._steps[symbol]
+        if symbol in self.basic:
+            return sympy.Integer(0)
+        name, k = self.owner[symbol]
+        if name in self.motions:
+            return self._d_dt(self._evaluated(self.motions[name])[k])
+        rate = self.rate(name)[k]
+        known_as = self.names[name].rate_name
+        return flat(self.value(known_as))[k] if known_as in self.motions else rate
+
+    def motion(self, symbol: Expression) -> Expression:
+        """A velocity written out in those of the bodies; None for what is of no velocity."""
+        if symbol in self.basic:
+            return symbol
+        name, k = self.owner.get(symbol, ("", 0))
+        return self._evaluated(self.motions[name])[k] if name in self.motions else None
+
+
+def _symbols(name: str, shape: tuple[int, ...]) -> Any:
+    if not shape:
+        return sympy.Symbol(name, real=True)
+    return tuple(_symbols(f"{name}[{k}]", shape[1:]) for k in range(shape[0]))
+
+
+def exact(expression: Expression) -> Expression:
+    """With 0.0, 1.0, 0.5 and their like as exact numbers, so that zeros and ones vanish."""
+    floats = {x: sympy.Rational(float(x)) for x in expression.atoms(sympy.Float)
+              if (2.0 * float(x)).is_integer()}  # fmt: skip
+    return expression.xreplace(floats)
+
+
+def traced(kernel: Callable[..., Any], symbols: Symbols, what: str) -> list[Expression]:
+    """The numbers that a kernel returns, as expressions.
+
+    Raises:
+        DerivationError: it does with a quantity what no formula can; says what to write instead.
+    """
+    try:
+        value = kernel(*(symbols.value(name) for name in parameters(kernel)))
+        return [exact(x) for x in flat(value)]
+    except DerivationError:
+        raise
+    except Exception as error:
+        reason = f"({type(error).__name__}: {error}){line_of(error, kernel)}; {PLAINLY}"
+        said = f"{what} cannot be differentiated as a formula {reason}; or write the rest by hand"
+        raise DerivationError(said) from error
+
+
+def derive_joint(
+    C: Callable[..., Any] | None,
+    C_dot: Callable[..., Any] | None,
+    position_rows: Sequence[int],
+    rows: int,
+    symbols: Symbols,
+) -> tuple[dict[str, Any], Steps]:
+    """J, gamma and nu of a joint, as nested lists of expressions over the names and steps.
+
+    Args:
+        C: of the rows of the position level; None where there is none.
+        C_dot: of the other rows: what must vanish, linear in the velocities.
+        position_rows: which rows C gives.
+        rows: how many there are in all.
+        symbols: the joint's names.
+
+    Raises:
+        DerivationError: says why, and what to do.
+    """
+    J: list[Any] = [[None] * rows for _ in range(len(symbols.basic) // 6)]
+    gamma, nu = [sympy.Integer(0)] * rows, [sympy.Integer(0)] * rows
+    steps: Steps = {}
+    velocity_rows = [k for k in range(rows) if k not in position_rows]
+    for kernel, which, what in ((C, position_rows, "C"), (C_dot, velocity_rows, "C_dot")):
+        if kernel is None:
+            continue
+        program = Program.of(traced(kernel, symbols, what), symbols.fresh)
+        phi = symbols.d_dt(program) if what == "C" else program
+        rate = symbols.d_dt(phi)
+        steps |= rate.steps
+        rest = _at_rest(phi, symbols)
+        steps |= rest.steps
+        for k, row in enumerate(which):
+            with_gradient, gradient = program.gradient(k)
+            steps |= with_gradient.steps
+            coefficients = _coefficients(gradient, symbols, of_rates=what == "C_dot")
+            for n, block in enumerate(J):
+                block[row] = coefficients[6 * n : 6 * n + 6]
+            if what == "C_dot":
+                _check_linear(program.plain(k), row, symbols)
+            gamma[row], nu[row] = -rate.results[k], -rest.results[k]
+    return {"J": J, "gamma": gamma, "nu": nu}, steps
+
+
+def _coefficients(
+    gradient: Mapping[Expression, Expression], symbols: Symbols, *, of_rates: bool
+) -> list[Expression]:
+    """Coefficients of the bodies' velocities in the rate of what has this gradient.
+
+    of_rates: the gradient is that of a form in the velocities, by the rates themselves.
+    """
+    found: list[list[Expression]] = [[] for _ in symbols.basic]
+    for symbol, weight in gradient.items():
+        if of_rates:
+            motion = symbols.motion(symbol)
+        else:
+            name, k = symbols.owner[symbol]
+            motion = symbols.rate(name)[k]
+        for u in motion.free_symbols if motion is not None else ():
+            if u in symbols.basic:
+                found[symbols.basic.index(u)].append(weight * sympy.diff(motion, u))
+    return [sympy.Add(*terms) for terms in found]
+
+
+def _at_rest(phi: Program, symbols: Symbols) -> Program:
+    """The program with all bodies at rest: what is left depends on time."""
+    used = set().union(*(x.free_symbols for x in (*phi.steps.values(), *phi.results)))
+    zero = {s: sympy.Integer(0) for s in used if symbols.motion(s) is not None}
+    steps: Steps = {}
+    for symbol, expression in phi.steps.items():
+        rest = expression.xreplace(zero)
+        zero[symbol] = rest if rest.is_Atom else next(symbols.fresh)
+        if not rest.is_Atom:
+            steps[zero[symbol]] = rest
+    return Program(steps, [x.xreplace(zero) for x in phi.results], symbols.fresh)
+
+
+def _check_linear(form: Expression, row: int, symbols: Symbols) -> None:
+    rates = {s: symbols.motion(s) for s in form.free_symbols}
+    in_velocities = form.xreplace({s: x for s, x in rates.items() if x is not None})
+    basic = set(symbols.basic)
+    if any(sympy.diff(in_velocities, u).free_symbols & basic for u in basic):
+        raise DerivationError(f"row {row + 1} of C_dot is not linear in the velocities")
+
+
+def derive_wrench(energy: Callable[..., Any], symbols: Symbols) -> tuple[dict[str, Any], Steps]:
+    """The wrench of a potential: its gradient along each velocity of each body, reversed."""
+    potential = Program.of(traced(energy, symbols, "energy"), symbols.fresh)
+    program, gradient = potential.gradient(0)
+    force = [-x for x in _coefficients(gradient, symbols, of_rates=False)]
+    pairs = [[force[n : n + 3], force[n + 3 : n + 6]] for n in range(0, len(force), 6)]
+    return {"wrench": pairs}, program.steps
+
+
+def derive_value(value: Callable[..., Any], symbols: Symbols) -> tuple[dict[str, Any], Steps]:
+    """(f, f', f'', f''') of a function that gives f alone."""
+    found = traced(value, symbols, "value")[:1]
+    for _ in range(3):
+        found.append(_diff(found[-1], symbols.value("x")))
+    return {"value": found}, {}

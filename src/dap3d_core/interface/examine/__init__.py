@@ -1,0 +1,1 @@
+"""Trial of a type before use: its kernels are called once with random arguments."""

@@ -1,0 +1,71 @@
+"""Random numbers for what kernels and ``prepare`` take: types are tried with them before use."""
+
+import math
+import random
+from typing import Any
+
+from dap3d_core.interface.body_pose import BodyPose, pose
+from dap3d_core.interface.codegen.kernel_arguments import Quantity
+from dap3d_core.interface.fields import FieldSpec
+
+
+def numbers(rng: random.Random, n: int) -> tuple[float, ...]:
+    """Numbers of size 0.5 to 1.5, of either sign."""
+    return tuple(rng.uniform(0.5, 1.5) * rng.choice((-1.0, 1.0)) for _ in range(n))
+
+
+def unit(values: tuple[float, ...]) -> tuple[float, ...]:
+    """The same direction with length 1."""
+    length = math.sqrt(sum(x * x for x in values))
+    return tuple(x / length for x in values)
+
+
+def random_pose(rng: random.Random) -> BodyPose:
+    """A pose off the origin and turned."""
+    return pose(numbers(rng, 3), unit(numbers(rng, 4)))
+
+
+def random_value(shape: tuple[int, ...], rng: random.Random) -> Any:
+    """A number, a vector, a rotation matrix (3, 3), Euler parameters (4,), or tuples of these."""
+    if shape == ():
+        return rng.uniform(0.5, 1.5)
+    if shape == (3, 3):
+        return random_pose(rng).A
+    if shape == (4,):
+        return unit(numbers(rng, 4))
+    if len(shape) > 1:
+        return tuple(random_value(shape[1:], rng) for _ in range(shape[0]))
+    return numbers(rng, shape[0])
+
+
+def random_quantity(quantity: Quantity, rng: random.Random) -> Any:
+    """What a kernel may be given for a name: numbers, a table, or a function to be called."""
+    if quantity.derivative >= 0:
+        a, b = rng.uniform(0.5, 1.5), rng.uniform(0.5, 1.5)
+        return lambda x: a + b * x
+    if quantity.columns:
+        rows = [(float(k), *numbers(rng, quantity.columns - 1)) for k in range(3)]
+        return [x for row in rows for x in row], 0, len(rows), (0.0,) * quantity.columns
+    return random_value(quantity.shape, rng)
+
+
+def random_field(spec: FieldSpec, rng: random.Random) -> Any:
+    """What the scene may give for a field, as ``prepare`` sees it."""
+    if spec.kind == "table":
+        return tuple(float(k) + rng.uniform(0.0, 0.5) for k in range(6)) if spec.given else None
+    if spec.kind == "angle":
+        return None
+    if spec.kind in ("point", "vec3", "vector2"):
+        return numbers(rng, 3)
+    if spec.kind == "vector":
+        return unit(numbers(rng, 3))
+    if spec.kind == "matrix":
+        return random_pose(rng).A
+    if spec.kind == "number":
+        low = 0.5 if spec.minimum is None else spec.minimum + 0.5
+        value = rng.uniform(low, low + 1.0)
+        value = value if spec.maximum is None else min(value, spec.maximum)
+        return float(math.ceil(low)) if spec.whole else value
+    if spec.kind == "choice":
+        return spec.choices[0]
+    return None if spec.kind == "function" else spec.kind

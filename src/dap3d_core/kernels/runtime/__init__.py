@@ -1,0 +1,1 @@
+"""Around compiled code: its cache, function tables, structs of arrays, generated modules."""

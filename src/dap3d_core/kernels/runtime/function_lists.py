@@ -1,0 +1,59 @@
+"""Tables of functions by their addresses: what the driver did not know when it was compiled."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
+
+import attrs
+
+from dap3d_core.kernels.compiler.types import FLOAT, INT, Numbers, Signature, Table
+from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, VECTOR, Arrays, pointer
+from dap3d_core.kernels.runtime.cache import compiled, table_of
+
+
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class LoopArrays(Arrays):
+    """What every group loop reads; the driver's system begins with it."""
+
+    types: ClassVar[dict[str, Any]] = {"body": MATRIX, "F": MATRIX, "idx": INTEGERS}
+
+    body: Any  # (n+1, BODY_WIDTH) state and constants of each body (loop_support.py)
+    F: Any  # (functions+1, 5) functions of time, at t and (the last column) at 0
+    idx: Any  # integers of all instances
+    par: Any  # numbers of all instances
+
+
+_OUT = Numbers()
+#: Signature of every group loop (loop_modules.py).
+LOOP = Signature((FLOAT, LoopArrays.type_of(), INT, INT, INT, _OUT, _OUT, _OUT))
+LOOP_LIST = Table(LOOP)
+#: A Python integer as an argument.
+INTEGER = INT
+
+
+def procedure_signature(*arguments: Any) -> Signature:
+    """Signature of a function of these arguments that returns nothing."""
+    return Signature(arguments)
+
+
+def step_signature(system: Any) -> Signature:
+    """Signature of a formulation's functions: (t, y, out, system, loops)."""
+    return procedure_signature(FLOAT, VECTOR, VECTOR, system, LOOP_LIST)
+
+
+def number_signature(*arguments: Any) -> Signature:
+    """Signature of a function of two numbers and these arguments that returns a number."""
+    return Signature((FLOAT, FLOAT, *arguments), FLOAT)
+
+
+def loop_list(loops: Sequence[Callable[..., Any]]) -> Any:
+    """Group loops as the one table that the driver takes as an argument of its own."""
+    return table_of(LOOP, loops)
+
+
+@compiled
+def call_loop(
+    loops: Any, q: int, t: float, arrays: Any, group: Any, out1: Any, out2: Any, out3: Any
+) -> None:
+    """Call one group loop, with arrays and a group (i0, p0, count) of the caller's."""
+    loop = loops[q]
+    loop(t, arrays, group[0], group[1], group[2], pointer(out1), pointer(out2), pointer(out3))

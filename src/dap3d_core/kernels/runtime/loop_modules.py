@@ -1,0 +1,113 @@
+"""Group loops: one compiled function that runs a type's kernel over all its instances.
+
+A loop is written as the source of a small module: gather the named quantities of instance q, call
+the kernel, store what it returns. All loops have one signature, so that the driver holds them in
+one list and is never recompiled for a new type:
+
+    loop(t, arrays, i0, p0, count, out1, out2, out3)
+
+    arrays            body, F, idx, par (lists.LoopArrays); row 0 of F is the absent function
+    i0, p0            where this group's integers and numbers begin in idx and par
+    out1, out2, out3  what the kernels return, flat (by_address.pointer)
+"""
+
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from dap3d_core.kernels import table_lookup
+from dap3d_core.kernels.compiler.trace import trace
+from dap3d_core.kernels.compiler.units import Entry, Unit
+from dap3d_core.kernels.runtime import generated_modules, loop_support
+from dap3d_core.kernels.runtime.cache import cache_folder, jit_is_on, names_of, places, sources
+from dap3d_core.kernels.runtime.function_lists import LOOP, LoopArrays
+from dap3d_core.kernels.runtime.outer_references import refuse_what_is_outside
+
+
+class Loop(NamedTuple):
+    """What a loop module is written from."""
+
+    name: str  # of the type and what it computes: shown while compiling
+    kernels: dict[str, Callable]  # the pure functions, by the name under which ``lines`` call them
+    lines: Sequence[str]  # body of the loop for instance q
+
+
+def source_of(loop: Loop) -> str:
+    """The source text of a loop's module, without its kernels (they are put into its namespace)."""
+    head = (
+        f'"""Group loop of {loop.name}; written by dap3d, do not edit."""\n\n'
+        "from dap3d_core.kernels.runtime.loop_support import *\n\n\n"
+        "def loop(t, arrays, i0, p0, count, out1, out2, out3):\n"
+        "    body, F, idx, par = arrays.body, arrays.F, arrays.idx, arrays.par\n"
+        "    for q in range(count):\n"
+    )
+    return head + "".join(f"        {line}\n" for line in loop.lines)
+
+
+_built: dict[tuple[str, str], Callable] = {}
+#: Held while a loop is built, which several threads may ask for at once.
+_building = threading.Lock()
+#: Names of the loops that this process had to compile (not those it found in the cache).
+compiled_here: list[str] = []
+
+
+def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable:
+    """The compiled loop, from this process, from the cache folder, or compiled now.
+
+    Args:
+        loop: what to build.
+        announce: called with the loop's name before it is compiled anew.
+
+    Raises:
+        CompileError: a kernel does what only numbers can; names its line, and what to do.
+    """
+    text = source_of(loop)
+    gathering = (
+        loop_support.vector_at,
+        loop_support.matrix_at,
+        loop_support.unwound,
+        loop_support.doubtful,
+    )
+    gathering += (table_lookup.lookup,)
+    kernels = loop.kernels.values()
+    parts = (text, repr(_members()), *places(*kernels), *sources(*kernels, *gathering))
+    names = names_of("loop", kernels, *parts)
+    with _building:
+        if names not in _built:
+            _built[names] = _build(loop, text, *names, announce)
+        return _built[names]
+
+
+def _build(
+    loop: Loop, text: str, ready_name: str, name: str, announce: Callable[[str], None] | None
+) -> Callable:
+    def python() -> dict[str, Any]:
+        namespace = generated_modules.load(None, name, text)
+        namespace.update(loop.kernels)
+        return namespace
+
+    if not jit_is_on():
+        return python()["loop"]
+
+    def write(symbols: list[str]) -> tuple[str, list[Any]]:
+        if announce is not None:
+            announce(loop.name)
+        refuse_what_is_outside(*loop.kernels.values())
+        compiled_here.append(loop.name)
+        return trace(symbols[0], python(), _members()), ["None"]
+
+    unit = Unit(name, 1, write, cache_folder(), optimise=True, ready_name=ready_name)
+    return Entry(unit, 0, LOOP)
+
+
+def _members() -> dict[str, tuple[int, str, int]]:
+    """Of each array: its first word in the table, LLVM's type of its items, width of its rows."""
+    found, first = {}, 0
+    for name, type_ in LoopArrays.type_of().members:
+        found[name] = (
+            first,
+            type_.item.words[0],
+            {"body": loop_support.BODY_WIDTH, "F": 5}.get(name, 0),
+        )
+        first += len(type_.words)
+    return found

@@ -1,0 +1,1 @@
+"""Sparse block LDL^T factorisation of the saddle-point matrix."""

@@ -1,0 +1,346 @@
+"""The compiled side of the elimination program: assemble, factor, solve.
+
+What remains to be factored when the early bodies are gone (linear/ldlt/saddle_point.py) is K: its
+blocks stand by columns of the lower triangle. The pivot of a node is L d L^T with d positive for a
+hub and negative for a joint (its ``sign``). In the place of the pivot's diagonal 1/d is stored,
+below it L (one on its diagonal), and for a block A below the pivot A L^-T.
+
+Nodes of three and five rows (spherical and revolute joints) have their own code: the same lines,
+put there again with the number of rows known, so that no loop remains. Panels have theirs, too
+(linear/ldlt/panels.py).
+
+With ``regularise`` the matrix is [I D^^T; D^ -E] with a positive diagonal E, the compliance of the
+rows: it can be factored in any order, whatever the rank of D^ (Vanderbei, Symmetric quasidefinite
+matrices, SIAM J. Optim. 5, 1995).
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.kernels.runtime.array_struct import pointer
+from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
+from dap3d_core.linear.ldlt.panels import factor_panel, solve_panel_backwards, solve_panel_forwards
+from dap3d_core.linear.ldlt.plan import COPY, DIAGONAL, PRODUCTS, TRANSPOSE, Integers
+from dap3d_core.linear.ordering.supernodes import LEAST_ROWS
+
+Floats = NDArray[np.float64]
+
+
+#: Pivots are squares of lengths. Near a singular pose one is a hundredth in length of what it was
+#: at the start, and the product of its node has fallen by as much: to LESS at least, where others
+#: have grown.
+POOR, LESS = 1e-4, 1e-2
+
+
+@compiled_into
+def add_rows_product(
+    D: Floats, a: int, b: int, K: Floats, o: int, m: int, n: int, lower: bool, first: bool
+) -> None:
+    """K block (m, n) at o less the product of m rows of D at a with n rows at b, transposed.
+
+    lower: the lower triangle alone. first: K held nothing before.
+    """
+    for r in range(m):
+        x0, x1, x2 = D[a + 6 * r], D[a + 6 * r + 1], D[a + 6 * r + 2]
+        x3, x4, x5 = D[a + 6 * r + 3], D[a + 6 * r + 4], D[a + 6 * r + 5]
+        for c in range(r + 1 if lower else n):
+            e = b + 6 * c
+            s = (x0 * D[e] + x1 * D[e + 1] + x2 * D[e + 2]
+                 + x3 * D[e + 3] + x4 * D[e + 4] + x5 * D[e + 5])  # fmt: skip
+            K[o + r * n + c] = -s if first else K[o + r * n + c] - s
+
+
+@compiled_into
+def add_product_of(
+    D: Floats, a: int, b: int, K: Floats, o: int, m: int, n: int, lower: bool, first: bool
+) -> None:
+    """``add_rows_product``, by sizes."""
+    if m == 3 and n == 3:
+        if lower:
+            add_rows_product(D, a, b, K, o, 3, 3, True, first)
+        else:
+            add_rows_product(D, a, b, K, o, 3, 3, False, first)
+    elif m == 5 and n == 5:
+        if lower:
+            add_rows_product(D, a, b, K, o, 5, 5, True, first)
+        else:
+            add_rows_product(D, a, b, K, o, 5, 5, False, first)
+    else:
+        add_rows_product(D, a, b, K, o, m, n, lower, first)
+
+
+@compiled
+def assemble(targets: Integers, contributions: Integers, D: Floats, K: Floats) -> None:
+    """Fill K before its factorisation."""
+    D, K = pointer(D), pointer(K)
+    for q in range(targets.shape[0]):
+        o, m, n, kind = targets[q, 0], targets[q, 1], targets[q, 2], targets[q, 5]
+        first, last = targets[q, 3], targets[q, 4]
+        if kind in (DIAGONAL, PRODUCTS):
+            if first == last:
+                for k in range(o, o + m * n):
+                    K[k] = 0.0
+            for c in range(first, last):
+                a, b = contributions[c, 0], contributions[c, 1]
+                add_product_of(D, a, b, K, o, m, n, kind == DIAGONAL, c == first)
+        elif kind == COPY:
+            b = contributions[first, 0]
+            for k in range(m * n):
+                K[o + k] = D[b + k]
+        elif kind == TRANSPOSE:
+            b = contributions[first, 0]
+            for r in range(m):
+                for k in range(n):
+                    K[o + r * n + k] = D[b + k * m + r]
+        else:  # IDENTITY
+            for r in range(m):
+                for k in range(n):
+                    K[o + r * n + k] = 1.0 if r == k else 0.0
+
+
+@compiled_inside
+def weigh_rows(blocks: Integers, D: Floats, part: float, compliance: Floats) -> None:
+    """E of each joint row, ``part`` of the squared length of the row in D^; zero on hub rows."""
+    for k in range(compliance.shape[0]):
+        compliance[k] = 0.0
+    for q in range(blocks.shape[0]):
+        o, f = blocks[q, 0], blocks[q, 3]
+        for r in range(blocks[q, 2]):
+            s = 0.0
+            for c in range(o, o + 6):
+                s += D[c] * D[c]
+            compliance[f + r] += part * s
+            o += 6
+
+
+@compiled
+def regularise(nodes: Integers, compliance: Floats, K: Floats) -> None:
+    """Subtract E from the pivots of the joints, between ``assemble`` and ``factor``."""
+    for k in range(nodes.shape[0] - 1):
+        m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        if nodes[k, 3] < 0:
+            for r in range(m):
+                K[d + r * (m + 1)] -= compliance[f + r]
+
+
+@compiled_into
+def factor_pivot(
+    m: int, d: int, sign: float, K: Floats, smallest: Floats, x: int, drop: bool
+) -> int:
+    """L d L^T of the m rows at d; returns how many pivots were small."""
+    counted = 0
+    for c in range(m):
+        s = K[d + c * m + c]
+        small = not sign * s > smallest[x + c]
+        counted += small
+        inverse = 1.0 / s if sign * s > 0.0 else np.nan
+        if drop and small:
+            inverse = 0.0
+        K[d + c * m + c] = inverse
+        for r in range(c + 1, m):
+            w = K[d + r * m + c]
+            for t in range(c + 1, r):
+                K[d + r * m + t] -= w * K[d + t * m + c]
+            K[d + r * m + c] = w * inverse
+            K[d + r * m + r] -= w * w * inverse
+    return counted
+
+
+@compiled_into
+def divide_row(m: int, d: int, o: int, K: Floats) -> None:
+    """One row a of m numbers at o becomes a L^-T."""
+    for c in range(1, m):
+        s = K[o + c]
+        for t in range(c):
+            s -= K[o + t] * K[d + c * m + t]
+        K[o + c] = s
+
+
+@compiled_into
+def subtract_product(
+    m: int, rows: int, cols: int, diagonal: bool, d: int, a: int, e: int, o: int, K: Floats
+) -> None:
+    """What the elimination of m rows at d takes from the block at o: its rows at a, at e."""
+    for r in range(rows):
+        for c in range(r + 1 if diagonal else cols):
+            s = K[o + r * cols + c]
+            for t in range(m):
+                s -= K[a + r * m + t] * K[d + t * m + t] * K[e + c * m + t]
+            K[o + r * cols + c] = s
+
+
+@compiled_into
+def eliminate(
+    k: int,
+    m: int,
+    nodes: Integers,
+    columns: Integers,
+    updates: Integers,
+    K: Floats,
+    smallest: Floats,
+    drop: bool,
+) -> int:
+    """Eliminate node k, of m rows; returns how many of its pivots were small."""
+    x, d, sign = nodes[k, 1], nodes[k, 2], float(nodes[k, 3])
+    counted = factor_pivot(m, d, sign, K, smallest, x, drop)
+    for q in range(nodes[k, 4], nodes[k + 1, 4]):
+        o = columns[q, 0]
+        for r in range(columns[q, 2]):
+            divide_row(m, d, o + r * m, K)
+    for q in range(nodes[k, 5], nodes[k + 1, 5]):
+        a, e, o = updates[q, 0], updates[q, 1], updates[q, 2]
+        rows, cols, diagonal = updates[q, 3], updates[q, 4], updates[q, 5] != 0
+        if diagonal and rows == m:
+            subtract_product(m, m, m, True, d, a, e, o, K)
+        else:
+            subtract_product(m, rows, cols, diagonal, d, a, e, o, K)
+    return counted
+
+
+@compiled
+def factor(
+    nodes: Integers, columns: Integers, updates: Integers, K: Floats, smallest: Floats, drop: bool
+) -> int:
+    """Factor K in place.
+
+    Args:
+        nodes, columns, updates: of the plan.
+        K: filled by ``assemble``.
+        smallest: (rows,) a pivot not above this is counted.
+        drop: True to leave a counted row out (its unknown becomes zero). False to use it all the
+            same; where it is not positive at all its unknowns become NaN.
+
+    Returns:
+        number of counted pivots.
+    """
+    K, smallest = pointer(K), pointer(smallest)
+    counted = 0
+    for k in range(nodes.shape[0] - 1):
+        m = nodes[k, 0]
+        if m == 3:
+            counted += eliminate(k, 3, nodes, columns, updates, K, smallest, drop)
+        elif m == 5:
+            counted += eliminate(k, 5, nodes, columns, updates, K, smallest, drop)
+        elif m >= LEAST_ROWS:
+            counted += factor_panel(k, nodes, columns, updates, K, smallest, drop)
+        else:
+            counted += eliminate(k, m, nodes, columns, updates, K, smallest, drop)
+    return counted
+
+
+@compiled_inside
+def have_pivots(nodes: Integers, K: Floats) -> bool:
+    """Whether no pivot has come out as zero or with the wrong sign, from the factors of K."""
+    for k in range(nodes.shape[0] - 1):
+        m, d = nodes[k, 0], nodes[k, 2]
+        for r in range(d, d + m * m, m + 1):
+            if K[r] != K[r]:
+                return False
+    return True
+
+
+@compiled_inside
+def pivot_lengths(nodes: Integers, K: Floats, smallest: Floats, lengths: Floats) -> int:
+    """Of each node the square root of its pivots' product, from the factors of K; 0 if none.
+
+    Near a singular pose it goes linearly through zero. Each pivot is measured by ``smallest``: POOR
+    of what it was at the start. Rows that nobody watches (it is zero) are left out. The single
+    pivots would tell as much, but they change with the axes that rows are written in: where masses
+    are very different, the small one wanders from row to row as the bodies turn, while the product
+    stays.
+
+    Returns the number of nodes with a pivot not above ``smallest`` and a product below LESS.
+    """
+    counted = 0
+    for k in range(nodes.shape[0] - 1):
+        m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        product, small = 1.0, 0
+        for r in range(m):
+            if smallest[f + r] > 0.0:
+                ratio = 1.0 / (abs(K[d + r * (m + 1)]) * smallest[f + r])
+                small |= not ratio > 1.0
+                product *= POOR * ratio
+        if not product > LESS:
+            counted += small
+        lengths[k] = np.sqrt(product) if product > 0.0 else 0.0
+    return counted
+
+
+@compiled_into
+def solve_forwards(
+    k: int, m: int, nodes: Integers, columns: Integers, K: Floats, x: Floats
+) -> None:
+    """What node k, of m rows, does to its own unknowns and those below, on the way down."""
+    f, d = nodes[k, 1], nodes[k, 2]
+    for c in range(1, m):
+        s = x[f + c]
+        for t in range(c):
+            s -= K[d + c * m + t] * x[f + t]
+        x[f + c] = s
+    for c in range(m):
+        x[f + c] *= K[d + c * m + c]
+    for q in range(nodes[k, 4], nodes[k + 1, 4]):
+        o, g = columns[q, 0], columns[q, 1]
+        for r in range(columns[q, 2]):
+            s = x[g + r]
+            for t in range(m):
+                s -= K[o + r * m + t] * x[f + t]
+            x[g + r] = s
+
+
+@compiled_into
+def solve_backwards(
+    k: int, m: int, nodes: Integers, columns: Integers, K: Floats, x: Floats
+) -> None:
+    """What the unknowns below node k, of m rows, do to its own, on the way up."""
+    f, d = nodes[k, 1], nodes[k, 2]
+    for q in range(nodes[k, 4], nodes[k + 1, 4]):
+        o, g = columns[q, 0], columns[q, 1]
+        for r in range(columns[q, 2]):
+            for t in range(m):
+                x[f + t] -= K[d + t * m + t] * K[o + r * m + t] * x[g + r]
+    for c in range(m - 1, -1, -1):
+        s = x[f + c]
+        for t in range(c + 1, m):
+            s -= K[d + t * m + c] * x[f + t]
+        x[f + c] = s
+
+
+@compiled_into
+def solve_down(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
+    """What all nodes do on the way down; K, x: pointers."""
+    for k in range(nodes.shape[0] - 1):
+        m = nodes[k, 0]
+        if m == 3:
+            solve_forwards(k, 3, nodes, columns, K, x)
+        elif m == 5:
+            solve_forwards(k, 5, nodes, columns, K, x)
+        elif m >= LEAST_ROWS:
+            solve_panel_forwards(k, nodes, columns, K, x)
+        else:
+            solve_forwards(k, m, nodes, columns, K, x)
+
+
+@compiled_into
+def solve_up(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
+    """What all nodes do on the way up; K, x: pointers."""
+    for k in range(nodes.shape[0] - 2, -1, -1):
+        m = nodes[k, 0]
+        if m == 3:
+            solve_backwards(k, 3, nodes, columns, K, x)
+        elif m == 5:
+            solve_backwards(k, 5, nodes, columns, K, x)
+        elif m >= LEAST_ROWS:
+            solve_panel_backwards(k, nodes, columns, K, x)
+        else:
+            solve_backwards(k, m, nodes, columns, K, x)
+
+
+@compiled_inside
+def solve(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
+    """Solve K z = x in place, with the factors of K."""
+    solve_down(nodes, columns, pointer(K), pointer(x))
+    solve_up(nodes, columns, pointer(K), pointer(x))

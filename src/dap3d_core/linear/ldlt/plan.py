@@ -1,0 +1,232 @@
+"""The static elimination program of a model: where each block stands, which products are made.
+
+K is stored by nodes: below the square block of a node's own rows those of the rows that it updates,
+all of them with as many numbers as the node has rows. A panel (ordering/supernodes.py) is one node
+of many rows; what is assembled into it, and what small nodes subtract from it, stands in blocks of
+its own until the panel's turn comes, so that small nodes know nothing of panels.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.linear.ldlt.factor_layout import Contents, Matrix, lay_matrix, list_updates
+from dap3d_core.linear.ordering.elimination_order import Ordering, order_nodes
+
+if TYPE_CHECKING:
+    from dap3d_core.linear.ordering.bisection import Halves
+
+Integers = NDArray[np.int64]
+
+
+@attrs.frozen(eq=False)
+class Plan:
+    """Arrays of the program; all entries are indices into flat arrays.
+
+    Attributes:
+        ordering: what was found, for reports.
+        joint_row: (joints,) place of each joint's first row in the row vectors (gamma, nu, C, x).
+        joint_block: per joint the places in D of its blocks, one a slot (ground's a spare place).
+        row_size: length of the row vectors: all rows, six for each hub, the copy of ``halves``.
+        block_size, matrix_size: lengths of D and K.
+        blocks: (b, 5) of D: place, body, rows, first row, 1 if its body is a hub.
+        targets: (t, 6) of K: place, rows, columns, first and last+1 contribution, kind (see below).
+        contributions: (c, 2) places in D of the two factors.
+        nodes: (n + 1, 6) rows, first row, place of the diagonal block, sign, first column entry,
+            first update.
+        columns: (k, 3) blocks below the diagonal: place in K, first row, rows.
+        updates: (u, 6) place of left and right factor and of the target in K, rows, columns, 1 on
+            the diagonal. A panel's have twice the length of the target's rows added to the last
+            number; before them stand the blocks that it gathers, with minus that number.
+        hubs: (h, 2) body and first row of each body that waits.
+        fill: blocks, one for two joint nodes or hubs, that are zero before the factorisation.
+        unfilled_size: numbers of the blocks that are not, and of the diagonal blocks.
+        halves: how the program is cut in two (ordering/bisection.py); None where it is not.
+    """
+
+    ordering: Ordering
+    joint_row: Integers
+    joint_block: tuple[tuple[int, ...], ...]
+    row_size: int
+    block_size: int
+    matrix_size: int
+    blocks: Integers
+    targets: Integers
+    contributions: Integers
+    nodes: Integers
+    columns: Integers
+    updates: Integers
+    hubs: Integers
+    fill: int
+    unfilled_size: int
+    halves: "Halves | None" = None
+
+
+#: Kinds of a target: off-diagonal sum of products, diagonal sum of products, copy of a block of D
+#: by rows or transposed, identity.
+PRODUCTS, DIAGONAL, COPY, TRANSPOSE, IDENTITY = range(5)
+
+
+def make_plan(
+    body_count: int,
+    joint_slots: Sequence[tuple[int, ...]],
+    joint_rows: Sequence[int],
+    *,
+    halved: bool = False,
+) -> Plan:
+    """Find the elimination program of a model's sparsity.
+
+    Args:
+        body_count: bodies without ground, numbered from 1.
+        joint_slots: bodies of each joint by slot, ground 0.
+        joint_rows: rows of each joint.
+        halved: whether it is cut in two halves, if the scene lets them share the work.
+    """
+    found = order_nodes(body_count, joint_slots, joint_rows, halved=halved)
+    node_count, sizes = len(found.nodes), found.sizes
+    starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64).tolist()
+    place = {node: k for k, node in enumerate(found.order)}
+    hubs = {b: node_count + h for h, b in enumerate(found.hubs)}
+
+    blocks, block_of, joint_row, joint_block, block_size = _lay_blocks(
+        found, joint_slots, joint_rows, place, starts, hubs
+    )
+    made_of = _contents(found, place, block_of)
+    matrix = lay_matrix(found, starts, made_of)
+    targets, contributions = _targets(found, starts, matrix, made_of)
+    updates, update_start = list_updates(found, starts, matrix)
+    hub_rows = [(b, starts[place[hubs[b]]]) for b in found.hubs]
+    filled = sum(1 for row, column in made_of if row != column)
+    nodes, columns = _nodes(found, starts, matrix, update_start), _table(matrix.columns, 3)
+    halves = None
+    if found.parts:
+        from dap3d_core.linear.ordering.bisection import halves_of
+
+        halves = halves_of(found, starts, nodes, targets, columns, updates)
+    return Plan(
+        ordering=found,
+        joint_row=np.array(joint_row, dtype=np.int64),
+        joint_block=tuple(joint_block),
+        row_size=starts[-1] + (int(halves.rows[3] - halves.rows[2]) if halves else 0),
+        block_size=block_size,
+        matrix_size=matrix.size + (int(halves.matrix[1]) if halves else 0),
+        blocks=_table(blocks, 5),
+        targets=targets,
+        contributions=contributions,
+        nodes=nodes,
+        columns=columns,
+        updates=updates,
+        hubs=_table(hub_rows, 2),
+        fill=sum(map(len, found.below)) - filled,
+        unfilled_size=sum(m * m for m in sizes)
+        + sum(sizes[row] * sizes[column] for row, column in made_of if row != column),
+        halves=halves,
+    )
+
+
+def _nodes(
+    found: Ordering, starts: Sequence[int], matrix: Matrix, update_start: Sequence[int]
+) -> Integers:
+    rows = []
+    for k, (first, last, _) in enumerate(matrix.spans):
+        size, sign = starts[last] - starts[first], 1 if found.is_hub(first) else -1
+        begin = matrix.column_start[k], update_start[k]
+        rows.append((size, starts[first], matrix.place[k], sign, *begin))
+    rows.append((0, starts[-1], matrix.size, 0, matrix.column_start[-1], update_start[-1]))
+    return _table(rows, 6)
+
+
+def _table(rows: Sequence[Sequence[int]], width: int) -> Integers:
+    return np.array(rows, dtype=np.int64).reshape(-1, width)
+
+
+def _lay_blocks(
+    found: Ordering,
+    joint_slots: Sequence[tuple[int, ...]],
+    joint_rows: Sequence[int],
+    place: dict[int, int],
+    starts: Sequence[int],
+    hubs: dict[int, int],
+) -> tuple[
+    list[tuple[int, ...]], dict[tuple[int, int], int], list[int], list[tuple[int, ...]], int
+]:
+    """Places of the blocks of D: by node, then body, the node's joints below one another."""
+    blocks: list[tuple[int, ...]] = []
+    block_of: dict[tuple[int, int], int] = {}
+    joint_row = [0] * len(joint_slots)
+    joint_block: list[tuple[int, ...]] = [()] * len(joint_slots)
+    size = 6 * max((int(m) for m in joint_rows), default=0)  # the spare place, for ground
+    for k, node in enumerate(found.nodes):
+        first_row = starts[place[k]]
+        for b in node.bodies:
+            blocks.append((size, b, node.rows, first_row, int(b in hubs)))
+            block_of[k, b] = size
+            size += 6 * node.rows
+        offset = 0
+        for joint in node.joints:
+            joint_row[joint] = first_row + offset
+            slots = joint_slots[joint]
+            joint_block[joint] = tuple(block_of[k, b] + 6 * offset if b else 0 for b in slots)
+            offset += int(joint_rows[joint])
+    return blocks, block_of, joint_row, joint_block, size
+
+
+def _contents(
+    found: Ordering, place: dict[int, int], block_of: dict[tuple[int, int], int]
+) -> Contents:
+    """What the blocks of K (row, column; places in the order) are made of, where they are not zero.
+
+    Pairs of blocks of D whose products are summed up, or one block that is copied.
+    """
+    products: Contents = {}
+    hubs = {b: place[len(found.nodes) + h] for h, b in enumerate(found.hubs)}
+    of_body: dict[int, list[int]] = {}
+    for k, node in enumerate(found.nodes):
+        for b in node.bodies:
+            of_body.setdefault(b, []).append(k)
+    for b in found.early:
+        at = sorted((place[k], block_of[k, b]) for k in of_body.get(b, ()))
+        for n, (column, right) in enumerate(at):
+            products.setdefault((column, column), []).append((right, right))
+            for row, left in at[n + 1 :]:
+                products.setdefault((row, column), []).append((left, right))
+    for b, hub in hubs.items():
+        for k in of_body.get(b, ()):
+            block = block_of[k, b]
+            products[max(place[k], hub), min(place[k], hub)] = [(block, block)]
+    return products
+
+
+def _targets(
+    found: Ordering, starts: Sequence[int], matrix: Matrix, contents: Contents
+) -> tuple[Integers, Integers]:
+    """What each block of K is made of before the factorisation."""
+    targets: list[tuple[int, ...]] = []
+    contributions: list[tuple[int, int]] = []
+
+    def add(
+        where: int, rows: int, cols: int, kind: int, made_of: Sequence[tuple[int, int]]
+    ) -> None:
+        first = len(contributions)
+        contributions.extend(made_of)
+        targets.append((where, rows, cols, first, len(contributions), kind))
+
+    sizes = found.sizes
+    for k, (first, last, _) in enumerate(matrix.spans):
+        if last - first > 1:  # a panel: all zero, until it gathers its blocks
+            size = matrix.heights[k]
+            add(matrix.place[k], size, starts[last] - starts[first], PRODUCTS, ())
+        for column in range(first, last):
+            m = sizes[column]
+            is_hub = found.is_hub(column)
+            kind = IDENTITY if is_hub else DIAGONAL
+            add(matrix.diagonal[column], m, m, kind, contents.get((column, column), ()))
+            for row, where in matrix.blocks[column].items():
+                kind = PRODUCTS
+                if is_hub != found.is_hub(row) and (row, column) in contents:
+                    kind = COPY if is_hub else TRANSPOSE
+                add(where, sizes[row], m, kind, contents.get((row, column), ()))
+    return _table(targets, 6), _table(contributions, 2)

@@ -1,0 +1,1 @@
+"""Unsymmetric block LU factorisation."""

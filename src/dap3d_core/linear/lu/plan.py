@@ -1,0 +1,134 @@
+"""The static elimination program of a block matrix that is not symmetric, but for its pattern.
+
+Nodes are bodies (positions and velocities together) and joints (the multipliers of both levels).
+Joints and force elements couple bodies directly, too. The order is that of
+ordering/elimination_order.py with every body waiting like a hub: the cheapest node comes next, a
+joint of the spanning tree after its outboard body, a joint that closes a loop after the bodies of
+its loop. So trees have no fill.
+"""
+
+from collections.abc import Iterable, Sequence
+
+import attrs
+import numpy as np
+
+from dap3d_core.linear.ldlt.plan import Integers
+from dap3d_core.linear.ordering.elimination_order import JointNode, _eliminate, _waits
+
+#: Unknowns of a body (position, velocity), and of a row (a multiplier of each level).
+BODY_SIZE, ROW_SIZE = 12, 2
+
+
+@attrs.frozen(eq=False)
+class LuPlan:
+    """Arrays of the program; all entries are indices into flat arrays.
+
+    Attributes:
+        size: number of unknowns.
+        matrix_size: length of the matrix's array, its blocks by rows.
+        nodes: (n + 1, 5) unknowns, first unknown, place of the diagonal block, first column entry,
+            first update; in the order of elimination.
+        columns: (k, 4) neighbours eliminated later: place of the block below the diagonal, of the
+            one to its right, first unknown, unknowns.
+        updates: (u, 5) place of left and right factor and of the target, rows, columns.
+        body_first, joint_first: (bodies + 1,), (joint nodes,) first unknown.
+        fill: blocks that are zero before the factorisation.
+    """
+
+    size: int
+    matrix_size: int
+    nodes: Integers
+    columns: Integers
+    updates: Integers
+    body_first: Integers
+    joint_first: Integers
+    fill: int
+    _place: dict[tuple[int, int], int]
+    _joint_count: int
+
+    def body_block(self, a: int, b: int) -> int:
+        """Place of the block of rows of body a and columns of body b (from 1)."""
+        j = self._joint_count - 1
+        return self._place[j + a, j + b]
+
+    def joint_blocks(self, k: int, b: int) -> tuple[int, int]:
+        """Places of the blocks (joint node k, body b) and (body b, joint node k)."""
+        j = self._joint_count - 1
+        return self._place[k, j + b], self._place[j + b, k]
+
+    def joint_block(self, k: int) -> int:
+        """Place of the diagonal block of joint node k."""
+        return self._place[k, k]
+
+
+def make_lu_plan(
+    body_count: int, nodes: Sequence[JointNode], coupled: Iterable[tuple[int, ...]]
+) -> LuPlan:
+    """Find the elimination program.
+
+    Args:
+        body_count: bodies without ground, numbered from 1.
+        nodes: joint nodes, as ordering/elimination_order.py merges joints.
+        coupled: bodies of each element that couples them directly, ground (0) allowed.
+    """
+    joints = len(nodes)
+    sizes = [ROW_SIZE * node.rows for node in nodes] + [BODY_SIZE] * body_count
+    neighbours: list[set[int]] = [set() for _ in sizes]
+    of_body: list[list[int]] = [[] for _ in range(body_count + 1)]
+    for k, node in enumerate(nodes):
+        for b in node.bodies:
+            of_body[b].append(k)
+            neighbours[k].add(joints + b - 1)
+            neighbours[joints + b - 1].add(k)
+    for bodies in coupled:
+        there = {joints + b - 1 for b in bodies if b}
+        for a in there:
+            neighbours[a] |= there - {a}
+    before = sum(len(others) for others in neighbours)
+    waits = _waits(nodes, of_body, range(1, body_count + 1)) if nodes else {}
+    order, below = _eliminate(neighbours, sizes, waits)
+    return _lay_out(sizes, order, below, joints, before)
+
+
+def _lay_out(
+    sizes: Sequence[int], order: Sequence[int], below: dict[int, set[int]], joints: int, before: int
+) -> LuPlan:
+    rank = {node: k for k, node in enumerate(order)}
+    first = [0] * len(sizes)
+    place: dict[tuple[int, int], int] = {}
+    size = start = 0
+    for node in order:
+        first[node] = start
+        start += sizes[node]
+    later = {node: sorted(below[node], key=rank.__getitem__) for node in order}
+    for node in order:
+        place[node, node] = size
+        size += sizes[node] ** 2
+        for other in later[node]:
+            place[other, node], place[node, other] = size, size + sizes[node] * sizes[other]
+            size += 2 * sizes[node] * sizes[other]
+    rows: list[tuple[int, ...]] = []
+    columns: list[tuple[int, ...]] = []
+    updates: list[tuple[int, ...]] = []
+    for node in order:
+        begin = (sizes[node], first[node], place[node, node], len(columns), len(updates))
+        rows.append(begin)
+        for i in later[node]:
+            columns.append((place[i, node], place[node, i], first[i], sizes[i]))
+            updates.extend(
+                (place[i, node], place[node, j], place[i, j], sizes[i], sizes[j])
+                for j in later[node]
+            )
+    rows.append((0, start, size, len(columns), len(updates)))
+    return LuPlan(
+        size=start,
+        matrix_size=size,
+        nodes=np.array(rows, dtype=np.int64).reshape(-1, 5),
+        columns=np.array(columns, dtype=np.int64).reshape(-1, 4),
+        updates=np.array(updates, dtype=np.int64).reshape(-1, 5),
+        body_first=np.array([0, *first[joints:]], dtype=np.int64),
+        joint_first=np.array(first[:joints], dtype=np.int64),
+        fill=2 * len(columns) - before,
+        place=place,
+        joint_count=joints,
+    )

@@ -1,0 +1,1 @@
+"""Elimination orders: nested dissection, supernodes, bisection."""

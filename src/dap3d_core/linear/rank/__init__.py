@@ -1,0 +1,1 @@
+"""Rank and null space of the constraint Jacobian."""

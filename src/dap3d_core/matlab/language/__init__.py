@@ -1,0 +1,1 @@
+"""Interpreter of the MATLAB subset that models are written in."""

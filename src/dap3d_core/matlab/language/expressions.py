@@ -1,0 +1,301 @@
+"""Values of MATLAB expressions: a small part of the language, worked out here and never run."""
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dap3d_core.matlab.language.builtins import CONSTANTS, FUNCTIONS, call
+from dap3d_core.matlab.language.operators import (
+    EXTRAS,
+    OPERATIONS,
+    Operation,
+    RefusalError,
+    ReportedError,
+    check_size,
+    checked,
+    numbers,
+)
+from dap3d_core.matlab.language.parse import Source, text_of
+from dap3d_core.matlab.language.structures import MAKERS
+from dap3d_core.matlab.language.values import Broken, Numbers, Struct, kind_of, make, size_of
+from dap3d_core.registry.suggestions import nearest
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+#: Brackets within brackets, at most.
+DEEPEST = 50
+#: Entries of all arrays that the expressions of a file come to, at most: some seconds of work.
+MOST_ENTRIES = 3_000_000
+
+_NUMBER = re.compile(r"(\d++\.?\d*+|\.\d++)([eEdD][+-]?\d++)?")
+_OUTSIDE = {
+    "lambda": "a function handle",
+    "range": "a range",
+    "cell": "a cell array",
+    "comparison_operator": "a comparison",
+    "boolean_operator": "a logical expression",
+    "not_operator": "a logical expression",
+    "handle_operator": "a function handle",
+    "metaclass_operator": "a class",
+    "boolean": "a truth value",
+    "superclass": "a class",
+}
+
+
+def _length(value: Any) -> int:
+    """What a value that is no matrix costs to copy, in entries of one."""
+    return 10 * len(value) if isinstance(value, list) else 1
+
+
+def named_children(node: "Node") -> list["Node"]:
+    """The children of a node that mean something."""
+    return [n for n in node.children if n.is_named and n.type not in EXTRAS]
+
+
+class Expressions:
+    """Finds the values of expressions.
+
+    Args:
+        source: the file they stand in.
+        variables: values by name.
+    """
+
+    def __init__(self, source: Source, variables: dict[str, Any]) -> None:
+        self.source, self.variables = source, variables
+        self._depth = self._entries = 0
+        self._lengths: list[int] = []  # what ``end`` means, innermost last
+        self._kinds: dict[str, Callable[[Node], Any]] = {
+            "number": self._number,
+            "string": self._text,
+            "identifier": self._name,
+            "parenthesis": lambda node: self._only(node),
+            "matrix": self._matrix,
+            "function_call": self._call,
+            "field_expression": self._field,
+            "end_keyword": self._end,
+            **dict.fromkeys(OPERATIONS, lambda node: Operation(node, self.value).result()),
+        }
+
+    def value(self, node: "Node") -> Any:
+        """The value of an expression: a matrix, text, a structure or a list of structures.
+
+        Raises:
+            RefusalError: it is outside the language, or wrong.
+            ReportedError: it needs a value that could not be found.
+        """
+        find = self._kinds.get(node.type)
+        if find is None:
+            what = _OUTSIDE.get(node.type, f"this ({node.type.replace('_', ' ')})")
+            raise RefusalError(node, f"{what} is outside the language that is read")
+        if self._depth >= DEEPEST:
+            raise RefusalError(node, f"more than {DEEPEST} brackets within brackets")
+        self._depth += 1
+        try:
+            found = find(node)
+        finally:
+            self._depth -= 1
+        self._entries += found.size if isinstance(found, np.ndarray) else _length(found)
+        if self._entries > MOST_ENTRIES:
+            words = f"more than {MOST_ENTRIES} entries of arrays in one file"
+            raise RefusalError(node, f"{words}; what follows is not read")
+        return found
+
+    @property
+    def are_spent(self) -> bool:
+        """Whether the file has used up what one file may."""
+        return self._entries > MOST_ENTRIES
+
+    def _number(self, node: "Node") -> Numbers:
+        text = text_of(node)
+        if not _NUMBER.fullmatch(text):
+            raise RefusalError(node, "not a decimal number")
+        return checked(np.array([[float(text.lower().replace("d", "e"))]]), node)
+
+    def _text(self, node: "Node") -> str:
+        text = text_of(node)
+        return text[1:-1].replace(text[0] * 2, text[0])
+
+    def _only(self, node: "Node") -> Any:
+        inner = named_children(node)
+        if len(inner) != 1:
+            raise RefusalError(node, "one expression is needed between the brackets")
+        return self.value(inner[0])
+
+    def _name(self, node: "Node") -> Any:
+        name = text_of(node)
+        if name in self.variables:
+            value = self.variables[name]
+            if isinstance(value, Broken):
+                raise ReportedError
+            return value
+        if name in CONSTANTS:
+            return np.array([[CONSTANTS[name]]])
+        if name in MAKERS:
+            return make(MAKERS[name], self.source.place(node))
+        raise self._unknown(node, name)
+
+    def _unknown(self, node: "Node", name: str) -> RefusalError:
+        if name in FUNCTIONS:
+            return RefusalError(node, f"the function {name} needs arguments")
+        known = [*self.variables, *CONSTANTS, *FUNCTIONS, *MAKERS]
+        return RefusalError(node, f"{name} is not defined in this file", "", nearest(name, known))
+
+    def _matrix(self, node: "Node") -> Any:
+        rows = [n for n in named_children(node) if n.type == "row"]
+        parts = [[self.value(n) for n in named_children(row)] for row in rows]
+        flat = [v for row in parts for v in row]
+        if any(isinstance(v, (Struct, list)) for v in flat):
+            return self._array_of(node, flat)
+        if any(isinstance(v, str) for v in flat):
+            raise RefusalError(node, "text in brackets is not read")
+        filled = [[numbers(v, node) for v in row if v.size] for row in parts]
+        filled = [row for row in filled if row]
+        if not filled:
+            return np.zeros((0, 0))
+        check_size(sum(v.size for row in filled for v in row), node)
+        try:
+            found = np.vstack([np.hstack(row) for row in filled])
+        except ValueError:
+            words = "; ".join(" ".join(size_of(v) for v in row) for row in filled)
+            what = f"rows and columns do not fit together (sizes {words})"
+            raise RefusalError(node, what) from None
+        return checked(found, node)
+
+    def _array_of(self, node: "Node", parts: list[Any]) -> list[Any]:
+        """Structures in brackets, an array of them."""
+        found: list[Any] = []
+        for part in parts:
+            if isinstance(part, np.ndarray) and part.size == 0:
+                continue
+            if not isinstance(part, (Struct, list)):
+                raise RefusalError(node, f"structures and {kind_of(part)} in one array")
+            found += part if isinstance(part, list) else [part]
+            check_size(len(found), node)
+        kinds = {v.structure.kind for v in found if isinstance(v, Struct)}
+        if len(kinds) > 1:
+            words = " and ".join(sorted(f"{k}_struct" for k in kinds))
+            raise RefusalError(node, f"{words} in one array")
+        return [v if isinstance(v, Broken) else v.copy() for v in found]
+
+    # ---------------------------------------------------------------- calls and elements
+
+    def _call(self, node: "Node") -> Any:
+        """An element of a variable, or a function: MATLAB writes both with brackets."""
+        name_node = node.child_by_field_name("name")
+        if name_node is None or name_node.type != "identifier":
+            raise RefusalError(node, "this call is outside the language that is read")
+        name = text_of(name_node)
+        arguments = arguments_of(node)
+        if name in self.variables:
+            return self.element(node, self._name(name_node), arguments)
+        if name in MAKERS and not arguments:
+            return make(MAKERS[name], self.source.place(node))
+        if name not in FUNCTIONS:
+            what = f"the function {name} is outside the language that is read; nothing is run"
+            near = nearest(name, [*FUNCTIONS, *MAKERS, *self.variables])
+            remedy = "" if near else f"functions that are read: {', '.join(FUNCTIONS)}"
+            raise RefusalError(node, what, remedy, near)
+        values = [numbers(self.value(n), n) for n in arguments]
+        return call(name, values, node)
+
+    def element(self, node: "Node", value: Any, arguments: list["Node"]) -> Any:
+        """An element of a matrix or of an array of structures."""
+        if isinstance(value, Struct):
+            value = [value]
+        if isinstance(value, list):
+            (place,) = self.indices(node, arguments, (len(value),))
+            found = value[place]
+            if isinstance(found, Broken):
+                raise ReportedError
+            return found
+        matrix = numbers(value, node)
+        return np.array([[matrix[self.at(node, matrix, arguments)]]])
+
+    def at(self, node: "Node", matrix: Numbers, arguments: list["Node"]) -> tuple[int, int]:
+        """Row and column, from 0, of one element; a single index counts down the columns."""
+        if len(arguments) == 1:
+            (k,) = self.indices(node, arguments, (matrix.size,))
+            return k % matrix.shape[0], k // matrix.shape[0]
+        row, column = self.indices(node, arguments, matrix.shape)
+        return row, column
+
+    def indices(
+        self, node: "Node", arguments: list["Node"], lengths: tuple[int, ...], room: int = 0
+    ) -> tuple[int, ...]:
+        """Indices, from 0, of which there are as many as lengths; ``room``: how far beyond."""
+        if len(arguments) != len(lengths):
+            raise RefusalError(node, f"{len(lengths)} indices are needed here")
+        found = []
+        for argument, length in zip(arguments, lengths, strict=True):
+            if argument.type == "spread_operator":
+                raise RefusalError(node, "several elements at once (:) are not read")
+            self._lengths.append(length)
+            try:
+                index = numbers(self.value(argument), argument)
+            finally:
+                self._lengths.pop()
+            if index.size != 1 or not float(index[0, 0]).is_integer():
+                raise RefusalError(node, "an index is one whole number")
+            k = int(index[0, 0])
+            if not 1 <= k <= length + room:
+                raise RefusalError(node, f"index {k} is outside; there are {length} elements")
+            found.append(k - 1)
+        return tuple(found)
+
+    def _end(self, node: "Node") -> Numbers:
+        if not self._lengths:
+            raise RefusalError(node, "end means something in an index alone")
+        return np.array([[float(self._lengths[-1])]])
+
+    def _field(self, node: "Node") -> Any:
+        """A field of a structure: ``B1.r``, ``Bodies(2).r(3)``."""
+        owner, field, arguments = self.parts_of(node)
+        value = self.value(owner)
+        if isinstance(value, list) and len(value) == 1:
+            value = value[0]
+        if not isinstance(value, Struct):
+            raise RefusalError(node, f"{text_of(owner)} is {kind_of(value)}, which has no fields")
+        check_field(node, value, field)
+        found = value.value(field)
+        if isinstance(found, Broken):
+            raise ReportedError
+        return found if arguments is None else self.element(node, found, arguments)
+
+    def parts_of(self, node: "Node") -> tuple["Node", str, list["Node"] | None]:
+        """Owner, name of the field, and the indices behind it or None."""
+        owner = node.child_by_field_name("object")
+        fields = node.children_by_field_name("field")
+        named = [n for n in fields if n.type not in (".", *EXTRAS)]
+        if owner is None or owner.type not in ("identifier", "function_call") or len(named) != 1:
+            raise RefusalError(node, "fields of fields are not read")
+        (field,) = named
+        if field.type == "identifier":
+            return owner, text_of(field), None
+        name = field.child_by_field_name("name") if field.type == "function_call" else None
+        if name is None:
+            raise RefusalError(node, "a field is named by a word here")
+        return owner, text_of(name), arguments_of(field)
+
+
+def arguments_of(node: "Node") -> list["Node"]:
+    """The arguments of a call."""
+    found = [n for n in node.children if n.type == "arguments"]
+    return named_children(found[0]) if found else []
+
+
+def check_field(node: "Node", struct: Struct, field: str) -> None:
+    """Whether a structure has a field.
+
+    Raises:
+        RefusalError: it has none of this name.
+    """
+    structure = struct.structure
+    known = structure.known
+    if field not in known:
+        near = structure.slips.get(field) or nearest(field, known)
+        what = f"a {structure.kind}_struct has no field {field}"
+        given = [n for n in known if n not in structure.computed]
+        raise RefusalError(node, what, f"its fields: {', '.join(given)}", near)

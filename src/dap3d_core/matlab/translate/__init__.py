@@ -1,0 +1,1 @@
+"""From MATLAB structures to a scene."""

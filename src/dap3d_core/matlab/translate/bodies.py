@@ -1,0 +1,222 @@
+"""Bodies, points, vectors and what is drawn: from MATLAB structures into a scene."""
+
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.matlab.language.structures import LIMITS
+from dap3d_core.matlab.language.values import Numbers, Struct, plain_value
+from dap3d_core.matlab.report import remark
+from dap3d_core.matlab.translate.fields import Fields, name_of
+from dap3d_core.scene import MISSING, Mistake, Scene
+
+#: How far a rotation matrix may be from one, and two ways to give one thing from each other.
+ROTATION_TOLERANCE = 1e-6
+#: Fields of a body whose default is worth a word.
+_TELLING = ("mass", "Jp", "r")
+_COLOR = 255
+
+
+def add_bodies(scene: Scene, fields: Fields) -> None:
+    """The bodies, in the order of their array."""
+    for k, struct in enumerate(fields.model.arrays["Bodies"] or [], 1):
+        name = name_of("Bodies", k)
+        values: dict[str, Any] = {
+            "mass": fields.number(struct, "mass"),
+            "Jp": _inertia(fields, struct),
+            "p": _orientation(fields, struct),
+            **{field: fields.vector(struct, field) for field in ("r", "r_dot")},
+        }
+        values["w"] = _angular_velocity(fields, struct, values["p"])
+        values["color"] = _color(fields, struct)
+        for field in ("mass", "Jp", "r", "p", "r_dot", "w", "color"):
+            source = {"p": "A", "w": "p_dot"}.get(field, field)
+            fields.placed(
+                f"bodies.{name}.{field}", struct, field if field in struct.given else source
+            )
+        fields.placed(f"bodies.{name}", struct)
+        _tell_defaults(fields, struct)
+        _tell_computed(fields, struct)
+        scene.add_body(name, **values)
+
+
+def _tell_defaults(fields: Fields, struct: Struct) -> None:
+    missing = [f for f in _TELLING if f not in struct.given]
+    words = {"mass": "mass = 1", "Jp": "Jp = eye(3)", "r": "r = [0;0;0]"}
+    if missing:
+        fields.defaulted(struct, ", ".join(words[f] for f in missing))
+
+
+def _tell_computed(fields: Fields, struct: Struct) -> None:
+    for field in struct.given:
+        if field in struct.structure.computed:
+            fields.left_out(struct, field, "is worked out by the program: not read")
+
+
+def _inertia(fields: Fields, struct: Struct) -> Any:
+    """The inertia matrix; three numbers where it is diagonal."""
+    matrix = fields.matrix(struct, "Jp")
+    if matrix is None:
+        return None
+    off = [matrix[a][b] for a in range(3) for b in range(3) if a != b]
+    return matrix if any(off) else tuple(matrix[a][a] for a in range(3))
+
+
+def _orientation(fields: Fields, struct: Struct) -> Any:
+    """Euler parameters, from the rotation matrix where that is given instead."""
+    p = fields.vector(struct, "p", 4)
+    if "A" not in struct.given or p is None:
+        return p
+    rows = fields.matrix(struct, "A")
+    if rows is None:
+        return None
+    A = np.array(rows)
+    found = parameters_of(A)
+    if np.abs(rotation_of(found) - A).max() > ROTATION_TOLERANCE:
+        what = f"should be a rotation matrix (A^T A = I, det A = 1, within {ROTATION_TOLERANCE:g})"
+        fields.refuse(struct, "A", what)
+        return None
+    if "p" not in struct.given:
+        words = "gives the orientation: p is worked out from it (the MATLAB program reads p alone)"
+        fields.changed(struct, "A", words)
+        return tuple(found.tolist())
+    if np.abs(rotation_of(np.array(p) / max(np.linalg.norm(p), 1e-300)) - A).max() > 1e-3:
+        fields.refuse(struct, "A", "is another orientation than p", "give one of them")
+        return None
+    fields.left_out(struct, "A", "says what p says: p is read")
+    return p
+
+
+def parameters_of(A: Numbers) -> Numbers:
+    """Euler parameters of a rotation matrix, e0 >= 0; of the four, the largest is found first."""
+    trace = np.trace(A)
+    squares = 0.25 * np.array([1.0 + trace, *(1.0 + 2.0 * np.diag(A) - trace)])
+    k = int(np.argmax(squares))
+    largest = np.sqrt(max(squares[k], 1e-300))
+    skew = np.array([A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]])
+    if k == 0:
+        p = np.array([largest, *(0.25 * skew / largest)])
+    else:
+        column = 0.25 * (A[k - 1] + A[:, k - 1]) / largest
+        column[k - 1] = largest
+        p = np.array([0.25 * skew[k - 1] / largest, *column])
+    with np.errstate(all="ignore"):
+        p = np.nan_to_num(p / np.linalg.norm(p))
+    return np.asarray(-p if p[0] < 0.0 else p)
+
+
+def rotation_of(p: Numbers) -> Numbers:
+    """The rotation matrix (2 e0^2 - 1) I + 2 (e e^T + e0 e~) of Euler parameters of unit length."""
+    e0, e = p[0], p[1:]
+    skew = np.array([[0.0, -e[2], e[1]], [e[2], 0.0, -e[0]], [-e[1], e[0], 0.0]])
+    return np.asarray((2.0 * e0**2 - 1.0) * np.eye(3) + 2.0 * (np.outer(e, e) + e0 * skew))
+
+
+def _angular_velocity(fields: Fields, struct: Struct, p: Any) -> Any:
+    """Angular velocity in ground axes, from p_dot where that is given instead: w = 2 G p_dot."""
+    w = fields.vector(struct, "w")
+    if "p_dot" not in struct.given or w is None or p is None:
+        return w
+    given = fields.vector(struct, "p_dot", 4)
+    if given is None:
+        return None
+    p_dot, e0, e = np.array(given), p[0], np.array(p[1:])
+    rates = p_dot[1:]
+    found = 2.0 * (-e * p_dot[0] + np.cross(e, rates) + e0 * rates)
+    size = max(1.0, float(np.abs(p_dot).max()))
+    if abs(float(np.dot(p, p_dot))) > ROTATION_TOLERANCE * size:
+        what = "should be at right angles to p: Euler parameters keep unit length"
+        fields.refuse(struct, "p_dot", what)
+        return None
+    if "w" not in struct.given:
+        words = "gives the rotation: w is worked out from it (the MATLAB program reads w alone)"
+        fields.changed(struct, "p_dot", words)
+        return tuple(found.tolist())
+    if np.abs(found - np.array(w)).max() > 1e-3 * size:
+        fields.refuse(struct, "p_dot", "is another rotation than w", "give one of them")
+        return None
+    fields.left_out(struct, "p_dot", "says what w says: w is read")
+    return w
+
+
+def _color(fields: Fields, struct: Struct) -> str | None:
+    """A colour by its letter or name, or three shares of red, green and blue; "" if not given."""
+    if "color" not in struct.given:
+        return ""
+    if isinstance(struct.value("color"), str):
+        return fields.word(struct, "color")
+    shares = fields.vector(struct, "color")
+    if shares is None:
+        return None
+    if not all(0.0 <= x <= 1.0 for x in shares):
+        fields.refuse(struct, "color", "should be a letter, or three numbers from 0 to 1")
+        return None
+    return "#" + "".join(f"{round(_COLOR * x):02x}" for x in shares)
+
+
+def add_geometry(scene: Scene, fields: Fields) -> None:
+    """Points and vectors, in the order of their arrays."""
+    arrays = fields.model.arrays
+    for array, field, table in (("Points", "sPp", "points"), ("Vectors1", "sp", "vectors")):
+        for k, struct in enumerate(arrays[array] or [], 1):
+            name = name_of(array, k)
+            add = scene.add_point if array == "Points" else scene.add_vector
+            add(name, fields.body(struct), fields.vector(struct, field))
+            _note_on_body(fields, struct, field)
+            fields.placed(f"{table}.{name}", struct)
+            fields.placed(f"{table}.{name}.body", struct, "Bindex")
+            fields.placed(f"{table}.{name}.{field}", struct, field)
+    for k, struct in enumerate(arrays["Vectors2"] or [], 1):
+        name = name_of("Vectors2", k)
+        ends = [
+            fields.reference(struct, f"{end}Pindex", "Points", needed=True) for end in ("i", "j")
+        ]
+        scene.add_vector2(name, *ends)
+        _tell_computed(fields, struct)
+        fields.placed(f"vectors2.{name}", struct)
+        for end in ("i", "j"):
+            fields.placed(f"vectors2.{name}.P_{end}", struct, f"{end}Pindex")
+
+
+def _note_on_body(fields: Fields, struct: Struct, field: str) -> None:
+    missing = []
+    if "Bindex" not in struct.given:
+        missing.append("Bindex = 0, the ground")
+    if field not in struct.given:
+        missing.append(f"{field} = [0;0;0]")
+    if missing:
+        fields.defaulted(struct, ", ".join(missing))
+    _tell_computed(fields, struct)
+
+
+def add_animation(scene: Scene, fields: Fields) -> None:
+    """Points that are only drawn, and the limits of the drawing."""
+    for k, struct in enumerate(fields.model.arrays["Points_anim"] or [], 1):
+        body, local = fields.body(struct), fields.vector(struct, "sPp")
+        _note_on_body(fields, struct, "sPp")
+        if body is not None and local is not None:
+            scene.add_animation_point(body, local)
+        fields.placed(f"animation.points.{k}", struct)
+    limits = fields.model.limits
+    given = [_limit(fields, name) for pair in LIMITS for name in pair if name in limits]
+    missing = [name for pair in LIMITS for name in pair if name not in limits]
+    if given and missing:
+        text = f"no {', '.join(missing)}: the limits of the drawing are left open"
+        place = next(iter(limits.values()))[1]
+        fields.report.unused.append(remark(place, text))
+    elif given and None not in given:
+        pairs = zip(given[::2], given[1::2], strict=True)
+        scene.animation.limits = tuple(pairs)
+        fields.places["animation.limits"] = limits["xmin"][1]
+
+
+def _limit(fields: Fields, name: str) -> float | None:
+    value, place = fields.model.limits[name]
+    if isinstance(value, np.ndarray) and value.size == 1:
+        return float(value[0, 0])
+    if isinstance(value, (str, np.ndarray)):
+        shown = MISSING if isinstance(value, np.ndarray) and not value.size else plain_value(value)
+        fields.model.mistakes.append(
+            Mistake(name, shown, "should be a number", file=place.file, line=place.line)
+        )
+    return None

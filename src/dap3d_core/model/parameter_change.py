@@ -1,0 +1,111 @@
+"""Other numbers for a force of a model that is made: what its rows would hold."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+
+from dap3d_core.interface.examine.examine import pose
+from dap3d_core.interface.fields import FieldSpec, specs_of
+from dap3d_core.model.groups import Floats, Group, Grouping, Integers
+from dap3d_core.model.model import Model
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.scene import Checked
+from dap3d_core.scene.validate.coerce_values import Fault, bounded, matrix_of, number_of, numbers_of
+
+
+class Change(NamedTuple):
+    """Entries of a group's numbers: their values are to be ``new`` where ``where`` is true."""
+
+    group: Group
+    places: Integers
+    where: Any
+    new: Floats
+
+
+def changed(checked: Checked, model: Model, place: int, fields: Mapping[str, Any]) -> Change:
+    """What fields of a force, given anew, make of its numbers.
+
+    Args:
+        checked: the scene.
+        model: made from it.
+        place: of the force among the forces of the scene.
+        fields: field -> number, three numbers or a matrix.
+
+    Raises:
+        ValueError: the force has no such field, or it cannot be changed, or not to this value.
+    """
+    force = checked.forces[place]
+    specs = specs_of(force.examined.type)
+    values = {name: _value(force.name, specs, name, value) for name, value in fields.items()}
+    for group in model.forces:
+        places = np.flatnonzero(group.members == place)
+        if len(places):
+            return _of_force(checked, group, places, place, values)
+    return _of_friction(model, force.name, place, values)
+
+
+def _value(force: str, specs: Mapping[str, FieldSpec], name: str, value: Any) -> Any:
+    """The value of a field, checked as in a scene."""
+    numeric = [n for n, s in specs.items() if s.kind in ("number", "vec3", "matrix")]
+    if name not in numeric:
+        near = nearest(name, numeric)
+        hint = f"did you mean {near!r}?" if near else f"it has {', '.join(numeric) or 'none'}"
+        raise ValueError(f"force {force} has no numbers under the name {name!r}; {hint}")
+    spec = specs[name]
+    found: Any
+    if spec.kind == "number":
+        limits = {n: getattr(spec, n) for n in ("positive", "minimum", "maximum", "whole")}
+        found = bounded(number_of(value), **limits)
+    else:
+        found = numbers_of(value, 3) if spec.kind == "vec3" else matrix_of(value)
+    if isinstance(found, Fault):
+        raise ValueError(f"force {force}: {name} {found.what}, not {value!r}")
+    return found
+
+
+def _of_force(
+    checked: Checked, group: Group, places: Integers, place: int, values: Mapping[str, Any]
+) -> Change:
+    force = checked.forces[place]
+    n = len(checked.body_names)
+    poses = {0: pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))}
+    poses |= {
+        b: pose(checked.r[b - 1], checked.p[b - 1], checked.Jp[b - 1]) for b in range(1, n + 1)
+    }
+    grouping = Grouping("force", poses, n, checked.functions)
+    given = {**force.values, **values}
+    try:
+        (old,) = grouping.groups([force], [place])
+        (new,) = grouping.groups([attrs.evolve(force, values=given)], [place])
+    except ValueError as error:  # PrepareError: the type's own words
+        raise ValueError(f"force {force.name}: {error}") from error
+    if not _same_tables(old, new):
+        raise ValueError(f"force {force.name}: this would change a table, which cannot be done")
+    # what is the same stays: turns that were counted, places of tables, numbers changed before
+    return Change(group, places, old.numbers != new.numbers, new.numbers)
+
+
+def _same_tables(old: Group, new: Group) -> bool:
+    return all(
+        np.array_equal(a, b) for (*_, a), (*_, b) in zip(old.tables, new.tables, strict=True)
+    )
+
+
+def _of_friction(model: Model, name: str, place: int, values: Mapping[str, Any]) -> Change:
+    """The numbers that a force brings into the friction of a joint."""
+    for group in model.friction:
+        places = np.flatnonzero(group.members == place)
+        if not len(places):
+            continue
+        numbers = group.numbers[places].copy()
+        where = np.zeros(numbers.shape, dtype=bool)
+        own = specs_of(group.examined.type)
+        for field, value in values.items():
+            if field in own or field not in group.examined.layout.numbers:
+                raise ValueError(f"force {name}: {field} is not used in this joint")
+            at, _ = group.examined.layout.numbers[field]
+            numbers[:, at], where[:, at] = value, True
+        return Change(group, places, where, numbers)
+    raise ValueError(f"force {name} has no numbers")

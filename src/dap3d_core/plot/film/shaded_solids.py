@@ -1,0 +1,135 @@
+"""Shapes of bodies in films and snapshots: triangles, shaded, the nearest drawn last."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+from matplotlib.colors import is_color_like, to_hex, to_rgb
+
+from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.model.rotations import to_global
+from dap3d_core.plot.film.projection import Camera
+from dap3d_core.scene.scene import Scene
+from dap3d_core.view.scene3d.shapes import GROUND_COLOR, Drawn, drawn
+from dap3d_core.view.scene3d.solids import solid
+
+#: Shapes of more triangles are not drawn: every picture of a film draws all of them.
+MOST_TRIANGLES = 30_000
+#: Longer edges, as parts of the largest shape, are divided: the middle of a large triangle says
+#: little of what it hides.
+LONGEST = 0.12
+#: The darkest face of a shape, as part of its colour; where light comes from beside the viewer.
+DARKEST, BESIDE = 0.55, (0.3, 0.5)
+
+
+@attrs.frozen(eq=False)
+class Shapes:
+    """Triangles fixed in bodies.
+
+    Attributes:
+        body: (k,) body of each vertex, 0 for ground.
+        local: (k, 3) vertices in the axes of the body, m.
+        triangles: (q, 3) places of vertices.
+        colors: (q, 3) red, green, blue from 0 to 1.
+        hues: index of a body that has a shape -> colour of its first one.
+        notes: what is not drawn, and why.
+    """
+
+    body: Integers
+    local: Floats
+    triangles: Integers
+    colors: Floats
+    hues: dict[int, str]
+    notes: tuple[str, ...]
+
+    @property
+    def corners(self) -> Integers:
+        """Places of the vertices that bound each body's shapes, for the frame of the picture."""
+        found = []
+        for k in np.unique(self.body):
+            places = np.flatnonzero(self.body == k)
+            ends = self.local[places]
+            found += [places[ends.argmin(axis=0)], places[ends.argmax(axis=0)]]
+        return np.unique(np.concatenate(found)) if found else np.zeros(0, dtype=np.int64)
+
+    def seen(self, r: Floats, p: Floats, camera: Camera) -> tuple[Floats, Floats]:
+        """Triangles (q, 3, 2) in the picture, from back to front, and their colours (q, 3)."""
+        places = self.local.copy()
+        moving = self.body > 0
+        on = self.body[moving] - 1
+        places[moving] = r[on] + to_global(p[on], self.local[moving])
+        corners = places[self.triangles]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.linalg.norm(normal, axis=1)
+        light = camera.towards + BESIDE[0] * camera.right + BESIDE[1] * camera.up
+        bright = np.abs(normal @ (light / np.linalg.norm(light))) / np.where(length, length, 1.0)
+        order = np.argsort(camera.depth(corners).mean(axis=1), kind="stable")
+        shade = DARKEST + (1.0 - DARKEST) * bright[order, None]
+        return camera.project(corners[order]), self.colors[order] * shade
+
+
+def shapes_of(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Shapes:
+    """The shapes of a scene; arguments as ``view.shapes.drawn`` has them."""
+    found: Drawn = drawn(scene, names, colors)
+    notes = list(found.notes)
+    pieces = []
+    for mark in found.marks:
+        form = solid(mark.kind)
+        local = np.asarray(mark.at) + to_global(mark.q, form.vertices * mark.size)
+        pieces.append((mark.body, local, form.triangles, mark.color))
+    for mesh in found.meshes:
+        local = np.asarray(mesh.at) + to_global(mesh.q, mesh.vertices * mesh.scale)
+        pieces.append((mesh.body, local, mesh.triangles, mesh.color))
+    pieces = [(body, *_divided(local, triangles, _size(pieces)), hue)
+              for body, local, triangles, hue in pieces]  # fmt: skip
+    for line in found.lines:  # triangles without an area, of which their edges are seen
+        k = np.arange(len(line.points) - 1)
+        pieces.append(
+            (line.body, np.array(line.points), np.stack([k, k + 1, k + 1], axis=1), line.color)
+        )
+    if sum(len(piece[2]) for piece in pieces) > MOST_TRIANGLES:
+        notes.append(
+            f"shapes of more than {MOST_TRIANGLES} triangles in all are not drawn; dap3d view and "
+            "dap3d export show them"
+        )
+        pieces = []
+    starts = np.cumsum([0, *(len(piece[1]) for piece in pieces)])
+    nothing = np.zeros((0, 3))
+    return Shapes(
+        body=np.repeat([piece[0] for piece in pieces], np.diff(starts)).astype(np.int64),
+        local=np.concatenate([nothing, *(piece[1] for piece in pieces)]),
+        triangles=np.concatenate(
+            [nothing, *(piece[2] + start for piece, start in zip(pieces, starts, strict=False))]
+        ).astype(np.int64),
+        colors=np.concatenate(
+            [nothing, *(np.tile(_rgb(piece[3]), (len(piece[2]), 1)) for piece in pieces)]
+        ),
+        hues={piece[0]: to_hex(_rgb(piece[3])) for piece in reversed(pieces)},
+        notes=tuple(notes),
+    )
+
+
+def _rgb(color: str) -> tuple[float, float, float]:
+    """Red, green, blue of a colour; grey for a word that is none."""
+    return to_rgb(color) if is_color_like(color) else to_rgb(GROUND_COLOR)
+
+
+def _size(pieces: Sequence[Any]) -> float:
+    """The largest extent of a shape, m."""
+    return max(float(np.max(np.ptp(local, axis=0))) for _, local, _, _ in pieces)
+
+
+def _divided(local: Floats, triangles: Integers, size: float) -> tuple[Floats, Integers]:
+    """Triangles whose edges are short: each long one becomes four, some times."""
+    corners = local[triangles]
+    for _ in range(4):
+        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+        long = edges.max(axis=1) > LONGEST * size
+        if not long.any() or 3 * long.sum() + len(corners) > MOST_TRIANGLES:
+            break
+        a, b, c = corners[long].swapaxes(0, 1)
+        d, e, f = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+        four = [np.stack(t, axis=1) for t in ((a, d, f), (d, b, e), (f, e, c), (d, e, f))]
+        corners = np.concatenate([corners[~long], *four])
+    return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)

@@ -1,0 +1,241 @@
+"""The stick figure of a result: lines from the mass centre of each body to its points."""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+from matplotlib.colors import is_color_like, to_hex
+
+from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.model.rotations import euler_rates, split, to_global
+from dap3d_core.plot.cubics import cubic
+from dap3d_core.plot.curves import MARKERS, PALETTE
+from dap3d_core.result import Result
+from dap3d_core.scene import Scene, SceneError, load, parse
+
+if TYPE_CHECKING:
+    from dap3d_core.plot.film.shaded_solids import Shapes
+
+#: Usual names of colours -> the shade of that hue in which colour-blind readers can tell it apart.
+SHADES = {
+    "blue": "#0072B2", "orange": "#E69F00", "green": "#009E73", "red": "#D55E00",
+    "purple": "#4B0082", "magenta": "#CC79A7", "pink": "#CC79A7", "cyan": "#56B4E9",
+    "gray": "#606060", "grey": "#606060", "brown": "#6B4423", "olive": "#C2C25A",
+    "yellow": "#E69F00", "black": "#000000",
+    "b": "#0072B2", "g": "#009E73", "r": "#D55E00", "c": "#56B4E9", "m": "#CC79A7",
+    "y": "#E69F00", "k": "#000000",
+}  # fmt: skip
+#: Corners of the circle of a disk; its radius where a scene gives none, m, as its type has it.
+SIDES, RADIUS = 32, 1.0
+#: Numbers of coordinates that are computed at once.
+BLOCK = 1_000_000
+
+
+@attrs.frozen(eq=False)
+class Sticks:
+    """What is drawn of a result, as places on bodies: first the n mass centres.
+
+    Attributes:
+        names, colors, markers: of the bodies; what tells one from the others twice over.
+        body: (k,) body of each place, 1 to n, 0 for ground.
+        local: (k, 3) its coordinates there, m.
+        points: places of the points that belong to bodies.
+        anchors: places of points of the ground.
+        springs, links: (q, 2) pairs of places: ends of force elements; points that joints couple.
+        rims: (q, 2) pairs of places: the circles of disks that roll, each with a spoke.
+        shapes: of the scene, in place of the lines and markers of their bodies; None without.
+        limits: (3, 2) of the axes as the scene gives them, m, or None.
+    """
+
+    names: tuple[str, ...]
+    colors: tuple[str, ...]
+    markers: tuple[str, ...]
+    body: Integers
+    local: Floats
+    points: Integers
+    anchors: Integers
+    springs: Integers
+    links: Integers
+    rims: Integers
+    shapes: "Shapes | None"
+    limits: Floats | None
+
+    @property
+    def lines(self) -> Integers:
+        """(q, 2) pairs of places: from mass centres to the points of their bodies; the rims."""
+        spokes = np.stack([self.body[self.points] - 1, self.points], axis=1)
+        return np.concatenate([spokes, self.rims])
+
+    def positions(self, r: Floats, p: Floats) -> Floats:
+        """Positions (..., k, 3), m, of all places at poses r (..., n, 3), p (..., n, 4)."""
+        out = np.empty((*r.shape[:-2], len(self.body), 3))
+        moving = self.body > 0
+        b = self.body[moving] - 1
+        out[..., ~moving, :] = self.local[~moving]
+        out[..., moving, :] = r[..., b, :] + to_global(p[..., b, :], self.local[moving])
+        return out
+
+    @property
+    def _framed(self) -> "Sticks":
+        """The same with places where the shapes end."""
+        if self.shapes is None:
+            return self
+        ends = self.shapes.corners
+        body = np.concatenate([self.body, self.shapes.body[ends]])
+        return attrs.evolve(self, body=body, local=np.vstack([self.local, self.shapes.local[ends]]))
+
+    def extent(self, result: Result, directions: Floats) -> Floats:
+        """(d, 2) least and largest of all places over the reported instants, m.
+
+        Args:
+            result: whose motion.
+            directions: (3, d) unit vectors along which they are measured.
+        """
+        n, found = result.subject.body_count, []
+        count = max(1, BLOCK // (3 * len(self._framed.body)))
+        for start in range(0, len(result.t), count):
+            r, p, _, _ = split(result.u[start : start + count], n)
+            all_of_them = self._framed.positions(r, p).reshape(-1, 3) @ directions
+            found.append([all_of_them.min(axis=0), all_of_them.max(axis=0)])
+        return np.stack([np.min(found, axis=(0, 1)), np.max(found, axis=(0, 1))], axis=1)
+
+
+def sticks_of(result: Result, model: str | os.PathLike[str] | None = None) -> Sticks:
+    """The stick figure of a result, from its points and from the scene in it.
+
+    Args:
+        result: whose.
+        model: in whose folder meshes of shapes lie, where they are drawn.
+    """
+    subject = result.subject
+    scene = _scene(result.scene_text)
+    if model is not None:
+        scene.path = load(model).path
+    n = subject.body_count
+    body = [*range(1, n + 1), *(int(b) for b in subject.point_body)]
+    local = [*np.zeros((n, 3)), *subject.point_local]
+    place = {f"{name}.O": k for k, name in enumerate(subject.body_names)}
+    place |= {name: n + k for k, name in enumerate(subject.point_names)}
+    pairs = {kind: list(_ends(scene, kind)) for kind in ("forces", "joints")}
+    for name in {end for found in pairs.values() for pair in found for end in pair} - set(place):
+        if name == "ground.O":
+            place[name] = len(body)
+            body.append(0)
+            local.append(np.zeros(3))
+    springs, links = (_places(pairs[kind], place) for kind in ("forces", "joints"))
+    pairs_of_bodies = [(body[a], body[b]) for a, b in links if body[a] and body[b]]
+    colors = _colors(scene, subject.body_names, pairs_of_bodies)
+    shapes = None
+    if scene.shapes:
+        from dap3d_core.plot.film.shaded_solids import shapes_of
+
+        shapes = shapes_of(scene, subject.body_names, [to_hex(color) for color in colors])
+        colors = tuple(shapes.hues.get(k, color) for k, color in enumerate(colors, 1))
+    found, shaped = np.array(body), [] if shapes is None else [*shapes.hues]
+    bare = np.isin(found, shaped, invert=True)
+    wheels = [(k, R) for k, R in _wheels(scene, subject.body_names) if k not in shaped]
+    rims = [pair for n, (k, _) in enumerate(wheels) for pair in _rim(k, len(body) + n * SIDES)]
+    around = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
+    circle = np.stack([np.cos(around), 0.0 * around, np.sin(around)], axis=1)
+    return Sticks(
+        names=subject.body_names,
+        colors=colors,
+        markers=tuple(MARKERS[k % len(MARKERS)] for k in range(n)),
+        body=np.array([*body, *(k for k, _ in wheels for _ in circle)]),
+        local=np.vstack([np.reshape(local, (-1, 3)), *(R * circle for _, R in wheels)]),
+        points=np.flatnonzero((found > 0) & (np.arange(len(found)) >= n) & bare),
+        anchors=np.flatnonzero(found == 0),
+        springs=springs,
+        links=links,
+        rims=np.array(rims, dtype=np.int64).reshape(-1, 2),
+        shapes=shapes,
+        limits=_limits(scene.animation.limits),
+    )
+
+
+def _scene(scene_text: str) -> Scene:
+    """The scene, whatever is wrong in it; an empty one where a result has none that can be read."""
+    try:
+        return parse(scene_text)
+    except SceneError:
+        return Scene()
+
+
+def _limits(given: Any) -> Floats | None:
+    """Limits of the axes (3, 2), m; None where there are none that make sense."""
+    try:
+        found = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        return None
+    return found if found.shape == (3, 2) and np.isfinite(found).all() else None
+
+
+def _ends(scene: Scene, kind: str) -> Iterator[tuple[str, str]]:
+    """Names of the two points of each element that has two, given as such or by a vector."""
+    for element in getattr(scene, kind).values():
+        fields, d = element.fields, element.fields.get("d")
+        ends = fields.get("P_i"), fields.get("P_j")
+        if isinstance(d, str) and d in scene.vectors2:
+            ends = scene.vectors2[d].P_i, scene.vectors2[d].P_j
+        P_i, P_j = ends
+        if isinstance(P_i, str) and isinstance(P_j, str):
+            yield P_i, P_j
+
+
+def _wheels(scene: Scene, names: Sequence[str]) -> Iterator[tuple[int, float]]:
+    """Bodies that joints of the type ``disk`` roll, and their radii, m."""
+    for element in scene.joints.values():
+        body, radius = element.fields.get("body_i"), element.fields.get("radius", RADIUS)
+        is_size = isinstance(radius, int | float) and 0.0 < radius < np.inf
+        if element.type == "disk" and body in names and is_size:
+            yield names.index(body) + 1, float(radius)
+
+
+def _rim(body: int, first: int) -> Iterator[tuple[int, int]]:
+    """Pairs of places of a circle whose places begin at ``first``, with a spoke to its centre."""
+    yield body - 1, first
+    for k in range(SIDES):
+        yield first + k, first + (k + 1) % SIDES
+
+
+def _places(pairs: Sequence[tuple[str, str]], place: Mapping[str, int]) -> Integers:
+    found = [(place[a], place[b]) for a, b in pairs if a in place and b in place]
+    return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+
+def _colors(
+    scene: Scene, names: Sequence[str], joined: Sequence[tuple[int, int]]
+) -> tuple[str, ...]:
+    """The scene's colours, usual names in shades of the palette; the palette in turn elsewhere.
+
+    Of more bodies than it has colours those of a chain of joints have one hue, as in pages.
+    """
+    found = []
+    for name in names:
+        given: Any = scene.bodies[name].color if name in scene.bodies else None
+        shade = SHADES.get(str(given).removeprefix("tab:"), given)
+        found.append(shade if is_color_like(shade) else "")
+    if len(names) <= len(PALETTE):
+        return tuple(color or PALETTE[k] for k, color in enumerate(found))
+    from dap3d_core.view.scene3d.colors import colors
+
+    return tuple(colors([color and to_hex(color) for color in found], joined))
+
+
+def pose_at(result: Result, t: float) -> tuple[Floats, Floats]:
+    """Poses r (n, 3), p (n, 4) of all bodies at a time, s, between reported instants as well.
+
+    There they are interpolated by cubics from positions and velocities at both instants; bodies
+    stay rigid.
+    """
+    n, times = result.subject.body_count, result.t
+    k = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, max(0, len(times) - 2)))
+    r, p, rd, w = split(result.u[k : k + 2], n)
+    if len(times) < 2:
+        return r[0], p[0]
+    h = float(times[k + 1] - times[k])
+    a = min(max((t - float(times[k])) / h, 0.0), 1.0)
+    turned = cubic(a, h, p, euler_rates(p, w))
+    return cubic(a, h, r, rd), turned / np.linalg.norm(turned, axis=-1, keepdims=True)

@@ -1,0 +1,1 @@
+"""Plots of sweeps: curves, maps, parallel coordinates."""

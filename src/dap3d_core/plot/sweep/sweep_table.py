@@ -1,0 +1,247 @@
+"""What is drawn of a sweep's data set: its numbers, its outputs, how its points ended."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.model.groups import Floats
+from dap3d_core.plot.curves import unit_text
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.result import UnknownNameError
+from dap3d_core.result.file.schema import SWEEP
+from dap3d_core.study import REDUCTIONS, PointStatus
+from dap3d_core.study.sweep.subsample import at_places, evenly
+
+if TYPE_CHECKING:
+    import xarray
+
+#: Dimensions that are no varied number.
+POINT, TIME = "point", "time"
+#: Values that reach so far, greatest over least, lie on a log scale when their logarithmic steps
+#: differ by less than this, relative.
+FAR, EVEN = 10.0, 1e-6
+#: Names that an error lists.
+LISTED = 12
+#: What was computed at a point: outputs of other points are not drawn as values.
+DONE = PointStatus.DONE.value
+
+
+@attrs.frozen(eq=False)
+class Column:
+    """A number or an output of all points that are drawn.
+
+    Attributes:
+        name: of the data set.
+        label, unit: what stands at its axis.
+        values: of the points; of an axis of a grid its values.
+        is_log: whether its scale is logarithmic.
+    """
+
+    name: str
+    label: str
+    unit: str
+    values: Floats
+    is_log: bool = False
+
+
+@attrs.frozen(eq=False)
+class Table:
+    """A sweep, perhaps cut and thinned.
+
+    Attributes:
+        data: its data set; dimensions of one value are gone.
+        sampled: whether its points are samples.
+        numbers: names of the numbers that still vary.
+        outputs: names of the outputs.
+        words: title, and what was cut or left out.
+    """
+
+    data: "xarray.Dataset"
+    sampled: bool
+    numbers: tuple[str, ...]
+    outputs: tuple[str, ...]
+    words: tuple[str, ...]
+
+    @property
+    def status(self) -> NDArray[np.int8]:
+        """How each point ended, over the axes of the numbers."""
+        if "status" in self.data:
+            kept = self.data["status"].transpose(*self.dimensions, missing_dims="ignore")
+            return np.asarray(kept.values).reshape(self.shape)
+        return np.full(self.shape, DONE, dtype=np.int8)
+
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """Of the points."""
+        if self.sampled:
+            return (POINT,)
+        return self.numbers
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the points."""
+        return tuple(self.data.sizes.get(d, 1) for d in self.dimensions)
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return math.prod(self.shape)
+
+    def check(self, output: str) -> None:
+        """Refuse a name of no output.
+
+        Raises:
+            UnknownNameError: names the nearest.
+        """
+        if output not in self.outputs:
+            raise unknown("output", output, self.outputs)
+
+    def usual(self, x: str | None) -> tuple[str, ...]:
+        """The outputs that are drawn where none is named: over something else no series."""
+        return tuple(n for n in self.outputs if x is None or not self.is_series(n))
+
+    def is_series(self, name: str) -> bool:
+        """Whether an output has a value at each instant."""
+        return TIME in self.data[name].dims
+
+    def number(self, name: str) -> Column:
+        """A varied number, an axis of a grid or over all samples; also ``time``."""
+        values = np.asarray(self.data[name].values, dtype=float)
+        unit = self.data[name].attrs.get("units", "")
+        return Column(name, name, unit, values, self._is_log(name, values))
+
+    def output(self, name: str) -> Column:
+        """An output (points..., [time]); NaN where the run did not go to its end."""
+        about = self.data[name].attrs
+        kept = self.data[name].transpose(*self.dimensions, ..., missing_dims="ignore")
+        values = np.array(kept.values, dtype=float).reshape(*self.shape, *self._instants(name))
+        values[~np.isfinite(values)] = np.nan
+        if not self.is_series(name):
+            values[self.status != DONE] = np.nan
+        label = str(about.get("long_name", name))
+        word = name.rpartition(":")[2]
+        if ":" in name and word in REDUCTIONS and word != "series":
+            label = f"{label}, {word}"
+        return Column(name, label, str(about.get("units", "")), values)
+
+    def flat(self, name: str) -> Column:
+        """A number or an output over all points in one row (n,)."""
+        if name in self.outputs:
+            column = self.output(name)
+            return attrs.evolve(column, values=column.values.ravel())
+        column = self.number(name)
+        if self.sampled or not self.numbers:
+            return column
+        place = self.numbers.index(name)
+        axes = [self.number(n).values for n in self.numbers]
+        return attrs.evolve(column, values=np.meshgrid(*axes, indexing="ij")[place].ravel())
+
+    def thinned(self, most: int) -> "Table":
+        """With so many points at most, evenly chosen; says so."""
+        if self.size <= most:
+            return self
+        chosen = zip(self.dimensions, evenly(self.shape, most), strict=True)
+        places = {axis: there for axis, there in chosen if axis in self.data.dims}
+        fewer = attrs.evolve(self, data=at_places(self.data, places))
+        return attrs.evolve(fewer, words=(*self.words, f"{fewer.size} of {self.size} points"))
+
+    def _instants(self, name: str) -> tuple[int, ...]:
+        return (self.data.sizes[TIME],) if self.is_series(name) else ()
+
+    def _is_log(self, name: str, values: Floats) -> bool:
+        """Whether a number was varied evenly in its logarithm."""
+        spec = _varied(self.data).get(name, "")
+        if isinstance(spec, str) and spec.replace(" ", "").endswith(":log"):
+            return bool(np.all(values > 0.0))
+        if self.sampled or name == TIME or len(values) < 3 or np.any(values <= 0.0):
+            return False
+        if values[-1] < FAR * values[0]:
+            return False
+        steps = np.diff(np.log(values))
+        return bool(np.ptp(steps) <= EVEN * np.abs(steps).max())
+
+
+def table_of(data: "xarray.Dataset", at: Mapping[str, float] | None = None) -> Table:
+    """The table of a data set.
+
+    Args:
+        data: of a sweep, perhaps with points chosen by xarray.
+        at: dimension -> value; the nearest one there is stays.
+
+    Raises:
+        ValueError: this is no sweep, it has no points, or a value cannot be.
+        UnknownNameError: the sweep has no such dimension.
+    """
+    if SWEEP not in data.attrs:
+        raise ValueError(
+            f"the data set is of no sweep: it has no attribute {SWEEP}; dap.sweep and "
+            "dap.open_sweep give one (keep_attrs=True keeps attributes in xarray)"
+        )
+    varied = [name for name in _varied(data) if name in data.coords]
+    sampled = POINT in data.dims
+    cut, words = _cut(data, at or {}, varied, sampled)
+    for name in varied:
+        if name in cut.dims and cut.sizes[name] == 1:
+            cut = cut.isel({name: 0})
+    if 0 in cut.sizes.values():
+        raise ValueError("the sweep has no points: there is nothing to draw")
+    alone = [n for n in varied if n not in cut.dims and not cut[n].ndim]
+    words += [f"{n} = {float(cut[n]):.6g}{_unit(cut, n)}" for n in alone]
+    dimensions = [n for n in varied if n in cut.dims]
+    if not sampled:
+        unsorted = [n for n in dimensions if np.any(np.diff(cut[n].values) < 0.0)]
+        cut = cut.sortby(unsorted) if unsorted else cut
+        if not dimensions and varied:  # a single point is drawn over its last number
+            cut, dimensions = cut.expand_dims(varied[-1]), [varied[-1]]
+            words = [w for w in words if not w.startswith(f"{varied[-1]} = ")]
+    numbers = tuple(n for n in varied if n in cut.coords) if sampled else tuple(dimensions)
+    title = str(data.attrs.get("model", ""))
+    outputs = tuple(str(n) for n in cut.data_vars if n not in ("status", "note"))
+    return Table(cut, sampled, numbers, outputs, tuple(w for w in (title, *words) if w))
+
+
+def _varied(data: "xarray.Dataset") -> dict[str, Any]:
+    """Name and form of each number that varies."""
+    try:
+        return {str(one["name"]): one.get("spec", "") for one in json.loads(data.attrs["varied"])}
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"the sweep does not say what varies: {error}") from error
+
+
+def _cut(
+    data: "xarray.Dataset", at: Mapping[str, float], varied: Sequence[str], sampled: bool
+) -> tuple["xarray.Dataset", list[str]]:
+    """The data set at the values nearest to some, and what to say of it."""
+    words = []
+    axes = [n for n in (*varied, TIME) if n in data.dims]
+    for name, value in at.items():
+        if name in varied and sampled:
+            raise ValueError(
+                f"samples have no axes: {name} cannot be held at {value:g}; x = {name} draws "
+                "outputs over it"
+            )
+        if name not in axes:
+            raise unknown("dimension", name, axes)
+        if not math.isfinite(value):
+            raise ValueError(f"{name} = {value} is no value to cut at")
+        data = data.isel({name: int(np.argmin(np.abs(data[name].values - value)))})
+        if name == TIME:
+            words.append(f"t = {float(data[TIME]):.6g} s")
+    return data, words
+
+
+def _unit(data: "xarray.Dataset", name: str) -> str:
+    unit = data[name].attrs.get("units", "")
+    return f" {unit_text(unit)[1:-1]}" if unit not in ("", "1") else ""
+
+
+def unknown(what: str, name: str, known: Sequence[str]) -> UnknownNameError:
+    """The error for a name that a sweep does not have: lists what it has where that is little."""
+    shown = ", ".join(known[:LISTED]) + (", ..." if len(known) > LISTED else "")
+    words = f"the sweep has no {what} {name!r}" + (f" ({what}s: {shown})" if known else "")
+    return UnknownNameError(words, nearest(name, known))

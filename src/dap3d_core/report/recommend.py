@@ -1,0 +1,138 @@
+"""Which setting to take for an error that is wanted, and why, in words."""
+
+import math
+import statistics
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import attrs
+
+if TYPE_CHECKING:
+    from dap3d_core.report.report import Run
+
+
+#: An error is smaller than another one if it is below this part of it: equal motions differ in
+#: their rounding.
+BETTER = 0.95
+#: A run that was timed once may have taken so many times its usual time: another program ran.
+ONCE = 3.0
+
+
+@attrs.frozen
+class Recommendation:
+    """The fastest setting that reaches an error.
+
+    Attributes:
+        target_error: the error e that is wanted.
+        run: the run that was fastest; None where no setting reaches it.
+        reason: in words.
+        flags: what the command line takes for it; "" without a run.
+    """
+
+    target_error: float
+    run: "Run | None"
+    reason: str
+    flags: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {
+            "target_error": self.target_error,
+            "run": None if self.run is None else self.run.to_dict(),
+            "reason": self.reason,
+            "flags": self.flags,
+        }
+
+
+def front(runs: Sequence["Run"], uncertainty: float | None) -> set[int]:
+    """Places of the runs than which no faster one has a smaller error: the Pareto front.
+
+    Errors below the uncertainty of the reference count as that uncertainty.
+    """
+    least, found = math.inf, set()
+    for k in sorted(range(len(runs)), key=lambda k: (runs[k].time_s, runs[k].error)):
+        error = known_error(runs[k], uncertainty)
+        if error < BETTER * least:
+            least = error
+            found.add(k)
+    return found
+
+
+def known_error(run: "Run", uncertainty: float | None) -> float:
+    """What is known of a run's error: it, or the uncertainty of the reference above it."""
+    return max(run.error, uncertainty or 0.0)
+
+
+def recommend(
+    runs: Sequence["Run"], uncertainty: float | None, target_error: float
+) -> Recommendation:
+    """The fastest run whose error is known to be within the target.
+
+    Where timings cannot tell, that with the least work is: its evaluations of the right-hand side,
+    at the cost that one has over all runs of its method and integrator.
+
+    Raises:
+        ValueError: the target is not a positive number.
+    """
+    if not 0.0 < target_error < math.inf:
+        raise ValueError(f"a target of the error is a positive number, not {target_error}")
+    reaching = [run for run in runs if known_error(run, uncertainty) <= target_error]
+    if not reaching:
+        return Recommendation(target_error, None, _why_none(runs, uncertainty, target_error), "")
+    fastest = min(reaching, key=lambda run: run.time_s)
+    costs = _costs(runs)
+    best = min(
+        (run for run in reaching if _cannot_tell(fastest, run)),
+        key=lambda run: (run.counts["rhs"] * costs[run.method, run.integrator], run.time_s),
+    )
+    return Recommendation(target_error, best, _why(best, reaching), best.setting.flags)
+
+
+def _cannot_tell(fast: "Run", slow: "Run") -> bool:
+    """Whether the timings of two runs leave open which of them is the faster one."""
+    if min(fast.repeats, slow.repeats) < 2:
+        return slow.time_s <= ONCE * fast.time_s
+    return slow.time_min_s <= fast.time_max_s
+
+
+def _costs(runs: Sequence["Run"]) -> dict[tuple[str, str], float]:
+    """Seconds a right-hand side of each method and integrator: the median over their runs."""
+    found: dict[tuple[str, str], list[float]] = {}
+    for run in runs:
+        each = found.setdefault((run.method, run.integrator), [])
+        each.append(run.time_s / max(run.counts["rhs"], 1))
+    return {series: statistics.median(costs) for series, costs in found.items()}
+
+
+def _why(best: "Run", reaching: Sequence["Run"]) -> str:
+    is_fastest = best.time_s <= min(run.time_s for run in reaching)
+    rank = "is the fastest" if is_fastest else "takes the least work"
+    words = (
+        f"{best.setting} {rank} of {len(reaching)} settings that reach it, with an error "
+        f"of {best.error:.1e} in {1e3 * best.time_s:.3g} ms and {best.counts['rhs']:,} right-hand "
+        "sides"
+    )
+    others = [
+        run for run in reaching if (run.method, run.integrator) != (best.method, best.integrator)
+    ]
+    if not others:
+        return words
+    other = min(others, key=lambda run: run.time_s)
+    ratio = other.time_s / best.time_s
+    words += f"; next is {other.setting} at {ratio:.2g} times its time"
+    if min(best.repeats, other.repeats) < 2:
+        return f"{words}, each timed once"
+    within = _cannot_tell(*sorted((best, other), key=lambda run: run.time_s))
+    return f"{words}, which is within the spread of the timings" if within else words
+
+
+def _why_none(runs: Sequence["Run"], uncertainty: float | None, target_error: float) -> str:
+    if not runs:
+        return "no setting came to its end"
+    if uncertainty is not None and uncertainty > target_error:
+        return (
+            f"errors below {uncertainty:.1e}, the uncertainty of the reference, cannot be told "
+            "from one another"
+        )
+    nearest = min(runs, key=lambda run: run.error)
+    return f"no setting reaches it; the nearest is {nearest.setting} with {nearest.error:.1e}"

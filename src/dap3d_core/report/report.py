@@ -1,0 +1,263 @@
+"""What a report found: its runs, what failed, and the forms in which programs read it."""
+
+import csv
+import io
+import json
+import os
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from dap3d_core.report.recommend import Recommendation, recommend
+from dap3d_core.report.reference import Reference
+from dap3d_core.report.settings_ladder import Setting
+from dap3d_core.report.timing import Refused
+from dap3d_core.result import Result, current_versions
+from dap3d_core.result.file.atomic_write import whole_file
+from dap3d_core.scene.display import html_table
+
+#: Columns of the table that are not counts.
+COLUMNS = (
+    "method",
+    "integrator",
+    "rtol",
+    "atol",
+    "step",
+    "time_s",
+    "time_min_s",
+    "time_max_s",
+    "repeats",
+    "error",
+    "final_position_error",
+    "energy_error",
+    "constraint_error",
+    "constraint_velocity_error",
+    "constraint_acceleration_error",
+    "quaternion_error",
+    "below_uncertainty",
+    "on_front",
+    "failed",
+)
+
+
+@attrs.frozen(kw_only=True)
+class Run:
+    """One setting that came to its end.
+
+    Attributes:
+        setting: what was run.
+        time_s, time_min_s, time_max_s: median, least and largest wall time, s, compile time apart.
+        repeats: how often it was timed.
+        error: the error e against the reference (error_norms.py), over all its instants.
+        final_position_error: largest distance of a mass centre from the reference at the last
+            instant, m.
+        energy_error: imbalance of energy and work, relative, as in the ledger.
+        constraint_error, constraint_velocity_error, constraint_acceleration_error: largest ``|C|``,
+            ``|D v - nu|``, ``|D v_dot - gamma|``.
+        quaternion_error: largest deviation of Euler parameters from unit length.
+        counts: steps, rejected, rhs, projections and whatever else a run counts.
+        below_uncertainty: whether the error is below the reference's own uncertainty, so that only
+            this is known of it.
+        on_front: whether no faster run has a smaller error.
+    """
+
+    setting: Setting
+    time_s: float
+    time_min_s: float
+    time_max_s: float
+    repeats: int
+    error: float
+    final_position_error: float
+    energy_error: float
+    constraint_error: float
+    constraint_velocity_error: float
+    constraint_acceleration_error: float
+    quaternion_error: float
+    counts: dict[str, int]
+    below_uncertainty: bool = False
+    on_front: bool = False
+
+    @property
+    def method(self) -> str:
+        """The formulation."""
+        return self.setting.method
+
+    @property
+    def integrator(self) -> str:
+        """The method of integration."""
+        return self.setting.integrator
+
+    @property
+    def rtol(self) -> float | None:
+        """Relative tolerance; None for fixed steps."""
+        return self.setting.rtol
+
+    @property
+    def step(self) -> float | None:
+        """Fixed step, s; None where the integrator chooses it."""
+        return self.setting.step
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it: ``rtol`` and ``atol`` or ``step``, and the counts among the rest."""
+        found = attrs.asdict(self, recurse=False)
+        setting = attrs.asdict(found.pop("setting"), filter=lambda _, value: value is not None)
+        return {**setting, **{k: v for k, v in found.items() if k != "counts"}, **self.counts}
+
+
+@attrs.frozen
+class Failed:
+    """A setting that gave no result, and why, in words."""
+
+    setting: Setting
+    reason: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        setting = attrs.asdict(self.setting, filter=lambda _, value: value is not None)
+        return {**setting, "failed": self.reason}
+
+
+def run_of(setting: Setting, result: Result, times: list[float], error: float, final: float) -> Run:
+    """The facts of a run, given its errors."""
+    ledger = {name: entry.value for name, entry in result.ledger.items()}
+    counts = attrs.asdict(result.stats)
+    return Run(
+        setting=setting,
+        time_s=0.0,
+        time_min_s=0.0,
+        time_max_s=0.0,
+        repeats=0,
+        error=error,
+        final_position_error=final,
+        energy_error=ledger["energy"],
+        constraint_error=ledger["position"],
+        constraint_velocity_error=ledger["velocity"],
+        constraint_acceleration_error=ledger["acceleration"],
+        quaternion_error=ledger["quaternion"],
+        counts={k: v for k, v in counts.items() if not k.endswith("_s")},
+    )
+
+
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Report:
+    """Speed against error of one scene.
+
+    Attributes:
+        scene: its name.
+        t_end, dt: final time and reporting step, s.
+        runs: settings that came to their end, by method and integrator, coarse ones first.
+        failed: settings that did not, with reasons.
+        refused: methods that do not fit the scene, with reasons.
+        reference: what errors are measured against.
+        target_error: the error that was asked for; None where none was.
+        status: "done" or "interrupted".
+        notes: what to know of the whole.
+        versions: of dap3d, numpy, llvmlite, python.
+    """
+
+    scene: str
+    t_end: float
+    dt: float
+    runs: tuple[Run, ...]
+    failed: tuple[Failed, ...]
+    refused: tuple[Refused, ...]
+    reference: Reference
+    target_error: float | None = None
+    status: str = "done"
+    notes: tuple[str, ...] = ()
+    versions: dict[str, str] = attrs.Factory(current_versions)
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.runs)} settings ran, {len(self.failed)} failed"
+        return f"<Report {self.scene!r}: {self.status}, {counts}; {self.recommended().reason}>"
+
+    def _repr_html_(self) -> str:
+        """The settings that ran as a table, for notebooks."""
+        header = "method", "integrator", "rtol", "step [s]", "time [s]", "error", "on the front"
+        rows = [
+            (r.method, r.integrator, r.rtol, r.step, r.time_s, r.error, "yes" if r.on_front else "")
+            for r in self.runs
+        ]
+        return f"<p>{escape(repr(self)[1:-1])}</p>{html_table(header, rows)}"
+
+    def recommended(self, target_error: float | None = None) -> Recommendation:
+        """The fastest setting that reaches an error.
+
+        Args:
+            target_error: the error e to reach; by default the one the report was made for, or 1e-6.
+
+        Raises:
+            ValueError: the target is not a positive number.
+        """
+        wanted = target_error if target_error is not None else self.target_error
+        return recommend(self.runs, self.reference.uncertainty, 1e-6 if wanted is None else wanted)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it; see docs/report.md."""
+        reference = self.reference
+        expected = reference.expected
+        return {
+            "scene": self.scene,
+            "t_end": self.t_end,
+            "dt": self.dt,
+            "status": self.status,
+            "runs": [run.to_dict() for run in self.runs],
+            "failed": [each.to_dict() for each in self.failed],
+            "refused": [attrs.asdict(each) for each in self.refused],
+            "reference": {
+                "settings": [setting.flags for setting in reference.settings],
+                "uncertainty": reference.uncertainty,
+                "instants": len(reference.t),
+                "measured_to": float(reference.t[-1]),
+                "meaningless_from": reference.meaningless_from,
+                "expected": None if expected is None else attrs.asdict(expected),
+                "notes": list(reference.notes),
+            },
+            "recommended": self.recommended().to_dict(),
+            "notes": list(self.notes),
+            "versions": self.versions,
+        }
+
+    def to_json(self) -> str:
+        """The text of one JSON object (RFC 8259): ``to_dict``."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
+
+    def to_csv(self) -> str:
+        """A table of all settings, failed ones with their reason; numbers read back bit for bit."""
+        rows = [run.to_dict() for run in self.runs]
+        rows += [each.to_dict() for each in self.failed]
+        counts = dict.fromkeys(key for row in rows for key in row if key not in COLUMNS)
+        text = io.StringIO()
+        table = csv.DictWriter(text, (*COLUMNS[:-1], *counts, COLUMNS[-1]), lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
+        return text.getvalue()
+
+    def save_csv(self, path: str | os.PathLike[str], force: bool = False) -> Path:
+        """Write ``to_csv`` to a file, whole or not at all.
+
+        Raises:
+            ResultError: it cannot be written, or exists and ``force`` is off.
+        """
+        target = Path(path)
+        with whole_file(target, force) as part:
+            part.write_text(self.to_csv(), "utf-8")
+        return target
+
+    def plot(self, path: str | os.PathLike[str], force: bool = False, **options: Any) -> Path:
+        """Draw time against error into a file; arguments as ``save_work_precision``.
+
+        Raises:
+            ValueError: there is no run to draw, or the suffix is none of a picture.
+            ResultError: it cannot be written, or exists and ``force`` is off.
+        """
+        from dap3d_core.plot.work_precision import Mark, save_work_precision
+
+        marks = [
+            Mark(run.method, run.integrator, run.error, run.time_s, run.on_front)
+            for run in self.runs
+        ]
+        title, uncertainty = self.scene, self.reference.uncertainty
+        return save_work_precision(marks, path, title, uncertainty, force=force, **options)

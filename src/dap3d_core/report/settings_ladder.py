@@ -1,0 +1,113 @@
+"""The settings that a report runs: a ladder of tolerances or steps for each method."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import attrs
+
+from dap3d_core.integrators import METHODS as CODE
+from dap3d_core.scene.validate.settings import FIXED_STEP, INTEGRATORS, METHODS
+
+#: Relative tolerances of integrators that choose their step.
+TOLERANCES = tuple(float(f"1e-{k}") for k in range(3, 13))
+QUICK_TOLERANCES = (1e-4, 1e-7, 1e-10)
+#: atol is this part of rtol.
+ATOL = 1e-2
+#: A ladder of steps has so many rungs, each step half the one before: an error of order 4 falls by
+#: 2e8 from the first to the last.
+STEPS, QUICK_STEPS = 8, 3
+QUICK_FACTOR = 4.0
+
+#: Pairs that no run takes: radau and adams need the constraints that penalty replaces by springs.
+UNFIT = (("penalty", "radau"), ("penalty", "adams"))
+#: Formulations that a report may run.
+FORMULATIONS = tuple(name for name in METHODS if name != "auto")
+#: Integrators that a report may run: auto is one of them, or two.
+MEASURED = tuple(name for name in INTEGRATORS if name != "auto")
+#: Integrators that choose their step, those of the highest order first.
+ADAPTIVE = tuple(
+    sorted(
+        (name for name in MEASURED if name not in FIXED_STEP),
+        key=lambda name: -int(getattr(CODE.get(name), "order", 0)),
+    )
+)
+
+
+@attrs.frozen
+class Setting:
+    """One rung: a method, an integrator, and tolerances or a step.
+
+    Attributes:
+        method: the formulation.
+        integrator: the method of integration.
+        rtol, atol: tolerances of a step's error; None for fixed steps.
+        step: fixed step, s; None where the integrator chooses it.
+    """
+
+    method: str
+    integrator: str
+    rtol: float | None = None
+    atol: float | None = None
+    step: float | None = None
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What ``simulate`` takes, but for the method, which a model is compiled for."""
+        found = attrs.asdict(self, filter=lambda _, value: value is not None)
+        del found["method"]
+        return found
+
+    @property
+    def flags(self) -> str:
+        """What the command line takes for the same run."""
+        words = [f"--method {self.method} --integrator {self.integrator}"]
+        for name in ("rtol", "atol", "step"):
+            value = getattr(self, name)
+            if value is not None:
+                words.append(f"--{name} {value!r}")
+        return " ".join(words)
+
+    @property
+    def control(self) -> str:
+        """What sets its accuracy, in words."""
+        return f"step {self.step:g} s" if self.step is not None else f"rtol {self.rtol:.0e}"
+
+    def __str__(self) -> str:
+        return f"{self.method}, {self.integrator}, {self.control}"
+
+
+def controlled(method: str, integrator: str, rtol: float) -> Setting:
+    """The setting of an integrator that chooses its step."""
+    return Setting(method, integrator, rtol, float(f"{ATOL * rtol:.6g}"))
+
+
+def ladder(
+    method: str, integrator: str, tolerances: Iterable[float], steps: Iterable[float]
+) -> list[Setting]:
+    """The rungs of a method and an integrator, coarse ones first; none where they do not fit."""
+    if (method, integrator) in UNFIT:
+        return []
+    if integrator in FIXED_STEP:
+        return [Setting(method, integrator, step=h) for h in sorted(steps, reverse=True)]
+    return [controlled(method, integrator, rtol) for rtol in sorted(tolerances, reverse=True)]
+
+
+def ladder_of_steps(t_end: float, dt: float, step_count: int, *, quick: bool) -> tuple[float, ...]:
+    """Fixed steps that suit a scene, s.
+
+    The first is the mean step of a coarse controlled run: the motion's own scale of time.
+
+    Args:
+        t_end: final time, s.
+        dt: the reporting step, beyond which no fixed step goes, s.
+        step_count: steps of the coarse run.
+        quick: whether few are wanted.
+    """
+    first = min(t_end / max(step_count, 1), dt)
+    count, factor = (QUICK_STEPS, QUICK_FACTOR) if quick else (STEPS, 2.0)
+    return tuple(float(f"{first / factor**k:.3g}") for k in range(count))
+
+
+def chosen(names: Sequence[str] | None, known: Sequence[str]) -> tuple[str, ...]:
+    """The names asked for, all that are known by default; each once."""
+    return tuple(dict.fromkeys(names)) if names else tuple(known)

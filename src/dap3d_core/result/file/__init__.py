@@ -1,0 +1,1 @@
+"""Result files: schema, writing, lazy reading, checksum, validation."""

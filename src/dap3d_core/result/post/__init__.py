@@ -1,0 +1,1 @@
+"""Post-processing: point motion, reactions, forces, ledger, global error."""

@@ -1,0 +1,216 @@
+"""What joints do to bodies, and the Jacobian: evaluated again at reported states (spec 2, 10)."""
+
+from collections.abc import Collection, Iterator
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
+from dap3d_core.model import Model
+from dap3d_core.model.groups import Floats, Group, Integers
+from dap3d_core.model.rotations import read_only, split, to_body, to_global
+
+if TYPE_CHECKING:
+    from dap3d_core.formulations.constraint_rows import Rows
+    from dap3d_core.formulations.evaluator import Machine
+
+#: With more constraint rows than this the Jacobian is a list of sparse arrays.
+DENSE_ROWS = 1000
+
+
+@attrs.frozen(eq=False)
+class Reaction:
+    """What a joint, or a force element, exerts on one of its bodies at nt instants.
+
+    Attributes:
+        body: name of the body.
+        force: (nt, 3) N, global axes.
+        moment: (nt, 3) N m about the body's mass centre, global axes; for ground about the origin.
+        p: (nt, 4) Euler parameters of the body.
+        local: (3,) m, the element's own point on this body (``P_i`` for slot i), body axes; None
+            where its type has none.
+    """
+
+    body: str
+    force: Floats
+    moment: Floats
+    p: Floats
+    local: Floats | None
+
+    @property
+    def force_body(self) -> Floats:
+        """(nt, 3) N, the force in body axes: A^T f."""
+        return to_body(self.p, self.force)
+
+    @property
+    def moment_body(self) -> Floats:
+        """(nt, 3) N m, the moment about the mass centre in body axes: A^T n."""
+        return to_body(self.p, self.moment)
+
+    @property
+    def moment_at_point(self) -> Floats | None:
+        """(nt, 3) N m, the moment about the element's own point on this body, global axes.
+
+        n - s x f with the arm s of the point; None where the type has no such point.
+        """
+        if self.local is None:
+            return None
+        return self.moment - np.cross(to_global(self.p, self.local), self.force)
+
+
+def rows_at(machine: "Machine", t: Floats, u: Floats) -> Iterator["Rows"]:
+    """The constraint rows at each instant, one after the other."""
+    for time, state in zip(t, u, strict=True):
+        yield machine.rows(time, state)
+
+
+def jacobians(machine: "Machine", t: Floats, u: Floats) -> Any:
+    """The constraint Jacobian D of C(q, t) at each reported instant, D v = nu (spec 2).
+
+    Args:
+        machine: evaluates the model.
+        t: (nt,) s.
+        u: (nt, 13 n) states.
+
+    Returns:
+        (nt, m, 6 n) array; beyond 1000 rows a list of nt scipy CSR arrays (m, 6 n).
+    """
+    model = machine.model
+    if model.row_count > DENSE_ROWS:
+        return [rows.sparse() for rows in rows_at(machine, t, u)]
+    D = np.zeros((len(t), model.row_count, 6 * model.body_count))
+    for k, rows in enumerate(rows_at(machine, t, u)):
+        D[k] = rows.dense()
+    return read_only(D)
+
+
+@np.errstate(all="ignore")  # as compiled code does
+def reactions(
+    machine: "Machine",
+    t: Floats,
+    u: Floats,
+    Lam: Floats,
+    joints: Collection[int],
+    angles: Floats | None = None,
+) -> dict[int, dict[str, Reaction]]:
+    """What joints exert on each of their bodies: D_slot^T lambda (spec 2).
+
+    Args:
+        machine: evaluates the model.
+        t: (nt,) s.
+        u: (nt, 13 n) states.
+        Lam: (nt, m) multipliers, m rows in the order of the model.
+        joints: places of the joints in the model.
+        angles: (nt, k) angles as ``Arrays`` has them; None where they are not known.
+
+    Returns:
+        For each joint a reaction for each slot, by its letter.
+    """
+    loops = _own_loops(machine, np.array(list(joints), dtype=np.int64))
+    found = [np.empty((len(t), *loop.shape)) for loop in loops]
+    for k, time in placed(machine, t, u):
+        for loop, out in zip(loops, found, strict=True):
+            if angles is not None:
+                loop.angles.set(angles[k])
+            out[k] = loop.wrenches(time, Lam[k])
+    return {
+        int(joint): actions_of(machine.model, u, loop.group, place, out[:, n])
+        for loop, out in zip(loops, found, strict=True)
+        for n, (joint, place) in enumerate(zip(loop.joints, loop.places, strict=True))
+    }
+
+
+def placed(machine: "Machine", t: Floats, u: Floats) -> Iterator[tuple[int, float]]:
+    """Put the bodies and functions of a machine to each instant in turn: its place, the time."""
+    from dap3d_core.assembly.arrays import VALUE
+    from dap3d_core.assembly.evaluate import call_kinds, place_bodies
+
+    s = machine.system
+    for k, y in enumerate(machine.integrated(u) if len(t) else ()):
+        time = float(t[k])
+        place_bodies(y, s.body, s.metric)
+        call_kinds(VALUE, VALUE, time, s, machine.loops, s.force, s.force, s.force)
+        yield k, time
+
+
+def actions_of(
+    model: Model, u: Floats, group: Group, place: int, wrenches: Floats
+) -> dict[str, Reaction]:
+    """Wrenches (nt, slots, 6) of an instance of a group, at its place there, by slot."""
+    layout, p = group.examined.layout, split(u, model.body_count)[1]
+    names, found = ("ground", *model.body_names), {}
+    for n, (slot, body) in enumerate(zip(layout.slots, group.bodies[place], strict=True)):
+        at, shape = layout.numbers.get(f"P_{slot}", (0, ()))
+        local = read_only(group.numbers[place, at : at + 3]) if shape == (3,) else None
+        turned = p[:, body - 1] if body else np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(u), 4))
+        force, moment = read_only(wrenches[:, n, :3]), read_only(wrenches[:, n, 3:])
+        found[slot] = Reaction(names[body], force, moment, turned, local)
+    return found
+
+
+class Angles:
+    """The angles of instances of a group among numbers of their own: they are set, not counted."""
+
+    def __init__(self, model: Model, group: Group, places: Integers, numbers: Floats) -> None:
+        """Args: whose; their (k, par_width) numbers, which setting changes."""
+        self._numbers, self._columns = numbers, model.angles_of(group, places)
+        self._at = list(group.examined.layout.angles.values())
+
+    def set(self, angles: Floats) -> None:
+        """Let them be as reported at an instant, (all angles of the model,)."""
+        for column, at in zip(self._columns.T, self._at, strict=True):
+            self._numbers[:, at : at + ANGLE_WIDTH] = 0.0
+            self._numbers[:, at] = angles[column]
+
+
+def _own_loops(machine: "Machine", joints: Integers) -> list["_OwnLoop"]:
+    """Loops over some joints, each with arrays of its own, by type."""
+    loops = []
+    for q, (kind, group) in enumerate(machine.what):
+        if kind == "acceleration":
+            places = np.flatnonzero(np.isin(group.members, joints))
+            if len(places):
+                loops.append(_OwnLoop(machine, q, group, places))
+    return loops
+
+
+class _OwnLoop:
+    """The loop of a type over some of its joints, into arrays of its own.
+
+    So that ground has its blocks, too: in the driver they share a place that nothing reads.
+    interface/codegen/loop_source.py says how an instance's integers are laid out: row and blocks
+    stand last.
+    """
+
+    def __init__(self, machine: "Machine", q: int, group: Group, places: Integers) -> None:
+        from dap3d_core.interface.codegen.loop_source import stride
+
+        s, model, count = machine.system, machine.model, len(places)
+        self.machine, self.q, self.group, self.places = machine, q, group, places
+        self.joints = group.members[places]
+        slots, rows = len(group.examined.layout.slots), int(model.joint_rows[self.joints[0]])
+        self.shape = count, slots, 6
+        self._rows = model.joint_start[self.joints][:, None] + np.arange(rows)
+        width, numbers = stride(group.examined), group.examined.layout.par_width
+        i0, p0, _ = s.groups[q]
+        idx = s.idx[i0 : i0 + group.count * width].reshape(-1, width)[places]
+        idx[:, -slots - 1] = rows * np.arange(count)
+        idx[:, -slots:] = 6 * rows * np.arange(count * slots).reshape(count, slots)
+        self._idx = idx.ravel()
+        par = s.par[p0 : p0 + group.count * numbers].reshape(group.count, numbers)
+        self._par = np.concatenate([s.par, par[places].ravel()])  # tables keep their places
+        own = self._par[len(s.par) :].reshape(count, numbers)
+        self.angles = Angles(model, group, places, own)
+        self._group = np.array([0, len(s.par), count])
+        self._D = np.zeros((count, slots, rows, 6))
+        self._gamma, self._nu = np.zeros(count * rows), np.zeros(count * rows)
+
+    def wrenches(self, time: float, Lam: Floats) -> Floats:
+        """(joints, slots, 6) D^T lambda where the bodies stand, with multipliers Lam (m,)."""
+        from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop
+
+        s, D = self.machine.system, self._D.reshape(-1)
+        arrays = LoopArrays(body=s.body, F=s.F, idx=self._idx, par=self._par)
+        call_loop(self.machine.loops, self.q, time, arrays, self._group, D, self._gamma, self._nu)
+        return np.asarray(np.einsum("msrv,mr->msv", self._D, Lam[self._rows]))

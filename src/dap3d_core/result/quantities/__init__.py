@@ -1,0 +1,1 @@
+"""Quantities of a result: catalogue, lookup by name, tables and data sets."""

@@ -1,0 +1,1 @@
+"""Scene files: TOML in, TOML out, line numbers."""

@@ -1,0 +1,338 @@
+"""From a file to a scene. Reads data alone: nothing of it is run."""
+
+import os
+import re
+import stat
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+from dap3d_core.registry.regular_files import read_regular
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.scene.coerce import plain
+from dap3d_core.scene.errors import MISSING, Key, Mistake, SceneError, dotted
+from dap3d_core.scene.scene import (
+    HEADER_KEYS,
+    NAMED,
+    SCHEMA,
+    TABLES,
+    Animation,
+    AnimationPoint,
+    Element,
+    Scene,
+    Simulation,
+    keys_of,
+    unknown_key,
+)
+
+#: Larger files are refused before they are read.
+LARGEST_FILE = 64 * 2**20
+#: Keys of more parts are refused before they are read: reading one takes the square of their number
+#: in time and memory.
+MOST_PARTS = 32
+_LONG_KEY = re.compile(
+    r"""(?:^|[,{[])[ \t]*+(?:(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
+    rf"{{{MOST_PARTS}}}",
+    re.MULTILINE,
+)
+#: Mistakes for which the nearest spelling is searched while reading.
+SUGGESTIONS = 200
+#: The scene of a model's folder, and its own types.
+SCENE_FILE, PLUGIN_FILE = "scene.toml", "plugin.py"
+#: Tables and lists within one another, at most; a scene needs five.
+DEEPEST = 50
+
+
+def load(source: str | os.PathLike[str]) -> Scene:
+    """Read a scene; its values are checked later, all at once, by ``check``.
+
+    Args:
+        source: a folder with a ``scene.toml``, a TOML file, or the name of a shipped model, with
+            or without its group (``A04``, ``benchmarks/A04``).
+
+    Raises:
+        SceneError: there is no such file, or it is not TOML; says where and what to do.
+    """
+    path, notes = _find(source)
+    data = _parse(_read(path), path)
+    scene = scene_of(data)
+    scene.path = path
+    scene.notes += notes
+    return scene
+
+
+def parse(text: str) -> Scene:
+    """A scene from the text of a scene file, such as the one a result carries.
+
+    Raises:
+        SceneError: the text is not TOML.
+    """
+    return scene_of(tables_of(text))
+
+
+def tables_of(text: str) -> dict[str, Any]:
+    """The tables of the text of a scene file, or of its beginning, as they are written.
+
+    Raises:
+        SceneError: the text is not TOML.
+    """
+    return _parse(text, Path("scene"))
+
+
+def shipped_models() -> dict[str, Path]:
+    """The folders of the models that come with dap3d, by name; those of a group come last.
+
+    A group is a folder of models, such as ``benchmarks``.
+    """
+    root = _models_folder()
+    found = [sorted(root.glob(f"{depth}/{SCENE_FILE}")) for depth in ("*", "*/*")]
+    return {file.parent.name: file.parent for group in found for file in group}
+
+
+def group_of(folder: Path) -> str:
+    """The group that the folder of a shipped model belongs to, "" if to none."""
+    return folder.parent.name if folder.parent != _models_folder() else ""
+
+
+def scene_of(data: dict[str, Any]) -> Scene:
+    """A scene from the tables of a scene file; what has no place there becomes a fault."""
+    faults: list[tuple[Key, Mistake]] = []
+    tables = _Tables(data, faults)
+    scene = Scene(faults=faults)
+    header = tables.known(("scene",), data.get("scene", {}), HEADER_KEYS)
+    scene.name = header.get("name", "")
+    scene.description = header.get("description", "")
+    scene.schema = header.get("schema", SCHEMA)
+    for table, class_ in NAMED.items():
+        things = getattr(scene, table)
+        for name, content in tables.table((table,), data.get(table, {})).items():
+            things[name] = _thing(tables, (table, name), content, class_)
+    scene.animation = _animation(tables, data.get("animation", {}))
+    settings = tables.known(("simulation",), data.get("simulation", {}), keys_of(Simulation))
+    scene.simulation = Simulation(**settings)
+    return scene
+
+
+class _Tables:
+    """Reads tables of known keys; everything else is kept as a fault."""
+
+    def __init__(self, data: dict[str, Any], faults: list[tuple[Key, Mistake]]) -> None:
+        self.faults = faults
+        for name, content in data.items():
+            if name not in TABLES:
+                what = f"unknown table; a scene has {', '.join(TABLES)}"
+                value = MISSING if isinstance(content, (dict, list)) else plain(content)
+                self.fault((name,), value, what, self.nearest(name, TABLES))
+
+    def fault(self, key: Key, value: Any, what: str, near: str = "") -> None:
+        self.faults.append((key, Mistake(dotted(key), value, what, near)))
+
+    def nearest(self, word: Any, allowed: Collection[str]) -> str:
+        """The nearest right spelling; no longer searched after many faults, it takes time."""
+        return nearest(word, allowed) if len(self.faults) < SUGGESTIONS else ""
+
+    def table(self, key: Key, content: Any) -> dict[str, Any]:
+        """The content of a table, empty where it is none."""
+        if isinstance(content, dict):
+            return content
+        if isinstance(content, list):
+            what = f"should be a table: write [{dotted(key)}] with single brackets, names below it"
+        else:
+            what = f"should be a table, [{dotted(key)}]"
+        self.fault(key, plain(content), what)
+        return {}
+
+    def known(self, key: Key, content: Any, allowed: frozenset[str]) -> dict[str, Any]:
+        """The known keys of a table."""
+        table = self.table(key, content)
+        if table.keys() <= allowed:
+            return table
+        for name, value in table.items():
+            if name not in allowed:
+                near = self.nearest(name, allowed)
+                self.fault((*key, name), plain(value), unknown_key(allowed), near)
+        return {k: v for k, v in table.items() if k in allowed}
+
+
+def _thing(tables: _Tables, key: Key, content: Any, class_: type) -> Any:
+    name = key[-1]
+    if class_ is Element:
+        fields = {k: plain(v) for k, v in tables.table(key, content).items()}
+        return Element(str(name), fields.pop("type", None), fields)
+    return class_(name, **tables.known(key, content, keys_of(class_)))
+
+
+def _animation(tables: _Tables, content: Any) -> Animation:
+    known = tables.known(("animation",), content, keys_of(Animation))
+    points = known.get("points", [])
+    if not isinstance(points, list):
+        what = 'should be a list of tables such as {body = "crank", sPp = [0.0, 0.0, 1.0]}'
+        tables.fault(("animation", "points"), plain(points), what)
+        points = []
+    keys = keys_of(AnimationPoint)
+    found = [
+        AnimationPoint(**tables.known(("animation", "points", k), point, keys))
+        for k, point in enumerate(points)
+    ]
+    return Animation(found, known.get("limits"))
+
+
+# ---------------------------------------------------------------------------- files
+
+
+def _find(source: Any) -> tuple[Path, list[str]]:
+    """The scene file that a name, folder or path means, with notes on the choice."""
+    try:
+        text = os.fsdecode(source)
+    except TypeError:
+        raise _refused("", f"a scene is loaded by name or path, not {source!r}") from None
+    if not text.strip():
+        raise _refused("", "the name of the model is empty; give a name, a folder or a file")
+    if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", text):
+        raise _refused(text, "a URL cannot be loaded", remedy="download it and give the file")
+    path, models = Path(text), shipped_models()
+    shipped = _shipped(text, models)
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        if shipped is not None:
+            return shipped / SCENE_FILE, []
+        raise _not_found(path, text, models) from None
+    except OSError as error:
+        raise _unreadable(path, error) from None
+    if not stat.S_ISDIR(mode):
+        return path, []
+    if not (path / SCENE_FILE).exists():
+        if shipped is not None:
+            return shipped / SCENE_FILE, []
+        raise _no_scene_in(path, models)
+    notes = []
+    if shipped is not None and shipped.resolve() != path.resolve():
+        notes.append(f"{text} is also the name of a shipped model; the folder {path} was read")
+    return path / SCENE_FILE, notes
+
+
+def _shipped(text: str, models: dict[str, Path]) -> Path | None:
+    """The folder of the shipped model that NAME or GROUP/NAME means."""
+    folder = models.get(text.rpartition("/")[2])
+    if folder is None:
+        return None
+    names = (folder.name, Path(group_of(folder), folder.name).as_posix())
+    return folder if text in names else None
+
+
+def _models_folder() -> Path:
+    """Where the shipped models lie: in the package once installed, beside the sources before."""
+    package = Path(__file__).parents[2]
+    installed = package / "models_shipped"
+    return installed if installed.is_dir() else package.parents[1] / "models"
+
+
+def _read(path: Path) -> str:
+    """The text of a file, read only if it is a file of reasonable size."""
+    try:
+        info = path.stat()
+        if not stat.S_ISREG(info.st_mode):
+            raise _refused(str(path), "is not a regular file")
+        if info.st_size > LARGEST_FILE:
+            what = f"has {info.st_size / 2**20:.0f} MiB; at most {LARGEST_FILE >> 20} MiB are read"
+            raise _refused(str(path), what, remedy="build a scene of this size with a script")
+        data = read_regular(path, LARGEST_FILE)
+    except OSError as error:
+        raise _unreadable(path, error) from None
+    if b"\0" in data:
+        raise _refused(str(path), "is not a text file: it holds NUL bytes")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        what = f"is not UTF-8 text: byte {data[error.start]:#04x} cannot be read"
+        raise _refused(str(path), what, line=line, remedy="save it as UTF-8") from None
+
+
+def _parse(text: str, path: Path) -> dict[str, Any]:
+    import tomllib
+
+    if long := _LONG_KEY.search(text):
+        what = f"a key of more than {MOST_PARTS} parts; those of a scene have 4 at most"
+        raise _refused(str(path), what, line=text.count("\n", 0, long.end()) + 1)
+    try:
+        data = tomllib.loads(text)
+    except RecursionError:
+        raise _too_deep(path) from None
+    except ValueError as error:  # TOMLDecodeError, and integers of thousands of digits
+        words = str(error)
+    else:
+        if _is_too_deep(data):
+            raise _too_deep(path)
+        return data
+    place = re.search(r"\(at line (\d+), column (\d+)\)", words)
+    what = re.sub(r"\s*\(at [^()]*\)$", "", words)
+    if place is None:
+        line = text.count("\n") + 1 if "end of document" in words else None
+        what = f"not valid TOML: {what}" + (" at the end of the file" if line else "")
+    else:
+        line = int(place[1])
+        what = f"not valid TOML: {what} at line {line}, column {place[2]}"
+    remedy = "" if line is None else _remedy(text.splitlines()[line - 1 : line])
+    if path.suffix == ".m":
+        remedy = "this is a MATLAB file; dap3d import-matlab FOLDER makes a scene of it"
+    raise _refused(str(path), what, line=line, remedy=remedy)
+
+
+#: What people write for a value that TOML has otherwise, and what to do.
+_HABITS = (
+    (r"[+-]?\d+,\d+", "a number has a decimal point, and no comma"),
+    (r"[+-]?(\.\d+|\d+\.)([eE][+-]?\d+)?", "write digits on both sides of the decimal point"),
+    (r"(?i)[+-]?(nan|inf|infinity)", "a scene has finite numbers alone"),
+    (r"(True|False|TRUE|FALSE)", "write true or false"),
+    (r"[A-Za-z_][\w .-]*", "write text in quotes"),
+)
+
+
+def _remedy(lines: list[str]) -> str:
+    """What to do about a line whose value is none, where a habit of other languages is known."""
+    for line in lines:
+        value = line.partition("=")[2].partition("#")[0].strip()
+        for habit, remedy in _HABITS:
+            if value and re.fullmatch(habit, value):
+                return remedy
+    return ""
+
+
+def _is_too_deep(data: dict[str, Any]) -> bool:
+    """Whether tables and lists lie more than ``DEEPEST`` levels within one another."""
+    level: list[Any] = [data]
+    for _ in range(DEEPEST):
+        inside = (v for c in level for v in (c.values() if type(c) is dict else c))
+        level = [v for v in inside if type(v) in (dict, list)]
+        if not level:
+            return False
+    return True
+
+
+def _too_deep(path: Path) -> SceneError:
+    what = f"lists or tables are nested too deeply: more than {DEEPEST} within one another"
+    return _refused(str(path), what)
+
+
+def _refused(file: str, what: str, *, line: int | None = None, remedy: str = "") -> SceneError:
+    return SceneError([Mistake("", MISSING, what, remedy=remedy, file=file, line=line)])
+
+
+def _unreadable(path: Path, error: OSError) -> SceneError:
+    return _refused(str(path), f"cannot be read: {error.strerror or error}")
+
+
+def _not_found(path: Path, text: str, models: dict[str, Path]) -> SceneError:
+    near = nearest(text, models)
+    what = f"there is no file or folder {text!r}, and no shipped model of that name"
+    if near:
+        what += f"; did you mean {near!r}?"
+    return _refused("", what, remedy=f"shipped models: {', '.join(models) or 'none'}")
+
+
+def _no_scene_in(path: Path, models: dict[str, Path]) -> SceneError:
+    others = sorted(f.name for f in path.glob("*.toml"))
+    remedy = f"it holds {', '.join(others[:5])}; give that file" if others else ""
+    return _refused(str(path), f"the folder has no {SCENE_FILE}", remedy=remedy)

@@ -1,0 +1,398 @@
+"""What the user described: bodies, points, vectors, elements and settings, by name and as written.
+
+Values are kept as plain Python (arrays and lists become tuples); whether they make sense is asked
+once, for all of them, by ``check``.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.scene.coerce import plain
+from dap3d_core.scene.display import SceneDisplay
+from dap3d_core.scene.errors import Key, Mistake, SceneError
+
+#: The newest version of the scene file that this program reads.
+SCHEMA = 1
+#: The body that is always there.
+GROUND = "ground"
+
+ZERO = (0.0, 0.0, 0.0)
+NO_TURN = (1.0, 0.0, 0.0, 0.0)
+
+
+@attrs.define
+class Body:
+    """A rigid body; its frame stands at its mass centre.
+
+    Attributes:
+        name: as other parts of the scene call it.
+        mass: kg; None where the scene gives none (1.0 is then used, with a note).
+        Jp: inertia matrix in body axes, 3 numbers (its diagonal) or 3x3, kg m^2; None as for mass.
+        r: position, 3 numbers, m.
+        p: Euler parameters e0, e1, e2, e3, unit length.
+        r_dot: velocity, 3 numbers, m/s.
+        w: angular velocity in global axes, 3 numbers, rad/s.
+        color: for drawings, "" for the next of the colour cycle.
+    """
+
+    name: str
+    mass: Any = attrs.field(default=None, converter=plain)
+    Jp: Any = attrs.field(default=None, converter=plain)
+    r: Any = attrs.field(default=ZERO, converter=plain)
+    p: Any = attrs.field(default=NO_TURN, converter=plain)
+    r_dot: Any = attrs.field(default=ZERO, converter=plain)
+    w: Any = attrs.field(default=ZERO, converter=plain)
+    color: Any = ""
+
+
+@attrs.define
+class Point:
+    """A point fixed in a body: name, name of the body, its coordinates there (3 numbers, m)."""
+
+    name: str
+    body: Any = None
+    sPp: Any = attrs.field(default=None, converter=plain)
+
+
+@attrs.define
+class Vector:
+    """A vector fixed in a body (type 1): name, name of the body, 3 components there."""
+
+    name: str
+    body: Any = None
+    sp: Any = attrs.field(default=None, converter=plain)
+
+
+@attrs.define
+class Vector2:
+    """A vector between two points (type 2): name, and the points it runs from and to."""
+
+    name: str
+    P_i: Any = None
+    P_j: Any = None
+
+
+@attrs.define
+class Element:
+    """A joint, force, function or shape: its name, the keyword of its type, its fields."""
+
+    name: str
+    type: Any = None
+    fields: dict[str, Any] = attrs.Factory(dict)
+
+
+@attrs.define
+class AnimationPoint:
+    """A point that is only drawn: name of its body, its coordinates there (3 numbers, m)."""
+
+    body: Any = None
+    sPp: Any = attrs.field(default=None, converter=plain)
+
+
+@attrs.define
+class Animation:
+    """What drawings use: points of bodies, and limits of the axes, 3 pairs (m), or None."""
+
+    points: list[AnimationPoint] = attrs.Factory(list)
+    limits: Any = attrs.field(default=None, converter=plain)
+
+
+@attrs.define
+class Simulation:
+    """Settings of a run.
+
+    Attributes:
+        t_end: final time, s; None where the scene leaves it open.
+        dt: reporting step, s; None where the scene leaves it open.
+        method: formulation, or "auto".
+        integrator: method of integration.
+        rtol, atol: relative and absolute tolerance of a step; atol of all, or by quantity.
+        step: step of an integrator with fixed steps, s, or None.
+        correct: whether initial positions and velocities are corrected to fulfil the constraints.
+        project: whether states are projected on the constraints along the run.
+        hold: names of bodies that the correction leaves where they are.
+        correct_metric: "unit" or "mass": how the least correction is measured.
+        alpha, Omega, mu: parameters of the penalty formulation.
+    """
+
+    t_end: Any = attrs.field(default=None, converter=plain)
+    dt: Any = attrs.field(default=None, converter=plain)
+    method: Any = attrs.field(default="auto", converter=plain)
+    integrator: Any = attrs.field(default="dop853", converter=plain)
+    rtol: Any = attrs.field(default=1e-8, converter=plain)
+    atol: Any = attrs.field(default=None, converter=plain)
+    step: Any = attrs.field(default=None, converter=plain)
+    correct: Any = attrs.field(default=True, converter=plain)
+    project: Any = attrs.field(default=True, converter=plain)
+    hold: Any = attrs.field(default=(), converter=plain)
+    correct_metric: Any = attrs.field(default="unit", converter=plain)
+    alpha: Any = attrs.field(default=1e7, converter=plain)
+    Omega: Any = attrs.field(default=10.0, converter=plain)
+    mu: Any = attrs.field(default=1.0, converter=plain)
+
+
+def keys_of(class_: type) -> frozenset[str]:
+    """The keys that a table of the scene file may hold, given the class it becomes."""
+    return frozenset(a.name for a in attrs.fields(class_)) - {"name"}
+
+
+BODY_KEYS = keys_of(Body)
+HEADER_KEYS = frozenset({"name", "description", "schema"})
+#: Tables of the scene file that hold named things, and the class of each.
+NAMED: dict[str, type] = {
+    "bodies": Body,
+    "points": Point,
+    "vectors": Vector,
+    "vectors2": Vector2,
+    "joints": Element,
+    "forces": Element,
+    "functions": Element,
+    "shapes": Element,
+}
+TABLES = ("scene", *NAMED, "animation", "simulation")
+
+
+@attrs.define(repr=False)
+class Scene(SceneDisplay):
+    """A mechanism and the settings of its simulation, as the user described them.
+
+    Attributes:
+        name, description: for people.
+        schema: version of the file format.
+        bodies, points, vectors, vectors2, joints, forces, functions, shapes: by name, in file
+            order.
+        animation, simulation: what is drawn; settings of a run.
+        path: the file this was read from, or None.
+        faults: what reading could not place (unknown keys, wrong tables); ``check`` reports it.
+        notes: what is worth saying about how it was found.
+    """
+
+    name: Any = ""
+    description: Any = ""
+    schema: Any = SCHEMA
+    bodies: dict[str, Body] = attrs.Factory(dict)
+    points: dict[str, Point] = attrs.Factory(dict)
+    vectors: dict[str, Vector] = attrs.Factory(dict)
+    vectors2: dict[str, Vector2] = attrs.Factory(dict)
+    joints: dict[str, Element] = attrs.Factory(dict)
+    forces: dict[str, Element] = attrs.Factory(dict)
+    functions: dict[str, Element] = attrs.Factory(dict)
+    shapes: dict[str, Element] = attrs.Factory(dict)
+    animation: Animation = attrs.Factory(Animation)
+    simulation: Simulation = attrs.Factory(Simulation)
+    path: Path | None = attrs.field(default=None, eq=False)
+    faults: list[tuple[Key, Mistake]] = attrs.field(factory=list, eq=False)
+    notes: list[str] = attrs.field(factory=list, eq=False)
+    _counts: dict[str, int] = attrs.field(factory=dict, eq=False, init=False)
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder of the file this was read from, where ``plugin.py`` may stand, or None."""
+        return None if self.path is None else self.path.parent
+
+    def copy(self) -> "Scene":
+        """A scene of its own that is equal to this one: changing one leaves the other as it is."""
+        named: dict[str, Any] = {
+            table: {name: _copied(part) for name, part in getattr(self, table).items()}
+            for table in NAMED
+        }
+        points = [_copied(point) for point in self.animation.points]
+        scene = attrs.evolve(
+            self,
+            animation=attrs.evolve(self.animation, points=points),
+            simulation=_copied(self.simulation),
+            faults=list(self.faults),
+            notes=list(self.notes),
+            **named,
+        )
+        scene._counts = dict(self._counts)
+        return scene
+
+    def __deepcopy__(self, memo: Any) -> "Scene":
+        """As ``copy``, for the values in a scene are plain: they cannot be changed."""
+        return self.copy()
+
+    def add_body(self, name: str, **fields: Any) -> str:
+        """Add a body and return its name.
+
+        Args:
+            name: without dots, not ``ground``, not used by another body.
+            fields: mass, Jp, r, p, r_dot, w, color, as in ``Body``.
+
+        Raises:
+            SceneError: the name is taken or illegal, or a key is unknown.
+        """
+        self._refuse_name("bodies", self.bodies, name)
+        if not fields.keys() <= BODY_KEYS:
+            raise _unknown_keys(f"bodies.{name}", fields, BODY_KEYS)
+        if any(value is None for value in fields.values()):
+            fields = {k: v for k, v in fields.items() if v is not None}
+        self.bodies[name] = Body(name, **fields)
+        return name
+
+    def add_point(self, name: str, body: Any = None, sPp: Any = None, **unknown: Any) -> str:
+        """Add a point fixed in a body at ``sPp`` (3 numbers in its axes, m) and return its name.
+
+        Raises:
+            SceneError: the name is taken or illegal, or a key is unknown.
+        """
+        self._refuse_name("points", self.points, name)
+        if unknown:
+            raise _unknown_keys(f"points.{name}", unknown, keys_of(Point))
+        self.points[name] = Point(name, body, sPp)
+        return name
+
+    def add_vector(self, name: str, body: Any = None, sp: Any = None, **unknown: Any) -> str:
+        """Add a vector fixed in a body (3 components in its axes) and return its name.
+
+        Raises:
+            SceneError: the name is taken or illegal, or a key is unknown.
+        """
+        self._refuse_name("vectors", self.vectors, name)
+        if unknown:
+            raise _unknown_keys(f"vectors.{name}", unknown, keys_of(Vector))
+        self.vectors[name] = Vector(name, body, sp)
+        return name
+
+    def add_vector2(self, name: str, P_i: Any = None, P_j: Any = None, **unknown: Any) -> str:
+        """Add a vector from point ``P_i`` to point ``P_j`` and return its name.
+
+        Raises:
+            SceneError: the name is taken or illegal, or a key is unknown.
+        """
+        self._refuse_name("vectors2", self.vectors2, name)
+        if unknown:
+            raise _unknown_keys(f"vectors2.{name}", unknown, keys_of(Vector2))
+        self.vectors2[name] = Vector2(name, P_i, P_j)
+        return name
+
+    def add_joint(self, type: str, name: str | None = None, **fields: Any) -> str:
+        """Add a joint of a type (its keyword) and return its name, made from the type if None.
+
+        Raises:
+            SceneError: the name is taken or illegal. Fields are checked with the whole scene.
+        """
+        return self._add_element("joints", self.joints, type, name, fields)
+
+    def add_force(self, type: str, name: str | None = None, **fields: Any) -> str:
+        """Add a force element of a type (its keyword) and return its name, made from it if None.
+
+        Raises:
+            SceneError: the name is taken or illegal. Fields are checked with the whole scene.
+        """
+        return self._add_element("forces", self.forces, type, name, fields)
+
+    def add_function(self, type: str, name: str | None = None, **fields: Any) -> str:
+        """Add a function of a type (its keyword) and return its name, made from the type if None.
+
+        Raises:
+            SceneError: the name is taken or illegal. Fields are checked with the whole scene.
+        """
+        return self._add_element("functions", self.functions, type, name, fields)
+
+    def add_shape(self, type: str, name: str | None = None, **fields: Any) -> str:
+        """Add a shape that is drawn (box, sphere, cylinder, cone, disk, line, mesh); its name.
+
+        Raises:
+            SceneError: the name is taken or illegal. Fields are checked with the whole scene.
+        """
+        return self._add_element("shapes", self.shapes, type, name, fields)
+
+    def add_animation_point(self, body: str, sPp: Any) -> None:
+        """Add a point that is only drawn, at ``sPp`` (3 numbers in the axes of a body, m)."""
+        self.animation.points.append(AnimationPoint(body, sPp))
+
+    def to_toml(self) -> str:
+        """The scene as the text of a scene file; reading it gives an equal scene.
+
+        Raises:
+            SceneError: it holds something that a scene file cannot.
+        """
+        from dap3d_core.scene.files.write_toml import to_toml
+
+        return to_toml(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the scene to a file, or to ``scene.toml`` in a folder; returns the file.
+
+        Raises:
+            SceneError: it cannot be written.
+        """
+        from dap3d_core.scene.files.write_toml import save
+
+        return save(self, path)
+
+    def _add_element(
+        self,
+        table: str,
+        elements: dict[str, Element],
+        type_: str,
+        name: str | None,
+        fields: dict[str, Any],
+    ) -> str:
+        type_ = plain(type_)
+        if type(type_) is not str or not type_:
+            what = 'the type of an element is the keyword of a type, such as "sph"'
+            raise SceneError([Mistake(f"{table}.{name or ''}".rstrip("."), type_, what)])
+        if name is None:
+            name = self._free_name(table, elements, type_)
+        self._refuse_name(table, elements, name)
+        elements[name] = Element(
+            name, type_, {k: plain(v) for k, v in fields.items() if v is not None}
+        )
+        return name
+
+    def _free_name(self, table: str, elements: dict[str, Element], type_: str) -> str:
+        count = self._counts.get(f"{table}.{type_}", 0) + 1
+        while f"{type_}{count}" in elements:
+            count += 1
+        self._counts[f"{table}.{type_}"] = count
+        return f"{type_}{count}"
+
+    def _refuse_name(self, table: str, taken: dict[str, Any], name: Any) -> None:
+        fault = fault_of_name(name)
+        if not fault and name in taken:
+            fault = f"there is one of this name in {table} already"
+        if fault:
+            raise SceneError([Mistake(table, name, f"not a name for one of the {table}: {fault}")])
+
+
+def _copied(part: Any) -> Any:
+    """A part of a scene; what it holds are plain values, the fields of an element in a dict."""
+    if type(part) is Element and type(part.fields) is dict:
+        return attrs.evolve(part, fields=dict(part.fields))
+    return attrs.evolve(part)
+
+
+def fault_of_name(name: Any) -> str:
+    """Why something cannot be the name of a part of a scene; "" where it can."""
+    if type(name) is not str:
+        return f"a name is text, not {type(name).__name__}"
+    if not name.strip():
+        return "a name is not empty"
+    if name.strip().lower() == GROUND:
+        return f"{GROUND} is always there and has no data of its own; take another name"
+    if name != name.strip():
+        return "a name neither begins nor ends with a space"
+    if "." in name:
+        return "a name holds no dot (NAME.O, NAME.x are the origin and axes of a body)"
+    if not name.isprintable():
+        return "a name holds no line breaks or other control characters"
+    return ""
+
+
+def _unknown_keys(place: str, fields: dict[str, Any], allowed: frozenset[str]) -> SceneError:
+    return SceneError(
+        Mistake(f"{place}.{k}", v, unknown_key(allowed), nearest(k, allowed))
+        for k, v in fields.items()
+        if k not in allowed
+    )
+
+
+def unknown_key(allowed: frozenset[str] | tuple[str, ...]) -> str:
+    """What is wrong with a key that is not among the allowed ones."""
+    words = allowed if isinstance(allowed, tuple) else tuple(sorted(allowed))
+    return f"unknown key; allowed: {', '.join(words) or 'none'}"

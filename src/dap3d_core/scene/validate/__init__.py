@@ -1,0 +1,1 @@
+"""Validation of a scene: all mistakes at once, and the validated scene."""

@@ -1,0 +1,262 @@
+"""Points and vectors: on which body each stands, and where references lead."""
+
+from collections.abc import Collection
+from itertools import islice
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.scene.errors import MISSING, Key
+from dap3d_core.scene.scene import GROUND, ZERO
+from dap3d_core.scene.validate.bodies import ROUNDING, Bodies
+from dap3d_core.scene.validate.coerce_columns import Floats, Keys, tuples, vectors
+from dap3d_core.scene.validate.coerce_values import Fault, numbers_of
+from dap3d_core.scene.validate.mistake_collector import Collector
+
+#: A vector shorter than this has no direction.
+SHORTEST = 1e-12
+
+#: Body index (ground 0) and components on that body.
+Located = tuple[int, tuple[float, ...]]
+#: What every body offers without declaration.
+ORIGIN = {"O": ZERO}
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+#: Body index of something that was reported as a mistake already.
+BAD = -1
+
+
+@attrs.frozen(eq=False)
+class Geometry:
+    """Where references lead.
+
+    Attributes:
+        points: name -> body index, coordinates on it.
+        vectors: name -> body index, components on it, unit length.
+        raw_vectors: the same with the length as given.
+        vectors2: name -> points it runs from and to; None where it was reported already.
+        point_names, point_body, point_local, animation_count: as in ``Checked``.
+    """
+
+    bodies: Bodies
+    points: dict[str, Located]
+    vectors: dict[str, Located]
+    raw_vectors: dict[str, Located]
+    vectors2: dict[str, tuple[Located, Located] | None]
+    point_names: tuple[str, ...]
+    point_body: NDArray[np.int64]
+    point_local: Floats
+    animation_count: int
+
+    def point(self, name: Any) -> Located | None:
+        """The point of this name, declared or the origin of a body; None where there is none."""
+        return _look_up(name, self.points, self.bodies, ORIGIN)
+
+    def vector(self, name: Any, *, unit: bool = True) -> Located | None:
+        """The vector of this name, declared or an axis of a body; None where there is none."""
+        return _look_up(name, self.vectors if unit else self.raw_vectors, self.bodies, AXES)
+
+
+def _look_up(
+    name: Any, declared: dict[str, Located], bodies: Bodies, offered: dict[str, Any]
+) -> Located | None:
+    if not isinstance(name, str):
+        return None
+    found = declared.get(name)
+    if found is None and "." in name:
+        body, _, last = name.rpartition(".")
+        if body in bodies.index and last in offered:
+            return bodies.index[body], offered[last]
+    return found
+
+
+def read_geometry(report: Collector, bodies: Bodies) -> Geometry:
+    """Points, vectors and animation points of a scene; what is wrong is reported."""
+    scene = report.scene
+    points = list(scene.points.values())
+    names = tuple(scene.points)
+    on = _bodies_of(report, Keys("points", names, "body"), [p.body for p in points], bodies)
+    local = vectors(report, Keys("points", names, "sPp"), [p.sPp for p in points], 3)
+    names1 = tuple(scene.vectors)
+    on1 = [v.body for v in scene.vectors.values()]
+    on1 = _bodies_of(report, Keys("vectors", names1, "body"), on1, bodies)
+    raw, unit = _directions(report, names1)
+    drawn = [f"animation.{k}" for k in range(1, len(scene.animation.points) + 1)]
+    drawn_on, drawn_at = _animation(report, bodies)
+    geometry = Geometry(
+        bodies,
+        dict(zip(names, zip(on, tuples(local), strict=True), strict=True)),
+        dict(zip(names1, zip(on1, tuples(unit), strict=True), strict=True)),
+        dict(zip(names1, zip(on1, tuples(raw), strict=True), strict=True)),
+        {},
+        (*names, *drawn),
+        np.array([*on, *drawn_on], dtype=np.int64),
+        np.concatenate([local, drawn_at]),
+        len(drawn),
+    )
+    for name in scene.vectors2:
+        geometry.vectors2[name] = _vector2(report, geometry, name)
+    return geometry
+
+
+def two_ends(
+    report: Collector, geometry: Geometry, key: Key, P_i: Any, P_j: Any
+) -> tuple[Located, Located] | None:
+    """The points that a vector of type 2 runs from and to; None and reported where one is bad."""
+    tail = point_of(report, geometry, (*key, "P_i"), P_i)
+    head = point_of(report, geometry, (*key, "P_j"), P_j)
+    if tail is None or head is None or BAD in (tail[0], head[0]):
+        return None
+    return (tail, head)
+
+
+def _vector2(report: Collector, geometry: Geometry, name: str) -> tuple[Located, Located] | None:
+    """A declared vector of type 2: its ends lie on two bodies, and it does not start on ground."""
+    vector2, key = report.scene.vectors2[name], ("vectors2", name)
+    ends = two_ends(report, geometry, key, vector2.P_i, vector2.P_j)
+    if ends is None:
+        return None
+    if ends[0][0] == ends[1][0]:
+        body = [GROUND, *geometry.bodies.names][ends[0][0]]
+        report.add((*key, "P_j"), vector2.P_j, f"both ends are on {body}; they lie on two bodies")
+        return None
+    if ends[0][0] == 0:
+        what = "the vector starts on ground; an end on ground is P_j"
+        report.add((*key, "P_i"), vector2.P_i, what, remedy="exchange P_i and P_j")
+        return None
+    return ends
+
+
+def point_of(report: Collector, geometry: Geometry, key: Key, name: Any) -> Located | None:
+    """The point that a reference means; reported where there is none."""
+    found = geometry.point(name)
+    if found is None:
+        _no_reference(report, geometry, key, name, "point", geometry.points, "O")
+    return found
+
+
+def vector_of(
+    report: Collector, geometry: Geometry, key: Key, name: Any, *, unit: bool
+) -> Located | None:
+    """The vector that a reference means; reported where there is none."""
+    found = geometry.vector(name, unit=unit)
+    if found is None:
+        _no_reference(report, geometry, key, name, "vector", geometry.vectors, "x")
+    return found
+
+
+def body_of(report: Collector, bodies: Bodies, key: Key, name: Any) -> int:
+    """Index of the body that a reference means; BAD and reported where there is none."""
+    found = bodies.index.get(name, BAD) if isinstance(name, str) else BAD
+    if found == BAD:
+        report.add(
+            key,
+            MISSING if name is None else name,
+            *missing_words(report, "body", name, bodies.index),
+        )
+    return found
+
+
+def _no_reference(
+    report: Collector,
+    geometry: Geometry,
+    key: Key,
+    name: Any,
+    what: str,
+    declared: dict[str, Located],
+    offered: str,
+) -> None:
+    words, near, remedy = missing_words(report, what, name, declared)
+    index = geometry.bodies.index
+    if isinstance(name, str) and "." in name:
+        body, _, last = name.rpartition(".")
+        options = ORIGIN if what == "point" else AXES
+        if body in index:
+            words = f"bodies offer as {what}s: {', '.join(options)}; there is no {last!r}"
+            close = report.nearest(last, options)
+            near = f"{body}.{close}" if close else ""
+        else:
+            words = f"there is no body {body!r}"
+            close = report.nearest(body, index)
+            near = f"{close}.{last}" if close and last in options else ""
+    elif isinstance(name, str) and name in index and not near:
+        remedy = f"{name} is a body; of it, {name}.{offered} is a {what}"
+    report.add(key, MISSING if name is None else name, words, near, remedy)
+
+
+def missing_words(
+    report: Collector, what: str, name: Any, declared: Collection[str]
+) -> tuple[str, str, str]:
+    """Words, nearest spelling and remedy for a reference that leads nowhere."""
+    if name is None:
+        return f"is required: the name of a {what}", "", ""
+    if isinstance(name, int) and not isinstance(name, bool):
+        remedy = _numbered(name, declared)
+        return f"should be the name of a {what} (text), not a number", "", remedy
+    if not isinstance(name, str):
+        return f"should be the name of a {what}", "", ""
+    words, near = f"there is no {what} {name!r}", report.nearest(name, declared)
+    if name and declared and not near:
+        few = ", ".join(islice(declared, 8)) + (", ..." if len(declared) > 8 else "")
+        words += f" (there are {few})"
+    return words, near, ""
+
+
+def _numbered(number: int, declared: Collection[str]) -> str:
+    """What a number of the manual means: bodies are counted from ground, 0, all else from 1."""
+    place = number if GROUND in declared else number - 1
+    if number == 0 and GROUND in declared:
+        return "number 0 of the manual is the ground"
+    if number < 1 or place >= len(declared):
+        return ""
+    return f"number {number} in the order of the file is {next(islice(declared, place, None))!r}"
+
+
+def _bodies_of(report: Collector, keys: Keys, names: list[Any], bodies: Bodies) -> list[int]:
+    """Body indices of a column of names."""
+    if set(map(type, names)) <= {str}:
+        found = [bodies.index.get(name, BAD) for name in names]
+        if BAD not in found:
+            return found
+    return [body_of(report, bodies, keys[k], name) for k, name in enumerate(names)]
+
+
+def _directions(report: Collector, names: tuple[str, ...]) -> tuple[Floats, Floats]:
+    """Type-1 vectors as given and as unit vectors."""
+    given = [v.sp for v in report.scene.vectors.values()]
+    keys = Keys("vectors", names, "sp")
+    raw = vectors(report, keys, given, 3)
+    length = np.sqrt(np.einsum("nk,nk->n", raw, raw))
+    for k in np.flatnonzero(length < SHORTEST):
+        what = f"a vector needs a direction; the length of this one is {length[k]:g}"
+        report.add(keys[k], given[k], what)
+    off = np.abs(length - 1.0) > ROUNDING
+    for k in np.flatnonzero(off & (length >= SHORTEST)):
+        report.note(
+            f"vectors.{names[k]}.sp: length {length[k]:.9g}, normalised to 1", "vectors normalised"
+        )
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return raw, np.asarray(raw / length[:, None])
+
+
+def _animation(report: Collector, bodies: Bodies) -> tuple[list[int], Floats]:
+    """Bodies and coordinates of the animation points; the limits are checked as well."""
+    points = report.scene.animation.points
+    keys = [("animation", "points", k) for k in range(len(points))]
+    on = [
+        body_of(report, bodies, (*key, "body"), p.body) for key, p in zip(keys, points, strict=True)
+    ]
+    at = vectors(report, [(*key, "sPp") for key in keys], [p.sPp for p in points], 3)
+    limits = report.scene.animation.limits
+    if limits is not None and not _are_limits(limits):
+        what = "should be three pairs [[x_min, x_max], [y_min, y_max], [z_min, z_max]], min < max"
+        report.add(("animation", "limits"), limits, what)
+    return on, at
+
+
+def _are_limits(value: Any) -> bool:
+    if type(value) is not tuple or len(value) != 3:
+        return False
+    pairs = [numbers_of(pair, 2) for pair in value]
+    return not any(isinstance(pair, Fault) or pair[0] >= pair[1] for pair in pairs)

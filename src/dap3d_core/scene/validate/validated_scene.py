@@ -1,0 +1,85 @@
+"""A scene that was checked: what the model is made from. No name is searched after this."""
+
+from typing import TYPE_CHECKING, Any
+
+import attrs
+
+from dap3d_core.interface.examine.examine import Examined
+from dap3d_core.registry import Registry
+from dap3d_core.scene.scene import Scene
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
+
+
+@attrs.define
+class Instance:
+    """A joint, a force or a function with everything its type needs.
+
+    Attributes:
+        name: as the scene calls it.
+        examined: its type.
+        bodies: body index of each slot of ``examined.layout.slots`` (ground 0); empty for an
+            element that acts on each body.
+        functions: for each of ``examined.layout.functions`` 0 where absent, else 1 + its place
+            among the functions of the scene.
+        others: body index of each of ``examined.layout.others``, vectors that no slot belongs to.
+        values: field -> plain value. Points and vectors: 3 numbers on their body, vectors of unit
+            length; a vector2 gives the two points ``P_i`` and ``P_j``; numbers: floats, or None
+            where ``prepare`` finds them; vec3, table: tuples; matrix: three rows; references to
+            bodies, functions and joints: words; choices: words, False or True.
+    """
+
+    name: str
+    examined: Examined = attrs.field(repr=False)
+    bodies: tuple[int, ...]
+    functions: tuple[int, ...]
+    values: dict[str, Any]
+    others: tuple[int, ...] = ()
+
+
+@attrs.frozen(eq=False)
+class Checked:
+    """A scene without mistakes, as arrays and instances.
+
+    Attributes:
+        scene: what was checked.
+        registry: where its types come from (with those of the model's own file, where needed).
+        body_names: n names without ground, in file order.
+        body_index: name -> index; ground 0, bodies 1 to n.
+        mass: (n,) kg.
+        Jp: (n, 3, 3) inertia matrices in body axes, symmetric, kg m^2.
+        r: (n, 3) positions, m.
+        p: (n, 4) Euler parameters of unit length.
+        r_dot: (n, 3) velocities, m/s.
+        w: (n, 3) angular velocities in global axes, rad/s.
+        point_names: declared points in file order, then animation points (``animation.1``, ...).
+        point_body: (points,) body index of each.
+        point_local: (points, 3) coordinates on that body, m.
+        animation_count: how many of the points are animation points.
+        joints, forces, functions: in file order.
+        notes: what was changed, assumed or looks odd; nothing of it stops a run.
+    """
+
+    scene: Scene
+    registry: Registry
+    body_names: tuple[str, ...]
+    body_index: dict[str, int]
+    mass: "Floats"
+    Jp: "Floats"
+    r: "Floats"
+    p: "Floats"
+    r_dot: "Floats"
+    w: "Floats"
+    point_names: tuple[str, ...]
+    point_body: "Integers"
+    point_local: "Floats"
+    animation_count: int
+    joints: list[Instance]
+    forces: list[Instance]
+    functions: list[Instance]
+    notes: list[str]

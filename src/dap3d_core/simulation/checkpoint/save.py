@@ -1,0 +1,164 @@
+"""When a run writes checkpoints, and what stands in them."""
+
+import json
+import math
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+from numpy.typing import NDArray
+
+from dap3d_core.assembly.arrays import KEPT
+from dap3d_core.kernels.runtime.cache import driver_digest
+from dap3d_core.result import Result, ResultError, open_result
+from dap3d_core.result.metadata import to_json
+from dap3d_core.simulation.checkpoint.file import (
+    Checkpoint,
+    path_of,
+    read_checkpoint,
+    write_checkpoint,
+)
+from dap3d_core.simulation.errors import CheckpointError
+
+if TYPE_CHECKING:
+    from dap3d_core.simulation.run import Run
+
+
+class Saver:
+    """Writes the checkpoints of a run.
+
+    Attributes:
+        path: where they stand.
+        has_written: whether there is one of this run.
+    """
+
+    def __init__(self, run: "Run", seconds: float, *, force: bool) -> None:
+        """Args:
+            run: whose; its keeper has an output.
+            seconds: from one checkpoint to the next.
+            force: whether a checkpoint of another run is given up.
+
+        Raises:
+            ResultError: there is one of another run.
+        """
+        keeper = run.keeper
+        assert keeper is not None
+        assert keeper.output is not None
+        self.path = path_of(keeper.output)
+        if self.path.exists() and not force:
+            raise ResultError(
+                f"{self.path} exists: a run that was ended goes on from it (dap3d resume); force "
+                "gives it up"
+            )
+        self.has_written = False
+        self._run, self._seconds = run, seconds
+        self._next = time.perf_counter() + seconds
+
+    def begin(self) -> None:
+        """Write the first checkpoint before anything is integrated, where more are to follow.
+
+        So a run that is killed at any later moment goes on.
+        """
+        if math.isfinite(self._seconds):
+            self._save()
+
+    def look(self) -> None:
+        """Write a checkpoint if it is time."""
+        if time.perf_counter() >= self._next:
+            self._save()
+
+    def _save(self) -> None:
+        run, keeper = self._run, self._run.keeper
+        assert keeper is not None
+        keeper.to_disk(lambda: run.record("done"))
+        self.write()
+        self._next = time.perf_counter() + self._seconds
+
+    def leave(self, error: BaseException) -> None:
+        """Write a checkpoint where a run is ended from outside, its result being saved.
+
+        ``error.checkpoint`` names it, where the run stands between two chunks.
+        """
+        run = self._run
+        if run.is_whole:
+            self.write()
+            error.checkpoint = self.path  # type: ignore[attr-defined]
+
+    def write(self) -> None:
+        """Write a checkpoint of the run as it stands, once its rows are in a file."""
+        write_checkpoint(self.path, checkpoint_of(self._run))
+        self.has_written = True
+
+    def remove(self) -> None:
+        """The run has ended by itself: nothing goes on from here. The checkpoint goes last.
+
+        That of another run, which has taken its place, stays.
+        """
+        keeper = self._run.keeper
+        assert keeper is not None
+        assert keeper.output is not None
+        remove_parts(keeper.output, keeper.run)
+        with suppress(CheckpointError):
+            if read_checkpoint(self.path).header["run"] == keeper.run:
+                self.path.unlink(missing_ok=True)
+
+
+def results_of(files: Iterable[Path], run: str) -> Iterator[tuple[Path, Result]]:
+    """Those of some files that can be read and are of a run, given its identity."""
+    for file in files:
+        with suppress(ResultError):
+            result = open_result(file)
+            if result.record.run == run:
+                yield file, result
+
+
+def parts_of(output: Path) -> list[Path]:
+    """The unfinished files beside a result file."""
+    return sorted(output.parent.glob(f"{output.name}.part*"))
+
+
+def remove_parts(output: Path, run: str) -> None:
+    """Remove the unfinished files that a run has left beside its result file."""
+    for part, _ in results_of(parts_of(output), run):
+        part.unlink()
+
+
+def checkpoint_of(run: "Run") -> Checkpoint:
+    """A run as it stands between two chunks, its rows taken."""
+    keeper, compiled = run.keeper, run.compiled
+    assert keeper is not None
+    assert keeper.output is not None
+    header: dict[str, Any] = {
+        "run": keeper.run,
+        "output": keeper.output.name,
+        "rows": keeper.count,
+        "t": run.runs[-1].t,
+        "integrations": len(run.runs),
+        "crossed": run.crossed,
+        "until": run.until if math.isfinite(run.until) else None,
+        "scene": compiled.scene_text,
+        "method": compiled.asked,
+        "settings": attrs.asdict(run.settings),
+        "estimate_error": run.estimate_error,
+        "notes": run.notes,
+        "wall_time_s": time.perf_counter() - run.started,
+        "compile_time_s": run.compile_time,
+        "driver": driver_digest("integrators"),
+        "types": {name: one["digest"] for name, one in compiled.types.items()},
+    }
+    if run.watcher is not None:
+        header["events"] = run.watcher.state()
+    return Checkpoint(json.loads(to_json(header)), arrays_of(run))
+
+
+def arrays_of(run: "Run") -> dict[str, NDArray[Any]]:
+    """All that a run goes on from, by name."""
+    found = {
+        f"{k}.{name}": array
+        for k, integration in enumerate(run.runs)
+        for name, array in integration.all_arrays()
+    }
+    return found | {f"system.{name}": getattr(run.machine.system, name) for name in KEPT}

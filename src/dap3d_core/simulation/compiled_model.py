@@ -1,0 +1,374 @@
+"""A scene made ready to run: checked, modelled, with its method chosen and its kernels compiled."""
+
+import logging
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any, NoReturn, Self
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.kernels.runtime.cache import cache_notes
+from dap3d_core.model import Model, ModelError, build_model
+from dap3d_core.registry import Registry, load_registry
+from dap3d_core.result import INFORMATION
+from dap3d_core.scene import (
+    Checked,
+    Scene,
+    SceneError,
+    check,
+    check_simulation,
+    load,
+    mistake_at,
+)
+from dap3d_core.simulation.errors import AssemblyError, SimulationError
+from dap3d_core.simulation.events.breakpoints import Pace
+from dap3d_core.simulation.explain import explain
+from dap3d_core.simulation.failure.diagnosis import find_offender
+from dap3d_core.simulation.failure.narrow_forces import notes_on_laws
+from dap3d_core.simulation.initial.assemble import model_size
+from dap3d_core.simulation.initial.conservative import is_conservative
+from dap3d_core.simulation.initial.driver_notes import notes_on_drivers
+from dap3d_core.simulation.initial.given_state import state_of, time_of
+from dap3d_core.simulation.initial.undefined_directions import undefined_directions
+from dap3d_core.simulation.initial_state import Start, find_start
+from dap3d_core.simulation.output.type_sources import types_of
+from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
+
+Floats = NDArray[np.float64]
+Announce = Callable[[str], None]
+
+#: Joints whose lines in the file a message gives.
+MOST_PLACES = 10
+
+
+@cache
+def log_first_compilation() -> None:
+    """Tell a script, once in a process, that kernels are compiled, which takes a while.
+
+    It is a warning of the logger "dap3d", which Python shows on stderr unless it is told otherwise:
+    ``logging.getLogger("dap3d").setLevel("ERROR")``. Who passes ``announce`` is told there alone.
+    """
+    logging.getLogger("dap3d").warning("compiling for the first time; this happens once")
+
+
+class _Machines(threading.local):
+    """The machines of one thread.
+
+    Attributes:
+        stack: the last one is what the thread works with.
+        running: whether it is in the middle of a run.
+    """
+
+    def __init__(self) -> None:
+        self.stack: list[Machine] = []
+        self.running = False
+
+
+class CompiledModel:
+    """What ``compile`` returns: a frozen model that can be evaluated and explained.
+
+    Threads may use one at once: each has arrays of its own to work on. So may a callback of a run,
+    which may run the model again.
+
+    Attributes:
+        scene: a copy of the scene, as it was when it was compiled.
+        checked: the scene after its check.
+        model: arrays, groups, row and column pointers (irc, iru, irv).
+        method: the formulation, "unconstrained", "standard", "penalty" or "lsq".
+        reason: why this formulation.
+        notes: what was changed or assumed.
+        compile_time: seconds that checking, modelling and compiling took.
+    """
+
+    def __init__(
+        self,
+        scene: Scene | str | os.PathLike[str],
+        *,
+        method: str | None = None,
+        allow_code: bool = False,
+        registry: Registry | None = None,
+        announce: Announce | None = None,
+    ) -> None:
+        """Check a scene, build its model, compile what it needs; arguments as for ``compile``."""
+        started = time.perf_counter()
+        if isinstance(scene, Scene):
+            scene = scene.copy()  # whoever has it may change it
+        else:
+            scene = load(Path(scene) if isinstance(scene, os.PathLike) else scene)
+        announce = announce or (lambda kernel: log_first_compilation())
+        registry = registry or load_registry()
+        self.scene: Scene = scene
+        self.checked: Checked = check(scene, registry, allow_code=allow_code)
+        self.model: Model = _modelled(self.checked)
+        if method is not None:
+            settings = attrs.evolve(scene.simulation, method=method)
+            check_simulation(settings, self.model.body_names)
+        #: The method that was asked for, perhaps "auto".
+        self.asked = asked = method or str(scene.simulation.method)
+        self._paces: dict[float, Pace] = {}
+        self._starts: dict[tuple[bool, tuple[str, ...], str], Start] = {}
+        self._own = _Machines()
+        self._first_method = self.method = choose_method(self.model, asked)[0]
+        self._own.stack.append(self.another_machine(announce))
+        self.method, self.reason = self.choice(asked)
+        self.machine.method = self.method
+        # compiled here, and not on the clock of the first run
+        try:
+            _ = self.machine.second_thread
+        except ValueError as error:  # what DAP3D_THREADS says
+            raise SimulationError(str(error)) from error
+        _ = self.machine.functions
+        self.notes: list[str] = [
+            *self.checked.notes,
+            *self.model.notes,
+            *notes_on_drivers(self.checked),
+            *notes_on_laws(self.checked),
+            *(f"{INFORMATION}{note}" for note in cache_notes()),
+        ]
+        self._redundancy: Redundancy | None = None
+        self.compile_time = time.perf_counter() - started
+
+    @property
+    def machine(self) -> Machine:
+        """What evaluates the model for this thread; made when a thread first asks for it."""
+        stack = self._own.stack
+        if not stack:
+            stack.append(self.another_machine())
+        return stack[-1]
+
+    @contextmanager
+    def in_use(self) -> Iterator[Machine]:
+        """A machine for a run: this thread's or, in a callback of a run that has it, another."""
+        own = self._own
+        if own.running:
+            own.stack.append(self.another_machine())
+            try:
+                yield own.stack[-1]
+            finally:
+                own.stack.pop()
+            return
+        own.running = True
+        try:
+            yield self.machine
+        finally:
+            own.running = False
+
+    def another_machine(self, announce: Announce | None = None) -> Machine:
+        """A machine of the model with arrays of its own, for whoever changes its numbers."""
+        machine = Machine(self.model, self._first_method, announce)
+        machine.method = self.method
+        settings = self.scene.simulation
+        machine.set_penalty(settings.alpha, settings.Omega, settings.mu)
+        return machine
+
+    def __copy__(self) -> Self:
+        """Itself: nothing of it changes."""
+        return self
+
+    def __deepcopy__(self, memo: Any) -> Self:
+        """Itself: nothing of it changes."""
+        return self
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "a compiled model stays in its process, because compiled code does: send the scene to "
+            "the other process, and compile it there"
+        )
+
+    @property
+    def irc(self) -> NDArray[np.int64]:
+        """(n,) index in u of the first coordinate of each body; iru and irv as in ``Model``."""
+        return self.model.irc
+
+    @property
+    def iru(self) -> NDArray[np.int64]:
+        """(n,) index in u of the first velocity of each body."""
+        return self.model.iru
+
+    @property
+    def irv(self) -> NDArray[np.int64]:
+        """(n,) index in v_dot, column in the Jacobian, of the first acceleration of each body."""
+        return self.model.irv
+
+    @cached_property
+    def is_conservative(self) -> bool:
+        """Whether potentials account for all work that can be done in the scene."""
+        return is_conservative(self.machine, self.model.u0)
+
+    @cached_property
+    def types(self) -> dict[str, dict[str, str]]:
+        """Where the scene's types come from (type_sources.py), for the record of its results."""
+        return types_of(self.checked)
+
+    @cached_property
+    def scene_text(self) -> str:
+        """The scene as the text of a scene file, for the record of its results."""
+        return self.scene.to_toml()
+
+    def rhs(self, t: float, u: ArrayLike) -> Floats:
+        """du/dt (13 n,) at time t in s and state u (13 n,).
+
+        In the order of u: r_dot, p_dot of each body, then r_ddot, omega_dot of each.
+
+        Raises:
+            ValueError: u is not 13 n finite numbers, t is not one, or Euler parameters are zero.
+            SimulationError: the rates are not finite; names the body, force or joint.
+        """
+        t, state = time_of(t), state_of(u, self.model.body_names)
+        rates = self.machine.rhs(t, state)
+        if not np.all(np.isfinite(rates)):
+            machine = self.machine
+            found = find_offender(machine, t, machine.integrated(state), t)
+            raise SimulationError(f"the rates are not finite: {found or f't = {t:.9g} s'}")
+        return rates
+
+    def redundancy(self, u: ArrayLike | None = None) -> Redundancy:
+        """Rank of the constraints at a state u (13 n,), or as given; see ``Redundancy``.
+
+        Raises:
+            ValueError: as ``rhs``.
+        """
+        state = self.model.u0 if u is None else state_of(u, self.model.body_names)
+        for start in self._starts.values():
+            if np.array_equal(start.u, state):
+                return start.redundancy
+        if u is not None:
+            return redundancy_of(self.machine, state)
+        if self._redundancy is None:
+            self._redundancy = redundancy_of(self.machine, state)
+        return self._redundancy
+
+    def pace(self, t_end: float) -> Pace:
+        """How fast functions of time change in a run from 0 to t_end, found once."""
+        if t_end not in self._paces:
+            self._paces[t_end] = Pace(self.checked, self.machine, t_end)
+        return self._paces[t_end]
+
+    def start(self, correct: bool, hold: tuple[str, ...], metric: str = "unit") -> Start:
+        """Where a run starts, found once; arguments and errors as of ``find_start``.
+
+        Raises:
+            SceneError: a direction that an element needs is undefined there.
+        """
+        key = correct, tuple(hold), metric
+        if key not in self._starts:
+            try:
+                start = find_start(self.machine, *key)
+            except AssemblyError as error:
+                raise self._located(error) from error
+            mistakes = undefined_directions(
+                self.scene, self.model, start.u, model_size(self.machine)
+            )
+            if mistakes:
+                raise SceneError(mistakes)
+            self._starts[key] = start
+        return self._starts[key]
+
+    def _located(self, error: AssemblyError) -> AssemblyError:
+        """The same error with the file and the lines of the joints that are open."""
+        found = [
+            mistake_at(self.scene, ("joints", name), "") for name in error.joints[:MOST_PLACES]
+        ]
+        places = [f"{m.file}:{m.line}: {m.key}" for m in found if m.line is not None]
+        return AssemblyError("\n".join([str(error), *places]), error.joints)
+
+    def choice(self, asked: str) -> tuple[str, str]:
+        """The formulation that a run takes when ``asked`` for one, and the reason in words.
+
+        Raises:
+            SimulationError: the method asked for does not fit the scene.
+        """
+        method, reason = choose_method(self.model, asked)
+        if asked != "auto" or not self.model.row_count:
+            return method, reason
+        settings = self.scene.simulation
+        try:
+            start = self.start(settings.correct, settings.hold, str(settings.correct_metric))
+        except AssemblyError:  # a run tells it
+            return method, reason
+        found = start.redundancy
+        if found.rank.redundant:
+            return "lsq", f"{found.rank.redundant} of {found.rank.rows} rows are redundant"
+        return method, f"{reason}, and their rows are independent"
+
+    def explain(self) -> str:
+        """What was modelled, what was left out and why, and which method was chosen and why.
+
+        The rank is that where a run would start, or as given where that cannot be assembled.
+        """
+        u, settings = self.model.u0, self.scene.simulation
+        try:
+            start = self.start(settings.correct, settings.hold, str(settings.correct_metric))
+            u, redundancy = start.u, start.redundancy
+        except AssemblyError:
+            redundancy = self.redundancy()
+        return explain(
+            self.checked, self.model, self.machine, self.method, self.reason, u, redundancy
+        )
+
+
+def choose_method(model: Model, asked: str) -> tuple[str, str]:
+    """The formulation for a model, as far as its number of rows decides, and the reason in words.
+
+    Raises:
+        SimulationError: the method asked for does not fit the scene.
+    """
+    constrained = model.row_count > 0
+    if asked == "auto":
+        if constrained:
+            return "standard", "the scene has joints"
+        return "unconstrained", "the scene has no joints"
+    if asked == "unconstrained" and constrained:
+        raise SimulationError(
+            "method unconstrained does not fit: the scene has "
+            f"{len(model.joint_names)} joints with {model.row_count} rows; use standard or auto"
+        )
+    if asked != "unconstrained" and not constrained:
+        return "unconstrained", f"asked for {asked}, but the scene has no joints"
+    return asked, "asked for"
+
+
+def _modelled(checked: Checked) -> Model:
+    try:
+        return build_model(checked)
+    except ModelError as error:
+        found = [
+            mistake_at(checked.scene, (f"{k}s", name), words) for k, name, words in error.faults
+        ]
+        raise SceneError(sorted(found, key=lambda m: m.line or 0)) from error
+
+
+def compile_scene(
+    scene: Scene | str | os.PathLike[str],
+    *,
+    method: str | None = None,
+    allow_code: bool = False,
+    registry: Registry | None = None,
+    announce: Announce | None = None,
+) -> CompiledModel:
+    """Check a scene, build its model and compile the kernels it needs.
+
+    Args:
+        scene: a Scene, or what ``load`` takes: the name of a shipped model, a folder, a TOML file.
+        method: formulation; the scene's own choice when left out.
+        allow_code: whether the model's own types (plugin.py in its folder) may be loaded.
+        registry: where types come from; by default the installed plugins.
+        announce: called with the name of each kernel that has to be compiled anew; by default the
+            first one is told as a warning of the logger "dap3d".
+
+    Raises:
+        SceneError: the scene has mistakes; all of them are in the message.
+        PluginError: a type that the scene uses cannot be loaded.
+        SimulationError: the method does not fit the scene.
+    """
+    return CompiledModel(
+        scene, method=method, allow_code=allow_code, registry=registry, announce=announce
+    )

@@ -1,0 +1,1 @@
+"""User events: definition, sampling, location."""

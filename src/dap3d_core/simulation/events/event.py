@@ -1,0 +1,249 @@
+"""Events that a script asks for: what is watched, and what is done where it passes a level."""
+
+from collections.abc import Callable, Collection, Iterable
+from functools import cached_property
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations import REPORT
+from dap3d_core.model.parameter_change import Change, changed
+from dap3d_core.model.rotations import from_integrated
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.result import Record, Result
+from dap3d_core.simulation.compiled_model import CompiledModel
+
+Floats = NDArray[np.float64]
+ACTIONS = ("stop", "record")
+
+
+@attrs.frozen
+class Event:
+    """Something to look out for: a number that passes a level.
+
+    It is found where it passes, not where it stands: a run that starts beyond the level goes on.
+
+    Attributes:
+        of: a quantity by its name in results, one number (``crank.r.z``); or a function of t and
+            the ``Instant`` that returns a number.
+        below, above: the level, passed downwards or upwards; at most one of below, above, at.
+        at: the level, passed in the given direction; by default 0.
+        direction: +1 upwards, -1 downwards, 0 both.
+        action: "record" notes the instant in ``result.events``; "stop" ends the run there as well;
+            a function is called with the ``Instant`` there, and may change numbers of forces
+            (``Instant.set``).
+        name: what it is called in the result; made from the rest where it is left out.
+        every: s, the largest distance of two looks at it; by default as its values ask for it.
+
+    Raises:
+        ValueError: several levels, one that is no finite number, an action or direction that does
+            not exist, or an ``every`` that is no positive time.
+        TypeError: ``of`` is neither a name nor a function.
+    """
+
+    of: str | Callable[[float, "Instant"], float]
+    below: float | None = attrs.field(default=None, kw_only=True)
+    above: float | None = attrs.field(default=None, kw_only=True)
+    at: float | None = attrs.field(default=None, kw_only=True)
+    direction: int = attrs.field(default=0, kw_only=True)
+    action: str | Callable[["Instant"], object] = attrs.field(default="record", kw_only=True)
+    name: str = attrs.field(default="", kw_only=True)
+    every: float | None = attrs.field(default=None, kw_only=True)
+
+    def __attrs_post_init__(self) -> None:
+        given = [n for n in ("below", "above", "at") if getattr(self, n) is not None]
+        if len(given) > 1:
+            raise ValueError(f"an event has one level, not {' and '.join(given)}")
+        of: Any = self.of
+        if not isinstance(of, str) and not callable(of):
+            words = "an event watches a quantity by its name, or a function of t and the instant"
+            raise TypeError(f"{words}, not {of!r}")
+        if not _is_number(self.level):
+            raise ValueError(f"the level of an event is a finite number, not {self.level!r}")
+        if self.every is not None and not (_is_number(self.every) and self.every > 0.0):
+            raise ValueError(f"every is {self.every!r}; it should be a positive number of seconds")
+        if self.direction not in (-1, 0, 1):
+            raise ValueError(f"direction is {self.direction!r}; it should be -1, 0 or 1")
+        if self.direction and self.sense != self.direction:
+            raise ValueError(f"{given[0]} has a direction of its own; leave direction out")
+        if not callable(self.action) and self.action not in ACTIONS:
+            words = f"action is {self.action!r}; it should be 'stop', 'record' or a function"
+            raise ValueError(words)
+
+    @property
+    def level(self) -> float:
+        """The number that is passed."""
+        return next((x for x in (self.below, self.above, self.at) if x is not None), 0.0)
+
+    @property
+    def sense(self) -> int:
+        """+1 upwards, -1 downwards, 0 both."""
+        if self.below is not None:
+            return -1
+        return 1 if self.above is not None else self.direction
+
+    @property
+    def title(self) -> str:
+        """What it is called."""
+        if self.name:
+            return self.name
+        of = self.of if isinstance(self.of, str) else getattr(self.of, "__name__", "event")
+        way = {-1: "below", 0: "through", 1: "above"}[self.sense]
+        return f"{of} {way} {self.level:g}"
+
+    def value(self, instant: "Instant") -> float:
+        """How far the number is above its level.
+
+        Raises:
+            ValueError: it is not one finite number.
+        """
+        of = self.of
+        found = instant[of] if isinstance(of, str) else of(instant.t, instant)
+        if np.ndim(found):
+            raise ValueError(f"event {self.title}: it should be one number, not {np.shape(found)}")
+        if not _is_number(found):
+            truth = isinstance(found, (bool, np.bool_))
+            remedy = "; return a number that changes its sign where the event is" if truth else ""
+            raise ValueError(
+                f"event {self.title}: it should be a finite number, not {found!r}, at "
+                f"t = {instant.t:.9g} s{remedy}"
+            )
+        return float(found) - self.level
+
+
+def _is_number(value: Any) -> bool:
+    """Whether this is one finite real number; a truth value is none."""
+    number = np.asarray(value)
+    return number.dtype.kind in "iuf" and not number.shape and bool(np.isfinite(number))
+
+
+def checked_events(events: Any) -> tuple[Event, ...]:
+    """The events of a run.
+
+    Raises:
+        TypeError: they are not several ``Event``.
+    """
+    if isinstance(events, Event):
+        raise TypeError("events is a list of dap.Event; write [event] for a single one")
+    found = tuple(events) if isinstance(events, Iterable) else (events,)
+    for event in found:
+        if not isinstance(event, Event):
+            raise TypeError(f"events is a list of dap.Event, not of {event!r}")
+    return found
+
+
+class Instant:
+    """A state in the course of a run.
+
+    Attributes:
+        t: s.
+        u: (13 n,) the state, read-only, in the order of ``Result.u``.
+    """
+
+    def __init__(self, compiled: CompiledModel, t: float, y: Floats, numbers: "Numbers") -> None:
+        """Args: the model, time, the integrated state (13 n + 1,), numbers that may be changed."""
+        self._compiled, self._y, self._numbers = compiled, y, numbers
+        self.t = t
+        u = from_integrated(y[None], compiled.model.body_count)[0]
+        u.flags.writeable = False
+        self.u: Floats = u
+        self.changes: dict[str, dict[str, Any]] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        """A quantity by its name in results: a number, or (components,).
+
+        Raises:
+            UnknownNameError: there is no such quantity.
+        """
+        values = self._result.quantity(name).values[0]
+        return values if np.ndim(values) else float(values)
+
+    def set(self, force: str, **fields: Any) -> None:
+        """Change numbers of a force from here to the end of the run, and for this run alone.
+
+        Args:
+            force: its name.
+            fields: field -> new value, a number, three numbers or a matrix.
+
+        Raises:
+            ValueError: there is no such force or field, or the value is not allowed.
+        """
+        self._numbers.set(force, fields)
+        self.changes.setdefault(force, {}).update(fields)
+
+    @cached_property
+    def _result(self) -> Result:
+        machine, y = self._compiled.machine, self._y
+        row = np.concatenate([[self.t], y, np.zeros(machine.report_size)])
+        with np.errstate(all="ignore"):  # as compiled code does
+            machine.functions[REPORT](self.t, y, row[1 + len(y) :], machine.system, machine.loops)
+        record = Record(scene_text=self._compiled.scene_text)
+        return Result.of_run(machine.model, row[None], record, lambda: machine)
+
+
+class Numbers:
+    """The numbers of the forces of a compiled model; what was changed can be put back.
+
+    Attributes:
+        given: those of the scene, once they were changed; else None.
+    """
+
+    def __init__(self, compiled: CompiledModel) -> None:
+        self._compiled = compiled
+        self.given: Floats | None = None
+
+    def set(self, force: str, fields: dict[str, Any]) -> None:
+        """As ``Instant.set``."""
+        names = self._compiled.model.force_names
+        if force not in names:
+            near = nearest(force, names)
+            hint = f"did you mean {near!r}?" if near else f"forces: {', '.join(names) or 'none'}"
+            raise ValueError(f"there is no force {force!r}; {hint}")
+        model, par = self._compiled.model, self._compiled.machine.system.par
+        change = changed(self._compiled.checked, model, names.index(force), fields)
+        if self.given is None:
+            self.given = par.copy()
+        rows = self._rows(change)
+        rows[change.where] = change.new[change.where]
+        self._write(change, rows)
+
+    def changeable(self, forces: Collection[str]) -> NDArray[np.bool_]:
+        """Which of ``par`` ``set`` may have changed, given names of forces: no place of a table."""
+        model = self._compiled.model
+        found = np.zeros(len(self._compiled.machine.system.par), dtype=bool)
+        numbers = [k for k, name in enumerate(model.force_names) if name in forces]
+        for group in (*model.forces, *model.friction):
+            changes = np.zeros(group.numbers.shape, dtype=bool)
+            changes[np.isin(group.members, numbers)] = True
+            for instance, offset, _ in group.tables:
+                changes[instance, offset : offset + 2] = False
+            if changes.any():
+                first = self._first(group)
+                found[first : first + changes.size] |= changes.ravel()
+        return found
+
+    def put_back(self) -> None:
+        """Make the numbers those of the scene again."""
+        if self.given is not None:
+            self._compiled.machine.system.par[:] = self.given
+            self.given = None
+
+    def _first(self, group: Any) -> int:
+        machine = self._compiled.machine
+        q = next(k for k, (_, g) in enumerate(machine.what) if g is group)
+        return int(machine.system.groups[q, 1])
+
+    def _rows(self, change: Change) -> Floats:
+        count, width = change.group.numbers.shape
+        first = self._first(change.group)
+        table = self._compiled.machine.system.par[first : first + count * width]
+        found: Floats = table.reshape(count, width)[change.places]
+        return found
+
+    def _write(self, change: Change, rows: Floats) -> None:
+        count, width = change.group.numbers.shape
+        first = self._first(change.group)
+        table = self._compiled.machine.system.par[first : first + count * width]
+        table.reshape(count, width)[change.places] = rows

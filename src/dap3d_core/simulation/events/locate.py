@@ -1,0 +1,261 @@
+"""Events of a script: looked for after every step, located by steps that end where they are.
+
+There is no interpolation in what is found: a step is taken back and made again to another end until
+the number that is watched passes its level there, to the last digit of time. So what holds of a
+step (its error, the constraints) holds of the state at an event.
+"""
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.assembly.arrays import KEPT
+from dap3d_core.formulations import RHS
+from dap3d_core.integrators import Integration, Status
+from dap3d_core.result.event_record import Occurrence
+from dap3d_core.result.file.validate import are_events, is_number
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.events.event import Event, Instant, Numbers, checked_events
+from dap3d_core.simulation.events.sampling import Sampler
+
+Floats = NDArray[np.float64]
+
+EPSILON = float(np.finfo(float).eps)
+
+
+class Watcher:
+    """Looks out for events while an integration goes on.
+
+    Attributes:
+        occurrences: what was found.
+        numbers: of the forces, which events may change.
+    """
+
+    def __init__(self, compiled: CompiledModel, events: Sequence[Event]) -> None:
+        self.compiled, self.events = compiled, checked_events(events)
+        self.numbers = Numbers(compiled)
+        self.occurrences: list[Occurrence] = []
+        self._samplers = [Sampler(event.every) for event in self.events]
+        self._values: list[float] = []
+        self._sides: list[float] = []
+
+    def state(self) -> dict[str, Any]:
+        """What was found and is known so far, as plain data."""
+        return {
+            "titles": [event.title for event in self.events],
+            "occurrences": [attrs.asdict(one) for one in self.occurrences],
+            "values": self._values,
+            "sides": self._sides,
+            "samplers": [sampler.state() for sampler in self._samplers],
+        }
+
+    def restore(self, found: Mapping[str, Any]) -> None:
+        """Go on from what ``state`` gave.
+
+        Raises:
+            ValueError: it is not of that form.
+        """
+        values: Any = found.get("values")
+        sides: Any = found.get("sides")
+        lengths = (0, len(self.events))
+        if not (_are_numbers(values, lengths) and _are_numbers(sides, (len(values),))):
+            raise ValueError("the values and sides of events should be a number for each")
+        if not (set(sides) <= {-1.0, 0.0, 1.0} and are_events(found.get("occurrences"))):
+            raise ValueError("what events have found is damaged")
+        self.occurrences = [Occurrence(**one) for one in found["occurrences"]]
+        self._values, self._sides = list(values), list(sides)
+        states: Any = found.get("samplers")
+        if not (isinstance(states, list) and len(states) == len(self.events)):
+            raise ValueError("what is known of how events change is damaged")
+        for sampler, state in zip(self._samplers, states, strict=True):
+            sampler.restore(state)
+        if any(one.changes for one in self.occurrences):
+            self.numbers.given = self.compiled.machine.system.par.copy()
+
+    @property
+    def changed_forces(self) -> set[str]:
+        """Names of the forces whose numbers events have changed."""
+        return {force for one in self.occurrences for force in one.changes}
+
+    def notes(self) -> list[str]:
+        """Which events changed faster than they could be looked at."""
+        return [
+            f"event {event.title}: from t = {sampler.lost:.6g} s on it changed too fast to be "
+            "followed, at some times at least: it may have passed its level unseen. Let it change "
+            "more slowly, or give a shorter step"
+            for event, sampler in zip(self.events, self._samplers, strict=True)
+            if sampler.lost is not None
+        ]
+
+    def advance(self, integration: Integration, budget: int) -> Status:
+        """As ``Integration.advance``, step by step."""
+        if not self._values:
+            self._values = self._all(self._instant(integration))
+            self._sides = [float(np.sign(value)) for value in self._values]
+        limit = integration.statistics.rhs + budget
+        while integration.status is Status.RUNNING and not integration.rows_are_full:
+            self._step(integration)
+            if integration.statistics.rhs > limit:
+                break
+        return integration.status
+
+    def _step(self, integration: Integration) -> None:
+        arrays = self._arrays(integration)
+        saved = [array.copy() for array in arrays]
+        t, y, slope = integration.t, integration.y, self._slope(integration)
+
+        def go_to(end: float) -> Instant:
+            """Make the step again, to another end."""
+            for array, before in zip(arrays, saved, strict=True):
+                array[...] = before
+            while integration.t < end and integration.status is Status.RUNNING:
+                integration.advance_to(end)
+            return self._instant(integration)
+
+        integration.advance_to(np.inf)
+        if integration.t == t:
+            return
+        here = self._instant(integration)
+        within = self._within(integration, here, t, y, slope)
+        found = {k: self._ahead(k, values) for k, values in enumerate(within)}
+        ends = [self._end(go_to, t, k, *ahead) for k, ahead in found.items() if ahead]
+        if ends:
+            here = go_to(min(ends))
+        self._take_notice(integration, here)
+
+    def _arrays(self, integration: Integration) -> list[Any]:
+        """All that a step changes."""
+        system = self.compiled.machine.system
+        return [*integration.state_arrays(), *(getattr(system, name) for name in KEPT)]
+
+    def _instant(self, integration: Integration) -> Instant:
+        return Instant(self.compiled, integration.t, integration.y, self.numbers)
+
+    def _all(self, instant: Instant) -> list[float]:
+        return [event.value(instant) for event in self.events]
+
+    def _is_past(self, k: int, value: float) -> bool:
+        """Whether a number has passed its level since the last step; that it may be zero counts."""
+        return self._sides[k] != 0.0 and value * self._sides[k] <= 0.0
+
+    def _slope(self, integration: Integration) -> Floats:
+        """dy/dt where the integration stands."""
+        slope = integration.slope
+        if slope is not None:
+            return slope
+        machine, found = self.compiled.machine, np.zeros_like(integration.y)
+        with np.errstate(all="ignore"):  # as compiled code does
+            machine.functions[RHS](
+                integration.t, integration.y, found, machine.system, machine.loops
+            )
+        return found
+
+    def _within(
+        self, integration: Integration, here: Instant, t: float, y: Floats, slope: Floats
+    ) -> list[Iterator[tuple[float, float]]]:
+        """For each event instants within the step from t, and its values there, in order."""
+        end, last, h = integration.y, self._slope(integration), here.t - t
+        known: dict[float, Instant] = {here.t: here}
+
+        def instant(time: float) -> Instant:
+            if time not in known:
+                between = hermite((time - t) / h, h, y, slope, end, last)
+                known[time] = Instant(self.compiled, time, between, self.numbers)
+            return known[time]
+
+        def value(event: Event, time: float) -> float:
+            return event.value(instant(time))
+
+        return [
+            sampler.look(partial(value, event), t, first, here.t)
+            for event, sampler, first in zip(self.events, self._samplers, self._values, strict=True)
+        ]
+
+    def _ahead(self, k: int, values: Iterator[tuple[float, float]]) -> tuple[float, bool] | None:
+        """A time in the step at which event k is past, and whether in its direction.
+
+        One in the other direction is told where the event comes after it in the same step.
+        """
+        side, passed = self._sides[k], None
+        for time, value in values:
+            if side == 0.0 or value * side > 0.0:
+                continue
+            if self.events[k].sense * side <= 0.0:
+                return (time, True) if passed is None else (passed, False)
+            side, passed = -side, time
+        return None
+
+    def _end(
+        self, go_to: Callable[[float], Instant], start: float, k: int, end: float, sought: bool
+    ) -> float:
+        """Where a step is to end for event k."""
+        return self._locate(go_to, start, k, end) if sought else end
+
+    def _locate(self, go_to: Callable[[float], Instant], start: float, k: int, end: float) -> float:
+        """The first time after ``start`` at which event k is past, to the last digits."""
+        from scipy.optimize import brentq
+
+        past = end
+
+        def value(t: float) -> float:
+            nonlocal past
+            if t == start:
+                return self._values[k] or self._sides[k] * float(np.finfo(float).tiny)
+            found = self.events[k].value(go_to(t))
+            if self._is_past(k, found):
+                past = min(past, t)
+            return found
+
+        if value(end) * self._sides[k] < 0.0:  # else it was the interpolation's mistake
+            resolution = 2.0 * EPSILON * max(abs(start), abs(end))
+            brentq(value, start, end, xtol=resolution, rtol=4.0 * EPSILON)
+        return past
+
+    def _take_notice(self, integration: Integration, here: Instant) -> None:
+        """Act on the events that are past here."""
+        self._values = self._all(here)
+        changes = False
+        for k, event in enumerate(self.events):
+            side, value = self._sides[k], self._values[k]
+            if not self._is_past(k, value):
+                self._sides[k] = side or float(np.sign(value))
+                continue
+            self._sides[k] = -side
+            if event.sense * side <= 0.0:
+                changes |= self._act(integration, event, int(-side))
+        if changes:  # numbers may jump with them: that is no event
+            integration.restart()
+            self._values = self._all(self._instant(integration))
+            self._sides = [float(np.sign(value)) for value in self._values]
+
+    def _act(self, integration: Integration, event: Event, direction: int) -> bool:
+        """Do what an event asks for; whether numbers of forces were changed."""
+        here, kind = self._instant(integration), "change"
+        if callable(event.action):
+            event.action(here)
+        else:
+            kind = event.action
+        if kind == "stop":
+            integration.end()
+        self.occurrences.append(
+            Occurrence(name=event.title, t=here.t, direction=direction, kind=kind, u=here.u,
+                       changes=here.changes)
+        )  # fmt: skip
+        return bool(here.changes)
+
+
+def hermite(
+    part: float, h: float, y0: Floats, slope0: Floats, y1: Floats, slope1: Floats
+) -> Floats:
+    """The cubic through both ends of a step of length h, a part of the way along."""
+    a, b = part * part * (3.0 - 2.0 * part), part * (1.0 - part)
+    found: Floats = (1.0 - a) * y0 + a * y1 + b * h * ((1.0 - part) * slope0 - part * slope1)
+    return found
+
+
+def _are_numbers(values: Any, lengths: Collection[int]) -> bool:
+    return isinstance(values, list) and len(values) in lengths and all(map(is_number, values))

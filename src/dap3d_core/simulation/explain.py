@@ -1,0 +1,107 @@
+"""What was modelled, what was left out and why."""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.model import Model
+from dap3d_core.scene import Checked, Instance, Scene
+from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
+from dap3d_core.simulation.redundancy.redundancy import Redundancy
+
+Floats = NDArray[np.float64]
+
+
+def explain(
+    checked: Checked,
+    model: Model,
+    machine: Machine,
+    method: str,
+    reason: str,
+    u: Floats,
+    redundancy: Redundancy,
+) -> str:
+    """A text for people, one fact a line; u (13 n,) is where a run would start."""
+    n, ordering = model.body_count, machine.plan.ordering
+    lines = [f"scene {checked.scene.name or '(no name)'}"]
+    sizes = f"{13 * n} states, {6 * n} accelerations"
+    lines.append(f"  bodies     {n}: {_some(model.body_names)}; {sizes}")
+    kinds = {"joints": checked.joints, "forces": checked.forces, "functions": checked.functions}
+    lines += [f"  {title:10s} {_counts(instances)}" for title, instances in kinds.items()]
+    if model.row_count:
+        lines.append(f"  rows       {redundancy.describe()}")
+        lines += [f"  reactions  {words}" for words in redundancy.describe_reactions()]
+        if redundancy.rank.redundant:
+            elsewhere = redundancy_elsewhere(machine, u, redundancy)
+            lines.append(f"  poses      {elsewhere.describe(redundancy)}")
+            if redundancy.singular:
+                lines.append(f"  start      {redundancy.singular.describe()}")
+        lines.append(
+            f"  matrix     {len(ordering.early)} bodies eliminated first, then "
+            f"{len(ordering.nodes)} joint nodes and {len(ordering.hubs)} hubs; "
+            f"{machine.plan.fill} blocks of fill"
+        )
+    lines.append(f"  method     {method}, because {reason}")
+    compiled = sorted({f"{group.keyword} ({kind})" for kind, group in machine.what})
+    lines.append(f"  kernels    {', '.join(compiled) or 'none'}")
+    left_out = _left_out(checked, model)
+    lines.append("left out")
+    lines += [f"  {line}" for line in left_out] or ["  nothing"]
+    for note in checked.notes:
+        lines.append(f"note: {note}")
+    return "\n".join(lines)
+
+
+def _some(names: tuple[str, ...], most: int = 8) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def types_of(instances: Sequence[Instance]) -> dict[str, int]:
+    """Keyword -> how many elements of this type there are, in the order of the file."""
+    return dict(Counter(instance.examined.type.keyword for instance in instances))
+
+
+def _counts(instances: Sequence[Instance]) -> str:
+    return ", ".join(f"{count} {word}" for word, count in types_of(instances).items()) or "none"
+
+
+def _left_out(checked: Checked, model: Model) -> list[str]:
+    scene = checked.scene
+    elements = {"constraints": model.joints, "forces": model.forces, "functions": model.functions}
+    result = []
+    for title, groups in elements.items():
+        if not groups:
+            result.append(f"{title}: the scene has none, so no code for them was loaded")
+    if model.forces and not any(g.examined.type.keyword == "weight" for g in model.forces):
+        result.append("weight: no force of this type, so there is no gravity")
+    for word, declared in _declared(scene).items():
+        unused = [name for name in declared if name not in _used(scene)]
+        if unused:
+            result.append(f"{word} that nothing uses: {_some(tuple(unused))}")
+    if checked.animation_count:
+        result.append(f"animation points: {checked.animation_count}, not part of the analysis")
+    return result
+
+
+def _declared(scene: Scene) -> dict[str, Any]:
+    return {
+        "points": scene.points,
+        "vectors": scene.vectors,
+        "vectors2": scene.vectors2,
+        "functions": scene.functions,
+    }
+
+
+def _used(scene: Scene) -> Counter[str]:
+    """Names that joints, forces and vectors2 mention."""
+    found: Counter[str] = Counter()
+    for elements in (scene.joints, scene.forces):
+        for element in elements.values():
+            found.update(v for v in element.fields.values() if isinstance(v, str))
+    for d in scene.vectors2.values():
+        found.update((d.P_i, d.P_j))
+    return found

@@ -1,0 +1,1 @@
+"""Causes of failed runs, and notes on doubtful ones."""

@@ -1,0 +1,175 @@
+"""Who made a number that no run can have: the first body, force or joint to blame."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.assembly.arrays import KINDS
+from dap3d_core.assembly.evaluate import place_bodies
+from dap3d_core.formulations import RHS
+from dap3d_core.formulations.evaluator import AS_COMPILED, Machine
+from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.kernels.runtime.function_lists import call_loop
+from dap3d_core.model import Group
+from dap3d_core.model.rotations import from_integrated
+from dap3d_core.scene.validate.coerce_values import LARGEST
+
+Floats = NDArray[np.float64]
+
+#: Where to look behind the last good state, as parts of the time.
+AHEAD = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
+
+#: A row this many times the others, in its own units, tells of a pose that its joint cannot have.
+STEEP = 1e6
+#: A state or a rate, in SI units, beyond which no step goes on for long: cubes of it overflow soon.
+ENORMOUS = 1e50
+
+
+@AS_COMPILED
+def find_offender(machine: Machine, t: float, y: Floats, t_stop: float) -> str:
+    """Name what is not finite, or too large, at or just after time t with the integrated state y.
+
+    "" where nothing is.
+    """
+    for later in (t, t_stop, *(t + part * (1.0 + abs(t)) for part in AHEAD)):
+        found = _at(machine, later, y)
+        if found:
+            return f"{found} (t = {later:.9g} s)"
+    return _steepest(machine, t, y) or _runaway(machine, t, y)
+
+
+def fastest_body(machine: Machine, y: Floats) -> str:
+    """Name the body whose velocities are the largest; where all is finite it is to blame."""
+    n = machine.model.body_count
+    speeds = np.abs(y[7 * n : 13 * n]).reshape(n, 6)
+    b = int(np.argmax(speeds.max(axis=1)))
+    v, w = speeds[b, :3].max(), speeds[b, 3:].max()
+    return (
+        f"it was so within a step, not before; body {machine.model.body_names[b]} is the fastest "
+        f"there, with up to {v:.3g} m/s and {w:.3g} rad/s along an axis"
+    )
+
+
+def _at(machine: Machine, t: float, y: Floats) -> str:
+    n = machine.model.body_count
+    for b, name in enumerate(machine.model.body_names):
+        numbers = np.concatenate([y[7 * b : 7 * b + 7], y[7 * n + 6 * b : 7 * n + 6 * b + 6]])
+        if fault := _fault(numbers):
+            return f"the state of body {name} is {fault}"
+    s = machine.system
+    place_bodies(y, s.body, s.metric)
+    s.F[:, :4] = 0.0  # filled again one by one: what stands there may be of no finite number
+    for q, (kind, group) in enumerate(machine.what):
+        for k in range(group.count):
+            if fault := _fault_of(machine, q, k, kind, group, t):
+                name = _name(machine, kind, group, k)
+                return f"{_title(kind)} {name} (type {group.keyword}) is {fault}"
+    return _without_direction(machine, t, y) or _singular(machine, t) or _accelerated(machine, t, y)
+
+
+def _without_direction(machine: Machine, t: float, y: Floats) -> str:
+    """The joint of the first row whose gradient is zero: no force of it can hold anything."""
+    if not machine.model.row_count:
+        return ""
+    rows = machine.rows(t, from_integrated(y, machine.model.body_count))
+    size = np.bincount(rows.row, np.abs(rows.value), minlength=rows.shape[0])
+    zero = np.flatnonzero(size == 0.0)
+    if not len(zero):
+        return ""
+    return f"the gradient of a row of joint {machine.model.row_owner(int(zero[0]))} is zero"
+
+
+def _steepest(machine: Machine, t: float, y: Floats) -> str:
+    """The joint with the largest row, where its pose is so near to a singular one of its own."""
+    model = machine.model
+    if not model.row_count:
+        return ""
+    rows = machine.rows(t, from_integrated(y, model.body_count))
+    largest = np.abs(rows.gamma)
+    np.maximum.at(largest, rows.row, np.abs(rows.value))
+    worst = int(np.argmax(largest))
+    if not largest[worst] > STEEP * max(1.0, float(np.median(largest))):
+        return ""
+    size, name = largest[worst], model.row_owner(worst)
+    return f"a row of joint {name} has grown to {size:.2g} (t = {t:.9g} s)"
+
+
+def _runaway(machine: Machine, t: float, y: Floats) -> str:
+    """The body with the largest number or rate, where no step can go on with it."""
+    n = machine.model.body_count
+    states = np.hstack([y[: 7 * n].reshape(n, 7), y[7 * n : 13 * n].reshape(n, 6)])
+    largest = np.max(np.abs(np.hstack([states, _rates(machine, t, y)])), axis=1)
+    first = int(np.argmax(largest))
+    if not largest[first] > ENORMOUS:
+        return ""
+    name = machine.model.body_names[first]
+    return f"body {name} runs away: a number or a rate of {largest[first]:.2g} (t = {t:.9g} s)"
+
+
+def _fault(*numbers: Floats) -> str:
+    """What is wrong with numbers: not finite, or too large for a run; "" if nothing is."""
+    if not all(bool(np.all(np.isfinite(part))) for part in numbers):
+        return "not finite"
+    too_large = any(bool(np.any(np.abs(part) > LARGEST)) for part in numbers)
+    return f"beyond {LARGEST:g}, too large" if too_large else ""
+
+
+def _accelerated(machine: Machine, t: float, y: Floats) -> str:
+    """The body whose acceleration is too large, though all that acts on it is not."""
+    for name, rates in zip(machine.model.body_names, _rates(machine, t, y), strict=True):
+        if fault := _fault(rates):
+            return f"the acceleration of body {name} is {fault}"
+    return ""
+
+
+def _rates(machine: Machine, t: float, y: Floats) -> Floats:
+    """(n, 13) dy/dt of each body."""
+    out, n = np.zeros_like(y), machine.model.body_count
+    machine.functions[RHS](float(t), y, out, machine.system, machine.loops)
+    return np.hstack([out[: 7 * n].reshape(n, 7), out[7 * n : 13 * n].reshape(n, 6)])
+
+
+def _fault_of(machine: Machine, q: int, k: int, kind: str, group: Group, t: float) -> str:
+    s = machine.system
+    for out in (s.force, s.gamma, s.nu, s.C, s.D, s.x):
+        out[:] = 0.0
+    joint_outs = {"acceleration": (s.D, s.gamma, s.nu), "position": (s.C, s.C, s.C),
+                  "friction": (s.force, s.x, s.x)}  # fmt: skip
+    if kind == "switch":
+        joint_outs[kind] = np.zeros(len(group.examined.outputs[kind])), np.zeros(1), np.zeros(1)
+    outs = joint_outs.get(kind, (s.force, s.force, s.force))
+    _call_one(machine, q, k, group, t, outs)
+    return _fault(*outs, s.F[:, :4])
+
+
+def _call_one(
+    machine: Machine, q: int, k: int, group: Group, t: float, outs: tuple[Floats, Floats, Floats]
+) -> None:
+    """Call loop q for instance k of its group alone."""
+    s = machine.system
+    i0, p0, _ = s.groups[q]
+    i1, p1 = i0 + k * stride(group.examined), p0 + k * group.examined.layout.par_width
+    call_loop(machine.loops, q, t, s, np.array([i1, p1, 1]), *outs)
+
+
+def _title(kind: str) -> str:
+    assert kind in KINDS
+    titles = {"value": "function", "wrench": "force", "energy": "the energy of force",
+              "friction": "the friction of force"}  # fmt: skip
+    return titles.get(kind, "joint")
+
+
+def _name(machine: Machine, kind: str, group: Group, k: int) -> str:
+    names = {"value": machine.model.function_names, "wrench": machine.model.force_names}
+    names["energy"] = names["friction"] = machine.model.force_names
+    return str(names.get(kind, machine.model.joint_names)[int(group.members[k])])
+
+
+def _singular(machine: Machine, t: float) -> str:
+    """The joint whose rows (nearly) depend on those before, where the pose is (nearly) singular."""
+    if machine.method == "unconstrained" or not machine.model.row_count:
+        return ""
+    row = machine.poor_rows(t)
+    if not len(row):
+        return ""
+    joint = machine.model.row_owner(int(row[0]))
+    return f"the pose is (nearly) singular, where the rows of joint {joint} depend on the others"

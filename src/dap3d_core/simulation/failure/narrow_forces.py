@@ -1,0 +1,62 @@
+"""Laws that steps may pass over, because their types do not say where they change."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from dap3d_core.interface.examine.examine import Examined
+from dap3d_core.kernels import lookup, where
+from dap3d_core.kernels.runtime.cache import reached
+from dap3d_core.model.knots import breaks_are_told
+from dap3d_core.result import INFORMATION
+from dap3d_core.scene import Checked
+
+#: Words of kernels that choose between formulas.
+CHOOSING = (where, lookup)
+#: Kernels that make the law of a force.
+LAWS = ("wrench", "energy")
+
+
+def notes_on_laws(checked: Checked) -> list[str]:
+    """Functions of an argument, and laws with branches, that do not say where they change."""
+    functions = {function.name: function for function in checked.functions}
+    elements = (*checked.joints, *checked.forces)
+    called = dict.fromkeys(
+        name
+        for element in elements
+        for field in element.examined.argument_functions
+        if (name := element.values[field]) is not None
+    )
+    found = [
+        f"functions.{name} ({functions[name].examined.type.keyword}): its type says neither where "
+        "it takes another form (breaks) nor that it does not (smooth): steps may pass over what it "
+        "does over a short way"
+        for name in called
+        if not breaks_are_told(functions[name])
+    ]
+    by_type: dict[Any, list[str]] = {}
+    for element in checked.forces:
+        by_type.setdefault(element.examined.type, []).append(element.name)
+    examined = {force.examined.type: force.examined for force in checked.forces}
+    return [*found, *_branching(by_type, examined)]
+
+
+def _branching(by_type: dict[Any, list[str]], examined: dict[Any, Examined]) -> Iterator[str]:
+    for type_, names in by_type.items():
+        kernels = examined[type_].kernels
+        if "switch" in kernels or not _chooses(examined[type_]):
+            continue
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        yield (
+            f"{INFORMATION}{type_.kind}s.{names[0]}{more} ({type_.keyword}): its law has branches "
+            "and its type no switch: steps go across them, and may pass over a short one"
+        )
+
+
+def _chooses(examined: Examined) -> bool:
+    """Whether a law of a type chooses between formulas."""
+    laws = [examined.kernels[name] for name in LAWS if name in examined.kernels]
+    return any(
+        word in (plain.__globals__.get(name) for name in plain.__code__.co_names)
+        for plain in reached(*laws)[0]
+        for word in CHOOSING
+    )

@@ -1,0 +1,112 @@
+"""How a run ended, in words, and what happened on the way."""
+
+from collections.abc import Sequence
+
+from dap3d_core.formulations.common.friction import PASSES
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.integrators import Integration, Status
+from dap3d_core.integrators.stepping.event_location import CHATTER
+from dap3d_core.integrators.stepping.integration_state import LOGGED
+from dap3d_core.result import INFORMATION, Occurrence
+from dap3d_core.simulation.failure.contradictory_joints import find_contradiction
+from dap3d_core.simulation.failure.diagnosis import fastest_body, find_offender
+
+REASONS = {
+    Status.STEP_FLOOR: "the step size fell to the resolution of time",
+    Status.NOT_FINITE: "a number came up that is beyond 1e+100, infinite or not a number",
+    Status.PROJECTION_FAILED: "the state could not be projected onto the constraints",
+}
+
+
+def doubts(machine: Machine, rhs: int) -> list[str]:
+    """Notes on what was computed less surely than all else; rhs: evaluations of the run."""
+    notes = []
+    if count := machine.unsettled:
+        notes.append(
+            f"friction: the multipliers did not settle in {PASSES} passes, {count} times of {rhs} "
+            "or more; the last ones were used. Motion there is uncertain: a high mu may lock the "
+            "joint by itself"
+        )
+    if count := machine.singular_reports:
+        notes.append(
+            f"{count} times a pose was singular where it was reported: the rows leave "
+            "accelerations open there, and those reported, with their multipliers, are not "
+            "determined"
+        )
+    if count := machine.doubtful_turns:
+        notes.append(
+            f"turns of angles: the rate of turn changed so much within a step, {count} times, "
+            "that whole turns may be miscounted; give a tighter rtol, or a shorter step"
+        )
+    return notes
+
+
+def why_stopped(machine: Machine, integration: Integration, rank: int) -> str:
+    """Why an integration ended before its time, with who is to blame; rank: that of the start."""
+    t = integration.t
+    head = f"the run stopped at t = {t:.9g} s"
+    if integration.status is Status.SWITCHED:
+        switch = machine.switches[integration.culprit]
+        return f"{head}: {_title(machine, integration.culprit)}: {switch.words}"
+    if integration.status is Status.CHATTERED:
+        return f"{head}: {_chatter(machine, integration)}"
+    t_stop = integration.t_stop if integration.t_stop is not None else t
+    message = f"{head}: {REASONS[integration.status]}"
+    if integration.status is not Status.NOT_FINITE:
+        culprit = find_contradiction(machine, t, integration.y, rank)
+        if culprit:
+            return f"{head}: {culprit}"
+    culprit = find_offender(machine, t, integration.y, t_stop)
+    if not culprit and integration.status is Status.NOT_FINITE:
+        culprit = fastest_body(machine, integration.y)
+    return f"{message}: {culprit}" if culprit else message
+
+
+def occurrences(
+    machine: Machine, runs: Sequence[Integration], of_script: Sequence[Occurrence]
+) -> list[Occurrence]:
+    """What happened at instants that were located, in their order."""
+    last = runs[-1]
+    ended = last.status is Status.SWITCHED
+    found = []
+    for t, which, side in (crossing for run in runs for crossing in run.crossings):
+        switch = machine.switches[int(which)]
+        ends = ended and int(which) == last.culprit and side < 0.0 and bool(switch.words)
+        kind = switch.group.examined.type.kind
+        found.append(
+            Occurrence(
+                name=f"{kind} {switch.name(machine.model)}",
+                t=float(t),
+                direction=int(side),
+                kind="end" if ends else "switch",
+            )
+        )
+    return sorted([*found, *of_script], key=lambda event: event.t)
+
+
+def event_notes(runs: Sequence[Integration], events: Sequence[Occurrence]) -> list[str]:
+    """Notes on what happened: an event that stopped the run, more crossings than are kept."""
+    notes = [f"{INFORMATION}the run was stopped by an event, {event.words}"
+             for event in events if event.kind == "stop"]  # fmt: skip
+    if (count := sum(run.crossing_count for run in runs)) > LOGGED:
+        notes.append(
+            f"{INFORMATION}switches changed their sign {count} times; the first {LOGGED} are kept"
+        )
+    return notes
+
+
+def _title(machine: Machine, which: int) -> str:
+    switch = machine.switches[which]
+    group = switch.group
+    return f"{group.examined.type.kind} {switch.name(machine.model)} ({group.keyword})"
+
+
+def _chatter(machine: Machine, integration: Integration) -> str:
+    """What chatters, how long already, and what helps."""
+    since, count = integration.chatter
+    return (
+        f"{_title(machine, integration.culprit)} chatters: its switch changed its sign "
+        f"{count} times within {integration.t - since:.2g} s (more than {CHATTER} in a millionth "
+        "of the run end it). On either side its law drives the motion back to the other; let the "
+        "law change over a small range, as tanh does, or give it a range in which it stays as it is"
+    )

@@ -1,0 +1,170 @@
+"""Integrations that take a run over from each other: where it is stiff, and at singular poses.
+
+The iteration of Radau IIA does not converge where a weak singular value of the constraints changes
+its sign, and its steps stop short of it. Those of dop853 are placed about it
+(integrators/stepping/singular_poses.py, docs/decisions/0007), so it takes the run across.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations import PROJECT, RHS
+from dap3d_core.formulations.evaluator import AS_COMPILED, Machine
+from dap3d_core.integrators import METHODS, Integration, Status
+from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.stepping.singular_poses import RATE
+from dap3d_core.result import INFORMATION
+from dap3d_core.simulation.implicit_run import (
+    EXPLICIT,
+    change_note,
+    implicit_rest,
+    take_over,
+)
+from dap3d_core.simulation.settings import explicit_options
+
+if TYPE_CHECKING:
+    from dap3d_core.simulation.run import Run
+
+Floats = NDArray[np.float64]
+
+#: A singular pose is met where it is less than this part of the run away.
+NEAR = 0.05
+#: Rates of lengths are taken over this part of the run.
+APART = 1e-6
+#: The implicit integrator takes over again behind this many times the way to the pose.
+BEHIND = 3.0
+#: A length that goes to zero with a higher power of the time left than this is not near zero.
+HIGHEST = 6.0
+#: How an integration ends that does not get through a singular pose.
+FAILURES = (Status.STEP_FLOOR, Status.NOT_FINITE, Status.PROJECTION_FAILED)
+
+
+def hand_over(run: "Run") -> bool:
+    """Let the other integration go on where the present one leaves the run to it; whether so.
+
+    An explicit one does where the scene is stiff, or behind a singular pose; an implicit one
+    before such a pose, once.
+    """
+    present, settings, left = run.runs[-1], run.settings, np.inf
+    if present.status in (Status.STIFF, Status.RUNNING):
+        run.until = np.inf
+        if present.status is Status.RUNNING:
+            present.work.integer[at.STATUS] = Status.FINISHED
+    else:
+        left = _left(run)
+        has_just_begun = len(run.runs) > 1 and run.runs[0].t >= present.t
+        if left == np.inf or has_just_begun or settings.step or not settings.project:
+            return False
+        run.until = present.t + BEHIND * left
+        run.crossed.append(present.t + left)
+    if len(run.runs) == 1:
+        begin_other(run)
+    else:
+        take_over(run.runs[0], present)
+        run.runs.reverse()
+        run.look_on()
+    if left < np.inf:
+        _aim_across(run, left)
+    return True
+
+
+def begin_other(run: "Run") -> None:
+    """Go on with the other one of the explicit and the implicit integrator, set up for that."""
+    present, machine, options = run.runs[-1], run.machine, run.options
+    if not present.implicit:
+        run.notes.append(change_note(present.t))
+        run.begin(implicit_rest(machine, present, run.times, options))
+        return
+    options = options | explicit_options(machine) | {"first_step": None}
+    functions = machine.functions, machine.system, machine.loops
+    other = Integration(METHODS[EXPLICIT], *functions, present.y, run.times, **options)
+    other.beside = machine.second_thread
+    take_over(other, present)
+    run.begin(other)
+
+
+def _left(run: "Run") -> float:
+    """Time left until the pose that has stopped the implicit integrator; infinite if none has."""
+    present, span = run.runs[-1], float(run.times[-1])
+    if not present.implicit or present.status not in FAILURES:
+        return np.inf
+    return time_left(lengths_at(run.machine, present.t, present.y, span), span)
+
+
+def _aim_across(run: "Run", left: float) -> None:
+    """Let the first step of the explicit integration be one across: a trial step goes closer."""
+    present = run.runs[-1]
+    span = float(run.times[-1])
+    present.work.lengths[:] = lengths_at(run.machine, present.t, present.y, span)
+    present.work.real[at.H] = left / present.work.real[at.CALM]
+
+
+@AS_COMPILED
+def lengths_at(machine: Machine, t: float, y: Floats, span: float) -> Floats:
+    """(2, m) lengths that projection gives, and their rates, as crossing.py has them.
+
+    A length that goes to zero with a power of the time left is given the mean rate until then.
+
+    Args:
+        machine: the model.
+        t, y: where the motion stands, on the constraints.
+        span: length of the run, s.
+    """
+    slope, h = np.zeros_like(y), APART * span
+    machine.functions[RHS](t, y, slope, machine.system, machine.loops)
+    now, before, earlier = (_lengths(machine, t - k * h, y - k * h * slope) for k in range(3))
+    rate = (now - before) / h
+    return np.array([now, rate / _orders(now, rate, (now - 2.0 * before + earlier) / h**2)])
+
+
+@np.errstate(all="ignore")
+def _orders(now: Floats, rate: Floats, bend: Floats) -> Floats:
+    """(m,) powers of the time left with which lengths that fall go to zero: 1, or more.
+
+    As many as the freedoms that a pose opens at once, for c d^k: 1 - now bend / rate^2 = 1 / k.
+    """
+    orders = np.rint(1.0 / (1.0 - now * bend / rate**2))
+    return np.where((rate < 0.0) & (orders > 1.0) & (orders <= HIGHEST), orders, 1.0)
+
+
+def time_left(lengths: Floats, span: float) -> float:
+    """Time left until one of the lengths vanishes; infinite where that is not near."""
+    now, rate = lengths[:, lengths[RATE] < 0.0]
+    nearest = float(np.min(-now / rate, initial=np.inf))
+    return nearest if nearest < NEAR * span else np.inf
+
+
+def _lengths(machine: Machine, t: float, y: Floats) -> Floats:
+    found = np.zeros(at.LENGTHS - at.OUTCOME + machine.length_count)
+    machine.functions[PROJECT](t, y.copy(), found, machine.system, machine.loops)
+    lengths: Floats = found[at.LENGTHS - at.OUTCOME :]
+    return lengths
+
+
+def crossing_notes(crossed: Sequence[float]) -> list[str]:
+    """Note on the times of poses that the explicit integrator crossed for the implicit one."""
+    if not crossed:
+        return []
+    often = "once" if len(crossed) == 1 else f"{len(crossed)} times"
+    return [
+        f"{INFORMATION}radau met a singular pose {often} (first at t = {crossed[0]:.6g} s), where "
+        f"{EXPLICIT} took the run across"
+    ]
+
+
+def cannot_cross(message: str, run: "Run") -> str:
+    """Why a run ended, and that a singular pose lies ahead, where the implicit integrator met one.
+
+    message: the former.
+    """
+    left = _left(run)
+    if left == np.inf:
+        return message
+    return (
+        f"{message}. Integrator radau cannot cross the singular pose at "
+        f"t = {run.runs[-1].t + left:.6g} s; {EXPLICIT} and auto can, with project on and steps "
+        "that their error chooses"
+    )

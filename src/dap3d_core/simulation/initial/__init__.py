@@ -1,0 +1,1 @@
+"""Initial conditions: assembly, undefined directions, singular starts, tolerances."""

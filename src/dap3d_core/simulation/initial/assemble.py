@@ -1,0 +1,388 @@
+"""Initial conditions brought onto the constraints, at position and at velocity level (spec 8).
+
+The change is the least one: of all that fulfil the linear equations D x = residual the one whose
+sum of squares is the smallest, of displacements in m (in units of ``Model.length`` where the scene
+is not of ordinary size) and rotations in rad as they are (metric "unit", the manual's), or weighted
+by masses and inertias (metric "mass"): a heavy body then stays nearly where it is.
+"""
+
+from collections.abc import Collection
+from itertools import pairwise
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.assembly.arrays import System
+from dap3d_core.formulations.arrays import set_metric
+from dap3d_core.formulations.constraint_rows import Rows, scaled_rows
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.linear.ldlt.plan import Integers
+from dap3d_core.linear.rank.rank import DENSE_ROWS, factor_independent
+from dap3d_core.model import Model
+from dap3d_core.model.rotations import join, split
+from dap3d_core.result import INFORMATION
+from dap3d_core.scene import Body, Scene
+from dap3d_core.simulation.errors import AssemblyError
+from dap3d_core.simulation.failure.diagnosis import find_offender
+
+Floats = NDArray[np.float64]
+
+#: Position residuals above this are corrected; Newton stops below it.
+TOLERANCE = 1e-10
+#: Positions that no pass brings closer count as closed below this (as a part of the model where it
+#: is smaller than one metre), with a note: joints that are redundant but for a misfit.
+FIT = 1e-8
+MOST_PASSES = 25
+#: A pass turns no body by more than this (rad), moves none by more than this part of the model.
+MOST_TURN, MOST_SHIFT = 0.5, 0.5
+#: A correction of this part of the model's size, or of the speeds, is one of rounding.
+ROUNDING = 1e-6
+#: A row of a shorter gradient, in its own units, is not changed by small changes.
+FLAT = 1e-6
+#: Joints that the message of a failure lists.
+MOST_JOINTS = 10
+#: Singular values below this part of the largest are left out of the least-norm solution.
+RCOND = 1e-10
+
+
+@attrs.frozen(eq=False)
+class Initial:
+    """A corrected start.
+
+    Attributes:
+        u: (13 n,) the state.
+        violation: (position, velocity) largest residuals as given.
+        residual: the same after the correction.
+        passes: Newton passes at position level.
+        moved, turned: largest displacement in m and rotation in rad of a body.
+    """
+
+    u: Floats
+    violation: tuple[float, float]
+    residual: tuple[float, float]
+    passes: int
+    moved: float
+    turned: float
+
+
+def finite_rows(machine: Machine, t: float, u: Floats) -> Rows:
+    """All constraint rows at a state u (13 n,).
+
+    Raises:
+        AssemblyError: one of them is not finite there; the message names joint or function.
+    """
+    rows = machine.rows(t, u)
+    good = np.isfinite(rows.C) & np.isfinite(rows.nu) & np.isfinite(rows.gamma)
+    good[rows.row[~np.isfinite(rows.value)]] = False
+    if not np.all(good):
+        joint = machine.model.row_owner(int(np.argmin(good)))
+        culprit = find_offender(machine, t, machine.integrated(u), t)
+        culprit = culprit or f"joint {joint} is not finite"
+        raise AssemblyError(f"the initial positions cannot be assembled: {culprit}")
+    return rows
+
+
+def violation(machine: Machine, u: Floats, t: float = 0.0) -> tuple[float, float]:
+    """Largest residuals |C| and |D v - nu| of a state u (13 n,).
+
+    In the units of the rows; in m and m/s where the scene is not of ordinary size (Model.length).
+    """
+    if not machine.model.row_count:
+        return 0.0, 0.0
+    rows = finite_rows(machine, t, u)
+    weight = weights_of(machine)
+    return _largest(weight * rows.C), _largest(weight * _velocity_residual(rows, u))
+
+
+def weights_of(machine: Machine) -> Floats:
+    """(rows,) weights of the residuals of the model's rows (System.weight)."""
+    weight: Floats = machine.system.weight[machine.system.row]
+    return weight
+
+
+def correct_initial(
+    machine: Machine,
+    u: Floats,
+    t: float = 0.0,
+    hold: Collection[int] = (),
+    metric: str = "unit",
+) -> Initial:
+    """Correct positions by Newton's method, velocities by a linear step, each by the least change.
+
+    Rows without a position level do not take part in the position stage.
+
+    Args:
+        machine: the model.
+        u: (13 n,) the state as given.
+        t: time, s.
+        hold: bodies, from 1, that the position stage leaves where they are.
+        metric: "unit" or "mass", see the head of this file.
+
+    Raises:
+        AssemblyError: the position residual does not vanish; the message has that of each joint.
+    """
+    before = violation(machine, u, t)
+    if not machine.model.row_count:
+        return Initial(u, before, before, 0, 0.0, 0.0)
+    start = u
+    held = np.array(sorted(hold), dtype=np.int64)
+    u, passes = correct_positions(machine, u, t, held, metric)
+    rows = finite_rows(machine, t, u)
+    residual = _velocity_residual(rows, u)
+    if _largest(residual) > 0.0:
+        u = u.copy()
+        velocities = u[7 * machine.model.body_count :]
+        velocities -= least_change(machine, rows, residual, t, None, metric)
+    moved, turned = distance(start, u, machine.model.body_count)
+    return Initial(u, before, violation(machine, u, t), passes, float(moved), float(turned))
+
+
+def correction_notes(initial: Initial, machine: Machine, scene: Scene) -> list[str]:
+    """What was changed, in words.
+
+    No more than rounding, or velocities that the scene leaves open, is for information.
+    """
+    notes = []
+    position, velocity = initial.violation
+    tolerance = TOLERANCE * machine.model.length
+    if position > tolerance:
+        mark = INFORMATION if position <= ROUNDING * model_size(machine) else ""
+        notes.append(
+            f"{mark}initial positions corrected in {initial.passes} passes: "
+            f"|C| {position:.2g} -> {initial.residual[0]:.2g}; "
+            f"bodies moved by up to {initial.moved:.2g} m and {initial.turned:.2g} rad"
+        )
+    if initial.residual[0] > tolerance:
+        notes.append(
+            f"redundant joints do not fit together: {initial.residual[0]:.2g} of their positions "
+            f"stays open. Below {FIT:g} the run goes on as if they fitted"
+        )
+    if velocity > tolerance:
+        speed = _largest(machine.model.u0[7 * machine.model.body_count :])
+        usual = attrs.fields(Body)
+        open_ = all(
+            body.r_dot is usual.r_dot.default and body.w is usual.w.default
+            for body in scene.bodies.values()
+        )
+        mark = INFORMATION if open_ or velocity <= ROUNDING * speed else ""
+        notes.append(
+            f"{mark}initial velocities corrected: "
+            f"|D v - nu| {velocity:.2g} -> {initial.residual[1]:.2g}"
+        )
+    return notes
+
+
+def correct_positions(
+    machine: Machine, u: Floats, t: float, held: Integers, metric: str = "unit"
+) -> tuple[Floats, int]:
+    """The position stage of ``correct_initial``: the state with other r and p, and the passes.
+
+    Raises:
+        AssemblyError: the residual does not vanish.
+    """
+    size, limit, before = model_size(machine), 1.0, np.inf
+    length, weight = machine.model.length, weights_of(machine)
+    fit = length * fit_of(machine.model)
+    for passes in range(MOST_PASSES + 1):
+        rows = finite_rows(machine, t, u)
+        worst = _largest(weight * rows.C)
+        stands = worst > 0.5 * before and worst <= fit
+        if worst <= TOLERANCE * length or stands:
+            return u, passes
+        before = worst
+        if passes == MOST_PASSES:
+            break
+        change = least_change(machine, rows, rows.C, t, held, metric).reshape(-1, 6)
+        shift = float(np.max(np.linalg.norm(change[:, :3], axis=1)))
+        turn = float(np.max(np.linalg.norm(change[:, 3:], axis=1)))
+        shift_limit = MOST_SHIFT * size / shift if shift else 1.0
+        turn_limit = MOST_TURN / turn if turn else 1.0
+        limit = min(1.0, shift_limit, turn_limit)
+        u = displaced(u, -limit * change, machine.model.body_count)
+    raise _failure(machine, rows, passes, held, is_far=limit < 1.0)
+
+
+def least_change(
+    machine: Machine,
+    rows: Rows,
+    residual: Floats,
+    t: float,
+    held: Integers | None = None,
+    metric: str = "unit",
+) -> Floats:
+    """The shortest x (6 n,) with D x = residual, on all rows.
+
+    With ``held`` (bodies, maybe none) on the position rows alone, and zero on these bodies.
+    """
+    if machine.model.row_count > DENSE_ROWS:
+        return _sparse_least_change(machine, residual, t, held, metric)
+    length = machine.model.length
+    if length != 1.0:  # rows of very different units
+        gradient = scaled_rows(rows, length)[1]
+        rows = attrs.evolve(rows, value=rows.value / gradient[rows.row])
+        residual = residual / gradient
+    D = rows.dense()
+    if held is None:
+        held = np.zeros(0, dtype=np.int64)
+    else:
+        keep = machine.model.position_row
+        D, residual = D[keep], residual[keep]
+    block = D.reshape(len(D), -1, 6)
+    block[:, held - 1] = 0.0
+    scale, frame = mass_scaling(machine)
+    if metric == "mass":
+        block[:, :, :3] *= scale
+        block[:, :, 3:] = np.einsum("mbr,brc->mbc", block[:, :, 3:], frame)
+    else:
+        block[:, :, :3] *= length
+    solution: Floats = np.asarray(np.linalg.lstsq(D, residual, rcond=RCOND)[0], dtype=np.float64)
+    change = solution.reshape(-1, 6)
+    change[held - 1] = 0.0  # rounding
+    if metric == "mass":
+        change[:] = unscaled(change, scale, frame)
+    else:
+        change[:, :3] *= length
+    return solution
+
+
+def mass_scaling(machine: Machine) -> tuple[Floats, Floats]:
+    """1/sqrt(m) (n, 1) and B (n, 3, 3) of the bodies as placed (linear/ldlt/factor.py)."""
+    metric = machine.system.metric[1:]
+    return metric[:, :1], metric[:, 7:16].reshape(-1, 3, 3)
+
+
+def unscaled(change: Floats, scale: Floats, frame: Floats) -> Floats:
+    """From the coordinates in which masses are one, (n, 6), to metres and rad in global axes."""
+    return np.hstack([scale * change[:, :3], np.einsum("brc,bc->br", frame, change[:, 3:])])
+
+
+def _sparse_least_change(
+    machine: Machine, residual: Floats, t: float, held: Integers | None, metric: str
+) -> Floats:
+    """The same by the block factorisation, for many rows; metric "unit" sets every mass to one."""
+    from dap3d_core.formulations.common.constraints import correct, linearise
+
+    system: System = machine.system
+    before = system.metric.copy()
+    n = machine.model.body_count
+    try:
+        if metric == "unit":
+            light = np.full(n, machine.model.length**-2)
+            set_metric(system.metric, light, np.tile(np.eye(3), (n, 1, 1)))
+            system.metric[1:, 7:16] = system.body[1:, 3:12]
+        if held is not None:
+            system.metric[held] = 0.0
+        linearise(t, system, machine.loops)
+        if held is not None:
+            row, _, place = machine.pattern
+            system.D[place[~machine.model.position_row[row]]] = 0.0
+        factor_independent(machine.plan, system.D, system.K)
+        system.C[:] = 0.0
+        system.C[system.row] = -residual
+        correct(system)
+        change = unscaled(system.force[6:].reshape(n, 6), *mass_scaling(machine))
+    finally:
+        system.metric[:] = before
+    return change.ravel()
+
+
+def displaced(u: Floats, change: Floats, n: int) -> Floats:
+    """The state with r + dr, and with p + 1/2 G^T dtheta of unit length (dtheta global, small)."""
+    r, p, v, w = split(u, n)
+    e0, e, turn = p[:, :1], p[:, 1:], 0.5 * change[:, 3:]
+    dp = np.hstack([-np.sum(e * turn, axis=1, keepdims=True), e0 * turn + np.cross(turn, e)])
+    p = p + dp
+    return join(r + change[:, :3], p / np.linalg.norm(p, axis=1, keepdims=True), v, w)
+
+
+def distance(u: Floats, other: Floats, n: int) -> tuple[Floats, Floats]:
+    """Largest displacement, m, and rotation, rad, of a body between states (..., 13 n or more)."""
+    r, p, _, _ = split(u, n)
+    s, q, _, _ = split(other, n)
+    cosine = np.sum(p * q, axis=-1)
+    sine = np.linalg.norm(p - np.sign(cosine)[..., None] * q, axis=-1)
+    cosine = np.clip(np.abs(cosine), 0.0, 1.0)
+    small, large = 4.0 * np.arcsin(np.clip(sine / 2.0, 0, 1)), 2.0 * np.arccos(cosine)
+    angle = np.where(cosine > 0.9, small, large)
+    shift = np.linalg.norm(r - s, axis=-1)
+    return np.max(shift, axis=-1, initial=0.0), np.max(angle, axis=-1, initial=0.0)
+
+
+def _velocity_residual(rows: Rows, u: Floats) -> Floats:
+    v = u[-rows.shape[1] :]
+    return np.bincount(rows.row, rows.value * v[rows.column], minlength=rows.shape[0]) - rows.nu
+
+
+def fit_of(model: Model) -> float:
+    """What counts as closed, as a part of the scene's length (FIT)."""
+    return FIT * min(1.0, model.size / model.length)
+
+
+def model_size(machine: Machine) -> float:
+    """A length of the model, m."""
+    return machine.model.size
+
+
+def extent(machine: Machine, v: Floats) -> float:
+    """How fast something moves at velocities (6 n,), in rad or parts of the model."""
+    x = np.abs(v.reshape(-1, 6))
+    return max(_largest(x[:, :3]) / model_size(machine), _largest(x[:, 3:]))
+
+
+def _largest(values: Floats) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
+
+
+def _failure(
+    machine: Machine, rows: Rows, passes: int, held: Integers, *, is_far: bool
+) -> AssemblyError:
+    """Why it failed: the joints that are open, the worst first, in lines of at most 80 columns."""
+    model, C = machine.model, weights_of(machine) * rows.C
+    tolerance = TOLERANCE * model.length
+    worst = np.array([_largest(C[a:b]) for a, b in pairwise(model.joint_start)])
+    still_open = [int(k) for k in np.argsort(-worst, kind="stable") if worst[k] > tolerance]
+    types = {int(k): group.keyword for group in model.joints for k in group.members}
+    lines = [f"  {'joint':30} {'type':10} {'residual':>9}  rows"]
+    for k in still_open[:MOST_JOINTS]:
+        open_rows = np.flatnonzero(np.abs(C[slice(*model.joint_start[k : k + 2])]) > tolerance) + 1
+        words = ", ".join(map(str, open_rows))
+        name = f"{_cut(model.joint_names[k], 30):30} {_cut(types[k], 10):10}"
+        lines.append(f"  {name} {worst[k]:9.3g}  {_cut(words, 25)}")
+    if len(still_open) > MOST_JOINTS:
+        lines.append(f"  and {len(still_open) - MOST_JOINTS} joints more")
+    names = ", ".join(model.body_names[b - 1] for b in held)
+    why = ["contradictory joints cannot be assembled"]
+    if is_far:
+        why = ["the bodies were still on their way: give positions nearer to an assembled pose,",
+               "unless the joints contradict each other"]  # fmt: skip
+    if flat := _without_gradient(machine, rows):
+        why = [f"no small change closes {flat}: points coincide there, or axes are",
+               "parallel or perpendicular and should not be; begin at another pose"]  # fmt: skip
+    text = "\n".join(
+        [
+            "the initial positions cannot be assembled:",
+            f"after {passes} passes these joints are still open",
+            *lines,
+            "check the points, axes and lengths of these joints;",
+            *why,
+            *([f"held where they are: {names}"] if names else []),
+        ]
+    )
+    return AssemblyError(text, [model.joint_names[k] for k in still_open])
+
+
+def _without_gradient(machine: Machine, rows: Rows) -> str:
+    """The first open row that no change of the pose affects to first order, in words; else ""."""
+    weight, unit = weights_of(machine), machine.model.length
+    length = weight * np.bincount(rows.row, rows.value**2, minlength=rows.shape[0]) ** 0.5
+    stuck = np.flatnonzero((weight * np.abs(rows.C) > TOLERANCE * unit) & (length < FLAT * unit))
+    if not len(stuck):
+        return ""
+    k = int(np.searchsorted(machine.model.joint_start, stuck[0], side="right")) - 1
+    row = int(stuck[0] - machine.model.joint_start[k]) + 1
+    return f"row {row} of {_cut(machine.model.joint_names[k], 30)}"
+
+
+def _cut(words: str, width: int) -> str:
+    return words if len(words) <= width else f"{words[: width - 3]}..."

@@ -1,0 +1,88 @@
+"""Whether potentials account for all work that can be done in a scene: tried, not guessed.
+
+A force with an energy may have a damper beside its spring; what its kernels say is compared at a
+few states taken at random about the start.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.assembly.arrays import ENERGY, VALUE, WRENCH
+from dap3d_core.assembly.evaluate import call_kinds, place_bodies
+from dap3d_core.formulations.evaluator import AS_COMPILED, Machine
+from dap3d_core.model.rotations import join, split, to_global
+
+Floats = NDArray[np.float64]
+
+#: States that are tried, and the largest displacement of a body there, m and rad.
+STATES, REACH = 3, 0.1
+#: Central differences of order four, over H seconds at speeds of order one: truncation is of order
+#: H^4, rounding eps / H, of the energy.
+OFFSETS, WEIGHTS, H = (-2, -1, 1, 2), (1 / 12, -2 / 3, 2 / 3, -1 / 12), 1e-3
+#: Power and rate of the potential agree to this part of their size.
+AGREE = 1e-6
+
+
+@AS_COMPILED
+def is_conservative(machine: Machine, u: Floats) -> bool:
+    """Whether neither dampers, drivers, friction nor forces without a potential can do work.
+
+    Args:
+        machine: the model.
+        u: (13 n,) a state about which the forces are tried.
+    """
+    model = machine.model
+    driven = any(np.any(g.functions > 0) for g in model.joints)
+    if driven or model.friction or any("energy" not in g.examined.kernels for g in model.forces):
+        return False
+    rng = np.random.default_rng(1)
+    r, p, _, _ = split(u, model.body_count)
+    for _ in range(STATES):
+        v, w = rng.normal(size=r.shape), rng.normal(size=r.shape)
+        near = _moved(r, p, rng.normal(size=r.shape), rng.normal(size=r.shape), REACH)
+        power, size = _power(machine, join(*near, v, to_global(near[1], w)))
+        rate = sum(c * _energy(machine, *near, v, w, k * H) for k, c in zip(OFFSETS, WEIGHTS,
+                   strict=True)) / H  # fmt: skip
+        if not abs(power + rate) <= AGREE * (size + abs(rate)):
+            return False
+    return True
+
+
+def _moved(r: Floats, p: Floats, v: Floats, w: Floats, h: float) -> tuple[Floats, Floats]:
+    """Poses after h seconds at constant velocity v and body-frame angular velocity w."""
+    angle = np.linalg.norm(w, axis=1, keepdims=True)
+    half = 0.5 * h * angle
+    c, e = np.cos(half), np.sin(half) * w / np.where(angle > 0.0, angle, 1.0)
+    turned = np.hstack(
+        [
+            p[:, :1] * c - np.sum(p[:, 1:] * e, axis=1, keepdims=True),
+            p[:, :1] * e + c * p[:, 1:] + np.cross(p[:, 1:], e),
+        ]
+    )
+    return r + h * v, turned
+
+
+def _power(machine: Machine, u: Floats) -> tuple[float, float]:
+    """Power of the applied forces, and the sum of its parts' sizes."""
+    s, n = machine.system, machine.model.body_count
+    place_bodies(machine.integrated(u), s.body, s.metric)
+    s.force[:] = 0.0
+    _call(machine, VALUE, s.force)
+    _call(machine, WRENCH, s.force)
+    parts = s.force[6:] * u[7 * n :]
+    return float(np.sum(parts)), float(np.sum(np.abs(parts)))
+
+
+def _energy(machine: Machine, r: Floats, p: Floats, v: Floats, w: Floats, h: float) -> float:
+    """The potential energy h seconds later at constant velocities."""
+    s = machine.system
+    u = join(*_moved(r, p, v, w, h), v, w)
+    place_bodies(machine.integrated(u), s.body, s.metric)
+    value = np.zeros(1)
+    _call(machine, ENERGY, value)
+    return float(value[0])
+
+
+def _call(machine: Machine, kind: int, out: Floats) -> None:
+    s = machine.system
+    call_kinds(kind, kind, 0.0, s, machine.loops, out, out, out)

@@ -1,0 +1,154 @@
+"""Absolute tolerances of a run, of each quantity: as they are given, else by the scene's scales.
+
+1e-10 (m, 1, m/s, rad/s) suits scenes of metres and seconds. In a scene that is not of ordinary size
+(``Model.length``) it is 1e-10 of its own length, and of the time in which its start would change by
+as much as its size.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.integrators import Integration
+from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE, ROUNDED, RTOL, H, Y
+from dap3d_core.model.rotations import split
+from dap3d_core.scene import Simulation
+from dap3d_core.scene.validate.settings import QUANTITIES, USUAL_ATOL
+
+Floats = NDArray[np.float64]
+#: A motion is resolved that is this many times what a step may be off by.
+RESOLVED = 1e3
+#: Names that a note lists.
+MOST_NAMES = 5
+#: Times beyond are no scale of a motion, s.
+LONGEST = 1e12
+
+
+def resolved_atol(atol: Any, machine: Machine) -> float | dict[str, float]:
+    """Absolute tolerances as a run uses them: one for all, or by quantity.
+
+    Args:
+        atol: as given: None, a number, or a table of some quantities.
+        machine: what evaluates the model.
+    """
+    if isinstance(atol, (int, float)):
+        return float(atol)
+    usual = usual_atol(machine)
+    if atol is None:
+        return usual
+    every = usual if isinstance(usual, dict) else dict.fromkeys(QUANTITIES, usual)
+    return every | {name: float(value) for name, value in atol.items()}
+
+
+def usual_atol(machine: Machine) -> float | dict[str, float]:
+    """What is taken where nothing is given."""
+    length = machine.model.length
+    if length == 1.0:
+        return USUAL_ATOL
+    time = _time_of(machine)
+    scales = {"r": length, "p": 1.0, "v": length / time, "w": 1.0 / time}
+    return {name: float(f"{USUAL_ATOL * scale:.6g}") for name, scale in scales.items()}
+
+
+def _time_of(machine: Machine) -> float:
+    """A time of the scene as given, s, as a power of ten: 1 where nothing moves."""
+    model, size = machine.model, machine.model.part_size
+    _, _, v, w = split(model.u0, model.body_count)
+    _, _, a, alpha = split(machine.rhs(0.0, model.u0), model.body_count)
+    rates = [_largest(v) / size, _largest(w)]
+    rates += [np.sqrt(_largest(a) / size), np.sqrt(_largest(alpha))]
+    fastest = float(np.max(rates))
+    if not 1.0 / LONGEST < fastest < LONGEST:
+        return 1.0
+    return float(10.0 ** -np.round(np.log10(fastest)))
+
+
+def motion_notes(low: Floats, high: Floats, settings: Simulation) -> list[str]:
+    """That what moves is no more than what a step may be off by, in words.
+
+    A scene at rest moves by rounding, far less than that, and has no such note.
+
+    Args:
+        low, high: (13 n,) the least and the largest value of each component of u.
+        settings: of the run, its tolerances resolved.
+    """
+    n = len(low) // 13
+    moved, size = high - low, np.maximum(np.abs(low), np.abs(high))
+    atol = (
+        settings.atol
+        if isinstance(settings.atol, Mapping)
+        else dict.fromkeys(QUANTITIES, settings.atol)
+    )
+    shift, turn, _, _ = split(moved, n)
+    far = split(size, n)[0]
+    part, rtol = _largest(shift), float(settings.rtol)
+    allowed = atol["r"] + rtol * float(np.max(far, initial=0.0))
+    turning = _largest(turn) > RESOLVED * (atol["p"] + rtol)
+    if turning or not allowed / RESOLVED < part < RESOLVED * allowed:
+        return []
+    return [
+        f"no body moves by more than {part:.2g} m, and a step may be off by {allowed:.2g} m (atol "
+        "+ rtol |r|, with |r| from the origin): the motion is hardly resolved. Give a smaller rtol "
+        "and atol (atol = {r = 1e-15, v = 1e-15}), and place the scene near the origin"
+    ]
+
+
+def rounding_notes(runs: Sequence[Integration], names: Sequence[str]) -> list[str]:
+    """That rounding, and not the tolerances, limits the accuracy of some bodies, in words."""
+    work = runs[-1].work
+    if not work.integer[ROUNDED] > 1:
+        return []
+    n = len(names)
+    noise = work.real[H] * work.tolerance[NOISE, : 13 * n]
+    above = noise > work.tolerance[ABSOLUTE, : 13 * n] + work.real[RTOL] * np.abs(
+        work.state[Y, :-1]
+    )
+    worst = [bool(np.any(np.concatenate([part[k] for part in split(above, n)]))) for k in range(n)]
+    bodies = [name for name, is_worst in zip(names, worst, strict=True) if is_worst]
+    if not bodies:
+        return []
+    words = ", ".join(bodies[:MOST_NAMES]) + (", ..." if len(bodies) > MOST_NAMES else "")
+    return [
+        f"the accuracy of {words} is limited by rounding, not by the tolerances: its inertias are "
+        "very different, or it is far from the origin; smaller tolerances change nothing there"
+    ]
+
+
+def _largest(vectors: Floats) -> float:
+    return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
+
+
+def atol_vector(atol: float | Mapping[str, float], n: int) -> float | Floats:
+    """Absolute tolerances of the components of y (13 n + 1,), in its order; a number stays one."""
+    if not isinstance(atol, Mapping):
+        return atol
+    coordinates = np.repeat([atol["r"], atol["p"]], [3, 4])
+    velocities = np.repeat([atol["v"], atol["w"]], 3)
+    return np.concatenate([np.tile(coordinates, n), np.tile(velocities, n), [USUAL_ATOL]])
+
+
+def tighter(atol: float | Mapping[str, float], factor: float) -> float | dict[str, float]:
+    """Absolute tolerances divided by a factor."""
+    if isinstance(atol, Mapping):
+        return {name: value / factor for name, value in atol.items()}
+    return atol / factor
+
+
+def words_of(atol: float | Mapping[str, float]) -> str:
+    """As messages have it."""
+    if isinstance(atol, Mapping):
+        return ", ".join(f"{name} = {value:g}" for name, value in atol.items())
+    return f"{atol:g}"
+
+
+def atol_notes(given: Any, used: float | Mapping[str, float], machine: Machine) -> list[str]:
+    """That the usual tolerances were scaled to the scene, in words."""
+    if not isinstance(used, Mapping) or (given is not None and set(given) == set(QUANTITIES)):
+        return []
+    if machine.model.length == 1.0:
+        return []
+    words = words_of(used)
+    return [f"atol follows the size of the parts, {machine.model.part_size:.2g} m: {words}"]

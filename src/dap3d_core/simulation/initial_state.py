@@ -1,0 +1,70 @@
+"""The state that a run starts from: corrected if asked for, with the rank of its constraints."""
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.scene import Scene
+from dap3d_core.simulation.initial.assemble import (
+    Initial,
+    correct_initial,
+    correction_notes,
+    violation,
+)
+from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
+
+Floats = NDArray[np.float64]
+
+#: A start this far off the constraints, left uncorrected, gets a note.
+OFF_CONSTRAINTS = 1e-6
+
+
+@attrs.frozen(eq=False)
+class Start:
+    """Where a run starts.
+
+    Attributes:
+        u: (13 n,) the state.
+        initial: what its correction did; None where it was not corrected.
+        redundancy: of the constraints there.
+    """
+
+    u: Floats
+    initial: Initial | None
+    redundancy: Redundancy
+
+
+def find_start(
+    machine: Machine, correct: bool, hold: tuple[str, ...], metric: str = "unit"
+) -> Start:
+    """The start of a run.
+
+    Args:
+        machine: the model.
+        correct: whether its initial conditions are brought onto the constraints.
+        hold: names of bodies that the correction of positions leaves where they are.
+        metric: "unit" or "mass", of ``correct_initial``.
+
+    Raises:
+        AssemblyError: the positions cannot be assembled, or a row is not finite.
+    """
+    u, initial = machine.model.u0, None
+    if correct:
+        held = [machine.model.body_names.index(name) + 1 for name in hold]
+        initial = correct_initial(machine, u, hold=held, metric=metric)
+        u = initial.u
+    return Start(u, initial, redundancy_of(machine, u))
+
+
+def start_notes(start: Start, machine: Machine, scene: Scene) -> list[str]:
+    """How a start was corrected, or that it is off the constraints, in words."""
+    if start.initial is not None:
+        return correction_notes(start.initial, machine, scene)
+    position, velocity = violation(machine, start.u)
+    if max(position, velocity) <= OFF_CONSTRAINTS:
+        return []
+    return [
+        f"the initial conditions violate the constraints (position {position:.2g}, "
+        f"velocity {velocity:.2g}) and were not corrected; switch correct on"
+    ]

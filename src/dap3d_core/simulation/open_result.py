@@ -1,0 +1,105 @@
+"""Results from disk, with the way back to a model for what only a model can compute."""
+
+import os
+from collections.abc import Callable, Mapping
+
+import attrs
+
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.interface import PluginError
+from dap3d_core.model import Model
+from dap3d_core.result import INFORMATION, Result, ResultError
+from dap3d_core.result import open_result as open_file
+from dap3d_core.scene import SceneError, load, parse
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.output.type_sources import changed_types
+
+#: Of results that older versions of dap3d wrote.
+NOT_RECORDED = (
+    "the file does not say which sources its types had, so that reactions, forces and the Jacobian "
+    "cannot be protected from formulas that have changed since the run"
+)
+
+
+def open_result(
+    path: str | os.PathLike[str],
+    *,
+    model: str | os.PathLike[str] | None = None,
+    allow_code: bool = False,
+) -> Result:
+    """Open a result file.
+
+    Positions, velocities, accelerations, multipliers and energies come from the file; the Jacobian,
+    reactions and quantities of forces are computed when asked for, which loads the types that the
+    stored scene names.
+
+    Args:
+        path: a NetCDF file that ``Result.save`` or ``dap3d run`` wrote.
+        model: the model (a name, a folder, a file) whose own types, in its ``plugin.py``, the run
+            used. A result does not say where they stand, so that opening one never runs a file
+            that it points to.
+        allow_code: whether that ``plugin.py`` may be loaded.
+
+    Raises:
+        ResultError: missing, truncated, newer, or not a result.
+        SceneError: there is no such model.
+    """
+    home = None if model is None else load(model).path
+
+    def rebuild(scene_text: str) -> tuple[Model, Callable[[], Machine]]:
+        scene = parse(scene_text)
+        scene.path = home
+        try:
+            compiled = CompiledModel(scene, allow_code=allow_code)
+        except (PluginError, SceneError, SimulationError) as error:
+            raise _unmade(path, error, allow_code and home is not None) from error
+        _check_types(path, known, compiled)
+        return compiled.model, lambda: compiled.machine
+
+    result = open_file(path, rebuild)
+    known = result.record.types  # read by ``rebuild``, which is called later
+    if known is None:
+        notes = (*result.notes, f"{INFORMATION}{NOT_RECORDED}")
+        result.record = attrs.evolve(result.record, notes=notes)
+    return result
+
+
+def _check_types(
+    path: str | os.PathLike[str],
+    known: Mapping[str, Mapping[str, str]] | None,
+    compiled: CompiledModel,
+) -> None:
+    changed = changed_types(known or {}, compiled.types)
+    if changed:
+        raise ResultError(
+            f"the formulas of {', '.join(changed)} have changed since the run of {path}: the "
+            "Jacobian, reactions and forces cannot be computed with them. Bring back the files of "
+            "these types, or run the scene again. All other arrays are in the file"
+        )
+
+
+def _unmade(path: str | os.PathLike[str], error: Exception, allowed: bool) -> ResultError:
+    """The error for a model that cannot be made again from the scene in a result."""
+    return ResultError(
+        f"the model of {path} cannot be made again, which the Jacobian, reactions and forces need: "
+        f"{why_unmade(error, allowed=allowed)}. All other arrays are in the file"
+    )
+
+
+def why_unmade(error: Exception, *, allowed: bool) -> str:
+    """Why the model of a stored scene cannot be made, and what helps.
+
+    Args:
+        error: what came of it.
+        allowed: whether the types of a model's own file were allowed.
+    """
+    mistakes = getattr(error, "mistakes", None)
+    reason = mistakes[0].what if mistakes else str(error)
+    if allowed:
+        return f"{reason}; install what brings the type"
+    return (
+        f"{reason}; install what brings the type or, where that is the plugin.py of the model, "
+        "name the model and allow its code: model=FOLDER, allow_code=True, or on the command line "
+        "--model FOLDER --allow-code"
+    )

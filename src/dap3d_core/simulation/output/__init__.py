@@ -1,0 +1,1 @@
+"""Output of a run: recorder, progress, free space, error estimate."""

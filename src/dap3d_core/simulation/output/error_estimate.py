@@ -1,0 +1,148 @@
+"""The error of a run, estimated by a second one: tolerances ten times tighter, or half the step."""
+
+import os
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+
+from dap3d_core.result import INFORMATION, Result, estimated_error
+from dap3d_core.result.post.global_error import MEANINGLESS
+from dap3d_core.scene import SceneError, Simulation
+from dap3d_core.scene.validate.settings import SMALLEST_RTOL
+from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.initial.tolerances import tighter, words_of
+
+#: The second run's tolerances are those of the first divided by this.
+TIGHTER = 10.0
+#: Its first step, as a part of the mean step of the first run. Error control starts from a step
+#: that hardly depends on the tolerance, and lets it grow by a largest factor: two runs would begin
+#: with equal steps, and their equal errors would not show in the difference.
+FIRST_STEP = 0.01
+
+
+class StepLimits(NamedTuple):
+    """Limits on the steps of a second run, s: the first, and the longest.
+
+    Where a state is below the tolerances steps grow as far as they may, in both runs, and errors
+    that are the same in both do not show.
+    """
+
+    first: float
+    longest: float
+
+
+#: Makes a run with other settings, and with limits on its steps where these are controlled.
+Again = Callable[[Simulation, StepLimits | None], Result]
+
+
+def finer(settings: Simulation) -> Simulation | None:
+    """Settings of the second run; None where tolerances cannot be tightened any more."""
+    if settings.step is not None:
+        return attrs.evolve(settings, step=settings.step / 2.0)
+    rtol = float(settings.rtol)
+    if rtol / TIGHTER < SMALLEST_RTOL:
+        return None
+    return attrs.evolve(settings, rtol=rtol / TIGHTER, atol=tighter(settings.atol, TIGHTER))
+
+
+def add_error(
+    result: Result,
+    settings: Simulation,
+    again: Again,
+    output: str | os.PathLike[str] | None,
+) -> None:
+    """Estimate the error of a result by a second run, and write it into its file as well.
+
+    Where the second run fails, the result stays as it is and a note says why it has no estimate.
+
+    Args:
+        result: of the first run, which reached its end.
+        settings: of that run.
+        again: makes the second run.
+        output: the file of the result, None where it has none.
+
+    Raises:
+        BaseException: whatever ends the second run from outside (Ctrl-C, an exception of
+            ``progress``); it carries the first result as ``.result``.
+    """
+    finer_settings = finer(settings)
+    if finer_settings is None:
+        note = f"its error was not estimated: rtol {settings.rtol:g} cannot be made any tighter"
+        _amend(result, output, note)
+        return
+    words = _words(finer_settings)
+    try:
+        second = again(finer_settings, _limits(result, finer_settings))
+    except (SimulationError, SceneError) as error:
+        _amend(result, output, f"its error was not estimated: in a second run at {words}, {error}")
+        return
+    except BaseException as error:
+        _amend(result, output, "the estimate of its error was ended early and left out")
+        error.result = result  # type: ignore[attr-defined]
+        raise
+    if not _same_instants(result, second):
+        note = f"a second run at {words} ended elsewhere, by its events"
+        _amend(result, output, f"its error was not estimated: {note}")
+        return
+    steps = second.stats.steps
+    result.arrays = result.arrays.with_error(estimated_error(result.u, second.u, steps))
+    note = f"{INFORMATION}its error is estimated by a second run at {words} ({steps:,} steps)"
+    _amend(result, output, note, *_lost(result))
+
+
+def _same_instants(result: Result, second: Result) -> bool:
+    """Whether two runs reported at the same times; those of an event differ by its error."""
+    if len(result.t) != len(second.t):
+        return False
+    spacing = float(np.max(np.diff(result.t))) if len(result.t) > 1 else 0.0
+    return bool(np.all(np.abs(result.t - second.t) <= 1e-3 * spacing))
+
+
+def _limits(result: Result, settings: Simulation) -> StepLimits | None:
+    if settings.step is not None or not result.stats.steps:
+        return None
+    mean = float(result.t[-1] - result.t[0]) / result.stats.steps
+    return StepLimits(FIRST_STEP * mean, mean)
+
+
+def halved(stops: Sequence[tuple[float, bool]]) -> list[tuple[float, bool]]:
+    """Instants that no step goes over, and others in between: a step of the first run between two
+    of them is at least two of the second.
+    """
+    between = [(0.5 * (a + b), False) for (a, _), (b, _) in pairwise(stops)]
+    return sorted([*stops, *between])
+
+
+def _words(settings: Any) -> str:
+    if settings.step is not None:
+        return f"steps of {settings.step:g} s"
+    return f"rtol {settings.rtol:g}, atol {words_of(settings.atol)}"
+
+
+def _lost(result: Result) -> list[str]:
+    """A note on where the error has become as large as to leave the state no meaning."""
+    error = result.error
+    assert error is not None
+    if (when := error.meaningless_from) is None:
+        return []
+    note = (
+        f"from t = {when:.6g} s on the estimated error is beyond {MEANINGLESS:g} of the size of "
+        "the motion: what follows is not the motion of this scene, and its estimate no measure of "
+        "how far it is off"
+    )
+    if (tenfold := error.tenfold) is None:
+        return [f"{note}. A tighter rtol, or a shorter step, goes further"]
+    return [
+        f"{note}. Until then it grew exponentially, tenfold every {tenfold:.3g} s (chaos): an "
+        f"error of the steps ten times smaller holds about {tenfold:.3g} s longer"
+    ]
+
+
+def _amend(result: Result, output: str | os.PathLike[str] | None, *notes: str) -> None:
+    """Add notes, and bring the file up to date."""
+    result.record = attrs.evolve(result.record, notes=(*result.notes, *notes))
+    if output is not None:
+        result.save(output, force=True)

@@ -1,0 +1,1 @@
+"""Redundant and nearly redundant constraints."""

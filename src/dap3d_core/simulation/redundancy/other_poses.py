@@ -1,0 +1,125 @@
+"""Whether redundant constraints are so everywhere, or only at one pose (spec 8).
+
+The rank can drop at special poses: links in line, axes parallel. Near a pose it can only be higher,
+so other poses of the same assembly tell: the bodies are moved along a random direction that the
+position rows leave free, put together again, and the rank is taken there.
+"""
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.constraint_rows import scaled_rows
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.simulation.errors import AssemblyError
+from dap3d_core.simulation.initial.assemble import (
+    correct_positions,
+    displaced,
+    finite_rows,
+    least_change,
+    model_size,
+)
+from dap3d_core.simulation.redundancy.redundancy import Redundancy, rank_of
+
+Floats = NDArray[np.float64]
+
+#: Poses that are tried up to this many rows; beyond, the last number.
+POSES = ((300, 3), (1000, 2), (10**9, 1))
+#: No body is turned by more than this (rad), or moved by more than this part of the model.
+TURN, SHIFT = 0.4, 0.2
+#: A move that cannot be put together is tried again at half its size, so many times.
+HALVINGS = 5
+#: What is left of a random direction below this part is rounding: nothing can move.
+FREE = 1e-8
+#: A pose counts as another one if it differs by this part of what was asked for.
+ANOTHER = 0.05
+
+NONE = np.zeros(0, dtype=np.int64)
+
+
+@attrs.frozen
+class Elsewhere:
+    """Redundancy of the same scene at other poses.
+
+    Attributes:
+        poses: ranks found there.
+        redundant: rows that are redundant at all of them; None where nothing could be moved.
+        everywhere: whether as many are redundant there as at the pose asked about; None where
+            nothing could be moved.
+    """
+
+    poses: tuple[int, ...]
+    redundant: int | None
+    everywhere: bool | None
+
+    def describe(self, redundancy: Redundancy) -> str:
+        """A sentence without its full stop."""
+        here = redundancy.rank.redundant
+        if self.everywhere is None:
+            return (
+                "whether they are redundant everywhere or only at this pose cannot be told: "
+                "the scene cannot be moved"
+            )
+        count = len(self.poses)
+        poses = "another pose" if count == 1 else f"{count} other poses"
+        if self.everywhere:
+            return f"as many are redundant at {poses}: it is not this pose alone"
+        ranks = ", ".join(str(rank) for rank in self.poses)
+        return (
+            f"{here - (self.redundant or 0)} of the {here} are redundant only at this pose, "
+            f"{self.redundant or 'none'} at {poses} too (ranks there: {ranks})"
+        )
+
+
+def redundancy_elsewhere(
+    machine: Machine, u: Floats, redundancy: Redundancy, t: float = 0.0
+) -> Elsewhere:
+    """Take the rank at other poses that the joints allow; the same ones each time.
+
+    Args:
+        machine: the model.
+        u: (13 n,) an assembled state.
+        redundancy: that of u.
+        t: time, s; functions of time stand still.
+    """
+    rows = machine.model.row_count
+    count = next(number for limit, number in POSES if rows <= limit)
+    ranks = []
+    for k in range(count):
+        other = _other_pose(machine, u, t, np.random.default_rng(k))
+        if other is not None:
+            rows_there = finite_rows(machine, t, other)
+            ranks.append(rank_of(machine, scaled_rows(rows_there, machine.model.length)[0]).rank)
+    if not ranks:
+        return Elsewhere((), None, None)
+    redundant = rows - max(ranks)
+    return Elsewhere(tuple(ranks), redundant, redundant == redundancy.rank.redundant)
+
+
+def _other_pose(machine: Machine, u: Floats, t: float, rng: np.random.Generator) -> Floats | None:
+    """A state at another pose, or None where the joints allow none."""
+    n, size = machine.model.body_count, model_size(machine)
+    rows = finite_rows(machine, t, u)
+    wish = rng.standard_normal((n, 6))
+    wish[:, :3] *= size
+    wish = wish.ravel()
+    flow = rows.value * wish[rows.column]
+    product: Floats = np.bincount(rows.row, flow, minlength=rows.shape[0]).astype(float)
+    free = (wish - least_change(machine, rows, product, t, NONE)).reshape(n, 6)
+    if np.linalg.norm(free) <= FREE * np.linalg.norm(wish):
+        return None
+    extent = max(_largest(free[:, :3]) / (SHIFT * size), _largest(free[:, 3:]) / TURN)
+    for halving in range(HALVINGS + 1):
+        step = free / (extent * 2.0**halving)
+        try:
+            other, _ = correct_positions(machine, displaced(u, step, n), t, NONE)
+        except AssemblyError:
+            continue
+        gone = np.linalg.norm(other[: 7 * n] - u[: 7 * n])
+        if gone > ANOTHER * np.linalg.norm(displaced(u, step, n)[: 7 * n] - u[: 7 * n]):
+            return other
+    return None
+
+
+def _largest(vectors: Floats) -> float:
+    return float(np.max(np.linalg.norm(vectors, axis=1)))

@@ -1,0 +1,336 @@
+"""Runs that go on from a checkpoint: bit for bit as if they had not been ended."""
+
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.assembly.arrays import DOUBTFUL, UNSETTLED
+from dap3d_core.integrators import Status
+from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED, NEXT
+from dap3d_core.integrators.stepping.restore import check_alike, restored
+from dap3d_core.interface import PluginError
+from dap3d_core.kernels.runtime.cache import driver_digest
+from dap3d_core.model.rotations import from_integrated
+from dap3d_core.result import INFORMATION, Result, current_versions
+from dap3d_core.result.file.validate import are_texts
+from dap3d_core.scene import SceneError, Simulation, check_simulation, load, parse
+from dap3d_core.simulation.checkpoint.file import Checkpoint, path_of, read_checkpoint
+from dap3d_core.simulation.checkpoint.save import (
+    Saver,
+    parts_of,
+    remove_parts,
+    results_of,
+)
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.errors import CheckpointError
+from dap3d_core.simulation.events.event import Event
+from dap3d_core.simulation.handover import begin_other
+from dap3d_core.simulation.initial.given_state import state_of
+from dap3d_core.simulation.open_result import why_unmade
+from dap3d_core.simulation.output.monitor import Standing
+from dap3d_core.simulation.output.type_sources import digests_of
+from dap3d_core.simulation.run import Progress, Run
+from dap3d_core.simulation.settings import check_checkpoint, report_times
+
+
+def resume(
+    path: str | os.PathLike[str],
+    *,
+    output: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    checkpoint: float = math.inf,
+    model: str | os.PathLike[str] | None = None,
+    allow_code: bool = False,
+    events: Sequence[Event] = (),
+    progress: Progress | None = None,
+    watch: Callable[[Standing], None] | None = None,
+    announce: Callable[[str], None] | None = None,
+) -> Result:
+    """Go on with a run from its checkpoint; its result is that of a run that was not ended.
+
+    Bit for bit so on the same machine and with the same versions; where they differ, a note says
+    so. Once the run has ended by itself, its checkpoint and its unfinished files are removed.
+
+    Args:
+        path: the checkpoint, ``RESULT.checkpoint``. The rows that the run had reported are in a
+            file beside it: RESULT, or ``RESULT.part`` where the run was killed.
+        output, force: another result file, and whether over an existing one. By default RESULT.
+        checkpoint: as ``simulate`` has it.
+        model, allow_code: where the model's own types stand, and whether they may be loaded; as
+            ``open`` has them.
+        events: those of the run, given again, in their order.
+        progress, watch, announce: as ``simulate`` has them.
+
+    Raises:
+        CheckpointError: missing, cut off, damaged, foreign or newer; its rows are gone; the types
+            or events are not those of the run.
+        PluginError, SceneError: a type is not installed.
+        SimulationError, ResultError: as ``simulate``.
+    """
+    found = resumption(path, model=model, allow_code=allow_code, announce=announce)
+    return found.go(
+        output, force=force, checkpoint=checkpoint, events=events, progress=progress, watch=watch
+    )
+
+
+def resumption(
+    path: str | os.PathLike[str],
+    *,
+    model: str | os.PathLike[str] | None = None,
+    allow_code: bool = False,
+    announce: Callable[[str], None] | None = None,
+) -> "Resumption":
+    """A checkpoint read, its model compiled; arguments and errors as of ``resume``."""
+    place = Path(path)
+    found = read_checkpoint(place)
+    return Resumption(place, found, model=model, allow_code=allow_code, announce=announce)
+
+
+class Resumption:
+    """A checkpoint with the model that it belongs to.
+
+    Attributes:
+        compiled: the model.
+        output: the result file of the run.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        found: Checkpoint,
+        *,
+        model: str | os.PathLike[str] | None,
+        allow_code: bool,
+        announce: Callable[[str], None] | None,
+    ) -> None:
+        """Make the model again; arguments and errors as of ``resume``."""
+        self.path, self._found, self._announce = path, found, announce
+        header = found.header
+        scene = parse(header["scene"])
+        scene.path = None if model is None else load(model).path
+        try:
+            self.compiled = CompiledModel(
+                scene, method=header["method"], allow_code=allow_code, announce=announce
+            )
+        except (PluginError, SceneError) as error:
+            words = why_unmade(error, allowed=allow_code and model is not None)
+            raise CheckpointError(f"cannot resume from {path}: {words}") from error
+        self._check_types()
+        # its name alone: what a file says does not point out of its folder
+        self.output = path.with_name(Path(header["output"]).name)
+
+    def go(
+        self,
+        output: str | os.PathLike[str] | None = None,
+        *,
+        force: bool = False,
+        checkpoint: float = math.inf,
+        events: Sequence[Event] = (),
+        progress: Progress | None = None,
+        watch: Callable[[Standing], None] | None = None,
+    ) -> Result:
+        """Go on to the end; arguments and errors as of ``resume``."""
+        check_checkpoint(checkpoint, self.output)
+        target = self.output if output is None else Path(output)
+        with self.compiled.in_use():
+            run = self._run(target, events, watch, force=force)
+            run.saver = Saver(run, checkpoint, force=force or self._is_ours(target))
+            try:
+                result = run.finish(progress)
+            except BaseException as error:
+                if hasattr(error, "checkpoint"):  # it takes the place of this one
+                    self._remove_what_is_replaced(target)
+                raise
+        self._remove_what_is_replaced(target)
+        return result
+
+    def _run(
+        self,
+        target: Path,
+        events: Sequence[Event],
+        watch: Callable[[Standing], None] | None,
+        *,
+        force: bool,
+    ) -> Run:
+        """The run, standing where the checkpoint was written, with the rows until there."""
+        header = self._found.header
+        before, earlier = self._rows_so_far()
+        settings, estimate = self._settings(), bool(header["estimate_error"])
+        run = Run(self.compiled, settings, self._announce, events, watch, estimate_error=estimate)
+        ours = target.exists() and target.samefile(before)
+        run.keep(target, force=force or ours, identity=header["run"])
+        assert run.keeper is not None
+        run.prepare()
+        self._restore(run)
+        for block in earlier:
+            run.keeper.add(block, lambda: run.record("done"))
+        return run
+
+    def _remove_what_is_replaced(self, target: Path) -> None:
+        """Remove the unfinished rows of the run, and this checkpoint where another file goes on.
+
+        A result file stays, whatever it holds.
+        """
+        remove_parts(self.output, self._found.header["run"])
+        if not self._is_ours(target):
+            self.path.unlink(missing_ok=True)
+
+    def _is_ours(self, target: Path) -> bool:
+        """Whether the checkpoints of the run that goes on replace this one."""
+        other = path_of(target)
+        return other.exists() and other.samefile(self.path)
+
+    def _check_types(self) -> None:
+        known, here = self._found.header["types"], digests_of(self.compiled.checked)
+        changed = [name for name in {**known, **here} if known.get(name) != here.get(name)]
+        if changed:
+            raise CheckpointError(
+                f"cannot resume from {self.path}: the formulas of {', '.join(changed)} have "
+                "changed since; run the scene anew, or bring back the files of these types"
+            )
+
+    def _rows_so_far(self) -> tuple[Path, Any]:
+        """The file that has the rows of the run, and these, block by block."""
+        header = self._found.header
+        files = (self.output, *parts_of(self.output))
+        for file, result in results_of(files, header["run"]):
+            if len(result.arrays) >= header["rows"]:
+                return file, _first(result, header["rows"])
+        raise CheckpointError(
+            f"cannot resume from {self.path}: the rows of its run are gone; neither {self.output} "
+            f"nor {self.output.name}.part holds them. Run the scene anew"
+        )
+
+    def _settings(self) -> Simulation:
+        """The settings of the run, checked as those of a scene are."""
+        stored = self._found.header["settings"]
+        names = {field.name for field in attrs.fields(Simulation)}
+        if stored.keys() != names or not isinstance(stored["hold"], list):
+            other = ", ".join(sorted(stored.keys() ^ names)) or "hold"
+            raise self._damaged(f"its settings are not those of a run ({other})")
+        settings = Simulation(**stored | {"hold": tuple(stored["hold"])})
+        try:
+            check_simulation(settings, self.compiled.model.body_names)
+            report_times(settings.t_end, settings.dt)
+        except SceneError as error:
+            raise self._damaged(f"its settings make no sense: {error}") from error
+        return settings
+
+    def _restore(self, run: Run) -> None:
+        """Stand where the checkpoint was written."""
+        header, stored = self._found.header, self._found.arrays
+        self._restore_events(run)
+        try:
+            if header["integrations"] == 2:
+                begin_other(run)
+                if run.runs[0].implicit != ("0.own" in stored):  # which implicit ones have
+                    run.runs.reverse()
+            for k, integration in enumerate(run.runs):
+                first = f"{k}."
+                integration.restore(
+                    {n.removeprefix(first): a for n, a in stored.items() if n.startswith(first)}
+                )
+            if len(run.runs) > 1 and run.runs[0].status is Status.RUNNING:
+                raise ValueError("its first integration goes on, and there is a second")
+            run.crossed, until = header["crossed"], header["until"]
+            run.until = math.inf if until is None else until
+            restore_system(run, stored)
+            check_position(run, header["rows"])
+        except ValueError as error:
+            raise self._damaged(str(error)) from error
+        run.notes = [*header["notes"], *self._notes(run.runs[-1].t)]
+        run.started -= header["wall_time_s"]
+        run.compile_time += header["compile_time_s"]
+
+    def _damaged(self, words: str) -> CheckpointError:
+        return CheckpointError(
+            f"cannot resume from {self.path}: {words}; it was changed, or another program made it. "
+            "Run the scene anew"
+        )
+
+    def _restore_events(self, run: Run) -> None:
+        events = self._found.header.get("events")
+        if not isinstance(events, dict | None) or not are_texts((events or {}).get("titles", [])):
+            raise self._damaged("its events should be a table")
+        titles = events.get("titles", []) if events else []
+        asked = [event.title for event in run.watcher.events] if run.watcher else []
+        if titles != asked:
+            raise CheckpointError(
+                f"cannot resume from {self.path}: the run has the events {titles or 'none'}, given "
+                f"are {asked or 'none'}; give the same again, in their order"
+            )
+        if events and run.watcher is not None:
+            try:
+                run.watcher.restore(events)
+            except ValueError as error:
+                raise self._damaged(str(error)) from error
+
+    def _notes(self, t: float) -> list[str]:
+        """Where the run went on, and whether its digits may differ."""
+        header = self._found.header
+        notes = [f"{INFORMATION}resumed from a checkpoint at t = {t:.9g} s"]
+        here = current_versions()
+        other = [
+            f"{name} {number} (here {here.get(name)})"
+            for name, number in header["versions"].items()
+            if here.get(name) != number
+        ]
+        if header["driver"] != driver_digest("integrators") and not other:
+            other = ["another state of dap3d's sources"]
+        if other:
+            notes.append(
+                f"the checkpoint was made with {', '.join(other)}: digits may differ from those of "
+                "a run that was not ended"
+            )
+        return notes
+
+
+def _first(result: Result, count: int) -> Any:
+    """The first rows of a result, block by block."""
+    left = count
+    for block in result.arrays.blocks():
+        if left:
+            yield block.part(slice(min(left, len(block))))
+            left -= min(left, len(block))
+
+
+def restore_system(run: Run, stored: Mapping[str, Any]) -> None:
+    """Give the model the turns, changed numbers and counts of a checkpoint; the rest is its own.
+
+    What else ``par`` holds, such as the places of tables, compiled code takes for indices.
+
+    Raises:
+        ValueError: they are of another model, or not finite.
+    """
+    machine, changed = run.machine, run.watcher.changed_forces if run.watcher else ()
+    par, settings = machine.system.par, machine.system.settings
+    changes = np.zeros(len(par), dtype=bool)
+    for places in machine.turn_places():
+        changes[places] = True
+    if run.watcher and changed:
+        changes |= run.watcher.numbers.changeable(changed)
+    new = restored("system.par", par, stored.get("system.par"), np.flatnonzero(~changes))
+    counts: Any = stored.get("system.settings")
+    check_alike("system.settings", counts, settings)
+    own = counts[[UNSETTLED, DOUBTFUL]]
+    if not (np.isfinite(new).all() and ((own >= 0.0) & (own <= MOST_COUNTED)).all()):
+        raise ValueError("the numbers of its forces, turns or counts are not finite")
+    par[:], settings[[UNSETTLED, DOUBTFUL]] = new, own
+
+
+def check_position(run: Run, rows: int) -> None:
+    """Whether a restored run stands at a state of its model, after so many rows.
+
+    Raises:
+        ValueError: it does not.
+    """
+    model, last = run.machine.model, run.runs[-1]
+    state_of(from_integrated(last.y[None], model.body_count)[0], model.body_names)
+    reported = last.work.integer[NEXT]
+    if rows - reported not in (0, 1):  # an event that ends a run reports its own instant
+        raise ValueError(f"{rows} rows are reported of the {reported} that its instants need")

@@ -1,0 +1,158 @@
+"""What a run was asked for: its model, its settings, its reporting times."""
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.scene import (
+    METHODS,
+    MISSING,
+    Mistake,
+    Scene,
+    SceneError,
+    Simulation,
+    check_simulation,
+)
+from dap3d_core.scene.validate.settings import notes_of
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.implicit_run import EXPLICIT
+from dap3d_core.simulation.initial.tolerances import atol_vector, resolved_atol
+
+Floats = NDArray[np.float64]
+
+
+def settings_of(compiled: CompiledModel, **asked: Any) -> Simulation:
+    """The scene's settings with what is given (not None) in their places.
+
+    Raises:
+        SceneError: they make no sense.
+    """
+    given = {k: v for k, v in asked.items() if v is not None}
+    settings = attrs.evolve(compiled.scene.simulation, **given)
+    check_simulation(settings, compiled.model.body_names)
+    return settings
+
+
+def settings_notes(compiled: CompiledModel, settings: Simulation) -> list[str]:
+    """What looks odd in the settings of a run, and is not so in its scene, which notes its own."""
+    return [note for note in notes_of(settings) if note not in compiled.notes]
+
+
+def compiled_for(
+    scene: Scene | str | os.PathLike[str] | CompiledModel,
+    method: str | None,
+    allow_code: bool,
+    announce: Callable[[str], None] | None,
+) -> CompiledModel:
+    """The compiled model of a scene; one that was compiled before must have the method asked for.
+
+    Raises:
+        SceneError: there is no such method.
+        SimulationError: it has another.
+    """
+    if not isinstance(scene, CompiledModel):
+        return CompiledModel(scene, method=method, allow_code=allow_code, announce=announce)
+    if method is not None and method not in METHODS:
+        settings = attrs.evolve(scene.scene.simulation, method=method)
+        check_simulation(settings, scene.model.body_names)
+    if method is not None and scene.choice(method)[0] != scene.method:
+        words = f"the model was compiled for method {scene.method}; compile it for {method}"
+        raise SimulationError(words)
+    return scene
+
+
+def check_checkpoint(seconds: float | None, output: str | os.PathLike[str] | None) -> None:
+    """Refuse checkpoints that make no sense.
+
+    Raises:
+        SceneError: their distance is no positive time, or there is no result file.
+    """
+    if seconds is None:
+        return
+    if not isinstance(seconds, (int, float)) or isinstance(seconds, bool) or not seconds > 0.0:
+        words = "the time between two checkpoints is a positive number of seconds"
+        raise SceneError([Mistake("checkpoint", seconds, words)])
+    if output is None:
+        words = "a checkpoint belongs to a result file"
+        raise SceneError([Mistake("checkpoint", seconds, words, remedy="give output")])
+
+
+def report_times(t_end: float | None, dt: float | None) -> Floats:
+    """Reporting times (nt,): multiples of dt, and t_end where it is none of them.
+
+    Raises:
+        SceneError: no final time.
+    """
+    if t_end is None:
+        remedy = "give t_end in the scene's [simulation], or --t-end"
+        raise SceneError([Mistake("t_end", MISSING, "a run needs a final time", remedy=remedy)])
+    if t_end == 0.0:
+        return np.zeros(1)
+    dt = t_end / 100.0 if dt is None else dt
+    count = int(np.floor(t_end / dt * (1.0 + 1e-12) + 1e-9))
+    times = dt * np.arange(count + 1, dtype=np.float64)
+    if t_end - times[-1] > 1e-9 * dt:
+        return np.append(times, t_end)
+    times[-1] = t_end
+    return times
+
+
+def integration_options(machine: Machine, settings: Simulation) -> dict[str, Any]:
+    """What any integration takes from a machine and the settings of a run."""
+    return {
+        "rtol": settings.rtol,
+        "atol": atol_vector(resolved_atol(settings.atol, machine), machine.model.body_count),
+        "step": settings.step,
+        "project_on": settings.project,
+        "error_size": 13 * machine.model.body_count,  # the work does not steer the step
+        "report_size": machine.report_size,
+        "ends": machine.ending,
+    }
+
+
+def explicit_options(machine: Machine) -> dict[str, Any]:
+    """What an explicit one takes besides."""
+    return {"length_count": machine.length_count, "watched": machine.counts_turns}
+
+
+def refuse_adams(machine: Machine) -> None:
+    """Adams methods look at many past states, which must lie on one smooth motion.
+
+    Raises:
+        SimulationError: with method penalty projected states do not.
+    """
+    if machine.method == "penalty":
+        raise SimulationError(
+            "integrator adams does not fit method penalty, whose accelerations leave the "
+            "constraints; use method standard, lsq or auto, or integrator dop853"
+        )
+
+
+def refuse_singular_start(settings: Simulation, first_step: float) -> None:
+    """Only dop853 leaves a singular pose: its result does not use the first stages, close to it.
+
+    first_step: it takes so long, s, because close to the pose rounding takes the place of rates.
+
+    Raises:
+        SimulationError: the integrator is another, its steps are fixed, projection is off, or the
+            run is too short.
+    """
+    t_end = float(settings.t_end or 0.0)
+    if 0.0 < t_end < first_step:
+        raise SimulationError(
+            f"the run starts at a singular pose, which one step has to leave behind: give t_end of "
+            f"{first_step:.3g} s or more ({t_end:g} is given)"
+        )
+    fits = settings.integrator in ("auto", EXPLICIT) and settings.step is None
+    if not fits or not settings.project:
+        raise SimulationError(
+            f"the run starts at a singular pose, from which integrator {EXPLICIT} alone (or auto) "
+            "goes on, by steps that its error chooses and with project on; take it, or start at "
+            "another pose"
+        )

@@ -1,0 +1,251 @@
+"""Many runs of one model in one compiled call: the points of a study.
+
+The integrator is the one of a single run (integrators/runge_kutta/step.py), called by its address;
+here is only what stands around it: numbers put in their places, a start, rows taken. A point's
+numbers are the same bit for bit whichever points were run before it, and as ``simulate`` gives
+them.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.assembly.arrays import DOUBTFUL, UNSETTLED, System
+from dap3d_core.integrators.stepping.integration_state import (
+    CUT,
+    CUTS,
+    ERROR_OLD,
+    FINISHED,
+    FRESH,
+    LAST_REJECTED,
+    LIMIT,
+    LOOKED,
+    NOISE,
+    PROJECT_ON,
+    RHS,
+    ROW,
+    RUNNING,
+    SIDE,
+    STATUS,
+    STEP,
+    STEPS,
+    Function,
+    H,
+    T,
+    Work,
+    Y,
+)
+from dap3d_core.integrators.stepping.output import project_state
+from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
+from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
+from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.study.batch.initial_state import LEAST, OPEN, STARTING
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# Places in ``at``: the point that is to be run, whether it has begun, how to start: as it stands,
+# corrected, or corrected and no more.
+POINT, BEGUN, ASSEMBLES, PLACES = range(4)
+AS_IT_STANDS, CORRECTED, ALONE = range(3)
+# Columns of ``found`` behind those of the start: status, rows, steps, right-hand sides, how often
+# friction did not settle.
+ENDED, ROWS, TAKEN, CALLS, LOOSE, COLUMNS = range(STARTING, STARTING + 6)
+#: Stands for a status where the start could not be assembled as it should.
+NO_START = -1
+#: Rows that hang together so closely at the start that the run has to be looked at by itself: the
+#: least pivot as a part of its row, 1e4 times what a rank is judged by.
+CLOSE = 1e-10
+
+
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class Points(Arrays):
+    """k points of a model with n state components; w numbers change from point to point."""
+
+    types: ClassVar[dict[str, Any]] = {
+        **dict.fromkeys(("at", "places", "first_integer"), INTEGER_VECTOR),
+        **dict.fromkeys(
+            ("table", "y0", "metric", "stops", "rows", "found", "first_switches", "first_lengths"),
+            MATRIX,
+        ),
+    }
+
+    at: Integers  # (PLACES,)
+    places: Integers  # (w,) places in par, body and metric, one behind the other
+    table: Floats  # (k, w) their numbers
+    y0: Floats  # (k, n) states to start from
+    metric: Floats  # of the model, where its numbers do not change from point to point
+    unit: Floats  # (7,) constants of the metric that displacements are measured by at the start
+    stops: Floats  # (s, 2) times that no step goes over, and whether something jumps there
+    starting: Floats  # (STARTING + rows,) what is told to and by the start (initial_state.py)
+    first_real: Floats  # the work as it is before a run
+    first_integer: Integers
+    first_switches: Floats
+    first_lengths: Floats
+    rows: Floats  # (k nt, width) what was reported
+    found: Floats  # (k, COLUMNS)
+
+
+@compiled_inside
+def copy_into(target: Any, source: Any) -> None:
+    """Copy a vector."""
+    for k in range(source.shape[0]):
+        target[k] = source[k]
+
+
+@compiled_inside
+def put_numbers(points: Points, p: int, system: System) -> None:
+    """The numbers of point p into the arrays of the system."""
+    places, par, body, metric = points.places, system.par, system.body, system.metric
+    first_body = par.shape[0]
+    first_metric = first_body + body.shape[0] * body.shape[1]
+    for c in range(places.shape[0]):
+        place, value = places[c], points.table[p, c]
+        if place < first_body:
+            par[place] = value
+        elif place < first_metric:
+            body[(place - first_body) // body.shape[1], (place - first_body) % body.shape[1]] = (
+                value
+            )
+        else:
+            k = place - first_metric
+            metric[k // metric.shape[1], k % metric.shape[1]] = value
+
+
+@compiled_inside
+def put_back(points: Points, p: int, work: Work) -> None:
+    """The work as it is before a run, with the state of point p."""
+    copy_into(work.real, points.first_real)
+    copy_into(work.integer, points.first_integer)
+    for k in range(work.switches.shape[0]):
+        copy_into(work.switches[k], points.first_switches[k])
+    for k in range(work.lengths.shape[0]):
+        copy_into(work.lengths[k], points.first_lengths[k])
+    for i in range(work.tolerance.shape[1]):
+        work.tolerance[NOISE, i] = 0.0
+    copy_into(work.state[Y], points.y0[p])
+
+
+@compiled_inside
+def start(
+    points: Points,
+    p: int,
+    work: Work,
+    starting: Sequence[Function],
+    system: System,
+    loops: Any,
+) -> bool:
+    """Make ready for the run of point p; whether it can be run here."""
+    found, metric = points.found[p], system.metric
+    put_back(points, p, work)
+    put_numbers(points, p, system)
+    t, y = work.real[T], work.state[Y]
+    if points.at[ASSEMBLES] != 0:
+        for b in range(1, metric.shape[0]):
+            copy_into(metric[b], points.unit)
+        starting[1](t, y, points.starting, system, loops)
+        copy_into(found[:STARTING], points.starting[:STARTING])
+        for b in range(1, metric.shape[0]):
+            copy_into(metric[b], points.metric[b])
+        put_numbers(points, p, system)
+        if found[OPEN] != 0.0 or not found[LEAST] > CLOSE:
+            return False
+        copy_into(points.y0[p], y)
+    starting[0](t, y, found, system, loops)
+    return True
+
+
+@compiled_inside
+def restart(work: Work) -> None:
+    """As ``Integration.restart``."""
+    real, integer = work.real, work.integer
+    real[H], real[ERROR_OLD], real[CUT] = 0.0, 1e-4, np.inf
+    integer[FRESH] = integer[LOOKED] = integer[LAST_REJECTED] = integer[CUTS] = 0
+    for q in range(work.switches.shape[1]):
+        work.switches[SIDE, q] = 0.0
+
+
+@compiled_inside
+def next_stop(
+    stops: Floats,
+    work: Work,
+    functions: Any,
+    drive: Function,
+    system: System,
+    loops: Any,
+) -> float:
+    """As ``Integration._next_stop``."""
+    real, adaptive = work.real, work.real[STEP] == 0.0
+    for k in range(stops.shape[0]):
+        t = stops[k, 0]
+        if t < real[T]:
+            continue
+        before = np.nextafter(t, -np.inf) if stops[k, 1] != 0.0 and adaptive else t
+        if real[T] < before:
+            return before
+        if before < t:
+            real[T] = real[LIMIT] = t
+            drive(work, functions, system, loops, 0)
+            if work.integer[STATUS] != RUNNING:
+                return t
+            real[T] = np.nextafter(t, np.inf)
+            restart(work)
+            if work.integer[PROJECT_ON] != 0:
+                work.integer[STATUS] = project_state(
+                    real, work.integer, real[T], work.state[Y], functions[1], system, loops
+                )
+                if work.integer[STATUS] != RUNNING:
+                    return t
+    return np.inf
+
+
+@compiled
+def run_points(
+    points: Points,
+    work: Work,
+    functions: Any,
+    drives: Any,
+    starting: Any,
+    system: System,
+    loops: Any,
+    budget: int,
+) -> None:
+    """Go on with the points until all are run or more than ``budget`` right-hand sides are spent.
+
+    What a run's end leaves stands in ``found``; where one was not FINISHED its rows count for
+    nothing.
+    """
+    at, integer, found = points.at, work.integer, points.found
+    drive, spent, nt = drives[0], 0, work.rows.shape[0]
+    while at[POINT] < found.shape[0] and spent <= budget:
+        p = at[POINT]
+        if at[BEGUN] == 0:
+            if not start(points, p, work, starting, system, loops):
+                found[p, ENDED] = NO_START
+                at[POINT] += 1
+                continue
+            if at[ASSEMBLES] == ALONE:
+                found[p, ENDED] = FINISHED
+                at[POINT] += 1
+                continue
+            at[BEGUN] = 1
+        calls = integer[RHS]
+        if points.stops.shape[0] != 0:
+            work.real[LIMIT] = next_stop(points.stops, work, functions, drive, system, loops)
+        drive(work, functions, system, loops, budget - spent)
+        work.real[LIMIT] = np.inf
+        spent += integer[RHS] - calls
+        if integer[STATUS] != RUNNING:
+            for k in range(integer[ROW]):
+                copy_into(points.rows[p * nt + k], work.rows[k])
+            found[p, ENDED], found[p, ROWS] = integer[STATUS], integer[ROW]
+            found[p, TAKEN], found[p, CALLS] = integer[STEPS], integer[RHS]
+            found[p, LOOSE] = system.settings[UNSETTLED] + system.settings[DOUBTFUL]
+            at[POINT] += 1
+            at[BEGUN] = 0

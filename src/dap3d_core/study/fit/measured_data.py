@@ -1,0 +1,225 @@
+"""Measured data: what they may be given as, checked, and as plain arrays."""
+
+import csv
+import io
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.registry.regular_files import read_regular
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.scene import MISSING, Mistake
+from dap3d_core.study.fit.fit_parameters import is_number
+
+Floats = NDArray[np.float64]
+
+#: What the column of the times may be called.
+TIMES = ("t", "time")
+#: What stands in a CSV file where nothing was measured.
+EMPTY = ("", "nan", "na", "n/a", "null", "none")
+
+
+@attrs.frozen(eq=False)
+class Measured:
+    """Data that a fit compares runs with.
+
+    Attributes:
+        t: (nt,) times, s, as they were given: in any order, also several times the same.
+        values: label -> (nt,) what was measured, SI; NaN where nothing was.
+        quantities: label -> name of the quantity in results.
+        sigma: label -> (nt,) standard deviations; empty where they are not known.
+    """
+
+    t: Floats
+    values: dict[str, Floats]
+    quantities: dict[str, str]
+    sigma: dict[str, Floats]
+
+    @property
+    def count(self) -> int:
+        """How many numbers were measured."""
+        return int(sum(np.isfinite(v).sum() for v in self.values.values()))
+
+    def weighted(self, values: Mapping[str, Floats]) -> Floats:
+        """Values (..., nt) by label in one vector (..., count), over their standard deviations."""
+        parts = []
+        for label, data in self.values.items():
+            there = np.isfinite(data)
+            sigma = self.sigma[label][there] if self.sigma else 1.0
+            parts.append(values[label][..., there] / sigma)
+        return np.concatenate(parts, axis=-1)
+
+
+def read_measured(
+    measured: Any, outputs: Any, sigma: Any
+) -> tuple[Measured | None, dict[str, str], list[Mistake]]:
+    """Measured data as ``fit`` takes them, None where something is wrong with them; label ->
+    quantity of the columns that are used; what is wrong.
+    """
+    mistakes: list[Mistake] = []
+    columns = _columns(measured, mistakes)
+    if mistakes:
+        return None, {}, mistakes
+    named = [name for name in TIMES if name in columns]
+    if not named:
+        remedy = f"there are {', '.join(columns)}" if columns else ""
+        what = "the times of the measurements are missing: a column called t, in s"
+        return None, {}, [Mistake("measured", MISSING, what, remedy=remedy)]
+    times = _numbers(named[0], columns.pop(named[0]), mistakes)
+    chosen = _chosen(columns, outputs, mistakes)
+    values = {label: _numbers(label, columns[label], mistakes) for label in chosen}
+    if times is not None:
+        _check_times(named[0], times, mistakes)
+        for label, found in values.items():
+            if found is not None and len(found) != len(times):
+                what = f"{len(found)} values for {len(times)} times"
+                mistakes.append(Mistake(f"measured.{label}", MISSING, what))
+    good = {label: v for label, v in values.items() if v is not None}
+    for label, found in good.items():
+        if np.isinf(found).any():
+            what = "not finite; NaN stands where nothing was measured"
+            mistakes.append(Mistake(f"measured.{label}", float(found[np.isinf(found)][0]), what))
+    if not mistakes and not any(np.isfinite(v).any() for v in good.values()):
+        mistakes.append(Mistake("measured", MISSING, "there is nothing that was measured"))
+    deviations = {} if mistakes or sigma is None else _deviations(sigma, good, mistakes)
+    if mistakes or times is None:
+        return None, chosen, mistakes
+    return Measured(times, good, chosen, deviations), chosen, []
+
+
+def _check_times(name: str, times: Floats, mistakes: list[Mistake]) -> None:
+    bad = times[~(np.isfinite(times) & (times >= 0.0))]
+    if len(bad):
+        what = "a run begins at t = 0: times are numbers from 0, in s"
+        mistakes.append(Mistake(f"measured.{name}", float(bad[0]), what))
+    elif not len(times):
+        mistakes.append(Mistake("measured", MISSING, "there are no measurements"))
+
+
+def _columns(measured: Any, mistakes: list[Mistake]) -> dict[str, Any]:
+    """Name -> values of a CSV file, a mapping, a data frame or a data set."""
+    if isinstance(measured, (str, os.PathLike)):
+        return _of_file(Path(measured), mistakes)
+    if hasattr(measured, "data_vars"):
+        return {str(name): variable.values for name, variable in measured.variables.items()
+                if name in TIMES or name in measured.data_vars}  # fmt: skip
+    if hasattr(measured, "keys") and hasattr(measured, "__getitem__"):
+        return {str(name): measured[name] for name in measured.keys()}  # noqa: SIM118  data frames
+    what = (
+        "measured data are a mapping {'t': times, 'mass.r.x': values}, an xarray.Dataset, or the "
+        "path of a CSV file with a header"
+    )
+    mistakes.append(Mistake("measured", measured, what))
+    return {}
+
+
+def _of_file(path: Path, mistakes: list[Mistake]) -> dict[str, Any]:
+    """The columns of a CSV file; units in brackets behind names, and # lines, are left out."""
+    try:
+        text = io.StringIO(read_regular(path).decode("utf-8-sig"), newline="")
+        rows = [(k, row) for k, row in enumerate(csv.reader(text), start=1)
+                if any(row) and not row[0].startswith("#")]  # fmt: skip
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        mistakes.append(Mistake("measured", str(path), f"cannot be read as a CSV file: {why}"))
+        return {}
+    if not rows:
+        mistakes.append(Mistake("measured", str(path), "the file is empty"))
+        return {}
+    names = [head.partition("[")[0].strip() for head in rows[0][1]]
+    for name in {n for n in names if names.count(n) > 1}:
+        what = "two columns have this name"
+        mistakes.append(Mistake(f"measured.{name}", MISSING, what, file=str(path), line=rows[0][0]))
+    columns: dict[str, Any] = {name: np.full(len(rows) - 1, np.nan) for name in names}
+    for place, (line, row) in enumerate(rows[1:]):
+        if len(row) != len(names):
+            what = f"{len(row)} columns, the header has {len(names)}"
+            mistakes.append(Mistake("measured", MISSING, what, file=str(path), line=line))
+            continue
+        for name, word in zip(names, row, strict=True):
+            try:
+                columns[name][place] = np.nan if word.strip().lower() in EMPTY else float(word)
+            except ValueError:
+                mistakes.append(Mistake(f"measured.{name}", word, "should be a number",
+                                        file=str(path), line=line))  # fmt: skip
+    return columns
+
+
+def _chosen(columns: dict[str, Any], outputs: Any, mistakes: list[Mistake]) -> dict[str, str]:
+    """Label -> quantity of the columns that are to be used."""
+    asked: dict[str, Any] = {name: name for name in columns}
+    if isinstance(outputs, Mapping):
+        asked = {str(column): name for column, name in outputs.items()}
+    elif isinstance(outputs, (str, list, tuple)):
+        asked = {str(n): n for n in ([outputs] if isinstance(outputs, str) else outputs)}
+    elif outputs is not None:
+        what = "outputs are names of columns, or column -> name of its quantity"
+        mistakes.append(Mistake("outputs", outputs, what))
+    if not asked:
+        mistakes.append(Mistake("measured", MISSING, "there is no quantity besides the time"))
+    for column, quantity in asked.items():
+        if column not in columns:
+            near = nearest(column, columns)
+            remedy = "" if near else f"there are {', '.join(columns)}"
+            what = "the measured data have no such column"
+            mistakes.append(Mistake(f"outputs.{column}", MISSING, what, near, remedy))
+        if not isinstance(quantity, str):
+            what = "the name of a quantity is text such as 'crank.r.z'"
+            mistakes.append(Mistake(f"outputs.{column}", quantity, what))
+    return {c: name for c, name in asked.items() if c in columns and isinstance(name, str)}
+
+
+def _numbers(name: str, values: Any, mistakes: list[Mistake]) -> Floats | None:
+    """Values as (nt,) numbers, or a mistake and None."""
+    key = f"measured.{name}"
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind not in "fiuO":
+            raise ValueError
+        found = np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError):
+        listed = () if isinstance(values, str) or not np.iterable(values) else values
+        shown = next((v for v in listed if not is_number(v)), values)
+        mistakes.append(Mistake(key, shown, "should be numbers, one for each time"))
+        return None
+    if found.ndim != 1:
+        what = f"should be one number for each time, and has the shape {found.shape}"
+        remedy = "name its components, such as crank.r.z" if found.ndim == 2 else ""
+        mistakes.append(Mistake(key, MISSING, what, remedy=remedy))
+        return None
+    return found
+
+
+def _deviations(
+    sigma: Any, values: dict[str, Floats], mistakes: list[Mistake]
+) -> dict[str, Floats]:
+    """Label -> (nt,) standard deviations."""
+    given = dict(sigma) if isinstance(sigma, Mapping) else dict.fromkeys(values, sigma)
+    for label in given:
+        if label not in values:
+            what = "this is none of the measured quantities"
+            near = nearest(label, values)
+            mistakes.append(Mistake(f"sigma.{label}", MISSING, what, near))
+    found = {}
+    for label, data in values.items():
+        key = f"sigma.{label}" if isinstance(sigma, Mapping) else "sigma"
+        if label not in given:
+            what = "with standard deviations each quantity needs one"
+            mistakes.append(Mistake(key, MISSING, what))
+            continue
+        try:
+            array = np.broadcast_to(np.asarray(given[label], dtype=np.float64), data.shape)
+        except (TypeError, ValueError):
+            what = f"a standard deviation is a number, or one for each of the {len(data)} times"
+            mistakes.append(Mistake(key, given[label], what))
+            continue
+        bad = array[np.isfinite(data) & ~((array > 0.0) & np.isfinite(array))]
+        if len(bad):
+            mistakes.append(Mistake(key, float(bad[0]), "a standard deviation is above 0"))
+        found[label] = array
+    return found

@@ -1,0 +1,1 @@
+"""Sweeps: points, data set, incrementally written file."""

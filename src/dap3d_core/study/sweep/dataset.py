@@ -1,0 +1,321 @@
+"""The data set of a sweep: what its dimensions, variables and attributes are, and how it is read.
+
+Of a grid there is a dimension for each number that varies, called by its name; of samples there is
+``point``, along which the numbers are coordinates. Outputs are variables called by their names;
+series have ``time`` as their last dimension.
+"""
+
+import json
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.result import ResultError, current_versions
+from dap3d_core.result.file.checksum import check_seal
+from dap3d_core.result.file.lazy_arrays import LARGE
+from dap3d_core.result.file.library import NETCDF
+from dap3d_core.result.file.schema import SWEEP
+from dap3d_core.result.file.validate import check_claims
+from dap3d_core.result.metadata import to_json
+from dap3d_core.result.open import check_signature, unreadable
+from dap3d_core.simulation.output.type_sources import digests_of
+from dap3d_core.study.design import Design
+from dap3d_core.study.study import Batch, Ensemble, PointStatus
+
+if TYPE_CHECKING:
+    import xarray
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Read = TypeVar("Read")
+
+#: Version of the format, raised when an older reader would misread it.
+FORMAT = 1
+#: Seconds that a reader waits for who writes the file.
+PATIENCE = 1.0
+#: Attributes whose text is JSON.
+JSON = ("varied", "outputs", "versions")
+ABOUT_STATUS = {
+    "long_name": "how the run at the point ended",
+    "units": "1",
+    "flag_values": np.array([status.value for status in PointStatus], dtype=np.int8),
+    "flag_meanings": " ".join(status.name.lower() for status in PointStatus),
+}
+ABOUT_NOTE = {"long_name": "what there is to say of the point", "units": "1"}
+
+
+@attrs.frozen(eq=False)
+class Variable:
+    """A variable of a data set: name, dimensions, attributes."""
+
+    name: str
+    dimensions: tuple[str, ...]
+    about: dict[str, Any]
+
+
+@attrs.frozen(eq=False)
+class Coordinate(Variable):
+    """One whose values are known from the start."""
+
+    values: Floats
+
+
+@attrs.frozen(eq=False)
+class Layout:
+    """What a sweep's data set is made of, but for what the runs give.
+
+    Attributes:
+        sizes: length of each dimension, ``time`` last where there is a series.
+        dimensions: those of the points.
+        coordinates: the numbers that vary, and ``time``.
+        outputs: what is kept of each run.
+        attributes: of the data set.
+    """
+
+    sizes: dict[str, int]
+    dimensions: tuple[str, ...]
+    coordinates: tuple[Coordinate, ...]
+    outputs: tuple[Variable, ...]
+    attributes: dict[str, Any]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the points."""
+        return tuple(self.sizes[name] for name in self.dimensions)
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return int(np.prod(self.shape))
+
+    @property
+    def width(self) -> int:
+        """Numbers that are kept of one point."""
+        return sum(self.sizes["time"] if o.dimensions[-1] == "time" else 1 for o in self.outputs)
+
+    def shape_of(self, variable: Variable) -> tuple[int, ...]:
+        """The shape of a variable."""
+        return tuple(self.sizes[name] for name in variable.dimensions)
+
+
+def layout_of(ensemble: Ensemble, design: Design, points: Floats) -> Layout:
+    """The layout of a sweep.
+
+    Args:
+        ensemble: what runs the points.
+        design: which points there are.
+        points: (N, numbers) the values of the numbers.
+    """
+    sampled = design.count is not None
+    values = list(points.T) if sampled else design.axes
+    coordinates = [
+        Coordinate(
+            number.name,
+            design.dimensions if sampled else (number.name,),
+            {"long_name": number.name, "units": number.unit},
+            axis,
+        )
+        for number, axis in zip(ensemble.numbers, values, strict=True)
+    ]
+    sizes = dict(zip(design.dimensions, design.shape, strict=True))
+    if any(output.reduction == "series" for output in ensemble.outputs):
+        sizes["time"] = len(ensemble.times)
+        about = {"long_name": "time", "units": "s"}
+        coordinates.append(Coordinate("time", ("time",), about, ensemble.times))
+    outputs = [
+        Variable(
+            output.name,
+            (*design.dimensions, "time") if output.reduction == "series" else design.dimensions,
+            {"long_name": ensemble.labels[output.name], "units": ensemble.units[output.name]},
+        )
+        for output in ensemble.outputs
+    ]
+    about_all = _attributes(ensemble, design)
+    return Layout(sizes, design.dimensions, tuple(coordinates), tuple(outputs), about_all)
+
+
+def _attributes(ensemble: Ensemble, design: Design) -> dict[str, Any]:
+    scene = ensemble.compiled.scene
+    varied = [{"name": v.name, "spec": v.spec} for v in design.varied]
+    outputs = [
+        {"name": o.name, "label": ensemble.labels[o.name], "unit": ensemble.units[o.name]}
+        for o in ensemble.outputs
+    ]
+    found: dict[str, Any] = {
+        SWEEP: np.int32(FORMAT),
+        "model": str(scene.name).replace("\0", ""),
+        "scene": ensemble.asked.scene.to_toml(),
+        "varied": to_json(varied),
+        "outputs": to_json(outputs),
+        "design": design.name,
+        "types": to_json(digests_of(ensemble.compiled.checked)),
+        "versions": to_json(current_versions()),
+    }
+    if ensemble.study.pack > 1:
+        found["pack"] = np.int64(ensemble.study.pack)
+    return found if design.seed is None else found | {"seed": np.int64(design.seed)}
+
+
+class InMemory:
+    """The points of a sweep in memory.
+
+    Attributes:
+        layout: of the data set.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        count = layout.count
+        self._status = np.zeros(count, dtype=np.int8)
+        self._notes = np.full(count, "", dtype=object)
+        self._values = {o.name: np.full(layout.shape_of(o), np.nan) for o in layout.outputs}
+
+    @property
+    def todo(self) -> Integers:
+        """The points that are still to be run."""
+        return np.flatnonzero(self._status == PointStatus.OPEN)
+
+    def put(self, places: Integers, batch: Batch) -> None:
+        """Keep what came of some points."""
+        for name, whole in self._values.items():
+            values = batch.values[name]
+            whole.reshape(len(self._status), *values.shape[1:])[places] = values
+        self._notes[places] = batch.notes
+        self._status[places] = batch.status
+
+    def dataset(self) -> "xarray.Dataset":
+        """What there is so far."""
+        from dap3d_core.study.sweep.display import Sweep
+
+        layout = self.layout
+        shape, dimensions = layout.shape, layout.dimensions
+        variables = {o.name: (o.dimensions, self._values[o.name], o.about) for o in layout.outputs}
+        variables["status"] = (dimensions, self._status.reshape(shape), ABOUT_STATUS)
+        variables["note"] = (dimensions, self._notes.reshape(shape), ABOUT_NOTE)
+        coordinates = {c.name: (c.dimensions, c.values, c.about) for c in layout.coordinates}
+        return Sweep(variables, coordinates, layout.attributes)
+
+
+def open_sweep(path: str | os.PathLike[str]) -> "xarray.Dataset":
+    """Read what ``sweep`` wrote.
+
+    Args:
+        path: its file; also ``NAME.part`` of a sweep that has not ended, whose ``status`` says
+            which points are there.
+
+    Returns:
+        The data set as ``sweep`` gives it. Variables of a large one stay in the file until they
+        are asked for.
+
+    Raises:
+        ResultError: there is no such file, it is no sweep, damaged, or of a newer dap3d.
+    """
+    file = Path(path)
+    check_signature(file, "sweep")
+    return _patiently(file, _opened)
+
+
+def _patiently(file: Path, read: Callable[[Path], Read]) -> Read:
+    """Read a file; one that grows is tried again for a while, for it may be written just now."""
+    grows = file.suffix.startswith(".part")
+    until = time.monotonic() + (PATIENCE if grows else 0.0)
+    while True:
+        try:
+            return read(file)
+        except ResultError:
+            if time.monotonic() > until:
+                raise
+            time.sleep(0.02)
+
+
+def _opened(file: Path) -> "xarray.Dataset":
+    """What a file holds."""
+    import xarray
+
+    from dap3d_core.study.sweep.display import Sweep
+
+    check_seal(file)
+    with NETCDF:
+        _check(file)
+        try:
+            found = xarray.open_dataset(
+                file, engine="netcdf4", decode_times=False, decode_timedelta=False
+            )
+            varied = [one["name"] for one in json.loads(found.attrs["varied"])]
+            found = found.set_coords([name for name in varied if name in found])
+            found = found.drop_encoding()  # how a file holds it is no property of the data
+            if found.nbytes <= LARGE:
+                with found:
+                    found.load()
+        except Exception as error:  # whatever a damaged file makes of it
+            raise unreadable(file, error) from error
+    sweep = Sweep(found.data_vars, found.coords, found.attrs)
+    sweep.set_close(found.close)
+    return sweep
+
+
+def is_sweep(path: str | os.PathLike[str]) -> bool:
+    """Whether there is a file, and it is that of a sweep."""
+    try:
+        check_signature(Path(path))
+        return bool(_patiently(Path(path), lambda file: SWEEP in _attributes_of(file)))
+    except ResultError:
+        return False
+
+
+def _attributes_of(file: Path) -> list[str]:
+    import netCDF4
+
+    check_seal(file)
+    try:
+        with NETCDF, netCDF4.Dataset(os.path.abspath(file), "r") as dataset:
+            return list(dataset.ncattrs())
+    except Exception as error:  # whatever a damaged file makes of it
+        raise unreadable(file, error) from error
+
+
+def _check(file: Path) -> None:
+    """Refuse a file that is no sweep, or claims more than it can hold."""
+    import netCDF4
+
+    try:
+        with netCDF4.Dataset(os.path.abspath(file), "r") as dataset:
+            check_format(file, dataset)
+            check_claims(file, dataset)
+    except ResultError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of it
+        raise unreadable(file, error) from error
+
+
+def check_format(file: Path, dataset: Any) -> None:
+    """Refuse a file that is no sweep of a version that this program reads.
+
+    Raises:
+        ResultError: says what it is.
+    """
+    names = dataset.ncattrs()
+    if SWEEP not in names:
+        what = "a NetCDF-4 file, but no sweep of dap3d"
+        if "Conventions" in names and dataset.getncattr("Conventions") == "dap3d-result":
+            what = "it is the result of one run, not of a sweep; dap.open reads it"
+        raise ResultError(f"cannot read {file}: {what}")
+    try:
+        found = int(dataset.getncattr(SWEEP))
+    except (TypeError, ValueError) as error:
+        raise unreadable(file, error) from error
+    if found > FORMAT:
+        raise ResultError(
+            f"cannot read {file}: a newer dap3d wrote it in format {found}, this program reads up "
+            f"to {FORMAT}; install a newer dap3d"
+        )
+    missing = [n for n in (*JSON, "scene", "design", "model") if n not in names]
+    missing += [n for n in ("status", "note") if n not in dataset.variables]
+    if missing:
+        raise unreadable(file, ValueError(f"it has no {missing[0]}"))

@@ -1,0 +1,95 @@
+"""How a sweep lies in its file: definitions, and where points of a grid have their places."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.result.file.schema import write_attributes
+from dap3d_core.study.study import PointStatus
+from dap3d_core.study.sweep.dataset import ABOUT_NOTE, ABOUT_STATUS, Layout
+
+#: Bytes of a note in the file: it has its place from the start.
+NOTE = 200
+
+
+def boxes(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[Any, int]]:
+    """Places ``first`` to ``last`` of a grid in C order as blocks: an index and how many it has.
+
+    Args:
+        shape: of the grid.
+        first, last: places in the order of memory; the last one is left out.
+    """
+    if first >= last:
+        return
+    inner = int(np.prod(shape[1:]))
+    row, begin = divmod(first, inner)
+    end_row, end = divmod(last, inner)
+    if begin and row == end_row:
+        yield from _rows(shape, row, begin, end)
+        return
+    if begin:
+        yield from _rows(shape, row, begin, inner)
+        row += 1
+    if row < end_row:
+        index = (slice(row, end_row), *(slice(0, length) for length in shape[1:]))
+        yield index, (end_row - row) * inner
+    if end:
+        yield from _rows(shape, end_row, 0, end)
+
+
+def _rows(shape: tuple[int, ...], row: int, first: int, last: int) -> Iterator[tuple[Any, int]]:
+    """The same within one row of the first axis."""
+    for index, count in boxes(shape[1:], first, last):
+        yield (slice(row, row + 1), *index), count
+
+
+def cut(note: str) -> bytes:
+    """A note in UTF-8, cut to its place."""
+    words = note.encode("utf-8", "replace")
+    if len(words) <= NOTE:
+        return words
+    return words[: NOTE - 4].decode("utf-8", "ignore").encode() + b" ..."
+
+
+def define(dataset: Any, layout: Layout) -> None:
+    """Define everything in a new file, each variable in one piece, and write what is known.
+
+    What no run has given is NaN; the notes that are not there take no room on a disk.
+    """
+    for name, length in layout.sizes.items():
+        dataset.createDimension(name, length)
+    dataset.createDimension("note_length", NOTE)
+    for coordinate in layout.coordinates:
+        variable = _variable(dataset, coordinate.name, "f8", coordinate.dimensions, False)
+        _describe(variable, coordinate.about)
+        variable[...] = coordinate.values
+    names = [c.name for c in layout.coordinates if c.name not in layout.sizes]
+    last = (-1,) * len(layout.dimensions)
+    for output in layout.outputs:
+        variable = _variable(dataset, output.name, "f8", output.dimensions, np.nan)
+        _describe(variable, output.about)
+        if names and not any(" " in name for name in names):
+            variable.setncattr_string("coordinates", " ".join(names))
+        variable[(*last, -1)[: len(output.dimensions)]] = np.nan  # takes its place in the file
+    status = _variable(dataset, "status", "i1", layout.dimensions, False)
+    _describe(status, ABOUT_STATUS)
+    status[last] = PointStatus.OPEN
+    note = _variable(dataset, "note", "S1", (*layout.dimensions, "note_length"), False)
+    note.set_auto_chartostring(False)
+    _describe(note, ABOUT_NOTE)
+    note.setncattr("_Encoding", "utf-8")
+    note[(*last, -1)] = b""
+    write_attributes(dataset, layout.attributes)
+
+
+def _variable(dataset: Any, name: str, kind: str, dimensions: tuple[str, ...], fill: Any) -> Any:
+    return dataset.createVariable(name, kind, dimensions, fill_value=fill, contiguous=True)
+
+
+def _describe(variable: Any, about: dict[str, Any]) -> None:
+    for name, value in about.items():
+        if isinstance(value, str):
+            variable.setncattr_string(name, value)
+        else:
+            variable.setncattr(name, value)

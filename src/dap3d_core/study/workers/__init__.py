@@ -1,0 +1,1 @@
+"""Workers of a study: threads of this machine, dask clusters."""

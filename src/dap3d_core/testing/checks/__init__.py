@@ -1,0 +1,1 @@
+"""Checks of joints, forces and functions."""

@@ -1,0 +1,357 @@
+"""The checks of a joint: J, nu and gamma against derivatives, reactions, rank, rigid motions."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from dap3d_core.interface.fields import specs_of
+from dap3d_core.testing.checks.forces import rigid_motion
+from dap3d_core.testing.compare import (
+    DIFFERENCE_TOLERANCE,
+    Comparison,
+    Rate,
+    Wrong,
+    body_words,
+    rates,
+)
+from dap3d_core.testing.findings import Outcome
+from dap3d_core.testing.samples.random_state import Direction, Floats
+from dap3d_core.testing.samples.sampled_type import Sample, Subject, position_jacobian
+
+#: Singular values below this part of the largest count as zero.
+RANK_TOLERANCE = 1e-8
+#: Singular values of J below this count as zero where its rows are of size one off the manifold:
+#: Newton's method leaves |C| < 1e-11, where the gradient of a square is some 1e-5.
+VANISHING = 1e-3
+
+
+def jacobian(subject: Subject) -> Outcome:
+    """J is the derivative of C."""
+    c = Comparison("J", subject, "J", "J against dC/dq, by complex step and by differences")
+    rows = subject.type.position_rows()
+    for sample in poses(subject):
+        J = sample.value("J")
+        for slot in range(J.shape[0]):
+            for column in range(6):
+                for rate in rates(sample, "C", Direction.of(slot, column), c):
+                    says = _about_jacobian(sample, slot, column, rate.way)
+                    c.compare(sample, J[slot, rows, column], rate.value, says,
+                              tolerance=rate.tolerance, bound=rate.bound, rows=rows)  # fmt: skip
+    return c.outcome()
+
+
+def _about_jacobian(sample: Sample, slot: int, column: int, way: str) -> Callable[[Wrong], str]:
+    by = body_words(sample, slot, column)
+    return lambda x: (
+        f"row {x.row + 1} of J is wrong by {x.error:.3g} at this pose: {x.is_:.6g} stands in "
+        f"column {column + 1} of body {by.split()[-3]}, and it should be {x.should:.6g}, the "
+        f"derivative of row {x.row + 1} of C by {by} ({way})"
+    )
+
+
+def velocity_side(subject: Subject) -> Outcome:
+    """The side nu is minus the rate of C where only time goes on."""
+    c = Comparison("nu", subject, "nu", "nu against -dC/dt at a fixed pose")
+    rows, there = subject.type.position_rows(), "nu" in subject.kernels.names()
+    for sample in poses(subject):
+        nu = sample.value("nu")[list(rows)] if there else np.zeros(len(rows))
+        for rate in rates(sample, "C", Direction.in_time(), c):
+            c.compare(sample, nu, -rate.value, _about_nu(rate.way, there),
+                      tolerance=rate.tolerance, bound=rate.bound, rows=rows)  # fmt: skip
+    return c.outcome()
+
+
+def _about_nu(way: str, there: bool) -> Callable[[Wrong], str]:
+    def says(x: Wrong) -> str:
+        n = x.row + 1
+        found = f"nu is missing, and row {n} of C depends on time: row {n} of nu is zero"
+        if there:
+            found = _is_wrong("nu", x)
+        return _should_be(found, x, f"minus the rate of row {n} of C at a fixed pose", way)
+
+    return says
+
+
+def _is_wrong(side: str, x: Wrong) -> str:
+    return f"row {x.row + 1} of {side} is wrong by {x.error:.3g} at this pose: it is {x.is_:.6g}"
+
+
+def _should_be(found: str, x: Wrong, source: str, way: str) -> str:
+    return f"{found} and should be {x.should:.6g}, {source} ({way})"
+
+
+def velocity_form(subject: Subject) -> Outcome:
+    """The form C_dot that a type gives for its velocity rows is J v - nu."""
+    c = Comparison("velocity form", subject, "C_dot", "C_dot against J v - nu")
+    rows = subject.type.velocity_rows()
+    for sample in poses(subject):
+        J, v = sample.value("J")[:, rows], _velocities(sample)
+        form = np.einsum("srk,sk->r", J, v)
+        if "nu" in subject.kernels.names():
+            form = form - sample.value("nu")[list(rows)]
+        size = float(np.max(np.abs(J)) * np.max(np.abs(v)))
+        c.compare(sample, sample.value("C_dot"), form, _about_form,
+                  tolerance=1e-12, scale=size, rows=rows)  # fmt: skip
+    return c.outcome()
+
+
+def _about_form(x: Wrong) -> str:
+    n = x.row + 1
+    return (
+        f"row {n} of J and nu is not the form C_dot: C_dot is {x.is_:.6g} at this pose, "
+        f"J v - nu is {x.should:.6g}"
+    )
+
+
+def acceleration_side(subject: Subject) -> Outcome:
+    """The side gamma is what d/dt (J v - nu) = 0 leaves on the right of J v_dot = gamma.
+
+    Rows of which J or nu is wrong are compared with what C (or C_dot) says.
+    """
+    c = Comparison("gamma", subject, "gamma", "gamma against the time derivative of nu - J v")
+    wrong = _rows_apart(subject)
+    good = [k for k in range(subject.type.rows) if k not in wrong]
+    for row, form in wrong.items():
+        c.note(f"row {row + 1} of J or nu is not what {form} says: gamma is compared with {form}")
+    for sample in poses(subject):
+        along, gamma, v = sample.state.motion(), sample.value("gamma"), _velocities(sample)
+        J_dot = rates(sample, "J", along, c)
+        still = [Rate(np.zeros(1), None, r.tolerance, r.way) for r in J_dot]
+        nu_dot = rates(sample, "nu", along, c) if "nu" in subject.kernels.names() else still
+        for turning in J_dot:
+            pushing = next((r for r in nu_dot if r.way == turning.way), nu_dot[-1])
+            terms = np.einsum("srk,sk->r", turning.value, v)
+            bound = None
+            if turning.bound is not None:
+                bound = np.einsum("srk,sk->r", turning.bound, np.abs(v))
+                bound = (bound if pushing.bound is None else bound + pushing.bound)[good]
+            tolerance = max(turning.tolerance, pushing.tolerance)
+            size = float(np.max(np.abs(turning.value), initial=0.0) * np.max(np.abs(v)))
+            c.compare(sample, gamma[good], (pushing.value - terms)[good],
+                      _about_gamma(turning.way, subject), rows=good,
+                      tolerance=tolerance, bound=bound, scale=size)  # fmt: skip
+        for form, rows in _forms(subject):
+            if apart := [k for k in rows if wrong.get(k) == form]:
+                places = [rows.index(k) for k in apart]
+                rate = sample.bend(along) if form == "C" else sample.difference(form, along)
+                value, bound = (x[places] for x in rate)
+                c.compare(sample, gamma[apart], -value, _about_gamma_by(form), rows=apart,
+                          tolerance=DIFFERENCE_TOLERANCE, bound=bound)  # fmt: skip
+    return c.outcome()
+
+
+def _forms(subject: Subject) -> list[tuple[str, tuple[int, ...]]]:
+    """The kernels of which J, nu and gamma are derivatives, and the rows of each."""
+    rows = {"C": subject.type.position_rows(), "C_dot": subject.type.velocity_rows()}
+    return [(form, rows[form]) for form in rows if form in subject.kernels.names() and rows[form]]
+
+
+def _rows_apart(subject: Subject) -> dict[int, str]:
+    """Rows of which J v - nu is not the rate of C, or C_dot, that the type gives; and which."""
+    found = {}
+    for sample in poses(subject):
+        v = _velocities(sample)
+        rate = np.einsum("srk,sk->r", sample.value("J"), v)
+        if "nu" in subject.kernels.names():
+            rate = rate - sample.value("nu")
+        for form, rows in _forms(subject):
+            want, bound = sample.value(form), np.zeros(len(rows))
+            if form == "C":
+                want, bound = sample.difference("C", sample.state.motion())
+            size = 1.0 + float(np.max(np.abs(want)))
+            for k, row in enumerate(rows):
+                if abs(rate[row] - want[k]) - bound[k] > DIFFERENCE_TOLERANCE * size:
+                    found[row] = form
+    return found
+
+
+def _about_gamma_by(form: str) -> Callable[[Wrong], str]:
+    order = "second time derivative" if form == "C" else "time derivative"
+    return lambda x: _should_be(
+        _is_wrong("gamma", x), x, f"minus the {order} of row {x.row + 1} of {form} at constant "
+        "velocities", "differences")  # fmt: skip
+
+
+def _about_gamma(way: str, subject: Subject) -> Callable[[Wrong], str]:
+    def says(x: Wrong) -> str:
+        n = x.row + 1
+        source = f"minus the time derivative of row {n} of J, times v"
+        if "nu" in subject.kernels.names():
+            source = f"the time derivative of row {n} of nu less that of row {n} of J, times v"
+        return _should_be(_is_wrong("gamma", x), x, source, way)
+
+    return says
+
+
+def virtual_power(subject: Subject) -> Outcome:
+    """Reactions do no work on velocities that C allows while time stands still."""
+    c = Comparison("virtual power", subject, "J", "reactions J^T lambda do no work where C allows")
+    rows = subject.type.position_rows()
+    for sample in poses(subject):
+        J = sample.value("J")[:, rows].transpose(1, 0, 2).reshape(len(rows), -1)
+        allowed = null_space(position_jacobian(sample).reshape(len(rows), -1))
+        c.compare(sample, J @ allowed, 0.0, _about_power, tolerance=1e-6,
+                  scale=float(np.max(np.abs(J))), rows=rows)  # fmt: skip
+    return c.outcome()
+
+
+def _about_power(x: Wrong) -> str:
+    return (
+        f"row {x.row + 1} of J is a reaction that does work: its power is {abs(x.is_):.3g} on a "
+        "unit velocity that keeps C as it is, and should be zero"
+    )
+
+
+def frame(subject: Subject) -> Outcome:
+    """All bodies turned and shifted as one: what was allowed is allowed, turned."""
+    c = Comparison(
+        "frame", subject, "C", "the same motions are allowed after a common rigid motion"
+    )
+    for k, sample in enumerate(subject.assembled):
+        rows = subject.type.position_rows()
+        moved, R = rigid_motion(sample.state, subject.seed, k)
+        if rows:
+            c.kernel = "C"
+            c.compare(sample, sample.value("C", moved), 0.0, _about_frame_C, rows=rows)
+        J, J_moved = sample.value("J"), sample.value("J", moved)
+        turned, count = np.kron(np.eye(2 * len(J)), R), J.shape[1]
+        flat, flat_moved = (x.transpose(1, 0, 2).reshape(count, -1) for x in (J, J_moved))
+        c.kernel = "J"
+        c.compare(sample, flat_moved @ turned @ null_space(flat), 0.0, _about_frame_J)
+        for name in ("nu", "gamma"):
+            if name in subject.kernels.names():
+                c.kernel = name
+                side, side_moved = sample.value(name), sample.value(name, moved)
+                solution = turned @ np.linalg.lstsq(flat, side, rcond=None)[0]
+                c.compare(sample, side_moved, flat_moved @ solution, _about_frame_side(name))
+    return c.outcome()
+
+
+def _about_frame_C(x: Wrong) -> str:
+    return (
+        f"row {x.row + 1} of C notices where ground is: it was zero and is {x.is_:.3g} after a "
+        "common rigid motion of all bodies; a joint between bodies should stay assembled"
+    )
+
+
+def _about_frame_J(x: Wrong) -> str:
+    return (
+        f"row {x.row + 1} of J notices where ground is: turned with the bodies, a velocity that "
+        f"was allowed is no more so after a common rigid motion (by {abs(x.is_):.3g})"
+    )
+
+
+def _about_frame_side(name: str) -> Callable[[Wrong], str]:
+    return lambda x: (
+        f"row {x.row + 1} of {name} notices where ground is: after a common rigid motion of all "
+        f"bodies it is {x.is_:.6g} and should be {x.should:.6g}, as J turned with them has it"
+    )
+
+
+def action_and_reaction(subject: Subject) -> Outcome:
+    """What a row of J exerts on the bodies sums to zero: force, and at C = 0 moment."""
+    c = Comparison(
+        "action and reaction", subject, "J", "forces and moments of each row sum to zero"
+    )
+    rows = subject.type.position_rows()
+    if len(rows) < subject.type.rows:
+        c.note("moments are asked of rows of the position level alone")
+    for sample in subject.assembled:
+        J, r = sample.value("J"), sample.state.r[1:]
+        force = J[:, :, :3].sum(axis=0)
+        arms = np.cross(r[: len(J), None, :], J[:, :, :3])
+        moment = (J[:, :, 3:] + arms).sum(axis=0)
+        c.compare(sample, force, 0.0, _about_balance("force"))
+        c.compare(sample, moment[list(rows)], 0.0, _about_balance("moment about the origin"),
+                  rows=rows, scale=float(np.max(np.abs(arms))))  # fmt: skip
+    return c.outcome()
+
+
+def _about_balance(what: str) -> Callable[[Wrong], str]:
+    return lambda x: (
+        f"row {x.row + 1} of J has no reaction: the {what} that it exerts on all bodies together "
+        f"is {x.is_:.3g} along {'xyz'[x.at[-1]]} and should be zero"
+    )
+
+
+def assembly(subject: Subject) -> Outcome:
+    """There are poses with C = 0."""
+    c = Comparison("assembly", subject, "C", "C = 0 is reached from random poses")
+    count = len(subject.assembled)
+    if not count:
+        c.fail("no pose with C = 0 was found from any of many random ones: its rows contradict "
+               "each other, or C is not the function that J differentiates")  # fmt: skip
+    elif count < subject.poses:
+        c.note(f"reached from {count} of {subject.poses}")
+    for sample in subject.assembled:
+        c.largest = max(c.largest or 0.0, float(np.max(np.abs(sample.value("C")), initial=0.0)))
+    return c.outcome()
+
+
+def rank(subject: Subject) -> Outcome:
+    """The rows of J are independent, at one of the poses at least."""
+    c = Comparison("rank", subject, "J", f"rank of J against {subject.type.rows} declared rows")
+    size = np.max([np.linalg.norm(_rows_of_J(s), axis=1) for s in subject.samples], axis=0)
+    size = np.where(size > 0.0, size, 1.0)[:, None]
+    ranks = [(_rank(_rows_of_J(sample) / size), sample) for sample in subject.assembled]
+    found, sample = max(ranks, key=lambda pair: pair[0], default=(subject.type.rows, None))
+    if sample is not None and found < subject.type.rows:
+        row = _dependent_row(_rows_of_J(sample) / size) + 1
+        off = max(_rank(_rows_of_J(s) / size) for s in subject.samples)
+        why = f"row {row} follows from those before it, so one row is too many"
+        if off > found:
+            why = (
+                f"where C = 0 the gradient of row {row} vanishes or follows from those before it, "
+                f"though elsewhere the rank is {off}, so that nothing holds the bodies there; is C "
+                "a square, whose root would do?"
+            )
+        c.fail(f"the rank of J is {found} at best, and {subject.type.rows} rows are declared: "
+               f"{why}", sample, row)  # fmt: skip
+    return c.outcome(sized=False)
+
+
+def _rows_of_J(sample: Sample) -> Floats:
+    """(rows, columns) J of the bodies that are not on ground."""
+    J = sample.value("J")
+    J = J[[s for s in range(len(J)) if not (sample.grounded and s == 1)]]
+    return J.transpose(1, 0, 2).reshape(J.shape[1], -1)
+
+
+def _rank(rows: Floats) -> int:
+    """The rank of rows whose size is about one off the manifold."""
+    return int(np.sum(np.linalg.svd(rows, compute_uv=False) > VANISHING))
+
+
+def _dependent_row(rows: Floats) -> int:
+    """The first row that those before it span."""
+    return next(k for k in range(len(rows)) if _rank(rows[: k + 1]) <= k)
+
+
+def null_space(matrix: Floats) -> Floats:
+    """(columns, n) orthonormal velocities that a matrix takes to zero."""
+    _, values, right = np.linalg.svd(matrix)
+    count = int(np.sum(values > RANK_TOLERANCE * max(np.max(values, initial=0.0), 1e-300)))
+    return right[count:].T
+
+
+def poses(subject: Subject) -> list[Sample]:
+    """Random poses off the manifold and on it."""
+    return [*subject.samples, *subject.assembled]
+
+
+def against_ground(subject: Subject) -> str:
+    """Why a type is not asked to be indifferent to where ground is; "" where it is."""
+    specs = specs_of(subject.type)
+    fixed = [name for name, spec in specs.items() if spec.kind == "vector" and spec.ground]
+    if fixed:
+        return f"{fixed[0]} is a vector of ground"
+    if len(subject.examined.layout.slots) < 2:
+        return "it acts between one body and ground"
+    if subject.type.ground_axes:
+        return "it is declared to use the axes of ground (ground_axes = True)"
+    return ""
+
+
+def _velocities(sample: Sample) -> Floats:
+    count = len(sample.kernels.examined.layout.slots)
+    return np.hstack([sample.state.v, sample.state.w])[1 : count + 1]

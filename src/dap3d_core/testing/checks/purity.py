@@ -1,0 +1,182 @@
+"""The checks that hold for kernels of every kind: they are pure, and the same when compiled."""
+
+import builtins
+import dis
+import random
+import types
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
+from dap3d_core.kernels.runtime.cache import jit_is_on, reached
+from dap3d_core.testing.compare import Comparison, Wrong, left_out
+from dap3d_core.testing.findings import Outcome
+from dap3d_core.testing.samples.sampled_type import Sample, Subject, UndefinedError
+
+#: Compiled and plain code round differently (a b + c in one rounding).
+COMPILED_TOLERANCE = 1e-12
+#: Modules and built-in functions that a pure function has no use for.
+IMPURE_MODULES = ("datetime", "io", "os", "pathlib", "random", "secrets", "socket", "subprocess",
+                  "sys", "tempfile", "threading", "time", "uuid")  # fmt: skip
+IMPURE_BUILTINS = ("delattr", "eval", "exec", "globals", "id", "input", "locals", "open", "print",
+                   "setattr", "vars")  # fmt: skip
+#: What a kernel may read from outside: it cannot change, or is looked at in its turn.
+CONSTANTS = (bool, int, float, complex, str, bytes, type(None), type, types.FunctionType,
+             types.BuiltinFunctionType, np.generic, np.ufunc)  # fmt: skip
+
+
+def purity(subject: Subject) -> Outcome:
+    """Kernels give the same numbers each time, and read and change nothing from outside."""
+    c = Comparison("purity", subject, "", "the same numbers each time, nothing from outside")
+    for name in _names(subject):
+        c.kernel = name
+        for words in _outside(subject.examined.kernels[name]):
+            c.fail(f"{name} is not pure: {words}")
+    for name, difference in differing(subject).items():
+        c.kernel = name
+        c.fail(*difference)
+    c.kernel = "prepare"
+    try:
+        same = all(a.element.par == b.element.par
+                   for a, b in zip(subject.samples, subject.again(), strict=True))  # fmt: skip
+    except UndefinedError:
+        same = False
+    if not same:
+        c.fail(
+            "prepare returns other numbers for the same fields and poses when it is called again"
+        )
+    return c.outcome(sized=False)
+
+
+def differing(subject: Subject) -> dict[str, tuple[str, Sample, int]]:
+    """The kernels that give other numbers when they are called again: words, pose and row."""
+    return subject.kept("differing", lambda: dict(_differing(subject)))
+
+
+def _differing(subject: Subject) -> Iterator[tuple[str, tuple[str, Sample, int]]]:
+    for name in _names(subject):
+        samples = (subject.friction if name == "friction" else subject).samples
+        first = [sample.value(name) for sample in samples]
+        again = [sample.value(name) for sample in reversed(samples)][::-1]
+        found = [(sample, k, one[k], other[k])
+                 for sample, one, other in zip(samples, first, again, strict=True)
+                 for k in range(len(one)) if not np.array_equal(one[k], other[k])]  # fmt: skip
+        if found:
+            sample, k, one, other = found[0]
+            words = f"row {k + 1} of {name} gives other numbers when it is called again: "
+            yield name, (f"{words}{_number(one)}, then {_number(other)}", sample, k + 1)
+
+
+def _names(subject: Subject) -> tuple[str, ...]:
+    """The kernels of a type, the friction of a joint among them."""
+    return (*subject.kernels.names(), *(("friction",) if _rubs(subject) else ()))
+
+
+def compiled(subject: Subject) -> Outcome:
+    """Compiled, the kernels give the numbers of plain Python."""
+    if not jit_is_on():
+        return left_out("compiled", subject, "nothing is compiled (DAP3D_PLAIN)")
+    c = Comparison("compiled", subject, "", "compiled numbers against those of plain Python")
+    for kind, kernels in LOOP_KINDS.items():
+        owner = subject.friction if kind == "friction" and _rubs(subject) else subject
+        if any(name in owner.kernels.names() for name in kernels):
+            _compare_compiled(c, owner, kind)
+    return c.outcome()
+
+
+def _compare_compiled(c: Comparison, subject: Subject, kind: str) -> None:
+    for sample in subject.samples:
+        try:
+            found = subject.kernels.compiled_values(kind, sample.element, sample.state)
+        except Exception as error:
+            c.kernel = kind
+            c.fail(
+                f"the kernels of its loop cannot be compiled ({kind}): {error}; a kernel is plain: "
+                "tuples of numbers, the words of dap3d_core.kernels, where() for branches"
+            )
+            return
+        for name, value in found.items():
+            c.kernel = name
+            plain = sample.value(name)
+            if name == "J":  # rows first
+                value, plain = value.transpose(1, 0, 2), plain.transpose(1, 0, 2)
+            c.compare(sample, value, plain, _about_compiled(name), tolerance=COMPILED_TOLERANCE)
+
+
+def _about_compiled(name: str) -> Callable[[Wrong], str]:
+    return lambda x: (
+        f"row {x.row + 1} of {name} is {x.is_:.17g} compiled and {x.should:.17g} in plain Python"
+    )
+
+
+def _rubs(subject: Subject) -> bool:
+    return "friction" in subject.examined.kernels and subject.type.kind == "joint"
+
+
+def _outside(kernel: Callable[..., Any]) -> Iterator[str]:
+    """What a function, and those it calls, read or change that is not theirs, in words."""
+    for function in reached(kernel)[0]:
+        if (function.__module__ or "").partition(".")[0] == "dap3d_core":
+            continue
+        where = "" if function.__code__ is kernel.__code__ else f" (in {function.__name__})"
+        for code in _codes(function.__code__):
+            for step in dis.get_instructions(code):
+                if words := _about(function, step):
+                    yield f"{words}{where}"
+
+
+def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from _codes(constant)
+
+
+def _about(function: Any, step: dis.Instruction) -> str:
+    name = str(step.argval)
+    if step.opname in ("STORE_GLOBAL", "DELETE_GLOBAL"):
+        return f"it changes {name} of its module; return what is to be known"
+    if step.opname in ("STORE_ATTR", "STORE_SUBSCR", "DELETE_SUBSCR", "DELETE_ATTR"):
+        return "it changes something in place; tuples are made anew"
+    if step.opname in ("IMPORT_NAME", "IMPORT_FROM"):
+        return f"it imports {name}; import at the top of the file"
+    if step.opname == "LOAD_GLOBAL":
+        return _about_global(name, function.__globals__)
+    if step.opname == "LOAD_DEREF" and name in function.__code__.co_freevars:
+        cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+        return _about_value(name, cells[name].cell_contents)
+    return ""
+
+
+def _about_global(name: str, names: dict[str, Any]) -> str:
+    if name in names:
+        return _about_value(name, names[name])
+    if name in IMPURE_BUILTINS and hasattr(builtins, name):
+        return f"it calls {name}()"
+    return ""
+
+
+def _about_value(name: str, value: Any) -> str:
+    """Why a value from outside is no constant; "" where it is one."""
+    module = (
+        value.__name__ if isinstance(value, types.ModuleType) else getattr(value, "__module__", "")
+    )
+    if str(module).partition(".")[0].lstrip("_") in IMPURE_MODULES or isinstance(
+        getattr(value, "__self__", None), random.Random
+    ):
+        return f"it uses {name} of the module {module}, whose answer is not made of its arguments"
+    if isinstance(value, tuple):
+        return next((w for v in value if (w := _about_value(name, v))), "")
+    if isinstance(value, (*CONSTANTS, types.ModuleType)) or hasattr(value, "__wrapped__"):
+        return ""
+    return (
+        f"it reads {name}, a {type(value).__name__} that anyone may change; make it a tuple, or "
+        "let prepare return it"
+    )
+
+
+def _number(value: Any) -> str:
+    worst = np.ravel(value)
+    return f"{worst[0]:.17g}" if len(worst) == 1 else str(tuple(worst.tolist()))

@@ -1,0 +1,173 @@
+"""Comparing what a kernel returns with what it should be, row by row, at many poses."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.testing.findings import FAILED, LEFT_OUT, OK, Finding, Outcome
+from dap3d_core.testing.samples.random_state import Direction, Floats
+from dap3d_core.testing.samples.sampled_type import Sample, Subject
+
+#: Allowed of the largest number compared: a derivative by complex step has the roundings of the
+#: formula alone, some 1e-16 times its condition; differences with h = 2e-3 leave about 1e-12 of
+#: truncation and rounding, far more where functions are steep (the spread of three steps says).
+STEP_TOLERANCE, DIFFERENCE_TOLERANCE, EXACT_TOLERANCE = 1e-9, 1e-7, 1e-9
+
+
+@attrs.frozen
+class Wrong:
+    """A number that is wrong: row (from 0), place behind it, what it is and should be."""
+
+    row: int
+    at: tuple[int, ...]
+    is_: float
+    should: float
+
+    @property
+    def error(self) -> float:
+        """By how much."""
+        return abs(self.is_ - self.should)
+
+
+@attrs.define
+class Comparison:
+    """The outcome of one check of a type, as it is found pose by pose.
+
+    Attributes:
+        check: its name.
+        subject: what is checked.
+        kernel: the function that is wrong where something is.
+        words: what is compared.
+    """
+
+    check: str
+    subject: Subject
+    kernel: str
+    words: str
+    notes: dict[str, None] = attrs.field(factory=dict)
+    largest: float | None = None
+    differences: float | None = None
+    _worst: dict[Any, tuple[float, Finding]] = attrs.field(factory=dict)
+
+    def compare(
+        self,
+        sample: Sample,
+        got: Floats,
+        want: Any,
+        says: Callable[[Wrong], str],
+        *,
+        tolerance: float = EXACT_TOLERANCE,
+        bound: Any = None,
+        scale: float = 0.0,
+        rows: Iterable[int] | None = None,
+    ) -> None:
+        """Compare two arrays, the rows first.
+
+        Args:
+            sample: where.
+            got, want: (rows, ...) what is, and what should be.
+            says: the finding in words.
+            tolerance: allowed, times 1 + the largest number of both.
+            bound: (rows, ...) how wrong ``want`` may be itself, which is found by differences.
+            scale: a larger number than those compared, of which they are differences.
+            rows: which rows of the kernel these are.
+        """
+        got, want = np.asarray(got, dtype=float), np.broadcast_to(want, got.shape)
+        if not got.size:
+            return
+        numbers = list(range(len(got))) if rows is None else list(rows)
+        size = 1.0 + max(scale, np.max(np.abs(want), initial=0.0), np.max(np.abs(got), initial=0.0))
+        excess = np.abs(got - want) / size
+        if bound is None:
+            self.largest = max(self.largest or 0.0, float(np.max(excess)))
+        else:
+            spread = np.broadcast_to(bound, got.shape) / size
+            smooth = excess[spread < tolerance]
+            self.differences = max(self.differences or 0.0, float(np.max(smooth, initial=0.0)))
+            excess = excess - spread
+        for k, row in enumerate(numbers):
+            at = np.unravel_index(np.argmax(excess[k]), excess[k].shape)
+            error = float(excess[k][at])
+            if not np.isfinite(error):
+                continue
+            wrong = Wrong(row, tuple(map(int, at)), float(got[k][at]), float(want[k][at]))
+            if error > tolerance and error > self._worst.get((self.kernel, row), (0.0, None))[0]:
+                self._add((self.kernel, row), error, row + 1, says(wrong), sample, wrong.error,
+                          tolerance * size)  # fmt: skip
+
+    def fail(self, words: str, sample: Sample | None = None, row: int = 0) -> None:
+        """Something is wrong that has no size."""
+        self._worst.setdefault(words, (0.0, self._finding(row, words, sample, 0.0, 0.0)))
+
+    def note(self, words: str) -> None:
+        """Something could not be done; said once."""
+        self.notes[words] = None
+
+    def outcome(self, *, sized: bool = True) -> Outcome:
+        """What the check came to."""
+        findings = tuple(finding for _, finding in self._worst.values())
+        error, state = self.largest if sized else None, FAILED if findings else OK
+        variant, notes = self.subject.variant, tuple(self.notes)
+        return Outcome(
+            self.check, variant, state, self.words, error, self.differences, notes, findings
+        )
+
+    def _add(
+        self, key: Any, excess: float, row: int, words: str, sample: Sample, *numbers: float
+    ) -> None:
+        self._worst[key] = excess, self._finding(row, words, sample, *numbers)
+
+    def _finding(
+        self, row: int, words: str, sample: Sample | None, error: float, tolerance: float
+    ) -> Finding:
+        pose = {} if sample is None else sample.pose()
+        return Finding(
+            self.check, self.subject.variant, self.kernel, row, words, error, tolerance, pose
+        )
+
+
+def left_out(check: str, subject: Subject, why: str) -> Outcome:
+    """The outcome of a check that does not apply."""
+    return Outcome(check, subject.variant, LEFT_OUT, why)
+
+
+@attrs.frozen(eq=False)
+class Rate:
+    """A derivative: its values, how far they may be wrong (None for those by complex step), what is
+    allowed, and how it was found.
+    """
+
+    value: Floats
+    bound: Floats | None
+    tolerance: float
+    way: str
+
+
+def rates(sample: Sample, name: str, along: Direction, comparison: Comparison) -> list[Rate]:
+    """The derivative of a kernel along a direction: by complex step and by differences.
+
+    Where the kernel does not take complex numbers, by differences alone; a note says so.
+    """
+    found = []
+    try:
+        slope = sample.slope(name, along)
+        found.append(Rate(slope, None, STEP_TOLERANCE, "complex step"))
+    except Exception as error:
+        comparison.note(
+            f"{name} does not run on complex numbers ({type(error).__name__}: {error}), so its "
+            "derivatives are differences alone; take the words of dap3d_core.kernels"
+        )
+    value, bound = sample.difference(name, along)
+    found.append(Rate(value, bound, DIFFERENCE_TOLERANCE, "differences"))
+    return found
+
+
+def body_words(sample: Sample, slot: int, component: int) -> str:
+    """A way to move a body, in words: "the position of body i along x"."""
+    letter = sample.kernels.examined.layout.slots[slot]
+    axis = "xyz"[component % 3]
+    if component < 3:
+        return f"the position of body {letter} along {axis}"
+    return f"a turn of body {letter} about {axis}"

@@ -1,0 +1,113 @@
+"""Kernels run on numbers of any kind: what they do with them can be compiled and differentiated."""
+
+import random
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from dap3d_core.interface.codegen.kernel_arguments import friction_names, parameters
+from dap3d_core.interface.examine.examine import ATTEMPTS
+from dap3d_core.interface.examine.random_values import random_quantity
+from dap3d_core.interface.kernel_words import PLAINLY
+from dap3d_core.interface.source_location import line_of
+from dap3d_core.testing.compare import Comparison
+from dap3d_core.testing.findings import Outcome
+from dap3d_core.testing.samples.complex_step import Stepped
+from dap3d_core.testing.samples.sampled_type import UNDEFINED, Subject
+
+#: Random inputs of each kernel: ``where`` takes one of two ways.
+TRIES = 8
+
+
+class BranchError(TypeError):
+    """A kernel asks whether a condition on its numbers holds."""
+
+
+class Condition:
+    """A comparison of numbers whose answer only the words of kernels may see."""
+
+    __slots__ = ("holds",)
+
+    def __init__(self, holds: bool) -> None:
+        self.holds = holds
+
+    def __bool__(self) -> bool:
+        asking = sys._getframe(1).f_globals.get("__name__", "")
+        if not asking.startswith("dap3d_core.kernels"):
+            raise BranchError("a branch on a number")
+        return self.holds
+
+    def __and__(self, other: Any) -> "Condition":
+        return Condition(self.holds & getattr(other, "holds", other))
+
+    def __or__(self, other: Any) -> "Condition":
+        return Condition(self.holds | getattr(other, "holds", other))
+
+    __rand__, __ror__ = __and__, __or__
+
+
+def _compared(name: str) -> Callable[[Any, Any], Condition]:
+    compare = getattr(Stepped, name)
+    return lambda self, other: Condition(compare(self, other))
+
+
+class Unknown(Stepped):
+    """A number that is no float, and tells nobody how large it is."""
+
+    __slots__ = ()
+    __hash__ = complex.__hash__
+    __eq__, __ne__ = _compared("__eq__"), _compared("__ne__")  # type: ignore[assignment]
+    __lt__, __le__ = _compared("__lt__"), _compared("__le__")  # type: ignore[assignment]
+    __gt__, __ge__ = _compared("__gt__"), _compared("__ge__")  # type: ignore[assignment]
+
+    def __bool__(self) -> bool:
+        raise BranchError("a branch on a number")
+
+    def _has_no_digits(self, *_: Any) -> Any:
+        raise TypeError("the digits of a number are asked for")
+
+    __floor__ = __ceil__ = __trunc__ = _has_no_digits
+    __round__ = _has_no_digits  # type: ignore[assignment]
+
+
+def plain(subject: Subject) -> Outcome:
+    """Kernels branch by ``where`` alone, and take their mathematics from the words of kernels."""
+    words = "kernels run on numbers that are no floats, as derivatives and compilers have them"
+    c = Comparison("plain", subject, "", words)
+    for name, kernel in subject.examined.kernels.items():
+        if reason := _not_plain(subject, name, kernel):
+            c.kernel = name
+            c.fail(f"{name} {reason}; {PLAINLY}")
+    return c.outcome(sized=False)
+
+
+def _not_plain(subject: Subject, name: str, kernel: Callable[..., Any]) -> str:
+    """What a kernel does that is not plain, with its line; "" where it is plain."""
+    offered, rng = subject.examined.names, random.Random(f"{subject.seed} {name}")
+    if name == "friction":
+        offered = friction_names(subject.type.rows) | offered
+    tries = 0
+    for _ in range(ATTEMPTS):
+        values = [random_quantity(offered[n], rng) for n in parameters(kernel)]
+        try:
+            kernel(*map(_unknown, values))
+        except UNDEFINED:
+            continue
+        except BranchError as error:
+            return f"branches on a number{line_of(error, kernel)}"
+        except Exception as error:
+            words = f"{type(error).__name__}: {error}"
+            if "__array_ufunc__" in words:
+                words = "a function of numpy or scipy"
+            return f"takes floats alone ({words}){line_of(error, kernel)}"
+        tries += 1
+        if tries == TRIES:
+            break
+    return ""
+
+
+def _unknown(value: Any) -> Any:
+    """The numbers of a value, made unknown; tables and functions as they are."""
+    if isinstance(value, tuple) and not (value and isinstance(value[0], list)):
+        return tuple(map(_unknown, value))
+    return Unknown(value) if isinstance(value, float) else value

@@ -1,0 +1,1 @@
+"""Random types, elements and states that checks are run on."""

@@ -1,0 +1,198 @@
+"""The state of the bodies and functions of an element, and the ways in which it is changed."""
+
+import math
+import random
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.interface.examine.random_values import numbers, random_pose
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, R, V, W
+
+Floats = NDArray[np.float64]
+
+#: Ground, and a body for each of the slots i, j, k.
+BODIES = 4
+
+
+@attrs.frozen
+class TimeFunction:
+    """A smooth function of time with its exact derivatives: c0 + c1 t + c2 t^2 + c3 sin(c4 t)."""
+
+    c: tuple[float, ...]
+
+    def at(self, t: float) -> tuple[float, ...]:
+        """(f, f', f'', f''') at a time."""
+        c0, c1, c2, c3, c4 = self.c
+        s, c = c3 * math.sin(c4 * t), c3 * math.cos(c4 * t)
+        return (
+            c0 + c1 * t + c2 * t * t + s,
+            c1 + 2 * c2 * t + c4 * c,
+            2 * c2 - c4**2 * s,
+            -(c4**3) * c,
+        )
+
+
+@attrs.frozen(eq=False)
+class Direction:
+    """A way to go: rates of positions (m/s), turns (rad/s, global) and time, row 0 for ground."""
+
+    move: Floats
+    turn: Floats
+    time: float = 0.0
+
+    @classmethod
+    def of(cls, slot: int, component: int) -> "Direction":
+        """Body ``slot`` (from 0) along x, y, z or about x, y, z (components 0 to 5)."""
+        both = np.zeros((2, BODIES, 3))
+        both[component // 3, slot + 1, component % 3] = 1.0
+        return cls(both[0], both[1])
+
+    @classmethod
+    def in_time(cls) -> "Direction":
+        """Time alone: the bodies stay where they are."""
+        return cls(np.zeros((BODIES, 3)), np.zeros((BODIES, 3)), 1.0)
+
+
+@attrs.frozen(eq=False)
+class State:
+    """Time, and for ground and each slot r (4, 3), p (4, 4), velocity, angular velocity (4, 3).
+
+    ``mass`` (4,) and ``Jp`` (4, 9) are the bodies' inertia, ``functions`` those of time; None
+    stands for one that is absent.
+    """
+
+    t: float
+    r: Floats
+    p: Floats
+    v: Floats
+    w: Floats
+    mass: Floats
+    Jp: Floats
+    functions: tuple[TimeFunction | None, ...]
+
+    def body(self) -> Floats:
+        """(4, BODY_WIDTH) columns of the bodies, as a group loop reads them."""
+        body = np.zeros((BODIES, BODY_WIDTH))
+        body[:, R : R + 3], body[:, A : A + 9] = self.r, rotation(self.p).reshape(BODIES, 9)
+        body[:, V : V + 3], body[:, W : W + 3], body[:, P : P + 4] = self.v, self.w, self.p
+        body[:, MASS], body[:, JP : JP + 9] = self.mass, self.Jp
+        return body
+
+    def body_rate(self, along: Direction) -> Floats:
+        """The rate of ``body`` along a direction; velocities stay."""
+        rate = np.zeros((BODIES, BODY_WIDTH))
+        rate[:, R : R + 3] = along.move
+        turned = (along.turn @ _SKEW).reshape(BODIES, 3, 3) @ rotation(self.p)
+        rate[:, A : A + 9] = turned.reshape(BODIES, 9)
+        rate[:, P : P + 4] = 0.5 * quaternion_product(_pure(along.turn), self.p)
+        return rate
+
+    def table(self) -> Floats:
+        """(functions + 1, 5) f, f', f'', f''' at t, and f at 0; row 0 is the absent function."""
+        rows = [(*f.at(self.t), f.at(0.0)[0]) if f else (0.0,) * 5 for f in self.functions]
+        return np.array([(0.0,) * 5, *rows])
+
+    def table_rate(self, along: Direction) -> Floats:
+        """The rate of ``table`` along a direction."""
+        rate = np.zeros((len(self.functions) + 1, 5))
+        rate[:, :3] = along.time * self.table()[:, 1:4]
+        return rate
+
+    def moved(self, along: Direction, h: float) -> "State":
+        """The state a finite way h along a direction: turns are finite rotations."""
+        angle = np.sqrt(np.sum(along.turn**2, axis=1, keepdims=True)) * h
+        half = np.where(angle == 0.0, 0.5 * h, np.sin(angle / 2) * h / np.where(angle, angle, 1.0))
+        q = np.hstack([np.cos(angle / 2), half * along.turn])
+        return attrs.evolve(
+            self,
+            t=self.t + along.time * h,
+            r=self.r + h * along.move,
+            p=quaternion_product(q, self.p),
+        )
+
+    def together(self, q: Floats, shift: Floats, speed: Floats, spin: Floats) -> "State":
+        """All bodies turned by a quaternion and shifted as one, then set in motion as one."""
+        R = rotation(q[None])[0]
+        r = self.r @ R.T + shift
+        return attrs.evolve(
+            self,
+            r=r,
+            p=quaternion_product(np.broadcast_to(q, (BODIES, 4)), self.p),
+            v=self.v @ R.T + speed + np.cross(spin, r),
+            w=self.w @ R.T + spin,
+        )
+
+    def at_rest(self) -> "State":
+        """The same pose without velocities."""
+        return attrs.evolve(self, v=np.zeros((BODIES, 3)), w=np.zeros((BODIES, 3)))
+
+    def with_velocity(self, x: Floats) -> "State":
+        """The same pose with velocities (slots, 6) of the bodies."""
+        v, w = self.v.copy(), self.w.copy()
+        v[1 : len(x) + 1], w[1 : len(x) + 1] = x[:, :3], x[:, 3:]
+        return attrs.evolve(self, v=v, w=w)
+
+    def motion(self) -> Direction:
+        """The direction in which the state moves: its velocities, and time."""
+        return Direction(self.v, self.w, 1.0)
+
+
+def random_state(rng: random.Random, functions: Sequence[bool], *, grounded: bool) -> State:
+    """A state off the origin, turned and moving.
+
+    Args:
+        rng: where its numbers come from.
+        functions: which functions of time are there.
+        grounded: whether slot j is on ground.
+    """
+    poses = [random_pose(rng) for _ in range(BODIES)]
+    r, p = np.array([x.r for x in poses]), np.array([x.p for x in poses])
+    v, w = (np.array([numbers(rng, 3) for _ in range(BODIES)]) for _ in range(2))
+    L = [np.reshape([rng.uniform(-0.3, 0.3) for _ in range(9)], (3, 3)) for _ in range(BODIES)]
+    Jp = np.array([(x @ x.T + 0.5 * np.eye(3)).ravel() for x in L])
+    mass = np.array([rng.uniform(0.5, 2.0) for _ in range(BODIES)])
+    for b in (0, 2) if grounded else (0,):
+        r[b], p[b], v[b], w[b], mass[b], Jp[b] = 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0
+    found = (TimeFunction(numbers(rng, 5)) if there else None for there in functions)
+    return State(rng.uniform(0.1, 1.0), r, p, v, w, mass, Jp, tuple(found))
+
+
+def quaternion_product(a: Floats, b: Floats) -> Floats:
+    """The quaternion products a o b of rows of four."""
+    found: Floats = (a[:, :, None] * b[:, None, :]).reshape(-1, 16) @ _PRODUCT
+    return found
+
+
+def rotation(p: Floats) -> Floats:
+    """(n, 3, 3) rotation matrices of rows of unit Euler parameters (spec 1)."""
+    return ((p[:, :, None] * p[:, None, :]).reshape(-1, 16) @ _ROTATION).reshape(-1, 3, 3)
+
+
+def _tables() -> tuple[Floats, Floats, Floats]:
+    """What products of two quaternions, rotations and skew matrices are made of.
+
+    A = (e0^2 - e . e) I + 2 e e^T + 2 e0 e~;  a o b = (a0 b0 - u . v, a0 v + b0 u + u x v).
+    """
+    unit = np.eye(3)
+    skew = np.array([np.cross(unit, -e) for e in unit]).transpose(0, 2, 1)
+    turn, product = np.zeros((4, 4, 3, 3)), np.zeros((4, 4, 4))
+    turn[0, 0], product[0, 0, 0] = unit, 1.0
+    for k in range(3):
+        turn[k + 1, k + 1] -= unit
+        turn[0, k + 1] += 2.0 * skew[k]
+        product[k + 1, k + 1, 0] = -1.0
+        product[0, k + 1, k + 1] = product[k + 1, 0, k + 1] = 1.0
+        for n in range(3):
+            turn[k + 1, n + 1, k, n] += 2.0
+            product[k + 1, n + 1, 1:] += np.cross(unit[k], unit[n])
+    return product.reshape(16, 4), turn.reshape(16, 9), skew.reshape(3, 9)
+
+
+_PRODUCT, _ROTATION, _SKEW = _tables()
+
+
+def _pure(turn: Floats) -> Floats:
+    return np.hstack([np.zeros((BODIES, 1)), turn])

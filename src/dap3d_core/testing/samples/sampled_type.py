@@ -1,0 +1,314 @@
+"""What is checked: a type, or one of its variants, at random poses on and off the manifold."""
+
+import math
+import random
+from collections.abc import Callable, Iterator, Mapping
+from itertools import product
+from typing import Any, TypeVar
+
+import attrs
+import numpy as np
+
+from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
+from dap3d_core.interface.examine.examine import ATTEMPTS, Examined, examine, where_is
+from dap3d_core.interface.fields import specs_of
+from dap3d_core.testing.samples.cubic import Cubic
+from dap3d_core.testing.samples.random_element import Element, Kernels, Refusal, draw
+from dap3d_core.testing.samples.random_state import Direction, Floats, State, random_state
+
+Kept = TypeVar("Kept")
+#: |C| below which a pose counts as assembled, and Newton steps and starts until it must be.
+ASSEMBLED, NEWTON_STEPS, STARTS = 1e-11, 40, 12
+#: Newton's method has failed where it does not halve |C| in so many steps.
+STALLED = 8
+#: Smallest singular value of J, of the largest, below which another pose is looked for.
+SINGULAR = 1e-3
+#: What a pose without a number is: division by zero, the square root of a negative number.
+UNDEFINED = (ZeroDivisionError, OverflowError, FloatingPointError)
+
+
+class UndefinedError(ValueError):
+    """The kernels of a type give no finite numbers for any of many random poses."""
+
+
+@attrs.frozen(eq=False)
+class Sample:
+    """An element in a state.
+
+    Attributes:
+        kernels: of its type.
+        element: the instance.
+        state: where the bodies are, and how they move.
+        grounded: whether slot j is on ground.
+        label: which of the random poses it is.
+        seed: of all of them.
+    """
+
+    kernels: Kernels
+    element: Element
+    state: State
+    grounded: bool
+    label: str
+    seed: int
+
+    def value(self, name: str, state: State | None = None) -> Floats:
+        """What a kernel returns, here or in another state."""
+        return self.kernels.value(name, self.element, self.state if state is None else state)
+
+    def slope(self, name: str, along: Direction) -> Floats:
+        """Its derivative by complex step; raises what the kernel raises on complex numbers."""
+        return self.kernels.slope(name, self.element, self.state, along)
+
+    def difference(self, name: str, along: Direction) -> tuple[Floats, Floats]:
+        """Its derivative by sixth-order central differences, and how far it may be wrong.
+
+        The bound is large where a branch lies among the samples: ten times the difference of two
+        step sizes, and of the bend between the sides that does not shrink with the step.
+        """
+        return self._difference(lambda state: self.value(name, state), along)
+
+    def bend(self, along: Direction) -> tuple[Floats, Floats]:
+        """The second derivative of C along a direction, and how far it may be wrong."""
+
+        def slope(state: State) -> Floats:
+            try:
+                return self.kernels.slope("C", self.element, state, along)
+            except Exception:  # of a kernel that takes floats alone
+                return attrs.evolve(self, state=state).difference("C", along)[0]
+
+        return self._difference(slope, along)
+
+    def _difference(
+        self, value: Callable[[State], Floats], along: Direction
+    ) -> tuple[Floats, Floats]:
+        h, here = 1e-3, value(self.state)
+        odd, even = {}, {}
+        for k in (1, 2, 3, 4, 6):
+            ahead, back = (value(self.state.moved(along, s * k * h)) for s in (1, -1))
+            odd[k], even[k] = ahead - back, np.abs(ahead - 2.0 * here + back) / (k * h)
+        one, two = (
+            (45.0 * odd[k] - 9.0 * odd[2 * k] + odd[3 * k]) / (60.0 * k * h) for k in (1, 2)
+        )
+        corner = np.maximum(even[1] - 0.5 * even[4], 0.0)
+        return two, 10.0 * (np.abs(one - two) + corner)
+
+    @property
+    def is_good(self) -> bool:
+        """Whether all kernels give finite numbers here, and the switches of the type are open."""
+        names = self.kernels.names()
+        type_: Any = self.kernels.examined.type
+        if "switch" in names and type_.switch_words and np.min(self.value("switch")) <= 0.0:
+            return False
+        return all(np.isfinite(self.value(name)).all() for name in names)
+
+    def pose(self) -> dict[str, Any]:
+        """The pose by name, for messages."""
+        s = self.state
+        slots = self.kernels.examined.layout.slots
+        found: dict[str, Any] = {"seed": self.seed, "pose": self.label, "t": float(s.t)}
+        for k, slot in enumerate(slots, start=1):
+            found |= {f"{n}_{slot}": tuple(x[k].tolist()) for n, x in
+                      (("r", s.r), ("p", s.p), ("v", s.v), ("w", s.w))}  # fmt: skip
+        return found | {n: v for n, v in self.element.fields.items() if n not in found}
+
+
+@attrs.frozen(eq=False)
+class Subject:
+    """A type, or a variant of it, with its random samples.
+
+    Attributes:
+        examined: the type or variant, its functions of an argument known.
+        choices: values of fields that make the variant.
+        seed, poses: of the samples, and how many of each sort.
+    """
+
+    examined: Examined
+    choices: Mapping[str, Any]
+    seed: int
+    poses: int
+    _memory: dict[str, Any] = attrs.field(factory=dict)
+
+    @property
+    def type(self) -> Any:
+        """The class."""
+        return self.examined.type
+
+    @property
+    def variant(self) -> str:
+        """The values that make the variant, in words."""
+        return ", ".join(f"{n} = {str(v).lower() if isinstance(v, bool) else v}"
+                         for n, v in self.choices.items())  # fmt: skip
+
+    @property
+    def kernels(self) -> Kernels:
+        """Its kernels."""
+        return self.kept("kernels", lambda: Kernels(self.examined))
+
+    @property
+    def friction(self) -> "Subject":
+        """The friction of a joint as an element of its own."""
+        return self.kept(
+            "friction",
+            lambda: Subject(bind_friction(self.examined), self.choices, self.seed, self.poses),
+        )
+
+    @property
+    def samples(self) -> list[Sample]:
+        """Random poses off the manifold; of elements of two bodies or more the last is on ground.
+
+        Raises:
+            UndefinedError: there are none with finite numbers.
+        """
+        return self.kept("samples", lambda: [self._sample(k) for k in range(self.poses)])
+
+    @property
+    def assembled(self) -> list[Sample]:
+        """Random poses with C = 0 and velocities with J v = nu; fewer where none was found."""
+        return self.kept("assembled", lambda: list(self._assembled()))
+
+    def again(self) -> list[Sample]:
+        """The samples, drawn anew from the same random numbers."""
+        return [self._sample(k) for k in range(self.poses)]
+
+    def kept(self, name: str, make: Callable[[], Kept]) -> Kept:
+        """What is found once and asked for often."""
+        if name not in self._memory:
+            self._memory[name] = make()
+        kept: Kept = self._memory[name]
+        return kept
+
+    def _sample(self, k: int, start: int = 0) -> Sample:
+        title = f"{self.seed} {self.type.__qualname__} {k} {start}"
+        rng = random.Random(title)
+        layout = self.examined.layout
+        grounded = k == self.poses - 1 > 0 and layout.slots[1:2] == ("j",)
+        given = [k % 2 == 0 or rng.random() < 0.5 for _ in layout.functions]
+        given += [False] if self.type.kind == "function" else []  # the row that it fills itself
+        conditions = dict.fromkeys(self.examined.argument_functions, True) | dict(self.choices)
+        choices = {n: "cubic" if specs_of(self.type)[n].kind == "function" else v
+                   for n, v in conditions.items() if v is not False or
+                   specs_of(self.type)[n].kind == "choice"}  # fmt: skip
+        words = "its kernels give no finite numbers"
+        for _ in range(ATTEMPTS):
+            state = random_state(rng, given, grounded=grounded)
+            try:
+                element = draw(self.examined, choices, rng, state)
+                state = random_state(rng, given, grounded=grounded)
+                sample = Sample(self.kernels, element, state, grounded,
+                                f"pose {k + 1} off the manifold", self.seed)  # fmt: skip
+                if sample.is_good:
+                    return sample
+            except Refusal as error:
+                words = str(error)
+            except UNDEFINED:
+                continue
+        raise UndefinedError(f"{where_is(self.type)}: {ATTEMPTS} random elements in a row: {words}")
+
+    def _assembled(self) -> Iterator[Sample]:
+        starts = STARTS
+        for k in range(self.poses):
+            found = [assembled(self._sample(k, 1))]
+            while (found[-1] is None or _is_singular(found[-1])) and len(found) < starts:
+                found.append(assembled(self._sample(k, len(found) + 1)))
+            starts = 1 if len(found) == STARTS else starts  # more would not help
+            there = [sample for sample in found if sample is not None]
+            if there:
+                yield attrs.evolve(there[-1], label=f"pose {k + 1} on the manifold")
+
+
+def subjects(examined: Examined, seed: int, poses: int) -> list[Subject]:
+    """The type as it is, where no variant takes its place for all values, and its variants."""
+    found = []
+    own = own_values(examined)
+    if own is not None:
+        found.append((own, examined))
+    found += [(dict(conditions), e) for conditions, e in examined.variants]
+    return [Subject(_given(e, values), values, seed, poses) for values, e in found]
+
+
+def _given(examined: Examined, values: Mapping[str, Any]) -> Examined:
+    """The type with a cubic for each of its functions of an argument that is there.
+
+    One by whose absence no variant is told from another is always there.
+    """
+    there = {f: examine(Cubic) for f in examined.argument_functions if values.get(f, True)}
+    return bind_functions(examined, there, dict.fromkeys(there, 0)) if there else examined
+
+
+def own_values(examined: Examined) -> dict[str, Any] | None:
+    """Values of choices for which no variant takes the type's place; None where there are none."""
+    specs = specs_of(examined.type)
+    asked = [n for n in specs if any(n in conditions for conditions, _ in examined.variants)]
+    without = [(False,) * (not specs[n].required) for n in asked]
+    ways = [specs[n].choices or way for n, way in zip(asked, without, strict=True)]
+    for values in (dict(zip(asked, way, strict=True)) for way in product(*ways)):
+        given = {n: v or None if specs[n].kind == "function" else v for n, v in values.items()}
+        if examined.chosen(given) is examined:
+            return values
+    return None
+
+
+def position_jacobian(sample: Sample, state: State | None = None) -> Floats:
+    """dC/dq (position rows, slots, 6) by complex step, or by differences where that fails."""
+    here = sample if state is None else attrs.evolve(sample, state=state)
+    columns = []
+    for slot in range(len(here.kernels.examined.layout.slots)):
+        for component in range(6):
+            along = Direction.of(slot, component)
+            try:
+                columns.append(here.slope("C", along))
+            except Exception:
+                columns.append(here.difference("C", along)[0])
+    return np.stack(columns, axis=-1).reshape(len(columns[0]), -1, 6)
+
+
+def assembled(sample: Sample) -> Sample | None:
+    """The sample brought to C = 0 by Newton's method and to J v = nu; None where that fails."""
+    state, kernels, sizes = sample.state, sample.kernels, [math.inf] * STALLED
+    slots = len(kernels.examined.layout.slots)
+    free = [s for s in range(slots) if not (sample.grounded and s == 1)]
+    try:
+        for _ in range(NEWTON_STEPS if "C" in kernels.names() else 0):
+            C = sample.value("C", state)
+            if not np.isfinite(C).all():
+                return None
+            sizes.append(float(np.max(np.abs(C), initial=0.0)))
+            if sizes[-1] < ASSEMBLED:
+                break
+            if sizes[-1] > 0.5 * sizes[-1 - STALLED]:
+                return None
+            C_q = position_jacobian(sample, state)[:, free].reshape(len(C), -1)
+            step = -np.linalg.lstsq(C_q, C, rcond=1e-10)[0].reshape(-1, 6)
+            step *= min(1.0, 0.7 / max(float(np.max(np.abs(step))), 1e-300))
+            whole = np.zeros((slots, 6))
+            whole[free] = step
+            state = state.moved(_direction(whole), 1.0)
+        else:
+            if "C" in kernels.names():
+                return None
+        J = sample.value("J", state)
+        nu = sample.value("nu", state) if "nu" in kernels.names() else np.zeros(J.shape[1])
+        x = np.hstack([state.v, state.w])[1 : slots + 1]
+        flat = J[free].transpose(1, 0, 2).reshape(J.shape[1], -1)
+        x[free] -= np.linalg.lstsq(flat, flat @ x[free].ravel() - nu, rcond=1e-10)[0].reshape(-1, 6)
+        found = attrs.evolve(sample, state=state.with_velocity(x))
+        good = found.is_good
+    except (*UNDEFINED, np.linalg.LinAlgError):
+        return None
+    return found if good else None
+
+
+def _is_singular(sample: Sample) -> bool:
+    """Whether the rows of J nearly depend on each other, as Newton's method may lead to."""
+    J = sample.value("J")
+    values = np.linalg.svd(J.transpose(1, 0, 2).reshape(J.shape[1], -1), compute_uv=False)
+    return bool(values[-1] < SINGULAR * values[0])
+
+
+def _direction(x: Floats) -> Direction:
+    move, turn = np.zeros((4, 3)), np.zeros((4, 3))
+    move[1 : len(x) + 1], turn[1 : len(x) + 1] = x[:, :3], x[:, 3:]
+    return Direction(move, turn)
+
+
+__all__ = ["Sample", "Subject", "UndefinedError", "assembled", "own_values", "subjects"]

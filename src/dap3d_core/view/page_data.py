@@ -1,0 +1,108 @@
+"""The data of a page: motion, drawing, arrows, curves, and what the run says of itself."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import attrs
+
+from dap3d_core.result import Result, find
+from dap3d_core.scene.scene import Scene
+from dap3d_core.view.scene3d.arrows import arrows_of
+from dap3d_core.view.scene3d.primitives import packed
+from dap3d_core.view.scene3d.sampled_motion import Motion, chosen, thinned
+from dap3d_core.view.scene3d.scene_data import elements_of, geometry_of
+
+#: Curves that every page can draw besides those derived from motion and reactions.
+USUAL = ("energy.kinetic", "energy.potential", "energy.total")
+
+
+def page_data(
+    result: Result,
+    scene: Scene,
+    quantities: Sequence[str],
+    fps: float | None,
+    *,
+    share: int = 1,
+) -> dict[str, Any]:
+    """Everything that the page knows, ready for JSON.
+
+    Args:
+        result: what is shown.
+        scene: what was run.
+        quantities: curves that are shown at once, by name.
+        fps: frames a second; None for all instants, as far as they fit.
+        share: how many results share the page.
+
+    Raises:
+        UnknownNameError: there is no such quantity.
+        ValueError: there is no instant, or fps cannot be.
+    """
+    if not len(result.t):
+        raise ValueError("the result has no instants: there is nothing to show")
+    if fps is not None and not (math.isfinite(fps) and 0.0 < fps <= 1e6):
+        raise ValueError(f"fps = {fps:g}: the number of frames a second is greater than 0")
+    places = chosen(result.t, share * result.subject.body_count, fps)
+    shown = thinned(result, places)
+    elements = elements_of(result)
+    geometry = geometry_of(shown, scene, elements)
+    arrows = arrows_of(shown, elements, geometry["stage"]["size"])
+    notes = [*geometry.pop("notes"), *arrows.pop("notes")]
+    if len(places) < len(result.t):
+        notes.append(f"{len(places)} of {len(result.t)} reported instants are on this page")
+    return {
+        "instants": len(places),
+        "t": packed(shown.t, "<f8"),
+        "poses": packed(Motion(shown).poses),
+        **geometry,
+        **arrows,
+        "series": [_series(shown, name) for name in dict.fromkeys((*USUAL, *quantities))],
+        "asked": list(dict.fromkeys(quantities)),
+        "about": _about(result, scene, notes),
+    }
+
+
+def _series(result: Result, name: str) -> dict[str, Any]:
+    found = find(result, name)
+    return {
+        "name": name,
+        "label": found.label,
+        "unit": found.unit,
+        "components": list(found.components),
+        "values": packed(found.values, "<f8"),
+        "rates": packed(find(result, found.rate).values, "<f8") if found.rate else None,
+    }
+
+
+def _about(result: Result, scene: Scene, notes: list[str]) -> dict[str, Any]:
+    ledger = {name: attrs.asdict(entry) for name, entry in result.ledger.items()}
+    found: dict[str, Any] = _finite(
+        {
+            "title": result.record.title or "scene without a name",
+            "description": str(scene.description),
+            "status": result.status,
+            "method": result.method,
+            "integrator": result.integrator,
+            "instants": len(result.t),
+            "stats": attrs.asdict(result.stats),
+            "ledger": ledger,
+            "settings": result.settings,
+            "versions": result.versions,
+            "notes": result.notes,
+            "view_notes": notes,
+            "events": [{"t": event.t, "text": event.words} for event in result.events],
+            "scene": result.scene_text,
+        }
+    )
+    return found
+
+
+def _finite(value: Any) -> Any:
+    """The same with words for numbers that JSON does not have."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {str(k): _finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(v) for v in value]
+    return value

@@ -1,0 +1,1 @@
+"""The three-dimensional scene of a page: bodies, shapes, joints, forces, arrows."""

@@ -1,0 +1,97 @@
+"""Reactions of joints and what forces exert, as arrows: forces and moments over the instants."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.model.groups import Floats
+from dap3d_core.result import Result, ResultError, UnknownNameError
+from dap3d_core.result.post.reactions import Reaction
+from dap3d_core.view.scene3d.elements import ORIGIN, Placed
+from dap3d_core.view.scene3d.primitives import packed
+from dap3d_core.view.scene3d.scene_data import Elements
+
+#: An arrow below this part of the largest of its kind is not there.
+SMALLEST = 1e-9
+#: The longest arrow and the usual one are to be no longer than these parts of the scene's size.
+LONGEST, USUAL = 0.36, 0.16
+
+
+def arrows_of(result: Result, elements: Elements, size: float) -> dict[str, Any]:
+    """The arrows of a page and their scales.
+
+    A joint's reaction is that on the body of its first slot, at the joint's point there; the other
+    body feels the opposite force. A force element has an arrow on each of its moving bodies.
+
+    Args:
+        result: its instants are those of the page.
+        elements: joints and forces.
+        size: of the scene, m.
+
+    Returns:
+        ``arrows``: ``layer``, ``what``, ``name``, ``body``, ``at``, packed ``values`` (nt, 3) N or
+        N m, global axes; ``scales``: m for one N, m for one N m; ``notes``.
+    """
+    notes: list[str] = []
+    found = [*_reactions(result, elements), *_applied(result, elements, notes)]
+    scales, arrows, least = {}, [], 0.0
+    for what in ("force", "moment"):
+        alike = [arrow for arrow in found if arrow["what"] == what]
+        lengths = [np.linalg.norm(arrow["values"], axis=1) for arrow in alike]
+        largest = max((float(length.max()) for length in lengths), default=0.0)
+        least = max(least * size, SMALLEST * largest)  # forces that cancel leave rounding moments
+        kept = [
+            (arrow, length)
+            for arrow, length in zip(alike, lengths, strict=True)
+            if length.max() > least
+        ]
+        scales[what] = _scale([length for _, length in kept], size)
+        arrows += [{**arrow, "values": packed(arrow["values"])} for arrow, _ in kept]
+    return {"arrows": arrows, "scales": scales, "notes": notes}
+
+
+def _scale(lengths: list[Floats], size: float) -> float:
+    """Metres for one N or N m: peaks, as of impacts, may be longer than what is usual."""
+    if not lengths:
+        return 1.0
+    peak = max(float(np.max(length)) for length in lengths)
+    usual = max(float(np.median(length)) for length in lengths)
+    middle = np.sqrt(max(usual, 1e-3 * peak) * peak)
+    return float(min(LONGEST / peak, USUAL / middle) * size)
+
+
+def _reactions(result: Result, elements: Elements) -> Iterator[dict[str, Any]]:
+    every = result.reactions() if elements.joints else {}
+    for joint in elements.joints:
+        slot, reaction = next(iter(every[joint.name].items()))
+        yield from _pair("reactions", joint, slot, reaction)
+
+
+def _applied(result: Result, elements: Elements, notes: list[str]) -> Iterator[dict[str, Any]]:
+    for force in elements.forces:
+        try:
+            applied = result.force(force.name)
+        except UnknownNameError:  # it acts in a joint
+            continue
+        except ResultError as error:
+            notes.append(f"arrows of force {force.name} are not drawn: {error}")
+            continue
+        for slot, action in applied.on.items():
+            if force.bodies.get(slot):
+                yield from _pair("forces", force, slot, action)
+
+
+def _pair(layer: str, one: Placed, slot: str, action: Reaction) -> Iterator[dict[str, Any]]:
+    body, at = one.place(slot)
+    moment = action.moment if action.local is None else action.moment_at_point
+    if action.local is None:
+        at = ORIGIN
+    about = {"layer": layer, "name": one.name, "body": body, "at": at}
+    for what, values in (("force", action.force), ("moment", moment)):
+        if values is not None and np.all(np.isfinite(values)):
+            yield {**about, "what": what, "values": _floats(values)}
+
+
+def _floats(values: Floats) -> Floats:
+    return np.asarray(values, dtype=np.float64)

@@ -1,0 +1,113 @@
+"""Joints and forces of a model as geometry: the points, vectors and numbers their types declare."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import attrs
+
+from dap3d_core.interface.fields import slot_of, specs_of
+from dap3d_core.model import Model
+from dap3d_core.model.groups import Group
+from dap3d_core.view.scene3d.primitives import Located, plain
+
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+@attrs.frozen
+class Placed:
+    """A joint or a force with its geometry, whatever its type.
+
+    Attributes:
+        name, keyword: its own, and that of its type.
+        bodies: slot -> body index, ground 0.
+        points: slot -> the point ``P_i``, ``P_j``, ... on that body.
+        vectors: field -> body index and direction there.
+        numbers: field -> number.
+        has_ends: whether the type declares a vector between two points.
+    """
+
+    name: str
+    keyword: str
+    bodies: dict[str, int]
+    points: dict[str, Located]
+    vectors: dict[str, Located]
+    numbers: dict[str, float]
+    has_ends: bool
+
+    def place(self, slot: str) -> Located:
+        """The element's point on the body of a slot, the origin where it has none."""
+        return self.points.get(slot, (self.bodies[slot], ORIGIN))
+
+
+def joints_of(model: Model) -> list[Placed]:
+    """The joints of a model, in file order."""
+    return _in_order(model.joints, model.joint_names)
+
+
+def forces_of(model: Model) -> list[Placed]:
+    """The forces of a model that act on bodies of their own, in file order."""
+    groups = [g for g in model.forces if not getattr(g.examined.type, "each_body", False)]
+    return _in_order(groups, model.force_names)
+
+
+def gravity_of(model: Model) -> tuple[float, ...] | None:
+    """(3,) gravitational acceleration, m/s^2, as forces on each body declare it; None without.
+
+    That is a force with the number ``gravity`` and the direction ``wgt``, as ``weight`` has them.
+    """
+    for group in model.forces:
+        numbers = group.examined.layout.numbers
+        if getattr(group.examined.type, "each_body", False) and {"gravity", "wgt"} <= set(numbers):
+            g = group.numbers[0, numbers["gravity"][0]]
+            at = numbers["wgt"][0]
+            return plain(g * group.numbers[0, at : at + 3])
+    return None
+
+
+def _in_order(groups: Any, names: tuple[str, ...]) -> list[Placed]:
+    found = {
+        int(member): _placed(group, k, names[int(member)])
+        for group in groups
+        for k, member in enumerate(group.members)
+    }
+    return [found[member] for member in sorted(found)]
+
+
+def _placed(group: Group, place: int, name: str) -> Placed:
+    layout, specs = group.examined.layout, specs_of(group.examined.type)
+    bodies = dict(zip(layout.slots, map(int, group.bodies[place]), strict=True))
+    has_ends = any(spec.kind == "vector2" for spec in specs.values())
+    on = dict(_bodies_of_vectors(group, place, bodies))
+    points: dict[str, Located] = {}
+    vectors: dict[str, Located] = {}
+    numbers: dict[str, float] = {}
+    for field, (at, shape) in layout.numbers.items():
+        values = plain(group.numbers[place, at : at + (3 if shape else 1)])
+        kind = specs[field].kind if field in specs else ""
+        slot = slot_of(field)
+        is_end = has_ends and field in ("P_i", "P_j")
+        if shape == (3,) and slot in bodies and (kind == "point" or is_end):
+            points[slot] = bodies[slot], values
+        elif shape == (3,) and field in on:
+            vectors[field] = on[field], values
+        elif shape == () and kind == "number":
+            numbers[field] = values[0]
+    return Placed(name, group.keyword, bodies, points, vectors, numbers, has_ends)
+
+
+def _bodies_of_vectors(
+    group: Group, place: int, bodies: dict[str, int]
+) -> Iterator[tuple[str, int]]:
+    """The body of each vector field: that of its slot, ground, or the one the scene names."""
+    layout = group.examined.layout
+    others = dict(zip(layout.others, group.functions[place, len(layout.functions) :], strict=True))
+    for field, spec in specs_of(group.examined.type).items():
+        slot = slot_of(field)
+        if spec.kind != "vector":
+            continue
+        if spec.ground:
+            yield field, 0
+        elif field in others:
+            yield field, int(others[field])
+        elif slot in bodies:
+            yield field, bodies[slot]

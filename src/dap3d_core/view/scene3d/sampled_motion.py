@@ -1,0 +1,130 @@
+"""Where things are at the instants that the page shows: instants, points, the extent of it all."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.model.rotations import split, to_body, to_global
+from dap3d_core.result import Result
+from dap3d_core.result.post.point_motion import motion_of
+from dap3d_core.view.scene3d.primitives import Located
+
+#: Without ``fps`` the page holds every instant, up to so many numbers of poses (16 MB).
+MOST_NUMBERS = 4_000_000
+#: More frames than this are every instant: nobody asks for so many otherwise.
+_MOST_FRAMES = 1e6
+#: Instants that the extent of a motion is found from.
+_LOOKED_AT = 200
+
+
+def chosen(t: Floats, bodies: int, fps: float | None) -> Integers:
+    """Places of the instants that the page shows, among those that were reported.
+
+    Args:
+        t: (nt,) reported instants, s.
+        bodies: number of bodies.
+        fps: frames a second; None for every instant, as far as they fit a page.
+
+    Returns:
+        (k,) increasing; the first and the last are among them.
+    """
+    last = len(t) - 1
+    if fps is None:
+        most = max(2, MOST_NUMBERS // (7 * max(bodies, 1)))
+        if len(t) <= most:
+            return np.arange(len(t))
+        return np.unique(np.linspace(0, last, most).round().astype(np.int64))
+    if (t[-1] - t[0]) * fps > _MOST_FRAMES:
+        return np.arange(len(t))
+    wanted = np.append(np.arange(t[0], t[-1], 1.0 / fps), t[-1])
+    after = np.clip(np.searchsorted(t, wanted), 1, max(last, 1))
+    after = np.minimum(after, last)
+    before = np.maximum(after - 1, 0)
+    nearest = np.where(wanted - t[before] <= t[after] - wanted, before, after)
+    return np.unique(np.concatenate([[0], nearest, [last]])).astype(np.int64)
+
+
+def thinned(result: Result, places: Integers) -> Result:
+    """A result with some of its instants alone, whose model is that of the whole."""
+    if len(places) == len(result.t):
+        return result
+    return Result.of_parts(
+        result.subject,
+        result.arrays.at(places),
+        result.record,
+        lambda: (result.model, lambda: result.machine),
+    )
+
+
+class Extent(NamedTuple):
+    """Least and largest coordinates (3,) of a motion, and the places (k, 3) farthest out, m."""
+
+    low: Floats
+    high: Floats
+    farthest: Floats
+
+
+@attrs.frozen(eq=False)
+class Motion:
+    """Poses of n bodies at nt instants; ground is body 0."""
+
+    result: Result
+
+    @property
+    def poses(self) -> Floats:
+        """(nt, n, 7) r (m) and p of each body."""
+        return np.asarray(np.concatenate([self.result.r, self.result.p], axis=2))
+
+    def points(self, located: Iterable[Located]) -> Floats:
+        """(nt, k, 3) places of points, global axes, m."""
+        found = list(located)
+        body = np.array([b for b, _ in found], dtype=np.int64)
+        local = np.array([at for _, at in found], dtype=float).reshape(-1, 3)
+        return motion_of(body, local, self.result.u, self.result.v_dot, 0)
+
+    def direction(self, vector: Located) -> Floats:
+        """(nt, 3) a vector fixed in a body, global axes."""
+        body, local = vector
+        if body == 0:
+            return np.broadcast_to(np.asarray(local, dtype=float), (len(self.result.t), 3))
+        return np.asarray(to_global(self.result.p[:, body - 1], np.asarray(local, dtype=float)))
+
+    def point_in(self, body: int, place: Floats) -> Floats:
+        """(3,) coordinates in a body of a place (3,) as it is at the first instant."""
+        if body == 0:
+            return place
+        return self.vector_in(body, place - self.result.r[0, body - 1])
+
+    def vector_in(self, body: int, direction: Floats) -> Floats:
+        """(3,) components in a body of a direction (3,) as it is at the first instant."""
+        if body == 0:
+            return direction
+        _, p, _, _ = split(self.result.u[:1], self.result.subject.body_count)
+        return np.asarray(to_body(p[0, body - 1], direction))
+
+    def extent(self, located: Iterable[Located], reach: float = 0.0) -> Extent:
+        """What points reach over the motion.
+
+        Args:
+            located: the points.
+            reach: how far things stand out beyond them, m.
+        """
+        places = np.linspace(0, len(self.result.t) - 1, min(_LOOKED_AT, len(self.result.t)))
+        few = thinned(self.result, np.unique(places.round().astype(np.int64)))
+        found = Motion(few).points(located).reshape(-1, 3)
+        farthest = found[np.argmax(found @ _DIRECTIONS.T, axis=0)] + reach * _DIRECTIONS
+        return Extent(found.min(axis=0) - reach, found.max(axis=0) + reach, farthest)
+
+
+def _directions(count: int) -> Floats:
+    """(count, 3) unit vectors spread over the sphere."""
+    k = np.arange(count)
+    z = 1.0 - (2.0 * k + 1.0) / count
+    angle, radius = np.pi * (3.0 - np.sqrt(5.0)) * k, np.sqrt(1.0 - z * z)
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
+
+
+_DIRECTIONS = _directions(96)

@@ -1,0 +1,212 @@
+"""What the page draws of a result: bodies, shapes, joints, forces, ground, and from where."""
+
+import os
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.result import Result, ResultError
+from dap3d_core.scene import SceneError, load, parse
+from dap3d_core.scene.scene import Scene
+from dap3d_core.view.scene3d.bodies import attached, framing, inertia_ellipsoid, links, unit_of
+from dap3d_core.view.scene3d.camera import stage
+from dap3d_core.view.scene3d.colors import colors
+from dap3d_core.view.scene3d.elements import ORIGIN, Placed, forces_of, gravity_of, joints_of
+from dap3d_core.view.scene3d.primitives import Located, Mark, Span, packed
+from dap3d_core.view.scene3d.sampled_motion import Extent, Motion
+from dap3d_core.view.scene3d.shapes import Drawn, Mesh, drawn
+from dap3d_core.view.scene3d.symbols import Drawer
+
+#: The colour of what belongs to ground.
+GROUND = "#9aa3ad"
+
+
+@attrs.frozen
+class Elements:
+    """Joints and forces, where the model can be had; else why not."""
+
+    joints: list[Placed]
+    forces: list[Placed]
+    gravity: tuple[float, ...] | None
+    missing: str
+
+
+def scene_of(result: Result, model: str | os.PathLike[str] | None = None) -> Scene:
+    """The scene that was run; its folder is that of the model, where one is named."""
+    try:
+        scene = parse(result.scene_text)
+    except SceneError:  # a result made by a script, without the text of a scene
+        scene = Scene()
+    if model is not None:
+        scene.path = load(model).path
+    for name in result.subject.body_names:
+        if name not in scene.bodies:
+            scene.add_body(name)
+    return scene
+
+
+def elements_of(result: Result) -> Elements:
+    """The joints and forces of a result, none where its model cannot be made again."""
+    try:
+        model = result.model
+    except ResultError as error:
+        return Elements([], [], None, str(error))
+    return Elements(joints_of(model), forces_of(model), gravity_of(model), "")
+
+
+@attrs.frozen(eq=False)
+class SceneGeometry:
+    """What stands for a scene in pictures of it, all but arrows.
+
+    Attributes:
+        names, colors: of the bodies, without ground.
+        marks, spans: solids fixed in bodies, and those between two.
+        shapes: lines, meshes and notes of the scene's shapes; its solids are among the marks.
+        extent: of the motion, with what is drawn.
+        unit: radius of a thin link, m.
+    """
+
+    names: tuple[str, ...]
+    colors: list[str]
+    marks: list[Mark]
+    spans: list[Span]
+    shapes: Drawn
+    extent: Extent
+    unit: float
+
+
+def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeometry:
+    """What stands for the scene of a result.
+
+    Args:
+        result: whose motion rails and extent follow.
+        scene: what was run; its folder, where known, holds its meshes.
+        elements: of the result.
+    """
+    subject, motion = result.subject, Motion(result)
+    hues = colors([scene.bodies[n].color for n in subject.body_names], _pairs(elements.joints))
+    shapes = drawn(scene, subject.body_names, hues)
+    every = [*elements.joints, *elements.forces]
+    places = attached(subject, every)
+    points = [*framing(motion, places), *shapes.corners]
+    bare = [k for k in range(1, subject.body_count + 1) if not places[k] and k not in shapes.bodies]
+    low, high, _ = motion.extent(points)
+    size = float(np.linalg.norm(high - low))
+    unit = unit_of(places, size or 1.0)
+    marks = _bodies(result, places, shapes.bodies, unit, hues, _joined(elements.joints))
+    ellipsoids = _bare_bodies(result, bare, elements.joints, size, hues)
+    reach = max((max(m.size) for m in ellipsoids), default=0.0)
+    reach = max([reach, *(j.numbers.get("radius", 0.0) for j in elements.joints)])
+    extent = motion.extent(points, reach + 2.0 * unit)
+    drawer = Drawer(motion, unit, elements.joints)
+    drawings = [drawer.joint(j) for j in elements.joints]
+    drawings += [drawer.force(f) for f in elements.forces]
+    marks += [*ellipsoids, *shapes.marks, *(m for d in drawings for m in d.marks)]
+    spans = [s for d in drawings for s in d.spans]
+    return SceneGeometry(subject.body_names, hues, marks, spans, shapes, extent, unit)
+
+
+def _pairs(joints: Iterable[Placed]) -> list[tuple[int, ...]]:
+    """The bodies that each joint couples, ground left out."""
+    return [tuple(body for body in joint.bodies.values() if body) for joint in joints]
+
+
+def geometry_of(result: Result, scene: Scene, elements: Elements) -> dict[str, Any]:
+    """What stands for a scene, as plain data for the page; arguments as ``scene_geometry``."""
+    found = scene_geometry(result, scene, elements)
+    return {
+        "stage": {**stage(found.extent, elements.gravity), "unit": found.unit},
+        "bodies": [{"name": n, "color": c} for n, c in zip(found.names, found.colors, strict=True)],
+        "points": _points(result),
+        "joints": [_about(j, found.names) for j in elements.joints],
+        "forces": [_about(f, found.names) for f in elements.forces],
+        "marks": [_row(m) for m in found.marks],
+        "spans": [attrs.asdict(s) for s in found.spans],
+        "lines": [attrs.asdict(line) for line in found.shapes.lines],
+        "meshes": [_packed_mesh(mesh) for mesh in found.shapes.meshes],
+        "notes": notes_of(elements, found.shapes),
+    }
+
+
+def _packed_mesh(mesh: Mesh) -> dict[str, Any]:
+    about = attrs.asdict(mesh, filter=lambda a, _: a.name not in ("vertices", "triangles"))
+    about |= {"vertices": packed(mesh.vertices), "triangles": packed(mesh.triangles, "<u4")}
+    return {**about, "count": len(mesh.triangles)}
+
+
+def _bodies(
+    result: Result,
+    places: list[list[tuple[float, ...]]],
+    shaped: set[int],
+    unit: float,
+    hues: Sequence[str],
+    joined: set[Located],
+) -> list[Mark]:
+    """Links of the bodies without shapes; of ground short posts where joints stand."""
+    marks = []
+    for k, name in enumerate(result.subject.body_names, 1):
+        if k not in shaped and places[k]:
+            ends = [at for at in places[k] if (k, at) not in joined]
+            marks += links(k, places[k], unit, hues[k - 1], name, ends=ends)
+    if 0 not in shaped:
+        marks += [
+            Mark("bodies", "box", 0, at, (4.5 * unit,) * 3, color=GROUND, owner="ground")
+            for at in [*places[0], ORIGIN]
+            if (0, at) in joined
+        ]
+    return marks
+
+
+def _bare_bodies(
+    result: Result, bare: list[int], joints: list[Placed], size: float, hues: Sequence[str]
+) -> list[Mark]:
+    """Bodies that nothing is attached to; a wheel is drawn by its joint."""
+    subject = result.subject
+    wheels = {j.bodies["i"] for j in joints if j.keyword == "disk"}
+    most = 0.2 * size if size > 0.0 else np.inf
+    return [
+        inertia_ellipsoid(
+            k, subject.mass[k - 1], subject.Jp[k - 1], most, hues[k - 1], subject.body_names[k - 1]
+        )
+        for k in bare
+        if k not in wheels
+    ]
+
+
+def _joined(joints: list[Placed]) -> set[Located]:
+    """Where joints stand, which draw something there themselves."""
+    return {point for joint in joints for point in joint.points.values()}
+
+
+def _points(result: Result) -> list[dict[str, Any]]:
+    subject = result.subject
+    columns = zip(subject.point_names, subject.point_body, subject.point_local, strict=True)
+    return [{"name": n, "body": int(b), "at": at.tolist()} for n, b, at in columns]
+
+
+def _about(one: Placed, names: Sequence[str]) -> dict[str, Any]:
+    bodies = [names[b - 1] if b else "ground" for b in one.bodies.values()]
+    place = one.place(next(iter(one.bodies)))
+    return {
+        "name": one.name, "type": one.keyword, "bodies": bodies, "body": place[0], "at": place[1]
+    }  # fmt: skip
+
+
+def _row(mark: Mark) -> list[Any]:
+    """A mark without the names of its attributes: there are many."""
+    return [
+        mark.layer, mark.kind, mark.body, *(_short(v) for v in (mark.at, mark.size, mark.q)),
+        mark.color, mark.owner,
+    ]  # fmt: skip
+
+
+def _short(values: tuple[float, ...]) -> list[float]:
+    return [float(f"{x:.7g}") for x in values]
+
+
+def notes_of(elements: Elements, shapes: Drawn) -> list[str]:
+    """What of a scene is not drawn, and why."""
+    missing = f"joints and forces are not drawn: {elements.missing}" if elements.missing else ""
+    return [*([missing] if missing else []), *shapes.notes]

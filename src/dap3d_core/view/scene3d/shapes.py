@@ -1,0 +1,210 @@
+"""Shapes of the scene as marks, lines and meshes."""
+
+import re
+from collections.abc import Sequence
+from io import BytesIO
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.model.rotations import to_global
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.validate.coerce_values import Fault
+from dap3d_core.scene.validate.mistake_collector import Collector
+from dap3d_core.scene.validate.shapes import Shape, mesh_file, read_shapes
+from dap3d_core.view.scene3d.colors import color
+from dap3d_core.view.scene3d.primitives import Located, Mark, plain, turned_to
+
+#: Meshes of more triangles are not put into a page.
+MOST_TRIANGLES = 300_000
+#: Nor are further ones, once it holds so many triangles.
+MOST_IN_ALL = 1_000_000
+#: Nor are larger files read, bytes: that many triangles as text.
+LARGEST_MESH = 100 * 2**20
+#: A shape that reaches farther from the origin of its body is not drawn, m: graphics hardware
+#: computes lengths in single precision, in which larger ones overflow.
+FARTHEST = 1e15
+#: Ground's shapes where they name no colour.
+GROUND_COLOR = "#9aa3ad"
+
+
+@attrs.frozen(eq=False)
+class Mesh:
+    """Triangles fixed in a body.
+
+    Attributes:
+        body: index, ground 0.
+        at, q: place (3,), m, and Euler parameters (4,) of the axes of the file in the body.
+        scale: m for one unit of the file.
+        vertices: (k, 3) in units of the file.
+        triangles: (m, 3) places of vertices.
+        color, owner: as of a mark.
+    """
+
+    body: int
+    at: tuple[float, ...]
+    q: tuple[float, ...]
+    scale: float
+    vertices: Floats
+    triangles: Integers
+    color: str
+    owner: str
+
+
+@attrs.frozen
+class Line:
+    """A line through points (k, 3), m, of a body."""
+
+    body: int
+    points: tuple[tuple[float, ...], ...]
+    color: str
+    owner: str
+
+
+@attrs.define
+class Drawn:
+    """The shapes of a scene as pictures of it show them.
+
+    Attributes:
+        marks, lines, meshes: solids, lines and triangles.
+        corners: (body, place) pairs that the shapes reach to, for the camera.
+        bodies: indices of the bodies that have a shape.
+        notes: shapes that are not drawn, and why.
+    """
+
+    marks: list[Mark] = attrs.Factory(list)
+    lines: list[Line] = attrs.Factory(list)
+    meshes: list[Mesh] = attrs.Factory(list)
+    corners: list[Located] = attrs.Factory(list)
+    bodies: set[int] = attrs.Factory(set)
+    notes: list[str] = attrs.Factory(list)
+
+
+def drawn(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Drawn:
+    """The shapes of a scene.
+
+    Args:
+        scene: checked when it was run; its folder, where it is known, holds its meshes.
+        names, colors: of the bodies, without ground.
+    """
+    index = {"ground": 0} | {name: k for k, name in enumerate(names, 1)}
+    found = Drawn()
+    for shape in read_shapes(Collector(scene), index):
+        usual = colors[shape.body - 1] if shape.body else GROUND_COLOR
+        with np.errstate(over="ignore", invalid="ignore"):  # what is too large is told
+            fault = _add(found, shape, color(shape.values["color"], usual), scene.folder)
+        if fault:
+            found.notes.append(f"shape {shape.name} is not drawn: {fault}")
+    return found
+
+
+def _add(found: Drawn, shape: Shape, hue: str, folder: Path | None) -> str:
+    """Add a shape to those that are drawn; "", or why it is not."""
+    values = shape.values
+    about: dict[str, Any] = {"body": shape.body, "color": hue, "owner": shape.name}
+    piece: Mark | Line | Mesh
+    if shape.type == "mesh":
+        if sum(len(mesh.triangles) for mesh in found.meshes) >= MOST_IN_ALL:
+            return f"the picture holds {MOST_IN_ALL} triangles already, or more"
+        mesh = _mesh(folder, values["file"])
+        if isinstance(mesh, str):
+            return mesh
+        piece = Mesh(at=values["at"], q=values["p"], scale=values["scale"],
+                     vertices=mesh[0], triangles=mesh[1], **about)  # fmt: skip
+        box = piece.scale * np.array([mesh[0].min(axis=0), mesh[0].max(axis=0)])
+        corners = _corners(shape.body, piece.at, piece.q, box)
+    elif shape.type == "line":
+        piece = Line(points=values["points"], **about)
+        corners = [(shape.body, point) for point in piece.points]
+    else:
+        piece = _solid(shape, hue)
+        half = {"box": (0.5, 0.5, 0.5), "cylinder": (1.0, 1.0, 0.5)}.get(piece.kind, (1.0,) * 3)
+        high = np.multiply(half, piece.size)
+        low = high * (-1.0, -1.0, 0.0 if piece.kind == "cone" else -1.0)
+        corners = _corners(shape.body, piece.at, piece.q, np.array([low, high]))
+    farthest = float(np.nan_to_num(np.abs([place for _, place in corners]), nan=np.inf).max())
+    if farthest > FARTHEST:
+        return f"it reaches {farthest:.3g} m from the origin of its body, more than {FARTHEST:g} m"
+    kinds: dict[type, list[Any]] = {Mark: found.marks, Line: found.lines, Mesh: found.meshes}
+    kinds[type(piece)].append(piece)
+    found.corners += corners
+    found.bodies.add(shape.body)
+    return ""
+
+
+def _corners(body: int, at: tuple[float, ...], q: tuple[float, ...], box: Floats) -> list[Located]:
+    """The corners of a box (2, 3) least and largest coordinates, placed in a body."""
+    corners = np.array(list(product(*box.T)))
+    return [(body, plain(corner)) for corner in np.asarray(at) + to_global(q, corners)]
+
+
+def _solid(shape: Shape, hue: str) -> Mark:
+    v = shape.values
+    radius = v.get("radius", 0.0)
+    thickness = 0.02 * radius if shape.type == "disk" else v.get("length", radius)
+    kind = {"disk": "cylinder"}.get(shape.type, shape.type)
+    size = v["size"] if kind == "box" else (radius, radius, thickness)
+    q = turned_to(v["axis"]) if "axis" in v else v.get("p", (1.0, 0.0, 0.0, 0.0))
+    return Mark("shapes", kind, shape.body, v["at"], size, q, hue, shape.name)
+
+
+def _mesh(folder: Path | None, name: str) -> tuple[Floats, Any] | str:
+    """Vertices (k, 3) and triangles (m, 3) of a mesh file, or why they cannot be had."""
+    if folder is None:
+        return f"where {name} lies is not known; name the model (--model, model=)"
+    path = mesh_file(folder, name)
+    if isinstance(path, Fault):
+        return path.what
+    try:
+        import trimesh
+    except ImportError:
+        return "reading meshes needs trimesh: pip install 'dap3d[mesh]'"
+    try:
+        with path.open("rb") as file:
+            data = file.read(LARGEST_MESH + 1)
+        if len(data) > LARGEST_MESH:
+            return f"{name} has more than {LARGEST_MESH >> 20} MiB; save fewer triangles, or binary"
+        kind = path.suffix[1:].lower()
+        whole = _without_groups(data) if kind == "obj" else _one_solid(data)
+        # from memory: materials, which are other files, are not read
+        with np.errstate(all="ignore"):  # numbers are judged below
+            mesh: Any = trimesh.load(
+                BytesIO(whole), file_type=kind, force="mesh", skip_materials=True
+            )
+        vertices = np.asarray(mesh.vertices, dtype=np.float64)
+        triangles = np.asarray(mesh.faces, dtype=np.int64)
+    except Exception as error:  # a broken file makes a reader fail in any way
+        return f"{name} cannot be read: {error or type(error).__name__}"
+    if not len(triangles) or not np.all(np.isfinite(vertices)):
+        return (
+            f"{name} holds no triangles; is it a mesh?"
+            if not len(triangles)
+            else f"{name} holds no numbers"
+        )
+    if len(triangles) > MOST_TRIANGLES:
+        return f"{name} has {len(triangles)} triangles; at most {MOST_TRIANGLES} are drawn"
+    return vertices, triangles
+
+
+def _without_groups(data: bytes) -> bytes:
+    """The vertices and faces of an OBJ file alone.
+
+    Of each group, object and material the reader makes a mesh of its own, and the time it takes
+    to join them grows with the square of their number.
+    """
+    text = data.replace(b"\r\n", b"\n").replace(b"\\\n", b"")
+    lines = re.findall(rb"^[ \t]*[vf][ \t][^\n#]*", text, re.MULTILINE)
+    return b"\n".join(lines).replace(b"usemtl", b"") + b"\n"
+
+
+def _one_solid(data: bytes) -> bytes:
+    """An STL file whose solids are one, for the same reason; a binary file holds one anyway."""
+    if len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
+        return data
+    first, *others = data.lower().split(b"endsolid")
+    facets = [part[part.find(b"facet") :] for part in others if b"facet" in part]
+    return b"".join([first, *facets, b"\nendsolid" if others else b""])
