@@ -19,7 +19,7 @@ from unit.test_integrators_problems import (
     time_dependent,
 )
 
-from dap3d_core.integrators import METHODS
+from dap3d_core.integrators import TABLEAUS
 from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA, GROUP, GROUPS, TERMS, combinations
 
 # ------------------------------------------------------------------ coefficients
@@ -28,7 +28,7 @@ from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA, GROUP, GROUPS, 
 @pytest.mark.parametrize("name", ALL)
 def test_tableau_is_consistent(name):
     """Rows of a sum to c, and b integrates powers of t up to the order of the method."""
-    method = METHODS[name]
+    method = TABLEAUS[name]
     assert method.name == name
     assert np.allclose(method.a.sum(axis=1), method.c, rtol=0, atol=1e-13)
     b, c = method.a[method.stages], method.c
@@ -38,13 +38,13 @@ def test_tableau_is_consistent(name):
 
 def test_coefficients_are_those_of_scipy():
     """DOP853 and DOPRI5 agree with the independent copies in scipy."""
-    method = METHODS["dop853"]
+    method = TABLEAUS["dop853"]
     assert np.array_equal(method.a, dop853_coefficients.A)
     assert np.array_equal(method.c, dop853_coefficients.C)
     assert np.array_equal(method.d, dop853_coefficients.D)
     assert np.array_equal(method.e[0, :13], dop853_coefficients.E5)
     assert np.array_equal(method.e[1, :13], dop853_coefficients.E3)
-    method = METHODS["dopri5"]
+    method = TABLEAUS["dopri5"]
     assert np.allclose(method.a[:6, :5], RK45.A, rtol=1e-15)
     assert np.allclose(method.a[6, :6], RK45.B, rtol=1e-15)
     assert np.allclose(method.e[0], -RK45.E, rtol=1e-15)
@@ -54,7 +54,7 @@ def test_coefficients_are_those_of_scipy():
 @pytest.mark.parametrize("name", ALL)
 def test_packed_coefficients_are_the_coefficients(name):
     """The table of the compiled core, unpacked, is a, e and d."""
-    method = METHODS[name]
+    method = TABLEAUS[name]
     wanted = np.vstack([method.a, *method.e, *method.d])
     table = combinations(method)
     assert np.array_equal(table[: len(method.c), ABSCISSA], method.c)
@@ -84,7 +84,7 @@ def test_order_of_fixed_steps(name, e, T, steps):
         assert finish(run)[-1, 0] == T
         assert run.statistics.steps == n
         errors.append(np.linalg.norm(run.y - kepler_orbit(T, e)))
-    assert slope(T / np.array(steps), errors) == pytest.approx(METHODS[name].order, abs=0.2)
+    assert slope(T / np.array(steps), errors) == pytest.approx(TABLEAUS[name].order, abs=0.2)
 
 
 @pytest.mark.parametrize(("name", "h"), [("dopri5", 0.05), ("dop853", 0.15)])
@@ -95,7 +95,7 @@ def test_order_of_dense_output(name, h):
         times = size * np.array([0.0, 0.15, 0.4, 0.6, 0.85, 1.0])
         rows = finish(start(name, kepler, kepler_orbit(0.0), times, step=size))
         errors.append(np.linalg.norm(rows[1:-1, 1:] - kepler_orbit(times[1:-1])))
-    assert slope(sizes, errors) == pytest.approx(METHODS[name].dense_order + 1, abs=0.2)
+    assert slope(sizes, errors) == pytest.approx(TABLEAUS[name].dense_order + 1, abs=0.2)
 
 
 @pytest.mark.parametrize("name", ADAPTIVE)

@@ -27,7 +27,7 @@ from unit.test_integrators_problems import (
     time_dependent,
 )
 
-from dap3d_core.integrators import METHODS, Status
+from dap3d_core.integrators import TABLEAUS, Status
 from dap3d_core.kernels.runtime.cache import jit_is_on
 
 # ------------------------------------------------------------------ bookkeeping
@@ -112,7 +112,7 @@ def test_steps_are_those_of_the_literature(name):
         if run.t > times[-1]:
             times.append(run.t)
     times.append(run.t)
-    wanted, rejected = hairer_times(METHODS[name], kepler_f, y0, t_end, 1e-6)
+    wanted, rejected = hairer_times(TABLEAUS[name], kepler_f, y0, t_end, 1e-6)
     assert (run.statistics.steps, run.statistics.rejected) == (len(wanted) - 1, rejected)
     assert times == pytest.approx(wanted, abs=1e-6)
     # the last step is stretched by half a percent rather than followed by a tiny one

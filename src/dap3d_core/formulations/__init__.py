@@ -1,41 +1,77 @@
-"""The formulations floor: accelerations and multipliers from a state."""
+"""Formulations: accelerations and multipliers from a state.
+
+A formulation is a module of this package with the compiled functions ``rhs``, ``project`` and
+``report`` (standard.py says what each does), and an entry of ``FORMULATIONS``.
+"""
 
 from importlib import import_module
 from typing import Any
 
+import attrs
+
 from dap3d_core.assembly.arrays import step_functions
 
-#: Group loops of every formulation, and those of joints; each is there where the scene needs it.
-_ALL = ("value", "wrench", "energy", "angle", "turned", "switch", "knot")
-_WITH_JOINTS = (*_ALL, "acceleration", "position", "friction")
-
-#: Formulation -> the kinds of group loops that it calls.
-LOOPS = {
-    "unconstrained": _ALL,
-    "standard": _WITH_JOINTS,
-    "penalty": _WITH_JOINTS,
-    "lsq": _WITH_JOINTS,
-}
-
-#: Places of a formulation's functions in the list that an integrator takes.
+#: Indices of a formulation's functions in the list that an integrator takes.
 RHS, PROJECT, REPORT, ACCEPTED, WATCH = range(5)
 
+#: Kinds of group loops that every formulation calls, and those of joints.
+_ALL = ("value", "wrench", "energy", "angle", "turned", "switch", "knot")
+_OF_JOINTS = ("acceleration", "position", "friction")
 
-#: Formulations that do large scenes in two halves: module and least number of bodies.
-IN_HALVES = {"standard": ("standard_in_halves", 500)}
 
+@attrs.frozen
+class Formulation:
+    """The properties of a formulation.
 
-def functions_of(method: str, *, turns: bool, switches: bool, halved: bool = False) -> Any:
-    """A formulation's compiled functions as the list that an integrator takes.
-
-    They are rhs, project, report; accepted where ``turns`` are counted; watch for ``switches``.
-    ``halved``: whether the scene's plan is cut in two halves.
+    Attributes:
+        name: its name in scenes, and of its module.
+        needs_joints: it is for scenes with constraint rows; else for scenes without.
+        accepts_redundant: constraint rows may depend on each other.
+        is_exact: its accelerations satisfy the constraints, as implicit and multistep integrators
+            require.
+        two_threads: module that evaluates large scenes on two threads; "" if there is none.
+        two_threads_from: number of bodies from which that is used.
     """
-    name = IN_HALVES[method][0] if halved and method in IN_HALVES else method
-    module: Any = import_module(f"dap3d_core.formulations.{name}")
-    functions = [module.rhs, module.project, module.report]
-    if turns or switches:
-        from dap3d_core.formulations.common.switching_functions import accepted, watch
 
-        functions += [accepted, watch] if switches else [accepted]
-    return step_functions(*functions)
+    name: str
+    needs_joints: bool = True
+    accepts_redundant: bool = False
+    is_exact: bool = True
+    two_threads: str = ""
+    two_threads_from: int = 500
+
+    @property
+    def loops(self) -> tuple[str, ...]:
+        """Kinds of the group loops that it calls."""
+        return (*_ALL, *_OF_JOINTS) if self.needs_joints else _ALL
+
+    def is_divided(self, body_count: int) -> bool:
+        """Whether a scene of so many bodies is divided for two threads."""
+        return bool(self.two_threads) and body_count >= self.two_threads_from
+
+    def functions(self, *, turns: bool, switches: bool, divided: bool = False) -> Any:
+        """Its compiled functions as the list that an integrator takes.
+
+        They are rhs, project, report; accepted where ``turns`` are counted; watch for ``switches``.
+        ``divided``: those for two threads.
+        """
+        name = self.two_threads if divided else self.name
+        module: Any = import_module(f"dap3d_core.formulations.{name}")
+        functions = [module.rhs, module.project, module.report]
+        if turns or switches:
+            from dap3d_core.formulations.common.switching_functions import accepted, watch
+
+            functions += [accepted, watch] if switches else [accepted]
+        return step_functions(*functions)
+
+
+#: By name. Where a scene leaves the choice open, the first that fits it is taken.
+FORMULATIONS = {
+    formulation.name: formulation
+    for formulation in (
+        Formulation("unconstrained", needs_joints=False),
+        Formulation("standard", two_threads="two_threads.standard_halves"),
+        Formulation("penalty", accepts_redundant=True, is_exact=False),
+        Formulation("lsq", accepts_redundant=True),
+    )
+}

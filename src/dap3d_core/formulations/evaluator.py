@@ -29,7 +29,7 @@ from dap3d_core.assembly.arrays import (
     System,
 )
 from dap3d_core.assembly.evaluate import call_kinds, place_bodies
-from dap3d_core.formulations import IN_HALVES, LOOPS, REPORT, RHS, functions_of
+from dap3d_core.formulations import FORMULATIONS, REPORT, RHS
 from dap3d_core.formulations.arrays import build_loops, build_system, load_numbers
 from dap3d_core.formulations.constraint_rows import Rows, scaled_rows
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
@@ -95,7 +95,7 @@ class Machine:
 
     Attributes:
         model, plan, system, loops: what it evaluates.
-        method: name of the formulation.
+        formulation: its properties.
         report_size: numbers that ``report`` writes (formulations/standard.py).
         length_count: lengths that ``project`` gives (formulations/common/constraints.py).
     """
@@ -105,21 +105,26 @@ class Machine:
     ) -> None:
         """Args:
         model: what to evaluate.
-        method: "unconstrained", "standard", "penalty" or "lsq".
+        method: name of the formulation, a key of ``FORMULATIONS``.
         announce: called with the name of each group loop that has to be compiled.
         """
         self.model = model
-        self.method = method
-        halved = method in IN_HALVES and model.body_count >= IN_HALVES[method][1]
+        self.formulation = FORMULATIONS[method]
+        halved = self.formulation.is_divided(model.body_count)
         self.plan: Plan = make_plan(
             model.body_count, model.joint_slots, model.joint_rows.tolist(), halved=halved
         )
-        self.loops, self.what = build_loops(model, LOOPS[method], announce)
+        self.loops, self.what = build_loops(model, self.formulation.loops, announce)
         self.system: System = build_system(model, self.plan, self.what)
         self.start_functions()
         self._weigh_rows()
         self.report_size = 6 * model.body_count + model.row_count + model.angle_count + 4
         self.length_count = len(self.plan.nodes) - 1
+
+    @property
+    def method(self) -> str:
+        """Name of the formulation."""
+        return self.formulation.name
 
     @property
     def counts_turns(self) -> bool:
@@ -213,12 +218,12 @@ class Machine:
     def functions(self) -> Any:
         """The compiled functions (rhs, project, report, ...) that an integrator takes."""
         turns, switches = self.counts_turns, bool(self.switches)
-        return functions_of(self.method, turns=turns, switches=switches, halved=self.halved)
+        return self.formulation.functions(turns=turns, switches=switches, divided=self.halved)
 
     @property
     def halved(self) -> bool:
         """Whether right-hand sides are evaluated in two halves (two_threads/rhs_halves.py)."""
-        return self.system.halves is not None and self.method in IN_HALVES
+        return self.system.halves is not None and bool(self.formulation.two_threads)
 
     @cached_property
     def second_thread(self) -> Any:
@@ -285,13 +290,13 @@ class Machine:
         Relative to the start, because masses of very different size make small pivots, too. Rows
         that depend on others from the start are left alone.
         """
-        if self.method == "unconstrained" or not self.model.row_count:
+        if not self.formulation.needs_joints or not self.model.row_count:
             return
         s = self.system
         self._place(t, u)
         s.smallest[:] = 0.0
         pivots = self.pivots(t)
-        if self.method != "standard":
+        if self.formulation.accepts_redundant:
             pivots[pivots < REDUNDANT * s.x[s.row]] = 0.0
         s.smallest[s.row] = POOR * pivots
 
@@ -320,7 +325,7 @@ class Machine:
         s = self.system
         place = linearise_evenly if s.settings[EVEN] else linearise
         place(float(t), s, self.loops)
-        factorise(s, None if self.method == "standard" else PART)
+        factorise(s, PART if self.formulation.accepts_redundant else None)
         inverse = np.ones(self.plan.row_size)
         for size, first, diagonal, *_ in self.plan.nodes[:-1]:
             inverse[first : first + size] = s.K[diagonal : diagonal + size * size : size + 1]

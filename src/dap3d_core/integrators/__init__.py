@@ -1,7 +1,11 @@
-"""Explicit methods, compiled: they know a vector and three functions, no mechanics."""
+"""Integrators, compiled. All but radau know a vector and its functions, no mechanics."""
 
+from collections.abc import Callable
 from typing import Any
 
+import attrs
+
+from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.integrators.runge_kutta.dop853 import DOP853
 from dap3d_core.integrators.runge_kutta.dopri5 import DOPRI5
 from dap3d_core.integrators.runge_kutta.integration import Integration, Statistics
@@ -9,15 +13,83 @@ from dap3d_core.integrators.runge_kutta.rk4 import RK4
 from dap3d_core.integrators.runge_kutta.tableau import Method
 from dap3d_core.integrators.stepping.integration_state import Status
 
-#: The methods by name.
-METHODS: dict[str, Method] = {method.name: method for method in (DOP853, DOPRI5, RK4)}
+#: The explicit Runge-Kutta methods by name.
+TABLEAUS: dict[str, Method] = {method.name: method for method in (DOP853, DOPRI5, RK4)}
 
 
-def make_adams(*problem: Any, **options: Any) -> Integration:
-    """An ``AdamsIntegration``, imported and compiled for the runs that ask for it alone."""
+def _explicit(name: str) -> Callable[..., Integration]:
+    def make(machine: Machine, y0: Any, times: Any, **options: Any) -> Integration:
+        functions, system, loops = machine.functions, machine.system, machine.loops
+        options |= _placed_steps(machine)
+        return Integration(TABLEAUS[name], functions, system, loops, y0, times, **options)
+
+    return make
+
+
+def _adams(machine: Machine, y0: Any, times: Any, **options: Any) -> Integration:
     from dap3d_core.integrators.adams.integration import AdamsIntegration
 
-    return AdamsIntegration(*problem, **options)
+    functions, system, loops = machine.functions, machine.system, machine.loops
+    options |= _placed_steps(machine)
+    return AdamsIntegration(functions, system, loops, y0, times, **options)
 
 
-__all__ = ["METHODS", "Integration", "Method", "Statistics", "Status", "make_adams"]
+def _radau(machine: Machine, y0: Any, times: Any, **options: Any) -> Integration:
+    from dap3d_core.integrators.radau.integration import RadauIntegration
+
+    return RadauIntegration(machine, y0, times, **options)
+
+
+def _placed_steps(machine: Machine) -> dict[str, Any]:
+    """What explicit integrators know of singular poses and of turns."""
+    return {"length_count": machine.length_count, "watched": machine.counts_turns}
+
+
+@attrs.frozen
+class Integrator:
+    """The properties of an integrator.
+
+    Attributes:
+        name: its name in scenes.
+        make: an ``Integration`` of (machine, y0, times, **options), with the options of
+            ``Integration``; imports and compiles what no other integrator needs.
+        adaptive: steps are chosen by their error; else ``step`` is needed.
+        one_step: explicit and of one step, so that runs may share one compiled call.
+        leaves_singular: it can start at a singular pose.
+        requires: why it needs a formulation that is exact; "" where it does not.
+    """
+
+    name: str
+    make: Callable[..., Integration]
+    adaptive: bool = True
+    one_step: bool = False
+    leaves_singular: bool = False
+    requires: str = ""
+
+
+#: By name.
+INTEGRATORS = {
+    integrator.name: integrator
+    for integrator in (
+        Integrator("dopri5", _explicit("dopri5"), one_step=True),
+        Integrator("dop853", _explicit("dop853"), one_step=True, leaves_singular=True),
+        Integrator("adams", _adams, requires="past accelerations on one smooth motion"),
+        Integrator("rk4", _explicit("rk4"), adaptive=False, one_step=True),
+        Integrator("radau", _radau, requires="the constraints themselves"),
+    )
+}
+
+#: Integrator "auto" begins with the first, and continues with the second where a scene is stiff.
+EXPLICIT, IMPLICIT = INTEGRATORS["dop853"], INTEGRATORS["radau"]
+
+__all__ = [
+    "EXPLICIT",
+    "IMPLICIT",
+    "INTEGRATORS",
+    "TABLEAUS",
+    "Integration",
+    "Integrator",
+    "Method",
+    "Statistics",
+    "Status",
+]

@@ -8,6 +8,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 
+from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.model.groups import Floats
 from dap3d_core.report.error_norms import first_parting, trajectory_error
 from dap3d_core.report.settings_ladder import ADAPTIVE, Setting, controlled
@@ -21,7 +22,7 @@ from dap3d_core.simulation import SimulationError
 TIGHTEST = (1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8)
 #: Methods whose error does not fall below some level with the tolerance (the penalty formulation
 #: ends its passes at a residual): no references where another method fits.
-APPROXIMATE = ("penalty",)
+APPROXIMATE = tuple(f.name for f in FORMULATIONS.values() if not f.is_exact)
 #: A run for a reference may take so many times longer than others.
 PATIENCE = 4.0
 

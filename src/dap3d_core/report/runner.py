@@ -10,14 +10,14 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.formulations import FORMULATIONS
+from dap3d_core.integrators import INTEGRATORS
 from dap3d_core.report.error_norms import PARTED, final_position_error, trajectory_error
 from dap3d_core.report.recommend import front
 from dap3d_core.report.reference import Reference, find_reference
 from dap3d_core.report.report import Failed, Report, Run, run_of
 from dap3d_core.report.settings_ladder import (
     ADAPTIVE,
-    FORMULATIONS,
-    MEASURED,
     QUICK_TOLERANCES,
     TOLERANCES,
     Setting,
@@ -29,7 +29,6 @@ from dap3d_core.report.settings_ladder import (
 from dap3d_core.report.timing import Announce, Bench, Progress
 from dap3d_core.result import Result
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
-from dap3d_core.scene.validate.settings import FIXED_STEP
 from dap3d_core.simulation import report_times
 
 #: Seconds that all timings of one rung may take: longer runs are repeated less.
@@ -97,10 +96,12 @@ def report(
     used = _prepared(given, asked, methods, integrators, tolerances, steps)
     bench = Bench(used, limit_s=limit_s, allow_code=allow_code, announce=announce)
     rtols = tolerances or (QUICK_TOLERANCES if quick else TOLERANCES)
-    maker = _Maker(bench, chosen(methods, FORMULATIONS), repeat, progress)
+    maker = _Maker(bench, chosen(methods, tuple(FORMULATIONS)), repeat, progress)
     if given.simulation.step is not None:
         maker.notes.append(_STEP_LEFT_OUT.format(given.simulation.step))
-    return maker.make(chosen(integrators, MEASURED), rtols, steps, target_error, quick=quick)
+    return maker.make(
+        chosen(integrators, tuple(INTEGRATORS)), rtols, steps, target_error, quick=quick
+    )
 
 
 def _check_positive(**numbers: float | None) -> None:
@@ -125,7 +126,7 @@ def _prepared(
     tried = [settings]
     tried += [attrs.evolve(settings, method=name) for name in methods or ()]
     tried += [
-        attrs.evolve(settings, integrator=name, step=1.0 if name in FIXED_STEP else None)
+        attrs.evolve(settings, integrator=name, step=None if INTEGRATORS[name].adaptive else 1.0)
         for name in integrators or ()
     ]
     tried += [attrs.evolve(settings, rtol=rtol) for rtol in tolerances or ()]
@@ -215,7 +216,7 @@ class _Maker:
 
     def _fine_steps(self, steps: Sequence[float]) -> list[Setting]:
         """Fixed steps below the ladder, for a reference where no tolerance can be held."""
-        names = [name for name in MEASURED if name in FIXED_STEP]
+        names = [i.name for i in INTEGRATORS.values() if not i.adaptive]
         return [
             Setting(method, name, step=min(steps) / 2.0)
             for name in names

@@ -5,8 +5,9 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.integrators import METHODS as CODE
-from dap3d_core.scene.validate.settings import FIXED_STEP, INTEGRATORS, METHODS
+from dap3d_core.formulations import FORMULATIONS
+from dap3d_core.integrators import INTEGRATORS, TABLEAUS
+from dap3d_core.simulation.settings import fits
 
 #: Relative tolerances of integrators that choose their step.
 TOLERANCES = tuple(float(f"1e-{k}") for k in range(3, 13))
@@ -18,17 +19,11 @@ ATOL = 1e-2
 STEPS, QUICK_STEPS = 8, 3
 QUICK_FACTOR = 4.0
 
-#: Pairs that no run takes: radau and adams need the constraints that penalty replaces by springs.
-UNFIT = (("penalty", "radau"), ("penalty", "adams"))
-#: Formulations that a report may run.
-FORMULATIONS = tuple(name for name in METHODS if name != "auto")
-#: Integrators that a report may run: auto is one of them, or two.
-MEASURED = tuple(name for name in INTEGRATORS if name != "auto")
 #: Integrators that choose their step, those of the highest order first.
 ADAPTIVE = tuple(
     sorted(
-        (name for name in MEASURED if name not in FIXED_STEP),
-        key=lambda name: -int(getattr(CODE.get(name), "order", 0)),
+        (i.name for i in INTEGRATORS.values() if i.adaptive),
+        key=lambda name: -int(getattr(TABLEAUS.get(name), "order", 0)),
     )
 )
 
@@ -85,9 +80,9 @@ def ladder(
     method: str, integrator: str, tolerances: Iterable[float], steps: Iterable[float]
 ) -> list[Setting]:
     """The rungs of a method and an integrator, coarse ones first; none where they do not fit."""
-    if (method, integrator) in UNFIT:
+    if not fits(INTEGRATORS[integrator], FORMULATIONS[method]):
         return []
-    if integrator in FIXED_STEP:
+    if not INTEGRATORS[integrator].adaptive:
         return [Setting(method, integrator, step=h) for h in sorted(steps, reverse=True)]
     return [controlled(method, integrator, rtol) for rtol in sorted(tolerances, reverse=True)]
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.report.settings_ladder import FORMULATIONS, Setting
+from dap3d_core.formulations import FORMULATIONS
+from dap3d_core.report.settings_ladder import Setting
 from dap3d_core.result import Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation import (

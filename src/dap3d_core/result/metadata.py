@@ -134,8 +134,7 @@ class Record:
     def tolerances(self) -> tuple[float, dict[str, float]] | None:
         """rtol, and atol of r, p, v and w, that controlled the steps; None for fixed steps."""
         rtol, atol = self.settings.get("rtol"), self.settings.get("atol")
-        fixed = self.integrator == "rk4" or self.settings.get("step") is not None
-        if fixed or not rtol:
+        if self.settings.get("step") is not None or not rtol:
             return None
         return float(rtol), atol if isinstance(atol, dict) else dict.fromkeys("rpvw", atol or 0.0)
 

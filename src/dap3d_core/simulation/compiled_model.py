@@ -14,6 +14,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.kernels.runtime.cache import cache_notes
 from dap3d_core.model import Model, ModelError, build_model
@@ -82,7 +83,7 @@ class CompiledModel:
         scene: a copy of the scene, as it was when it was compiled.
         checked: the scene after its check.
         model: arrays, groups, row and column pointers (irc, iru, irv).
-        method: the formulation, "unconstrained", "standard", "penalty" or "lsq".
+        method: name of the formulation, a key of ``FORMULATIONS``.
         reason: why this formulation.
         notes: what was changed or assumed.
         compile_time: seconds that checking, modelling and compiling took.
@@ -119,7 +120,7 @@ class CompiledModel:
         self._first_method = self.method = choose_method(self.model, asked)[0]
         self._own.stack.append(self.another_machine(announce))
         self.method, self.reason = self.choice(asked)
-        self.machine.method = self.method
+        self.machine.formulation = FORMULATIONS[self.method]
         # compiled here, and not on the clock of the first run
         try:
             _ = self.machine.second_thread
@@ -164,7 +165,7 @@ class CompiledModel:
     def another_machine(self, announce: Announce | None = None) -> Machine:
         """A machine of the model with arrays of its own, for whoever changes its numbers."""
         machine = Machine(self.model, self._first_method, announce)
-        machine.method = self.method
+        machine.formulation = FORMULATIONS[self.method]
         settings = self.scene.simulation
         machine.set_penalty(settings.alpha, settings.Omega, settings.mu)
         return machine
@@ -296,7 +297,8 @@ class CompiledModel:
             return method, reason
         found = start.redundancy
         if found.rank.redundant:
-            return "lsq", f"{found.rank.redundant} of {found.rank.rows} rows are redundant"
+            fits = (f.name for f in FORMULATIONS.values() if f.accepts_redundant and f.is_exact)
+            return next(fits), f"{found.rank.redundant} of {found.rank.rows} rows are redundant"
         return method, f"{reason}, and their rows are independent"
 
     def explain(self) -> str:
@@ -322,18 +324,17 @@ def choose_method(model: Model, asked: str) -> tuple[str, str]:
         SimulationError: the method asked for does not fit the scene.
     """
     constrained = model.row_count > 0
+    usual = next(f.name for f in FORMULATIONS.values() if f.needs_joints == constrained)
     if asked == "auto":
-        if constrained:
-            return "standard", "the scene has joints"
-        return "unconstrained", "the scene has no joints"
-    if asked == "unconstrained" and constrained:
-        raise SimulationError(
-            "method unconstrained does not fit: the scene has "
-            f"{len(model.joint_names)} joints with {model.row_count} rows; use standard or auto"
-        )
-    if asked != "unconstrained" and not constrained:
-        return "unconstrained", f"asked for {asked}, but the scene has no joints"
-    return asked, "asked for"
+        return usual, f"the scene has {'' if constrained else 'no '}joints"
+    if FORMULATIONS[asked].needs_joints == constrained:
+        return asked, "asked for"
+    if not constrained:
+        return usual, f"asked for {asked}, but the scene has no joints"
+    raise SimulationError(
+        f"method {asked} does not fit: the scene has {len(model.joint_names)} joints with "
+        f"{model.row_count} rows; use {usual} or auto"
+    )
 
 
 def _modelled(checked: Checked) -> Model:

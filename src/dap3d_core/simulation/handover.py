@@ -13,17 +13,15 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations import PROJECT, RHS
 from dap3d_core.formulations.evaluator import AS_COMPILED, Machine
-from dap3d_core.integrators import METHODS, Integration, Status
+from dap3d_core.integrators import EXPLICIT, IMPLICIT, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.singular_poses import RATE
 from dap3d_core.result import INFORMATION
 from dap3d_core.simulation.implicit_run import (
-    EXPLICIT,
     change_note,
     implicit_rest,
     take_over,
 )
-from dap3d_core.simulation.settings import explicit_options
 
 if TYPE_CHECKING:
     from dap3d_core.simulation.run import Run
@@ -78,9 +76,7 @@ def begin_other(run: "Run") -> None:
         run.notes.append(change_note(present.t))
         run.begin(implicit_rest(machine, present, run.times, options))
         return
-    options = options | explicit_options(machine) | {"first_step": None}
-    functions = machine.functions, machine.system, machine.loops
-    other = Integration(METHODS[EXPLICIT], *functions, present.y, run.times, **options)
+    other = EXPLICIT.make(machine, present.y, run.times, **options | {"first_step": None})
     other.beside = machine.second_thread
     take_over(other, present)
     run.begin(other)
@@ -150,8 +146,8 @@ def crossing_notes(crossed: Sequence[float]) -> list[str]:
         return []
     often = "once" if len(crossed) == 1 else f"{len(crossed)} times"
     return [
-        f"{INFORMATION}radau met a singular pose {often} (first at t = {crossed[0]:.6g} s), where "
-        f"{EXPLICIT} took the run across"
+        f"{INFORMATION}{IMPLICIT.name} met a singular pose {often} (first at "
+        f"t = {crossed[0]:.6g} s), where {EXPLICIT.name} took the run across"
     ]
 
 
@@ -164,7 +160,7 @@ def cannot_cross(message: str, run: "Run") -> str:
     if left == np.inf:
         return message
     return (
-        f"{message}. Integrator radau cannot cross the singular pose at "
-        f"t = {run.runs[-1].t + left:.6g} s; {EXPLICIT} and auto can, with project on and steps "
-        "that their error chooses"
+        f"{message}. Integrator {IMPLICIT.name} cannot cross the singular pose at "
+        f"t = {run.runs[-1].t + left:.6g} s; {EXPLICIT.name} and auto can, with project on and "
+        "steps that their error chooses"
     )

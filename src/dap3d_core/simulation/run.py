@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.integrators import METHODS, Integration, Status, make_adams
+from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS, Integration, Status
 from dap3d_core.integrators.runge_kutta.integration import Statistics as Counts
 from dap3d_core.integrators.stepping.integration_state import LONGEST
 from dap3d_core.integrators.stepping.singular_start import begin_singular
@@ -21,7 +21,7 @@ from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.events.locate import Watcher
 from dap3d_core.simulation.failure.termination import doubts, event_notes, occurrences, why_stopped
 from dap3d_core.simulation.handover import cannot_cross, crossing_notes, hand_over
-from dap3d_core.simulation.implicit_run import EXPLICIT, implicit_integration, stiffness_notes
+from dap3d_core.simulation.implicit_run import stiffness_notes
 from dap3d_core.simulation.initial.singular_start import SingularStart
 from dap3d_core.simulation.initial.tolerances import (
     atol_notes,
@@ -36,9 +36,9 @@ from dap3d_core.simulation.output.monitor import Observer, Standing
 from dap3d_core.simulation.output.recorder import Keeper
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 from dap3d_core.simulation.settings import (
-    explicit_options,
+    check_fit,
+    fits,
     integration_options,
-    refuse_adams,
     refuse_singular_start,
     report_times,
     settings_notes,
@@ -130,7 +130,7 @@ class Run:
         self.started = time.perf_counter()
         start = self._start()
         integration = self._integration(start)
-        if self.settings.integrator != "radau":  # which evaluates its stages otherwise
+        if not integration.implicit:  # which evaluates its stages otherwise
             integration.beside = self.machine.second_thread
         self.begin(integration)
 
@@ -212,10 +212,11 @@ class Run:
         redundancy, u = start.redundancy, start.u
         self.singular = singular = redundancy.singular
         words = redundancy.describe()
-        if self.compiled.method == "standard":
+        formulation = self.machine.formulation
+        if not formulation.accepts_redundant:
             elsewhere = redundancy_elsewhere(self.machine, u, redundancy).describe(redundancy)
             raise RedundantError(
-                f"{words}; {elsewhere}. The standard method needs independent rows"
+                f"{words}; {elsewhere}. The {formulation.name} method needs independent rows"
             )
         if singular is not None and not singular.leads_on:
             raise RedundantError(singular.describe())
@@ -225,7 +226,7 @@ class Run:
             raise RedundantError(words)
         if singular is not None:
             refuse_singular_start(self.settings, singular.first_step)
-        least = " (reported are those of least |lambda|)" if self.compiled.method == "lsq" else ""
+        least = " (reported are those of least |lambda|)" if formulation.is_exact else ""
         self.notes.append(
             f"{words}. Accelerations are unique; reactions in these joints are not{least}"
         )
@@ -242,19 +243,12 @@ class Run:
             "first_step": None if self.limits is None else self.limits.first,
             "buffer_rows": max(1, min(len(self.times), BUFFER_NUMBERS // width)),
         }
+        integrator = INTEGRATORS.get(settings.integrator, EXPLICIT)
+        check_fit(integrator, machine.formulation)
+        if settings.integrator == "auto":
+            options = options | {"leave_stiff": fits(IMPLICIT, machine.formulation)}
         try:
-            if settings.integrator == "radau":
-                return implicit_integration(machine, y0, self.times, options)
-            options = options | explicit_options(machine)
-            problem = machine.functions, machine.system, machine.loops, y0, self.times
-            if settings.integrator == "adams":
-                refuse_adams(machine)
-                return make_adams(*problem, **options)
-            name = settings.integrator
-            if name == "auto":
-                name = EXPLICIT
-                options["leave_stiff"] = machine.method != "penalty"  # which radau does not solve
-            integration = Integration(METHODS[name], *problem, **options)
+            integration = integrator.make(machine, y0, self.times, **options)
         except ValueError as error:
             raise SceneError([Mistake("step", settings.step, str(error))]) from error
         if singular is not None:

@@ -8,7 +8,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.integrators import EXPLICIT, INTEGRATORS, Integrator
 from dap3d_core.scene import (
     METHODS,
     MISSING,
@@ -21,7 +23,6 @@ from dap3d_core.scene import (
 from dap3d_core.scene.validate.settings import notes_of
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.implicit_run import EXPLICIT
 from dap3d_core.simulation.initial.tolerances import atol_vector, resolved_atol
 
 Floats = NDArray[np.float64]
@@ -116,21 +117,22 @@ def integration_options(machine: Machine, settings: Simulation) -> dict[str, Any
     }
 
 
-def explicit_options(machine: Machine) -> dict[str, Any]:
-    """What an explicit one takes besides."""
-    return {"length_count": machine.length_count, "watched": machine.counts_turns}
+def fits(integrator: Integrator, formulation: Formulation) -> bool:
+    """Whether an integrator can take the accelerations of a formulation."""
+    return formulation.is_exact or not integrator.requires
 
 
-def refuse_adams(machine: Machine) -> None:
-    """Adams methods look at many past states, which must lie on one smooth motion.
+def check_fit(integrator: Integrator, formulation: Formulation) -> None:
+    """Refuse an integrator that a formulation does not suit.
 
     Raises:
-        SimulationError: with method penalty projected states do not.
+        SimulationError: it requires accelerations that satisfy the constraints.
     """
-    if machine.method == "penalty":
+    if not fits(integrator, formulation):
         raise SimulationError(
-            "integrator adams does not fit method penalty, whose accelerations leave the "
-            "constraints; use method standard, lsq or auto, or integrator dop853"
+            f"integrator {integrator.name} does not fit method {formulation.name}, whose "
+            f"accelerations leave the constraints: it needs {integrator.requires}; use method "
+            f"standard, lsq or auto, or integrator {EXPLICIT.name}"
         )
 
 
@@ -149,10 +151,10 @@ def refuse_singular_start(settings: Simulation, first_step: float) -> None:
             f"the run starts at a singular pose, which one step has to leave behind: give t_end of "
             f"{first_step:.3g} s or more ({t_end:g} is given)"
         )
-    fits = settings.integrator in ("auto", EXPLICIT) and settings.step is None
-    if not fits or not settings.project:
+    integrator = INTEGRATORS.get(settings.integrator, EXPLICIT)
+    if not integrator.leaves_singular or settings.step is not None or not settings.project:
         raise SimulationError(
-            f"the run starts at a singular pose, from which integrator {EXPLICIT} alone (or auto) "
-            "goes on, by steps that its error chooses and with project on; take it, or start at "
-            "another pose"
+            f"the run starts at a singular pose, from which integrator {EXPLICIT.name} alone (or "
+            "auto) goes on, by steps that its error chooses and with project on; take it, or start "
+            "at another pose"
         )

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dap3d_core.integrators import METHODS
+from dap3d_core.integrators import EXPLICIT, INTEGRATORS
 from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
@@ -20,8 +20,6 @@ from dap3d_core.study.reduction import Reduction
 Floats = NDArray[np.float64]
 Announce = Callable[[str], None]
 
-#: The integrator whose steps end at each reporting time.
-STEPPED = "rk4"
 #: Numbers of rows that are kept at once, at most: 64 MB.
 ROW_NUMBERS = 8_000_000
 
@@ -104,7 +102,8 @@ class Ensemble:
         self.outputs = self.reduction.outputs
         self.labels, self.units = self.reduction.labels, self.reduction.units
         self._own = threading.local()
-        self._together = settings.integrator in (*METHODS, "auto") and not any(
+        integrator = INTEGRATORS.get(settings.integrator, EXPLICIT)
+        self._together = integrator.one_step and not any(
             number.table == "simulation" for number in self.numbers
         )
 
@@ -205,7 +204,7 @@ def _at_the_end_alone(study: Study) -> Study:
     settings = study.scene.simulation
     if any(output.reduction != "end" for output in study.outputs) or "simulation.dt" in study.names:
         return study
-    if settings.integrator == STEPPED or not settings.t_end:
+    if not INTEGRATORS.get(settings.integrator, EXPLICIT).adaptive or not settings.t_end:
         return study
     scene = study.scene.copy()
     scene.simulation.dt = None if "simulation.t_end" in study.names else settings.t_end

@@ -126,7 +126,7 @@ class RadauIntegration(Integration):
         real[integration_state.STEP], real[integration_state.H] = step or 0.0, first_step or 0.0
         real[integration_state.T] = instants[0]
         own[at.FACCON] = own[at.ERROR_ACCEPTED] = 1.0
-        own[at.PART] = REGULAR if machine.method == "lsq" else 0.0
+        own[at.PART] = REGULAR if machine.formulation.accepts_redundant else 0.0
         integer[integration_state.ORDER], integer[integration_state.ERROR_SIZE] = ORDER, error_size
         integer[integration_state.DENSE], integer[integration_state.PROJECT_ON] = 1, project_on
         integer[integration_state.WATCHED] = machine.counts_turns

@@ -166,7 +166,7 @@ def _name(machine: Machine, kind: str, group: Group, k: int) -> str:
 
 def _singular(machine: Machine, t: float) -> str:
     """The joint whose rows (nearly) depend on those before, where the pose is (nearly) singular."""
-    if machine.method == "unconstrained" or not machine.model.row_count:
+    if not machine.formulation.needs_joints or not machine.model.row_count:
         return ""
     row = machine.poor_rows(t)
     if not len(row):

@@ -42,7 +42,7 @@ def together(ensemble: "Ensemble") -> "Together | None":
     found = start.redundancy
     if not found.is_plain:
         return None
-    if compiled.method == "standard" and found.rank.redundant:
+    if found.rank.redundant and not compiled.machine.formulation.accepts_redundant:
         return None
     return Together(ensemble, start)
 
@@ -185,4 +185,4 @@ class Together:
         if not model.row_count or not settings.correct:
             return not model.row_count
         usual = str(settings.correct_metric) == "unit" and not settings.hold
-        return compiled.method == "standard" and usual
+        return usual and not compiled.machine.formulation.accepts_redundant

@@ -7,16 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import STEPS, System, step_functions
+from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Machine
-from dap3d_core.integrators import METHODS, Integration
+from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS
 from dap3d_core.integrators.runge_kutta.step import advance
 from dap3d_core.integrators.stepping.integration_state import Status, Work
 from dap3d_core.kernels.runtime.cache import table_of
 from dap3d_core.kernels.runtime.function_lists import INTEGER, LOOP_LIST, procedure_signature
 from dap3d_core.scene import Simulation
-from dap3d_core.simulation.implicit_run import EXPLICIT
 from dap3d_core.simulation.initial.assemble import model_size
-from dap3d_core.simulation.settings import explicit_options, integration_options
+from dap3d_core.simulation.settings import fits, integration_options
 from dap3d_core.study.batch import driver as at
 from dap3d_core.study.batch import initial_state
 from dap3d_core.study.batch.driver import Points, run_points
@@ -68,7 +68,7 @@ class Runs:
     ) -> None:
         """Args:
         machine: what evaluates the model; its numbers change.
-        settings: of the runs; the integrator is one of ``METHODS``, or "auto": a run that turns
+        settings: of the runs; the integrator is a one-step one, or "auto": a run that turns
             out stiff is then not done.
         times: (nt,) reporting times.
         stops: times that no step goes over, and whether something jumps there.
@@ -76,17 +76,13 @@ class Runs:
         self.machine = machine
         y0 = machine.integrated(machine.model.u0)
         tries = settings.integrator == "auto"
-        self.integration = Integration(
-            METHODS[EXPLICIT if tries else str(settings.integrator)],
-            machine.functions,
-            machine.system,
-            machine.loops,
+        self.integration = INTEGRATORS.get(str(settings.integrator), EXPLICIT).make(
+            machine,
             y0,
             times,
             buffer_rows=len(times),
-            leave_stiff=tries and machine.method != "penalty",  # as Run does
+            leave_stiff=tries and fits(IMPLICIT, machine.formulation),  # as Run does
             **integration_options(machine, settings),
-            **explicit_options(machine),
         )
         self.stops = np.array(stops, dtype=float).reshape(-1, 2)
         self._metric = machine.system.metric.copy()
@@ -100,7 +96,7 @@ class Runs:
             "first_switches": work.switches.copy(),
             "first_lengths": work.lengths.copy(),
         }
-        self._starting = _starting(machine.method)
+        self._starting = _starting(machine.formulation)
         self.size = model_size(machine)
         self.last_start = y0
         self._told = np.zeros(initial_state.STARTING + machine.plan.row_size)
@@ -152,13 +148,12 @@ class Runs:
 
 
 @cache
-def _starting(method: str) -> Any:
+def _starting(formulation: Formulation) -> Any:
     """What a run remembers of its start, and what brings it there, as compiled functions."""
-    if method == "unconstrained":
+    if not formulation.needs_joints:
         return step_functions(initial_state.begin_free)
-    begin = (
-        initial_state.begin_standard if method == "standard" else initial_state.begin_regularised
-    )
+    redundant = formulation.accepts_redundant
+    begin = initial_state.begin_regularised if redundant else initial_state.begin_standard
     return step_functions(begin, initial_state.assemble_start)
 
 

@@ -15,9 +15,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-#: Formulations whose copies have nothing to do with each other but their steps.
-FORMULATIONS = ("unconstrained", "standard")
-
 
 class Packs:
     """Runs points of one model, ``count`` at a time. For one thread."""
@@ -55,7 +52,7 @@ def packs_for(ensemble: "Ensemble", one: Machine) -> Packs | None:
     (work, potential energy, residuals) nothing may be asked for.
     """
     count, model = ensemble.study.pack, ensemble.compiled.model
-    alone = one.method not in FORMULATIONS or one.halved or bool(one.switches) or model.friction
+    alone = one.formulation.accepts_redundant or one.halved or bool(one.switches) or model.friction
     if count < 2 or alone or not ensemble.reduction.is_of_single_copies:
         return None
     return Packs(ensemble, one, count)
