@@ -1,7 +1,7 @@
 """All benchmarks, as tables and as JSON.
 
 ``make bench``, or ``python benchmarks/run.py [--only NAME ...] [-o FILE]``. scale_long and
-streaming, some minutes, two_threads, study and start are run only when they are named. With
+streaming, some minutes, study and start are run only when they are named. With
 ``--docs`` the figures of hard_cases, long_time, chaos, flips and hinges go to docs/hard-cases.md as
 well; ``--only hard`` is all of these.
 """
@@ -33,13 +33,12 @@ import scale
 import start
 import streaming
 import study
-import two_threads
 import whole_runs
 from rich.console import Console
 from rich.table import Table
 
 #: What is run only when it is named.
-NAMED = ("scale_long", "two_threads", "streaming", "study", "start")
+NAMED = ("scale_long", "streaming", "study", "start")
 #: Columns that a table has at most beside its first.
 COLUMNS = 8
 #: Columns that every table of one title has, and those of sentences, which stand below.
@@ -95,7 +94,6 @@ def main():
         "start": start.measure,
         "scale": scale.measure,
         "scale_long": scale.long_chain,
-        "two_threads": two_threads.measure,
         "streaming": streaming.measure,
         "study": study.measure,
         "points": points.measure,

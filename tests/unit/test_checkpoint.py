@@ -128,15 +128,6 @@ def test_a_resumed_run_is_that_of_one_that_was_not_ended(case, tmp_path):
     assert [n for n in found.notes if n not in resumed] == list(whole.notes)
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(not jit_is_on(), reason="a large scene takes long in plain Python")
-def test_a_large_scene_in_two_halves_is_resumed(tmp_path):
-    settings = {"t_end": 0.05, "dt": 0.01}
-    whole = dap.simulate(problems.chain(600), **settings)
-    found = dap.resume(leave(problems.chain(600), tmp_path, 0.02, **settings))
-    assert same_bits(found, whole)
-
-
 def test_the_model_s_own_types_are_resumed_where_they_are_allowed(tmp_path):
     """And refused where they are not, or where they have changed."""
     folder = shutil.copytree(dap.shipped_models()["ball1"], tmp_path / "ball1")

@@ -12,7 +12,6 @@ import pytest
 from support.studies import POINTS, bob, collected, same
 
 import dap3d_core as dap
-from dap3d_core.formulations.two_threads.worker_thread import one_of_many, threads_allowed
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.study import Batch, Ensemble, PointStatus
 from dap3d_core.study.workers import threads as local
@@ -60,11 +59,9 @@ class Slow:
     seconds: float = 0.0
     fails_at: float = np.inf
     seen: list = attrs.Factory(list)
-    alone: set = attrs.Factory(set)
 
     def run(self, points):
         self.seen.append((threading.current_thread().name, len(points)))
-        self.alone.add(threads_allowed())
         time.sleep(self.seconds * len(points))
         if (points[:, 0] >= self.fails_at).any():
             raise ValueError("a function of the user")
@@ -152,20 +149,6 @@ def test_a_long_point_is_not_waited_for_for_ever(monkeypatch):
         thread.join(5.0)
     assert not ours()
     assert len(slow.seen) == run
-
-
-@pytest.mark.skipif(not jit_is_on(), reason="large scenes have no second thread in plain Python")
-def test_many_at_once_leave_no_core_for_a_second_thread(monkeypatch):
-    """With several workers, or where one thread is asked for; a point alone may have it."""
-    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 1}, raising=False)
-    monkeypatch.delenv("DAP3D_THREADS", raising=False)
-    for count, threads, allowed in ((8, 2, {1}), (8, 1, {1}), (1, None, {2}), (1, 1, {1})):
-        slow = Slow(0.001)
-        collected(run_here(slow, POINTS[:count], np.arange(count), threads=threads))
-        assert slow.alone == allowed, (count, threads)
-    assert threads_allowed() == 2
-    with one_of_many(), one_of_many():
-        assert threads_allowed() == 1
 
 
 def test_the_environment_limits_threads(monkeypatch):

@@ -23,10 +23,7 @@ AUTO_METHOD = (
 #: Environment variables, and what each does.
 VARIABLES = {
     "DAP3D_CACHE_DIR": "folder that keeps compiled code; by default `dap3d` in the user's cache",
-    "DAP3D_THREADS": (
-        "most threads of a study, by default one for each core; `1` also keeps large scenes on one "
-        "core; the numbers are the same"
-    ),
+    "DAP3D_THREADS": "most threads of a study, by default one for each core",
     "DAP3D_BLOCK": "distributions whose types are left out, or `NAME:KEYWORD` of single types, "
     "separated by commas",
     "DAP3D_CPU": "processor that code is compiled for, as LLVM names it; by default this one",

@@ -11,18 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.kernels.compiler.types import Table
-from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays
+from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX
 from dap3d_core.kernels.runtime.cache import table_of
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, step_signature
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-
-#: What is listed part by part in ``Halves``. Runs of bodies; of the blocks of D that are scaled, of
-#: those of a part's rows and of those of a part's bodies; of hubs. Pieces of groups of forces and
-#: of joints.
-BODIES, SCALED, BY_ROWS, BY_BODIES, HUBS, RUNS = range(6)
-FORCES, JOINTS, PIECES = range(3)
 
 #: The order of the group loops in the list: all loops of one kind stand together.
 KINDS = (
@@ -49,30 +43,6 @@ ENDS, BEGINS, UNSEEN = 1, 0, -1
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
-class Halves(Arrays):
-    """Partition of a large scene into two halves and a top (two_threads/partition.py)."""
-
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("mail", "nodes", "rows", "targets", "matrix"), INTEGERS),
-        **dict.fromkeys(("run_start", "piece_start"), INTEGERS),
-        **dict.fromkeys(("columns", "updates", "runs", "pieces"), INTEGER_MATRIX),
-    }
-
-    mail: Integers  # what the two threads tell each other (formulations/two_threads/rhs_halves.py)
-    numbers: Floats  # the time; powers of each part
-    nodes: Integers  # from here on as in linear.halving.Halves
-    rows: Integers
-    targets: Integers
-    matrix: Integers
-    columns: Integers
-    updates: Integers
-    run_start: Integers  # (RUNS * 3 + 1,) first of the runs of each kind and part
-    runs: Integers  # (k, 2) first, and last + 1, of bodies, blocks of D or hubs
-    piece_start: Integers  # (PIECES * 3 + 1,) first of the pieces of each kind and part
-    pieces: Integers  # (k, 4) a loop's place in the list; i0, p0, count of a run of its instances
-
-
-@attrs.frozen(eq=False, kw_only=True, slots=False)
 class System(LoopArrays):
     """Arrays of the driver. n bodies, ground is 0; rows in the order of the plan."""
 
@@ -83,7 +53,6 @@ class System(LoopArrays):
             ("groups", "blocks", "targets", "contributions", "nodes", "columns", "updates", "hubs"),
             INTEGER_MATRIX,
         ),
-        "halves": Halves.type_of(),
     }
 
     metric: Floats  # (n+1, 16): 1/sqrt(m); U = L^-T by rows, upper triangle; B = A U by rows
@@ -108,7 +77,6 @@ class System(LoopArrays):
     columns: Integers
     updates: Integers
     hubs: Integers
-    halves: Any  # Halves of a large scene, else None: nothing reads it then
 
 
 #: What a run changes and goes on from: ``par`` holds the turns of angles and the numbers that an

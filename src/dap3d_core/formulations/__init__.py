@@ -29,34 +29,24 @@ class Formulation:
         accepts_redundant: constraint rows may depend on each other.
         is_exact: its accelerations satisfy the constraints, as implicit and multistep integrators
             require.
-        two_threads: module that evaluates large scenes on two threads; "" if there is none.
-        two_threads_from: number of bodies from which that is used.
     """
 
     name: str
     needs_joints: bool = True
     accepts_redundant: bool = False
     is_exact: bool = True
-    two_threads: str = ""
-    two_threads_from: int = 500
 
     @property
     def loops(self) -> tuple[str, ...]:
         """Kinds of the group loops that it calls."""
         return (*_ALL, *_OF_JOINTS) if self.needs_joints else _ALL
 
-    def is_divided(self, body_count: int) -> bool:
-        """Whether a scene of so many bodies is divided for two threads."""
-        return bool(self.two_threads) and body_count >= self.two_threads_from
-
-    def functions(self, *, turns: bool, switches: bool, divided: bool = False) -> Any:
+    def functions(self, *, turns: bool, switches: bool) -> Any:
         """Its compiled functions as the list that an integrator takes.
 
         They are rhs, project, report; accepted where ``turns`` are counted; watch for ``switches``.
-        ``divided``: those for two threads.
         """
-        name = self.two_threads if divided else self.name
-        module: Any = import_module(f"dap3d_core.formulations.{name}")
+        module: Any = import_module(f"dap3d_core.formulations.{self.name}")
         functions = [module.rhs, module.project, module.report]
         if turns or switches:
             from dap3d_core.formulations.common.switching_functions import accepted, watch
@@ -70,7 +60,7 @@ FORMULATIONS = {
     formulation.name: formulation
     for formulation in (
         Formulation("unconstrained", needs_joints=False),
-        Formulation("standard", two_threads="two_threads.standard_halves"),
+        Formulation("standard"),
         Formulation("penalty", accepts_redundant=True, is_exact=False),
         Formulation("lsq", accepts_redundant=True),
     )

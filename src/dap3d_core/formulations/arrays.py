@@ -67,11 +67,6 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
     metric = np.zeros((n + 1, 16))
     set_metric(metric, model.mass, model.Jp)
     idx, par, groups, starts = _tables(model, plan, what)
-    halves = None
-    if plan.halves is not None:
-        from dap3d_core.formulations.two_threads.partition import divide
-
-        halves = divide(plan, what, groups)
     return System(
         body=body,
         metric=metric,
@@ -101,7 +96,6 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         columns=plan.columns,
         updates=plan.updates,
         hubs=plan.hubs,
-        halves=halves,
     )
 
 

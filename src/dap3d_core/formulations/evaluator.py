@@ -110,10 +110,7 @@ class Machine:
         """
         self.model = model
         self.formulation = FORMULATIONS[method]
-        halved = self.formulation.is_divided(model.body_count)
-        self.plan: Plan = make_plan(
-            model.body_count, model.joint_slots, model.joint_rows.tolist(), halved=halved
-        )
+        self.plan: Plan = make_plan(model.body_count, model.joint_slots, model.joint_rows.tolist())
         self.loops, self.what = build_loops(model, self.formulation.loops, announce)
         self.system: System = build_system(model, self.plan, self.what)
         self.start_functions()
@@ -218,21 +215,7 @@ class Machine:
     def functions(self) -> Any:
         """The compiled functions (rhs, project, report, ...) that an integrator takes."""
         turns, switches = self.counts_turns, bool(self.switches)
-        return self.formulation.functions(turns=turns, switches=switches, divided=self.halved)
-
-    @property
-    def halved(self) -> bool:
-        """Whether right-hand sides are evaluated in two halves (two_threads/rhs_halves.py)."""
-        return self.system.halves is not None and bool(self.formulation.two_threads)
-
-    @cached_property
-    def second_thread(self) -> Any:
-        """A context in which a second thread does one half; None where none helps."""
-        if not self.halved:
-            return None
-        from dap3d_core.formulations.two_threads.worker_thread import SecondThread, threads_allowed
-
-        return SecondThread(self.system, self.loops) if threads_allowed() > 1 else None
+        return self.formulation.functions(turns=turns, switches=switches)
 
     def integrated(self, u: ArrayLike) -> Floats:
         """The integrated state y (13 n + 1,) of a state u (13 n,)."""

@@ -121,12 +121,7 @@ class CompiledModel:
         self._own.stack.append(self.another_machine(announce))
         self.method, self.reason = self.choice(asked)
         self.machine.formulation = FORMULATIONS[self.method]
-        # compiled here, and not on the clock of the first run
-        try:
-            _ = self.machine.second_thread
-        except ValueError as error:  # what DAP3D_THREADS says
-            raise SimulationError(str(error)) from error
-        _ = self.machine.functions
+        _ = self.machine.functions  # compiled here, and not on the clock of the first run
         self.notes: list[str] = [
             *self.checked.notes,
             *self.model.notes,

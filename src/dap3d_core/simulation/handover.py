@@ -77,7 +77,6 @@ def begin_other(run: "Run") -> None:
         run.begin(implicit_rest(machine, present, run.times, options))
         return
     other = EXPLICIT.make(machine, present.y, run.times, **options | {"first_step": None})
-    other.beside = machine.second_thread
     take_over(other, present)
     run.begin(other)
 

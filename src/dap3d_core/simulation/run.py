@@ -130,8 +130,6 @@ class Run:
         self.started = time.perf_counter()
         start = self._start()
         integration = self._integration(start)
-        if not integration.implicit:  # which evaluates its stages otherwise
-            integration.beside = self.machine.second_thread
         self.begin(integration)
 
     def keep(

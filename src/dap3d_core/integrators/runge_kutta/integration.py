@@ -3,7 +3,7 @@
 from bisect import bisect_left
 from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,9 +22,6 @@ from dap3d_core.integrators.stepping.output import FAILED
 from dap3d_core.integrators.stepping.restore import Restorable
 from dap3d_core.integrators.stepping.rounding import tolerance_of
 from dap3d_core.kernels.runtime.cache import jit_is_on
-
-if TYPE_CHECKING:
-    from dap3d_core.formulations.two_threads.worker_thread import SecondThread
 
 
 class Statistics(NamedTuple):
@@ -90,8 +87,6 @@ class Integration(Restorable):
         For times, sizes, tolerances or steps that make no sense.
     """
 
-    #: Of a large scene a second thread, which takes part in its right-hand sides.
-    beside: "SecondThread | None" = None
     #: Times in ascending order that no step goes over, and whether the right-hand side may jump
     #: there, so that the integration starts anew.
     stops: Sequence[tuple[float, bool]] = ()
@@ -188,9 +183,7 @@ class Integration(Restorable):
         return self.status
 
     def _go(self, budget: int) -> None:
-        if self.beside is not None:
-            self.beside.call(lambda: self._advance(budget), lambda: self.statistics.rhs)
-        elif jit_is_on():
+        if jit_is_on():
             self._advance(budget)
         else:
             with np.errstate(all="ignore"):  # as in compiled code, which tests what matters

@@ -64,7 +64,7 @@ def lay_matrix(found: Ordering, starts: Sequence[int], contents: Contents) -> Ma
             result.diagonal.append(start)
             result.blocks.append(places)
         else:
-            for top, bottom in _runs(below, found.parts):
+            for top, bottom in _runs(below):
                 result.columns.append((size, starts[top], starts[bottom] - starts[top]))
                 size += (starts[bottom] - starts[top]) * m
         result.heights.append((size - start) // m)
@@ -95,11 +95,11 @@ def _below(found: Ordering, last: int, end: int) -> list[int]:
     return [*range(last, end), *found.below[end - 1]]
 
 
-def _runs(places: Iterable[int], cuts: Sequence[int] = ()) -> Iterator[tuple[int, int]]:
-    """Ranges (first, last + 1) of ascending places that follow each other, none across a cut."""
+def _runs(places: Iterable[int]) -> Iterator[tuple[int, int]]:
+    """Ranges (first, last + 1) of ascending places that follow each other."""
     first = last = -1
     for k in places:
-        if k != last or k in cuts:
+        if k != last:
             if first >= 0:
                 yield first, last
             first = k
@@ -198,7 +198,7 @@ class _Panels:
     def products(self, k: int) -> Iterator[tuple[int, ...]]:
         """What a panel subtracts: from ranges of columns of one node, ranges of rows."""
         first, last, end = self.matrix.spans[k]
-        runs = list(_runs(_below(self.found, last, end), self.found.parts))
+        runs = list(_runs(_below(self.found, last, end)))
         for n, run in enumerate(runs):
             for begin, close in self._pieces(run):
                 right = self.address(begin, first)

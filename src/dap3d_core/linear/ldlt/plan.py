@@ -7,7 +7,6 @@ its own until the panel's turn comes, so that small nodes know nothing of panels
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -15,9 +14,6 @@ from numpy.typing import NDArray
 
 from dap3d_core.linear.ldlt.factor_layout import Contents, Matrix, lay_matrix, list_updates
 from dap3d_core.linear.ordering.elimination_order import Ordering, order_nodes
-
-if TYPE_CHECKING:
-    from dap3d_core.linear.ordering.bisection import Halves
 
 Integers = NDArray[np.int64]
 
@@ -30,7 +26,7 @@ class Plan:
         ordering: what was found, for reports.
         joint_row: (joints,) place of each joint's first row in the row vectors (gamma, nu, C, x).
         joint_block: per joint the places in D of its blocks, one a slot (ground's a spare place).
-        row_size: length of the row vectors: all rows, six for each hub, the copy of ``halves``.
+        row_size: length of the row vectors: all rows, six for each hub.
         block_size, matrix_size: lengths of D and K.
         blocks: (b, 5) of D: place, body, rows, first row, 1 if its body is a hub.
         targets: (t, 6) of K: place, rows, columns, first and last+1 contribution, kind (see below).
@@ -62,7 +58,6 @@ class Plan:
     hubs: Integers
     fill: int
     unfilled_size: int
-    halves: "Halves | None" = None
 
 
 #: Kinds of a target: off-diagonal sum of products, diagonal sum of products, copy of a block of D
@@ -74,8 +69,6 @@ def make_plan(
     body_count: int,
     joint_slots: Sequence[tuple[int, ...]],
     joint_rows: Sequence[int],
-    *,
-    halved: bool = False,
 ) -> Plan:
     """Find the elimination program of a model's sparsity.
 
@@ -83,9 +76,8 @@ def make_plan(
         body_count: bodies without ground, numbered from 1.
         joint_slots: bodies of each joint by slot, ground 0.
         joint_rows: rows of each joint.
-        halved: whether it is cut in two halves, if the scene lets them share the work.
     """
-    found = order_nodes(body_count, joint_slots, joint_rows, halved=halved)
+    found = order_nodes(body_count, joint_slots, joint_rows)
     node_count, sizes = len(found.nodes), found.sizes
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64).tolist()
     place = {node: k for k, node in enumerate(found.order)}
@@ -101,18 +93,13 @@ def make_plan(
     hub_rows = [(b, starts[place[hubs[b]]]) for b in found.hubs]
     filled = sum(1 for row, column in made_of if row != column)
     nodes, columns = _nodes(found, starts, matrix, update_start), _table(matrix.columns, 3)
-    halves = None
-    if found.parts:
-        from dap3d_core.linear.ordering.bisection import halves_of
-
-        halves = halves_of(found, starts, nodes, targets, columns, updates)
     return Plan(
         ordering=found,
         joint_row=np.array(joint_row, dtype=np.int64),
         joint_block=tuple(joint_block),
-        row_size=starts[-1] + (int(halves.rows[3] - halves.rows[2]) if halves else 0),
+        row_size=starts[-1],
         block_size=block_size,
-        matrix_size=matrix.size + (int(halves.matrix[1]) if halves else 0),
+        matrix_size=matrix.size,
         blocks=_table(blocks, 5),
         targets=targets,
         contributions=contributions,
@@ -123,7 +110,6 @@ def make_plan(
         fill=sum(map(len, found.below)) - filled,
         unfilled_size=sum(m * m for m in sizes)
         + sum(sizes[row] * sizes[column] for row, column in made_of if row != column),
-        halves=halves,
     )
 
 

@@ -1,1 +1,1 @@
-"""Elimination orders: nested dissection, supernodes, bisection."""
+"""Elimination orders: nested dissection, supernodes."""

@@ -60,8 +60,6 @@ class Ordering:
         below: for each entry of ``order`` the places in ``order`` that it updates, ascending.
         panels: places (first, last + 1) in ``order`` of what is eliminated together, and where the
             group ends whose part it is.
-        parts: places where the second half and the top begin (bisection.py); none where it is
-        whole.
     """
 
     nodes: tuple[JointNode, ...]
@@ -70,7 +68,6 @@ class Ordering:
     order: tuple[int, ...]
     below: tuple[tuple[int, ...], ...]
     panels: tuple[tuple[int, int, int], ...] = ()
-    parts: tuple[int, ...] = ()
 
     def is_hub(self, place: int) -> bool:
         """Whether a hub, not a joint node, is at a place of ``order``."""
@@ -106,8 +103,6 @@ def order_nodes(
     body_count: int,
     joint_slots: Sequence[tuple[int, ...]],
     joint_rows: Sequence[int],
-    *,
-    halved: bool = False,
 ) -> Ordering:
     """Find the order of elimination.
 
@@ -115,8 +110,6 @@ def order_nodes(
         body_count: bodies without ground; they are numbered from 1.
         joint_slots: bodies of each joint, ground 0.
         joint_rows: rows of each joint.
-        halved: whether it is cut in two halves (bisection.py), if the scene lets them share the
-        work.
     """
     nodes = _merge(joint_slots, joint_rows)
     of_body: list[list[int]] = [[] for _ in range(body_count + 1)]
@@ -142,17 +135,7 @@ def order_nodes(
 
         other = eliminated(dissect(_neighbours(nodes, of_body, early, hubs), size))
         found = with_panels(min(found, other, key=lambda ordering: ordering.work))
-    if not halved:
-        return found
-    from dap3d_core.linear.ordering.bisection import MORE_WORK, in_halves
-
-    cut = in_halves(found)
-    if not cut.parts and not found.panels:  # minimum degree may go from one end to the other
-        from dap3d_core.linear.ordering.nested_dissection import dissect
-
-        other = eliminated(dissect(_neighbours(nodes, of_body, early, hubs), size, levels=1))
-        cut = in_halves(other) if other.work <= MORE_WORK * found.work else found
-    return cut if cut.parts else found
+    return found
 
 
 def _merge(joint_slots: Sequence[tuple[int, ...]], joint_rows: Sequence[int]) -> list[JointNode]:

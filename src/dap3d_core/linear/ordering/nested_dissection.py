@@ -26,16 +26,12 @@ CUTS = (0.42, 0.46, 0.5, 0.54, 0.58)
 TRIED = 4
 
 
-def dissect(
-    neighbours: Sequence[set[int]], weight: Sequence[int], *, levels: int | None = None
-) -> list[int]:
+def dissect(neighbours: Sequence[set[int]], weight: Sequence[int]) -> list[int]:
     """The stage of each node: 0 goes first, the first separator last.
 
     Args:
         neighbours: of each node, both ways.
         weight: of each node.
-        levels: how often halves are cut again, the first cut counted; by default until they are
-            small.
     """
     from scipy.sparse import csr_array
 
@@ -56,8 +52,7 @@ def dissect(
             chosen = nodes[piece]
             left, right, separator = _cut(mine, weights[chosen])
             depth[chosen[separator]] = level
-            if level + 1 != levels:
-                waiting += [(chosen[half], level + 1) for half in (left, right) if len(half)]
+            waiting += [(chosen[half], level + 1) for half in (left, right) if len(half)]
     deepest = int(np.max(depth, initial=-1))
     stages: list[int] = np.where(depth < 0, 0, deepest + 1 - depth).tolist()
     return stages

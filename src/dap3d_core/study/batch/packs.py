@@ -52,7 +52,7 @@ def packs_for(ensemble: "Ensemble", one: Machine) -> Packs | None:
     (work, potential energy, residuals) nothing may be asked for.
     """
     count, model = ensemble.study.pack, ensemble.compiled.model
-    alone = one.formulation.accepts_redundant or one.halved or bool(one.switches) or model.friction
+    alone = one.formulation.accepts_redundant or bool(one.switches) or model.friction
     if count < 2 or alone or not ensemble.reduction.is_of_single_copies:
         return None
     return Packs(ensemble, one, count)

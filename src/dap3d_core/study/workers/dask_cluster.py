@@ -15,7 +15,6 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.two_threads.worker_thread import one_of_many
 from dap3d_core.result import current_versions
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.simulation import SimulationError
@@ -284,11 +283,10 @@ def run_points(payload: bytes, digest: str, points: Floats) -> tuple[Batch, floa
     Returns:
         What came of them, and how many seconds they took.
     """
-    with one_of_many():
-        ensemble = _ensemble(payload, digest)
-        begun = time.perf_counter()
-        batch = ensemble.run(points)
-        return batch, time.perf_counter() - begun
+    ensemble = _ensemble(payload, digest)
+    begun = time.perf_counter()
+    batch = ensemble.run(points)
+    return batch, time.perf_counter() - begun
 
 
 #: Of a worker's process: the compiled studies by their digest, the last one used at the end.

@@ -1,9 +1,9 @@
 """The points of a study on the cores of this machine."""
 
+import os
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import nullcontext
 from queue import Empty, SimpleQueue
 from typing import Any
 
@@ -11,11 +11,6 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.two_threads.worker_thread import (
-    cores_allowed,
-    one_of_many,
-    threads_limit,
-)
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.simulation import SimulationError
 from dap3d_core.study.study import Batch, Ensemble
@@ -52,8 +47,37 @@ def run_here(
     count = min(threads_for(threads), len(places))
     if count > 1:
         return _by_many(ensemble, points, places, count)
-    # One point alone may have a second thread inside of its right-hand sides.
-    return _by_one(ensemble, points, places, alone=len(places) == 1 and threads != 1)
+    return _by_one(ensemble, points, places)
+
+
+def cores_allowed() -> int:
+    """Number of cores that the process may use: its own ones, or ``DAP3D_THREADS`` if less.
+
+    Raises:
+        ValueError: ``DAP3D_THREADS`` is no number of threads.
+    """
+    if hasattr(os, "sched_getaffinity"):
+        cores = len(os.sched_getaffinity(0))
+    else:
+        cores = os.cpu_count() or 1
+    return min(cores, threads_limit() or cores)
+
+
+def threads_limit() -> int | None:
+    """The number of threads that ``DAP3D_THREADS`` allows; None where it is not set.
+
+    Raises:
+        ValueError: it is no number of threads.
+    """
+    text = os.environ.get("DAP3D_THREADS", "").strip()
+    if not text:
+        return None
+    if not (text.isascii() and text.isdigit() and int(text) > 0):
+        raise ValueError(
+            f"the environment variable DAP3D_THREADS is {text!r}; it must be a whole number from "
+            "1: studies use at most so many threads; unset, they may use all cores"
+        )
+    return int(text)
 
 
 def threads_for(asked: int | None) -> int:
@@ -100,17 +124,14 @@ class Portions:
         return max(1, min(int(wanted), self._most, left))
 
 
-def _by_one(
-    ensemble: Ensemble, points: Floats, places: Integers, *, alone: bool = False
-) -> Iterator[Found]:
+def _by_one(ensemble: Ensemble, points: Floats, places: Integers) -> Iterator[Found]:
     """Run points in this thread."""
     portions = Portions(SECONDS, 1)
     while len(places):
         size = portions.next(len(places))
         chunk, places = places[:size], places[size:]
         begun = time.perf_counter()
-        with nullcontext() if alone else one_of_many():
-            batch = ensemble.run(points[chunk])
+        batch = ensemble.run(points[chunk])
         portions.note(size, time.perf_counter() - begun)
         yield chunk, batch
 
@@ -159,14 +180,13 @@ def _start(count: int, threads: list[threading.Thread], arguments: tuple[Any, ..
 
 def _work(ensemble: Ensemble, points: Floats, tasks: Any, done: Any) -> None:
     """Run portions until there is none: what a thread does."""
-    with one_of_many():
-        while (chunk := tasks.get()) is not None:
-            begun = time.perf_counter()
-            try:
-                found: Any = ensemble.run(points[chunk])
-            except BaseException as error:  # whatever it is: it belongs to who asked
-                found = error
-            done.put((chunk, found, time.perf_counter() - begun))
+    while (chunk := tasks.get()) is not None:
+        begun = time.perf_counter()
+        try:
+            found: Any = ensemble.run(points[chunk])
+        except BaseException as error:  # whatever it is: it belongs to who asked
+            found = error
+        done.put((chunk, found, time.perf_counter() - begun))
 
 
 def _end(threads: list[threading.Thread], tasks: Any) -> None:

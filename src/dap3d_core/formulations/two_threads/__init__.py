@@ -1,1 +1,0 @@
-"""The standard formulation of one large scene on two threads."""
