@@ -12,10 +12,11 @@ from support import problems
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
+from dap3d_core.integrators import INTEGRATORS
 from dap3d_core.report import Report, Run, Setting
 from dap3d_core.report.error_norms import final_position_error, first_parting, trajectory_error
 from dap3d_core.report.recommend import front, recommend
-from dap3d_core.report.settings_ladder import ADAPTIVE, MEASURED, ladder, ladder_of_steps
+from dap3d_core.report.settings_ladder import ADAPTIVE, ladder, ladder_of_steps
 from dap3d_core.report.timing import Bench
 from dap3d_core.scene.validate.settings import FIXED_STEP
 
@@ -71,8 +72,8 @@ def test_trajectories_part_where_they_differ_by_a_thousandth_of_the_size():
 
 def test_every_integrator_has_a_ladder_from_coarse_to_fine():
     """Those that need a step get steps, all others tolerances with atol = rtol / 100."""
-    assert set(ADAPTIVE) | set(FIXED_STEP) == set(MEASURED)
-    for name in MEASURED:
+    assert set(ADAPTIVE) | set(FIXED_STEP) == set(INTEGRATORS)
+    for name in INTEGRATORS:
         rungs = ladder("standard", name, (1e-6, 1e-3), (0.01, 0.02))
         if name in FIXED_STEP:
             assert [(r.step, r.rtol) for r in rungs] == [(0.02, None), (0.01, None)]
@@ -184,9 +185,9 @@ def test_every_integrator_is_measured_and_errors_fall_with_the_tolerance(small):
     """
     assert small.status == "done"
     assert not small.failed
-    assert {r.integrator for r in small.runs} == set(MEASURED)
+    assert {r.integrator for r in small.runs} == set(INTEGRATORS)
     for method, integrator in {(r.method, r.integrator) for r in small.runs} - {
-        ("penalty", name) for name in MEASURED  # its passes end at a residual
+        ("penalty", name) for name in INTEGRATORS  # its passes end at a residual
     }:  # fmt: skip
         errors = [r.error for r in small.runs if (r.method, r.integrator) == (method, integrator)]
         assert len(errors) == 3
@@ -348,7 +349,7 @@ def test_what_was_measured_is_kept_when_it_is_ended_early(failing):
     kept = caught.value.report
     assert isinstance(kept, Report)
     assert kept.status == "interrupted"
-    assert 0 < len(kept.runs) < 3 * len(MEASURED)
+    assert 0 < len(kept.runs) < 3 * len(INTEGRATORS)
     assert all(0.0 <= done <= total for done, total in calls)
 
 
