@@ -418,9 +418,9 @@ def test_limits_of_the_scene_that_the_motion_leaves_are_told(tmp_path):
 
 def parts_of(result):
     """Everything of a row but the time."""
-    from dap3d_core.model.rotations import to_integrated
+    from dap3d_core.model.state_layout import to_integrated
 
-    y = to_integrated(result.u, result.subject.body_count)
+    y = to_integrated(result.u)
     return y, result.v_dot, result.Lam, np.zeros((len(result.t), 4))
 
 

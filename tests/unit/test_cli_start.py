@@ -5,7 +5,7 @@ import pytest
 
 from dap3d_core.cli.console.console import output
 from dap3d_core.cli.console.initial_state import MOST_BODIES, show_start, start_facts
-from dap3d_core.model.rotations import join
+from dap3d_core.model.state_layout import join
 
 
 def corrected(shifts):

@@ -43,7 +43,8 @@ from dap3d_core.interface import (
 )
 from dap3d_core.kernels import dot
 from dap3d_core.model import build_model
-from dap3d_core.model.rotations import rotation, split
+from dap3d_core.model.rotations import rotation
+from dap3d_core.model.state_layout import split
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import Scene, check
 from dap3d_core.testing import check_type
@@ -148,7 +149,7 @@ def test_a_wrench_is_derived_from_the_energy(type_):
     u = motion.u(t)
     at_rest = np.concatenate([u[:-18], np.zeros(18)])
     v_dot, model = machine.report(0.0, at_rest)[:18].reshape(3, 6), machine.model
-    A = rotation(split(u, 3)[1])
+    A = rotation(split(u)[1])
     moment = np.einsum("bij,bj->bi", A @ model.Jp @ A.transpose(0, 2, 1), v_dot[:, 3:])
     power = np.hstack([model.mass[:, None] * v_dot[:, :3], moment]).ravel() @ u[-18:]
     rate = derivative(lambda t: machine.report(0.0, motion.u(t))[18:19], t, 3e-3)

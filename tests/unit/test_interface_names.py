@@ -32,7 +32,7 @@ from dap3d_core.interface import (
     vector2,
 )
 from dap3d_core.kernels import row
-from dap3d_core.model.rotations import split
+from dap3d_core.model.state_layout import split
 
 ZERO = (0.0, 0.0, 0.0)
 CLOSE = {"rtol": 1e-13, "atol": 1e-13}
@@ -166,7 +166,7 @@ def inertia(rng):
 def scene_of(*keywords, k="three", t_shift=0.0):
     """Three bodies as the motion has them at the start, and an element of each keyword twice."""
     rng = np.random.default_rng(5)
-    r, p, _, _ = split(MOTION.u(t_shift), 3)
+    r, p, _, _ = split(MOTION.u(t_shift))
     scene = dap.Scene(name="names")
     for n, name in enumerate(("one", "two", "three")):
         scene.add_body(name, mass=1.0 + n, Jp=inertia(rng), r=r[n], p=p[n])
@@ -202,7 +202,7 @@ class Truth:
     """The quantities at a state, by numpy and the definition of rotation matrices, A = G L^T."""
 
     def __init__(self, u):
-        r, p, v, w = split(u, 3)
+        r, p, v, w = split(u)
         self.r, self.p, self.v, self.w = (dict(zip("ijk", x, strict=True)) for x in (r, p, v, w))
         self.A = {s: attitude(q) for s, q in self.p.items()}
         self.s = {spot: self.A[spot[-1]] @ np.array(x) for spot, x in SPOTS.items()}

@@ -15,7 +15,8 @@ import dap3d_core as dap
 from dap3d_core.formulations import RHS
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model import build_model
-from dap3d_core.model.rotations import join, rotation, split, to_body
+from dap3d_core.model.rotations import rotation, to_body
+from dap3d_core.model.state_layout import join, split
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
 from dap3d_core.simulation.initial.assemble import correct_initial
@@ -108,7 +109,7 @@ def state_of(machine, seed):
     """A state taken at random, as u and as the arguments of the reference."""
     n = machine.model.body_count
     u = Motion(n, np.random.default_rng(seed)).u(0.1)
-    r, p, _, _ = split(u, n)
+    r, p, _, _ = split(u)
     return u, (r, rotation(p), u[7 * n :])
 
 
@@ -179,9 +180,9 @@ def test_layout_of_the_rates(name, length, machines):
     machine = machines[name]
     n = machine.model.body_count
     u, _ = state_of(machine, 4)
-    r, p, v, w = split(u, n)
+    r, p, v, w = split(u)
     stretched = join(r, length * p, v, w)
-    r_dot, p_dot, a, w_dot = split(machine.rhs(0.0, stretched), n)
+    r_dot, p_dot, a, w_dot = split(machine.rhs(0.0, stretched))
     assert np.array_equal(r_dot, v)
     for b in range(n):
         assert p_dot[b] == pytest.approx(0.5 * G(length * p[b]).T @ w[b], abs=1e-14)
@@ -246,12 +247,12 @@ def test_accelerations_do_not_depend_on_the_axes_of_a_body():
 
 def power_and_rate(machine, t, u):
     """Power that the formulation reports, and dT/dt from the accelerations by their definition."""
-    n, model = machine.model.body_count, machine.model
+    model = machine.model
     y = machine.integrated(u)
     out = np.zeros_like(y)
     machine.functions[RHS](t, y, out, machine.system, machine.loops)
-    _, p, v, w = split(u, n)
-    _, _, a, w_dot = split(machine.rhs(t, u), n)
+    _, p, v, w = split(u)
+    _, _, a, w_dot = split(machine.rhs(t, u))
     spin, spin_rate = to_body(p, w), to_body(p, w_dot)
     rate = np.sum(model.mass[:, None] * v * a) + np.einsum("bi,bij,bj", spin, model.Jp, spin_rate)
     return out[-1], rate

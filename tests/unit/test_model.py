@@ -8,15 +8,8 @@ import dap3d_core as dap
 from dap3d_core.interface import Body, Force, Joint, Vector, body, number, vector
 from dap3d_core.kernels import row
 from dap3d_core.model import build_model
-from dap3d_core.model.rotations import (
-    from_integrated,
-    join,
-    rotation,
-    split,
-    to_body,
-    to_global,
-    to_integrated,
-)
+from dap3d_core.model.rotations import rotation, to_body, to_global
+from dap3d_core.model.state_layout import from_integrated, join, split, to_integrated
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
 from dap3d_core.scene.scene import AnimationPoint
@@ -287,18 +280,18 @@ def test_rotation_matrices_are_right_handed_and_turn_about_their_axis():
 def test_states_are_split_and_joined_without_loss():
     """join(split(u)) is u bit for bit, for one state and for many; split gives views."""
     u = RNG.normal(size=(6, 39))
-    assert np.array_equal(join(*split(u, 3)), u)
-    assert np.array_equal(join(*split(u[0], 3)), u[0])
-    split(u, 3)[3][2, 1] = 5.0
+    assert np.array_equal(join(*split(u)), u)
+    assert np.array_equal(join(*split(u[0])), u[0])
+    split(u)[3][2, 1] = 5.0
     assert u[2, 21 + 6 + 3 : 21 + 12].tolist() == [5.0] * 3
 
 
 def test_the_integrated_state_has_body_components_and_work():
     """y is u with w' = A^T w and the work last; back again to rounding of two rotations."""
     u = RNG.normal(size=(6, 26))
-    y = to_integrated(u, 2, work=2.5)
+    y = to_integrated(u, work=2.5)
     assert y.shape == (6, 27)
     assert np.array_equal(y[:, -1], np.full(6, 2.5))
-    _, p, _, w = split(u, 2)
-    assert np.allclose(split(y, 2)[3], np.einsum("...rc,...r->...c", rotation(p), w), atol=1e-14)
-    assert np.allclose(from_integrated(y, 2), u, atol=1e-14)
+    _, p, _, w = split(u)
+    assert np.allclose(split(y)[3], np.einsum("...rc,...r->...c", rotation(p), w), atol=1e-14)
+    assert np.allclose(from_integrated(y), u, atol=1e-14)

@@ -11,7 +11,8 @@ from support.plain import in_another_process
 
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model import build_model
-from dap3d_core.model.rotations import join, to_global, to_integrated
+from dap3d_core.model.rotations import to_global
+from dap3d_core.model.state_layout import join, to_integrated
 from dap3d_core.registry import load_registry
 from dap3d_core.result import Result, ResultError, Statistics, UnknownNameError
 from dap3d_core.scene import Scene, check, load
@@ -37,7 +38,7 @@ def rows_of(
     angles = np.zeros((len(t), model.angle_count)) if angles is None else angles
     last = np.tile([0.0, *residuals], (len(t), 1))
     last[:, 0] = potential
-    y = to_integrated(u, model.body_count, work)
+    y = to_integrated(u, work)
     return np.hstack([t[:, None], y, v_dot, Lam, angles, last])
 
 
@@ -244,7 +245,7 @@ def thrown(request):
     u[:, 7 * model.body_count :] += rng.normal(size=(3, 6 * model.body_count))
     t = np.array([0.0, 0.3, 0.7])
     report = np.array([machine.report(*each) for each in zip(t, u, strict=True)])
-    y = to_integrated(u, model.body_count)
+    y = to_integrated(u)
     result = result_of(scene, np.hstack([t[:, None], y, report]), model)
     return result, machine
 

@@ -16,7 +16,7 @@ import xarray
 from unit.test_result import CONTROLLED, circling, circling_scene, drifting, model_of
 
 from dap3d_core.formulations.evaluator import Machine
-from dap3d_core.model.rotations import split
+from dap3d_core.model.state_layout import split
 from dap3d_core.result import (
     Result,
     ResultError,
@@ -358,4 +358,4 @@ def test_width_of_rows_is_that_of_the_integrator():
     result = Result(model=model, machine_of=lambda: None, rows=noisy(model), scene_text="")
     size = Machine(model, "standard").report_size
     assert row_width(result.subject) == 1 + 13 * model.body_count + 1 + size
-    assert split(result.u, model.body_count)[0].shape == result.r.shape
+    assert split(result.u)[0].shape == result.r.shape

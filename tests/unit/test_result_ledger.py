@@ -13,7 +13,7 @@ from unit.test_result import (
     rows_of,
 )
 
-from dap3d_core.model.rotations import join, split
+from dap3d_core.model.state_layout import join, split
 from dap3d_core.scene import Scene
 
 
@@ -105,7 +105,7 @@ def test_momentum_is_in_the_ledger_where_nothing_acts_from_outside():
 def test_momentum_that_is_not_conserved_is_found(column):
     result = drifting()
     wrong = np.array(result.u)
-    _, _, rd, w = split(wrong, 2)
+    _, _, rd, w = split(wrong)
     if column == "linear":
         rd[4:, 0, 1] += 1e-3
     else:

@@ -7,7 +7,8 @@ from support.scenes import scene_for
 from unit.test_result import ARM, MASS, PIVOT, RATE, about_z, circling, model_of, result_of, rows_of
 
 from dap3d_core.formulations.evaluator import Machine
-from dap3d_core.model.rotations import rotation, split
+from dap3d_core.model.rotations import rotation
+from dap3d_core.model.state_layout import split
 from dap3d_core.registry import load_registry
 from dap3d_core.result import ResultError, UnknownNameError
 from dap3d_core.scene import Scene
@@ -78,7 +79,7 @@ def test_action_and_reaction(keyword, ground):
     t, u = np.zeros(2), np.tile(u, (2, 1))
     rows = rows_of(model, t, u, np.zeros((2, 18)), Lam)
     on = result_of(scene, rows, model).reaction("element")
-    r, common = split(u, 3)[0], np.array([0.3, -2.0, 0.7])
+    r, common = split(u)[0], np.array([0.3, -2.0, 0.7])
     force, moment = np.zeros((2, 3)), np.zeros((2, 3))
     for one in on.values():
         centre = r[:, model.body_names.index(one.body)] if one.body != "ground" else 0.0

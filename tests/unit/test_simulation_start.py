@@ -15,7 +15,7 @@ from support.own_types import registry_of
 import dap3d_core as dap
 from dap3d_core.interface import Function, Joint, Vector2, number, vector2
 from dap3d_core.kernels import cross, dot, neg, row, scale, sqrt, where
-from dap3d_core.model.rotations import split
+from dap3d_core.model.state_layout import split
 from dap3d_core.result import INFORMATION
 from dap3d_core.simulation.initial import assemble
 from dap3d_core.simulation.initial.assemble import correct_initial, violation
@@ -37,7 +37,7 @@ def many_rows(monkeypatch):
 
 def turn_of(u, v, n):
     """Angles (n,) between the poses of two states, rad."""
-    cosine = np.abs(np.sum(split(u, n)[1] * split(v, n)[1], axis=1))
+    cosine = np.abs(np.sum(split(u)[1] * split(v)[1], axis=1))
     return 2.0 * np.arccos(np.minimum(cosine, 1.0))
 
 
@@ -66,7 +66,7 @@ def test_the_first_pass_is_the_least_change(monkeypatch):
     rows, keep = machine.rows(0.0, u0), machine.model.position_row
     change = -np.linalg.pinv(rows.dense()[keep]) @ rows.C[keep]
     shift, turn = change.reshape(n, 6)[:, :3], change.reshape(n, 6)[:, 3:]
-    assert split(found.u, n)[0] - split(u0, n)[0] == pytest.approx(shift, abs=1e-15)
+    assert split(found.u)[0] - split(u0)[0] == pytest.approx(shift, abs=1e-15)
     assert turn_of(u0, found.u, n) == pytest.approx(np.linalg.norm(turn, axis=1), abs=1e-7)
     assert found.moved == pytest.approx(np.max(np.linalg.norm(shift, axis=1)), rel=1e-9)
     assert found.turned == pytest.approx(np.max(np.linalg.norm(turn, axis=1)), rel=1e-3)
@@ -288,7 +288,7 @@ def test_corrected_velocities_are_the_least_change():
 def test_corrected_velocities_of_the_four_bar_are_those_of_the_specification():
     """Minimum-norm velocities from rest: 11 digits of an independent simulator (spec 14)."""
     _, found = corrected(dap.load("fourbar3"))
-    _, _, v, w = split(found.u, 3)
+    _, _, v, w = split(found.u)
     assert v[0] == pytest.approx([0, 2 * np.pi, 0], abs=1e-10)
     assert v[1] == pytest.approx([-6.27981570662, 12.56300101380, 0.00897437616], abs=2e-11)
     assert w[1] == pytest.approx([0.00257327185, -1.53315922740, 1.22499197617], abs=2e-11)

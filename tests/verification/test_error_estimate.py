@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from support import problems
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import split
+from dap3d_core.model.state_layout import split
 from dap3d_core.result.post.global_error import difference
 
 #: Scene, and settings where the scene leaves them open or a shorter run will do: A05 is stiff, A02
@@ -66,7 +66,7 @@ def tight(name, integrator, rtol):
 
 def norms(u):
     """By quantity, (nt, n) magnitudes of the vectors r, p, r_dot, w of each body."""
-    return [np.linalg.norm(part, axis=2) for part in split(u, u.shape[1] // 13)]
+    return [np.linalg.norm(part, axis=2) for part in split(u)]
 
 
 def pairs():

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import VALUE, Floats, System
+from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
 
@@ -19,7 +20,7 @@ def place_some(first: int, last: int, y: Floats, body: Floats, metric: Floats) -
     """``place_bodies`` for the bodies from first to before last."""
     n = body.shape[0] - 1
     for b in range(first, last):
-        c, f = 7 * (b - 1), 7 * n + 6 * (b - 1)
+        c, f = coordinate_offset(b), velocity_offset(b, n)
         s, k = body[b], metric[b]
         e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
         h = 1.0 / np.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
@@ -135,7 +136,7 @@ def some_rates(
     """``rates`` of the bodies from first to before last."""
     n = metric.shape[0] - 1
     for b in range(first, last):
-        c, f, o, k = 7 * (b - 1), 7 * n + 6 * (b - 1), 6 * b, metric[b]
+        c, f, o, k = coordinate_offset(b), velocity_offset(b, n), 6 * b, metric[b]
         e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
         w0, w1, w2 = 0.5 * y[f + 3], 0.5 * y[f + 4], 0.5 * y[f + 5]
         out[c], out[c + 1], out[c + 2] = y[f], y[f + 1], y[f + 2]

@@ -3,14 +3,15 @@
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats
+from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.kernels.runtime.cache import compiled_inside
 
 
 @compiled_inside
 def normalise(y: Floats, n: int) -> None:
     """Bring the Euler parameters of n bodies to unit length."""
-    for b in range(n):
-        c = 7 * b + 3
+    for b in range(1, n + 1):
+        c = coordinate_offset(b) + 3
         e0, e1, e2, e3 = y[c], y[c + 1], y[c + 2], y[c + 3]
         h = 1.0 / np.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
         for d in range(c, c + 4):
@@ -21,7 +22,7 @@ def normalise(y: Floats, n: int) -> None:
 def add_displacement(y: Floats, metric: Floats, force: Floats, out: Floats) -> None:
     """Add r and p's share of a scaled displacement (or its rate) in ``force``; out may be y."""
     for b in range(1, metric.shape[0]):
-        c, o, k = 7 * (b - 1), 6 * b, metric[b]
+        c, o, k = coordinate_offset(b), 6 * b, metric[b]
         a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
         w0 = 0.5 * (k[1] * a0 + k[2] * a1 + k[3] * a2)
         w1 = 0.5 * (k[4] * a1 + k[5] * a2)
@@ -58,15 +59,16 @@ def move(y: Floats, metric: Floats, force: Floats) -> None:
 @compiled_inside
 def change_velocity(y: Floats, metric: Floats, force: Floats) -> None:
     """Add a scaled change of velocity to the velocities."""
-    add_velocity(metric, force, y[7 * (metric.shape[0] - 1) :])
+    add_velocity(metric, force, y[velocity_offset(1, metric.shape[0] - 1) :])
 
 
 @compiled_inside
 def size_of_positions(y: Floats, n: int, length: float) -> float:
     """The length of the scene and the largest coordinate of n bodies: scale of a tolerance, m."""
     found = 0.0
-    for b in range(n):
-        for c in range(7 * b, 7 * b + 3):
+    for b in range(1, n + 1):
+        first = coordinate_offset(b)
+        for c in range(first, first + 3):
             found = max(found, abs(y[c]))
     return length + found
 
@@ -75,8 +77,8 @@ def size_of_positions(y: Floats, n: int, length: float) -> float:
 def size_of_velocities(y: Floats, n: int, length: float) -> float:
     """The same of velocities, m/s: of a radian that length."""
     found = 0.0
-    for b in range(n):
-        f = 7 * n + 6 * b
+    for b in range(1, n + 1):
+        f = velocity_offset(b, n)
         for c in range(3):
             found = max(found, abs(y[f + c]), length * abs(y[f + 3 + c]))
     return length + found

@@ -38,7 +38,8 @@ from dap3d_core.linear.ldlt.factor import LESS, POOR
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
 from dap3d_core.model import Group, Model
 from dap3d_core.model.knots import narrowest
-from dap3d_core.model.rotations import split, to_body, to_global, to_integrated
+from dap3d_core.model.rotations import to_body, to_global
+from dap3d_core.model.state_layout import split, to_integrated, velocities_of
 
 
 @attrs.frozen(eq=False)
@@ -115,7 +116,7 @@ class Machine:
         self.system: System = build_system(model, self.plan, self.what)
         self.start_functions()
         self._weigh_rows()
-        self.report_size = 6 * model.body_count + model.row_count + model.angle_count + 4
+        self.report_size = model.report_layout.size
         self.length_count = len(self.plan.nodes) - 1
 
     @property
@@ -219,7 +220,7 @@ class Machine:
 
     def integrated(self, u: ArrayLike) -> Floats:
         """The integrated state y (13 n + 1,) of a state u (13 n,)."""
-        return to_integrated(np.asarray(u, dtype=float), self.model.body_count)
+        return to_integrated(np.asarray(u, dtype=float))
 
     @AS_COMPILED
     def rhs(self, t: float, u: ArrayLike) -> Floats:
@@ -227,23 +228,22 @@ class Machine:
 
         In the order of u: r_dot, p_dot of each body, then r_ddot, omega_dot of each.
         """
-        n = self.model.body_count
         y = self.integrated(u)
         out = np.zeros_like(y)
         self.functions[RHS](float(t), y, out, self.system, self.loops)
-        w_dot = split(out, n)[3]
-        w_dot[:] = to_global(split(y, n)[1], w_dot)  # omega_dot = A omega'_dot, no extra term
-        return out[: 13 * n]
+        w_dot = split(out)[3]
+        w_dot[:] = to_global(split(y)[1], w_dot)  # omega_dot = A omega'_dot, no extra term
+        return out[:-1]
 
     @AS_COMPILED
     def rates(self, t: float, u: ArrayLike, v_dot: Floats) -> Floats:
         """dy/dt (13 n + 1,) with given accelerations (6 n,): r_ddot, omega_dot of each body."""
-        n, y = self.model.body_count, self.integrated(u)
+        y = self.integrated(u)
         out = np.zeros_like(y)
         self.functions[RHS](float(t), y, out, self.system, self.loops)
-        out[7 * n : 13 * n] = v_dot
-        w_dot = split(out, n)[3]
-        w_dot[:] = to_body(split(y, n)[1], w_dot)
+        velocities_of(out)[:] = v_dot
+        w_dot = split(out)[3]
+        w_dot[:] = to_body(split(y)[1], w_dot)
         return out
 
     @AS_COMPILED

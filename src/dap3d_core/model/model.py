@@ -13,6 +13,14 @@ import numpy as np
 from dap3d_core.interface.examine.examine import BodyPose, pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.rotations import read_only, to_global
+from dap3d_core.model.state_layout import (
+    COORDINATES,
+    VELOCITIES,
+    Layout,
+    report_layout,
+    row_layout,
+    state_layout,
+)
 from dap3d_core.scene import Checked, Instance
 
 #: Sizes, m, of ordinary scenes: their tolerances are in metres as they are.
@@ -99,20 +107,30 @@ class Model:
         """Groups of what may have angles, in the order of the loops (formulations/arrays.py)."""
         return (*self.forces, *self.joints)
 
+    @property
+    def report_layout(self) -> Layout:
+        """Layout of what is reported beside the state."""
+        return report_layout(self.body_count, self.row_count, self.angle_count)
+
+    @property
+    def row_layout(self) -> Layout:
+        """Layout of a reported row."""
+        return row_layout(self.body_count, self.row_count, self.angle_count)
+
     @cached_property
     def irc(self) -> Integers:
         """(n,) index in u of the first coordinate of each body (r, then p)."""
-        return read_only(7 * np.arange(self.body_count, dtype=np.int64))
+        return read_only(COORDINATES * np.arange(self.body_count, dtype=np.int64))
 
     @cached_property
     def iru(self) -> Integers:
         """(n,) index in u of the first velocity of each body (r_dot, then omega)."""
-        return read_only(7 * self.body_count + self.irv)
+        return read_only(state_layout(self.body_count)["velocities"].start + self.irv)
 
     @cached_property
     def irv(self) -> Integers:
         """(n,) index in v_dot, column in the Jacobian, of the first acceleration of each body."""
-        return read_only(6 * np.arange(self.body_count, dtype=np.int64))
+        return read_only(VELOCITIES * np.arange(self.body_count, dtype=np.int64))
 
     @cached_property
     def u0(self) -> Floats:

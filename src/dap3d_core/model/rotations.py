@@ -53,34 +53,6 @@ def euler_rates(p: Floats, w: Floats) -> Floats:
     return rates
 
 
-def split(u: ArrayLike, n: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Views r (..., n, 3), p (..., n, 4), r_dot (..., n, 3), w (..., n, 3) of u (..., 13 n)."""
-    u = np.asarray(u, dtype=float)
-    q = u[..., : 7 * n].reshape(*u.shape[:-1], n, 7)
-    v = u[..., 7 * n : 13 * n].reshape(*u.shape[:-1], n, 6)
-    return q[..., :3], q[..., 3:], v[..., :3], v[..., 3:]
-
-
-def join(r: ArrayLike, p: ArrayLike, v: ArrayLike, w: ArrayLike) -> Floats:
-    """States u (..., 13 n) from r, p, r_dot, w of n bodies: the inverse of ``split``."""
-    q = np.concatenate([r, p], axis=-1)
-    s = np.concatenate([v, w], axis=-1)
-    return np.concatenate([q.reshape(*q.shape[:-2], -1), s.reshape(*s.shape[:-2], -1)], axis=-1)
-
-
-def to_integrated(u: ArrayLike, n: int, work: ArrayLike = 0.0) -> Floats:
-    """The integrated state y (..., 13 n + 1): angular velocities in body axes, the work last."""
-    r, p, v, w = split(u, n)
-    work = np.broadcast_to(np.asarray(work, dtype=float), r.shape[:-2])[..., None]
-    return np.concatenate([join(r, p, v, to_body(p, w)), work], axis=-1)
-
-
-def from_integrated(y: ArrayLike, n: int) -> Floats:
-    """The state u (..., 13 n) of integrated states y (..., 13 n + 1)."""
-    r, p, v, w = split(y, n)
-    return join(r, p, v, to_global(p, w))
-
-
 def read_only(array: AnyArray) -> AnyArray:
     """The same array, which nobody can write to by this name from here on."""
     array.flags.writeable = False

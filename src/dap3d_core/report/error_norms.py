@@ -8,7 +8,7 @@ parameters, velocities, angular velocities. Euler parameters p and -p are one or
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.model.rotations import split
+from dap3d_core.model.state_layout import split
 from dap3d_core.result.post.global_error import difference, largest_norms, least_sizes, sizes_of
 
 #: Components below are compared with this (SI), not with themselves.
@@ -26,7 +26,7 @@ def trajectory_error(u: Floats, reference: Floats) -> float:
 def final_position_error(u: Floats, reference: Floats) -> float:
     """The largest distance of a mass centre from its reference at the last instant, m."""
     off = difference(reference[-1:], u[-1:])
-    r = split(off, u.shape[1] // 13)[0]
+    r = split(off)[0]
     return float(np.max(np.linalg.norm(r, axis=2), initial=0.0))
 
 

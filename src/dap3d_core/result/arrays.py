@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.model.rotations import from_integrated
+from dap3d_core.model.state_layout import Layout, from_integrated, row_layout, state_layout
 from dap3d_core.result.model_summary import Subject
 
 
@@ -136,25 +136,28 @@ def block_rows(count: int, width: int) -> Iterator[slice]:
 
 def column_sizes(subject: Subject) -> dict[str, int]:
     """Length of each dimension that a column may have besides time."""
-    n = subject.body_count
-    return {
-        "state": 13 * n, "velocity": 6 * n, "row": subject.row_count, "angle": subject.angle_count
-    }  # fmt: skip
+    n, row = subject.body_count, _layout(subject)
+    sizes = {"velocity": "v_dot", "row": "Lam", "angle": "angles"}
+    return {"state": state_layout(n).size} | {k: row.length(name) for k, name in sizes.items()}
 
 
 def row_width(subject: Subject) -> int:
     """Numbers in a row as the integrator delivers it."""
-    return 2 + 19 * subject.body_count + subject.row_count + subject.angle_count + 4
+    return _layout(subject).size
 
 
-def _states(y: Floats, n: int) -> Floats:
+def _layout(subject: Subject) -> Layout:
+    return row_layout(subject.body_count, subject.row_count, subject.angle_count)
+
+
+def _states(y: Floats) -> Floats:
     """States of integrated states, bit for bit the same however the rows are cut into pieces.
 
     Of one vector alone numpy adds the products in another order than of several.
     """
     if len(y) > 1:
-        return from_integrated(y, n)
-    return from_integrated(np.repeat(y, 2, axis=0), n)[:1] if len(y) else np.zeros((0, 13 * n))
+        return from_integrated(y)
+    return from_integrated(np.repeat(y, 2, axis=0))[:1] if len(y) else y[:, :-1]
 
 
 def arrays_of(rows: Floats, subject: Subject) -> Arrays:
@@ -172,8 +175,8 @@ def arrays_of(rows: Floats, subject: Subject) -> Arrays:
     width = row_width(subject)
     if rows.ndim != 2 or rows.shape[1] != width:
         raise ValueError(f"rows should have the shape (nt, {width}), not {rows.shape}")
-    n, m, k = subject.body_count, subject.row_count, subject.angle_count
-    parts = np.split(rows, np.cumsum([1, 13 * n + 1, 6 * n, m, k]), axis=1)
-    t, y, v_dot, Lam, angles, last = parts
-    columns = (t[:, 0], _states(y, n), v_dot, Lam, y[:, -1], *last.T, angles)
+    layout = _layout(subject)
+    t, *_, work, v_dot, Lam, angles, energy, residuals = (rows[:, layout[n]] for n in layout.names)
+    u = _states(rows[:, layout["coordinates"].start : layout["work"].stop])
+    columns = (t[:, 0], u, v_dot, Lam, work[:, 0], energy[:, 0], *residuals.T, angles)
     return arrays_from(np.array(column) for column in columns)

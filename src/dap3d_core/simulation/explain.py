@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model import Model
+from dap3d_core.model.state_layout import STATE, VELOCITIES
 from dap3d_core.scene import Checked, Instance, Scene
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 from dap3d_core.simulation.redundancy.redundancy import Redundancy
@@ -28,7 +29,7 @@ def explain(
     """A text for people, one fact a line; u (13 n,) is where a run would start."""
     n, ordering = model.body_count, machine.plan.ordering
     lines = [f"scene {checked.scene.name or '(no name)'}"]
-    sizes = f"{13 * n} states, {6 * n} accelerations"
+    sizes = f"{STATE * n} states, {VELOCITIES * n} accelerations"
     lines.append(f"  bodies     {n}: {_some(model.body_names)}; {sizes}")
     kinds = {"joints": checked.joints, "forces": checked.forces, "functions": checked.functions}
     lines += [f"  {title:10s} {_counts(instances)}" for title, instances in kinds.items()]

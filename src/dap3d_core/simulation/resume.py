@@ -15,7 +15,7 @@ from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED, NEXT
 from dap3d_core.integrators.stepping.restore import check_alike, restored
 from dap3d_core.interface import PluginError
 from dap3d_core.kernels.runtime.cache import driver_digest
-from dap3d_core.model.rotations import from_integrated
+from dap3d_core.model.state_layout import from_integrated
 from dap3d_core.result import INFORMATION, Result, current_versions
 from dap3d_core.result.file.validate import are_texts
 from dap3d_core.scene import SceneError, Simulation, check_simulation, load, parse
@@ -330,7 +330,7 @@ def check_position(run: Run, rows: int) -> None:
         ValueError: it does not.
     """
     model, last = run.machine.model, run.runs[-1]
-    state_of(from_integrated(last.y[None], model.body_count)[0], model.body_names)
+    state_of(from_integrated(last.y[None])[0], model.body_names)
     reported = last.work.integer[NEXT]
     if rows - reported not in (0, 1):  # an event that ends a run reports its own instant
         raise ValueError(f"{rows} rows are reported of the {reported} that its instants need")

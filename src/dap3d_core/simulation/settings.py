@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.integrators import EXPLICIT, INTEGRATORS, Integrator
+from dap3d_core.model.state_layout import state_layout
 from dap3d_core.scene import (
     METHODS,
     MISSING,
@@ -111,7 +112,9 @@ def integration_options(machine: Machine, settings: Simulation) -> dict[str, Any
         "atol": atol_vector(resolved_atol(settings.atol, machine), machine.model.body_count),
         "step": settings.step,
         "project_on": settings.project,
-        "error_size": 13 * machine.model.body_count,  # the work does not steer the step
+        "error_size": state_layout(
+            machine.model.body_count
+        ).size,  # the work does not steer the step
         "report_size": machine.report_size,
         "ends": machine.ending,
     }

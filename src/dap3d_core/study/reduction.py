@@ -81,9 +81,10 @@ class Reduction:
         if not all(self.of_rows.values()):
             return False
         model = self._compiled.model
-        machine, n = self._compiled.machine, model.body_count
-        rows = np.random.default_rng(0).random((1, 3, 2 + 13 * n + machine.report_size))
-        rows[..., 1 + 13 * n] = rows[..., -4:] = np.nan
+        layout = model.row_layout
+        rows = np.random.default_rng(0).random((1, 3, layout.size))
+        for name in ("work", "potential_energy", "residuals"):
+            rows[..., layout[name]] = np.nan
         found = self.reduce(rows, np.arange(3.0))
         return all(bool(np.all(np.isfinite(values))) for values in found.values())
 

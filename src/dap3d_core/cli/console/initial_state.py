@@ -34,13 +34,13 @@ def start_facts(
     """
     import numpy as np
 
-    from dap3d_core.model.rotations import split
+    from dap3d_core.model.state_layout import split
 
     change = np.abs(u - given) / (1.0 + np.abs(given))
-    parts = split(change, len(names))
+    parts = split(change)
     largest = np.max([np.max(part, axis=1) for part in parts], axis=0)
     most = np.argsort(-largest, kind="stable")[:MOST_BODIES]
-    r, p, r_dot, w = split(u, len(names))
+    r, p, r_dot, w = split(u)
     arrays = {"r": r, "p": p, "r_dot": r_dot, "w": w}
     return {
         "changed": bool(np.any(change > CHANGED)),

@@ -24,6 +24,7 @@ import attrs
 
 from dap3d_core.assembly.arrays import Floats, Integers, System
 from dap3d_core.assembly.evaluate import rates, zero
+from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.assembly.state_update import add_displacement
 from dap3d_core.formulations.common.constraints import (
     gather_forces,
@@ -231,7 +232,7 @@ def scale_residual(
     """
     count = metric.shape[0] - 1
     for b in range(1, count + 1):
-        c, f, o = 7 * (b - 1), 7 * count + 6 * (b - 1), matrix.body_first[b]
+        c, f, o = coordinate_offset(b), velocity_offset(b, count), matrix.body_first[b]
         k, e = metric[b], frames[b]
         for d in range(3):
             x[o + d] = (e[d] * R[c] + e[3 + d] * R[c + 1] + e[6 + d] * R[c + 2]) / k[0]
@@ -281,7 +282,7 @@ def unscale_solution(
     """A solution x as a change of y (13 n + 1,) and of the multipliers (2, rows)."""
     count = metric.shape[0] - 1
     for b in range(1, count + 1):
-        c, f, o = 7 * (b - 1), 7 * count + 6 * (b - 1), matrix.body_first[b]
+        c, f, o = coordinate_offset(b), velocity_offset(b, count), matrix.body_first[b]
         k, e, along = metric[b], frames[b], n[b]
         for d in range(3):
             g = 3 * d

@@ -15,6 +15,7 @@ from dap3d_core.integrators.radau.state import (
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, RTOL, Y
 from dap3d_core.integrators.stepping.step_control import EPSILON, LARGEST
 from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.model.state_layout import COORDINATES, STATE, VELOCITIES
 
 #: An iteration that converges slower than this does not.
 SLOWEST = 0.99
@@ -31,10 +32,10 @@ STALLED, MOST_ROUNDINGS = 10.0, 1e6
 def newton_limit(work: RadauWork) -> float:
     """Norm of a change at which the iteration ends (HW IV.8), not below what rounding allows."""
     y, rtol = work.state[Y], work.real[RTOL]
-    n = (y.shape[0] - 1) // 13
+    n = (y.shape[0] - 1) // STATE
     limit = min(0.03, math.sqrt(rtol))
     first = 0
-    for count in (7 * n, 6 * n):
+    for count in (COORDINATES * n, VELOCITIES * n):
         top = 0.0
         low = atol = LARGEST
         for k in range(first, first + count):

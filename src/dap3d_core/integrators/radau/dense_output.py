@@ -14,6 +14,7 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import VALUE, Floats, System
 from dap3d_core.assembly.evaluate import call_kinds, place_bodies, rates, zero
+from dap3d_core.assembly.offsets import velocity_offset, work_offset
 from dap3d_core.formulations.common.constraints import PART, correct, factorise, linearise
 from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import Matrix
@@ -64,10 +65,11 @@ def find_slope(
     else:
         zero(force)
     rates(y, metric, force, out)
-    for k in range(7 * n, 13 * n):
+    for k in range(velocity_offset(1, n), work_offset(n)):
         out[k] += (inverse[2, 0] * stages[0, k] + inverse[2, 1] * stages[1, k]
                    + inverse[2, 2] * stages[2, k]) / h  # fmt: skip
-    out[13 * n] = work.F[2, 13 * n]
+    last = work_offset(n)
+    out[last] = work.F[2, last]
     return 0.0
 
 
@@ -76,7 +78,7 @@ def scale_slopes(inverse: Floats, stages: Floats, h: float, metric: Floats, forc
     """The collocation polynomial's accelerations at the end of the step, scaled, into force."""
     n = metric.shape[0] - 1
     for b in range(1, n + 1):
-        f, o, k = 7 * n + 6 * (b - 1), 6 * b, metric[b]
+        f, o, k = velocity_offset(b, n), 6 * b, metric[b]
         for c in range(6):
             force[o + c] = (inverse[2, 0] * stages[0, f + c] + inverse[2, 1] * stages[1, f + c]
                             + inverse[2, 2] * stages[2, f + c]) / h  # fmt: skip

@@ -15,6 +15,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.evaluate import place, zero
+from dap3d_core.assembly.offsets import velocity_offset
 from dap3d_core.assembly.state_update import add_displacement, add_velocity
 from dap3d_core.formulations.common.constraints import linearise
 from dap3d_core.formulations.stabilized_index2.jacobian import Tangent, differentiate
@@ -254,7 +255,7 @@ def size_of_multipliers(h: float, change: Floats, work: RadauWork, system: Syste
     add_displacement(y, system.metric, force, out)
     zero(force)
     add_transposed(system.blocks, system.D, change[1], h, force)
-    add_velocity(system.metric, force, out[7 * n :])
+    add_velocity(system.metric, force, out[velocity_offset(1, n) :])
     return scaled_largest(out, y, y, work.integer[ERROR_SIZE], real[RTOL], work.tolerance, h)
 
 

@@ -32,7 +32,7 @@ from dap3d_core.kernels.runtime.folder_security import distrust
 
 #: Floors of the core that hold compiled code, low to high: a function depends on its own floor and
 #: those below.
-COMPILED_FLOORS = ("kernels", "assembly", "linear", "formulations", "integrators", "study")
+COMPILED_FLOORS = ("kernels", "model", "assembly", "linear", "formulations", "integrators", "study")
 
 _RESULTS = {type_.name: type_ for type_ in (NOTHING, BOOL, INT, FLOAT)}
 _units: dict[str, Unit] = {}

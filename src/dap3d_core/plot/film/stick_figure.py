@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.colors import is_color_like, to_hex
 
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.model.rotations import euler_rates, split, to_global
+from dap3d_core.model.rotations import euler_rates, to_global
+from dap3d_core.model.state_layout import split
 from dap3d_core.plot.cubics import cubic
 from dap3d_core.plot.curves import MARKERS, PALETTE
 from dap3d_core.result import Result
@@ -93,10 +94,10 @@ class Sticks:
             result: whose motion.
             directions: (3, d) unit vectors along which they are measured.
         """
-        n, found = result.subject.body_count, []
+        found = []
         count = max(1, BLOCK // (3 * len(self._framed.body)))
         for start in range(0, len(result.t), count):
-            r, p, _, _ = split(result.u[start : start + count], n)
+            r, p, _, _ = split(result.u[start : start + count])
             all_of_them = self._framed.positions(r, p).reshape(-1, 3) @ directions
             found.append([all_of_them.min(axis=0), all_of_them.max(axis=0)])
         return np.stack([np.min(found, axis=(0, 1)), np.max(found, axis=(0, 1))], axis=1)
@@ -230,9 +231,9 @@ def pose_at(result: Result, t: float) -> tuple[Floats, Floats]:
     There they are interpolated by cubics from positions and velocities at both instants; bodies
     stay rigid.
     """
-    n, times = result.subject.body_count, result.t
+    times = result.t
     k = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, max(0, len(times) - 2)))
-    r, p, rd, w = split(result.u[k : k + 2], n)
+    r, p, rd, w = split(result.u[k : k + 2])
     if len(times) < 2:
         return r[0], p[0]
     h = float(times[k + 1] - times[k])

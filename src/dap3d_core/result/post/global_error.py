@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.model.rotations import split
+from dap3d_core.model.state_layout import split
 from dap3d_core.result.arrays import Column
 
 #: The optional array of a result, as ``COLUMNS`` has the others.
@@ -107,7 +107,7 @@ class ErrorEstimate:
         return 1.0 / slope
 
     def _part(self, place: int) -> Floats:
-        return split(self.u, self.u.shape[1] // 13)[place]
+        return split(self.u)[place]
 
     def _norms(self) -> dict[str, Floats]:
         """By symbol, (nt,) the largest error of a body's vector."""
@@ -123,7 +123,7 @@ def _line(x: Floats, y: Floats) -> tuple[float, float]:
 
 def largest_norms(u: Floats) -> dict[str, Floats]:
     """By symbol r, p, rd, w: (nt,) the largest magnitude of a body's vector in u (nt, 13 n)."""
-    parts = split(u, u.shape[1] // 13)
+    parts = split(u)
     return {
         name: np.linalg.norm(part, axis=2).max(axis=1, initial=0.0)
         for name, part in zip(PARTS, parts, strict=True)
@@ -162,11 +162,10 @@ def difference(u: Floats, other: Floats) -> Floats:
     Returns:
         (nt, 13 n), a new array.
     """
-    n = u.shape[1] // 13
     found = u - other
-    p, q = split(u, n)[1], split(other, n)[1]
+    p, q = split(u)[1], split(other)[1]
     opposite = np.einsum("tbe,tbe->tb", p, q) < 0.0
-    split(found, n)[1][opposite] = (p + q)[opposite]
+    split(found)[1][opposite] = (p + q)[opposite]
     return found
 
 
@@ -189,7 +188,7 @@ def estimated_error(u: Floats, finer: Floats, step_count: int) -> Floats:
     np.maximum(found[1:-1], apart[2:], out=found[1:-1])  # the start is known
     np.maximum(found[1:], apart[:-1], out=found[1:])
     rounding = float(np.finfo(float).eps) * np.sqrt(step_count)
-    parts = split(found, u.shape[1] // 13)
+    parts = split(found)
     for part, size in zip(parts, sizes_of(u).values(), strict=True):
         np.maximum(part, rounding * size, out=part)
     return found

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.model.rotations import split
+from dap3d_core.model.state_layout import split, velocities_of
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.model_summary import Subject
 from dap3d_core.result.post.point_motion import kinetic_energy, momentum
@@ -60,8 +60,8 @@ def course_of(subject: Subject, arrays: "Arrays | FileArrays", length: float = 1
         for name, values in _numbers(subject, block).items():
             found.setdefault(name, []).append(values)
         arms = np.tile(np.repeat([1.0, length], 3), subject.body_count)
-        speeds = arms * block.u[:, 7 * subject.body_count :]
-        r = split(block.u, subject.body_count)[0]
+        speeds = arms * velocities_of(block.u)
+        r = split(block.u)[0]
         sizes = np.maximum(sizes, [_largest(a) for a in (r, speeds, arms * block.v_dot)])
     whole = {name: np.concatenate(values) for name, values in found.items()}
     nothing = {name: np.zeros(0) for name in ("far", "orbit", "linear", "angular")}
@@ -69,7 +69,7 @@ def course_of(subject: Subject, arrays: "Arrays | FileArrays", length: float = 1
 
 
 def _numbers(subject: Subject, block: Arrays) -> dict[str, Floats]:
-    r, p, rd, w = split(block.u, subject.body_count)
+    r, p, rd, w = split(block.u)
     fast = np.linalg.norm(rd, axis=2)
     inertia = np.linalg.norm(subject.Jp, ord=2, axis=(1, 2))
     off = np.abs(np.linalg.norm(p, axis=2) - 1.0)

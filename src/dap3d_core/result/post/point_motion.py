@@ -4,7 +4,8 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.model.rotations import split, to_body, to_global
+from dap3d_core.model.rotations import to_body, to_global
+from dap3d_core.model.state_layout import split
 from dap3d_core.result.model_summary import Subject
 
 
@@ -45,7 +46,7 @@ def motion_of(body: Integers, local: Floats, u: Floats, v_dot: Floats, level: in
     out = np.zeros((len(u), len(body), 3))
     moving = body > 0
     b = body[moving] - 1
-    r, p, rd, w = split(u, v_dot.shape[-1] // 6)
+    r, p, rd, w = split(u)
     s = to_global(p[:, b], local[moving])
     if level == 0:
         out[:, ~moving] = local[~moving]
@@ -79,7 +80,7 @@ class Energy:
 
 def kinetic_energy(subject: Subject, u: Floats) -> Floats:
     """(nt,) kinetic energy, J: sum of m |r_dot|^2 / 2 and omega' . J' omega' / 2."""
-    _, p, rd, w = split(u, subject.body_count)
+    _, p, rd, w = split(u)
     wp = to_body(p, w)
     sliding = np.einsum("b,tbc,tbc->t", subject.mass, rd, rd)
     turning = np.einsum("tbc,bcd,tbd->t", wp, subject.Jp, wp)
@@ -88,7 +89,7 @@ def kinetic_energy(subject: Subject, u: Floats) -> Floats:
 
 def momentum(subject: Subject, u: Floats) -> tuple[Floats, Floats]:
     """Linear momentum (nt, 3), kg m/s, and angular momentum about the origin (nt, 3), kg m^2/s."""
-    r, p, rd, w = split(u, subject.body_count)
+    r, p, rd, w = split(u)
     linear = subject.mass[:, None] * rd
     spin = to_global(p, np.einsum("bcd,tbd->tbc", subject.Jp, to_body(p, w)))
     return linear.sum(axis=1), (np.cross(r, linear) + spin).sum(axis=1)

@@ -9,7 +9,8 @@ import numpy as np
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats, Group, Integers
-from dap3d_core.model.rotations import read_only, split, to_body, to_global
+from dap3d_core.model.rotations import read_only, to_body, to_global
+from dap3d_core.model.state_layout import split
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.constraint_rows import Rows
@@ -138,7 +139,7 @@ def actions_of(
     model: Model, u: Floats, group: Group, place: int, wrenches: Floats
 ) -> dict[str, Reaction]:
     """Wrenches (nt, slots, 6) of an instance of a group, at its place there, by slot."""
-    layout, p = group.examined.layout, split(u, model.body_count)[1]
+    layout, p = group.examined.layout, split(u)[1]
     names, found = ("ground", *model.body_names), {}
     for n, (slot, body) in enumerate(zip(layout.slots, group.bodies[place], strict=True)):
         at, shape = layout.numbers.get(f"P_{slot}", (0, ()))

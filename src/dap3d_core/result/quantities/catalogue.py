@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.model.rotations import split, to_body
+from dap3d_core.model.rotations import to_body
+from dap3d_core.model.state_layout import split
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.post.point_motion import accelerations, point_motion
 
@@ -59,7 +60,7 @@ class Kind(NamedTuple):
 
 
 def _body_axes(result: "Result", vectors: Floats, body: int) -> Floats:
-    p = split(result.u, result.subject.body_count)[1]
+    p = split(result.u)[1]
     return to_body(p[:, body], vectors[:, body])
 
 

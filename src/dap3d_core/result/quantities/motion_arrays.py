@@ -5,7 +5,8 @@ from functools import cached_property
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.model.rotations import read_only, split, to_body
+from dap3d_core.model.rotations import read_only, to_body
+from dap3d_core.model.state_layout import split
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.file.lazy_arrays import FileArrays
 from dap3d_core.result.model_summary import Subject
@@ -41,22 +42,22 @@ class Kinematics:
     @property
     def r(self) -> Floats:
         """(nt, n, 3) positions of the mass centres, m."""
-        return split(self.u, self.subject.body_count)[0]
+        return split(self.u)[0]
 
     @property
     def p(self) -> Floats:
         """(nt, n, 4) Euler parameters."""
-        return split(self.u, self.subject.body_count)[1]
+        return split(self.u)[1]
 
     @property
     def rd(self) -> Floats:
         """(nt, n, 3) velocities, m/s."""
-        return split(self.u, self.subject.body_count)[2]
+        return split(self.u)[2]
 
     @property
     def w(self) -> Floats:
         """(nt, n, 3) angular velocities, rad/s, global axes."""
-        return split(self.u, self.subject.body_count)[3]
+        return split(self.u)[3]
 
     @cached_property
     def wp(self) -> Floats:

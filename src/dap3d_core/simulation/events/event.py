@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations import REPORT
 from dap3d_core.model.parameter_change import Change, changed
-from dap3d_core.model.rotations import from_integrated
+from dap3d_core.model.state_layout import from_integrated
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result import Record, Result
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -146,7 +146,7 @@ class Instant:
         """Args: the model, time, the integrated state (13 n + 1,), numbers that may be changed."""
         self._compiled, self._y, self._numbers = compiled, y, numbers
         self.t = t
-        u = from_integrated(y[None], compiled.model.body_count)[0]
+        u = from_integrated(y[None])[0]
         u.flags.writeable = False
         self.u: Floats = u
         self.changes: dict[str, dict[str, Any]] = {}

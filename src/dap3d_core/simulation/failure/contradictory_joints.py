@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.constraint_rows import Rows
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model import Model
-from dap3d_core.model.rotations import from_integrated
+from dap3d_core.model.state_layout import from_integrated, velocities_of
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import (
     FIT,
@@ -51,7 +51,7 @@ def find_contradiction(machine: Machine, t: float, y: Floats, rank: int) -> str:
     model = machine.model
     if not 0 < model.row_count <= MOST_ROWS:
         return ""
-    u = from_integrated(y, model.body_count)
+    u = from_integrated(y)
     try:
         finite_rows(machine, t, u)
     except AssemblyError:  # which find_offender tells
@@ -60,7 +60,7 @@ def find_contradiction(machine: Machine, t: float, y: Floats, rank: int) -> str:
 
 
 def _out_of_reach(machine: Machine, t: float, u: Floats) -> str:
-    speed = extent(machine, u[7 * machine.model.body_count :])
+    speed = extent(machine, velocities_of(u))
     span = FAR / speed if speed else FAR * (1.0 + abs(t))
     good = t
     for part in EARLIER:
@@ -85,7 +85,7 @@ def _out_of_reach(machine: Machine, t: float, u: Floats) -> str:
 def _closed(machine: Machine, u: Floats, t: float, later: float) -> Floats | None:
     """The bodies at a later time, put together; None where they cannot be."""
     n = machine.model.body_count
-    moved = displaced(u, (later - t) * u[7 * n :].reshape(n, 6), n)
+    moved = displaced(u, (later - t) * velocities_of(u).reshape(n, -1), n)
     try:
         return correct_positions(machine, moved, later, NONE)[0]
     except AssemblyError:

@@ -10,7 +10,7 @@ from dap3d_core.formulations.evaluator import AS_COMPILED, Machine
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.model import Group
-from dap3d_core.model.rotations import from_integrated
+from dap3d_core.model.state_layout import by_body, from_integrated, velocities_of
 from dap3d_core.scene.validate.coerce_values import LARGEST
 
 Floats = NDArray[np.float64]
@@ -40,7 +40,7 @@ def find_offender(machine: Machine, t: float, y: Floats, t_stop: float) -> str:
 def fastest_body(machine: Machine, y: Floats) -> str:
     """Name the body whose velocities are the largest; where all is finite it is to blame."""
     n = machine.model.body_count
-    speeds = np.abs(y[7 * n : 13 * n]).reshape(n, 6)
+    speeds = np.abs(velocities_of(y)).reshape(n, -1)
     b = int(np.argmax(speeds.max(axis=1)))
     v, w = speeds[b, :3].max(), speeds[b, 3:].max()
     return (
@@ -50,9 +50,7 @@ def fastest_body(machine: Machine, y: Floats) -> str:
 
 
 def _at(machine: Machine, t: float, y: Floats) -> str:
-    n = machine.model.body_count
-    for b, name in enumerate(machine.model.body_names):
-        numbers = np.concatenate([y[7 * b : 7 * b + 7], y[7 * n + 6 * b : 7 * n + 6 * b + 6]])
+    for name, numbers in zip(machine.model.body_names, by_body(y), strict=True):
         if fault := _fault(numbers):
             return f"the state of body {name} is {fault}"
     s = machine.system
@@ -70,7 +68,7 @@ def _without_direction(machine: Machine, t: float, y: Floats) -> str:
     """The joint of the first row whose gradient is zero: no force of it can hold anything."""
     if not machine.model.row_count:
         return ""
-    rows = machine.rows(t, from_integrated(y, machine.model.body_count))
+    rows = machine.rows(t, from_integrated(y))
     size = np.bincount(rows.row, np.abs(rows.value), minlength=rows.shape[0])
     zero = np.flatnonzero(size == 0.0)
     if not len(zero):
@@ -83,7 +81,7 @@ def _steepest(machine: Machine, t: float, y: Floats) -> str:
     model = machine.model
     if not model.row_count:
         return ""
-    rows = machine.rows(t, from_integrated(y, model.body_count))
+    rows = machine.rows(t, from_integrated(y))
     largest = np.abs(rows.gamma)
     np.maximum.at(largest, rows.row, np.abs(rows.value))
     worst = int(np.argmax(largest))
@@ -95,9 +93,7 @@ def _steepest(machine: Machine, t: float, y: Floats) -> str:
 
 def _runaway(machine: Machine, t: float, y: Floats) -> str:
     """The body with the largest number or rate, where no step can go on with it."""
-    n = machine.model.body_count
-    states = np.hstack([y[: 7 * n].reshape(n, 7), y[7 * n : 13 * n].reshape(n, 6)])
-    largest = np.max(np.abs(np.hstack([states, _rates(machine, t, y)])), axis=1)
+    largest = np.max(np.abs(np.hstack([by_body(y), _rates(machine, t, y)])), axis=1)
     first = int(np.argmax(largest))
     if not largest[first] > ENORMOUS:
         return ""
@@ -123,9 +119,9 @@ def _accelerated(machine: Machine, t: float, y: Floats) -> str:
 
 def _rates(machine: Machine, t: float, y: Floats) -> Floats:
     """(n, 13) dy/dt of each body."""
-    out, n = np.zeros_like(y), machine.model.body_count
+    out = np.zeros_like(y)
     machine.functions[RHS](float(t), y, out, machine.system, machine.loops)
-    return np.hstack([out[: 7 * n].reshape(n, 7), out[7 * n : 13 * n].reshape(n, 6)])
+    return by_body(out)
 
 
 def _fault_of(machine: Machine, q: int, k: int, kind: str, group: Group, t: float) -> str:

@@ -20,7 +20,7 @@ from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.linear.ldlt.plan import Integers
 from dap3d_core.linear.rank.rank import DENSE_ROWS, factor_independent
 from dap3d_core.model import Model
-from dap3d_core.model.rotations import join, split
+from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Body, Scene
 from dap3d_core.simulation.errors import AssemblyError
@@ -132,7 +132,7 @@ def correct_initial(
     residual = _velocity_residual(rows, u)
     if _largest(residual) > 0.0:
         u = u.copy()
-        velocities = u[7 * machine.model.body_count :]
+        velocities = velocities_of(u)
         velocities -= least_change(machine, rows, residual, t, None, metric)
     moved, turned = distance(start, u, machine.model.body_count)
     return Initial(u, before, violation(machine, u, t), passes, float(moved), float(turned))
@@ -159,7 +159,7 @@ def correction_notes(initial: Initial, machine: Machine, scene: Scene) -> list[s
             f"stays open. Below {FIT:g} the run goes on as if they fitted"
         )
     if velocity > tolerance:
-        speed = _largest(machine.model.u0[7 * machine.model.body_count :])
+        speed = _largest(velocities_of(machine.model.u0))
         usual = attrs.fields(Body)
         open_ = all(
             body.r_dot is usual.r_dot.default and body.w is usual.w.default
@@ -289,7 +289,7 @@ def _sparse_least_change(
 
 def displaced(u: Floats, change: Floats, n: int) -> Floats:
     """The state with r + dr, and with p + 1/2 G^T dtheta of unit length (dtheta global, small)."""
-    r, p, v, w = split(u, n)
+    r, p, v, w = split(u)
     e0, e, turn = p[:, :1], p[:, 1:], 0.5 * change[:, 3:]
     dp = np.hstack([-np.sum(e * turn, axis=1, keepdims=True), e0 * turn + np.cross(turn, e)])
     p = p + dp
@@ -298,8 +298,8 @@ def displaced(u: Floats, change: Floats, n: int) -> Floats:
 
 def distance(u: Floats, other: Floats, n: int) -> tuple[Floats, Floats]:
     """Largest displacement, m, and rotation, rad, of a body between states (..., 13 n or more)."""
-    r, p, _, _ = split(u, n)
-    s, q, _, _ = split(other, n)
+    r, p, _, _ = split(u)
+    s, q, _, _ = split(other)
     cosine = np.sum(p * q, axis=-1)
     sine = np.linalg.norm(p - np.sign(cosine)[..., None] * q, axis=-1)
     cosine = np.clip(np.abs(cosine), 0.0, 1.0)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from dap3d_core.assembly.arrays import ENERGY, VALUE, WRENCH
 from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 from dap3d_core.formulations.evaluator import AS_COMPILED, Machine
-from dap3d_core.model.rotations import join, split, to_global
+from dap3d_core.model.rotations import to_global
+from dap3d_core.model.state_layout import join, split, velocities_of
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +37,7 @@ def is_conservative(machine: Machine, u: Floats) -> bool:
     if driven or model.friction or any("energy" not in g.examined.kernels for g in model.forces):
         return False
     rng = np.random.default_rng(1)
-    r, p, _, _ = split(u, model.body_count)
+    r, p, _, _ = split(u)
     for _ in range(STATES):
         v, w = rng.normal(size=r.shape), rng.normal(size=r.shape)
         near = _moved(r, p, rng.normal(size=r.shape), rng.normal(size=r.shape), REACH)
@@ -64,12 +65,12 @@ def _moved(r: Floats, p: Floats, v: Floats, w: Floats, h: float) -> tuple[Floats
 
 def _power(machine: Machine, u: Floats) -> tuple[float, float]:
     """Power of the applied forces, and the sum of its parts' sizes."""
-    s, n = machine.system, machine.model.body_count
+    s = machine.system
     place_bodies(machine.integrated(u), s.body, s.metric)
     s.force[:] = 0.0
     _call(machine, VALUE, s.force)
     _call(machine, WRENCH, s.force)
-    parts = s.force[6:] * u[7 * n :]
+    parts = s.force[6:] * velocities_of(u)
     return float(np.sum(parts)), float(np.sum(np.abs(parts)))
 
 

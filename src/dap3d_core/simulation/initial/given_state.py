@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dap3d_core.model.state_layout import STATE, split, state_layout
+
 Floats = NDArray[np.float64]
 
 
@@ -15,8 +17,8 @@ def state_of(u: ArrayLike, body_names: Sequence[str]) -> Floats:
     Raises:
         ValueError: it is not 13 n finite numbers, or Euler parameters of a body are all zero.
     """
-    count = 13 * len(body_names)
-    wanted = f"u must be {count} finite numbers, 13 a body"
+    count = state_layout(len(body_names)).size
+    wanted = f"u must be {count} finite numbers, {STATE} a body"
     try:
         given = np.asanyarray(u)
     except (ValueError, TypeError) as error:  # lists of different lengths
@@ -31,8 +33,7 @@ def state_of(u: ArrayLike, body_names: Sequence[str]) -> Floats:
     if not np.all(np.isfinite(state)):
         first = _first(~np.isfinite(state))
         raise ValueError(f"{wanted}; entry {first} is {state[first]}")
-    turns = state[: 7 * len(body_names)].reshape(-1, 7)[:, 3:]
-    without = ~np.any(turns, axis=1)
+    without = ~np.any(split(state)[1], axis=1)
     if np.any(without):
         name = body_names[_first(without)]
         raise ValueError(f"the Euler parameters of body {name} in u are all zero")

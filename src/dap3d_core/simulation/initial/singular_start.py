@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.constraint_rows import Rows, scaled_rows
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.linear.rank.rank import DENSE_ROWS, Rank
-from dap3d_core.model.rotations import split
+from dap3d_core.model.state_layout import split, velocities_of
 from dap3d_core.simulation.initial.assemble import (
     displaced,
     extent,
@@ -106,7 +106,7 @@ def singular_start(machine: Machine, u: Floats, rank: Rank, t: float) -> Singula
     if machine.model.row_count > DENSE_ROWS or rank.dof > MOST_FREE:
         return _refused([], "the scene is too large for its branches to be found")
     cone = _Cone(machine, u, rank, t)
-    if np.any(cone.u[7 * machine.model.body_count :]):
+    if np.any(velocities_of(cone.u)):
         return _moving(cone)
     return _at_rest(cone)
 
@@ -115,7 +115,7 @@ def _loses_rank(machine: Machine, u: Floats, rank: Rank, t: float) -> bool:
     """Whether redundant rows forbid, at second order, velocities that all rows allow."""
     n = machine.model.body_count
     still = u.copy()
-    still[7 * n :] = 0.0
+    velocities_of(still)[:] = 0.0
     rows = finite_rows(machine, t, still)
     if not np.bincount(rows.row, rows.value**2, minlength=rows.shape[0]).all():
         return False  # a row without a gradient is named where the run stops
@@ -135,11 +135,10 @@ def _loses_rank(machine: Machine, u: Floats, rank: Rank, t: float) -> bool:
 
 def _quadratic(machine: Machine, still: Floats, v: Floats, t: float) -> Floats:
     """The part of gamma (rows,) that is quadratic in the velocities, at v (6 n,)."""
-    n = machine.model.body_count
     total = -2.0 * finite_rows(machine, t, still).gamma
     for sign in (1.0, -1.0):
         moving = still.copy()
-        moving[7 * n :] = sign * v
+        velocities_of(moving)[:] = sign * v
         total += finite_rows(machine, t, moving).gamma
     return 0.5 * total
 
@@ -167,7 +166,7 @@ class _Cone:
         self.machine, self.u, self.t = machine, u, t
         n = machine.model.body_count
         self.still = u.copy()
-        self.still[7 * n :] = 0.0
+        velocities_of(self.still)[:] = 0.0
         rows = finite_rows(machine, t, u)
         scale, frame = self._scaling = mass_scaling(machine)
         block = rows.dense().reshape(-1, n, 6)
@@ -202,10 +201,9 @@ class _Cone:
 
     def _without_joints(self) -> Floats:
         """Scaled accelerations (6 n,) that the bodies would have without joints."""
-        n = self.machine.model.body_count
         force = self.machine.applied_forces(self.t, self.u)
         scale, frame = self._scaling
-        w = split(self.u, n)[3]
+        w = split(self.u)[3]
         inertia = np.linalg.inv(frame @ frame.transpose(0, 2, 1))
         moment = force[:, 3:] - np.cross(w, np.einsum("brc,bc->br", inertia, w))
         return np.hstack([scale * force[:, :3], np.einsum("brc,br->bc", frame, moment)]).ravel()
@@ -280,7 +278,7 @@ class _Cone:
 
         way: (6 n,) velocities, or accelerations, along it.
         """
-        n, v = self.machine.model.body_count, self.u[7 * self.machine.model.body_count :]
+        n, v = self.machine.model.body_count, velocities_of(self.u)
         aside = displaced(self.still, ASIDE / extent(self.machine, way) * way.reshape(n, 6), n)
         acceleration = self.free + self.N @ z
         speed, rise = extent(self.machine, v), extent(self.machine, acceleration)
@@ -305,8 +303,7 @@ def _refused(lines: list[str], why: str) -> SingularStart:
 
 def _moving(cone: _Cone) -> SingularStart:
     """The branch that the velocities are on, and the accelerations there."""
-    n = cone.machine.model.body_count
-    v, gap = cone.u[7 * n :], cone.left @ cone.rows.gamma
+    v, gap = velocities_of(cone.u), cone.left @ cone.rows.gamma
     size = _size(cone.machine, cone.rows, v)
     if np.max(np.abs(gap)) > FULFILLED * size:
         lines = cone.words(cone.branches())
@@ -325,7 +322,7 @@ def _moving(cone: _Cone) -> SingularStart:
 
 def _gamma(cone: _Cone, v: Floats) -> Floats:
     state = cone.still.copy()
-    state[7 * cone.machine.model.body_count :] = v
+    velocities_of(state)[:] = v
     return finite_rows(cone.machine, cone.t, state).gamma
 
 
@@ -337,7 +334,7 @@ def _third(cone: _Cone, v: Floats, a: Floats) -> Floats:
     for k, weight in enumerate(FORWARD):
         s = k * h
         state = displaced(cone.still, (s * v + 0.5 * s * s * a).reshape(n, 6), n)
-        state[7 * n :] = v + s * a
+        velocities_of(state)[:] = v + s * a
         rows = finite_rows(cone.machine, cone.t + s, state)
         product = np.bincount(rows.row, rows.value * a[rows.column], minlength=rows.shape[0])
         total += weight * cone.left @ (product - rows.gamma)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.integrators import Integration
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE, ROUNDED, RTOL, H, Y
-from dap3d_core.model.rotations import split
+from dap3d_core.model.state_layout import split
 from dap3d_core.scene import Simulation
 from dap3d_core.scene.validate.settings import QUANTITIES, USUAL_ATOL
 
@@ -56,8 +56,8 @@ def usual_atol(machine: Machine) -> float | dict[str, float]:
 def _time_of(machine: Machine) -> float:
     """A time of the scene as given, s, as a power of ten: 1 where nothing moves."""
     model, size = machine.model, machine.model.part_size
-    _, _, v, w = split(model.u0, model.body_count)
-    _, _, a, alpha = split(machine.rhs(0.0, model.u0), model.body_count)
+    _, _, v, w = split(model.u0)
+    _, _, a, alpha = split(machine.rhs(0.0, model.u0))
     rates = [_largest(v) / size, _largest(w)]
     rates += [np.sqrt(_largest(a) / size), np.sqrt(_largest(alpha))]
     fastest = float(np.max(rates))
@@ -75,15 +75,14 @@ def motion_notes(low: Floats, high: Floats, settings: Simulation) -> list[str]:
         low, high: (13 n,) the least and the largest value of each component of u.
         settings: of the run, its tolerances resolved.
     """
-    n = len(low) // 13
     moved, size = high - low, np.maximum(np.abs(low), np.abs(high))
     atol = (
         settings.atol
         if isinstance(settings.atol, Mapping)
         else dict.fromkeys(QUANTITIES, settings.atol)
     )
-    shift, turn, _, _ = split(moved, n)
-    far = split(size, n)[0]
+    shift, turn, _, _ = split(moved)
+    far = split(size)[0]
     part, rtol = _largest(shift), float(settings.rtol)
     allowed = atol["r"] + rtol * float(np.max(far, initial=0.0))
     turning = _largest(turn) > RESOLVED * (atol["p"] + rtol)
@@ -102,11 +101,9 @@ def rounding_notes(runs: Sequence[Integration], names: Sequence[str]) -> list[st
     if not work.integer[ROUNDED] > 1:
         return []
     n = len(names)
-    noise = work.real[H] * work.tolerance[NOISE, : 13 * n]
-    above = noise > work.tolerance[ABSOLUTE, : 13 * n] + work.real[RTOL] * np.abs(
-        work.state[Y, :-1]
-    )
-    worst = [bool(np.any(np.concatenate([part[k] for part in split(above, n)]))) for k in range(n)]
+    noise = work.real[H] * work.tolerance[NOISE, :-1]
+    above = noise > work.tolerance[ABSOLUTE, :-1] + work.real[RTOL] * np.abs(work.state[Y, :-1])
+    worst = [bool(np.any(np.concatenate([part[k] for part in split(above)]))) for k in range(n)]
     bodies = [name for name, is_worst in zip(names, worst, strict=True) if is_worst]
     if not bodies:
         return []

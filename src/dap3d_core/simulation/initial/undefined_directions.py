@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.model import Group, Model
-from dap3d_core.model.rotations import rotation, split
+from dap3d_core.model.rotations import rotation
+from dap3d_core.model.state_layout import split
 from dap3d_core.scene import Mistake, Scene, mistake_at
 
 Floats = NDArray[np.float64]
@@ -78,7 +79,7 @@ def _asking(model: Model) -> Iterator[tuple[Group, dict[str, FieldSpec]]]:
 
 def _frames(u: Floats, n: int) -> tuple[Floats, Floats]:
     """R (..., n + 1, 3) and A (..., n + 1, 3, 3) of states (..., 13 n), ground first."""
-    r, p, _, _ = split(u, n)
+    r, p, _, _ = split(u)
     ground = np.zeros((*r.shape[:-2], 1, 3))
     axes = np.broadcast_to(np.eye(3), (*r.shape[:-2], 1, 3, 3))
     return np.concatenate([ground, r], axis=-2), np.concatenate([axes, rotation(p)], axis=-3)

@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from dap3d_core.model.state_layout import integrated_layout
 from dap3d_core.scene import MISSING, Mistake, SceneError
 
 #: Reports of less are not worth a look at the machine, bytes.
@@ -108,4 +109,4 @@ def _size(byte_count: float) -> str:
 
 def row_width(machine: Any) -> int:
     """Numbers that a run keeps of each instant: time, state, work, and what is reported beside."""
-    return int(2 + 13 * machine.model.body_count + machine.report_size)
+    return int(1 + integrated_layout(machine.model.body_count).size + machine.report_size)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.integrators import Integration
 from dap3d_core.model import Model
-from dap3d_core.model.rotations import from_integrated
+from dap3d_core.model.state_layout import from_integrated
 from dap3d_core.result.model_summary import subject_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 
@@ -70,5 +70,5 @@ class Observer:
 
     def _energies(self, y: NDArray[np.float64]) -> tuple[float, float]:
         """Kinetic energy and the work done so far, J."""
-        u = from_integrated(y, self._subject.body_count)
+        u = from_integrated(y)
         return float(kinetic_energy(self._subject, u[None])[0]), float(y[-1])

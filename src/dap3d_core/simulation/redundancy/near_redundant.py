@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.constraint_rows import Rows
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.linear.rank.rank import DENSE_ROWS
+from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import (
     FIT,
@@ -95,5 +96,5 @@ def _leads_away(machine: Machine, u: Floats, t: float, direction: Floats) -> boo
         closed, _ = correct_positions(machine, moved, t, np.zeros(0, dtype=np.int64))
     except AssemblyError:
         return False
-    gone, asked = closed[: 7 * n] - u[: 7 * n], moved[: 7 * n] - u[: 7 * n]
+    gone, asked = coordinates_of(closed - u), coordinates_of(moved - u)
     return float(asked @ gone) > AWAY * float(asked @ asked)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import scaled_rows
 from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import (
     correct_positions,
@@ -115,8 +116,8 @@ def _other_pose(machine: Machine, u: Floats, t: float, rng: np.random.Generator)
             other, _ = correct_positions(machine, displaced(u, step, n), t, NONE)
         except AssemblyError:
             continue
-        gone = np.linalg.norm(other[: 7 * n] - u[: 7 * n])
-        if gone > ANOTHER * np.linalg.norm(displaced(u, step, n)[: 7 * n] - u[: 7 * n]):
+        gone = np.linalg.norm(coordinates_of(other - u))
+        if gone > ANOTHER * np.linalg.norm(coordinates_of(displaced(u, step, n) - u)):
             return other
     return None
 

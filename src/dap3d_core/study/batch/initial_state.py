@@ -22,6 +22,7 @@ from dap3d_core.assembly.arrays import (
     System,
 )
 from dap3d_core.assembly.evaluate import call_kinds, place, place_bodies
+from dap3d_core.assembly.offsets import velocity_offset
 from dap3d_core.assembly.state_update import change_velocity, move
 from dap3d_core.formulations.common.constraints import (
     PART,
@@ -134,7 +135,7 @@ def shorten(system: System, longest_shift: float) -> float:
 @compiled_inside
 def place_with_spin(y: Floats, system: System) -> None:
     """Place bodies that were turned; their angular velocities stay as they are in global axes."""
-    body, first = system.body, 7 * (system.body.shape[0] - 1)
+    body, first = system.body, velocity_offset(1, system.body.shape[0] - 1)
     for b in range(1, body.shape[0]):
         o = first + 6 * (b - 1) + 3
         for c in range(3):

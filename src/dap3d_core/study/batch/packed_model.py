@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.model import Group, Model
+from dap3d_core.model.state_layout import coordinates_of, velocities_of
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -104,7 +105,8 @@ class Lanes:
     def __init__(self, one: Machine, many: Machine, count: int) -> None:
         """Args: a machine of the model, one of ``packed(model, count)``, how many copies."""
         self.count = count
-        self._n, self._rows = one.model.body_count, one.model.row_count
+        self._n = one.model.body_count
+        self._row, self._row_of_many = one.model.row_layout, many.model.row_layout
         self._angles = [g.count * len(g.examined.layout.angles) for g in one.model.acting]
         self._par = _places_of_par(one, many, count)
         self._sizes = (one.system.par.size, one.system.body.size)
@@ -128,8 +130,7 @@ class Lanes:
 
     def join(self, states: Floats) -> Floats:
         """(k, 13 n count + 1) one integrated state of all, of (k, count, 13 n + 1)."""
-        k, n = len(states), 7 * self._n
-        parts = (states[..., :n], states[..., n:-1])
+        k, parts = len(states), (coordinates_of(states), velocities_of(states))
         work = np.zeros((k, 1))
         return np.hstack([*(part.reshape(k, self.count * part.shape[-1]) for part in parts), work])
 
@@ -139,16 +140,14 @@ class Lanes:
         Work, potential energy and residuals, which all share, are NaN.
         """
         k, nt, _ = rows.shape
-        n, m, count = self._n, self._rows, self.count
-        out = np.full((k, count, nt, 1 + 13 * n + 1 + 6 * n + m + sum(self._angles) + 4), np.nan)
-        out[..., 0] = rows[:, None, :, 0]
-        source, target = 1, 1
-        for width in (7 * n, 6 * n):
-            part = rows[:, :, source : source + width * count].reshape(k, nt, count, width)
-            out[..., target : target + width] = part.transpose(0, 2, 1, 3)
-            source, target = source + width * count, target + width
-        source, target = source + 1, target + 1
-        for width in (6 * n, m, *self._angles):
+        count, one, many = self.count, self._row, self._row_of_many
+        out = np.full((k, count, nt, one.size), np.nan)
+        out[..., one["t"]] = rows[:, None, :, many["t"]]
+        for name in ("coordinates", "velocities", "v_dot", "Lam"):
+            part = rows[..., many[name]].reshape(k, nt, count, one.length(name))
+            out[..., one[name]] = part.transpose(0, 2, 1, 3)
+        source, target = many["angles"].start, one["angles"].start
+        for width in self._angles:
             part = rows[:, :, source : source + width * count].reshape(k, nt, count, width)
             out[..., target : target + width] = part.transpose(0, 2, 1, 3)
             source, target = source + width * count, target + width

@@ -26,7 +26,7 @@ class Packs:
         self._lanes = Lanes(one, self._many, count)
         stops = compiled.pace(float(times[-1])).stops
         self._runs = Runs(self._many, compiled.scene.simulation, times, stops)
-        self._width = 1 + 13 * one.model.body_count + 1 + one.report_size
+        self._width = one.model.row_layout.size
         self.count = count
 
     def run(self, table: Floats, places: Integers, y0: Floats) -> Found:

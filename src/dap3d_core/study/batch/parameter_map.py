@@ -22,7 +22,7 @@ from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.types import Function
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
 from dap3d_core.model import Group
-from dap3d_core.model.rotations import from_integrated, join, split, to_integrated
+from dap3d_core.model.state_layout import from_integrated, join, split, to_integrated
 from dap3d_core.scene import Checked, Instance
 from dap3d_core.scene.validate.bodies import SMALLEST_INERTIA, ZERO_INERTIA
 from dap3d_core.scene.validate.coerce_values import LARGEST
@@ -131,16 +131,15 @@ class Places:
 
     def states(self, values: Floats, u0: Floats) -> Floats:
         """(k, 13 n + 1) integrated states to start from; u0 (13 n,) is that of the scene."""
-        n = len(self._checked.body_names)
         u = np.repeat(u0[None], len(values), axis=0)
-        r, p, v, w = (part.copy() for part in split(u, n))
+        r, p, v, w = (part.copy() for part in split(u))
         parts = {"r": r, "r_dot": v, "w": w}
         for column, value in zip(self.columns, values.T, strict=True):
             number = column.number
             if number.table == "bodies" and number.path[2] in parts:
                 body = self._checked.body_index[number.path[1]] - 1
                 parts[number.path[2]][:, body, number.places[0]] = value
-        return to_integrated(join(r, p, v, w), n)
+        return to_integrated(join(r, p, v, w))
 
     def are_undefined(self, table: Floats, y0: Floats) -> Booleans:
         """Points at whose start y0 (k, 13 n + 1) the direction of an element is undefined."""
@@ -155,7 +154,7 @@ class Places:
             numbers[:, self.places[own] - first] = table[:, own]
             return numbers.reshape(count, *group.numbers.shape)
 
-        u = from_integrated(y0, model.body_count)
+        u = from_integrated(y0)
         return are_undefined(model, u, numbers_of, model_size(machine))
 
     # ------------------------------------------------------------------ one number

@@ -7,7 +7,8 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.model.rotations import split, to_body, to_global
+from dap3d_core.model.rotations import to_body, to_global
+from dap3d_core.model.state_layout import split
 from dap3d_core.result import Result
 from dap3d_core.result.post.point_motion import motion_of
 from dap3d_core.view.scene3d.primitives import Located
@@ -102,7 +103,7 @@ class Motion:
         """(3,) components in a body of a direction (3,) as it is at the first instant."""
         if body == 0:
             return direction
-        _, p, _, _ = split(self.result.u[:1], self.result.subject.body_count)
+        _, p, _, _ = split(self.result.u[:1])
         return np.asarray(to_body(p[0, body - 1], direction))
 
     def extent(self, located: Iterable[Located], reach: float = 0.0) -> Extent:

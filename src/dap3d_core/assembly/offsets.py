@@ -1,0 +1,22 @@
+"""Offsets into the integrated state for compiled code. Bodies count from 1; ground is 0."""
+
+from dap3d_core.kernels.runtime.cache import compiled_into
+from dap3d_core.model.state_layout import COORDINATES, STATE, VELOCITIES
+
+
+@compiled_into
+def coordinate_offset(b: int) -> int:
+    """Index of the first coordinate of body b."""
+    return COORDINATES * (b - 1)
+
+
+@compiled_into
+def velocity_offset(b: int, n: int) -> int:
+    """Index of the first velocity of body b of n."""
+    return COORDINATES * n + VELOCITIES * (b - 1)
+
+
+@compiled_into
+def work_offset(n: int) -> int:
+    """Index of the work done on n bodies."""
+    return STATE * n

@@ -1,0 +1,121 @@
+"""Layouts of state vectors and of reported rows. All offsets into them are computed here.
+
+The state u of n bodies holds the coordinates r, p of each, then the velocities r_dot, omega. The
+integrated state y has the same order, with omega' in body axes, and ends with the work done on the
+system (docs/decisions/0002). A reported row is t, y, and what is evaluated there.
+"""
+
+from functools import cache
+from itertools import accumulate
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dap3d_core.model.rotations import to_body, to_global
+
+Floats = NDArray[np.float64]
+
+#: Coordinates (r, p) and velocities (r_dot, omega) of a body, and both.
+COORDINATES, VELOCITIES = 7, 6
+STATE = COORDINATES + VELOCITIES
+
+
+class Layout:
+    """A vector cut into named segments.
+
+    Attributes:
+        names: of the segments, in their order.
+        size: entries of the vector.
+    """
+
+    def __init__(self, **sizes: int) -> None:
+        """Args: the number of entries of each segment, in their order."""
+        ends = list(accumulate(sizes.values(), initial=0))
+        self._slices = dict(zip(sizes, map(slice, ends[:-1], ends[1:]), strict=True))
+        self.names = tuple(sizes)
+        self.size = ends[-1]
+
+    def __getitem__(self, name: str) -> slice:
+        return self._slices[name]
+
+    def length(self, name: str) -> int:
+        """Number of entries of a segment."""
+        return self._slices[name].stop - self._slices[name].start
+
+
+@cache
+def state_layout(n: int) -> Layout:
+    """Layout of the state u of n bodies."""
+    return Layout(coordinates=COORDINATES * n, velocities=VELOCITIES * n)
+
+
+@cache
+def integrated_layout(n: int) -> Layout:
+    """Layout of the integrated state y of n bodies."""
+    return Layout(coordinates=COORDINATES * n, velocities=VELOCITIES * n, work=1)
+
+
+@cache
+def report_layout(n: int, rows: int, angles: int) -> Layout:
+    """Layout of what is reported beside the state: of n bodies, constraint rows, counted angles."""
+    sizes = {"v_dot": VELOCITIES * n, "Lam": rows, "angles": angles}
+    return Layout(**sizes, potential_energy=1, residuals=3)
+
+
+@cache
+def row_layout(n: int, rows: int, angles: int) -> Layout:
+    """Layout of a reported row."""
+    parts = integrated_layout(n), report_layout(n, rows, angles)
+    return Layout(t=1, **{name: part.length(name) for part in parts for name in part.names})
+
+
+def body_count_of(u: Floats) -> int:
+    """Number of bodies of states u (..., 13 n) or y (..., 13 n + 1)."""
+    return int(u.shape[-1]) // STATE
+
+
+def coordinates_of(u: Floats) -> Floats:
+    """View of the coordinates (..., 7 n) of states u or y."""
+    return u[..., state_layout(body_count_of(u))["coordinates"]]
+
+
+def velocities_of(u: Floats) -> Floats:
+    """View of the velocities (..., 6 n) of states u or y."""
+    return u[..., state_layout(body_count_of(u))["velocities"]]
+
+
+def by_body(u: Floats) -> Floats:
+    """Coordinates and velocities of each body, (..., n, 13), of states u or y; a copy."""
+    n = body_count_of(u)
+    q = coordinates_of(u).reshape(*u.shape[:-1], n, COORDINATES)
+    v = velocities_of(u).reshape(*u.shape[:-1], n, VELOCITIES)
+    return np.concatenate([q, v], axis=-1)
+
+
+def split(u: ArrayLike) -> tuple[Floats, Floats, Floats, Floats]:
+    """Views r (..., n, 3), p (..., n, 4), r_dot (..., n, 3), w (..., n, 3) of states u or y."""
+    u = np.asarray(u, dtype=float)
+    n = body_count_of(u)
+    q = coordinates_of(u).reshape(*u.shape[:-1], n, COORDINATES)
+    v = velocities_of(u).reshape(*u.shape[:-1], n, VELOCITIES)
+    return q[..., :3], q[..., 3:], v[..., :3], v[..., 3:]
+
+
+def join(r: ArrayLike, p: ArrayLike, v: ArrayLike, w: ArrayLike) -> Floats:
+    """States u (..., 13 n) from r, p, r_dot, w of n bodies: the inverse of ``split``."""
+    q = np.concatenate([r, p], axis=-1)
+    s = np.concatenate([v, w], axis=-1)
+    return np.concatenate([q.reshape(*q.shape[:-2], -1), s.reshape(*s.shape[:-2], -1)], axis=-1)
+
+
+def to_integrated(u: ArrayLike, work: ArrayLike = 0.0) -> Floats:
+    """Integrated states y (..., 13 n + 1) of states u (..., 13 n)."""
+    r, p, v, w = split(u)
+    work = np.broadcast_to(np.asarray(work, dtype=float), r.shape[:-2])[..., None]
+    return np.concatenate([join(r, p, v, to_body(p, w)), work], axis=-1)
+
+
+def from_integrated(y: ArrayLike) -> Floats:
+    """States u (..., 13 n) of integrated states y (..., 13 n + 1)."""
+    r, p, v, w = split(y)
+    return join(r, p, v, to_global(p, w))
