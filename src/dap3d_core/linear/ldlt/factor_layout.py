@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.linear.ordering.elimination_order import Ordering
+from dap3d_core.linear.ordering.ordering import Ordering
 
 #: Blocks of K (row, column) and the pairs of blocks of D that they are made of.
 Contents = dict[tuple[int, int], list[tuple[int, int]]]

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.linear.ldlt.factor_layout import Contents, Matrix, lay_matrix, list_updates
-from dap3d_core.linear.ordering.elimination_order import Ordering, order_nodes
+from dap3d_core.linear.ordering.elimination_order import order_nodes
+from dap3d_core.linear.ordering.ordering import Ordering
 
 Integers = NDArray[np.int64]
 

@@ -13,7 +13,8 @@ import attrs
 import numpy as np
 
 from dap3d_core.linear.ldlt.plan import Integers
-from dap3d_core.linear.ordering.elimination_order import JointNode, _eliminate, _waits
+from dap3d_core.linear.ordering.elimination_order import _eliminate, _waits
+from dap3d_core.linear.ordering.ordering import JointNode
 
 #: Unknowns of a body (position, velocity), and of a row (a multiplier of each level).
 BODY_SIZE, ROW_SIZE = 12, 2

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import attrs
 
-from dap3d_core.linear.ordering.elimination_order import Ordering
+from dap3d_core.linear.ordering.ordering import Ordering
 
 #: A panel has at least and at most so many rows. Fewer are no faster than nodes are; more would
 #: leave the working set of its products the first cache.
