@@ -3,8 +3,9 @@
 import shutil
 from pathlib import Path
 
-import dap3d_core
 import pytest
+
+import dap3d_core
 from dap3d_core.kernels.runtime import cache
 
 
