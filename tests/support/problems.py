@@ -76,3 +76,35 @@ def chain(n):
         outer = scene.add_point(f"out{k}", f"b{k}", (0.5, 0.0, 0.0))
     scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
     return scene
+
+
+def row_of_four_bars(count):
+    """Cranks on revolutes to ground, neighbours joined by couplers on spherical joints."""
+    scene = dap.Scene(name="four-bars")
+    for k in range(count + 1):
+        scene.add_body(f"crank{k}", mass=1.0, Jp=(0.1, 0.02, 0.1), r=(float(k), 0.5, 0.0))
+        scene.add_point(f"A{k}", f"crank{k}", (0.0, -0.5, 0.0))
+        scene.add_point(f"B{k}", f"crank{k}", (0.0, 0.5, 0.0))
+        scene.add_point(f"O{k}", "ground", (float(k), 0.0, 0.0))
+        scene.add_joint("rev", f"R{k}", P_i=f"A{k}", P_j=f"O{k}", a_i=f"crank{k}.z", a_j="ground.z")
+    for k in range(count):
+        scene.add_body(f"rod{k}", mass=1.0, Jp=(0.02, 0.1, 0.1), r=(k + 0.5, 1.0, 0.0))
+        for side, x in ((0, -0.5), (1, 0.5)):
+            scene.add_point(f"C{k}_{side}", f"rod{k}", (x, 0.0, 0.0))
+            scene.add_joint("sph", f"S{k}_{side}", P_i=f"C{k}_{side}", P_j=f"B{k + side}")
+    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
+    return scene
+
+
+def everything():
+    """A row of four-bars with springs, a free body, friction, a driver."""
+    scene, first, last, joint = row_of_four_bars(9), "crank1", "rod8", "R5"
+    bodies = list(scene.bodies)
+    scene.add_body("loose", mass=2.0, Jp=(1.0, 1.1, 1.2), r=(0.0, 0.0, 3.0), w=(0.1, 0.2, 0.3))
+    for n, (i, j) in enumerate([(first, bodies[0]), (first, last), (last, "ground"),
+                                ("loose", last), ("loose", "ground")]):  # fmt: skip
+        scene.add_force("ptp", f"spring{n}", P_i=f"{i}.O", P_j=f"{j}.O", k=20.0 + n, l0=0.3, c=0.5)
+    scene.add_force("friction", "rub", joint=joint, mu=0.2, radius=0.05)
+    scene.add_function("a", "turn", coeff=(0.0, 0.3, 0.1))
+    scene.add_joint("rel-rot", "motor", body_i=first, a_j="ground.z", function="turn")
+    return scene

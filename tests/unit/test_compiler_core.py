@@ -40,11 +40,10 @@ RUNS = [
     ("ball1", {"t_end": 0.5, "dt": 0.1, "allow_code": True}),
     ("tri", SHORT),
 ]
-#: Friction, packs of points, dense supernodes, two halves.
+#: Friction, packs of points, dense supernodes, radau with elements of many kinds.
 MORE = """
-from dap3d_core import formulations
+from support.problems import everything
 from unit.test_checkpoint import wheel
-from unit.test_halves import SCENES
 from unit.test_study_ensemble import ensemble, pendulum
 from unit.test_study_packs import CASES, in_packs
 
@@ -60,24 +59,20 @@ for case in CASES.values():
 recorder.record(pack, *CASES["functions and their breaks"], t_end=0.6)
 recorder.record(pack, pendulum, {"bodies.bob.mass": (1.0, 3.0)}, "bob.w", method="penalty")
 recorder.record(dap.simulate, "pen1", t_end=0.1, dt=0.1, rtol=1e-13, atol=1e-15)
-from dap3d_core.linear import dissection, ordering, supernodes
+from dap3d_core.linear.ordering import elimination_order, nested_dissection, supernodes
 from unit import test_linear_nets as nets
-usual = ordering.WIDE, dissection.LEAF, supernodes.ZEROS
-ordering.WIDE, dissection.LEAF, supernodes.ZEROS = 0, 4, 0.3
+usual = elimination_order.WIDE, nested_dissection.LEAF, supernodes.ZEROS
+elimination_order.WIDE, nested_dissection.LEAF, supernodes.ZEROS = 0, 4, 0.3
 recorder.record(lambda: nets.check_solution(
     nets.Case(nets.NETS["plates"](), np.random.default_rng(1))))
-ordering.WIDE, dissection.LEAF, supernodes.ZEROS = usual
-recorder.record(dap.simulate, SCENES["everything"](), t_end=1e-4, dt=1e-4, integrator="radau")
-formulations.IN_HALVES["standard"] = (formulations.IN_HALVES["standard"][0], 1)
-recorder.record(dap.simulate, SCENES["everything"](), t_end=4e-4, dt=2e-4)
+elimination_order.WIDE, nested_dissection.LEAF, supernodes.ZEROS = usual
+recorder.record(dap.simulate, everything(), t_end=1e-4, dt=1e-4, integrator="radau")
 """
-#: Functions that these runs do not call: of the second thread, which plain Python has not, and of
-#: rare events of a run. Whole runs cover them (test_compiler_bits.py, test_halves.py).
+#: Functions that these runs do not call, of rare events of a run.
 NOT_CALLED = {
     f"dap3d_core.{module}.{name}"
     for module, names in {
         "formulations.common.constraints": "linearise_evenly",
-        "formulations.two_threads.rhs_halves": "wait work_beside",
         "formulations.regularised": "rest",
         "formulations.standard": "settle_rows",
         "integrators.adams.step": "fail",

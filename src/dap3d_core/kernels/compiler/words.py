@@ -13,7 +13,6 @@ from dap3d_core.kernels.compiler.types import (
     COMPLEX,
     FLOAT,
     INT,
-    NOTHING,
     Array,
     Value,
     bits,
@@ -181,56 +180,3 @@ def complex_quotient(c: Any, a: Value, b: Value) -> Value:
 def _pointer(c: Any, node: Any, values: list[Value]) -> Value:
     first, *lengths = values[0].words
     return Value(Array(values[0].type.item, 1), (first, c.count_of(lengths)))
-
-
-@_writes("address_of")
-def _address(c: Any, node: Any, values: list[Value]) -> Value:
-    return Value(INT, (c.new(f"ptrtoint ptr {values[0].word} to i64"),))
-
-
-@_writes("vector_at")
-def _vector(c: Any, node: Any, values: list[Value]) -> Value:
-    at = c.new(f"inttoptr i64 {values[0].word} to ptr")
-    return Value(Array(FLOAT, 1), (at, values[1].word))
-
-
-@_writes("load")
-def _load(c: Any, node: Any, values: list[Value]) -> Value:
-    at = c.item(values[0], values[1].word)
-    return Value(INT, (c.new(f"load atomic i64, ptr {at} acquire, align 8"),))
-
-
-@_writes("store")
-def _store(c: Any, node: Any, values: list[Value]) -> Value:
-    at = c.item(values[0], values[1].word)
-    c.line(f"store atomic i64 {values[2].word}, ptr {at} release, align 8")
-    return Value(NOTHING)
-
-
-@_writes("replace")
-def _replace(c: Any, node: Any, values: list[Value]) -> Value:
-    at = c.item(values[0], values[1].word)
-    old, new = values[2].word, values[3].word
-    pair = c.new(f"cmpxchg ptr {at}, i64 {old}, i64 {new} acq_rel acquire, align 8")
-    return Value(BOOL, (c.new(f"extractvalue {{i64, i1}} {pair}, 1"),))
-
-
-@_writes("pause")
-def _pause(c: Any, node: Any, values: list[Value]) -> Value:
-    from dap3d_core.kernels.compiler.objects import processor
-
-    kind = processor().triple.split("-")[0]
-    name, argument = "llvm.x86.sse2.pause", ""
-    if kind in ("aarch64", "arm64"):
-        name, argument = "llvm.aarch64.hint", "i32 1"
-    if kind in ("x86_64", "amd64", "aarch64", "arm64"):
-        c.program.needs[name] = f"declare void @{name}({argument.split(' ')[0]})"
-        c.line(f"call void @{name}({argument})")
-    return Value(NOTHING)
-
-
-@_writes("give_way")
-def _give_way(c: Any, node: Any, values: list[Value]) -> Value:
-    c.program.needs["sched_yield"] = "declare i32 @sched_yield()"
-    c.new("call i32 @sched_yield()")
-    return Value(NOTHING)

@@ -41,7 +41,6 @@ class Plan:
         hubs: (h, 2) body and first row of each body that waits.
         fill: blocks, one for two joint nodes or hubs, that are zero before the factorisation.
         unfilled_size: numbers of the blocks that are not, and of the diagonal blocks.
-        halves: how the program is cut in two (ordering/bisection.py); None where it is not.
     """
 
     ordering: Ordering
