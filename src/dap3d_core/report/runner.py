@@ -29,6 +29,7 @@ from dap3d_core.report.settings_ladder import (
 from dap3d_core.report.timing import Announce, Bench, Progress
 from dap3d_core.result import Result
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
+from dap3d_core.scene.validate.settings import FIXED_STEP
 from dap3d_core.simulation import report_times
 
 #: Seconds that all timings of one rung may take: longer runs are repeated less.
@@ -126,7 +127,7 @@ def _prepared(
     tried = [settings]
     tried += [attrs.evolve(settings, method=name) for name in methods or ()]
     tried += [
-        attrs.evolve(settings, integrator=name, step=None if INTEGRATORS[name].adaptive else 1.0)
+        attrs.evolve(settings, integrator=name, step=1.0 if name in FIXED_STEP else None)
         for name in integrators or ()
     ]
     tried += [attrs.evolve(settings, rtol=rtol) for rtol in tolerances or ()]

@@ -11,6 +11,7 @@ import attrs
 
 from dap3d_core.result.event_record import Occurrence
 from dap3d_core.scene import SceneError, tables_of
+from dap3d_core.scene.validate.settings import FIXED_STEP
 
 #: How a run can have ended.
 STATUSES = ("done", "interrupted", "stopped")
@@ -134,7 +135,7 @@ class Record:
     def tolerances(self) -> tuple[float, dict[str, float]] | None:
         """rtol, and atol of r, p, v and w, that controlled the steps; None for fixed steps."""
         rtol, atol = self.settings.get("rtol"), self.settings.get("atol")
-        if self.settings.get("step") is not None or not rtol:
+        if self.integrator in FIXED_STEP or self.settings.get("step") is not None or not rtol:
             return None
         return float(rtol), atol if isinstance(atol, dict) else dict.fromkeys("rpvw", atol or 0.0)
 
