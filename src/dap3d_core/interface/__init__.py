@@ -1,6 +1,7 @@
 """What the author of a plugin imports, besides the kernels' words: joints, forces, functions."""
 
-from dap3d_core.interface.examine.examine import PluginError, examine
+from dap3d_core.interface.errors import PluginError
+from dap3d_core.interface.examine.examine import examine
 from dap3d_core.interface.fields import (
     REQUIRED,
     Body,

@@ -8,6 +8,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.interface.body_pose import BodyPose
+from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.interface.codegen.instance_layout import shape_of, size
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.specialise import (
@@ -15,7 +17,7 @@ from dap3d_core.interface.codegen.specialise import (
     bind_functions,
     uncalled,
 )
-from dap3d_core.interface.examine.examine import BodyPose, Examined, prepared
+from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.types import TypeBase
 from dap3d_core.model.knots import knots_of

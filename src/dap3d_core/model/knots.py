@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.interface.examine.examine import PluginError, where_is
+from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.interface.types import Function
 from dap3d_core.scene import Instance

@@ -10,7 +10,7 @@ from functools import cached_property
 import attrs
 import numpy as np
 
-from dap3d_core.interface.examine.examine import BodyPose, pose
+from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.rotations import read_only, to_global
 from dap3d_core.model.state_layout import (

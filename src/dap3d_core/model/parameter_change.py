@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from dap3d_core.interface.examine.examine import pose
+from dap3d_core.interface.body_pose import pose
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers
 from dap3d_core.model.model import Model

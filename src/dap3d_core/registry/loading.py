@@ -18,7 +18,9 @@ from typing import Any
 import pluggy
 
 from dap3d_core.interface import INTERFACE_VERSION, PluginError, hooks
-from dap3d_core.interface.examine.examine import Examined, examine, where_is
+from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.errors import where_is
+from dap3d_core.interface.examine.examine import examine
 from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.interface.types import KINDS, TypeBase
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source

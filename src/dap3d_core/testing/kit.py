@@ -8,7 +8,9 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.examine.examine import Examined, examine, where_is
+from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.errors import where_is
+from dap3d_core.interface.examine.examine import examine
 from dap3d_core.testing import plain_kernels
 from dap3d_core.testing.checks import forces, functions, joints, purity
 from dap3d_core.testing.findings import FAILED, LEFT_OUT, Finding, Outcome, Report

@@ -6,10 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 from dap3d_core.interface.codegen.kernel_arguments import friction_names, parameters
+from dap3d_core.interface.errors import PLAINLY, line_of
 from dap3d_core.interface.examine.examine import ATTEMPTS
 from dap3d_core.interface.examine.random_values import random_quantity
-from dap3d_core.interface.kernel_words import PLAINLY
-from dap3d_core.interface.source_location import line_of
 from dap3d_core.testing.compare import Comparison
 from dap3d_core.testing.findings import Outcome
 from dap3d_core.testing.samples.complex_step import Stepped

@@ -9,7 +9,7 @@ from dap3d_core.cli.app import Command
 from dap3d_core.cli.process.exit_codes import DONE, Refused
 
 if TYPE_CHECKING:
-    from dap3d_core.interface.examine.examine import Examined
+    from dap3d_core.interface.codegen.examined import Examined
     from dap3d_core.registry import Registry
 
 
@@ -67,7 +67,7 @@ def type_facts(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
     import inspect
 
     from dap3d_core.cli.commands.describe_example import example_of
-    from dap3d_core.interface.examine.examine import where_is
+    from dap3d_core.interface.errors import where_is
     from dap3d_core.interface.fields import specs_of
 
     examined = registry.get(kind, keyword)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dap3d_core.interface.examine.examine import Examined
+    from dap3d_core.interface.codegen.examined import Examined
     from dap3d_core.registry import Registry
 
 #: Body of each slot, a metre apart along x; points and vectors lie on it.
@@ -68,7 +68,7 @@ class _Example:
 
     def first(self, kind: str, is_good: Callable[["Examined"], bool]) -> "Examined":
         """The first usable type of a kind, by keyword, that is good for something."""
-        from dap3d_core.interface.examine.examine import PluginError
+        from dap3d_core.interface.errors import PluginError
         from dap3d_core.registry import LOAD_LIMIT
 
         for keyword in self.registry.keywords(kind):

@@ -4,9 +4,10 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
+from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
 from dap3d_core.interface.codegen.specialise import bind_friction
-from dap3d_core.interface.examine.examine import Examined, PluginError, where_is
+from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.kernels.runtime.loop_modules import build
 
 

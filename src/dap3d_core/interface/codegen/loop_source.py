@@ -7,8 +7,8 @@ row vectors and for each slot the place of its block in D; its numbers stand in 
 
 from collections.abc import Iterable, Sequence
 
+from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
-from dap3d_core.interface.examine.examine import Examined
 from dap3d_core.interface.types import Joint
 from dap3d_core.kernels.runtime.loop_modules import Loop
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.interface.codegen.instance_layout import Layout
 from dap3d_core.interface.codegen.kernel_arguments import (
     DERIVATIVES,
@@ -24,7 +25,7 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     parameters,
     stored,
 )
-from dap3d_core.interface.examine.examine import Examined, PluginError, where_is
+from dap3d_core.interface.errors import PluginError, where_is
 
 
 def uncalled(examined: Examined) -> str:

@@ -17,8 +17,7 @@ import sympy
 from sympy.logic.boolalg import Boolean
 
 from dap3d_core.interface.codegen.kernel_arguments import Quantity, parameters
-from dap3d_core.interface.kernel_words import PLAINLY
-from dap3d_core.interface.source_location import line_of
+from dap3d_core.interface.errors import PLAINLY, line_of
 from dap3d_core.kernels import add, cross, dot, sub
 
 Expression = Any

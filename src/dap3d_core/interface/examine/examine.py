@@ -1,10 +1,9 @@
-"""What is asked of a type before it is used: its kernels are called once, with random numbers.
+"""Examines a type before use: its kernels are called with random numbers, in plain Python.
 
-They run in plain Python. A wrong shape, an unknown name, a velocity in a position-level kernel or
-an exception is a ``PluginError`` that names file, type, function and remedy.
+A wrong shape, an unknown name, a velocity in a position-level kernel or an exception is a
+``PluginError`` that names file, type, function and remedy.
 """
 
-import inspect
 import math
 import random
 from collections.abc import Callable, Mapping, Sequence
@@ -15,8 +14,9 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.body_pose import BodyPose, pose
-from dap3d_core.interface.codegen.instance_layout import Layout, body_slots, layout_of, size
+from dap3d_core.interface.body_pose import BodyPose
+from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.instance_layout import body_slots, layout_of, size
 from dap3d_core.interface.codegen.kernel_arguments import (
     VELOCITY_KERNELS,
     Quantity,
@@ -26,91 +26,22 @@ from dap3d_core.interface.codegen.kernel_arguments import (
 )
 from dap3d_core.interface.codegen.return_shapes import ShapeError, checked_shape, entries, value_at
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
+from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
 from dap3d_core.interface.examine.random_values import (
     numbers,
     random_field,
     random_pose,
     random_quantity,
 )
-from dap3d_core.interface.fields import slot_of, specs_of
-from dap3d_core.interface.source_location import line_of, no_field
+from dap3d_core.interface.fields import specs_of
 from dap3d_core.interface.types import Function, Joint, TypeBase
 
-#: How often a type may refuse random values, or have none for them, before it is held to do so
-#: always.
+#: Random inputs a type may refuse, or be undefined for, before it counts as broken.
 ATTEMPTS = 200
 
 
-class PluginError(Exception):
-    """A type or a plugin cannot be used; the message names file, type, function and remedy."""
-
-
-@attrs.frozen
-class Examined:
-    """A type that passed, with what the loops are written from.
-
-    Attributes:
-        type: the class.
-        layout: how instances are stored.
-        names: every name its kernels may use.
-        outputs: kernel -> expressions of its numbers in the order of their shape.
-        kernels: its pure functions.
-        variants: types that stand in for it: (values of fields, the type).
-        argument_functions: its function fields of another argument than time.
-        rubs_in: of a force that acts by the friction of a joint, the field that names the joint; ""
-            for all others.
-        given: what completes it, for titles: the types of its functions of an argument.
-        derived: which of its kernels were derived from others.
-    """
-
-    type: type[TypeBase]
-    layout: Layout
-    names: dict[str, Quantity]
-    outputs: dict[str, tuple[str, ...]]
-    kernels: dict[str, Callable[..., Any]]
-    variants: tuple[tuple[Mapping[str, Any], "Examined"], ...] = ()
-    argument_functions: tuple[str, ...] = ()
-    rubs_in: str = ""
-    given: str = ""
-    derived: tuple[str, ...] = ()
-
-    def chosen(self, values: Mapping[str, Any]) -> "Examined":
-        """The variant for the values of an instance's fields; itself where none fits."""
-        for conditions, examined in self.variants:
-            if all(_holds(self.type, n, wanted, values[n]) for n, wanted in conditions.items()):
-                return examined
-        return self
-
-
-def _rubs_in(type_: type[TypeBase]) -> str:
-    """The field of the joint by whose friction a force acts; "" where it has a law of its own."""
-    if type_.kind != "force" or {"wrench", "energy"} & set(type_.kernels()):
-        return ""
-    named = [name for name, spec in specs_of(type_).items() if spec.kind == "joint"]
-    if len(named) > 1:
-        raise PluginError(
-            f"{where_is(type_)} has no wrench and would act by the friction of a joint, but names "
-            f"several joints: {', '.join(named)}; declare one, or define wrench"
-        )
-    return named[0] if named else ""
-
-
-def _holds(type_: type[TypeBase], name: str, wanted: Any, value: Any) -> bool:
-    is_function = specs_of(type_)[name].kind == "function"
-    return (value is not None) == wanted if is_function else bool(value == wanted)
-
-
-def where_is(type_: type) -> str:
-    """File and class of a type, for messages."""
-    try:
-        file = inspect.getsourcefile(type_) or type_.__module__
-    except (TypeError, OSError):
-        file = type_.__module__
-    return f"{file}: {type_.__name__}"
-
-
 def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
-    """Check a type and return what its loops are written from.
+    """Check a type and return what its loops are generated from.
 
     Raises:
         PluginError: with file, type, function and remedy.
@@ -125,7 +56,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
     names = namespace(type_, layout)
     kernels, outputs = type_.kernels(), {}
 
-    def try_out(kernel_name: str) -> None:
+    def call(kernel_name: str) -> None:
         kernel, offered = kernels[kernel_name], names
         if kernel_name == "friction" and issubclass(type_, Joint):
             offered = friction_names(type_.rows) | names
@@ -134,22 +65,27 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
         outputs[kernel_name] = _output(type_, kernel_name, kernel, quantities, rng)
 
     for kernel_name in kernels:
-        try_out(kernel_name)
+        call(kernel_name)
     lacking = missing(type_, outputs.get("value") == ("out",))
     if lacking:
         try:
             kernels |= derive(type_, layout, names, lacking)
         except CannotDeriveError as error:
             raise PluginError(f"{where_is(type_)}: {error}") from error
-        for kernel_name in lacking:
-            if kernel_name in kernels:  # nu is left out where it is zero
-                try_out(kernel_name)
-    specs = specs_of(type_).items()
-    functions = tuple(n for n, s in specs if s.kind == "function" and s.argument)
-    derived = tuple(n for n in lacking if n in kernels)
-    rubs_in = _rubs_in(type_)
+    derived = tuple(n for n in lacking if n in kernels)  # nu is left out where it is zero
+    for kernel_name in derived:
+        call(kernel_name)
+    functions = tuple(n for n, s in specs_of(type_).items() if s.kind == "function" and s.argument)
     return Examined(
-        type_, layout, names, outputs, kernels, variants, functions, rubs_in, derived=derived
+        type_,
+        layout,
+        names,
+        outputs,
+        kernels,
+        variants,
+        functions,
+        rubs_in=_joint_of_friction(type_),
+        derived=derived,
     )
 
 
@@ -160,30 +96,29 @@ def _output(
     quantities: Sequence[Quantity],
     rng: random.Random,
 ) -> tuple[str, ...]:
-    """Where the numbers of a kernel stand; it may be undefined for some random inputs, not all."""
+    """Expressions of a kernel's numbers; it may be undefined for some random inputs, not all."""
     who = f"{where_is(type_)}.{kernel_name}"
     for _ in range(ATTEMPTS):
         try:
             value = kernel(*(random_quantity(q, rng) for q in quantities))
-            found = entries(value, *_expected(type_, kernel_name, value))
+            paths = entries(value, *_expected(type_, kernel_name, value))
         except ShapeError as error:
             raise PluginError(f"{who}: {error}") from None
         except Exception as error:
-            reason = f"{type(error).__name__}: {error}"
-            where = line_of(error, kernel)
-            raise PluginError(f"{who} failed on a random input: {reason}{where}") from error
-        numbers = [value_at(value, path) for path in found]
-        wrong = [x for x in numbers if isinstance(x, bool) or not isinstance(x, (int, float))]
-        wrong = wrong or [x for x in numbers if not math.isfinite(x)]
+            reason = f"{type(error).__name__}: {error}{line_of(error, kernel)}"
+            raise PluginError(f"{who} failed on a random input: {reason}") from error
+        scalars = [value_at(value, path) for path in paths]
+        wrong = [x for x in scalars if isinstance(x, bool) or not isinstance(x, (int, float))]
+        wrong = wrong or [x for x in scalars if not math.isfinite(x)]
         if not wrong:
-            return tuple(found)
+            return tuple(paths)
         if not isinstance(wrong[0], float):
             break
     raise PluginError(f"{who} returned {wrong[0]!r} where a finite number is expected")
 
 
 def _random_constants(type_: type[TypeBase], rng: random.Random) -> dict[str, Any]:
-    """What ``prepare`` returns for some random instance; it may refuse many, but not all."""
+    """Constants of a random instance; ``prepare`` may refuse many of them, but not all."""
     conditions = next((dict(c) for c, class_ in type_.variants if class_ is type_), {})
     for _ in range(ATTEMPTS):
         bodies = {s: random_pose(rng) for s in body_slots(type_)}
@@ -200,7 +135,7 @@ def _random_constants(type_: type[TypeBase], rng: random.Random) -> dict[str, An
 
 
 def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
-    """What ``prepare`` returns for an instance, checked and as plain tuples of floats.
+    """The constants that ``prepare`` returns for an instance, checked, as tuples of floats.
 
     Raises:
         ValueError: the type refuses these values of its fields, in its own words; or they lead to
@@ -209,45 +144,43 @@ def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
             tuples of numbers.
     """
     type_ = type(instance)
+
+    def broken(reason: str) -> PluginError:
+        return PluginError(f"{where_is(type_)}.prepare {reason}")
+
     try:
         constants = instance.prepare(bodies)
-    except ValueError:  # a mistake in the scene, said in the type's own words
+    except ValueError:  # a mistake in the scene, in the type's own words
         raise
     except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
-        raise PluginError(f"{where_is(type_)}.prepare failed: {reason}") from error
+        raise broken(f"failed: {type(error).__name__}: {error}") from error
     if not isinstance(constants, Mapping):
-        raise PluginError(
-            f"{where_is(type_)}.prepare should return a dict; it returned {constants!r}"
-        )
-    wanted = {n for n, s in specs_of(type_).items() if s.kind == "table" and not s.given}
-    if missing := sorted(wanted - set(constants)):
-        raise PluginError(f"{where_is(type_)}.prepare returns no {', '.join(missing)}")
-    return {name: _constant(type_, name, value) for name, value in constants.items()}
+        raise broken(f"should return a dict; it returned {constants!r}")
+    needed = {n for n, s in specs_of(type_).items() if s.kind == "table" and not s.given}
+    if lacking := sorted(needed - set(constants)):
+        raise broken(f"returns no {', '.join(lacking)}")
+    return {name: _constant(name, value, broken) for name, value in constants.items()}
 
 
-def _constant(type_: type[TypeBase], name: Any, value: Any) -> Any:
-    """A constant that ``prepare`` returned, as plain tuples of floats."""
+def _constant(name: Any, value: Any, broken: Callable[[str], PluginError]) -> Any:
     if not (isinstance(name, str) and name.isidentifier() and not iskeyword(name)):
-        raise PluginError(
-            f"{where_is(type_)}.prepare returned {name!r}, which no kernel can name as a parameter"
-        )
+        raise broken(f"returned {name!r}, which no kernel can name as a parameter")
     try:
-        found = _as_floats(value)
-        count = size(checked_shape(found))
+        constant = _as_floats(value)
+        count = size(checked_shape(constant))
     except (TypeError, ValueError, OverflowError):
         count = 0
     if not count:
-        raise PluginError(
-            f"{where_is(type_)}.prepare should return numbers and tuples of numbers or of tuples "
+        raise broken(
+            "should return numbers and tuples of numbers or of tuples "
             f"of one length; {name} is {value!r}"
         )
-    if not _is_finite(found):
+    if not _is_finite(constant):
         raise ValueError(f"{name} comes out as {value!r}, which is not finite")
-    return found
+    return constant
 
 
-def set_ends(instance: Any, make: Any) -> None:
+def set_ends(instance: Any, make: Callable[[], Any]) -> None:
     """Give an instance with a vector2 field the ends of that vector as attributes P_i and P_j."""
     if any(spec.kind == "vector2" for spec in specs_of(type(instance)).values()):
         instance.P_i, instance.P_j = make(), make()
@@ -265,8 +198,21 @@ def _is_finite(value: Any) -> bool:
     return all(map(_is_finite, value)) if isinstance(value, tuple) else math.isfinite(value)
 
 
+def _joint_of_friction(type_: type[TypeBase]) -> str:
+    """The field of the joint by whose friction a force acts; "" where it has a law of its own."""
+    if type_.kind != "force" or {"wrench", "energy"} & set(type_.kernels()):
+        return ""
+    joints = [name for name, spec in specs_of(type_).items() if spec.kind == "joint"]
+    if len(joints) > 1:
+        raise PluginError(
+            f"{where_is(type_)} has no wrench and would act by the friction of a joint, but names "
+            f"several joints: {', '.join(joints)}; declare one, or define wrench"
+        )
+    return joints[0] if joints else ""
+
+
 def _check_conditions(type_: type[TypeBase], conditions: Mapping[str, Any], variant: type) -> None:
-    """What a variant asks of fields: a word of a choice, or whether a function is given."""
+    """The condition of a variant is a word of a choice, or the presence of a function."""
     specs = specs_of(type_)
     for name, wanted in conditions.items():
         spec = specs.get(name)
@@ -286,41 +232,57 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     for field in attrs.fields(type_):  # type: ignore[arg-type]
         if "dap3d" not in field.metadata and field.default is attrs.NOTHING:
             raise PluginError(f"{who}: {no_field(type_, field.name)}")
-    needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[kind]
+    kernels, by_joint = type_.kernels(), bool(_joint_of_friction(type_))
     derivable = missing(type_)
-    if derivable:
-        needed = []
-    by_joint = bool(_rubs_in(type_))
-    if (is_abstract and not type_.kernels()) or by_joint:
+    needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[kind]
+    needed = [] if derivable else needed
+    if (is_abstract and not kernels) or by_joint:
         needed = []
     elif issubclass(type_, Joint):
-        rows, mask = type_.rows, type_.holonomic
-        if not isinstance(rows, int) or rows < 1:
-            raise PluginError(f"{who} declares rows = {rows!r}; a joint has one row or more")
-        if not all(isinstance(k, int) and 0 <= k < rows for k in type_.unilateral):
-            raise PluginError(
-                f"{who}.unilateral names rows, 0 to {rows - 1}; it is {type_.unilateral!r}"
-            )
-        if not isinstance(mask, bool) and len(mask) != rows:
-            raise PluginError(f"{who}.holonomic needs one truth value for each of its {rows} rows")
+        _check_rows(type_)
         if derivable and type_.velocity_rows():
             needed = ["C_dot"]
         needed = [*(["C"] if type_.position_rows() else []), *needed]
     if kind != "function" and not by_joint and not body_slots(type_):
         raise PluginError(f"{who} acts on no body; declare a field such as P_i: Point = point()")
-    if sum(spec.kind == "vector2" for spec in specs_of(type_).values()) > 1:
+    _check_fields(type_)
+    _check_members(type_)
+    for name in needed:
+        if name not in kernels:
+            raise PluginError(f"{who} does not define {name}, which every {kind} of its rows needs")
+
+
+def _check_rows(type_: type[Joint]) -> None:
+    who, rows, mask = where_is(type_), type_.rows, type_.holonomic
+    if not isinstance(rows, int) or rows < 1:
+        raise PluginError(f"{who} declares rows = {rows!r}; a joint has one row or more")
+    if not all(isinstance(k, int) and 0 <= k < rows for k in type_.unilateral):
+        raise PluginError(
+            f"{who}.unilateral names rows, 0 to {rows - 1}; it is {type_.unilateral!r}"
+        )
+    if not isinstance(mask, bool) and len(mask) != rows:
+        raise PluginError(f"{who}.holonomic needs one truth value for each of its {rows} rows")
+
+
+def _check_fields(type_: type[TypeBase]) -> None:
+    who, specs = where_is(type_), specs_of(type_)
+    if sum(spec.kind == "vector2" for spec in specs.values()) > 1:
         raise PluginError(
             f"{who} declares more than one vector2, and each would have the ends P_i and P_j; "
             "declare points, and form the others in the kernel: sub(r_Q_j, r_Q_i)"
         )
-    for name, spec in specs_of(type_).items():
-        other = specs_of(type_).get(spec.across)
+    taken = {f"{q}_{s}" for q in ("r", "A", "p", "w", "mass", "Jp") for s in body_slots(type_)}
+    for name, spec in specs.items():
+        other = specs.get(spec.across)
         if spec.across and (other is None or other.kind != "vector"):
             raise PluginError(f"{who}.{name} is across {spec.across}, which is no vector field")
-    taken = {f"{q}_{s}" for q in ("r", "A", "p", "w", "mass", "Jp") for s in body_slots(type_)}
-    for name in specs_of(type_):
         if name in taken:
             raise PluginError(f"{who} has a field {name}, which is the body's; take another name")
+
+
+def _check_members(type_: type[TypeBase]) -> None:
+    """A public function that nothing calls is a misspelt kernel."""
+    kind = type_.kind
     allowed = [*type_.kernel_names, "prepare", *(["breaks"] if kind == "function" else [])]
     for name, value in vars(type_).items():
         is_public = isinstance(value, (staticmethod, FunctionType)) and not name.startswith("_")
@@ -328,61 +290,46 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
             near = get_close_matches(name, allowed, 1)
             choice = f"a {kind} may define {', '.join(allowed)}"
             hint = f"did you mean {near[0]}?" if near else choice
-            raise PluginError(f"{who} defines {name}, which nothing calls; {hint}")
-    for name in needed:
-        if name not in type_.kernels():
-            raise PluginError(f"{who} does not define {name}, which every {kind} of its rows needs")
+            raise PluginError(f"{where_is(type_)} defines {name}, which nothing calls; {hint}")
 
 
 def _check_names(
-    type_: type[TypeBase], kernel: str, asked: tuple[str, ...], names: Mapping[str, Quantity]
+    type_: type[TypeBase], kernel: str, wanted: tuple[str, ...], names: Mapping[str, Quantity]
 ) -> None:
-    for name in asked:
+    who = f"{where_is(type_)}.{kernel}"
+    for name in wanted:
         if name not in names:
             near, declared = get_close_matches(name, names, 1), no_field(type_, name)
-            hint = f"did you mean {near[0]}? " if near and not declared else ""
+            hint = f"did you mean {near[0]}? " if near else ""
             hint = f"{declared}; " if declared else hint
             raise PluginError(
-                f"{where_is(type_)}.{kernel} asks for {name}, which its fields do not offer; {hint}"
+                f"{who} asks for {name}, which its fields do not offer; {hint}"
                 f"they offer {', '.join(names)}"
             )
         if names[name].velocity and kernel not in VELOCITY_KERNELS:
             raise PluginError(
-                f"{where_is(type_)}.{kernel} asks for {name}, a quantity of the velocity level; "
+                f"{who} asks for {name}, a quantity of the velocity level; "
                 "at position level only positions and time may be used "
                 "(move the term to gamma or wrench)"
             )
 
 
 def _expected(type_: type[TypeBase], kernel: str, value: Any) -> tuple[tuple[int, ...], str]:
+    """The shape that a kernel should return, and its description for messages."""
     slots = len(body_slots(type_))
     if kernel == "switch":
         shape = (len(value),) if isinstance(value, tuple) and value else ()
         return shape, "one number, or a tuple of numbers"
-    if issubclass(type_, Joint) and kernel != "friction":
-        if kernel in ("C", "C_dot"):
-            n, level = len(type_.position_rows()), "position"
-            if kernel == "C_dot":
-                n, level = len(type_.velocity_rows()), "velocity"
-            return (n,), f"{n} numbers, one for each row of the {level} level"
-        if kernel == "J":
-            return (slots, type_.rows, 6), f"a block of {type_.rows} x 6 for each of {slots} bodies"
-        return (type_.rows,), f"{type_.rows} numbers, one for each row"
-    if issubclass(type_, Function):
-        return (4,) if isinstance(value, (tuple, list)) else (), "(f, f', f'', f''')"
     if kernel in ("wrench", "friction"):
         return (slots, 2, 3), f"(force, moment) for each of {slots} bodies"
-    return (), "one number"
-
-
-__all__ = [
-    "BodyPose",
-    "Examined",
-    "PluginError",
-    "examine",
-    "pose",
-    "prepared",
-    "set_ends",
-    "slot_of",
-    "where_is",
-]
+    if issubclass(type_, Function):
+        return (4,) if isinstance(value, (tuple, list)) else (), "(f, f', f'', f''')"
+    if not issubclass(type_, Joint):
+        return (), "one number"
+    if kernel == "J":
+        return (slots, type_.rows, 6), f"a block of {type_.rows} x 6 for each of {slots} bodies"
+    if kernel in ("C", "C_dot"):
+        level = "position" if kernel == "C" else "velocity"
+        n = len(type_.position_rows() if kernel == "C" else type_.velocity_rows())
+        return (n,), f"{n} numbers, one for each row of the {level} level"
+    return (type_.rows,), f"{type_.rows} numbers, one for each row"

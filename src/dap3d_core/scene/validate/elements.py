@@ -5,7 +5,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.examine.examine import Examined
+from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown

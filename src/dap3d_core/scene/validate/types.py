@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dap3d_core.interface import PluginError
-from dap3d_core.interface.examine.examine import Examined
+from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.registry import Registry, UnknownTypeError
 from dap3d_core.registry.declared_types import declares
 from dap3d_core.scene.errors import MISSING

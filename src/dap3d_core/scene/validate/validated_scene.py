@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from dap3d_core.interface.examine.examine import Examined
+from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.registry import Registry
 from dap3d_core.scene.scene import Scene
 

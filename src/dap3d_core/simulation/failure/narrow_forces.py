@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from dap3d_core.interface.examine.examine import Examined
+from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.kernels import lookup, where
 from dap3d_core.kernels.runtime.cache import reached
 from dap3d_core.model.knots import breaks_are_told

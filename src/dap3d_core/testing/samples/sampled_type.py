@@ -9,8 +9,10 @@ from typing import Any, TypeVar
 import attrs
 import numpy as np
 
+from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
-from dap3d_core.interface.examine.examine import ATTEMPTS, Examined, examine, where_is
+from dap3d_core.interface.errors import where_is
+from dap3d_core.interface.examine.examine import ATTEMPTS, examine
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.testing.samples.cubic import Cubic
 from dap3d_core.testing.samples.random_element import Element, Kernels, Refusal, draw

@@ -1,16 +1,37 @@
-"""Where in an author's file something is wrong, and what stands there in place of it."""
+"""The error of an unusable type: where the fault is in the author's file, and its remedy."""
 
 from collections.abc import Callable
-from inspect import get_annotations, unwrap
+from inspect import get_annotations, getsourcefile, unwrap
 from traceback import extract_tb
 from typing import Any
 
 import attrs
 
 from dap3d_core.interface.fields import specs_of
+from dap3d_core.kernels import __all__ as words
+from dap3d_core.kernels import scalar_math
 
-#: The maker of a field by what stands behind its name; of numbers by default.
+MATHEMATICS = [name for name in words if hasattr(scalar_math, name) and name != "where"]
+#: The remedy for a kernel written with anything but the words of kernels.
+PLAINLY = (
+    "branch by where(condition, a, b), not by if, while, and, or, not, min or max, and take "
+    f"{', '.join(MATHEMATICS)} from dap3d_core.kernels, not from math or numpy"
+)
+#: The maker of a field by its annotation; of numbers by default.
 MAKERS = {"Point": "point", "Vector": "vector", "Vector2": "vector2", "Body": "body"}
+
+
+class PluginError(Exception):
+    """A type or a plugin cannot be used; the message names file, type, function and remedy."""
+
+
+def where_is(type_: type) -> str:
+    """File and class of a type, for messages."""
+    try:
+        file = getsourcefile(type_) or type_.__module__
+    except (TypeError, OSError):
+        file = type_.__module__
+    return f"{file}: {type_.__name__}"
 
 
 def line_of(error: BaseException, kernel: Callable[..., Any]) -> str:
@@ -21,7 +42,7 @@ def line_of(error: BaseException, kernel: Callable[..., Any]) -> str:
 
 
 def no_field(type_: type, name: str) -> str:
-    """That a class has a name which looks like a field and is none, with the remedy; or ""."""
+    """The message for a member that looks like a field and is none, with the remedy; or ""."""
     for class_ in type_.__mro__:
         annotation = get_annotations(class_).get(name)
         if annotation is None or name in specs_of(type_):

@@ -1,0 +1,55 @@
+"""A type that passed its examination, with everything its group loops are generated from."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import attrs
+
+from dap3d_core.interface.codegen.instance_layout import Layout
+from dap3d_core.interface.codegen.kernel_arguments import Quantity
+from dap3d_core.interface.fields import specs_of
+from dap3d_core.interface.types import TypeBase
+
+
+@attrs.frozen
+class Examined:
+    """A type that passed, with what its loops are generated from.
+
+    Attributes:
+        type: the class.
+        layout: storage of its instances.
+        names: every name its kernels may use.
+        outputs: kernel -> expressions of its numbers in the order of their shape.
+        kernels: its pure functions.
+        variants: types that replace it: (values of fields, the type).
+        argument_functions: its function fields of another argument than time.
+        rubs_in: of a force that acts by the friction of a joint, the field that names the joint; ""
+            for all others.
+        given: the types of its functions of an argument, for titles.
+        derived: kernels derived from others.
+    """
+
+    type: type[TypeBase]
+    layout: Layout
+    names: dict[str, Quantity]
+    outputs: dict[str, tuple[str, ...]]
+    kernels: dict[str, Callable[..., Any]]
+    variants: tuple[tuple[Mapping[str, Any], "Examined"], ...] = ()
+    argument_functions: tuple[str, ...] = ()
+    rubs_in: str = ""
+    given: str = ""
+    derived: tuple[str, ...] = ()
+
+    def chosen(self, values: Mapping[str, Any]) -> "Examined":
+        """The variant for the values of an instance's fields; itself where none fits."""
+        specs = specs_of(self.type)
+
+        def holds(name: str, wanted: Any) -> bool:
+            value = values[name]
+            is_function = specs[name].kind == "function"
+            return (value is not None) == wanted if is_function else bool(value == wanted)
+
+        for conditions, examined in self.variants:
+            if all(holds(name, wanted) for name, wanted in conditions.items()):
+                return examined
+        return self
