@@ -8,21 +8,25 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.kernels import __all__ as words
-from dap3d_core.kernels import scalar_math
 
-MATHEMATICS = [name for name in words if hasattr(scalar_math, name) and name != "where"]
-#: The remedy for a kernel written with anything but the words of kernels.
-PLAINLY = (
-    "branch by where(condition, a, b), not by if, while, and, or, not, min or max, and take "
-    f"{', '.join(MATHEMATICS)} from dap3d_core.kernels, not from math or numpy"
-)
 #: The maker of a field by its annotation; of numbers by default.
 MAKERS = {"Point": "point", "Vector": "vector", "Vector2": "vector2", "Body": "body"}
 
 
 class PluginError(Exception):
     """A type or a plugin cannot be used; the message names file, type, function and remedy."""
+
+
+def plain_words() -> str:
+    """The remedy for a kernel written with anything but the words of kernels."""
+    from dap3d_core.kernels import __all__ as words  # imports numpy
+    from dap3d_core.kernels import scalar_math
+
+    mathematics = [name for name in words if hasattr(scalar_math, name) and name != "where"]
+    return (
+        "branch by where(condition, a, b), not by if, while, and, or, not, min or max, and take "
+        f"{', '.join(mathematics)} from dap3d_core.kernels, not from math or numpy"
+    )
 
 
 def where_is(type_: type) -> str:

@@ -1,8 +1,10 @@
-"""What the user described: classes for it, reading and writing scene files, and their check."""
+"""Scenes: description, scene files, validation."""
 
 from dap3d_core.scene.errors import MISSING, Mistake, SceneError
 from dap3d_core.scene.files.read_toml import load, parse, shipped_models, tables_of
 from dap3d_core.scene.scene import (
+    INTEGRATORS,
+    METHODS,
     Animation,
     AnimationPoint,
     Body,
@@ -14,7 +16,7 @@ from dap3d_core.scene.scene import (
     Vector2,
 )
 from dap3d_core.scene.validate.mistake_collector import mistake_at
-from dap3d_core.scene.validate.settings import INTEGRATORS, METHODS, check_simulation
+from dap3d_core.scene.validate.settings import check_simulation
 from dap3d_core.scene.validate.validate import check
 from dap3d_core.scene.validate.validated_scene import Checked, Instance
 

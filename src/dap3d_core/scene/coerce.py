@@ -1,4 +1,4 @@
-"""Values as plain Python, whatever a script or a file gave."""
+"""Conversion of values from scripts and files to plain Python."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ _PLAIN = frozenset({float, int, str, bool, type(None)})
 def plain(value: Any) -> Any:
     """A value as plain Python: arrays and lists become tuples, numpy's numbers Python's.
 
-    Arrays of objects are left as they are, for ``check`` to refuse.
+    Arrays of objects are returned unchanged, for ``check`` to refuse.
     """
     kind = type(value)
     if kind in _PLAIN:
@@ -32,11 +32,11 @@ def plain(value: Any) -> Any:
 
 
 def _of_array(value: Any) -> Any:
-    """An array or a number of numpy as plain Python; objects and masked numbers as they are."""
+    """An array or a number of numpy as plain Python; objects and masked numbers unchanged."""
     sort = getattr(getattr(value, "dtype", None), "kind", "")
-    if not value.shape and getattr(value, "mask", False):  # a number that is not there
+    if not value.shape and getattr(value, "mask", False):  # a missing number
         return value
     listed = value if sort == "O" else value.tolist()
     if type(listed) is not type(value):
         return plain(listed)
-    return float(listed) if sort == "f" else listed  # long doubles stay what they are
+    return float(listed) if sort == "f" else listed  # long doubles are returned unchanged

@@ -1,10 +1,10 @@
-"""What a scene shows of itself at a prompt and in a notebook."""
+"""Representation of a scene at a prompt and in a notebook."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any
 
-#: Rows that a table in a notebook has at most.
+#: Maximal number of rows of a table in a notebook.
 MOST_ROWS = 50
 #: Parts of a scene that are counted: table, one, several.
 COUNTED = (
@@ -51,12 +51,11 @@ class SceneDisplay:
 
 
 def html_table(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """A table of HTML, whatever its texts; of many rows the first ones and how many follow."""
-    every = list(rows)
-    lines = [_row("th", header), *(_row("td", row) for row in every[:MOST_ROWS])]
-    if len(every) > MOST_ROWS:
-        words = f"{len(every) - MOST_ROWS} more"
-        lines.append(f'<tr><td colspan="{len(header)}">{words}</td></tr>')
+    """An HTML table, its texts escaped; of many rows the first, and the number of the others."""
+    rows = list(rows)
+    lines = [_row("th", header), *(_row("td", row) for row in rows[:MOST_ROWS])]
+    if len(rows) > MOST_ROWS:
+        lines.append(f'<tr><td colspan="{len(header)}">{len(rows) - MOST_ROWS} more</td></tr>')
     return f"<table>{''.join(lines)}</table>"
 
 
@@ -65,7 +64,7 @@ def _row(tag: str, cells: Iterable[Any]) -> str:
 
 
 def _text(value: Any) -> str:
-    """A value as a reader likes it: numbers in six digits, none as nothing."""
+    """A value for readers: numbers in six digits, None as ""."""
     if value is None:
         return ""
     if isinstance(value, float):

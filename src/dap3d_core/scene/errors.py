@@ -1,30 +1,34 @@
-"""A mistake in a scene, and the error that reports all of them at once."""
+"""Mistakes in a scene, and the error that reports all of them at once."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any, Final
 
 import attrs
 
-#: Where something stands in a scene file: names of tables and keys, places in lists from 0.
+from dap3d_core.registry.suggestions import nearest
+
+#: Path to a value in a scene file: names of tables and keys, indices in lists from 0.
 Key = tuple[str | int, ...]
-#: Stands for the value of a key that is not there.
+#: Value of a key that is missing.
 MISSING: Final = "<missing>"
-#: How many mistakes are printed; all of them are in ``SceneError.mistakes``.
+#: Number of mistakes printed; all of them are in ``SceneError.mistakes``.
 PRINTED = 1000
+#: Number of mistakes up to which the nearest spelling is searched: it takes time.
+SUGGESTIONS = 200
 
 
 @attrs.frozen
 class Mistake:
-    """One thing that is wrong in a scene.
+    """A mistake in a scene.
 
     Attributes:
-        file: where the scene was read from, "" for one made by a script.
+        file: the scene file, "" for a scene made by a script.
         line: line of the key in that file, or None.
         key: dotted, such as ``bodies.crank.mass``; "" for the file as a whole.
-        value: what stands there; ``MISSING`` where nothing does.
-        what: what is wrong, or what is allowed.
+        value: the value given; ``MISSING`` where there is none.
+        what: the fault, or the allowed values.
         nearest: the nearest right spelling, or "".
-        remedy: what to do, or "".
+        remedy: the remedy, or "".
     """
 
     key: str
@@ -47,10 +51,10 @@ class Mistake:
 
 
 class SceneError(Exception):
-    """A scene cannot be used; holds every mistake that was found.
+    """The scene cannot be used.
 
     Attributes:
-        mistakes: tuple of ``Mistake``, in the order of the file.
+        mistakes: every ``Mistake``, in the order of the file.
     """
 
     def __init__(self, mistakes: Iterable[Mistake]) -> None:
@@ -64,8 +68,51 @@ class SceneError(Exception):
         return "\n".join(lines)
 
 
+class MistakeList:
+    """Mistakes with their keys, in the order in which they are found."""
+
+    def __init__(self, mistakes: Iterable[tuple[Key, Mistake]] = ()) -> None:
+        self.mistakes = list(mistakes)
+
+    def add(self, key: Key, value: Any, what: str, nearest: str = "", remedy: str = "") -> None:
+        """Append a mistake: its key, the value, the fault, the right spelling, the remedy."""
+        self.mistakes.append((key, Mistake(dotted(key), value, what, nearest, remedy)))
+
+    def add_unknown_keys(
+        self, key: Key, table: dict[str, Any], allowed: Collection[str], *, in_order: bool = False
+    ) -> None:
+        """Append a mistake for each key of a table that is not allowed.
+
+        Args:
+            key: of the table.
+            table: its content.
+            allowed: the keys it may have.
+            in_order: list these in their order, else sorted.
+        """
+        if table.keys() <= set(allowed):
+            return
+        words = allowed if in_order else sorted(allowed)
+        what = f"unknown key; allowed: {', '.join(words) or 'none'}"
+        for name, value in table.items():
+            if name not in allowed:
+                self.add((*key, name), value, what, self.nearest(name, allowed))
+
+    def nearest(self, word: Any, allowed: Collection[str]) -> str:
+        """The nearest right spelling; "" after many mistakes."""
+        return nearest(word, allowed) if len(self.mistakes) < SUGGESTIONS else ""
+
+    def raise_mistakes(self) -> None:
+        """Raise all mistakes as one error.
+
+        Raises:
+            SceneError: there is at least one.
+        """
+        if self.mistakes:
+            raise SceneError(mistake for _, mistake in self.mistakes)
+
+
 def dotted(key: Key) -> str:
-    """A key as messages write it; places in lists count from 1."""
+    """A key as messages write it; indices in lists count from 1."""
     return ".".join(_part(part) for part in key)
 
 
@@ -76,14 +123,13 @@ def _part(part: str | int) -> str:
 
 
 def shown(value: Any, width: int = 60) -> str:
-    """A value in a message: as the scene file writes it, cut where it is long."""
+    """A value in a message: as the scene file writes it, shortened where it is long."""
     if isinstance(value, bool):
         text = "true" if value else "false"
     elif isinstance(value, dict):
         items = [f"{k} = {shown(v, width)}" for k, v in list(value.items())[:width]]
         text = "{" + ", ".join(items) + "}"
     elif isinstance(value, (tuple, list)):
-        # A long value is cut anyway: its tail need not be written out.
         items = [shown(v, width) for v in value[: width // 2]]
         text = f"[{', '.join(items)}{', ...' if len(value) > len(items) else ''}]"
     elif isinstance(value, int) and value.bit_length() > 4 * width:

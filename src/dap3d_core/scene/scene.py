@@ -1,23 +1,30 @@
-"""What the user described: bodies, points, vectors, elements and settings, by name and as written.
+"""The scene as described: bodies, points, vectors, elements and settings, by name, as written.
 
-Values are kept as plain Python (arrays and lists become tuples); whether they make sense is asked
-once, for all of them, by ``check``.
+Values are stored as plain Python (arrays and lists become tuples); ``check`` validates them all.
 """
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import attrs
 
-from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.display import SceneDisplay
-from dap3d_core.scene.errors import Key, Mistake, SceneError
+from dap3d_core.scene.errors import Key, Mistake, MistakeList, SceneError
 
 #: The newest version of the scene file that this program reads.
 SCHEMA = 1
+#: File names in a model's folder: its scene, and its own types.
+SCENE_FILE, PLUGIN_FILE = "scene.toml", "plugin.py"
 #: The body that is always there.
 GROUND = "ground"
+
+#: Values of ``method`` and ``integrator``: "auto", and names of formulations and integrators.
+METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq")
+INTEGRATORS = ("auto", "dopri5", "dop853", "adams", "rk4", "radau")
+#: Integrators without an error estimate, which need a step; integrators that take none.
+FIXED_STEP, NO_STEP = ("rk4",), ("adams",)
 
 ZERO = (0.0, 0.0, 0.0)
 NO_TURN = (1.0, 0.0, 0.0, 0.0)
@@ -25,10 +32,10 @@ NO_TURN = (1.0, 0.0, 0.0, 0.0)
 
 @attrs.define
 class Body:
-    """A rigid body; its frame stands at its mass centre.
+    """A rigid body; its frame is at its mass centre.
 
     Attributes:
-        name: as other parts of the scene call it.
+        name: its name in the scene.
         mass: kg; None where the scene gives none (1.0 is then used, with a note).
         Jp: inertia matrix in body axes, 3 numbers (its diagonal) or 3x3, kg m^2; None as for mass.
         r: position, 3 numbers, m.
@@ -94,7 +101,7 @@ class AnimationPoint:
 
 @attrs.define
 class Animation:
-    """What drawings use: points of bodies, and limits of the axes, 3 pairs (m), or None."""
+    """Drawing: points of bodies, and limits of the axes, 3 pairs (m), or None."""
 
     points: list[AnimationPoint] = attrs.Factory(list)
     limits: Any = attrs.field(default=None, converter=plain)
@@ -111,10 +118,10 @@ class Simulation:
         integrator: method of integration.
         rtol, atol: relative and absolute tolerance of a step; atol of all, or by quantity.
         step: step of an integrator with fixed steps, s, or None.
-        correct: whether initial positions and velocities are corrected to fulfil the constraints.
-        project: whether states are projected on the constraints along the run.
-        hold: names of bodies that the correction leaves where they are.
-        correct_metric: "unit" or "mass": how the least correction is measured.
+        correct: initial positions and velocities are corrected to satisfy the constraints.
+        project: states are projected on the constraints during the run.
+        hold: names of bodies that the correction does not move.
+        correct_metric: "unit" or "mass", the norm of the least correction.
         alpha, Omega, mu: parameters of the penalty formulation.
     """
 
@@ -134,14 +141,14 @@ class Simulation:
     mu: Any = attrs.field(default=1.0, converter=plain)
 
 
+@cache
 def keys_of(class_: type) -> frozenset[str]:
     """The keys that a table of the scene file may hold, given the class it becomes."""
     return frozenset(a.name for a in attrs.fields(class_)) - {"name"}
 
 
-BODY_KEYS = keys_of(Body)
 HEADER_KEYS = frozenset({"name", "description", "schema"})
-#: Tables of the scene file that hold named things, and the class of each.
+#: Tables of the scene file with named entries, and the class of an entry.
 NAMED: dict[str, type] = {
     "bodies": Body,
     "points": Point,
@@ -164,10 +171,10 @@ class Scene(SceneDisplay):
         schema: version of the file format.
         bodies, points, vectors, vectors2, joints, forces, functions, shapes: by name, in file
             order.
-        animation, simulation: what is drawn; settings of a run.
+        animation, simulation: points to draw; settings of a run.
         path: the file this was read from, or None.
-        faults: what reading could not place (unknown keys, wrong tables); ``check`` reports it.
-        notes: what is worth saying about how it was found.
+        faults: mistakes found in reading (unknown keys, wrong tables); ``check`` reports them.
+        notes: information about the choice of the file.
     """
 
     name: Any = ""
@@ -190,11 +197,11 @@ class Scene(SceneDisplay):
 
     @property
     def folder(self) -> Path | None:
-        """The folder of the file this was read from, where ``plugin.py`` may stand, or None."""
+        """The folder of the file this was read from, which may hold ``plugin.py``, or None."""
         return None if self.path is None else self.path.parent
 
     def copy(self) -> "Scene":
-        """A scene of its own that is equal to this one: changing one leaves the other as it is."""
+        """An equal scene that shares nothing mutable with this one."""
         named: dict[str, Any] = {
             table: {name: _copied(part) for name, part in getattr(self, table).items()}
             for table in NAMED
@@ -212,7 +219,7 @@ class Scene(SceneDisplay):
         return scene
 
     def __deepcopy__(self, memo: Any) -> "Scene":
-        """As ``copy``, for the values in a scene are plain: they cannot be changed."""
+        """The same as ``copy``: values in a scene are plain and immutable."""
         return self.copy()
 
     def add_body(self, name: str, **fields: Any) -> str:
@@ -225,13 +232,7 @@ class Scene(SceneDisplay):
         Raises:
             SceneError: the name is taken or illegal, or a key is unknown.
         """
-        self._refuse_name("bodies", self.bodies, name)
-        if not fields.keys() <= BODY_KEYS:
-            raise _unknown_keys(f"bodies.{name}", fields, BODY_KEYS)
-        if any(value is None for value in fields.values()):
-            fields = {k: v for k, v in fields.items() if v is not None}
-        self.bodies[name] = Body(name, **fields)
-        return name
+        return self._add("bodies", name, fields)
 
     def add_point(self, name: str, body: Any = None, sPp: Any = None, **unknown: Any) -> str:
         """Add a point fixed in a body at ``sPp`` (3 numbers in its axes, m) and return its name.
@@ -239,11 +240,7 @@ class Scene(SceneDisplay):
         Raises:
             SceneError: the name is taken or illegal, or a key is unknown.
         """
-        self._refuse_name("points", self.points, name)
-        if unknown:
-            raise _unknown_keys(f"points.{name}", unknown, keys_of(Point))
-        self.points[name] = Point(name, body, sPp)
-        return name
+        return self._add("points", name, {"body": body, "sPp": sPp} | unknown)
 
     def add_vector(self, name: str, body: Any = None, sp: Any = None, **unknown: Any) -> str:
         """Add a vector fixed in a body (3 components in its axes) and return its name.
@@ -251,11 +248,7 @@ class Scene(SceneDisplay):
         Raises:
             SceneError: the name is taken or illegal, or a key is unknown.
         """
-        self._refuse_name("vectors", self.vectors, name)
-        if unknown:
-            raise _unknown_keys(f"vectors.{name}", unknown, keys_of(Vector))
-        self.vectors[name] = Vector(name, body, sp)
-        return name
+        return self._add("vectors", name, {"body": body, "sp": sp} | unknown)
 
     def add_vector2(self, name: str, P_i: Any = None, P_j: Any = None, **unknown: Any) -> str:
         """Add a vector from point ``P_i`` to point ``P_j`` and return its name.
@@ -263,11 +256,7 @@ class Scene(SceneDisplay):
         Raises:
             SceneError: the name is taken or illegal, or a key is unknown.
         """
-        self._refuse_name("vectors2", self.vectors2, name)
-        if unknown:
-            raise _unknown_keys(f"vectors2.{name}", unknown, keys_of(Vector2))
-        self.vectors2[name] = Vector2(name, P_i, P_j)
-        return name
+        return self._add("vectors2", name, {"P_i": P_i, "P_j": P_j} | unknown)
 
     def add_joint(self, type: str, name: str | None = None, **fields: Any) -> str:
         """Add a joint of a type (its keyword) and return its name, made from the type if None.
@@ -275,7 +264,7 @@ class Scene(SceneDisplay):
         Raises:
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
-        return self._add_element("joints", self.joints, type, name, fields)
+        return self._add_element("joints", type, name, fields)
 
     def add_force(self, type: str, name: str | None = None, **fields: Any) -> str:
         """Add a force element of a type (its keyword) and return its name, made from it if None.
@@ -283,7 +272,7 @@ class Scene(SceneDisplay):
         Raises:
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
-        return self._add_element("forces", self.forces, type, name, fields)
+        return self._add_element("forces", type, name, fields)
 
     def add_function(self, type: str, name: str | None = None, **fields: Any) -> str:
         """Add a function of a type (its keyword) and return its name, made from the type if None.
@@ -291,7 +280,7 @@ class Scene(SceneDisplay):
         Raises:
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
-        return self._add_element("functions", self.functions, type, name, fields)
+        return self._add_element("functions", type, name, fields)
 
     def add_shape(self, type: str, name: str | None = None, **fields: Any) -> str:
         """Add a shape that is drawn (box, sphere, cylinder, cone, disk, line, mesh); its name.
@@ -299,7 +288,7 @@ class Scene(SceneDisplay):
         Raises:
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
-        return self._add_element("shapes", self.shapes, type, name, fields)
+        return self._add_element("shapes", type, name, fields)
 
     def add_animation_point(self, body: str, sPp: Any) -> None:
         """Add a point that is only drawn, at ``sPp`` (3 numbers in the axes of a body, m)."""
@@ -325,24 +314,26 @@ class Scene(SceneDisplay):
 
         return save(self, path)
 
-    def _add_element(
-        self,
-        table: str,
-        elements: dict[str, Element],
-        type_: str,
-        name: str | None,
-        fields: dict[str, Any],
-    ) -> str:
+    def _add(self, table: str, name: str, fields: dict[str, Any]) -> str:
+        named, class_ = getattr(self, table), NAMED[table]
+        self._check_name(table, named, name)
+        mistakes = MistakeList()
+        mistakes.add_unknown_keys((table, name), fields, keys_of(class_))
+        mistakes.raise_mistakes()
+        named[name] = class_(name, **{k: v for k, v in fields.items() if v is not None})
+        return name
+
+    def _add_element(self, table: str, type_: Any, name: str | None, fields: dict[str, Any]) -> str:
+        elements = getattr(self, table)
         type_ = plain(type_)
         if type(type_) is not str or not type_:
             what = 'the type of an element is the keyword of a type, such as "sph"'
             raise SceneError([Mistake(f"{table}.{name or ''}".rstrip("."), type_, what)])
         if name is None:
             name = self._free_name(table, elements, type_)
-        self._refuse_name(table, elements, name)
-        elements[name] = Element(
-            name, type_, {k: plain(v) for k, v in fields.items() if v is not None}
-        )
+        self._check_name(table, elements, name)
+        fields = {k: plain(v) for k, v in fields.items() if v is not None}
+        elements[name] = Element(name, type_, fields)
         return name
 
     def _free_name(self, table: str, elements: dict[str, Element], type_: str) -> str:
@@ -352,7 +343,8 @@ class Scene(SceneDisplay):
         self._counts[f"{table}.{type_}"] = count
         return f"{type_}{count}"
 
-    def _refuse_name(self, table: str, taken: dict[str, Any], name: Any) -> None:
+    @staticmethod
+    def _check_name(table: str, taken: dict[str, Any], name: Any) -> None:
         fault = fault_of_name(name)
         if not fault and name in taken:
             fault = f"there is one of this name in {table} already"
@@ -361,14 +353,14 @@ class Scene(SceneDisplay):
 
 
 def _copied(part: Any) -> Any:
-    """A part of a scene; what it holds are plain values, the fields of an element in a dict."""
+    """A copy of a part of a scene, whose values are plain."""
     if type(part) is Element and type(part.fields) is dict:
         return attrs.evolve(part, fields=dict(part.fields))
     return attrs.evolve(part)
 
 
 def fault_of_name(name: Any) -> str:
-    """Why something cannot be the name of a part of a scene; "" where it can."""
+    """The reason why something cannot name a part of a scene; "" where it can."""
     if type(name) is not str:
         return f"a name is text, not {type(name).__name__}"
     if not name.strip():
@@ -382,17 +374,3 @@ def fault_of_name(name: Any) -> str:
     if not name.isprintable():
         return "a name holds no line breaks or other control characters"
     return ""
-
-
-def _unknown_keys(place: str, fields: dict[str, Any], allowed: frozenset[str]) -> SceneError:
-    return SceneError(
-        Mistake(f"{place}.{k}", v, unknown_key(allowed), nearest(k, allowed))
-        for k, v in fields.items()
-        if k not in allowed
-    )
-
-
-def unknown_key(allowed: frozenset[str] | tuple[str, ...]) -> str:
-    """What is wrong with a key that is not among the allowed ones."""
-    words = allowed if isinstance(allowed, tuple) else tuple(sorted(allowed))
-    return f"unknown key; allowed: {', '.join(words) or 'none'}"

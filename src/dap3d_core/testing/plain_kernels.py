@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dap3d_core.interface.codegen.kernel_arguments import friction_names, parameters
-from dap3d_core.interface.errors import PLAINLY, line_of
+from dap3d_core.interface.errors import line_of, plain_words
 from dap3d_core.interface.examine.examine import ATTEMPTS
 from dap3d_core.interface.examine.random_values import random_quantity
 from dap3d_core.testing.compare import Comparison
@@ -76,7 +76,7 @@ def plain(subject: Subject) -> Outcome:
     for name, kernel in subject.examined.kernels.items():
         if reason := _not_plain(subject, name, kernel):
             c.kernel = name
-            c.fail(f"{name} {reason}; {PLAINLY}")
+            c.fail(f"{name} {reason}; {plain_words()}")
     return c.outcome(sized=False)
 
 

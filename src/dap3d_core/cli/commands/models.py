@@ -40,7 +40,8 @@ def models(*, as_json: bool) -> int:
 def _facts(folder: Path) -> dict[str, Any]:
     """Description, bodies and joints of a model; only its scene file is read."""
     from dap3d_core.scene import SceneError, load
-    from dap3d_core.scene.files.read_toml import PLUGIN_FILE, group_of
+    from dap3d_core.scene.files.read_toml import group_of
+    from dap3d_core.scene.scene import PLUGIN_FILE
 
     group = group_of(folder)
     try:

@@ -17,7 +17,7 @@ import sympy
 from sympy.logic.boolalg import Boolean
 
 from dap3d_core.interface.codegen.kernel_arguments import Quantity, parameters
-from dap3d_core.interface.errors import PLAINLY, line_of
+from dap3d_core.interface.errors import line_of, plain_words
 from dap3d_core.kernels import add, cross, dot, sub
 
 Expression = Any
@@ -291,7 +291,7 @@ def traced(kernel: Callable[..., Any], symbols: Symbols, what: str) -> list[Expr
     except DerivationError:
         raise
     except Exception as error:
-        reason = f"({type(error).__name__}: {error}){line_of(error, kernel)}; {PLAINLY}"
+        reason = f"({type(error).__name__}: {error}){line_of(error, kernel)}; {plain_words()}"
         said = f"{what} cannot be differentiated as a formula {reason}; or write the rest by hand"
         raise DerivationError(said) from error
 

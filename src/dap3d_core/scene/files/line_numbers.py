@@ -1,4 +1,4 @@
-"""Finds the lines of the keys of a TOML text. Only asked when there is a mistake to report."""
+"""Line numbers of the keys of a TOML text; needed only to report a mistake."""
 
 import contextlib
 import re
@@ -23,8 +23,8 @@ _PLAIN_VALUE = re.compile(r"[^,\]}#\n]*")
 def lines_of(text: str) -> dict[Key, int]:
     """The line (from 1) of every table and key of a text that ``tomllib`` reads.
 
-    Tables in lists carry their place in the list, from 0. A text that cannot be followed gives
-    what was found up to there.
+    Keys of tables in lists hold their index, from 0. An invalid text gives the lines up to the
+    fault.
     """
     scanner = _Scanner(text)
     with contextlib.suppress(_LostError, RecursionError, IndexError):
@@ -33,11 +33,11 @@ def lines_of(text: str) -> dict[Key, int]:
 
 
 class _LostError(Exception):
-    """The text is not what it should be here."""
+    """The text is not valid at this position."""
 
 
 class _Scanner:
-    """One pass over a text; ``at`` is where it stands."""
+    """One pass over a text; ``at`` is its position."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -73,7 +73,7 @@ class _Scanner:
         return key
 
     def _in_lists(self, key: Key) -> Key:
-        """Tables below a list of tables belong to its last one."""
+        """The key with indices: a table below a list of tables belongs to its last one."""
         whole: Key = ()
         for n, part in enumerate(key):
             whole = (*whole, part)

@@ -1,19 +1,19 @@
-"""From a file to a scene. Reads data alone: nothing of it is run."""
+"""Reads scene files: data only, nothing in them is executed."""
 
 import os
 import re
 import stat
-from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
 from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.coerce import plain
-from dap3d_core.scene.errors import MISSING, Key, Mistake, SceneError, dotted
+from dap3d_core.scene.errors import MISSING, Key, Mistake, MistakeList, SceneError, dotted
 from dap3d_core.scene.scene import (
     HEADER_KEYS,
     NAMED,
+    SCENE_FILE,
     SCHEMA,
     TABLES,
     Animation,
@@ -22,29 +22,23 @@ from dap3d_core.scene.scene import (
     Scene,
     Simulation,
     keys_of,
-    unknown_key,
 )
 
 #: Larger files are refused before they are read.
 LARGEST_FILE = 64 * 2**20
-#: Keys of more parts are refused before they are read: reading one takes the square of their number
-#: in time and memory.
+#: Keys of more parts are refused unread: parsing takes time and memory quadratic in their number.
 MOST_PARTS = 32
 _LONG_KEY = re.compile(
     r"""(?:^|[,{[])[ \t]*+(?:(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
     rf"{{{MOST_PARTS}}}",
     re.MULTILINE,
 )
-#: Mistakes for which the nearest spelling is searched while reading.
-SUGGESTIONS = 200
-#: The scene of a model's folder, and its own types.
-SCENE_FILE, PLUGIN_FILE = "scene.toml", "plugin.py"
-#: Tables and lists within one another, at most; a scene needs five.
+#: Maximal nesting of tables and lists; a scene needs five levels.
 DEEPEST = 50
 
 
 def load(source: str | os.PathLike[str]) -> Scene:
-    """Read a scene; its values are checked later, all at once, by ``check``.
+    """Read a scene; ``check`` validates its values.
 
     Args:
         source: a folder with a ``scene.toml``, a TOML file, or the name of a shipped model, with
@@ -71,7 +65,7 @@ def parse(text: str) -> Scene:
 
 
 def tables_of(text: str) -> dict[str, Any]:
-    """The tables of the text of a scene file, or of its beginning, as they are written.
+    """The tables of the text of a scene file, or of its beginning, as written.
 
     Raises:
         SceneError: the text is not TOML.
@@ -85,8 +79,8 @@ def shipped_models() -> dict[str, Path]:
     A group is a folder of models, such as ``benchmarks``.
     """
     root = _models_folder()
-    found = [sorted(root.glob(f"{depth}/{SCENE_FILE}")) for depth in ("*", "*/*")]
-    return {file.parent.name: file.parent for group in found for file in group}
+    files = [f for depth in ("*", "*/*") for f in sorted(root.glob(f"{depth}/{SCENE_FILE}"))]
+    return {file.parent.name: file.parent for file in files}
 
 
 def group_of(folder: Path) -> str:
@@ -95,93 +89,80 @@ def group_of(folder: Path) -> str:
 
 
 def scene_of(data: dict[str, Any]) -> Scene:
-    """A scene from the tables of a scene file; what has no place there becomes a fault."""
-    faults: list[tuple[Key, Mistake]] = []
-    tables = _Tables(data, faults)
-    scene = Scene(faults=faults)
-    header = tables.known(("scene",), data.get("scene", {}), HEADER_KEYS)
+    """A scene from the tables of a scene file; ``Scene.faults`` holds their mistakes."""
+    mistakes = MistakeList()
+    for name, content in data.items():
+        if name not in TABLES:
+            value = MISSING if isinstance(content, (dict, list)) else plain(content)
+            what = f"unknown table; a scene has {', '.join(TABLES)}"
+            mistakes.add((name,), value, what, mistakes.nearest(name, TABLES))
+    scene = Scene(faults=mistakes.mistakes)
+    header = _known(mistakes, ("scene",), data.get("scene", {}), HEADER_KEYS)
     scene.name = header.get("name", "")
     scene.description = header.get("description", "")
     scene.schema = header.get("schema", SCHEMA)
     for table, class_ in NAMED.items():
-        things = getattr(scene, table)
-        for name, content in tables.table((table,), data.get(table, {})).items():
-            things[name] = _thing(tables, (table, name), content, class_)
-    scene.animation = _animation(tables, data.get("animation", {}))
-    settings = tables.known(("simulation",), data.get("simulation", {}), keys_of(Simulation))
-    scene.simulation = Simulation(**settings)
+        named = getattr(scene, table)
+        for name, content in _table(mistakes, (table,), data.get(table, {})).items():
+            named[name] = _entry(mistakes, (table, name), content, class_)
+    scene.animation = _animation(mistakes, data.get("animation", {}))
+    settings = data.get("simulation", {})
+    scene.simulation = Simulation(
+        **_known(mistakes, ("simulation",), settings, keys_of(Simulation))
+    )
     return scene
 
 
-class _Tables:
-    """Reads tables of known keys; everything else is kept as a fault."""
-
-    def __init__(self, data: dict[str, Any], faults: list[tuple[Key, Mistake]]) -> None:
-        self.faults = faults
-        for name, content in data.items():
-            if name not in TABLES:
-                what = f"unknown table; a scene has {', '.join(TABLES)}"
-                value = MISSING if isinstance(content, (dict, list)) else plain(content)
-                self.fault((name,), value, what, self.nearest(name, TABLES))
-
-    def fault(self, key: Key, value: Any, what: str, near: str = "") -> None:
-        self.faults.append((key, Mistake(dotted(key), value, what, near)))
-
-    def nearest(self, word: Any, allowed: Collection[str]) -> str:
-        """The nearest right spelling; no longer searched after many faults, it takes time."""
-        return nearest(word, allowed) if len(self.faults) < SUGGESTIONS else ""
-
-    def table(self, key: Key, content: Any) -> dict[str, Any]:
-        """The content of a table, empty where it is none."""
-        if isinstance(content, dict):
-            return content
-        if isinstance(content, list):
-            what = f"should be a table: write [{dotted(key)}] with single brackets, names below it"
-        else:
-            what = f"should be a table, [{dotted(key)}]"
-        self.fault(key, plain(content), what)
-        return {}
-
-    def known(self, key: Key, content: Any, allowed: frozenset[str]) -> dict[str, Any]:
-        """The known keys of a table."""
-        table = self.table(key, content)
-        if table.keys() <= allowed:
-            return table
-        for name, value in table.items():
-            if name not in allowed:
-                near = self.nearest(name, allowed)
-                self.fault((*key, name), plain(value), unknown_key(allowed), near)
-        return {k: v for k, v in table.items() if k in allowed}
+def _table(mistakes: MistakeList, key: Key, content: Any) -> dict[str, Any]:
+    """The content of a table; empty, and a mistake, for anything else."""
+    if isinstance(content, dict):
+        return content
+    what = f"should be a table, [{dotted(key)}]"
+    if isinstance(content, list):
+        what = f"should be a table: write [{dotted(key)}] with single brackets, names below it"
+    mistakes.add(key, plain(content), what)
+    return {}
 
 
-def _thing(tables: _Tables, key: Key, content: Any, class_: type) -> Any:
-    name = key[-1]
+def _known(
+    mistakes: MistakeList, key: Key, content: Any, allowed: frozenset[str]
+) -> dict[str, Any]:
+    """The known keys of a table; the others are mistakes."""
+    table = _table(mistakes, key, content)
+    if table.keys() <= allowed:
+        return table
+    mistakes.add_unknown_keys(key, {k: plain(v) for k, v in table.items()}, allowed)
+    return {k: v for k, v in table.items() if k in allowed}
+
+
+def _entry(mistakes: MistakeList, key: Key, content: Any, class_: type) -> Any:
+    name = str(key[-1])
     if class_ is Element:
-        fields = {k: plain(v) for k, v in tables.table(key, content).items()}
-        return Element(str(name), fields.pop("type", None), fields)
-    return class_(name, **tables.known(key, content, keys_of(class_)))
+        fields = {k: plain(v) for k, v in _table(mistakes, key, content).items()}
+        return Element(name, fields.pop("type", None), fields)
+    return class_(name, **_known(mistakes, key, content, keys_of(class_)))
 
 
-def _animation(tables: _Tables, content: Any) -> Animation:
-    known = tables.known(("animation",), content, keys_of(Animation))
-    points = known.get("points", [])
-    if not isinstance(points, list):
+def _animation(mistakes: MistakeList, content: Any) -> Animation:
+    known = _known(mistakes, ("animation",), content, keys_of(Animation))
+    tables = known.get("points", [])
+    if not isinstance(tables, list):
         what = 'should be a list of tables such as {body = "crank", sPp = [0.0, 0.0, 1.0]}'
-        tables.fault(("animation", "points"), plain(points), what)
-        points = []
+        mistakes.add(("animation", "points"), plain(tables), what)
+        tables = []
     keys = keys_of(AnimationPoint)
-    found = [
-        AnimationPoint(**tables.known(("animation", "points", k), point, keys))
-        for k, point in enumerate(points)
+    points = [
+        AnimationPoint(**_known(mistakes, ("animation", "points", k), table, keys))
+        for k, table in enumerate(tables)
     ]
-    return Animation(found, known.get("limits"))
+    return Animation(points, known.get("limits"))
 
 
 # ---------------------------------------------------------------------------- files
 
 
 def _find(source: Any) -> tuple[Path, list[str]]:
-    """The scene file that a name, folder or path means, with notes on the choice."""
+    """The scene file of a name, folder or path, with notes on the choice."""
     try:
         text = os.fsdecode(source)
     except TypeError:
@@ -222,14 +203,14 @@ def _shipped(text: str, models: dict[str, Path]) -> Path | None:
 
 
 def _models_folder() -> Path:
-    """Where the shipped models lie: in the package once installed, beside the sources before."""
+    """The folder of the shipped models: in the package once installed, else next to the sources."""
     package = Path(__file__).parents[2]
     installed = package / "models_shipped"
     return installed if installed.is_dir() else package.parents[1] / "models"
 
 
 def _read(path: Path) -> str:
-    """The text of a file, read only if it is a file of reasonable size."""
+    """The text of a regular file of at most ``LARGEST_FILE`` bytes."""
     try:
         info = path.stat()
         if not stat.S_ISREG(info.st_mode):
@@ -280,7 +261,7 @@ def _parse(text: str, path: Path) -> dict[str, Any]:
     raise _refused(str(path), what, line=line, remedy=remedy)
 
 
-#: What people write for a value that TOML has otherwise, and what to do.
+#: Invalid values that users of other languages write, and the remedy.
 _HABITS = (
     (r"[+-]?\d+,\d+", "a number has a decimal point, and no comma"),
     (r"[+-]?(\.\d+|\d+\.)([eE][+-]?\d+)?", "write digits on both sides of the decimal point"),
@@ -291,7 +272,7 @@ _HABITS = (
 
 
 def _remedy(lines: list[str]) -> str:
-    """What to do about a line whose value is none, where a habit of other languages is known."""
+    """The remedy for a line with an invalid value, where it is one of ``_HABITS``."""
     for line in lines:
         value = line.partition("=")[2].partition("#")[0].strip()
         for habit, remedy in _HABITS:
@@ -301,7 +282,7 @@ def _remedy(lines: list[str]) -> str:
 
 
 def _is_too_deep(data: dict[str, Any]) -> bool:
-    """Whether tables and lists lie more than ``DEEPEST`` levels within one another."""
+    """True if tables and lists are nested more than ``DEEPEST`` levels deep."""
     level: list[Any] = [data]
     for _ in range(DEEPEST):
         inside = (v for c in level for v in (c.values() if type(c) is dict else c))

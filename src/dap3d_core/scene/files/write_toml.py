@@ -1,4 +1,4 @@
-"""From a scene to the text of a scene file. Nothing is lost: floats are written to the last bit."""
+"""Writes scenes as scene files, without loss: floats are written to the last bit."""
 
 import os
 import re
@@ -11,9 +11,9 @@ import attrs
 
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.errors import MISSING, Mistake, SceneError
-from dap3d_core.scene.scene import NAMED, Element, Scene
+from dap3d_core.scene.scene import NAMED, SCENE_FILE, Element, Scene
 
-#: Bits of an integer: what other readers of TOML take is 64, Python itself writes some 14000.
+#: Maximal bits of an integer; TOML requires readers to take 64, Python writes some 14000.
 LONGEST_INTEGER = 4096
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t", "\r": "\\r"}
@@ -30,8 +30,8 @@ def to_toml(scene: Scene) -> str:
     header = {"name": scene.name, "description": scene.description, "schema": scene.schema}
     lines = _table("scene", ((k, v) for k, v in header.items() if v != ""))
     for table in NAMED:
-        for name, thing in getattr(scene, table).items():
-            lines += _table(f"{table}.{_key(name)}", _fields(thing))
+        for name, entry in getattr(scene, table).items():
+            lines += _table(f"{table}.{_key(name)}", _fields(entry))
     if scene.animation.points or scene.animation.limits is not None:
         lines += _animation(scene)
     lines += _table("simulation", _fields(scene.simulation), needed=False)
@@ -47,19 +47,16 @@ def save(scene: Scene, path: str | Path) -> Path:
     text = to_toml(scene)
     try:
         path = Path(path)
-        path = path / "scene.toml" if path.is_dir() else path
-        written = Path(os.path.realpath(path))  # a link stays one
-        aside = written.with_name(f".{uuid.uuid4().hex}.toml")
+        path = path / SCENE_FILE if path.is_dir() else path
+        target = Path(os.path.realpath(path))  # a link stays one
+        temporary = target.with_name(f".{uuid.uuid4().hex}.toml")
         try:
-            with aside.open("xb") as file:
+            with temporary.open("xb") as file:
                 file.write(text.encode("utf-8"))
-            os.replace(aside, written)
+            os.replace(temporary, target)
         finally:
-            aside.unlink(missing_ok=True)
-    except (
-        OSError,
-        ValueError,
-    ) as error:  # ValueError: text that UTF-8 cannot hold, NUL in the path
+            temporary.unlink(missing_ok=True)
+    except (OSError, ValueError) as error:  # ValueError: NUL in the path
         reason = error.strerror if isinstance(error, OSError) else error
         what = f"cannot be written: {reason}"
         raise SceneError([Mistake("", MISSING, what, file=str(path))]) from error
@@ -71,15 +68,15 @@ def _table(title: str, pairs: Iterable[tuple[str, Any]], *, needed: bool = True)
     return [f"[{title}]", *lines, ""] if lines or needed else []
 
 
-def _fields(thing: Any) -> Iterator[tuple[str, Any]]:
-    """What differs from the defaults; a default that was given anew is written too."""
-    if isinstance(thing, Element):
-        if thing.type is not None:
-            yield "type", thing.type
-        yield from thing.fields.items()
+def _fields(entry: Any) -> Iterator[tuple[str, Any]]:
+    """Fields that differ from their defaults; a default that was given again is written too."""
+    if isinstance(entry, Element):
+        if entry.type is not None:
+            yield "type", entry.type
+        yield from entry.fields.items()
         return
-    for field in attrs.fields(type(thing)):
-        value = getattr(thing, field.name)
+    for field in attrs.fields(type(entry)):
+        value = getattr(entry, field.name)
         if field.name == "name" or value is None or value is field.default:
             continue
         if type(value) is bool and value == field.default:

@@ -1,4 +1,4 @@
-"""Many values of one kind at once: an array, and a mistake for each that is not good."""
+"""Columns of values as arrays, with a mistake for each invalid value."""
 
 from collections.abc import Callable, Sequence
 from itertools import chain
@@ -7,30 +7,41 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.scene.errors import MISSING, Key
+from dap3d_core.scene.errors import Key
 from dap3d_core.scene.validate.coerce_values import LARGEST, Fault, number_of, numbers_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 
 Floats = NDArray[np.float64]
 
-_NUMBERS = {float, int}
-
 
 def numbers(report: Collector, keys: Sequence[Key], values: list[Any]) -> Floats:
-    """(n,) array of numbers; a bad one is reported under its key and becomes NaN."""
-    return _column(report, keys, values, (), _flat(values), number_of)
+    """(n,) array of numbers; an invalid one is reported under its key and becomes NaN."""
+    flat = _flat(values)
+    return _one_by_one(report, keys, values, (), number_of) if flat is None else flat
 
 
-def vectors(report: Collector, keys: Sequence[Key], values: list[Any], width: int) -> Floats:
-    """(n, width) array; a bad row is reported under its key and becomes NaN."""
-    good = set(map(type, values)) <= {tuple} and set(map(len, values)) <= {width}
-    flat = _flat(list(chain.from_iterable(values))) if good else None
-    return _column(report, keys, values, (width,), flat, lambda v: numbers_of(v, width))
+def vectors(
+    report: Collector,
+    keys: Sequence[Key],
+    values: list[Any],
+    width: int,
+    reader: Callable[[Any], Any] | None = None,
+) -> Floats:
+    """(n, width) array; an invalid row is reported under its key and becomes NaN.
+
+    ``reader`` reads one row; by default ``numbers_of``.
+    """
+    if set(map(type, values)) <= {tuple} and set(map(len, values)) <= {width}:
+        flat = _flat(list(chain.from_iterable(values)))
+        if flat is not None:
+            return flat.reshape(len(values), width)
+    reader = reader or (lambda value: numbers_of(value, width))
+    return _one_by_one(report, keys, values, (width,), reader)
 
 
 def _flat(values: list[Any]) -> Floats | None:
-    """The numbers as an array, or None where one of them is not fit."""
-    if not set(map(type, values)) <= _NUMBERS:
+    """The numbers as an array, or None where one of them is invalid."""
+    if not set(map(type, values)) <= {float, int}:
         return None
     try:
         array = np.array(values, dtype=np.float64)
@@ -39,26 +50,18 @@ def _flat(values: list[Any]) -> Floats | None:
     return array if bool(np.all(np.abs(array) <= LARGEST)) else None
 
 
-def _column(
+def _one_by_one(
     report: Collector,
     keys: Sequence[Key],
     values: list[Any],
     shape: tuple[int, ...],
-    flat: Floats | None,
-    read: Callable[[Any], Any],
+    reader: Callable[[Any], Any],
 ) -> Floats:
-    if flat is not None:
-        return flat.reshape(len(values), *shape)
     array = np.full((len(values), *shape), np.nan)
-    for place, value in enumerate(values):
-        found = read(value)
-        if isinstance(found, Fault):
-            given, what = value, found.what
-            if value is None:
-                given, what = MISSING, f"is required; it {what.removesuffix(', not nothing')}"
-            report.add(keys[place], given, what, found.nearest, found.remedy)
-        else:
-            array[place] = found
+    for k, value in enumerate(values):
+        result = report.read(keys[k], value, reader)
+        if not isinstance(result, Fault):
+            array[k] = result
     return array
 
 
@@ -68,7 +71,7 @@ def tuples(array: Floats) -> list[tuple[float, ...]]:
 
 
 class Keys(Sequence[Key]):
-    """The keys (table, name, field) of a column, made only where asked for."""
+    """The keys (table, name, field) of a column, made on access."""
 
     def __init__(self, table: str, names: Sequence[str], field: str) -> None:
         self.table, self.names, self.field = table, names, field
@@ -76,5 +79,5 @@ class Keys(Sequence[Key]):
     def __len__(self) -> int:
         return len(self.names)
 
-    def __getitem__(self, place: Any) -> Any:
-        return (self.table, self.names[place], self.field)
+    def __getitem__(self, index: Any) -> Any:
+        return (self.table, self.names[index], self.field)

@@ -1,8 +1,8 @@
-"""What a single value may be: a fast answer for good values, words for bad ones."""
+"""Readers of single values: each returns the value as it is used, or a ``Fault``."""
 
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple
 
 from dap3d_core.registry.suggestions import nearest
@@ -10,14 +10,17 @@ from dap3d_core.scene.coerce import plain
 
 #: Beyond this size products of two numbers leave double precision.
 LARGEST = 1e100
-#: Text that is a number in quotes; of longer text nobody needs to be told so.
+#: A number in quotes, and the length up to which it is recognised.
 _NUMBER, LONGEST_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"), 60
-
-Vector3 = tuple[float, float, float]
+#: Euler parameters farther from unit length are refused; those farther than ROUNDING are noted.
+UNIT_TOLERANCE = 1e-6
+ROUNDING = 1e-9
+#: A shorter vector has no direction.
+SHORTEST = 1e-12
 
 
 class Fault(NamedTuple):
-    """What is wrong with a value, what to do, the nearest right spelling."""
+    """The fault of a value, its remedy, the nearest right spelling."""
 
     what: str
     remedy: str = ""
@@ -25,7 +28,7 @@ class Fault(NamedTuple):
 
 
 def number_of(value: Any) -> float | Fault:
-    """A finite number as a float, or what is wrong. Text and truth values are no numbers."""
+    """A finite number as a float; text and truth values are no numbers."""
     if type(value) is float and -LARGEST <= value <= LARGEST:
         return value
     value = plain(value)
@@ -53,8 +56,8 @@ def _number_fault(value: Any) -> float | Fault:
     return Fault(f"{should}, not {_kind(value)}")
 
 
-def numbers_of(value: Any, count: int) -> tuple[float, ...] | Fault:
-    """Exactly ``count`` finite numbers as a tuple, or what is wrong."""
+def numbers_of(value: Any, count: int) -> Any:
+    """Exactly ``count`` finite numbers as a tuple."""
     if type(value) is tuple and len(value) == count:
         for x in value:
             if type(x) is not float or not -LARGEST <= x <= LARGEST:
@@ -68,17 +71,47 @@ def numbers_of(value: Any, count: int) -> tuple[float, ...] | Fault:
     if len(value) != count:
         hint = "write one row only" if value and type(value[0]) is tuple else ""
         return Fault(f"{should}; it has {len(value)}", hint)
-    found = []
-    for place, item in enumerate(value, 1):
-        number = number_of(item)
-        if isinstance(number, Fault):
-            return Fault(f"{should}; entry {place} {number.what}", number.remedy)
-        found.append(number)
-    return tuple(found)
+    return _entries(value, number_of, f"{should}; entry")
 
 
-def matrix_of(value: Any) -> tuple[Vector3, ...] | Fault:
-    """A 3x3 matrix as three rows, or what is wrong."""
+def _entries(value: tuple[Any, ...], reader: Callable[[Any], Any], should: str) -> Any:
+    """The entries of a list, each read; the fault of the first invalid one."""
+    entries = []
+    for k, item in enumerate(value, 1):
+        entry = reader(item)
+        if isinstance(entry, Fault):
+            return Fault(f"{should} {k} {entry.what}", entry.remedy)
+        entries.append(entry)
+    return tuple(entries)
+
+
+def points_of(value: Any) -> Any:
+    """Two or more points of 3 numbers each."""
+    value, should = plain(value), "should be a list of two or more points of 3 numbers each"
+    if type(value) is not tuple or len(value) < 2:
+        return Fault(should)
+    return _entries(value, lambda point: numbers_of(point, 3), f"{should}; point")
+
+
+def quaternion_of(value: Any) -> Any:
+    """Euler parameters of unit length."""
+    p = numbers_of(value, 4)
+    if isinstance(p, Fault):
+        return p
+    length = sum(x * x for x in p) ** 0.5
+    return Fault(not_unit(length)) if abs(length - 1.0) > UNIT_TOLERANCE else p
+
+
+def not_unit(length: float) -> str:
+    """The fault of Euler parameters of this length."""
+    return (
+        f"should be four numbers e0, e1, e2, e3 of unit length (within {UNIT_TOLERANCE:g}); "
+        f"the length is {length:.9g}"
+    )
+
+
+def matrix_of(value: Any) -> Any:
+    """A 3x3 matrix as three rows."""
     value = plain(value)
     should = "should be 3x3 numbers, three rows"
     if type(value) is not tuple:
@@ -87,17 +120,11 @@ def matrix_of(value: Any) -> tuple[Vector3, ...] | Fault:
         return Fault(f"{should}; it is one list of 9", "write [[..., ..., ...], [...], [...]]")
     if len(value) != 3:
         return Fault(f"{should}; it has {len(value)} entries")
-    rows: list[Any] = []
-    for place, item in enumerate(value, 1):
-        row = numbers_of(item, 3)
-        if isinstance(row, Fault):
-            return Fault(f"{should}; row {place} {row.what}", row.remedy)
-        rows.append(row)
-    return tuple(rows)
+    return _entries(value, lambda row: numbers_of(row, 3), f"{should}; row")
 
 
-def list_of(value: Any) -> tuple[float, ...] | Fault:
-    """One or more finite numbers as a tuple, or what is wrong."""
+def list_of(value: Any) -> Any:
+    """One or more finite numbers as a tuple."""
     value = plain(value)
     if type(value) is not tuple or not value:
         return Fault(f"should be a list of numbers, not {_kind(value)}")
@@ -105,7 +132,7 @@ def list_of(value: Any) -> tuple[float, ...] | Fault:
 
 
 def word_of(value: Any, allowed: Collection[Any], aliases: Mapping[str, str] | None = None) -> Any:
-    """One of the allowed words (or truth values), by its own or another name; else what's wrong."""
+    """One of the allowed words (or truth values), by its own name or an alias."""
     value = plain(value)
     if type(value) is str and aliases and value in aliases:
         value = aliases[value]
@@ -118,13 +145,13 @@ def word_of(value: Any, allowed: Collection[Any], aliases: Mapping[str, str] | N
 
 
 def truth_of(value: Any) -> bool | Fault:
-    """True or false, or what is wrong."""
+    """True or false."""
     value = plain(value)
     return value if type(value) is bool else Fault("should be true or false")
 
 
 def text_of(value: Any) -> str | Fault:
-    """Text, or what is wrong."""
+    """Text."""
     value = plain(value)
     return value if type(value) is str else Fault(f"should be text, not {_kind(value)}")
 
@@ -137,7 +164,7 @@ def bounded(
     maximum: float | None = None,
     whole: bool = False,
 ) -> float | Fault:
-    """A number within its limits, or what is wrong."""
+    """A number within its limits."""
     if isinstance(number, Fault):
         return number
     if positive and not number > 0.0:
@@ -151,14 +178,21 @@ def bounded(
     return number
 
 
+_KINDS: dict[type, str] = {
+    bool: "a truth value",
+    str: "text",
+    dict: "a table",
+    int: "a number",
+    float: "a number",
+}
+
+
 def _kind(value: Any) -> str:
     if value is None:
         return "nothing"
     if type(value) is tuple:
         return "an empty list" if not value else f"a list of {len(value)}"
-    names = {bool: "a truth value", str: "text", dict: "a table", int: "a number"}
-    names[float] = "a number"
-    if type(value) in names:
-        return names[type(value)]
+    if name := _KINDS.get(type(value)):
+        return name
     dtype = getattr(value, "dtype", None)
     return f"an array of {dtype}" if dtype is not None else f"a {type(value).__name__}"

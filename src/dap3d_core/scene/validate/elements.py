@@ -1,15 +1,15 @@
-"""Joints, forces and functions: from the fields as written to what their type needs."""
+"""Reads joints, forces and functions: from fields as written to the values their types need."""
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any
 
 import attrs
 
 from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
-from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
-from dap3d_core.scene.scene import GROUND, ZERO, Element, unknown_key
+from dap3d_core.scene.scene import GROUND, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
     Fault,
     bounded,
@@ -22,6 +22,7 @@ from dap3d_core.scene.validate.coerce_values import (
 from dap3d_core.scene.validate.geometry import (
     BAD,
     Geometry,
+    Located,
     body_of,
     missing_words,
     point_of,
@@ -32,38 +33,43 @@ from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance
 from dap3d_core.scene.validate.warnings import oddity
 
-#: The two points that may stand for a vector of type 2.
+#: The two points that may be given in place of a vector of type 2.
 ENDS = ("P_i", "P_j")
 
 _ABSENT: Any = object()
-#: A slot whose body no field has told yet.
+#: Body of a slot that no field has given yet.
 _UNKNOWN = -2
+
+#: Readers of the kinds of fields that hold values and no references.
+_READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
+    "number": lambda spec, value: bounded(
+        number_of(value),
+        positive=spec.positive,
+        minimum=spec.minimum,
+        maximum=spec.maximum,
+        whole=spec.whole,
+    ),
+    "vec3": lambda spec, value: numbers_of(value, 3),
+    "matrix": lambda spec, value: matrix_of(value),
+    "table": lambda spec, value: list_of(value),
+    "choice": lambda spec, value: word_of(value, spec.choices, spec.aliases),
+}
+
+
+def _unread(spec: FieldSpec, value: Any) -> Any:
+    """The value itself, of a kind without a reader."""
+    return value
 
 
 @attrs.frozen
 class _Field:
-    """A field of a type: its name, what it is, the place of its slot (-1: none), how it is read."""
+    """A field of a type: name, properties, index of its slot (-1: none), reader, value reader."""
 
     name: str
     spec: FieldSpec
     slot: int
-    read: Callable[["_Field", Any, "_Work"], None]
-
-
-@attrs.define
-class _Work:
-    """An element that is being read.
-
-    What was found, which field told the body of each slot, and the bodies of vectors of no slot.
-    """
-
-    element: Element
-    key: Key
-    values: dict[str, Any]
-    bodies: list[int]
-    told_by: list[str]
-    others: dict[str, int] = attrs.field(factory=dict)
-    good: bool = True
+    read: Callable[["_Reading", "_Field", Any], None]
+    value_of: Callable[[Any], Any]
 
 
 class Reader:
@@ -72,7 +78,7 @@ class Reader:
     Args:
         examined: the type.
         table: joints, forces or functions.
-        geometry: where references to points, vectors and bodies lead.
+        geometry: resolves references to points, vectors and bodies.
         report: takes mistakes and notes.
     """
 
@@ -81,9 +87,9 @@ class Reader:
     ) -> None:
         self.examined, self.table = examined, table
         self.geometry, self.report = geometry, report
-        self.body_names = (GROUND, *geometry.bodies.names)
+        self.body_names = (GROUND, *geometry.bodies.body_names)
         self.slots = () if getattr(examined.type, "each_body", False) else examined.layout.slots
-        self.function_place = {name: k for k, name in enumerate(report.scene.functions, 1)}
+        self.function_index = {name: k for k, name in enumerate(report.scene.functions, 1)}
         specs = {n: s for n, s in specs_of(examined.type).items() if s.given}
         takes_ends = ENDS[0] not in specs and any(s.kind == "vector2" for s in specs.values())
         self.ends = ENDS if takes_ends else ()
@@ -97,259 +103,232 @@ class Reader:
     def _field(self, name: str, spec: FieldSpec) -> _Field:
         letter = slot_of(name)
         slot = self.slots.index(letter) if letter in self.slots else -1
-        readers = {
-            "body": self._body,
-            "point": self._point,
-            "vector": self._vector,
-            "vector2": self._vector2,
-            "function": self._function,
-            "joint": self._joint,
-        }
-        return _Field(name, spec, slot, readers.get(spec.kind, self._value))
+        read = _FIELD_READERS.get(spec.kind, _Reading.value)
+        return _Field(name, spec, slot, read, partial(_READERS.get(spec.kind, _unread), spec))
 
     def read(self, element: Element) -> Instance | None:
-        """What the type needs of an element; None where something is wrong (it is reported)."""
-        given, count = element.fields, len(self.slots)
-        work = _Work(element, (self.table, element.name), {}, [_UNKNOWN] * count, [""] * count)
-        if not given.keys() <= self.known.keys():
-            self._report_unknown(work)
+        """The instance of an element; None where a mistake was reported."""
+        reading = _Reading(self, element)
+        if not element.fields.keys() <= self.known.keys():
+            reading.report.add_unknown_keys(
+                reading.key, element.fields, tuple(self.known), in_order=True
+            )
+            reading.good = False
         for field in self.fields:
-            value = given.get(field.name, _ABSENT)
+            value = element.fields.get(field.name, _ABSENT)
             if value is _ABSENT and not (self.ends and field.spec.kind == "vector2"):
                 if field.spec.required:
-                    self._report_missing(field, work)
+                    reading.refuse(field.name, f"is required{_of(field)}")
                     continue
                 value = field.spec.default
-            field.read(field, value, work)
-        self._check_slots(work)
-        if not work.good:
+            field.read(reading, field, value)
+        reading.check_slots()
+        if not reading.good:
             return None
-        values, bodies = work.values, tuple(work.bodies)
+        values, bodies = reading.values, tuple(reading.bodies)
         for field in self.late:
             if values[field.name] is None:
                 is_point = field.spec.kind == "point"
                 values[field.name] = ZERO if is_point else self.body_names[bodies[field.slot]]
         examined = self.examined.chosen(values) if self.examined.variants else self.examined
         functions = tuple(
-            [self.function_place.get(values[name], 0) for name in examined.layout.functions]
+            [self.function_index.get(values[name], 0) for name in examined.layout.functions]
         )
-        others = tuple([work.others[name] for name in examined.layout.others])
+        others = tuple([reading.others[name] for name in examined.layout.others])
         return Instance(element.name, examined, bodies, functions, values, others)
+
+
+class _Reading:
+    """One element: values of its fields, the body of each slot and the field that gave it."""
+
+    __slots__ = ("bodies", "element", "given_by", "good", "key", "others", "reader", "report",
+                 "values")  # fmt: skip
+
+    def __init__(self, reader: Reader, element: Element) -> None:
+        count = len(reader.slots)
+        self.reader, self.report, self.element = reader, reader.report, element
+        self.key: Key = (reader.table, element.name)
+        self.values: dict[str, Any] = {}
+        self.bodies, self.given_by = [_UNKNOWN] * count, [""] * count
+        self.others: dict[str, int] = {}  # bodies of vectors of no slot
+        self.good = True
+
+    def refuse(self, name: str, what: str, nearest: str = "", remedy: str = "") -> None:
+        """Report a mistake of a field, or of the element where the name is empty."""
+        key = (*self.key, name) if name else self.key
+        self.report.add(key, self.element.fields.get(name, MISSING), what, nearest, remedy)
+        self.good = False
 
     # ---------------------------------------------------------------- fields, by kind
 
-    def _body(self, field: _Field, value: Any, work: _Work) -> None:
-        work.values[field.name] = value
-        if value is None:
-            return
-        body = body_of(self.report, self.geometry.bodies, (*work.key, field.name), value)
-        self._tell(field.name, field.slot, body, work)
+    def body(self, field: _Field, value: Any) -> None:
+        self.values[field.name] = value
+        if value is not None:
+            bodies = self.reader.geometry.bodies
+            body = body_of(self.report, bodies, (*self.key, field.name), value)
+            self.set_body(field.name, field.slot, body)
 
-    def _point(self, field: _Field, value: Any, work: _Work) -> None:
-        if value is None:
-            work.values[field.name] = None
-            return
-        found = self.geometry.points.get(value) if type(value) is str else None
-        if found is None:
-            found = point_of(self.report, self.geometry, (*work.key, field.name), value)
-        self._located(field, found, work)
+    def point(self, field: _Field, value: Any) -> None:
+        geometry = self.reader.geometry
+        located = geometry.points.get(value) if type(value) is str else None
+        if located is None and value is not None:
+            located = point_of(self.report, geometry, (*self.key, field.name), value)
+        self.located(field, value, located)
 
-    def _vector(self, field: _Field, value: Any, work: _Work) -> None:
-        if value is None:
-            work.values[field.name] = None
-            return
-        key = (*work.key, field.name)
-        found = vector_of(self.report, self.geometry, key, value, unit=field.spec.unit_length)
-        self._located(field, found, work)
+    def vector(self, field: _Field, value: Any) -> None:
+        located = None
+        if value is not None:
+            key, unit = (*self.key, field.name), field.spec.unit_length
+            located = vector_of(self.report, self.reader.geometry, key, value, unit=unit)
+        self.located(field, value, located)
 
-    def _located(
-        self, field: _Field, found: tuple[int, tuple[float, ...]] | None, work: _Work
-    ) -> None:
-        if found is None:
-            work.good = False
+    def located(self, field: _Field, value: Any, located: Located | None) -> None:
+        """Store a point or a vector; None was left out, or reported where a value is given."""
+        if located is None:
+            self.values[field.name] = None
+            self.good &= value is None
             return
-        work.values[field.name] = found[1]
-        if field.spec.ground and found[0] > 0:
-            what = f"is on {self.body_names[found[0]]}; it is to be a vector of ground"
-            self._refuse(work, (*work.key, field.name), self._given(work, field.name), what)
+        body, self.values[field.name] = located
+        if field.spec.ground and body > 0:
+            what = f"is on {self.reader.body_names[body]}; it is to be a vector of ground"
+            self.refuse(field.name, what)
         elif field.slot < 0 and field.spec.kind == "vector" and not field.spec.ground:
-            work.others[field.name] = found[0]
-        self._tell(field.name, field.slot, found[0], work)
+            self.others[field.name] = body
+        self.set_body(field.name, field.slot, body)
 
-    def _vector2(self, field: _Field, value: Any, work: _Work) -> None:
+    def vector2(self, field: _Field, value: Any) -> None:
         """A vector between two points, by its name or by the two points."""
-        given = [end for end in self.ends if end in work.element.fields]
-        key = (*work.key, field.name)
+        fields, reader = self.element.fields, self.reader
+        given = [end for end in reader.ends if end in fields]
         ends = None
         if value is not _ABSENT and given:
-            what = f"give {field.name} or P_i and P_j, not both"
-            self.report.add(key, value, what)
-        elif value is not _ABSENT or not self.ends:
-            ends = self._declared(field, value, key)
+            self.refuse(field.name, f"give {field.name} or P_i and P_j, not both")
+        elif value is not _ABSENT or not reader.ends:
+            ends = self.declared_ends(field, value)
         elif given:
-            fields = work.element.fields
-            ends = two_ends(
-                self.report, self.geometry, work.key, fields.get("P_i"), fields.get("P_j")
-            )
+            P_i, P_j = fields.get("P_i"), fields.get("P_j")
+            ends = two_ends(self.report, reader.geometry, self.key, P_i, P_j)
         else:
-            what = f"is required, by name or by its ends P_i and P_j{_of(field)}"
-            self.report.add(key, MISSING, what)
+            self.refuse(field.name, f"is required, by name or by its ends P_i and P_j{_of(field)}")
         if ends is None:
-            work.good = False
+            self.good = False
             return
-        for end, located in zip(ENDS, ends, strict=True):
-            work.values[end] = located[1]
-            letter = end[-1]
-            if letter in self.slots:
-                told_by = end if given else field.name
-                self._tell(told_by, self.slots.index(letter), located[0], work)
+        for end, (body, local) in zip(ENDS, ends, strict=True):
+            self.values[end] = local
+            if (letter := end[-1]) in reader.slots:
+                self.set_body(end if given else field.name, reader.slots.index(letter), body)
 
-    def _declared(self, field: _Field, value: Any, key: Key) -> Any:
-        declared = self.geometry.vectors2
-        if isinstance(value, str) and value in declared:
-            return declared[value]
-        words, near, remedy = missing_words(
-            self.report, "vector between two points", value, declared
+    def declared_ends(self, field: _Field, value: Any) -> Any:
+        geometry = self.reader.geometry
+        if isinstance(value, str) and value in geometry.vectors2:
+            return geometry.vectors2[value]
+        what, near, remedy = missing_words(
+            self.report, "vector between two points", value, geometry.vectors2
         )
-        if isinstance(value, str) and value in self.geometry.vectors:
+        if isinstance(value, str) and value in geometry.vectors:
             remedy = f"{value} is a vector of one body; {field.name} is one of [vectors2]"
-        self.report.add(key, value, words, near, remedy)
+        self.refuse(field.name, what, near, remedy)
         return None
 
-    def _function(self, field: _Field, value: Any, work: _Work) -> None:
-        self._name_of(field, value, work, self.function_place, "function")
+    def function(self, field: _Field, value: Any) -> None:
+        self.name_of(field, value, self.reader.function_index)
 
-    def _joint(self, field: _Field, value: Any, work: _Work) -> None:
-        self._name_of(field, value, work, self.report.scene.joints, "joint")
+    def joint(self, field: _Field, value: Any) -> None:
+        self.name_of(field, value, self.report.scene.joints)
 
-    def _name_of(
-        self, field: _Field, value: Any, work: _Work, declared: dict[str, Any], what: str
-    ) -> None:
-        work.values[field.name] = value
-        if value is None or (isinstance(value, str) and value in declared):
-            return
-        words = missing_words(self.report, what, value, declared)
-        self.report.add((*work.key, field.name), value, *words)
-        work.good = False
+    def name_of(self, field: _Field, value: Any, declared: dict[str, Any]) -> None:
+        self.values[field.name] = value
+        if value is not None and not (isinstance(value, str) and value in declared):
+            self.refuse(field.name, *missing_words(self.report, field.spec.kind, value, declared))
 
-    def _value(self, field: _Field, value: Any, work: _Work) -> None:
+    def value(self, field: _Field, value: Any) -> None:
         """A number, a list of numbers, a matrix or a word."""
         spec = field.spec
         if value is None and spec.default is None:
-            work.values[field.name] = None
+            self.values[field.name] = None
             return
-        found: Any = value
-        if spec.kind == "number":
-            found = bounded(
-                number_of(value),
-                positive=spec.positive,
-                minimum=spec.minimum,
-                maximum=spec.maximum,
-                whole=spec.whole,
-            )
-        elif spec.kind == "vec3":
-            found = numbers_of(value, 3)
-        elif spec.kind == "matrix":
-            found = matrix_of(value)
-        elif spec.kind == "table":
-            found = list_of(value)
-        elif spec.kind == "choice":
-            found = word_of(value, spec.choices, spec.aliases)
-        if isinstance(found, Fault):
-            self.report.add((*work.key, field.name), value, found.what, found.nearest, found.remedy)
-            work.good = False
-        elif odd := oddity(spec, found):
-            self.report.note(f"{dotted((*work.key, field.name))} = {shown(value)} {odd}")
-        work.values[field.name] = found
+        key = (*self.key, field.name)
+        result = self.report.read(key, value, field.value_of)
+        self.values[field.name] = result
+        if isinstance(result, Fault):
+            self.good = False
+        elif odd := oddity(spec, result):
+            self.report.note(f"{dotted(key)} = {shown(value)} {odd}")
 
     # ---------------------------------------------------------------- bodies of slots
 
-    def _tell(self, name: str, slot: int, body: int, work: _Work) -> None:
-        """A field says which body its slot is; all fields of a slot must agree."""
+    def set_body(self, name: str, slot: int, body: int) -> None:
+        """Set the body of a slot, as a field gives it; all fields of a slot must agree."""
         if body == BAD:
-            work.good = False
+            self.good = False
         elif slot >= 0:
-            if work.bodies[slot] == _UNKNOWN:
-                work.bodies[slot], work.told_by[slot] = body, name
-            elif work.bodies[slot] != body:
-                self._report_conflict(name, slot, body, work)
+            if self.bodies[slot] == _UNKNOWN:
+                self.bodies[slot], self.given_by[slot] = body, name
+            elif self.bodies[slot] != body:
+                self.report_conflict(name, slot, body)
 
-    def _check_slots(self, work: _Work) -> None:
-        bodies = work.bodies
+    def check_slots(self) -> None:
+        """The bodies of an element are known, different, and the first is not ground."""
+        bodies, slots, names = self.bodies, self.reader.slots, self.reader.body_names
         if not bodies:
             return
         if _UNKNOWN not in bodies:
-            self._check_others(work)
+            self.check_others()
         if bodies[0] > 0 and bodies[-1] >= 0 and len(set(bodies)) == len(bodies) < 3:
-            return  # what nearly all elements are
-        if work.good and _UNKNOWN in bodies:
-            letter = self.slots[bodies.index(_UNKNOWN)]
-            fields = [f.name for f in self.fields if slot_of(f.name) == letter]
-            what = f"which body is {letter}? Give {' or '.join(fields)}"
-            self._refuse(work, work.key, MISSING, what)
-        if bodies[0] == 0:
-            self._report_ground(work)
+            return  # nearly all elements
+        if self.good and _UNKNOWN in bodies:
+            letter = slots[bodies.index(_UNKNOWN)]
+            fields = [f.name for f in self.reader.fields if slot_of(f.name) == letter]
+            self.refuse("", f"which body is {letter}? Give {' or '.join(fields)}")
+        if bodies[0] == 0 and len(slots) > 1:
+            what = "body i is ground; if one of the bodies is ground it is body j"
+            remedy = "exchange the two bodies (all of _i and _j)"
+            self.refuse(self.given_by[0], what, remedy=remedy)
+        elif bodies[0] == 0:
+            what = "the only body of this element is ground, which is fixed"
+            self.refuse(self.given_by[0], what)
         for n, body in enumerate(bodies):
             first = bodies.index(body)
             if body >= 0 and first < n:
-                one, other = self.slots[first], self.slots[n]
-                what = f"body {one} and body {other} are both {self.body_names[body]}"
+                what = f"body {slots[first]} and body {slots[n]} are both {names[body]}"
                 remedy = "an element acts between different bodies"
-                field = work.told_by[n]
-                self._refuse(work, (*work.key, field), self._given(work, field), what, remedy)
+                self.refuse(self.given_by[n], what, remedy=remedy)
 
-    def _check_others(self, work: _Work) -> None:
-        """Vectors of no slot stand on one of the element's bodies."""
-        for name, body in work.others.items():
-            if body != BAD and body not in work.bodies:
-                names = " or ".join(self.body_names[b] for b in work.bodies)
-                what = f"is on {self.body_names[body]}; it is to be a vector of {names}"
-                self._refuse(work, (*work.key, name), self._given(work, name), what)
+    def check_others(self) -> None:
+        """Vectors of no slot are fixed in one of the element's bodies."""
+        names = self.reader.body_names
+        for name, body in self.others.items():
+            if body != BAD and body not in self.bodies:
+                allowed = " or ".join(names[b] for b in self.bodies)
+                self.refuse(name, f"is on {names[body]}; it is to be a vector of {allowed}")
 
-    def _report_ground(self, work: _Work) -> None:
-        name = work.told_by[0]
-        key, value = (*work.key, name), self._given(work, name)
-        if len(self.slots) > 1:
-            what = "body i is ground; if one of the bodies is ground it is body j"
-            self._refuse(work, key, value, what, "exchange the two bodies (all of _i and _j)")
-        else:
-            self._refuse(
-                work, key, value, "the only body of this element is ground, which is fixed"
-            )
-
-    def _report_conflict(self, name: str, slot: int, body: int, work: _Work) -> None:
-        letter, first = self.slots[slot], work.told_by[slot]
-        here, there = self.body_names[body], self.body_names[work.bodies[slot]]
+    def report_conflict(self, name: str, slot: int, body: int) -> None:
+        letter, first = self.reader.slots[slot], self.given_by[slot]
+        names = self.reader.body_names
+        here, there = names[body], names[self.bodies[slot]]
         what = f"{name} is on {here}, but {first} on {there}: all of _{letter} is on one body"
         remedy = ""
-        if first not in work.element.fields and first not in self.ends:
+        if first not in self.element.fields and first not in self.reader.ends:
             what = f"{name} is on {here}, but {first}, which is not given, is {there}"
             remedy = f'write {first} = "{here}", or take {name} on {there}'
-        self._refuse(work, (*work.key, name), self._given(work, name), what, remedy)
+        self.refuse(name, what, remedy=remedy)
 
-    def _given(self, work: _Work, name: str) -> Any:
-        return work.element.fields.get(name, MISSING)
 
-    def _refuse(self, work: _Work, key: Key, value: Any, what: str, remedy: str = "") -> None:
-        self.report.add(key, value, what, "", remedy)
-        work.good = False
-
-    def _report_unknown(self, work: _Work) -> None:
-        for name, value in work.element.fields.items():
-            if name not in self.known:
-                near = nearest(name, self.known)
-                self.report.add((*work.key, name), value, unknown_key(tuple(self.known)), near)
-        work.good = False
-
-    def _report_missing(self, field: _Field, work: _Work) -> None:
-        self._refuse(work, (*work.key, field.name), MISSING, f"is required{_of(field)}")
+_FIELD_READERS = {
+    "body": _Reading.body,
+    "point": _Reading.point,
+    "vector": _Reading.vector,
+    "vector2": _Reading.vector2,
+    "function": _Reading.function,
+    "joint": _Reading.joint,
+}
 
 
 def _of(field: _Field) -> str:
-    """What a field is, in words, for a message about a key that is missing."""
-    what = {"vec3": "3 numbers", "matrix": "3x3 numbers", "choice": "a word", "table": "numbers"}
-    words = what.get(field.spec.kind, f"a {field.spec.kind}")
-    return f" ({words}: {field.spec.doc})" if field.spec.doc else f" ({words})"
+    """The kind and the description of a field, for the message that it is missing."""
+    kinds = {"vec3": "3 numbers", "matrix": "3x3 numbers", "choice": "a word", "table": "numbers"}
+    kind = kinds.get(field.spec.kind, f"a {field.spec.kind}")
+    return f" ({kind}: {field.spec.doc})" if field.spec.doc else f" ({kind})"
 
 
 def read_elements(
@@ -359,28 +338,28 @@ def read_elements(
 
     Args:
         report: takes mistakes and notes; its scene is read.
-        geometry: where references lead.
+        geometry: resolves references.
         table: joints, forces or functions.
         types: the examined types that could be loaded, by keyword.
     """
     readers = {keyword: Reader(e, table, geometry, report) for keyword, e in types.items()}
-    found = []
+    instances = []
     for element in getattr(report.scene, table).values():
         reader = readers.get(element.type) if type(element.type) is str else None
         instance = reader.read(element) if reader is not None else None
         if instance is not None:
-            found.append(instance)
-    return found
+            instances.append(instance)
+    return instances
 
 
 def report_twins(report: Collector, table: str, instances: Iterable[Instance]) -> None:
-    """Joints that are there twice are mistakes; forces twice, or other numbers, are notes."""
+    """Equal joints are mistakes; equal forces, or joints with other numbers, are noted."""
     seen: dict[Any, Instance] = {}
     for instance in instances:
-        references = {
-            n: v for n, v in instance.values.items() if not isinstance(v, (float, type(None)))
-        }
-        key = (id(instance.examined), instance.bodies, tuple(references.values()))
+        references = tuple(
+            v for v in instance.values.values() if not isinstance(v, (float, type(None)))
+        )
+        key = (id(instance.examined), instance.bodies, references)
         twin = seen.setdefault(key, instance)
         if twin is instance:
             continue

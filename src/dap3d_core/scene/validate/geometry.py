@@ -1,6 +1,6 @@
-"""Points and vectors: on which body each stands, and where references lead."""
+"""Points and vectors: the body of each, and the resolution of references."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from itertools import islice
 from typing import Any
 
@@ -10,32 +10,29 @@ from numpy.typing import NDArray
 
 from dap3d_core.scene.errors import MISSING, Key
 from dap3d_core.scene.scene import GROUND, ZERO
-from dap3d_core.scene.validate.bodies import ROUNDING, Bodies
+from dap3d_core.scene.validate.bodies import Bodies
 from dap3d_core.scene.validate.coerce_columns import Floats, Keys, tuples, vectors
-from dap3d_core.scene.validate.coerce_values import Fault, numbers_of
+from dap3d_core.scene.validate.coerce_values import ROUNDING, SHORTEST, Fault, numbers_of
 from dap3d_core.scene.validate.mistake_collector import Collector
-
-#: A vector shorter than this has no direction.
-SHORTEST = 1e-12
 
 #: Body index (ground 0) and components on that body.
 Located = tuple[int, tuple[float, ...]]
-#: What every body offers without declaration.
+#: Points and vectors of every body, which need no declaration.
 ORIGIN = {"O": ZERO}
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Body index of something that was reported as a mistake already.
+#: Body index of a reference already reported as a mistake.
 BAD = -1
 
 
 @attrs.frozen(eq=False)
 class Geometry:
-    """Where references lead.
+    """Resolves references to points and vectors.
 
     Attributes:
         points: name -> body index, coordinates on it.
         vectors: name -> body index, components on it, unit length.
         raw_vectors: the same with the length as given.
-        vectors2: name -> points it runs from and to; None where it was reported already.
+        vectors2: name -> points it runs from and to; None where a mistake was reported.
         point_names, point_body, point_local, animation_count: as in ``Checked``.
     """
 
@@ -63,16 +60,16 @@ def _look_up(
 ) -> Located | None:
     if not isinstance(name, str):
         return None
-    found = declared.get(name)
-    if found is None and "." in name:
+    located = declared.get(name)
+    if located is None and "." in name:
         body, _, last = name.rpartition(".")
-        if body in bodies.index and last in offered:
-            return bodies.index[body], offered[last]
-    return found
+        if body in bodies.body_index and last in offered:
+            return bodies.body_index[body], offered[last]
+    return located
 
 
 def read_geometry(report: Collector, bodies: Bodies) -> Geometry:
-    """Points, vectors and animation points of a scene; what is wrong is reported."""
+    """Points, vectors and animation points of a scene; mistakes are reported."""
     scene = report.scene
     points = list(scene.points.values())
     names = tuple(scene.points)
@@ -103,7 +100,7 @@ def read_geometry(report: Collector, bodies: Bodies) -> Geometry:
 def two_ends(
     report: Collector, geometry: Geometry, key: Key, P_i: Any, P_j: Any
 ) -> tuple[Located, Located] | None:
-    """The points that a vector of type 2 runs from and to; None and reported where one is bad."""
+    """The points that a vector of type 2 runs from and to; None where a mistake is reported."""
     tail = point_of(report, geometry, (*key, "P_i"), P_i)
     head = point_of(report, geometry, (*key, "P_j"), P_j)
     if tail is None or head is None or BAD in (tail[0], head[0]):
@@ -112,13 +109,13 @@ def two_ends(
 
 
 def _vector2(report: Collector, geometry: Geometry, name: str) -> tuple[Located, Located] | None:
-    """A declared vector of type 2: its ends lie on two bodies, and it does not start on ground."""
+    """The ends of a declared vector of type 2: on two bodies, the first not ground."""
     vector2, key = report.scene.vectors2[name], ("vectors2", name)
     ends = two_ends(report, geometry, key, vector2.P_i, vector2.P_j)
     if ends is None:
         return None
     if ends[0][0] == ends[1][0]:
-        body = [GROUND, *geometry.bodies.names][ends[0][0]]
+        body = [GROUND, *geometry.bodies.body_names][ends[0][0]]
         report.add((*key, "P_j"), vector2.P_j, f"both ends are on {body}; they lie on two bodies")
         return None
     if ends[0][0] == 0:
@@ -129,51 +126,51 @@ def _vector2(report: Collector, geometry: Geometry, name: str) -> tuple[Located,
 
 
 def point_of(report: Collector, geometry: Geometry, key: Key, name: Any) -> Located | None:
-    """The point that a reference means; reported where there is none."""
-    found = geometry.point(name)
-    if found is None:
-        _no_reference(report, geometry, key, name, "point", geometry.points, "O")
-    return found
+    """The point of a reference; a mistake is reported where there is none."""
+    point = geometry.point(name)
+    if point is None:
+        _report_reference(report, geometry, key, name, "point", geometry.points)
+    return point
 
 
 def vector_of(
     report: Collector, geometry: Geometry, key: Key, name: Any, *, unit: bool
 ) -> Located | None:
-    """The vector that a reference means; reported where there is none."""
-    found = geometry.vector(name, unit=unit)
-    if found is None:
-        _no_reference(report, geometry, key, name, "vector", geometry.vectors, "x")
-    return found
+    """The vector of a reference; a mistake is reported where there is none."""
+    vector = geometry.vector(name, unit=unit)
+    if vector is None:
+        _report_reference(report, geometry, key, name, "vector", geometry.vectors)
+    return vector
 
 
 def body_of(report: Collector, bodies: Bodies, key: Key, name: Any) -> int:
-    """Index of the body that a reference means; BAD and reported where there is none."""
-    found = bodies.index.get(name, BAD) if isinstance(name, str) else BAD
-    if found == BAD:
-        report.add(
-            key,
-            MISSING if name is None else name,
-            *missing_words(report, "body", name, bodies.index),
-        )
-    return found
+    """Index of the body of a reference; BAD where a mistake is reported."""
+    return body_index_of(report, bodies.body_index, key, name)
 
 
-def _no_reference(
+def body_index_of(report: Collector, index: Mapping[str, int], key: Key, name: Any) -> int:
+    """Index of the body of a reference; BAD where a mistake is reported."""
+    body = index.get(name, BAD) if isinstance(name, str) else BAD
+    if body == BAD:
+        value = MISSING if name is None else name
+        report.add(key, value, *missing_words(report, "body", name, index))
+    return body
+
+
+def _report_reference(
     report: Collector,
     geometry: Geometry,
     key: Key,
     name: Any,
-    what: str,
+    kind: str,
     declared: dict[str, Located],
-    offered: str,
 ) -> None:
-    words, near, remedy = missing_words(report, what, name, declared)
-    index = geometry.bodies.index
+    words, near, remedy = missing_words(report, kind, name, declared)
+    index, options = geometry.bodies.body_index, ORIGIN if kind == "point" else AXES
     if isinstance(name, str) and "." in name:
         body, _, last = name.rpartition(".")
-        options = ORIGIN if what == "point" else AXES
         if body in index:
-            words = f"bodies offer as {what}s: {', '.join(options)}; there is no {last!r}"
+            words = f"bodies offer as {kind}s: {', '.join(options)}; there is no {last!r}"
             close = report.nearest(last, options)
             near = f"{body}.{close}" if close else ""
         else:
@@ -181,22 +178,22 @@ def _no_reference(
             close = report.nearest(body, index)
             near = f"{close}.{last}" if close and last in options else ""
     elif isinstance(name, str) and name in index and not near:
-        remedy = f"{name} is a body; of it, {name}.{offered} is a {what}"
+        remedy = f"{name} is a body; of it, {name}.{next(iter(options))} is a {kind}"
     report.add(key, MISSING if name is None else name, words, near, remedy)
 
 
 def missing_words(
-    report: Collector, what: str, name: Any, declared: Collection[str]
+    report: Collector, kind: str, name: Any, declared: Collection[str]
 ) -> tuple[str, str, str]:
-    """Words, nearest spelling and remedy for a reference that leads nowhere."""
+    """Fault, nearest spelling and remedy of an invalid reference."""
     if name is None:
-        return f"is required: the name of a {what}", "", ""
+        return f"is required: the name of a {kind}", "", ""
     if isinstance(name, int) and not isinstance(name, bool):
         remedy = _numbered(name, declared)
-        return f"should be the name of a {what} (text), not a number", "", remedy
+        return f"should be the name of a {kind} (text), not a number", "", remedy
     if not isinstance(name, str):
-        return f"should be the name of a {what}", "", ""
-    words, near = f"there is no {what} {name!r}", report.nearest(name, declared)
+        return f"should be the name of a {kind}", "", ""
+    words, near = f"there is no {kind} {name!r}", report.nearest(name, declared)
     if name and declared and not near:
         few = ", ".join(islice(declared, 8)) + (", ..." if len(declared) > 8 else "")
         words += f" (there are {few})"
@@ -204,21 +201,21 @@ def missing_words(
 
 
 def _numbered(number: int, declared: Collection[str]) -> str:
-    """What a number of the manual means: bodies are counted from ground, 0, all else from 1."""
-    place = number if GROUND in declared else number - 1
+    """The name of an index of the manual: bodies count from ground, 0, all else from 1."""
+    index = number if GROUND in declared else number - 1
     if number == 0 and GROUND in declared:
         return "number 0 of the manual is the ground"
-    if number < 1 or place >= len(declared):
+    if number < 1 or index >= len(declared):
         return ""
-    return f"number {number} in the order of the file is {next(islice(declared, place, None))!r}"
+    return f"number {number} in the order of the file is {next(islice(declared, index, None))!r}"
 
 
 def _bodies_of(report: Collector, keys: Keys, names: list[Any], bodies: Bodies) -> list[int]:
     """Body indices of a column of names."""
     if set(map(type, names)) <= {str}:
-        found = [bodies.index.get(name, BAD) for name in names]
-        if BAD not in found:
-            return found
+        indices = [bodies.body_index.get(name, BAD) for name in names]
+        if BAD not in indices:
+            return indices
     return [body_of(report, bodies, keys[k], name) for k, name in enumerate(names)]
 
 
@@ -231,11 +228,9 @@ def _directions(report: Collector, names: tuple[str, ...]) -> tuple[Floats, Floa
     for k in np.flatnonzero(length < SHORTEST):
         what = f"a vector needs a direction; the length of this one is {length[k]:g}"
         report.add(keys[k], given[k], what)
-    off = np.abs(length - 1.0) > ROUNDING
-    for k in np.flatnonzero(off & (length >= SHORTEST)):
-        report.note(
-            f"vectors.{names[k]}.sp: length {length[k]:.9g}, normalised to 1", "vectors normalised"
-        )
+    for k in np.flatnonzero((np.abs(length - 1.0) > ROUNDING) & (length >= SHORTEST)):
+        text = f"vectors.{names[k]}.sp: length {length[k]:.9g}, normalised to 1"
+        report.note(text, "vectors normalised")
     with np.errstate(invalid="ignore", divide="ignore"):
         return raw, np.asarray(raw / length[:, None])
 

@@ -1,11 +1,20 @@
-"""The settings of a run: [simulation] of a scene file, or what a script or command line gives."""
+"""Check of the settings of a run, from a scene file, a script or the command line."""
 
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from dap3d_core.registry.suggestions import nearest
-from dap3d_core.scene.errors import MISSING, Key, Mistake, SceneError, dotted
-from dap3d_core.scene.scene import HEADER_KEYS, SCHEMA, Scene, Simulation
+from dap3d_core.scene.errors import MISSING, Key, MistakeList
+from dap3d_core.scene.scene import (
+    FIXED_STEP,
+    HEADER_KEYS,
+    INTEGRATORS,
+    METHODS,
+    NO_STEP,
+    SCHEMA,
+    Scene,
+    Simulation,
+)
 from dap3d_core.scene.validate.coerce_values import (
     Fault,
     bounded,
@@ -14,29 +23,23 @@ from dap3d_core.scene.validate.coerce_values import (
     truth_of,
     word_of,
 )
+from dap3d_core.scene.validate.mistake_collector import Collector
 
-#: What ``method`` and ``integrator`` may say.
-METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq")
-INTEGRATORS = ("auto", "dopri5", "dop853", "adams", "rk4", "radau")
-#: What ``correct_metric`` may say (simulation/initial/assemble.py).
+#: Values of ``correct_metric`` (simulation/initial/assemble.py).
 CORRECT_METRICS = ("unit", "mass")
-#: Integrators without an error estimate, which need a step.
-FIXED_STEP = ("rk4",)
-#: Integrators that take no step.
-NO_STEP = ("adams",)
-#: Absolute tolerances that are taken where none are given, SI, and what may have one of its own.
+#: Default absolute tolerance, SI, and the quantities that may have one of their own.
 USUAL_ATOL = 1e-10
 QUANTITIES = ("r", "p", "v", "w")
 #: Relative tolerances below are beyond double precision.
 SMALLEST_RTOL = 1e-14
-#: Times that are shorter, s, leave double precision in products and quotients.
+#: Shorter times, s, leave double precision in products and quotients.
 SHORTEST_TIME = 1e-100
-#: More reported times are refused before anything is computed.
+#: Maximal number of reported times.
 MOST_ROWS = 5e7
 
 
 def _time(value: Any, *, positive: bool = True) -> Any:
-    """A time, s, long enough to be computed with, or 0 where that is allowed."""
+    """A time, s, long enough to compute with, or 0 where that is allowed."""
     number = bounded(number_of(value), positive=positive, minimum=0.0)
     if isinstance(number, Fault) or number == 0.0 or number >= SHORTEST_TIME:
         return number
@@ -49,35 +52,39 @@ def _tolerance(value: Any) -> Any:
         return bounded(number_of(value), minimum=0.0)
     for name, part in value.items():
         if name not in QUANTITIES:
-            words = f"has no quantity {name!r}: r (m), p, v (m/s), w (rad/s)"
-            return Fault(words, nearest=nearest(str(name), QUANTITIES) or "")
+            what = f"has no quantity {name!r}: r (m), p, v (m/s), w (rad/s)"
+            return Fault(what, nearest=nearest(str(name), QUANTITIES) or "")
         number = bounded(number_of(part), minimum=0.0)
         if isinstance(number, Fault):
             return Fault(f"{name} {number.what}", number.remedy, number.nearest)
     return value
 
 
-_READ: dict[str, Callable[[Any], Any]] = {
+def _positive(value: Any) -> Any:
+    return bounded(number_of(value), positive=True)
+
+
+_READERS: dict[str, Callable[[Any], Any]] = {
     "t_end": lambda v: _time(v, positive=False),
     "dt": _time,
     "method": lambda v: word_of(v, METHODS),
     "integrator": lambda v: word_of(v, INTEGRATORS),
     "rtol": lambda v: bounded(number_of(v), minimum=SMALLEST_RTOL, maximum=1.0),
-    "atol": lambda v: _tolerance(v),
+    "atol": _tolerance,
     "step": _time,
     "correct": truth_of,
     "project": truth_of,
     "correct_metric": lambda v: word_of(v, CORRECT_METRICS),
-    "alpha": lambda v: bounded(number_of(v), positive=True),
-    "Omega": lambda v: bounded(number_of(v), positive=True),
-    "mu": lambda v: bounded(number_of(v), positive=True),
+    "alpha": _positive,
+    "Omega": _positive,
+    "mu": _positive,
 }
-#: Settings that may be left open.
+#: Settings without a default.
 OPEN = ("t_end", "dt", "atol", "step")
 
 
 def check_simulation(simulation: Simulation, body_names: Collection[str]) -> None:
-    """Refuse settings that make no sense, such as those a script or a command line gives.
+    """Check settings such as those of a script or the command line.
 
     Args:
         simulation: the settings.
@@ -86,105 +93,84 @@ def check_simulation(simulation: Simulation, body_names: Collection[str]) -> Non
     Raises:
         SceneError: all mistakes; their keys are the names of the settings.
     """
-    found = simulation_mistakes(simulation, body_names)
-    if found:
-        raise SceneError(m for _, m in found)
+    report = Collector(Scene())
+    check_settings(report, simulation, body_names, ())
+    report.raise_mistakes()
 
 
-def simulation_mistakes(
-    simulation: Simulation, body_names: Collection[str], key: Key = ()
-) -> list[tuple[Key, Mistake]]:
-    """Everything that is wrong in settings, under a key such as ``("simulation",)``."""
-    found: list[tuple[Key, Mistake]] = []
+def check_settings(
+    report: Collector, simulation: Simulation, body_names: Collection[str], key: Key
+) -> None:
+    """Report all mistakes in settings, under a key such as ``("simulation",)``."""
     good: dict[str, Any] = {}
-    for name, read in _READ.items():
+    for name, reader in _READERS.items():
         value = getattr(simulation, name)
-        result = None if value is None and name in OPEN else read(value)
-        if isinstance(result, Fault):
-            found.append(_mistake((*key, name), value, result))
-        else:
+        if value is None and name in OPEN:
+            continue
+        result = report.read((*key, name), value, reader)
+        if not isinstance(result, Fault):
             good[name] = result
-    found += _step_mistakes(simulation, good, key)
-    found += _span_mistakes(simulation, good, len(body_names), key)
-    found += _hold_mistakes(simulation.hold, body_names, (*key, "hold"))
-    return found
+    _check_step(report, simulation, good.get("integrator"), (*key, "step"))
+    _check_span(report, simulation, good, len(body_names), (*key, "dt"))
+    _check_hold(report, simulation.hold, body_names, (*key, "hold"))
 
 
-def _step_mistakes(
-    simulation: Simulation, good: dict[str, Any], key: Key
-) -> list[tuple[Key, Mistake]]:
-    if good.get("integrator") in NO_STEP and simulation.step is not None:
-        words = f"{simulation.integrator} chooses its step itself, together with its order"
-        fault = Fault(words, "leave step out, or take rk4, dopri5 or dop853")
-        return [_mistake((*key, "step"), simulation.step, fault)]
-    if good.get("integrator") not in FIXED_STEP or simulation.step is not None:
-        return []
-    words = f"{simulation.integrator} does not choose its step"
-    fault = Fault(f"{words}: give step, or take an adaptive method")
-    return [_mistake((*key, "step"), MISSING, fault)]
+def _check_step(report: MistakeList, simulation: Simulation, integrator: Any, key: Key) -> None:
+    if integrator in NO_STEP and simulation.step is not None:
+        what = f"{integrator} chooses its step itself, together with its order"
+        remedy = "leave step out, or take rk4, dopri5 or dop853"
+        report.add(key, simulation.step, what, remedy=remedy)
+    if integrator in FIXED_STEP and simulation.step is None:
+        what = f"{integrator} does not choose its step: give step, or take an adaptive method"
+        report.add(key, MISSING, what)
 
 
-def _span_mistakes(
-    simulation: Simulation, good: dict[str, Any], body_count: int, key: Key
-) -> list[tuple[Key, Mistake]]:
-    """A reporting step that fits the final time, and not too many reports."""
+def _check_span(
+    report: MistakeList, simulation: Simulation, good: dict[str, Any], body_count: int, key: Key
+) -> None:
+    """The reporting step is not longer than the run, and not too many times are reported."""
     t_end, dt = good.get("t_end"), good.get("dt")
     if not t_end or not dt:
-        return []
+        return
     if dt > t_end:
-        fault = Fault(f"the reporting step is longer than the run (t_end = {t_end:g})")
+        what = f"the reporting step is longer than the run (t_end = {t_end:g})"
+        report.add(key, simulation.dt, what)
     elif t_end / dt > MOST_ROWS:
-        rows, numbers = t_end / dt, 13 * max(body_count, 1)
-        fault = Fault(
-            f"t_end / dt asks for {rows:.3g} reported times of {numbers} numbers or more, "
-            f"{8 * numbers * rows / 2**30:.3g} GiB; at most {MOST_ROWS:g} times are reported",
-            f"give dt of at least {t_end / MOST_ROWS:.3g}",
+        rows, scalars = t_end / dt, 13 * max(body_count, 1)
+        what = (
+            f"t_end / dt asks for {rows:.3g} reported times of {scalars} numbers or more, "
+            f"{8 * scalars * rows / 2**30:.3g} GiB; at most {MOST_ROWS:g} times are reported"
         )
-    else:
-        return []
-    return [_mistake((*key, "dt"), simulation.dt, fault)]
+        report.add(key, simulation.dt, what, remedy=f"give dt of at least {t_end / MOST_ROWS:.3g}")
 
 
-def _hold_mistakes(hold: Any, body_names: Collection[str], key: Key) -> list[tuple[Key, Mistake]]:
+def _check_hold(report: MistakeList, hold: Any, body_names: Collection[str], key: Key) -> None:
     if type(hold) is not tuple:
-        return [_mistake(key, hold, Fault('should be a list of names of bodies, ["crank"]'))]
+        report.add(key, hold, 'should be a list of names of bodies, ["crank"]')
+        return
     known = frozenset(body_names)
-    wrong = [(k, n) for k, n in enumerate(hold) if not (isinstance(n, str) and n in known)]
-    near = {name: nearest(name, known) for _, name in wrong[:100] if isinstance(name, str)}
-    return [
-        _mistake((*key, k), name, Fault(f"there is no body {name!r}", "", near.get(name, "")))
-        for k, name in wrong
-    ]
+    for k, name in enumerate(hold):
+        if not (isinstance(name, str) and name in known):
+            report.add((*key, k), name, f"there is no body {name!r}", report.nearest(name, known))
 
 
-def header_mistakes(scene: Scene) -> list[tuple[Key, Mistake]]:
-    """Everything that is wrong in [scene]."""
-    found: list[tuple[Key, Mistake]] = []
+def check_header(report: Collector) -> None:
+    """Report all mistakes in [scene]."""
     for name in sorted(HEADER_KEYS - {"schema"}):
-        text = text_of(getattr(scene, name))
-        if isinstance(text, Fault):
-            found.append(_mistake(("scene", name), getattr(scene, name), text))
-    schema = scene.schema
+        report.read(("scene", name), getattr(report.scene, name), text_of)
+    schema, key = report.scene.schema, ("scene", "schema")
     if type(schema) is not int or schema < 1:
-        fault = Fault(f"the version of the file format is a whole number; the newest is {SCHEMA}")
+        what = f"the version of the file format is a whole number; the newest is {SCHEMA}"
+        report.add(key, schema, what)
     elif schema > SCHEMA:
-        fault = Fault(
-            f"the file format is newer than this program, which reads up to {SCHEMA}",
-            "install a newer dap3d",
-        )
-    else:
-        return found
-    return [*found, _mistake(("scene", "schema"), schema, fault)]
+        what = f"the file format is newer than this program, which reads up to {SCHEMA}"
+        report.add(key, schema, what, remedy="install a newer dap3d")
 
 
 def notes_of(simulation: Simulation) -> list[str]:
-    """What looks odd in settings that are allowed."""
+    """Notes on settings that are allowed and unusual."""
     atol = simulation.atol
     parts = atol.values() if isinstance(atol, Mapping) else [atol]
     if any(part == 0.0 and type(part) in (int, float) for part in parts):
         return ["simulation.atol = 0: a quantity that is zero is then asked for without any error"]
     return []
-
-
-def _mistake(key: Key, value: Any, fault: Fault) -> tuple[Key, Mistake]:
-    return key, Mistake(dotted(key), value, fault.what, fault.nearest, fault.remedy)

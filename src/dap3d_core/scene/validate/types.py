@@ -1,13 +1,13 @@
-"""The types that a scene names, from the registry; the model's own file only where it is needed."""
+"""Types that a scene names, from the registry; the model's own file only where needed."""
 
 from pathlib import Path
 
-from dap3d_core.interface import PluginError
 from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.errors import PluginError
 from dap3d_core.registry import Registry, UnknownTypeError
 from dap3d_core.registry.declared_types import declares
 from dap3d_core.scene.errors import MISSING
-from dap3d_core.scene.files.read_toml import PLUGIN_FILE
+from dap3d_core.scene.scene import PLUGIN_FILE
 from dap3d_core.scene.validate.coerce_values import Fault, text_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 
@@ -32,51 +32,50 @@ class Types:
         folder = report.scene.folder
         file = folder / PLUGIN_FILE if folder is not None else None
         self.file: Path | None = file if file is not None and file.is_file() else None
-        self._refused = ""  # why the model's own file gave no types
-        self._installed: list[tuple[str, str]] = []  # types that were taken from packages
+        self._refused = ""  # the reason why the model's own file gave no types
+        self._installed: list[tuple[str, str]] = []  # types taken from packages
 
     def of(self, table: str) -> dict[str, Examined]:
-        """The types of a table's elements by keyword; what cannot be had is reported."""
-        named: dict[str, list[str]] = {}
+        """The types of a table's elements by keyword; unusable ones are reported."""
+        elements: dict[str, list[str]] = {}
         for name, element in getattr(self.report.scene, table).items():
-            word = text_of(element.type) if element.type is not None else None
-            if isinstance(word, str):
-                named.setdefault(word, []).append(name)
+            key = (table, name, "type")
+            if element.type is None:
+                known = ", ".join(self.registry.keywords(KINDS[table]))
+                what = f"is required: the keyword of a type, one of {known}"
+                self.report.add(key, MISSING, what)
                 continue
-            known = ", ".join(self.registry.keywords(KINDS[table]))
-            what = f"is required: the keyword of a type, one of {known}"
-            what = what if word is None else word.what
-            value = MISSING if word is None else element.type
-            self.report.add((table, name, "type"), value, what)
-        found = {word: self._get(table, word, names) for word, names in named.items()}
-        return {word: examined for word, examined in found.items() if examined is not None}
+            keyword = self.report.read(key, element.type, text_of)
+            if not isinstance(keyword, Fault):
+                elements.setdefault(keyword, []).append(name)
+        types = {keyword: self._get(table, keyword, names) for keyword, names in elements.items()}
+        return {keyword: type_ for keyword, type_ in types.items() if type_ is not None}
 
     def note_unused_file(self) -> None:
-        """Say that the model's own file was not needed, where it stands there unused."""
+        """Note that the model's own file was not needed."""
         if self.file is not None and not self._is_loaded() and not self._refused:
             self.report.note(f"{self.file} was not loaded: every type of the scene is installed")
 
     def _is_loaded(self) -> bool:
         return any(s.module == str(self.file) for f in self.registry.sources.values() for s in f)
 
-    def _get(self, table: str, word: str, names: list[str]) -> Examined | None:
-        key = (table, names[0], "type")
-        count = len(names) - 1
-        more = f" ({count} more elements of this type)" if count else ""
+    def _get(self, table: str, keyword: str, names: list[str]) -> Examined | None:
+        """The type, or None where a mistake is reported, at the first element that names it."""
+        count, remedy = len(names) - 1, ""
         try:
-            return self._ask(KINDS[table], word)
+            return self._load(KINDS[table], keyword)
         except _NotAllowedError as error:
-            fault = Fault(str(error), "allow it with --allow-code (allow_code=True in Python)")
+            what, remedy = str(error), "allow it with --allow-code (allow_code=True in Python)"
         except UnknownTypeError as error:
-            words = str(error) + (f"; {self._refused}" if self._refused else "")
-            fault = Fault(words)
+            what = str(error) + (f"; {self._refused}" if self._refused else "")
         except PluginError as error:
-            fault = Fault(str(error))
-        self.report.add(key, word, fault.what + more, "", fault.remedy)
+            what = str(error)
+        what += f" ({count} more elements of this type)" if count else ""
+        self.report.add((table, names[0], "type"), keyword, what, remedy=remedy)
         return None
 
-    def _ask(self, kind: str, word: str) -> Examined:
-        """The type; one that the model's own file has as well is refused, whichever comes first."""
+    def _load(self, kind: str, word: str) -> Examined:
+        """The type; one that the model's own file has as well is refused."""
         try:
             examined = self.registry.get(kind, word)
         except UnknownTypeError as error:
@@ -98,7 +97,7 @@ class Types:
         except PluginError as error:
             self._refused = str(error)
             raise
-        for other in self._installed:  # the text of the file may not have told its keywords
+        for other in self._installed:  # the text of the file may not show all its keywords
             self.registry.get(*other)
         return self.registry.get(kind, word)
 

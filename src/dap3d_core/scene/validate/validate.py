@@ -1,6 +1,8 @@
-"""The check of a whole scene: every mistake is found and reported at once, with file and line."""
+"""Check of a whole scene: all mistakes are reported at once, with file and line."""
 
 from typing import TYPE_CHECKING
+
+import attrs
 
 from dap3d_core.registry import Registry
 from dap3d_core.scene.errors import dotted
@@ -13,23 +15,23 @@ if TYPE_CHECKING:
 
 
 def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Checked:
-    """Check a scene and return what the model is made from.
+    """Check a scene and return the arrays and instances that the model is built from.
 
     Args:
-        scene: what the user described.
+        scene: the scene as described.
         registry: the installed types; only those that the scene names are loaded.
-        allow_code: whether the ``plugin.py`` beside the scene may be run. It is run only where a
-            type is not installed.
+        allow_code: allow the scene's own ``plugin.py`` to run; it is run only where a type is not
+            installed.
 
     Raises:
-        SceneError: holds all mistakes, each with file, line, key, value, what is wrong, the nearest
-            right spelling and a remedy.
+        SceneError: holds all mistakes, each with file, line, key, value, fault, nearest right
+            spelling and remedy.
     """
     # numpy is imported here: a command that checks nothing does not wait for it.
     from dap3d_core.scene.validate.bodies import read_bodies
     from dap3d_core.scene.validate.elements import read_elements, report_twins
     from dap3d_core.scene.validate.geometry import read_geometry
-    from dap3d_core.scene.validate.settings import header_mistakes, notes_of, simulation_mistakes
+    from dap3d_core.scene.validate.settings import check_header, check_settings, notes_of
     from dap3d_core.scene.validate.types import Types
 
     report = Collector(scene)
@@ -42,9 +44,12 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Chec
     forces = read_elements(report, geometry, "forces", types.of("forces"))
     report_twins(report, "joints", joints)
     report_twins(report, "forces", forces)
-    _check_shapes(report, bodies)
-    report.extend(header_mistakes(scene))
-    report.extend(simulation_mistakes(scene.simulation, bodies.names, ("simulation",)))
+    if scene.shapes:
+        from dap3d_core.scene.validate.shapes import read_shapes
+
+        read_shapes(report, bodies.body_index)
+    check_header(report)
+    check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
     report.raise_mistakes()
 
     types.note_unused_file()
@@ -54,14 +59,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Chec
     return Checked(
         scene=scene,
         registry=types.registry,
-        body_names=bodies.names,
-        body_index=bodies.index,
-        mass=bodies.mass,
-        Jp=bodies.Jp,
-        r=bodies.r,
-        p=bodies.p,
-        r_dot=bodies.r_dot,
-        w=bodies.w,
+        **attrs.asdict(bodies, recurse=False),
         point_names=geometry.point_names,
         point_body=geometry.point_body,
         point_local=geometry.point_local,
@@ -78,33 +76,26 @@ def _check_names(report: Collector) -> None:
         names = getattr(report.scene, table)
         for name in names:
             if type(name) is str and name.isidentifier() and name.lower() != "ground":
-                continue  # what nearly all names are
+                continue  # nearly all names
             if fault := fault_of_name(name):
                 key = (table, str(name))
                 report.add(key, name, f"not a name for one of the {table}: {fault}")
 
 
-def _check_shapes(report: Collector, bodies: "Bodies") -> None:
-    if report.scene.shapes:
-        from dap3d_core.scene.validate.shapes import read_shapes
-
-        read_shapes(report, bodies.index)
-
-
 def _note_loose_bodies(report: Collector, bodies: "Bodies", elements: list[Instance]) -> None:
-    """Bodies that nothing holds or pushes: allowed, and worth a word."""
-    used = {body for e in elements for body in e.bodies}
+    """Note bodies without joints and forces."""
     if any(getattr(e.examined.type, "each_body", False) for e in elements):
         return
-    loose = [name for k, name in enumerate(bodies.names, 1) if k not in used]
-    for name in loose:
-        report.note(f"bodies.{name}: no joint and no force acts on it", "bodies left alone")
+    used = {body for e in elements for body in e.bodies}
+    for k, name in enumerate(bodies.body_names, 1):
+        if k not in used:
+            report.note(f"bodies.{name}: no joint and no force acts on it", "bodies left alone")
 
 
 def _note_unused_functions(report: Collector, elements: list[Instance]) -> None:
-    used = {place for e in elements for place in e.functions}
+    used = {index for e in elements for index in e.functions}
     called = {e.values[field] for e in elements for field in e.examined.argument_functions}
-    for place, name in enumerate(report.scene.functions, 1):
-        if place not in used and name not in called:
+    for index, name in enumerate(report.scene.functions, 1):
+        if index not in used and name not in called:
             key = dotted(("functions", name))
             report.note(f"{key}: no joint and no force uses it", "functions left unused")

@@ -1,4 +1,4 @@
-"""A scene that was checked: what the model is made from. No name is searched after this."""
+"""The validated scene, from which the model is built: arrays and instances, names resolved."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -21,16 +21,16 @@ class Instance:
     """A joint, a force or a function with everything its type needs.
 
     Attributes:
-        name: as the scene calls it.
+        name: its name in the scene.
         examined: its type.
         bodies: body index of each slot of ``examined.layout.slots`` (ground 0); empty for an
             element that acts on each body.
-        functions: for each of ``examined.layout.functions`` 0 where absent, else 1 + its place
-            among the functions of the scene.
+        functions: for each of ``examined.layout.functions`` 0 where absent, else 1 + its index
+            in the functions of the scene.
         others: body index of each of ``examined.layout.others``, vectors that no slot belongs to.
         values: field -> plain value. Points and vectors: 3 numbers on their body, vectors of unit
             length; a vector2 gives the two points ``P_i`` and ``P_j``; numbers: floats, or None
-            where ``prepare`` finds them; vec3, table: tuples; matrix: three rows; references to
+            where ``prepare`` returns them; vec3, table: tuples; matrix: three rows; references to
             bodies, functions and joints: words; choices: words, False or True.
     """
 
@@ -47,8 +47,8 @@ class Checked:
     """A scene without mistakes, as arrays and instances.
 
     Attributes:
-        scene: what was checked.
-        registry: where its types come from (with those of the model's own file, where needed).
+        scene: the scene as described.
+        registry: the source of its types (with those of the model's own file, where needed).
         body_names: n names without ground, in file order.
         body_index: name -> index; ground 0, bodies 1 to n.
         mass: (n,) kg.
@@ -60,9 +60,9 @@ class Checked:
         point_names: declared points in file order, then animation points (``animation.1``, ...).
         point_body: (points,) body index of each.
         point_local: (points, 3) coordinates on that body, m.
-        animation_count: how many of the points are animation points.
+        animation_count: number of animation points among the points.
         joints, forces, functions: in file order.
-        notes: what was changed, assumed or looks odd; nothing of it stops a run.
+        notes: changes, assumptions and unusual values; none of them stops a run.
     """
 
     scene: Scene

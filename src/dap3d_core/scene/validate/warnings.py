@@ -1,17 +1,16 @@
-"""Values that are allowed and look odd: they get a note, and are used as they are."""
+"""Notes on values that are allowed and unusual; they are used unchanged."""
 
 from typing import Any
 
 from dap3d_core.interface.fields import FieldSpec
+from dap3d_core.scene.validate.coerce_values import ROUNDING
 
 #: An angle beyond a full turn is probably given in degrees.
 TURN = 6.283185307179586
-#: Three numbers of this length within are of unit length.
-ROUNDING = 1e-9
 
 
 def oddity(spec: FieldSpec, value: Any) -> str:
-    """What is odd about a good value of a field, in words that follow it; "" if nothing is."""
+    """The note on an unusual value of a field, to follow it in a message; "" for no note."""
     if spec.kind == "number":
         low, high = spec.usual
         if low is not None and value < low:
