@@ -76,9 +76,9 @@ class Case(NamedTuple):
     """A bad input.
 
     Attributes:
-        title: the line of ``titles.md`` that it is one of.
+        title: the mistake in short.
         text: the scene.
-        comes: what must come of it: "refused" (a mistake of the scene), "failed" (no motion),
+        comes: the required outcome: "refused" (a mistake of the scene), "failed" (no motion),
             "noted" (a warning), "told" (for information), "allowed" (nothing is said).
         words: what must be said.
         key: of the mistake; with "failed" not used.

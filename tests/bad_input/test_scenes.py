@@ -1,8 +1,9 @@
-"""Every bad input in a scene is refused, noted or allowed, as its nature asks, in clear words."""
+"""Scenes that are valid and yet wrong: refused, noted or allowed, with clear messages.
 
-import re
+Mistakes that the check of a scene finds are in tests/unit/scene/mistakes.py.
+"""
+
 from itertools import groupby
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,37 +13,6 @@ import dap3d_core as dap
 from dap3d_core.result import INFORMATION
 
 CASES = [*bodies_and_numbers.CASES, *elements.CASES]
-HERE = Path(__file__).parent
-#: Titles that the tests of the scene floor cover: file, test or row of a table there.
-ELSEWHERE = {
-    "file missing": ("test_scene_reading.py", "no/such/file.toml"),
-    "is a directory": ("test_scene_reading.py", "test_a_folder_without_a_scene_names_what_it"),
-    "empty file": ("test_scene_check.py", "test_empty_and_bodiless_scenes_are_refused"),
-    "binary or image renamed .toml": ("test_scene_reading.py", '"image": (b"'),
-    "no read permission": ("test_scene_reading.py", "test_a_file_that_may_not_be_read_is_refused"),
-    "CRLF or mixed ends": ("test_scene_reading.py", "mixed_line_ends_are_read"),
-    "truncated file": ("test_scene_reading.py", '"truncated list"'),
-    "NUL bytes": ("test_scene_reading.py", '"NUL": ('),
-    "1 GB file": ("test_scene_reading.py", "test_a_huge_file_is_refused_before_it_is_read"),
-    "duplicate keys": ("test_scene_reading.py", '"key twice"'),
-    "unknown or misspelt key": ("scene_data/mistakes.py", '"mas = 1.0"'),
-    "wrong case key": ("scene_data/mistakes.py", '"MASS = 1.0"'),
-    "unknown or newer schema version": ("scene_data/mistakes.py", '"schema = 2"'),
-    "missing required section": ("test_scene_check.py", "[scene]\\nname = 'a'"),
-    "URL where a path is expected": ("test_scene_reading.py", "https://example.com"),
-    "odd file name": ("test_scene_reading.py", "test_odd_file_names_are_read"),
-    "MATLAB file with code to run": ("test_scene_reading.py", "system('true')"),
-    "missing body, point or vector": ("scene_data/mistakes.py", '"grund.O"'),
-    "index off by one, or 0 where not ground": ("scene_data/mistakes.py", "number 3"),
-    "body i = body j": ("scene_data/mistakes.py", "body i and body j are both crank"),
-    "ground as body i": ("scene_data/mistakes.py", "body i is ground"),
-    "nearly zero axis": ("scene_data/mistakes.py", "1e-14"),
-}  # fmt: skip
-
-
-def titles():
-    """The lines of the list."""
-    return re.findall(r"^- (.+)$", (HERE / "titles.md").read_text(), flags=re.MULTILINE)
 
 
 def names(cases):
@@ -54,15 +24,6 @@ def names(cases):
     ]
     assert len(set(numbered)) == len(numbered), "cases of a title stand together"
     return numbered
-
-
-def test_every_title_has_a_case():
-    """And every case a title; those of other files are there."""
-    covered = {case.title for case in CASES}
-    assert covered | set(ELSEWHERE) == set(titles())
-    for file, words in ELSEWHERE.values():
-        text = (HERE.parent / "unit" / file).read_text()
-        assert words.replace('\\"', '"') in text.replace('\\"', '"'), (file, words)
 
 
 @pytest.mark.parametrize("case", CASES, ids=names(CASES))

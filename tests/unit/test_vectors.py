@@ -300,7 +300,7 @@ def formula(a0, a1, a2, b0, b1, b2):
 
 def test_the_formula_uses_every_word():
     """What the tests above and below run over is complete: all public words, but for ``normals``
-    and ``lookup``, which reads tables (test_interface_variants.py)."""
+    and ``lookup``, which reads tables (interface/codegen/test_specialise.py)."""
     used = set(formula.__code__.co_names)
     assert used == set(kernels.__all__) - {"normals", "lookup"}
     assert all(inspect.getdoc(getattr(kernels, word)) for word in kernels.__all__)

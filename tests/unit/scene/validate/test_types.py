@@ -1,7 +1,7 @@
 """Types of a model's own: run only where allowed and needed; their fields are checked."""
 
 import pytest
-from unit.scene_data.base import mistakes_of, scene_of
+from unit.scene.base import mistakes_of, scene_of
 
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check

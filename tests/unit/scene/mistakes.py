@@ -1,8 +1,9 @@
-"""Mistakes in the good scene: what stands in the file, what is put there, key, words said."""
+"""Mistakes in the good scene: text of the file, its replacement, key, words of the message."""
 
 BODY_MISTAKES = [
     ("mass = 1.0", "mass = 0", "bodies.crank.mass", ["greater than 0", "small mass"]),
     ("mass = 1.0", "mass = -1.0", "bodies.crank.mass", ["-1.0", "greater than 0"]),
+    ("mass = 1.0", "mass = -0.0", "bodies.crank.mass", ["greater than 0", "small mass"]),
     ("mass = 1.0", "mass = nan", "bodies.crank.mass", ["finite number, not nan"]),
     ("mass = 1.0", "mass = inf", "bodies.crank.mass", ["finite number, not inf"]),
     ("mass = 1.0", "mass = 1e999", "bodies.crank.mass", ["finite number, not inf"]),
@@ -32,7 +33,8 @@ BODY_MISTAKES = [
     ("p = [1.0, 0.0, 0.0, 0.0]", "p = [0, 0, 0, 0]", "bodies.crank.p", ["zero length"]),
     ("p = [1.0, 0.0, 0.0, 0.0]", "p = [1, 0, 0]", "bodies.crank.p", ["4 numbers", "has 3"]),
     ("p = [1.0, 0.0, 0.0, 0.0]", "p = [1, 0, 0, 0, 0]", "bodies.crank.p", ["has 5"]),
-    ("p = [1.0, 0.0, 0.0, 0.0]", "p = [1.0, 0.01, 0, 0]", "bodies.crank.p", ["unit length"]),
+    ("p = [1.0, 0.0, 0.0, 0.0]", "p = [1.00001, 0, 0, 0]", "bodies.crank.p", ["write [1, 0"]),
+    ("p = [1.0, 0.0, 0.0, 0.0]", "p = [1e-200, 0, 0, 0]", "bodies.crank.p", ["zero length"]),
     ("p = [1.0, 0.0, 0.0, 0.0]", "p = [1.000002, 0, 0, 0]", "bodies.crank.p", ["1.000002"]),
     ("Jp = [0.5, 0.5, 0.1]", "Jp = [0.5, 0.5, 0]", "bodies.crank.Jp", ["zero", "small value"]),
     ("Jp = [0.5, 0.5, 0.1]", "Jp = [0, 0, 0]", "bodies.crank.Jp", ["zero"]),
@@ -42,6 +44,20 @@ BODY_MISTAKES = [
     ("Jp = [0.5, 0.5, 0.1]", "Jp = [1, 1]", "bodies.crank.Jp", ["3 numbers", "3x3"]),
     ("Jp = [0.5, 0.5, 0.1]", "Jp = 1", "bodies.crank.Jp", ["3 numbers", "3x3"]),
     ("Jp = [0.5, 0.5, 0.1]", "Jp = [1, nan, 1]", "bodies.crank.Jp", ["entry 2"]),
+    ("Jp = [0.5, 0.5, 0.1]", "Jp = [1e-320, 1e-320, 1e-320]", "bodies.crank.Jp", ["1e-100"]),
+    ("Jp = [0.5, 0.5, 0.1]", "Jp = [0.1, 0.1, 1e-15]", "bodies.crank.Jp", ["inertia is zero"]),
+    (
+        "Jp = [0.5, 0.5, 0.1]",
+        "Jp = [[0.1, 0], [0, 0.1]]",
+        "bodies.crank.Jp",
+        ["three rows", "2 entries"],
+    ),
+    (
+        "Jp = [0.5, 0.5, 0.1]",
+        "Jp = [[[1], [0], [0]], [[0], [1], [0]], [[0], [0], [1]]]",
+        "bodies.crank.Jp",
+        ["row 1", "entry 1", "a list of 1"],
+    ),
     ("[0.0, 0.5, 0.1]", "[0.0, 0.5, 0.2]", "bodies.rocker.Jp", ["symmetric", "(2, 3)", "(3, 2)"]),
     ("[0.0, 0.5, 0.1]", "[0.0, 0.5]", "bodies.rocker.Jp", ["row 2", "has 2"]),
     ("[0.0, 0.5, 0.1]", "[0.0, nan, 0.1]", "bodies.rocker.Jp", ["row 2", "entry 2"]),
@@ -56,6 +72,9 @@ BODY_MISTAKES = [
     ('color = "tab:blue"', "color = 3", "bodies.crank.color", ["colour"]),
     ("[bodies.crank]", '[bodies."a.b"]\nmass = 1.0\n[bodies.crank]', "bodies.a.b", ["no dot"]),
     ("[bodies.crank]", "[bodies.ground]\nmass = 1.0\n[bodies.crank]", "bodies.ground", ["always"]),
+    ("[bodies.crank]", "[bodies.Ground]\n[bodies.crank]", "bodies.Ground", ["another name"]),
+    ("[bodies.crank]", '[bodies."ground "]\n[bodies.crank]', "bodies.ground ", ["always"]),
+    ("[bodies.crank]", '[bodies."a "]\n[bodies.crank]', "bodies.a ", ["ends with a space"]),
     ("[bodies.crank]", '[bodies.""]\nmass = 1.0\n[bodies.crank]', "bodies.", ["not empty"]),
     ("[bodies.crank]", '[bodies."a\\nb"]\nmass = 1.0\n[bodies.crank]', "bodies.", ["line breaks"]),
 ]

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from unit.scene_data.base import BASE
-from unit.scene_data.base import scene_of as read_scene
+from unit.scene.base import BASE
+from unit.scene.base import scene_of as read_scene
 
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import Scene, SceneError, check

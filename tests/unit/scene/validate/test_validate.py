@@ -4,9 +4,9 @@ import textwrap
 
 import numpy as np
 import pytest
-from unit.scene_data.base import BASE, mistakes_of
-from unit.scene_data.base import scene_of as read_scene
-from unit.scene_data.mistakes import ALL
+from unit.scene.base import BASE, mistakes_of
+from unit.scene.base import scene_of as read_scene
+from unit.scene.mistakes import ALL
 
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import MISSING, SceneError, check, load

@@ -145,10 +145,13 @@ BAD_CONTENT = {
     "key twice": (TEXT.encode() + b"mass = 2.0\n", [":7:", "line 7, column 11"]),
     "table twice": (TEXT.encode() + b"[bodies.a]\n", [":7:", "line 7, column"]),
     "no value": (b"[scene]\nname =\n", [":2:", "line 2, column 7"]),
-    "word": (b"[scene]\nname = small\n", [":2:", "column 8"]),
+    "word": (b"[scene]\nname = small\n", [":2:", "column 8", "in quotes"]),
     "deep": (b"x = " + b"[" * 100_000, ["nested too deeply"]),
     "long integer": (b"x = " + b"9" * 10_000, ["not valid TOML"]),
     "old line ends": (TEXT.replace("\n", "\r").encode(), ["not valid TOML"]),
+    "decimal comma": (b"[scene]\nx = 1,5\n", [":2:", "decimal point"]),
+    "no digit": (b"[scene]\nx = .5\n", [":2:", "digits on both sides"]),
+    "NaN": (b"[scene]\nx = NaN\n", [":2:", "finite numbers"]),
     "program": (b"function inBodies\nsystem('rm -rf /tmp/x')\n", [":1:", "not valid TOML"]),
 }
 
