@@ -1,4 +1,4 @@
-"""The report floor: speed against error of every method and integrator on a user's own scene."""
+"""Work-precision reports: speed against error of every method and integrator on a scene."""
 
 import sys
 from types import ModuleType
@@ -6,7 +6,8 @@ from typing import Any
 
 from dap3d_core.report.recommend import Recommendation
 from dap3d_core.report.reference import Reference
-from dap3d_core.report.report import Failed, Report, Run
+from dap3d_core.report.report import Report
+from dap3d_core.report.run import Failed, Run
 from dap3d_core.report.runner import report
 from dap3d_core.report.settings_ladder import Setting
 from dap3d_core.report.timing import Refused
@@ -24,7 +25,7 @@ __all__ = [
 
 
 class _CallableModule(ModuleType):
-    """Lets ``dap3d_core.report(...)`` report whether or not this module is loaded."""
+    """Makes ``dap3d_core.report(...)`` callable once this module is loaded."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Report:
         return report(*arguments, **options)

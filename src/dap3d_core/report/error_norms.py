@@ -1,4 +1,4 @@
-"""How far a trajectory is from a reference: the measure of the IFToMM benchmark library.
+"""Distance of a trajectory from a reference: the measure of the IFToMM benchmark library.
 
 e = sqrt(mean over instants and components of (|y - y_ref| / max(|y_ref|, y_thr))^2), y_thr = 1e-3
 (Gonzalez, Dopico, Gonzalez, Cuadrado 2006), taken of the whole state u: positions, Euler
@@ -13,7 +13,7 @@ from dap3d_core.result.post.global_error import difference, largest_norms, least
 
 #: Components below are compared with this (SI), not with themselves.
 Y_THR = 1e-3
-#: Two references that differ by more than this part of the size have parted: chaos, or a fault.
+#: Relative difference from which two references have parted: chaos, or a fault.
 PARTED = 1e-3
 
 
@@ -31,10 +31,10 @@ def final_position_error(u: Floats, reference: Floats) -> float:
 
 
 def first_parting(t: Floats, u: Floats, other: Floats, length: float) -> int | None:
-    """Place of the first instant at which two trajectories have parted; None where they never do.
+    """Index of the first instant at which two trajectories have parted; None where they never do.
 
-    They have when a vector r, p, r_dot or w of some body differs by more than ``PARTED`` of the
-    largest such vector of the whole run; ``length``, m, is that of the scene (``least_sizes``).
+    They have parted where a vector r, p, r_dot or w of some body differs by more than ``PARTED`` of
+    the largest such vector of the run; ``length``, m, is that of the scene (``least_sizes``).
     """
     sizes, least = sizes_of(u), least_sizes(t, length)
     apart = np.zeros(len(u), dtype=bool)

@@ -1,20 +1,18 @@
-"""Which setting to take for an error that is wanted, and why, in words."""
+"""Recommendation of a setting for a target error, with its reason."""
 
 import math
 import statistics
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
 
-if TYPE_CHECKING:
-    from dap3d_core.report.report import Run
+from dap3d_core.report.run import Run
 
-
-#: An error is smaller than another one if it is below this part of it: equal motions differ in
+#: An error counts as smaller than another below this fraction of it: equal motions differ in
 #: their rounding.
 BETTER = 0.95
-#: A run that was timed once may have taken so many times its usual time: another program ran.
+#: Uncertainty, as a factor, of a run timed once: another program may have run.
 ONCE = 3.0
 
 
@@ -23,19 +21,19 @@ class Recommendation:
     """The fastest setting that reaches an error.
 
     Attributes:
-        target_error: the error e that is wanted.
-        run: the run that was fastest; None where no setting reaches it.
-        reason: in words.
-        flags: what the command line takes for it; "" without a run.
+        target_error: the error e to reach.
+        run: the fastest run; None where no setting reaches it.
+        reason: the reason, for users.
+        flags: its options of the command line; "" without a run.
     """
 
     target_error: float
-    run: "Run | None"
+    run: Run | None
     reason: str
     flags: str
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """The recommendation in JSON."""
         return {
             "target_error": self.target_error,
             "run": None if self.run is None else self.run.to_dict(),
@@ -44,32 +42,32 @@ class Recommendation:
         }
 
 
-def front(runs: Sequence["Run"], uncertainty: float | None) -> set[int]:
-    """Places of the runs than which no faster one has a smaller error: the Pareto front.
+def front(runs: Sequence[Run], uncertainty: float | None) -> set[int]:
+    """Indices of the runs on the Pareto front: no faster run has a smaller error.
 
     Errors below the uncertainty of the reference count as that uncertainty.
     """
-    least, found = math.inf, set()
+    least, members = math.inf, set()
     for k in sorted(range(len(runs)), key=lambda k: (runs[k].time_s, runs[k].error)):
         error = known_error(runs[k], uncertainty)
         if error < BETTER * least:
             least = error
-            found.add(k)
-    return found
+            members.add(k)
+    return members
 
 
-def known_error(run: "Run", uncertainty: float | None) -> float:
-    """What is known of a run's error: it, or the uncertainty of the reference above it."""
+def known_error(run: Run, uncertainty: float | None) -> float:
+    """Upper bound of a run's error: at least the uncertainty of the reference."""
     return max(run.error, uncertainty or 0.0)
 
 
 def recommend(
-    runs: Sequence["Run"], uncertainty: float | None, target_error: float
+    runs: Sequence[Run], uncertainty: float | None, target_error: float
 ) -> Recommendation:
-    """The fastest run whose error is known to be within the target.
+    """The fastest run with an error known to be within the target.
 
-    Where timings cannot tell, that with the least work is: its evaluations of the right-hand side,
-    at the cost that one has over all runs of its method and integrator.
+    Of runs equally fast within the spread of the timings, the one with the least work: evaluations
+    of the right-hand side times their mean cost over all runs of its method and integrator.
 
     Raises:
         ValueError: the target is not a positive number.
@@ -82,29 +80,29 @@ def recommend(
     fastest = min(reaching, key=lambda run: run.time_s)
     costs = _costs(runs)
     best = min(
-        (run for run in reaching if _cannot_tell(fastest, run)),
+        (run for run in reaching if _overlap(fastest, run)),
         key=lambda run: (run.counts["rhs"] * costs[run.method, run.integrator], run.time_s),
     )
     return Recommendation(target_error, best, _why(best, reaching), best.setting.flags)
 
 
-def _cannot_tell(fast: "Run", slow: "Run") -> bool:
-    """Whether the timings of two runs leave open which of them is the faster one."""
+def _overlap(fast: Run, slow: Run) -> bool:
+    """True if the timings of two runs overlap."""
     if min(fast.repeats, slow.repeats) < 2:
         return slow.time_s <= ONCE * fast.time_s
     return slow.time_min_s <= fast.time_max_s
 
 
-def _costs(runs: Sequence["Run"]) -> dict[tuple[str, str], float]:
-    """Seconds a right-hand side of each method and integrator: the median over their runs."""
-    found: dict[tuple[str, str], list[float]] = {}
+def _costs(runs: Sequence[Run]) -> dict[tuple[str, str], float]:
+    """Seconds per right-hand side of each method and integrator: the median over their runs."""
+    costs: dict[tuple[str, str], list[float]] = {}
     for run in runs:
-        each = found.setdefault((run.method, run.integrator), [])
-        each.append(run.time_s / max(run.counts["rhs"], 1))
-    return {series: statistics.median(costs) for series, costs in found.items()}
+        cost = run.time_s / max(run.counts["rhs"], 1)
+        costs.setdefault((run.method, run.integrator), []).append(cost)
+    return {series: statistics.median(values) for series, values in costs.items()}
 
 
-def _why(best: "Run", reaching: Sequence["Run"]) -> str:
+def _why(best: Run, reaching: Sequence[Run]) -> str:
     is_fastest = best.time_s <= min(run.time_s for run in reaching)
     rank = "is the fastest" if is_fastest else "takes the least work"
     words = (
@@ -122,11 +120,11 @@ def _why(best: "Run", reaching: Sequence["Run"]) -> str:
     words += f"; next is {other.setting} at {ratio:.2g} times its time"
     if min(best.repeats, other.repeats) < 2:
         return f"{words}, each timed once"
-    within = _cannot_tell(*sorted((best, other), key=lambda run: run.time_s))
+    within = _overlap(*sorted((best, other), key=lambda run: run.time_s))
     return f"{words}, which is within the spread of the timings" if within else words
 
 
-def _why_none(runs: Sequence["Run"], uncertainty: float | None, target_error: float) -> str:
+def _why_none(runs: Sequence[Run], uncertainty: float | None, target_error: float) -> str:
     if not runs:
         return "no setting came to its end"
     if uncertainty is not None and uncertainty > target_error:

@@ -1,4 +1,4 @@
-"""What a report measures errors against: two independent runs, and the model's expected numbers."""
+"""The reference of a report: two independent runs, and the expected values of the model."""
 
 import tomllib
 from collections.abc import Callable, Iterable, Iterator
@@ -17,26 +17,26 @@ from dap3d_core.result import Result
 from dap3d_core.scene import Scene, SceneError, load
 from dap3d_core.simulation import SimulationError
 
-#: Tolerances that are tried for a reference, the tightest first. That one is beyond the ladder; a
-#: run that has to serve as reference itself has no error, and is marked as not to be told.
+#: Tolerances tried for a reference, the tightest first, which is beyond the ladder: a run that is
+#: its own reference has no error.
 TIGHTEST = (1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8)
-#: Methods whose error does not fall below some level with the tolerance (the penalty formulation
-#: ends its passes at a residual): no references where another method fits.
+#: Methods with an error that does not vanish with the tolerance (the penalty formulation ends its
+#: passes at a residual): references only where no other method fits.
 APPROXIMATE = tuple(f.name for f in FORMULATIONS.values() if not f.is_exact)
-#: A run for a reference may take so many times longer than others.
-PATIENCE = 4.0
+#: Time limit of a reference run, relative to others.
+REFERENCE_LIMIT = 4.0
 
 Tick = Callable[[str], None]
 
 
 @attrs.frozen
 class Expected:
-    """How the reference compares with the expected.toml of the model.
+    """Comparison of the reference with the expected.toml of the model.
 
     Attributes:
-        count: numbers that could be compared: those of the state at reported instants.
-        deviation: the largest deviation of one (SI).
-        within: whether all are within the tolerances stated there.
+        count: number of values compared: those of the state at reported instants.
+        deviation: the largest deviation (SI).
+        within: all are within the tolerances stated there.
     """
 
     count: int
@@ -46,18 +46,18 @@ class Expected:
 
 @attrs.frozen(eq=False)
 class Reference:
-    """What errors are measured against.
+    """The trajectory that errors are measured against.
 
     Attributes:
-        t: (nt,) instants over which they are, s; fewer than reported where references part.
+        t: (nt,) instants, s; fewer than reported where the two reference runs part.
         u: (nt, 13 n) states there.
-        settings: of the reference, and of the second one that it is compared with where there is.
-        uncertainty: the error e of the second against it: nothing below can be told; None where
-            there is no second.
+        settings: of the reference, and of the second run it is compared with, if any.
+        uncertainty: the error e of the second run against it, the smallest error that can be
+            measured; None without a second run.
         meaningless_from: the instant, s, from which the two differ by more than 1e-3 of the size,
             so that errors mean nothing; None where they never do.
-        expected: how it compares with independent numbers; None where there are none.
-        notes: what to know of it.
+        expected: comparison with independent values; None where there are none.
+        notes: limitations of the reference.
     """
 
     t: Floats
@@ -72,16 +72,16 @@ class Reference:
 def find_reference(bench: Bench, fixed: list[Setting], tick: Tick) -> Reference:
     """The reference of a scene.
 
-    Two runs at the tightest tolerance that each can hold, with different integrators and, where
+    Two runs at the tightest tolerance that each can meet, with different integrators and, where
     more than one method fits, different methods.
 
     Args:
-        bench: what runs the settings.
-        fixed: settings of fixed steps that stand in where no tolerance can be held.
-        tick: told what is going on.
+        bench: runs the settings.
+        fixed: settings of fixed steps, used where no tolerance can be met.
+        tick: called with the present activity.
 
     Raises:
-        SimulationError: not one run came to its end; says why.
+        SimulationError: no run was completed; gives the reasons.
     """
     failures: dict[str, str] = {}
 
@@ -89,13 +89,13 @@ def find_reference(bench: Bench, fixed: list[Setting], tick: Tick) -> Reference:
         for setting in settings:
             if setting.method not in bench.models:
                 continue
-            words = f"reference: {setting}"
-            tick(words)
-            limit = PATIENCE * bench.limit_s
-            found = bench.run(setting, partial(tick, words), limit_s=limit)
-            if isinstance(found, Result):
-                return setting, found
-            failures[f"{setting.method}, {setting.integrator}"] = found
+            activity = f"reference: {setting}"
+            tick(activity)
+            limit = REFERENCE_LIMIT * bench.limit_s
+            result = bench.run(setting, partial(tick, activity), limit_s=limit)
+            if isinstance(result, Result):
+                return setting, result
+            failures[f"{setting.method}, {setting.integrator}"] = result
         return None
 
     first = first_of(_candidates(bench, fixed))
@@ -107,14 +107,14 @@ def find_reference(bench: Bench, fixed: list[Setting], tick: Tick) -> Reference:
     if seconds[0] is not None and seconds[0][0].rtol not in TIGHTEST[:2]:  # steps may do better
         others = [s for s in fixed if s.integrator != first[0].integrator]
         seconds.append(first_of(sorted(others, key=lambda s: s.method in APPROXIMATE)))
-    there = [second for second in seconds if second is not None]
+    completed = [second for second in seconds if second is not None]
     u = first[1].u
-    second = min(there, key=lambda other: trajectory_error(other[1].u, u), default=None)
+    second = min(completed, key=lambda other: trajectory_error(other[1].u, u), default=None)
     return _reference(bench, first, second)
 
 
 def _candidates(bench: Bench, fixed: list[Setting]) -> Iterator[Setting]:
-    """Settings in the order in which they are wanted."""
+    """Settings in order of preference."""
     exact = [name for name in bench.models if name not in APPROXIMATE]
     for methods in (exact, APPROXIMATE):
         for rtol in TIGHTEST:
@@ -124,18 +124,18 @@ def _candidates(bench: Bench, fixed: list[Setting]) -> Iterator[Setting]:
         yield from (setting for setting in fixed if setting.method in methods)
 
 
-def _others(first: Setting, settings: Iterator[Setting]) -> Iterator[Setting]:
-    """Those that share as little as can be with the first: integrator and method differ, or one."""
-    every = list(settings)
-    for rough in (False, True):
-        for same_integrator, same_method in ((False, False), (False, True), (True, False)):
-            for setting in every:
-                if (
-                    (setting.integrator == first.integrator) is same_integrator
-                    and (setting.method == first.method) is same_method
-                    and (setting.method in APPROXIMATE) is rough
-                ):
-                    yield setting
+def _others(first: Setting, settings: Iterable[Setting]) -> list[Setting]:
+    """Settings with another integrator or method than the first, the most different ones first."""
+
+    def similarity(setting: Setting) -> tuple[bool, bool, bool]:
+        return (
+            setting.method in APPROXIMATE,
+            setting.integrator == first.integrator,
+            setting.method == first.method,
+        )
+
+    others = [s for s in settings if (s.integrator, s.method) != (first.integrator, first.method)]
+    return sorted(others, key=similarity)
 
 
 def _reference(
@@ -182,10 +182,10 @@ def _reference(
 
 
 def compare_with_expected(bench: Bench, result: Result) -> Expected | None:
-    """Compare with the expected.toml beside the scene; None where that says nothing of this run.
+    """Compare with the expected.toml of the scene; None where it has no value of this run.
 
     Compared are r, p, rd, w of bodies at reported instants after the start, each within the
-    tolerance stated there. A scene that was changed since it was read has no expected numbers.
+    tolerance stated there. A scene that was changed since it was read has no expected values.
     """
     path = bench.scene.path
     if path is None or not _is_as_read(bench.scene, path):
@@ -197,30 +197,30 @@ def compare_with_expected(bench: Bench, result: Result) -> Expected | None:
     count, deviation, within = 0, 0.0, True
     for check in checks:
         head, _, body = str(check["quantity"]).partition(".")
-        place = result.subject.body_index.get(body)
-        if head not in ("r", "p", "rd", "w") or place is None or not check.get("t"):
+        index = result.subject.body_index.get(body)
+        if head not in ("r", "p", "rd", "w") or index is None or not check.get("t"):
             continue
-        (at,) = np.nonzero(np.abs(result.t - check["t"]) <= 1e-12 * abs(check["t"]))
-        if not len(at):
+        (rows,) = np.nonzero(np.abs(result.t - check["t"]) <= 1e-12 * abs(check["t"]))
+        if not len(rows):
             continue
-        value = np.array(check["value"], dtype=float)
-        found = getattr(result, head)[at[0], place]
-        if head == "p" and found @ value < 0.0:
-            found = -found
-        off = float(np.max(np.abs(found - value)))
+        expected = np.array(check["value"], dtype=float)
+        value = getattr(result, head)[rows[0], index]
+        if head == "p" and value @ expected < 0.0:
+            value = -value
+        error = float(np.max(np.abs(value - expected)))
         count += 1
-        deviation, within = max(deviation, off), within and off <= check["tolerance"]
+        deviation, within = max(deviation, error), within and error <= check["tolerance"]
     return Expected(count, deviation, within) if count else None
 
 
 def _is_as_read(scene: Scene, path: Path) -> bool:
-    """Whether a scene describes what its file does; how long and how it is run aside."""
+    """True if a scene equals its file, but for the duration and the method of the run."""
     try:
         read = load(path)
     except SceneError:
         return False
     settings = scene.simulation
-    asked = ("correct", "project", "hold", "correct_metric")
-    same = all(getattr(read.simulation, name) == getattr(settings, name) for name in asked)
+    names = ("correct", "project", "hold", "correct_metric")
+    same = all(getattr(read.simulation, name) == getattr(settings, name) for name in names)
     read.simulation = settings
     return same and read.to_toml() == scene.to_toml()

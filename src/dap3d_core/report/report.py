@@ -1,4 +1,4 @@
-"""What a report found: its runs, what failed, and the forms in which programs read it."""
+"""The work-precision report: its runs and failures, and their JSON, CSV and picture."""
 
 import csv
 import io
@@ -12,132 +12,18 @@ import attrs
 
 from dap3d_core.report.recommend import Recommendation, recommend
 from dap3d_core.report.reference import Reference
-from dap3d_core.report.settings_ladder import Setting
+from dap3d_core.report.run import Failed, Run
 from dap3d_core.report.timing import Refused
-from dap3d_core.result import Result, current_versions
+from dap3d_core.result import current_versions
 from dap3d_core.result.file.atomic_write import whole_file
 from dap3d_core.scene.display import html_table
 
 #: Columns of the table that are not counts.
 COLUMNS = (
-    "method",
-    "integrator",
-    "rtol",
-    "atol",
-    "step",
-    "time_s",
-    "time_min_s",
-    "time_max_s",
-    "repeats",
-    "error",
-    "final_position_error",
-    "energy_error",
-    "constraint_error",
-    "constraint_velocity_error",
-    "constraint_acceleration_error",
-    "quaternion_error",
-    "below_uncertainty",
-    "on_front",
+    *("method", "integrator", "rtol", "atol", "step"),
+    *(f.name for f in attrs.fields(Run) if f.name not in ("setting", "counts")),
     "failed",
 )
-
-
-@attrs.frozen(kw_only=True)
-class Run:
-    """One setting that came to its end.
-
-    Attributes:
-        setting: what was run.
-        time_s, time_min_s, time_max_s: median, least and largest wall time, s, compile time apart.
-        repeats: how often it was timed.
-        error: the error e against the reference (error_norms.py), over all its instants.
-        final_position_error: largest distance of a mass centre from the reference at the last
-            instant, m.
-        energy_error: imbalance of energy and work, relative, as in the ledger.
-        constraint_error, constraint_velocity_error, constraint_acceleration_error: largest ``|C|``,
-            ``|D v - nu|``, ``|D v_dot - gamma|``.
-        quaternion_error: largest deviation of Euler parameters from unit length.
-        counts: steps, rejected, rhs, projections and whatever else a run counts.
-        below_uncertainty: whether the error is below the reference's own uncertainty, so that only
-            this is known of it.
-        on_front: whether no faster run has a smaller error.
-    """
-
-    setting: Setting
-    time_s: float
-    time_min_s: float
-    time_max_s: float
-    repeats: int
-    error: float
-    final_position_error: float
-    energy_error: float
-    constraint_error: float
-    constraint_velocity_error: float
-    constraint_acceleration_error: float
-    quaternion_error: float
-    counts: dict[str, int]
-    below_uncertainty: bool = False
-    on_front: bool = False
-
-    @property
-    def method(self) -> str:
-        """The formulation."""
-        return self.setting.method
-
-    @property
-    def integrator(self) -> str:
-        """The method of integration."""
-        return self.setting.integrator
-
-    @property
-    def rtol(self) -> float | None:
-        """Relative tolerance; None for fixed steps."""
-        return self.setting.rtol
-
-    @property
-    def step(self) -> float | None:
-        """Fixed step, s; None where the integrator chooses it."""
-        return self.setting.step
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON has it: ``rtol`` and ``atol`` or ``step``, and the counts among the rest."""
-        found = attrs.asdict(self, recurse=False)
-        setting = attrs.asdict(found.pop("setting"), filter=lambda _, value: value is not None)
-        return {**setting, **{k: v for k, v in found.items() if k != "counts"}, **self.counts}
-
-
-@attrs.frozen
-class Failed:
-    """A setting that gave no result, and why, in words."""
-
-    setting: Setting
-    reason: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON has it."""
-        setting = attrs.asdict(self.setting, filter=lambda _, value: value is not None)
-        return {**setting, "failed": self.reason}
-
-
-def run_of(setting: Setting, result: Result, times: list[float], error: float, final: float) -> Run:
-    """The facts of a run, given its errors."""
-    ledger = {name: entry.value for name, entry in result.ledger.items()}
-    counts = attrs.asdict(result.stats)
-    return Run(
-        setting=setting,
-        time_s=0.0,
-        time_min_s=0.0,
-        time_max_s=0.0,
-        repeats=0,
-        error=error,
-        final_position_error=final,
-        energy_error=ledger["energy"],
-        constraint_error=ledger["position"],
-        constraint_velocity_error=ledger["velocity"],
-        constraint_acceleration_error=ledger["acceleration"],
-        quaternion_error=ledger["quaternion"],
-        counts={k: v for k, v in counts.items() if not k.endswith("_s")},
-    )
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
@@ -147,13 +33,13 @@ class Report:
     Attributes:
         scene: its name.
         t_end, dt: final time and reporting step, s.
-        runs: settings that came to their end, by method and integrator, coarse ones first.
-        failed: settings that did not, with reasons.
+        runs: completed settings, by method and integrator, coarse ones first.
+        failed: settings that were not completed, with reasons.
         refused: methods that do not fit the scene, with reasons.
-        reference: what errors are measured against.
-        target_error: the error that was asked for; None where none was.
+        reference: the trajectory that errors are measured against.
+        target_error: the requested error, or None.
         status: "done" or "interrupted".
-        notes: what to know of the whole.
+        notes: limitations of the report.
         versions: of dap3d, numpy, llvmlite, python.
     """
 
@@ -195,7 +81,7 @@ class Report:
         return recommend(self.runs, self.reference.uncertainty, 1e-6 if wanted is None else wanted)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON has it; see docs/report.md."""
+        """The report in JSON; see docs/report.md."""
         reference = self.reference
         expected = reference.expected
         return {

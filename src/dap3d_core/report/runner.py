@@ -1,4 +1,4 @@
-"""How a report is made: the reference, a first run of each rung, then timings taken in turns."""
+"""Makes a report: the reference, a first run of each rung, then timings in turns."""
 
 import copy
 import math
@@ -15,7 +15,8 @@ from dap3d_core.integrators import INTEGRATORS
 from dap3d_core.report.error_norms import PARTED, final_position_error, trajectory_error
 from dap3d_core.report.recommend import front
 from dap3d_core.report.reference import Reference, find_reference
-from dap3d_core.report.report import Failed, Report, Run, run_of
+from dap3d_core.report.report import Report
+from dap3d_core.report.run import Failed, Run, measures_of
 from dap3d_core.report.settings_ladder import (
     ADAPTIVE,
     QUICK_TOLERANCES,
@@ -29,14 +30,13 @@ from dap3d_core.report.settings_ladder import (
 from dap3d_core.report.timing import Announce, Bench, Progress
 from dap3d_core.result import Result
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
-from dap3d_core.scene.validate.settings import FIXED_STEP
 from dap3d_core.simulation import report_times
 
-#: Seconds that all timings of one rung may take: longer runs are repeated less.
+#: Time limit of all timings of one rung, s: longer runs are repeated less.
 CAP_S = 5.0
-#: Seconds after which a run is ended.
+#: Time limit of a run, s.
 LIMIT_S = 30.0
-#: A rung that was not run yet is expected to take so many times as long as the one before.
+#: Expected duration of a rung, relative to the previous one.
 GROWTH = 1.6
 
 
@@ -70,34 +70,34 @@ def report(
     Args:
         scene: a Scene, or what ``load`` takes; as it is, but for its step, method and integrator.
         target_error: the error e (error_norms.py) that ``Report.recommended`` takes by default.
-        methods, integrators: those that are measured; by default all.
+        methods, integrators: the ones to measure; by default all.
         tolerances: ladder of rtol (atol = rtol / 100); by default 1e-3, 1e-4 ... 1e-12.
         steps: ladder of fixed steps, s; by default from the mean step of a coarse run down.
-        repeat: timings of each rung, 5 by default; the median counts.
-        quick: three rungs, timed once, where the arguments before say nothing else.
-        t_end, dt, correct, project: as ``simulate`` has them.
+        repeat: timings of each rung, 5 by default; the median is reported.
+        quick: three rungs, timed once, unless the arguments above are given.
+        t_end, dt, correct, project: as of ``simulate``.
         limit_s: wall time, s, after which a run is ended; it is then listed with this reason.
         progress: called as progress(done, total, words), s of work.
-        allow_code, announce: as ``compile`` has them.
+        allow_code, announce: as of ``compile``.
 
     Returns:
-        the report. A run that fails is listed with its reason. An exception that ends it from
-        outside (Ctrl-C, an exception of ``progress``) carries what was measured as ``.report``.
+        the report. A run that fails is listed with its reason. An exception from outside (Ctrl-C,
+        an exception of ``progress``) carries the measurements so far as ``.report``.
 
     Raises:
         SceneError, PluginError: the scene or a setting has mistakes.
         AssemblyError: the initial positions cannot be assembled.
-        SimulationError: not one run came to its end, so that there is no reference.
+        SimulationError: no run was completed, so that there is no reference.
         ValueError: ``repeat``, ``limit_s`` or ``target_error`` is not positive.
     """
     repeat = (1 if quick else 5) if repeat is None else repeat
     _check_positive(repeat=repeat, limit_s=limit_s, target_error=target_error)
     given = scene if isinstance(scene, Scene) else load(scene)
-    asked = dict(t_end=t_end, dt=dt, correct=correct, project=project)
-    used = _prepared(given, asked, methods, integrators, tolerances, steps)
+    requested = dict(t_end=t_end, dt=dt, correct=correct, project=project)
+    used = _prepared(given, requested, methods, integrators, tolerances, steps)
     bench = Bench(used, limit_s=limit_s, allow_code=allow_code, announce=announce)
     rtols = tolerances or (QUICK_TOLERANCES if quick else TOLERANCES)
-    maker = _Maker(bench, chosen(methods, tuple(FORMULATIONS)), repeat, progress)
+    maker = _Measurement(bench, chosen(methods, tuple(FORMULATIONS)), repeat, progress)
     if given.simulation.step is not None:
         maker.notes.append(_STEP_LEFT_OUT.format(given.simulation.step))
     return maker.make(
@@ -113,27 +113,28 @@ def _check_positive(**numbers: float | None) -> None:
 
 def _prepared(
     scene: Scene,
-    asked: dict[str, Any],
+    requested: dict[str, Any],
     methods: Sequence[str] | None,
     integrators: Sequence[str] | None,
     tolerances: Sequence[float] | None,
     steps: Sequence[float] | None,
 ) -> Scene:
-    """A copy of the scene with the settings asked for; all that is asked for is checked."""
+    """A copy of the scene with the requested settings, all of them checked."""
     copied = copy.deepcopy(scene)
-    changes = {name: value for name, value in asked.items() if value is not None}
+    changes = {name: value for name, value in requested.items() if value is not None}
     changes |= {"step": None, "integrator": ADAPTIVE[0], "method": "auto"}
     settings = attrs.evolve(scene.simulation, **changes)
-    tried = [settings]
-    tried += [attrs.evolve(settings, method=name) for name in methods or ()]
-    tried += [
-        attrs.evolve(settings, integrator=name, step=1.0 if name in FIXED_STEP else None)
+    fixed_step = {name for name, one in INTEGRATORS.items() if not one.adaptive}
+    variants: list[dict[str, Any]] = [{}]
+    variants += [{"method": name} for name in methods or ()]
+    variants += [
+        {"integrator": name, "step": 1.0 if name in fixed_step else None}
         for name in integrators or ()
     ]
-    tried += [attrs.evolve(settings, rtol=rtol) for rtol in tolerances or ()]
-    tried += [attrs.evolve(settings, step=step) for step in steps or ()]
-    for one in tried:
-        check_simulation(one, scene.bodies)
+    variants += [{"rtol": rtol} for rtol in tolerances or ()]
+    variants += [{"step": step} for step in steps or ()]
+    for variant in variants:
+        check_simulation(attrs.evolve(settings, **variant), scene.bodies)
     report_times(settings.t_end, settings.dt)  # refuses a scene without a final time
     if settings.t_end == 0.0:
         remedy = "give a final time above zero"
@@ -144,22 +145,34 @@ def _prepared(
 
 @attrs.define(eq=False)
 class _Rung:
-    """A setting on its way: the run it became or why it failed, and its timings, s."""
+    """A setting with its measures, or the reason of its failure, and its timings, s."""
 
     setting: Setting
-    run: Run | None = None
+    measures: dict[str, Any] = attrs.Factory(dict)
     failed: str = ""
     times: list[float] = attrs.Factory(list)
 
-    def wanted(self, repeat: int) -> int:
-        """How often it is timed."""
-        if self.run is None:
+    def timings(self, repeat: int) -> int:
+        """Number of timings to take."""
+        if not self.measures:
             return len(self.times)
         return max(1, min(repeat, int(CAP_S / max(self.times[0], 1e-9))))
 
+    def run(self, uncertainty: float | None) -> Run:
+        """The completed run."""
+        return Run(
+            setting=self.setting,
+            time_s=statistics.median(self.times),
+            time_min_s=min(self.times),
+            time_max_s=max(self.times),
+            repeats=len(self.times),
+            below_uncertainty=uncertainty is not None and self.measures["error"] < uncertainty,
+            **self.measures,
+        )
 
-class _Maker:
-    """Makes one report."""
+
+class _Measurement:
+    """Measures one report."""
 
     def __init__(
         self, bench: Bench, methods: tuple[str, ...], repeat: int, progress: Progress | None
@@ -183,8 +196,8 @@ class _Maker:
         t_end, dt = float(times[-1]), float(times[1] - times[0]) if len(times) > 1 else 0.0
         count = self._coarse_steps() if steps is None else 0
         rungs = steps or ladder_of_steps(t_end, dt or 1.0, count, quick=quick)
-        reference = find_reference(self.bench, self._fine_steps(rungs), self._tell)
-        found = dict(
+        reference = find_reference(self.bench, self._fine_steps(rungs), self._tick)
+        header = dict(
             scene=self.bench.scene.name or "", t_end=t_end, dt=dt, reference=reference,
             target_error=target_error,
         )  # fmt: skip
@@ -199,24 +212,24 @@ class _Maker:
             self._measure(reference)
             self._time()
         except BaseException as error:
-            error.report = self._report(found, "interrupted")  # type: ignore[attr-defined]
+            error.report = self._report(header, "interrupted")  # type: ignore[attr-defined]
             raise
-        return self._report(found, "done")
+        return self._report(header, "done")
 
     def _coarse_steps(self) -> int:
-        """Steps of the first controlled run at the coarsest tolerance that comes to its end."""
+        """Steps of the first completed run at the coarsest tolerance."""
         for method in tuple(self.bench.models):
             for integrator in ADAPTIVE:
                 if method in self.bench.models:
                     setting = controlled(method, integrator, TOLERANCES[0])
-                    self._tell(f"looking for a step: {setting}")
+                    self._tick(f"looking for a step: {setting}")
                     result = self.bench.run(setting, lambda: None)
                     if isinstance(result, Result):
                         return result.stats.steps
         return 100
 
     def _fine_steps(self, steps: Sequence[float]) -> list[Setting]:
-        """Fixed steps below the ladder, for a reference where no tolerance can be held."""
+        """Fixed steps below the ladder, for a reference where no tolerance can be met."""
         names = [i.name for i in INTEGRATORS.values() if not i.adaptive]
         return [
             Setting(method, name, step=min(steps) / 2.0)
@@ -225,14 +238,14 @@ class _Maker:
         ]
 
     def _in_turns(self) -> Iterator[tuple[list[_Rung], int]]:
-        """All rungs, the coarse ones of every series first."""
+        """All rungs, by series and index, the coarse ones of every series first."""
         for k in range(max(map(len, self.series), default=0)):
             for series in self.series:
                 if k < len(series):
                     yield series, k
 
     def _measure(self, reference: Reference) -> None:
-        """Run each rung once: its errors. A run before, not timed, warms each series up."""
+        """Run each rung once for its errors, each series after a run that is not timed."""
         for series, k in self._in_turns():
             rung = series[k]
             if rung.setting.method not in self.bench.models:
@@ -251,52 +264,52 @@ class _Maker:
             return
         rung.times.append(result.stats.wall_time_s)
         u = result.u[: len(reference.t)]
-        error = trajectory_error(u, reference.u)
-        rung.run = run_of(
-            rung.setting, result, rung.times, error, final_position_error(u, reference.u)
-        )
+        rung.measures = measures_of(result) | {
+            "error": trajectory_error(u, reference.u),
+            "final_position_error": final_position_error(u, reference.u),
+        }
 
     def _time(self) -> None:
-        """Further timings in turns, so that the noise of the machine hits all alike."""
+        """Further timings in turns, so that the noise of the machine affects all alike."""
         for number in range(1, self.repeat):
             for series, k in self._in_turns():
                 rung = series[k]
-                if number < rung.wanted(self.repeat):
+                if number < rung.timings(self.repeat):
                     result = self._once(rung.setting)
                     if isinstance(result, Result):
                         rung.times.append(result.stats.wall_time_s)
 
     def _once(self, setting: Setting) -> Result | str:
-        words = str(setting)
-        self._tell(words)
-        return self.bench.run(setting, lambda: self._tell(words))
+        activity = str(setting)
+        self._tick(activity)
+        return self.bench.run(setting, lambda: self._tick(activity))
 
-    def _tell(self, words: str) -> None:
+    def _tick(self, activity: str) -> None:
         if self.progress is not None:
             done = time.perf_counter() - self.begun
-            self.progress(done, done + self._left(), words)
+            self.progress(done, done + self._remaining(), activity)
 
-    def _left(self) -> float:
-        """Seconds of work that are expected to be left."""
-        left = 0.0
+    def _remaining(self) -> float:
+        """Expected remaining work, s."""
+        remaining = 0.0
         for series in self.series:
             before = 0.0
             for rung in series:
                 if rung.times:
                     before = rung.times[0]
-                    left += before * max(rung.wanted(self.repeat) - len(rung.times), 0)
+                    remaining += before * max(rung.timings(self.repeat) - len(rung.times), 0)
                 elif not rung.failed:
                     before = min(before * GROWTH, self.bench.limit_s)
-                    left += before * min(self.repeat, max(1.0, CAP_S / max(before, 1e-9)))
-        return left
+                    remaining += before * min(self.repeat, max(1.0, CAP_S / max(before, 1e-9)))
+        return remaining
 
-    def _report(self, found: dict[str, Any], status: str) -> Report:
-        """What was measured so far."""
+    def _report(self, header: dict[str, Any], status: str) -> Report:
+        """The report of the measurements so far."""
         every = [rung for series in self.series for rung in series]
-        uncertainty = found["reference"].uncertainty
-        runs = [_timed(rung, uncertainty) for rung in every if rung.run is not None]
+        uncertainty = header["reference"].uncertainty
+        runs = [rung.run(uncertainty) for rung in every if rung.measures]
         best = front(runs, uncertainty)
-        if found["reference"].meaningless_from is not None and all(r.error > PARTED for r in runs):
+        if header["reference"].meaningless_from is not None and all(r.error > PARTED for r in runs):
             self.notes.append(
                 "no setting follows the reference up to there: a shorter final time tells more"
             )
@@ -317,17 +330,5 @@ class _Maker:
             refused=tuple(each for each in self.bench.refused if each.method in self.methods),
             status=status,
             notes=tuple(self.notes),
-            **found,
+            **header,
         )
-
-
-def _timed(rung: _Rung, uncertainty: float | None) -> Run:
-    assert rung.run is not None
-    return attrs.evolve(
-        rung.run,
-        time_s=statistics.median(rung.times),
-        time_min_s=min(rung.times),
-        time_max_s=max(rung.times),
-        repeats=len(rung.times),
-        below_uncertainty=uncertainty is not None and rung.run.error < uncertainty,
-    )

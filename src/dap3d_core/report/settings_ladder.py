@@ -1,4 +1,4 @@
-"""The settings that a report runs: a ladder of tolerances or steps for each method."""
+"""Settings of a report: a ladder of tolerances or steps for each method and integrator."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -12,10 +12,10 @@ from dap3d_core.simulation.settings import fits
 #: Relative tolerances of integrators that choose their step.
 TOLERANCES = tuple(float(f"1e-{k}") for k in range(3, 13))
 QUICK_TOLERANCES = (1e-4, 1e-7, 1e-10)
-#: atol is this part of rtol.
+#: atol divided by rtol.
 ATOL = 1e-2
-#: A ladder of steps has so many rungs, each step half the one before: an error of order 4 falls by
-#: 2e8 from the first to the last.
+#: Rungs of a ladder of steps, each half the previous one: an error of order 4 falls by 2e8 from the
+#: first to the last.
 STEPS, QUICK_STEPS = 8, 3
 QUICK_FACTOR = 4.0
 
@@ -47,25 +47,25 @@ class Setting:
 
     @property
     def options(self) -> dict[str, Any]:
-        """What ``simulate`` takes, but for the method, which a model is compiled for."""
-        found = attrs.asdict(self, filter=lambda _, value: value is not None)
-        del found["method"]
-        return found
+        """Options of ``simulate``; without the method, for which a model is compiled."""
+        return {name: value for name, value in self.to_dict().items() if name != "method"}
 
     @property
     def flags(self) -> str:
-        """What the command line takes for the same run."""
-        words = [f"--method {self.method} --integrator {self.integrator}"]
-        for name in ("rtol", "atol", "step"):
-            value = getattr(self, name)
-            if value is not None:
-                words.append(f"--{name} {value!r}")
-        return " ".join(words)
+        """Options of the command line for the same run."""
+        return " ".join(
+            f"--{name} {value if isinstance(value, str) else repr(value)}"
+            for name, value in self.to_dict().items()
+        )
 
     @property
     def control(self) -> str:
-        """What sets its accuracy, in words."""
+        """The tolerance or the step, for users."""
         return f"step {self.step:g} s" if self.step is not None else f"rtol {self.rtol:.0e}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The values that are set, by name."""
+        return attrs.asdict(self, filter=lambda _, value: value is not None)
 
     def __str__(self) -> str:
         return f"{self.method}, {self.integrator}, {self.control}"
@@ -90,13 +90,13 @@ def ladder(
 def ladder_of_steps(t_end: float, dt: float, step_count: int, *, quick: bool) -> tuple[float, ...]:
     """Fixed steps that suit a scene, s.
 
-    The first is the mean step of a coarse controlled run: the motion's own scale of time.
+    The first is the mean step of a coarse controlled run: the time scale of the motion.
 
     Args:
         t_end: final time, s.
-        dt: the reporting step, beyond which no fixed step goes, s.
+        dt: the reporting step, s, an upper bound.
         step_count: steps of the coarse run.
-        quick: whether few are wanted.
+        quick: fewer steps.
     """
     first = min(t_end / max(step_count, 1), dt)
     count, factor = (QUICK_STEPS, QUICK_FACTOR) if quick else (STEPS, 2.0)
@@ -104,5 +104,5 @@ def ladder_of_steps(t_end: float, dt: float, step_count: int, *, quick: bool) ->
 
 
 def chosen(names: Sequence[str] | None, known: Sequence[str]) -> tuple[str, ...]:
-    """The names asked for, all that are known by default; each once."""
+    """The requested names, by default all known ones; each once."""
     return tuple(dict.fromkeys(names)) if names else tuple(known)

@@ -1,8 +1,7 @@
-"""What runs the settings of a report: a model for each method, failures kept as words."""
+"""Runs the settings of a report, with one compiled model per method."""
 
 import time
 from collections.abc import Callable
-from typing import Any
 
 import attrs
 
@@ -18,13 +17,13 @@ from dap3d_core.simulation import (
     simulate,
 )
 
-#: ``progress(done, total, words)``: seconds of work done and expected in all; what is going on.
+#: ``progress(done, total, words)``: seconds of work done and in all; the present activity.
 Progress = Callable[[float, float, str], None]
 Announce = Callable[[str], None]
 
 
-class TooLong(Exception):  # noqa: N818 - a verdict of the report's own
-    """A run was ended because it took longer than it may."""
+class _TimeLimitError(Exception):
+    """A run took longer than its limit."""
 
 
 @attrs.frozen
@@ -33,7 +32,7 @@ class Refused:
 
     Attributes:
         method: its name.
-        reason: in words.
+        reason: the reason, for users.
     """
 
     method: str
@@ -44,19 +43,14 @@ class Bench:
     """Runs settings of one scene.
 
     Attributes:
-        scene: what is run; its own step is left out.
-        models: compiled model by method, of those that fit.
+        scene: the scene, without its own step.
+        models: compiled model by method, of the methods that fit.
         refused: methods that do not fit, with reasons.
         limit_s: seconds after which a run is ended.
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        *,
-        limit_s: float,
-        allow_code: bool,
-        announce: Announce | None,
+        self, scene: Scene, *, limit_s: float, allow_code: bool, announce: Announce | None
     ) -> None:
         """Compile the scene for each method that fits it.
 
@@ -80,19 +74,19 @@ class Bench:
                 self.models[method] = compiled
 
     def refuse(self, method: str, reason: str) -> None:
-        """Take a method off the list."""
+        """Remove a method."""
         self.models.pop(method, None)
         self.refused.append(Refused(method, reason))
 
     def run(
         self, setting: Setting, tick: Callable[[], None], *, limit_s: float | None = None
     ) -> Result | str:
-        """One run of a setting, or in words why there is none.
+        """The result of a setting, or the reason why there is none.
 
         Args:
-            setting: what is run; its method is among ``models``.
-            tick: called between chunks of the run; its exceptions come out as they are.
-            limit_s: seconds after which it is ended, in place of the bench's own.
+            setting: the setting; its method is in ``models``.
+            tick: called between chunks of the run; its exceptions are passed on.
+            limit_s: time limit, s, in place of the bench's own.
 
         Raises:
             AssemblyError: the scene cannot be assembled, whatever the setting.
@@ -108,19 +102,17 @@ class Bench:
                 outside.append(error)
                 raise
             if t < t_end and time.perf_counter() - begun > limit:
-                raise TooLong(f"ended after {limit:g} s, at t = {t:.4g} of {t_end:.4g} s")
+                raise _TimeLimitError(f"ended after {limit:g} s, at t = {t:.4g} of {t_end:.4g} s")
 
-        options: dict[str, Any] = setting.options
+        compiled, options = self.models[setting.method], setting.options
         try:
-            return simulate(
-                self.models[setting.method], progress=between, announce=self.announce, **options
-            )
+            return simulate(compiled, progress=between, announce=self.announce, **options)
         except AssemblyError:  # no method could
             raise
         except RedundantError as error:
             self.refuse(setting.method, str(error))
             return str(error)
-        except (SimulationError, TooLong) as error:
+        except (SimulationError, _TimeLimitError) as error:
             return str(error)
         except Exception as error:
             if error in outside:

@@ -297,7 +297,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason(monkeypatch):
 
 def test_a_run_that_takes_too_long_is_ended_and_finer_ones_are_left_out(monkeypatch):
     """A limit below the time of any run; the reference has more patience."""
-    monkeypatch.setattr("dap3d_core.report.reference.PATIENCE", 1e9)
+    monkeypatch.setattr("dap3d_core.report.reference.REFERENCE_LIMIT", 1e9)
     found = dap.report(
         problems.free_body((1, 2, 3), (1, 2, 0.5)), integrators=["rk4"], steps=[1e-3, 5e-4],
         t_end=1.0, dt=0.5, repeat=1, limit_s=1e-7,
