@@ -1,6 +1,6 @@
 """Models of the MATLAB program DAP3D: their files are read, never run, and become a scene."""
 
+from dap3d_core.matlab.files.report import FileFacts, ImportReport, Remark
 from dap3d_core.matlab.import_matlab import import_matlab
-from dap3d_core.matlab.report import FileFacts, ImportReport, Remark
 
 __all__ = ["FileFacts", "ImportReport", "Remark", "import_matlab"]

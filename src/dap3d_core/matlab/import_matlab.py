@@ -6,15 +6,16 @@ from pathlib import Path
 
 import attrs
 
-from dap3d_core.matlab.language.parse import Place, refused
-from dap3d_core.matlab.model_folder import Model, read_folder
-from dap3d_core.matlab.report import ImportReport, remark
+from dap3d_core.matlab.files.model_folder import Model, read_folder
+from dap3d_core.matlab.files.report import ImportReport, remark
+from dap3d_core.matlab.language.parse import Place
 from dap3d_core.matlab.translate.bodies import add_animation, add_bodies, add_geometry
 from dap3d_core.matlab.translate.elements import add_forces, add_functions, add_joints
 from dap3d_core.matlab.translate.fields import NAMES, Fields, name_of
-from dap3d_core.matlab.user_force import KEYWORD, add_user_forces
+from dap3d_core.matlab.translate.user_force import KEYWORD, add_user_forces
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.scene import Mistake, Scene, SceneError, check
+from dap3d_core.scene.errors import file_error
 
 #: What the check says of bodies that only a user's force may act on.
 _LEFT_ALONE = "no joint and no force acts on it"
@@ -53,7 +54,7 @@ def translate(folder: str | os.PathLike[str]) -> tuple[Scene, Fields]:
     try:
         path = Path(os.fsdecode(folder))
     except TypeError:
-        raise refused("", f"a MATLAB model is a folder, not {folder!r}") from None
+        raise file_error("", f"a MATLAB model is a folder, not {folder!r}") from None
     model = read_folder(path)
     report = ImportReport(str(path), files=model.files, unused=model.unused)
     fields = Fields(model, report)

@@ -111,6 +111,11 @@ class MistakeList:
             raise SceneError(mistake for _, mistake in self.mistakes)
 
 
+def file_error(file: Any, what: str, *, line: int | None = None, remedy: str = "") -> SceneError:
+    """The error for a file or a folder as a whole."""
+    return SceneError([Mistake("", MISSING, what, remedy=remedy, file=str(file), line=line)])
+
+
 def dotted(key: Key) -> str:
     """A key as messages write it; indices in lists count from 1."""
     return ".".join(_part(part) for part in key)

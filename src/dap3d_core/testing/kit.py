@@ -11,9 +11,8 @@ import attrs
 from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import examine
-from dap3d_core.testing import plain_kernels
-from dap3d_core.testing.checks import forces, functions, joints, purity
-from dap3d_core.testing.findings import FAILED, LEFT_OUT, Finding, Outcome, Report
+from dap3d_core.testing.checks import forces, functions, joints, plain_kernels, purity
+from dap3d_core.testing.checks.findings import FAILED, LEFT_OUT, Finding, Outcome, Report
 from dap3d_core.testing.samples.sampled_type import Subject, UndefinedError, subjects
 
 #: How many random poses on and off the manifold each check takes, and the seed of them.

@@ -2,7 +2,6 @@
 
 import os
 import re
-import stat
 import sys
 import time
 from pathlib import Path
@@ -10,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.scene import MISSING, Mistake, SceneError
+from dap3d_core.scene.errors import file_error
+from dap3d_core.scene.files.text_file import read_text, unreadable
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -84,13 +84,6 @@ def excerpt(node: "Node", width: int = 60) -> str:
     return words if len(words) <= width else f"{words[: width - 4]} ..."
 
 
-def refused(
-    file: str | Path, what: str, *, line: int | None = None, remedy: str = ""
-) -> SceneError:
-    """The error for a file or folder as a whole."""
-    return SceneError([Mistake("", MISSING, what, remedy=remedy, file=str(file), line=line)])
-
-
 def read_source(path: Path) -> Source:
     """The text of a MATLAB file, which is UTF-8 and of reasonable size.
 
@@ -101,26 +94,11 @@ def read_source(path: Path) -> Source:
         SceneError: says what is wrong with the file.
     """
     try:
-        info = path.stat()
-        if not stat.S_ISREG(info.st_mode):
-            raise refused(path, "is not a regular file")
-        if not path.resolve().is_relative_to(path.parent.resolve()):
-            raise refused(path, "is a link out of the folder", remedy="copy the file there")
-        if info.st_size > LARGEST_FILE:
-            what = f"has {info.st_size / 2**20:.1f} MiB; at most {LARGEST_FILE >> 20} MiB are read"
-            raise refused(path, what, remedy="build a scene of this size with a script")
-        data = read_regular(path, LARGEST_FILE)
+        if path.is_file() and not path.resolve().is_relative_to(path.parent.resolve()):
+            raise file_error(path, "is a link out of the folder", remedy="copy the file there")
     except OSError as error:
-        raise refused(path, f"cannot be read: {error.strerror or error}") from None
-    if b"\0" in data:
-        raise refused(path, "is not a text file: it holds NUL bytes")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        what = f"is not UTF-8 text: byte {error.object[error.start]:#04x} cannot be read"
-        remedy = "save it as UTF-8 (in MATLAB: Save As, encoding UTF-8)"
-        raise refused(path, what, line=line, remedy=remedy) from None
+        raise unreadable(path, error) from None
+    text = read_text(path, LARGEST_FILE, "save it as UTF-8 (in MATLAB: Save As, encoding UTF-8)")
     return Source(path, text.replace("\r\n", "\n").replace("\r", "\n"))
 
 
@@ -156,9 +134,9 @@ class Grammar:
         text = source.text if source.text.endswith("\n") else f"{source.text}\n"
         data = text.encode("utf-8")
         if data.count(b"%{") > BLOCKS:  # one within the other, they are looked for again and again
-            raise refused(source.path, f"holds more than {BLOCKS} comments of many lines")
+            raise file_error(source.path, f"holds more than {BLOCKS} comments of many lines")
         if _LONG_CHAIN.search(text):
-            raise refused(source.path, f"joins more than {CHAIN} names by dots")
+            raise file_error(source.path, f"joins more than {CHAIN} names by dots")
         if len(data) > QUICK:
             self._try(data, source.path)
         root: Node = self._parser.parse(data).root_node
@@ -176,7 +154,7 @@ class Grammar:
             self._parser.reset()
             took = f"{PARSING:g} s" if _peak() <= most else f"{MEMORY >> 20} MiB"
             what = f"is no model: finding its statements takes more than {took}"
-            raise refused(path, what) from None
+            raise file_error(path, what) from None
 
 
 def _peak() -> int:
@@ -223,10 +201,9 @@ def m_files(folder: Path) -> list[str]:
         if not folder.is_dir():
             if folder.exists():
                 remedy = f"give the folder that holds it: {folder.parent}"
-                raise refused(folder, "is a file; a MATLAB model is a folder", remedy=remedy)
-            raise refused(folder, "there is no such folder")
+                raise file_error(folder, "is a file; a MATLAB model is a folder", remedy=remedy)
+            raise file_error(folder, "there is no such folder")
         with os.scandir(folder) as entries:
             return sorted(e.name for e in entries if e.name.lower().endswith(".m"))
     except (OSError, ValueError) as error:  # ValueError: NUL in the path
-        reason = getattr(error, "strerror", None) or error
-        raise refused(folder, f"cannot be read: {reason}") from None
+        raise unreadable(folder, error) from None

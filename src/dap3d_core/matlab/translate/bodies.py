@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from dap3d_core.matlab.files.report import remark
 from dap3d_core.matlab.language.structures import LIMITS
 from dap3d_core.matlab.language.values import Numbers, Struct, plain_value
-from dap3d_core.matlab.report import remark
 from dap3d_core.matlab.translate.fields import Fields, name_of
 from dap3d_core.scene import MISSING, Mistake, Scene
 

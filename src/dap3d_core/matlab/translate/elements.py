@@ -4,9 +4,9 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.matlab.files.report import remark
 from dap3d_core.matlab.language.structures import DISKS
 from dap3d_core.matlab.language.values import Given, Struct
-from dap3d_core.matlab.report import remark
 from dap3d_core.matlab.translate.field_rules import (
     AT,
     BODY_I,

@@ -6,10 +6,10 @@ import stat
 from pathlib import Path
 from typing import Any
 
-from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.coerce import plain
-from dap3d_core.scene.errors import MISSING, Key, Mistake, MistakeList, SceneError, dotted
+from dap3d_core.scene.errors import MISSING, Key, MistakeList, SceneError, dotted, file_error
+from dap3d_core.scene.files.text_file import read_text, unreadable
 from dap3d_core.scene.scene import (
     HEADER_KEYS,
     NAMED,
@@ -48,7 +48,7 @@ def load(source: str | os.PathLike[str]) -> Scene:
         SceneError: there is no such file, or it is not TOML; says where and what to do.
     """
     path, notes = _find(source)
-    data = _parse(_read(path), path)
+    data = _parse(read_text(path, LARGEST_FILE), path)
     scene = scene_of(data)
     scene.path = path
     scene.notes += notes
@@ -166,11 +166,11 @@ def _find(source: Any) -> tuple[Path, list[str]]:
     try:
         text = os.fsdecode(source)
     except TypeError:
-        raise _refused("", f"a scene is loaded by name or path, not {source!r}") from None
+        raise file_error("", f"a scene is loaded by name or path, not {source!r}") from None
     if not text.strip():
-        raise _refused("", "the name of the model is empty; give a name, a folder or a file")
+        raise file_error("", "the name of the model is empty; give a name, a folder or a file")
     if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", text):
-        raise _refused(text, "a URL cannot be loaded", remedy="download it and give the file")
+        raise file_error(text, "a URL cannot be loaded", remedy="download it and give the file")
     path, models = Path(text), shipped_models()
     shipped = _shipped(text, models)
     try:
@@ -180,7 +180,7 @@ def _find(source: Any) -> tuple[Path, list[str]]:
             return shipped / SCENE_FILE, []
         raise _not_found(path, text, models) from None
     except OSError as error:
-        raise _unreadable(path, error) from None
+        raise unreadable(path, error) from None
     if not stat.S_ISDIR(mode):
         return path, []
     if not (path / SCENE_FILE).exists():
@@ -209,34 +209,12 @@ def _models_folder() -> Path:
     return installed if installed.is_dir() else package.parents[1] / "models"
 
 
-def _read(path: Path) -> str:
-    """The text of a regular file of at most ``LARGEST_FILE`` bytes."""
-    try:
-        info = path.stat()
-        if not stat.S_ISREG(info.st_mode):
-            raise _refused(str(path), "is not a regular file")
-        if info.st_size > LARGEST_FILE:
-            what = f"has {info.st_size / 2**20:.0f} MiB; at most {LARGEST_FILE >> 20} MiB are read"
-            raise _refused(str(path), what, remedy="build a scene of this size with a script")
-        data = read_regular(path, LARGEST_FILE)
-    except OSError as error:
-        raise _unreadable(path, error) from None
-    if b"\0" in data:
-        raise _refused(str(path), "is not a text file: it holds NUL bytes")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        what = f"is not UTF-8 text: byte {data[error.start]:#04x} cannot be read"
-        raise _refused(str(path), what, line=line, remedy="save it as UTF-8") from None
-
-
 def _parse(text: str, path: Path) -> dict[str, Any]:
     import tomllib
 
     if long := _LONG_KEY.search(text):
         what = f"a key of more than {MOST_PARTS} parts; those of a scene have 4 at most"
-        raise _refused(str(path), what, line=text.count("\n", 0, long.end()) + 1)
+        raise file_error(path, what, line=text.count("\n", 0, long.end()) + 1)
     try:
         data = tomllib.loads(text)
     except RecursionError:
@@ -258,7 +236,7 @@ def _parse(text: str, path: Path) -> dict[str, Any]:
     remedy = "" if line is None else _remedy(text.splitlines()[line - 1 : line])
     if path.suffix == ".m":
         remedy = "this is a MATLAB file; dap3d import-matlab FOLDER makes a scene of it"
-    raise _refused(str(path), what, line=line, remedy=remedy)
+    raise file_error(path, what, line=line, remedy=remedy)
 
 
 #: Invalid values that users of other languages write, and the remedy.
@@ -294,15 +272,7 @@ def _is_too_deep(data: dict[str, Any]) -> bool:
 
 def _too_deep(path: Path) -> SceneError:
     what = f"lists or tables are nested too deeply: more than {DEEPEST} within one another"
-    return _refused(str(path), what)
-
-
-def _refused(file: str, what: str, *, line: int | None = None, remedy: str = "") -> SceneError:
-    return SceneError([Mistake("", MISSING, what, remedy=remedy, file=file, line=line)])
-
-
-def _unreadable(path: Path, error: OSError) -> SceneError:
-    return _refused(str(path), f"cannot be read: {error.strerror or error}")
+    return file_error(path, what)
 
 
 def _not_found(path: Path, text: str, models: dict[str, Path]) -> SceneError:
@@ -310,10 +280,10 @@ def _not_found(path: Path, text: str, models: dict[str, Path]) -> SceneError:
     what = f"there is no file or folder {text!r}, and no shipped model of that name"
     if near:
         what += f"; did you mean {near!r}?"
-    return _refused("", what, remedy=f"shipped models: {', '.join(models) or 'none'}")
+    return file_error("", what, remedy=f"shipped models: {', '.join(models) or 'none'}")
 
 
 def _no_scene_in(path: Path, models: dict[str, Path]) -> SceneError:
     others = sorted(f.name for f in path.glob("*.toml"))
     remedy = f"it holds {', '.join(others[:5])}; give that file" if others else ""
-    return _refused(str(path), f"the folder has no {SCENE_FILE}", remedy=remedy)
+    return file_error(path, f"the folder has no {SCENE_FILE}", remedy=remedy)

@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.scene.coerce import plain
-from dap3d_core.scene.errors import MISSING, Mistake, SceneError
+from dap3d_core.scene.errors import MISSING, Mistake, SceneError, file_error
 from dap3d_core.scene.scene import NAMED, SCENE_FILE, Element, Scene
 
 #: Maximal bits of an integer; TOML requires readers to take 64, Python writes some 14000.
@@ -58,8 +58,7 @@ def save(scene: Scene, path: str | Path) -> Path:
             temporary.unlink(missing_ok=True)
     except (OSError, ValueError) as error:  # ValueError: NUL in the path
         reason = error.strerror if isinstance(error, OSError) else error
-        what = f"cannot be written: {reason}"
-        raise SceneError([Mistake("", MISSING, what, file=str(path))]) from error
+        raise file_error(path, f"cannot be written: {reason}") from error
     return path
 
 

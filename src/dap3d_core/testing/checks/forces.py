@@ -7,8 +7,8 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.examine.random_values import numbers, random_pose
-from dap3d_core.testing.compare import Comparison, Wrong, body_words, rates
-from dap3d_core.testing.findings import Outcome
+from dap3d_core.testing.checks.compare import Comparison, Wrong, body_words, rates
+from dap3d_core.testing.checks.findings import Outcome
 from dap3d_core.testing.samples.random_state import Direction, Floats, State, rotation
 from dap3d_core.testing.samples.sampled_type import UNDEFINED, Sample, Subject
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 import attrs
 import numpy as np
 
-from dap3d_core.testing.compare import Comparison, Wrong, rates
-from dap3d_core.testing.findings import Outcome
+from dap3d_core.testing.checks.compare import Comparison, Wrong, rates
+from dap3d_core.testing.checks.findings import Outcome
 from dap3d_core.testing.samples.random_state import Direction
 from dap3d_core.testing.samples.sampled_type import Subject
 

@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.testing.checks.forces import rigid_motion
-from dap3d_core.testing.compare import (
+from dap3d_core.testing.checks.compare import (
     DIFFERENCE_TOLERANCE,
     Comparison,
     Rate,
@@ -14,7 +13,8 @@ from dap3d_core.testing.compare import (
     body_words,
     rates,
 )
-from dap3d_core.testing.findings import Outcome
+from dap3d_core.testing.checks.findings import Outcome
+from dap3d_core.testing.checks.forces import rigid_motion
 from dap3d_core.testing.samples.random_state import Direction, Floats
 from dap3d_core.testing.samples.sampled_type import Sample, Subject, position_jacobian
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
 from dap3d_core.kernels.runtime.cache import jit_is_on, reached
-from dap3d_core.testing.compare import Comparison, Wrong, left_out
-from dap3d_core.testing.findings import Outcome
+from dap3d_core.testing.checks.compare import Comparison, Wrong, left_out
+from dap3d_core.testing.checks.findings import Outcome
 from dap3d_core.testing.samples.sampled_type import Sample, Subject, UndefinedError
 
 #: Compiled and plain code round differently (a b + c in one rounding).

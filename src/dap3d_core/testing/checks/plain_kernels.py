@@ -9,8 +9,8 @@ from dap3d_core.interface.codegen.kernel_arguments import friction_names, parame
 from dap3d_core.interface.errors import line_of, plain_words
 from dap3d_core.interface.examine.examine import ATTEMPTS
 from dap3d_core.interface.examine.random_values import random_quantity
-from dap3d_core.testing.compare import Comparison
-from dap3d_core.testing.findings import Outcome
+from dap3d_core.testing.checks.compare import Comparison
+from dap3d_core.testing.checks.findings import Outcome
 from dap3d_core.testing.samples.complex_step import Stepped
 from dap3d_core.testing.samples.sampled_type import UNDEFINED, Subject
 

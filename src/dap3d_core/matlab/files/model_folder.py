@@ -6,6 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.matlab.files.report import FileFacts, Remark, remark
 from dap3d_core.matlab.language.interpreter import Workspace, follow
 from dap3d_core.matlab.language.parse import (
     Grammar,
@@ -24,7 +25,6 @@ from dap3d_core.matlab.language.structures import (
     ModelFile,
 )
 from dap3d_core.matlab.language.values import Broken, Struct, kind_of
-from dap3d_core.matlab.report import FileFacts, Remark, remark
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import MISSING, Mistake, SceneError
 

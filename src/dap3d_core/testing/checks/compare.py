@@ -6,7 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.testing.findings import FAILED, LEFT_OUT, OK, Finding, Outcome
+from dap3d_core.testing.checks.findings import FAILED, LEFT_OUT, OK, Finding, Outcome
 from dap3d_core.testing.samples.random_state import Direction, Floats
 from dap3d_core.testing.samples.sampled_type import Sample, Subject
 

@@ -1,0 +1,1 @@
+"""Files of a MATLAB model and the report of their import."""
