@@ -1,4 +1,4 @@
-"""What the author of a plugin imports, besides the kernels' words: joints, forces, functions."""
+"""The interface of plugins: joints, forces, functions and their fields."""
 
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.examine.examine import examine

@@ -1,4 +1,4 @@
-"""A body in its pose as given, as the ``prepare`` of a type sees it."""
+"""The pose of a body in the scene, an argument of the ``prepare`` of a type."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import attrs
 
 @attrs.frozen
 class BodyPose:
-    """A body as ``prepare`` sees it: position r, Euler parameters p, rotation matrix A (rows).
+    """Pose of a body: position r, Euler parameters p, rotation matrix A (rows).
 
     Jp is its inertia matrix (rows) in its own axes, kg m^2; zeros for ground.
     """
@@ -31,7 +31,7 @@ class BodyPose:
 
 
 def pose(r: Any, p: Any, Jp: Any = ((0.0, 0.0, 0.0),) * 3) -> BodyPose:
-    """A body's pose from its position and (unit) Euler parameters, with its inertia matrix."""
+    """The pose of a body from its position, (unit) Euler parameters and inertia matrix."""
     e0, e1, e2, e3 = (float(x) for x in p)
     matrix = (
         (1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)),

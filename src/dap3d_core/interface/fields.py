@@ -1,8 +1,8 @@
-"""The fields a type may declare, and what each offers to its kernels.
+"""Fields that a type may declare.
 
 A field is one line in a type's class: ``P_i: Point = point()``. Its last letter after ``_``, one of
-i, j and k, names the body slot it belongs to. The maker says what the scene may write there;
-``codegen/kernel_arguments.py`` says which names it offers.
+i, j and k, names its body slot. The maker specifies its values in the scene;
+``codegen/kernel_arguments.py`` lists the names it offers to kernels.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,27 +21,27 @@ REQUIRED = attrs.NOTHING
 
 @attrs.frozen
 class FieldSpec:
-    """What a field is, for validation, documentation and the writing of loops.
+    """Properties of a field, for validation, documentation and the generation of loops.
 
     Attributes:
         kind: body, point, vector, vector2, number, vec3, matrix, table, function, choice, joint or
             angle.
-        default: value when the scene gives none; REQUIRED when it must.
+        default: value where the scene gives none; REQUIRED where it must.
         unit: SI unit of a number, "" for none.
-        doc: what it means, one short sentence.
-        positive, minimum, maximum: what a number must satisfy beyond being finite.
-        whole: whether a number must be a whole one.
+        doc: its meaning, one short sentence.
+        positive, minimum, maximum: limits of a number.
+        whole: a number must be whole.
         usual: least and greatest number (None: none) outside of which a scene gets a note.
         choices: allowed words of a choice (or False and True).
         aliases: other words for some of them.
-        direction: whether a vector between two points must not be of zero length at the start of a
-            run, or three numbers should be of unit length (with a note where they are not).
-        across: the field of a vector that this one may not lie along at the start of a run.
-        unit_length: whether a vector is normalised (with a warning where its length was not 1).
-        ground: whether a vector must be fixed in ground.
-        argument: what a function is a function of; "" for time.
+        direction: a vector between two points must not have zero length at the start of a run;
+            three numbers should have unit length (with a note otherwise).
+        across: the field of a vector that this one must not be parallel to at the start of a run.
+        unit_length: a vector is normalised (with a warning where its length is not 1).
+        ground: a vector must be fixed in ground.
+        argument: the argument of a function; "" for time.
         columns: numbers in a row of a table.
-        given: whether a table is given in the scene; False: ``prepare`` finds it.
+        given: a table is given in the scene; False: ``prepare`` returns it.
         axes: the fields an angle is measured between: two vectors, and the axis.
     """
 
@@ -67,7 +67,7 @@ class FieldSpec:
 
     @property
     def required(self) -> bool:
-        """Whether the scene must give this field."""
+        """True if the scene must give this field."""
         return self.default is REQUIRED
 
 
@@ -76,7 +76,7 @@ def _field(spec: FieldSpec) -> Any:
 
 
 def body(default: Any = REQUIRED, *, doc: str = "") -> Any:
-    """A body by name; the field's last letter is its slot (``body_i``)."""
+    """A body by name; the last letter of the field is its slot (``body_i``)."""
     return _field(FieldSpec("body", default, doc=doc))
 
 
@@ -90,9 +90,9 @@ def vector(
 ) -> Any:
     """A unit vector fixed in a body (type 1), by name; ``a_i`` is fixed in the body of slot i.
 
-    It is normalised, with a warning where its length was not 1. A vector whose name ends in no slot
+    It is normalised, with a warning where its length is not 1. A vector without a slot in its name
     (``axis``) may be fixed in any body of the element. With ``ground`` it must be fixed in ground,
-    and makes no body slot. With ``across``, the name of another vector field, a scene is refused
+    and has no body slot. With ``across``, the name of another vector field, a scene is refused
     where the two are parallel at the start of a run.
     """
     spec = FieldSpec("vector", default, doc=doc, unit_length=True, ground=ground, across=across)
@@ -121,7 +121,7 @@ def number(
 ) -> Any:
     """A finite number; a whole one (of teeth, say) with ``whole``.
 
-    ``default=None`` lets the scene leave it out: ``prepare`` then finds it. Outside of ``usual``,
+    With ``default=None`` the scene may omit it: ``prepare`` then returns it. Outside of ``usual``,
     (least, greatest) with None for no limit, it is allowed, and noted.
     """
     spec = FieldSpec("number", default, unit, doc, positive, minimum, maximum, whole, usual)
@@ -129,7 +129,7 @@ def number(
 
 
 def vec3(default: Any = REQUIRED, *, unit: str = "", direction: bool = False, doc: str = "") -> Any:
-    """Three finite numbers; with ``direction`` a length other than 1 is noted, and used."""
+    """Three finite numbers; with ``direction`` a length other than 1 is noted."""
     return _field(FieldSpec("vec3", default, unit, doc, direction=direction))
 
 
@@ -142,8 +142,8 @@ def table(*, columns: int = 1, given: bool = True, unit: str = "", doc: str = ""
     """Numbers of any count, which kernels read by ``lookup``.
 
     A table of one column is given in the scene as a list. With ``given=False`` it is not in the
-    scene: ``prepare`` returns it under the field's name, rows of ``columns`` numbers whose first
-    ones increase.
+    scene: ``prepare`` returns it under the field's name, rows of ``columns`` numbers with
+    increasing first numbers.
     """
     default = REQUIRED if given else None
     return _field(FieldSpec("table", default, unit, doc, columns=columns, given=given))
@@ -153,9 +153,9 @@ def function(default: Any = None, *, argument: str = "", doc: str = "") -> Any:
     """A function by name; absent, it is zero. With ``REQUIRED`` the scene must give it.
 
     Of time it offers its value and derivatives ``f``, ``f_dot``, ``f_ddot``, and ``f_0``, its value
-    at t = 0. With ``argument`` (what it is a function of, in words) kernels call ``f(x)``,
-    ``f_dot(x)``, ``f_ddot(x)``: value, first and second derivative for the argument; where it may
-    be left out, such kernels stand in a variant of the type for ``function=True``.
+    at t = 0. With ``argument`` (the name of its argument) kernels call ``f(x)``, ``f_dot(x)``,
+    ``f_ddot(x)``: value, first and second derivative; where it may be omitted, such kernels belong
+    to a variant of the type for ``function=True``.
     """
     return _field(FieldSpec("function", default, doc=doc, argument=argument))
 
@@ -167,7 +167,7 @@ def choice(
     aliases: Mapping[str, str] | None = None,
     doc: str = "",
 ) -> Any:
-    """One of several words, or of False and True; ``aliases`` are other words for some of them."""
+    """One of several words, or of False and True; ``aliases`` are other names of some of them."""
     spec = FieldSpec("choice", default, doc=doc, choices=tuple(choices), aliases=aliases or {})
     return _field(spec)
 
@@ -178,7 +178,7 @@ def joint(*, doc: str = "") -> Any:
 
 
 def angle(first: str, second: str, about: str, *, doc: str = "") -> Any:
-    """The angle from one vector field to another about a third; no field of the scene.
+    """The angle from one vector field to another about a third; not a field of the scene.
 
     Offers ``theta`` and ``theta_dot`` under its name: atan2(k . (a x b), a . b - (a . k) (b . k)),
     unwound (turns are counted at accepted steps), and its rate k . (w_j - w_i).
@@ -188,11 +188,11 @@ def angle(first: str, second: str, about: str, *, doc: str = "") -> Any:
 
 
 def specs_of(type_: type) -> dict[str, FieldSpec]:
-    """The declared fields of a type, in order, with what each is."""
+    """The declared fields of a type, in order, with their properties."""
     return {a.name: a.metadata["dap3d"] for a in attrs.fields(type_) if "dap3d" in a.metadata}
 
 
 def slot_of(name: str) -> str | None:
-    """The body slot a name belongs to by its last letter (``P_i`` -> i), or None."""
+    """The body slot of a name, its last letter (``P_i`` -> i), or None."""
     head, _, tail = name.rpartition("_")
     return tail if head and tail in ("i", "j", "k") else None

@@ -1,4 +1,4 @@
-"""The pluggy side: three hooks without arguments that return classes; the classes do the work."""
+"""The hooks of plugins, which return lists of classes."""
 
 import pluggy
 

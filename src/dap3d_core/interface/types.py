@@ -1,8 +1,8 @@
-"""What a joint, a force and a function type is: fields, and pure functions of named quantities.
+"""Base classes of joint, force and function types: fields, and pure functions of quantities.
 
-A type is an attrs class. Its functions stand there without ``self``: they are static, and their
-parameter names say what they need, as a pytest test names its fixtures.
-``codegen/kernel_arguments.py`` lists these names.
+A type is an attrs class. Its functions are static, without ``self``, and their parameter names are
+the quantities they need, as a pytest test names its fixtures; ``codegen/kernel_arguments.py`` lists
+these names.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -10,40 +10,47 @@ from typing import Any, ClassVar
 
 import attrs
 
-#: Raised by one when a type written for the old interface would no longer work.
+#: Increased by one when a type written for the old interface no longer works.
 INTERFACE_VERSION = 1
 
 
 class TypeBase:
-    """Common ground of the three kinds: gathers the kernels, makes the class an attrs class."""
+    """Base of the three kinds: collects the kernels, makes the class an attrs class."""
 
     kind: ClassVar[str] = ""
     kernel_names: ClassVar[tuple[str, ...]] = ()
     keyword: ClassVar[str] = ""
-    #: Classes that stand in for this one where fields have certain values: (conditions, class).
+    #: Classes that replace this one for certain values of fields: (conditions, class).
     variants: ClassVar[tuple[tuple[Mapping[str, Any], type["TypeBase"]], ...]] = ()
-    #: True for a type of two bodies or more that uses the axes of ground in its formulas: it is
-    #: not asked to be the same wherever its bodies stand together (docs/check-plugin.md).
+    #: True for a type of two bodies or more that uses the axes of ground in its formulas: it need
+    #: not be invariant to a common rigid motion of its bodies (docs/check-plugin.md).
     ground_axes: ClassVar[bool] = False
 
     def __init_subclass__(cls, **conditions: Any) -> None:
         super().__init_subclass__()
         if "kernel_names" in vars(cls):  # Joint, Force, Function themselves
             return
-        if conditions:  # class NoSlip(Disk, slip="xyz"): a variant of the type that has the keyword
+        if conditions:  # class NoSlip(Disk, slip="xyz"): a variant of the type with the keyword
             root: Any = next(base for base in cls.__mro__ if "keyword" in vars(base))
             root.variants = (*root.variants, (conditions, cls))
         for name in cls.kernel_names:
             function = vars(cls).get(name)
             if callable(function):
                 setattr(cls, name, staticmethod(function))
-        # slots would make a second class, and hooks see the first
+        # slots would make a second class, but hooks return the first
         attrs.define(cls, slots=False, kw_only=True)
 
     @classmethod
     def kernels(cls) -> dict[str, Callable[..., Any]]:
         """The pure functions this type defines, by name."""
         return {n: getattr(cls, n) for n in cls.kernel_names if getattr(cls, n, None) is not None}
+
+    def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
+        """Constants of this instance, such as the coefficients of a polynomial.
+
+        A 3-tuple with a name in _i, _j or _k is a vector in that body's axes.
+        """
+        return {}
 
 
 class Joint(TypeBase):
@@ -59,30 +66,30 @@ class Joint(TypeBase):
     ``J`` and ``gamma`` may be left out: they are derived, with ``nu``, from ``C``
     (derive/derive.py) and, for rows of the velocity level alone, from
 
-    * ``C_dot``  what must vanish there, linear in the velocities: one number a row not in ``C``.
+    * ``C_dot``  vanishes there, linear in the velocities: one number a row not in ``C``.
 
-    It may define, besides:
+    It may also define:
 
     * ``friction``  the wrench of its Coulomb friction on each body, as a force returns it; takes
       ``lam`` (its multipliers), ``mu``, ``v_tol``, ``radius``; a force ``friction`` switches it on;
     * ``switch``    a number, or a tuple of numbers, smooth in time. With ``switch_words`` the run
-      ends, and says them, where one becomes negative; without, the integration starts anew where
+      ends with this message where one becomes negative; without, the integration restarts where
       one changes its sign: there the element's law takes another branch (docs/events.md).
 
-    ``prepare(self, bodies)`` may return constants found once on the poses as given. A subclass that
-    names values of fields, ``class NoSlip(Disk, slip="xyz")``, is a variant of the type: it takes
-    its place, with its own rows and kernels, where the fields have these values (True for a
-    function: one is given).
+    ``prepare(self, bodies)`` may return constants of the poses in the scene. A subclass that names
+    values of fields, ``class NoSlip(Disk, slip="xyz")``, is a variant of the type: it replaces it,
+    with its own rows and kernels, where the fields have these values (True for a function: one is
+    given).
 
     Attributes:
-        keyword: the word that names the type in a scene.
+        keyword: the name of the type in a scene.
         rows: number of constraint equations.
-        holonomic: True, False, or one truth value a row: which rows exist at position level.
-        drives: whether it prescribes a freedom that other joints leave; where there are none
-            between its bodies a scene gets a note.
-        unilateral: rows, from 0, whose multiplier is not negative in what the type stands for: a
-            ground that carries and does not pull. A run where one is gets a note with the instant.
-        unilateral_words: what it means that one is negative; stands in that note.
+        holonomic: True, False, or one truth value a row: the rows of the position level.
+        drives: it prescribes a freedom that other joints leave; where there are none between its
+            bodies a scene gets a note.
+        unilateral: rows, from 0, with multipliers that are not negative in a valid motion: ground
+            carries and does not pull. A run where one is gets a note with the instant.
+        unilateral_words: the meaning of a negative multiplier, for that note.
     """
 
     kind = "joint"
@@ -100,36 +107,28 @@ class Joint(TypeBase):
         mask = cls.holonomic
         if isinstance(mask, bool):
             mask = (mask,) * cls.rows
-        return tuple(k for k, there in enumerate(mask) if there)
+        return tuple(k for k, is_position_row in enumerate(mask) if is_position_row)
 
     @classmethod
     def velocity_rows(cls) -> tuple[int, ...]:
         """Indices of the rows of the velocity level alone."""
         return tuple(k for k in range(cls.rows) if k not in cls.position_rows())
 
-    def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
-        """Constants of this instance.
-
-        A 3-tuple whose name ends in _i, _j or _k is a vector in that body's axes.
-        """
-        return {}
-
 
 class Force(TypeBase):
-    """A force element: what acts on one, two or more bodies.
+    """A force element on one, two or more bodies.
 
     Subclasses define ``wrench``, which returns for each body slot a pair (force, moment about the
-    mass centre) in global axes, and where there is one ``energy``, the potential in J. A force that
-    defines ``energy`` alone has its gradient for ``wrench``, derived (derive/derive.py). Variants
-    and ``switch`` are as for joints. A force that defines neither and names one joint, by a
-    ``joint`` field, switches on the friction of that joint; with a ``wrench`` it acts by that
-    alone.
+    mass centre) in global axes, and for conservative forces ``energy``, the potential in J. Of
+    ``energy`` alone the ``wrench`` is derived (derive/derive.py). Variants and ``switch`` are as
+    for joints. A force that defines neither and names one joint, by a ``joint`` field, switches on
+    the friction of that joint; one with a ``wrench`` does not.
 
     Attributes:
-        keyword: the word that names the type in a scene.
-        each_body: True when the element acts on every body of the scene (slot i in turn).
-        energy_where: where alone the energy is the potential of the wrench, in words that follow
-            "only"; "" where it is so everywhere.
+        keyword: the name of the type in a scene.
+        each_body: True if the element acts on every body of the scene (slot i in turn).
+        energy_where: the condition, to follow "only", for the energy to be the potential of the
+            wrench; "" for no condition.
     """
 
     kind = "force"
@@ -138,38 +137,27 @@ class Force(TypeBase):
     each_body: ClassVar[bool] = False
     energy_where: ClassVar[str] = ""
 
-    def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
-        """Constants of this instance.
-
-        A 3-tuple whose name ends in _i, _j or _k is a vector in that body's axes.
-        """
-        return {}
-
 
 class Function(TypeBase):
     """A function of one variable: ``value(x, ...)`` returns (f, f', f'', f''').
 
-    One that returns f alone has the others derived (derive/derive.py). No step of a run goes over
-    an argument that ``breaks`` names, be it a time or an elongation: a change that is shorter than
-    a step is not missed.
+    Of one that returns f alone the others are derived (derive/derive.py). No step of a run passes
+    over an argument listed by ``breaks``, a time or an elongation: a change shorter than a step is
+    not missed.
 
     Attributes:
-        keyword: the word that names the type in a scene.
-        smooth: whether it has one form everywhere, which nothing could divide. Of a function of
-            another argument than time that neither says so nor has ``breaks`` a run notes that its
-            steps may pass over what it does.
+        keyword: the name of the type in a scene.
+        smooth: it has one smooth form everywhere. Of a function of another argument than time that
+            is not declared smooth and has no ``breaks`` a run notes that steps may pass over
+            changes of it.
     """
 
     kind = "function"
     kernel_names = ("value",)
     smooth: ClassVar[bool] = False
 
-    def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
-        """Constants of this instance, found once (coefficients of a polynomial)."""
-        return {}
-
     def breaks(self) -> Sequence[float]:
-        """Arguments at which this instance takes another form: both ends of a transition."""
+        """Arguments at which this instance changes its form: both ends of a transition."""
         return ()
 
 

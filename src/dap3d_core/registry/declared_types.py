@@ -1,4 +1,4 @@
-"""Which types files declare, read as text: no line of them is run."""
+"""Types that files declare, read as text: nothing of it is executed."""
 
 import ast
 import json
@@ -14,23 +14,23 @@ from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.interface.types import KINDS
 from dap3d_core.registry.regular_files import read_regular
 
-#: A file of more bytes is not read: no author wrote it.
+#: Maximal size of a file, bytes.
 LONGEST = 10**6
 _BASES = {class_.__name__: kind for kind, class_ in KINDS.items()}
 
 
 def declares(path: Path, kind: str, keyword: str) -> bool:
-    """Whether a Python file has a class of this kind with this keyword, as far as its text tells.
+    """True if a Python file has a class of this kind with this keyword, as far as its text shows.
 
-    A class whose bases stand in another file may be of any kind.
+    A class with bases from another file may be of any kind.
     """
     try:
         text = read_regular(path) if path.stat().st_size <= LONGEST else b""
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # given where the file is run
+            warnings.simplefilter("ignore")  # repeated where the file is run
             tree = ast.parse(text)
     except (OSError, ValueError, SyntaxError, RecursionError, MemoryError):
-        return False  # told where the file is run
+        return False  # reported where the file is run
     kinds = dict(_BASES)
     for node in tree.body:
         if isinstance(node, ast.ClassDef):
@@ -42,8 +42,8 @@ def declares(path: Path, kind: str, keyword: str) -> bool:
 
 
 def _keywords(node: ast.ClassDef) -> list[str]:
-    """What a class sets ``keyword`` to: alone, or as one of several names."""
-    found = []
+    """Values that a class assigns to ``keyword``, alone or as one of several names."""
+    keywords = []
     for line in node.body:
         if isinstance(line, ast.Assign) and len(line.targets) == 1:
             target = line.targets[0]
@@ -52,12 +52,12 @@ def _keywords(node: ast.ClassDef) -> list[str]:
             for name, value in zip(names, values, strict=False):
                 is_keyword = isinstance(name, ast.Name) and name.id == "keyword"
                 if is_keyword and isinstance(value, ast.Constant):
-                    found.append(str(value.value))
-    return found
+                    keywords.append(str(value.value))
+    return keywords
 
 
 def not_yet_installed(keyword: str) -> str:
-    """How to install a type that the source of an installed package declares; "" for no such type.
+    """The remedy for a type that the source of an editable package declares since; "" for none.
 
     The entry points of an editable install are those of the day it was made.
     """
@@ -70,7 +70,7 @@ def not_yet_installed(keyword: str) -> str:
             file = folder / "pyproject.toml"
             entry_points = tomllib.loads(file.read_text("utf-8"))["project"]["entry-points"]
             groups = [entry_points.get(group, {}) for group, _ in GROUPS.values()]
-        except Exception:  # of a package that has no such files, or whose files are damaged
+        except Exception:  # the files are missing or damaged
             continue
         if any(keyword in group for group in groups):
             return (

@@ -1,4 +1,4 @@
-"""Which types are installed: read from entry points, without importing any of them."""
+"""Finds the installed types by their entry points, without importing any of them."""
 
 import os
 import re
@@ -13,25 +13,25 @@ import attrs
 
 from dap3d_core.interface.hooks import GROUPS
 
-#: Environment variable that leaves types out, separated by commas: all of a distribution, ``NAME``,
+#: Environment variable that excludes types, separated by commas: all of a distribution, ``NAME``,
 #: or one of them, ``NAME:KEYWORD``.
 BLOCK_VARIABLE = "DAP3D_BLOCK"
-#: Nanoseconds after which a folder's last change is told from the next one by its time.
+#: Resolution of a folder's time of change, ns.
 SETTLED = 10**9
 
 
 @attrs.frozen
 class Source:
-    """Where a type comes from.
+    """Origin of a type.
 
     Attributes:
         kind: joint, force or function; "" for a distribution whose entry points cannot be read.
-        keyword: the type's word in a scene.
-        module: the module that is the plugin, or the path of a model's own file.
+        keyword: the type's name in a scene.
+        module: the module of the plugin, or the path of a model's own file.
         distribution, version: the installed package; both "" for a model's own file.
-        blocked: the word of DAP3D_BLOCK that leaves it out; "" for none.
-        fault: why the entry point itself is of no use, "" for a good one.
-        type: the class, where it is loaded already (a model's own file).
+        blocked: the entry of DAP3D_BLOCK that excludes it; "" for none.
+        fault: the fault of the entry point itself, "" for a valid one.
+        type: the class, where it is already loaded (a model's own file).
     """
 
     kind: str
@@ -53,7 +53,7 @@ class Source:
 def discover(groups: Collection[str] | None = None) -> list[Source]:
     """Every type that the installed distributions declare, in the order of kinds and keywords.
 
-    What is installed is read again when a folder that Python searches has changed.
+    Installed distributions are read again when a folder of sys.path has changed.
 
     Args:
         groups: entry-point groups to read; all three by default, none with an empty collection.
@@ -66,19 +66,19 @@ def discover(groups: Collection[str] | None = None) -> list[Source]:
 def _discover(
     groups: frozenset[str], blocked: frozenset[str], path: tuple[tuple[str, int], ...]
 ) -> tuple[Source, ...]:
-    """The types; ``path`` says where they are looked for, and when that was changed."""
+    """The types; ``path`` is the search path with times of change, a key of the cache."""
     kinds = {group: kind for kind, (group, _) in GROUPS.items() if group in groups}
-    found = [source for one in _declaring(kinds) for source in _sources(one, kinds, blocked)]
+    sources = [source for one in _declaring(kinds) for source in _sources(one, kinds, blocked)]
     order = {kind: k for k, kind in enumerate(GROUPS)}
-    found.sort(key=lambda s: (order.get(s.kind, -1), s.keyword, s.distribution))
-    return tuple(found)
+    sources.sort(key=lambda s: (order.get(s.kind, -1), s.keyword, s.distribution))
+    return tuple(sources)
 
 
 def _changed(folder: str) -> tuple[str, int]:
-    """A folder, in full, and when something was last put into it, ns; 0 where it is not there.
+    """A folder's absolute path and time of change, ns; 0 where it is missing.
 
-    Where that was just now the time is this moment: the clock of a file system ticks slowly, and
-    more may come within the tick.
+    A change within ``SETTLED`` counts as now: the clock of a file system ticks slowly, and a second
+    change may fall into the same tick.
     """
     try:
         changed, now = os.stat(folder or ".").st_mtime_ns, time.time_ns()
@@ -88,7 +88,7 @@ def _changed(folder: str) -> tuple[str, int]:
 
 
 def blocked_words() -> frozenset[str]:
-    """What DAP3D_BLOCK leaves out, the names of distributions in their normal form."""
+    """Entries of DAP3D_BLOCK, with normalised names of distributions."""
     words = (w.partition(":") for w in os.environ.get(BLOCK_VARIABLE, "").split(",") if w.strip())
     return frozenset(f"{normal_name(name)}{colon}{word.strip()}" for name, colon, word in words)
 
@@ -99,10 +99,10 @@ def normal_name(name: str) -> str:
 
 
 def _declaring(groups: Collection[str]) -> Iterator[Distribution]:
-    """The distributions that have one of these groups; of two of a name the one that is imported.
+    """The distributions with one of these groups; of two of a name the one that is imported.
 
-    Entry points are looked for as text first: to parse what all the others declare, and the long
-    texts in which their names stand, would take ten times as long.
+    The text of the entry points is searched first: parsing the entry points and the metadata of all
+    distributions would take ten times as long.
     """
     seen: set[str] = set()
     for distribution in distributions():
@@ -118,10 +118,10 @@ def _declaring(groups: Collection[str]) -> Iterator[Distribution]:
 
 
 def _mentions(distribution: Distribution, groups: Collection[str]) -> bool:
-    """Whether a distribution may declare entry points of these groups."""
+    """True if a distribution may declare entry points of these groups."""
     try:
         text = distribution.read_text("entry_points.txt") or ""
-    except Exception:  # damaged: told where it is parsed
+    except Exception:  # damaged: reported where it is parsed
         return True
     return any(group in text for group in groups)
 
@@ -129,7 +129,7 @@ def _mentions(distribution: Distribution, groups: Collection[str]) -> bool:
 def _sources(
     distribution: Distribution, kinds: dict[str, str], blocked: frozenset[str]
 ) -> list[Source]:
-    """The types that a distribution declares; where it cannot be read, that."""
+    """The types that a distribution declares, or the fault that it cannot be read."""
     name, version = _name_and_version(distribution)
     try:
         entries = [entry for entry in distribution.entry_points if entry.group in kinds]
@@ -153,7 +153,7 @@ def _name_and_version(distribution: Distribution) -> tuple[str, str]:
 
 
 def _fault(value: str) -> str:
-    """Why an entry point is of no use, by what it names."""
+    """The fault of an entry point, by its value."""
     if re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)*", value):
         return ""
     return f"its entry point should name a module, such as my_package.my_type, not {value!r}"

@@ -1,4 +1,4 @@
-"""The registry: which types there are, and each of them examined when it is first asked for."""
+"""The registry of types; each is loaded and examined on first use."""
 
 from collections.abc import Collection
 from pathlib import Path
@@ -10,14 +10,14 @@ from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.registry.declared_types import not_yet_installed
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover
+from dap3d_core.registry.guard import OverdueError
 from dap3d_core.registry.loading import compile_kernels, load, load_file
 from dap3d_core.registry.suggestions import nearest
-from dap3d_core.registry.time_limit import OverdueError
 
-#: Seconds that a plugin may take to load where no scene asks for it: a command that looks at all
-#: types does not wait for one that never ends.
+#: Time limit of the loading of a plugin that no scene needs, s: a listing of all types must not
+#: wait for one that never ends.
 LOAD_LIMIT = 60.0
-#: The distribution whose types are compiled and run by the tests of dap3d.
+#: The distribution of dap3d's own types, which its tests compile and run.
 OWN = "dap3d"
 
 
@@ -33,15 +33,15 @@ class UnknownTypeError(PluginError, LookupError):
 
 @attrs.frozen
 class PluginInfo:
-    """One line of ``dap3d plugins``.
+    """A type and its state, a line of ``dap3d plugins``.
 
     Attributes:
         kind: joint, force or function; "" where a distribution's entry points cannot be read.
-        keyword: the type's word in a scene.
+        keyword: the type's name in a scene.
         distribution, version: the installed package; "" for a model's own file.
         module: the module, or the path of a model's own file.
         state: ok, broken, blocked or duplicate.
-        reason: why it is not ok, with the remedy; "" where it is.
+        reason: the fault, with the remedy; "" where the state is ok.
     """
 
     kind: str
@@ -55,29 +55,29 @@ class PluginInfo:
 
 @attrs.frozen(eq=False)
 class Registry:
-    """The types that scenes may name. A value: make one with ``load_registry`` and pass it on.
+    """The types that scenes may name; made by ``load_registry``, immutable.
 
     Attributes:
-        sources: where each type comes from, by kind and keyword; several where packages collide.
-        notes: what plugins changed in the process while they were loaded, and was put back.
+        sources: origin of each type, by kind and keyword; several where packages collide.
+        notes: changes of the process by plugins that were undone.
     """
 
     sources: dict[tuple[str, str], list[Source]]
     notes: list[str] = attrs.field(factory=list)
     _loaded: dict[Source, Examined | str] = attrs.field(factory=dict, repr=False)
-    _overdue: dict[str, str] = attrs.field(factory=dict, repr=False)  # packages that were given up
+    _overdue: dict[str, str] = attrs.field(factory=dict, repr=False)  # packages given up
 
     def get(self, kind: str, keyword: str, *, limit_s: float | None = None) -> Examined:
-        """The type of this keyword, loaded and examined when first asked for.
+        """The type of this keyword, loaded and examined on first use.
 
         Args:
             kind: joint, force or function.
-            keyword: the type's word in a scene.
-            limit_s: how long its plugin may take to load; by default as long as it takes.
+            keyword: the type's name in a scene.
+            limit_s: time limit of the loading of its plugin; by default none.
 
         Raises:
-            UnknownTypeError: there is none; it names the nearest and all others.
-            PluginError: the type cannot be used: two packages bring it, or its plugin is broken.
+            UnknownTypeError: there is none; names the nearest and all others.
+            PluginError: the type cannot be used: two packages have it, or its plugin is broken.
                 Names distribution, module or file, reason and remedy.
         """
         _check_kind(kind)
@@ -103,19 +103,15 @@ class Registry:
         """Every type with its state; loads each in its own guard and raises nothing.
 
         Args:
-            limit_s: how long each plugin may take to load; one that takes longer is broken.
-            compiling: whether the kernels of types from other packages are compiled as well, which
-                takes a second a type the first time.
+            limit_s: time limit of the loading of each plugin; one that takes longer is broken.
+            compiling: compile the kernels of types from other packages as well, which takes a
+                second a type the first time.
         """
-        infos = [
-            (s, self._info(s, found, limit_s)) for found in self.sources.values() for s in found
-        ]
-        if not compiling:
-            return [info for _, info in infos]
-        return [self._compiled(s, info) for s, info in infos]
+        infos = [(s, self._info(s, same, limit_s)) for same in self.sources.values() for s in same]
+        return [self._compiled(s, info) if compiling else info for s, info in infos]
 
     def with_file(self, path: str | Path) -> "Registry":
-        """A registry that has the types of a model's own Python file as well. Runs that file.
+        """A registry with the types of a model's own Python file as well; runs that file.
 
         Args:
             path: the file, ``plugin.py`` of a model's folder.
@@ -130,25 +126,25 @@ class Registry:
         return Registry(sources, notes, dict(self._loaded))
 
     def clash(self, kind: str, keyword: str, path: Path) -> str:
-        """What is wrong where a model's own file has the keyword of an installed type."""
+        """The fault of a model's own file with the keyword of an installed type."""
         sources = [s for s in self.sources[kind, keyword] if not s.blocked]
         return _collision([*sources, Source(kind, keyword, str(path))])
 
     def _load(self, source: Source, limit_s: float | None = None) -> Examined:
-        found = self._loaded.get(source)
-        if found is None:
+        loaded = self._loaded.get(source)
+        if loaded is None:
             package = source.module.partition(".")[0]
             try:
-                found = load(source, self.notes, limit_s, self._overdue.get(package, ""))
+                loaded = load(source, self.notes, limit_s, self._overdue.get(package, ""))
             except PluginError as error:
                 self._loaded[source] = str(error)
                 if isinstance(error.__cause__, OverdueError):
                     self._overdue[package] = str(error.__cause__)
                 raise
-            self._loaded[source] = found
-        if isinstance(found, str):
-            raise PluginError(found)
-        return found
+            self._loaded[source] = loaded
+        if isinstance(loaded, str):
+            raise PluginError(loaded)
+        return loaded
 
     def _info(self, source: Source, rivals: list[Source], limit_s: float | None) -> PluginInfo:
         state, reason = "ok", ""
@@ -164,23 +160,16 @@ class Registry:
                 self._load(source, limit_s)
             except PluginError as error:
                 state, reason = "broken", str(error)
-        return PluginInfo(
-            source.kind,
-            source.keyword,
-            source.distribution,
-            source.version,
-            source.module,
-            state,
-            reason,
-        )
+        s = source
+        return PluginInfo(s.kind, s.keyword, s.distribution, s.version, s.module, state, reason)
 
     def _compiled(self, source: Source, info: PluginInfo) -> PluginInfo:
-        """What is to be said of a type after its kernels were compiled; dap3d's own are tested."""
-        found = self._loaded.get(source)
-        if info.state != "ok" or info.distribution == OWN or not isinstance(found, Examined):
+        """The info after compiling the kernels of a type; dap3d's own are compiled by its tests."""
+        loaded = self._loaded.get(source)
+        if info.state != "ok" or info.distribution == OWN or not isinstance(loaded, Examined):
             return info
         try:
-            compile_kernels(source, found, self.notes)
+            compile_kernels(source, loaded, self.notes)
         except PluginError as error:
             return attrs.evolve(info, state="broken", reason=str(error))
         return info

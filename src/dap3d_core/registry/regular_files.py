@@ -1,10 +1,10 @@
-"""Reading files that others made: never waits for what is no file, such as a pipe or a device."""
+"""Reads regular files only, without waiting for a pipe or a device."""
 
 import errno
 import os
 import stat
 
-#: Names of what is neither a file nor a folder, for messages.
+#: Names of special files, for messages.
 _KINDS = {
     stat.S_IFIFO: "a pipe (FIFO)",
     stat.S_IFSOCK: "a socket",
@@ -16,15 +16,15 @@ _FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
 
 def kind_of(mode: int) -> str:
-    """What a mode of ``stat`` says that is no regular file, in words: "a pipe (FIFO)"."""
+    """The name of a special file by its mode of ``stat``: "a pipe (FIFO)"."""
     return _KINDS.get(stat.S_IFMT(mode), "something else")
 
 
 def read_regular(path: str | os.PathLike[str], most: int | None = None) -> bytes:
-    """The bytes of a regular file, at most ``most``, and no more than it has as it is opened.
+    """The bytes of a regular file, at most ``most``, and at most its size when it is opened.
 
     Raises:
-        OSError: it cannot be read, or is no regular file; ``strerror`` says which.
+        OSError: it cannot be read, or is no regular file; ``strerror`` gives the reason.
     """
     status = os.stat(path)
     if stat.S_ISDIR(status.st_mode):

@@ -6,14 +6,14 @@ from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-#: Of more words only those are compared that begin or end most alike: so many either way.
+#: Number of words up to which all are compared; of more, this many neighbours in either order.
 MANY_WORDS, NEIGHBOURS = 200, 25
 #: Nothing is similar to a longer word.
 LONGEST = 80
 
 
 class _Words(NamedTuple):
-    """Words regardless of case, sorted by their beginnings, and turned round by their ends."""
+    """Words regardless of case, in order of their beginnings and, reversed, of their ends."""
 
     word_of: dict[str, str]
     forward: list[str]
@@ -23,7 +23,7 @@ class _Words(NamedTuple):
 def nearest(word: Any, allowed: Collection[str]) -> str:
     """The allowed word most similar to ``word``, regardless of case; "" where none is similar.
 
-    An abbreviation is similar to the word it stands for: ``rev`` to ``revolute``.
+    An abbreviation is similar to its word: ``rev`` to ``revolute``.
     """
     if not isinstance(word, str) or not 0 < len(word) <= LONGEST:
         return ""
@@ -38,7 +38,7 @@ def nearest(word: Any, allowed: Collection[str]) -> str:
 
 @lru_cache(maxsize=4)
 def _sorted_words(allowed: tuple[str, ...]) -> _Words:
-    """The words, kept for the next mistake: a scene may have many, in references to many names."""
+    """The words in order, cached: a scene may have many mistakes in references to many names."""
     word_of: dict[str, str] = {}
     for candidate in allowed:
         word_of.setdefault(candidate.casefold(), candidate)
@@ -48,10 +48,10 @@ def _sorted_words(allowed: tuple[str, ...]) -> _Words:
 
 
 def _alike(wanted: str, words: _Words) -> list[str]:
-    """The words that share the longest beginnings, and the longest ends, with another."""
-    found = _neighbours(wanted, words.forward)
-    found += [form[::-1] for form in _neighbours(wanted[::-1], words.backward)]
-    return list(dict.fromkeys(found))
+    """The words with the longest beginnings, or the longest ends, in common with another."""
+    forms = _neighbours(wanted, words.forward)
+    forms += [form[::-1] for form in _neighbours(wanted[::-1], words.backward)]
+    return list(dict.fromkeys(forms))
 
 
 def _neighbours(wanted: str, ordered: list[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""What the authors of types test with: formulas against derivatives, balances and each other.
+"""Tests for authors of types: formulas against derivatives, balances and each other.
 
     from dap3d_core.testing import checks_for
 
@@ -6,7 +6,7 @@
     def test_screw(check):
         check()
 
-``check_type`` does all at once and returns a report; ``dap3d check-plugin`` shows it
+``check_type`` runs all checks and returns a report; ``dap3d check-plugin`` shows it
 (docs/check-plugin.md).
 """
 

@@ -1,4 +1,4 @@
-"""All checks of a type: one after the other, or each as a test of its own."""
+"""Runs the checks of a type, all at once or each as a separate test."""
 
 import contextlib
 import io
@@ -13,9 +13,9 @@ from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.testing.checks import forces, functions, joints, plain_kernels, purity
 from dap3d_core.testing.checks.findings import FAILED, LEFT_OUT, Finding, Outcome, Report
-from dap3d_core.testing.samples.sampled_type import Subject, UndefinedError, subjects
+from dap3d_core.testing.samples.sampled_type import SampledType, UndefinedError, sampled_types
 
-#: How many random poses on and off the manifold each check takes, and the seed of them.
+#: Default number of random poses on and off the manifold, and their seed.
 POSES, SEED = 4, 1
 
 
@@ -24,18 +24,18 @@ class Check:
     """One check of a type, or of one of its variants; a test calls it.
 
     Attributes:
-        name: what is checked, such as gamma.
+        name: the formula or property, such as gamma.
         subject: the type or variant, with its random poses.
-        inapplicable: why the check does not apply; "" where it does.
+        inapplicable: the reason why the check does not apply; "" where it does.
     """
 
     name: str
-    subject: Subject
+    subject: SampledType
     inapplicable: str
-    _run: Callable[[Subject], Outcome]
+    _run: Callable[[SampledType], Outcome]
 
     def run(self) -> Outcome:
-        """Carry it out."""
+        """Run the check."""
         if self.inapplicable:
             return Outcome(self.name, self.subject.variant, LEFT_OUT, self.inapplicable)
         with contextlib.redirect_stdout(io.StringIO()) as printed:
@@ -58,10 +58,10 @@ class Check:
             return Outcome(self.name, self.subject.variant, FAILED, words, findings=(finding,))
 
     def __call__(self) -> None:
-        """Carry it out.
+        """Run the check.
 
         Raises:
-            AssertionError: something is wrong; its words say what, for each row.
+            AssertionError: a formula is wrong; lists the findings.
         """
         outcome = self.run()
         if not outcome.ok:
@@ -77,15 +77,15 @@ def check_type(type_: Any, *, poses: int = POSES, seed: int = SEED) -> Report:
     """Check the formulas of a joint, force or function type, with all its variants.
 
     Args:
-        type_: the class, or what ``examine`` made of it.
+        type_: the class, or the result of ``examine``.
         poses: random poses off the manifold, and as many on it.
         seed: of the random poses.
 
     Returns:
-        the outcome of each check; ``ok`` where nothing is wrong.
+        the outcome of each check.
 
     Raises:
-        PluginError: the type cannot be used at all; says why.
+        PluginError: the type cannot be used at all.
     """
     examined = type_ if isinstance(type_, Examined) else examine(type_)
     outcomes = tuple(check.run() for check in _checks(examined, poses, seed))
@@ -94,19 +94,19 @@ def check_type(type_: Any, *, poses: int = POSES, seed: int = SEED) -> Report:
 
 
 def checks_for(type_: Any, *, poses: int = POSES, seed: int = SEED) -> list[Check]:
-    """The checks that apply to a type, each to be called, as tests of their own.
+    """The checks that apply to a type, to be called as separate tests.
 
         @pytest.mark.parametrize("check", checks_for(Screw), ids=str)
         def test_screw(check):
             check()
 
     Args:
-        type_: the class, or what ``examine`` made of it.
+        type_: the class, or the result of ``examine``.
         poses: random poses off the manifold, and as many on it.
         seed: of the random poses.
 
     Raises:
-        PluginError: the type cannot be used at all; says why.
+        PluginError: the type cannot be used at all.
     """
     examined = type_ if isinstance(type_, Examined) else examine(type_)
     return [check for check in _checks(examined, poses, seed) if not check.inapplicable]
@@ -116,24 +116,24 @@ def _checks(examined: Examined, poses: int, seed: int) -> list[Check]:
     if poses < 1:
         raise ValueError(f"poses is {poses}; a check takes one or more")
     of_kind = {"joint": _of_joint, "force": _of_force, "function": _of_function}
-    found = []
-    for subject in subjects(examined, seed, poses):
+    checks = []
+    for subject in sampled_types(examined, seed, poses):
         by_joint = "its formulas are the friction of its joint, which is checked with that"
         if subject.examined.rubs_in:
-            found.append(Check("energy", subject, by_joint, forces.potential))
+            checks.append(Check("energy", subject, by_joint, forces.potential))
             continue
-        found += of_kind[subject.type.kind](subject)
-        found.append(Check("purity", subject, "", purity.purity))
-        found.append(Check("plain", subject, "", plain_kernels.plain))
-        found.append(Check("compiled", subject, "", purity.compiled))
-    return found
+        checks += of_kind[subject.type.kind](subject)
+        checks.append(Check("purity", subject, "", purity.purity))
+        checks.append(Check("plain", subject, "", plain_kernels.plain))
+        checks.append(Check("compiled", subject, "", purity.compiled))
+    return checks
 
 
-def _of_joint(subject: Subject) -> list[Check]:
+def _of_joint(subject: SampledType) -> list[Check]:
     no_position = "" if subject.type.position_rows() else "it has no row at position level"
     no_form = "" if "C_dot" in subject.kernels.names() else "it defines no C_dot"
     ground = joints.against_ground(subject)
-    found = [
+    checks = [
         Check("J", subject, no_position, joints.jacobian),
         Check("nu", subject, no_position, joints.velocity_side),
         Check("velocity form", subject, no_form, joints.velocity_form),
@@ -145,19 +145,18 @@ def _of_joint(subject: Subject) -> list[Check]:
         Check("action and reaction", subject, ground, joints.action_and_reaction),
     ]
     if "friction" in subject.examined.kernels:
-        found.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))
+        checks.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))
         for name, run in (("friction frame", forces.frame), ("friction balance", forces.balance)):
-            found.append(
-                Check(name, subject, ground, _on_friction(partial(run, kernel="friction")))
-            )
-    return found
+            on_friction = _on_friction(partial(run, kernel="friction"))
+            checks.append(Check(name, subject, ground, on_friction))
+    return checks
 
 
-def _on_friction(run: Callable[[Subject], Outcome]) -> Callable[[Subject], Outcome]:
+def _on_friction(run: Callable[[SampledType], Outcome]) -> Callable[[SampledType], Outcome]:
     return lambda subject: run(subject.friction)
 
 
-def _of_force(subject: Subject) -> list[Check]:
+def _of_force(subject: SampledType) -> list[Check]:
     ground = joints.against_ground(subject)
     energy = "" if "energy" in subject.kernels.names() else "it has no energy"
     if not energy and subject.type.energy_where:
@@ -169,7 +168,7 @@ def _of_force(subject: Subject) -> list[Check]:
     ]
 
 
-def _of_function(subject: Subject) -> list[Check]:
+def _of_function(subject: SampledType) -> list[Check]:
     return [Check("derivatives", subject, "", functions.derivatives)]
 
 

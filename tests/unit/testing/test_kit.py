@@ -15,7 +15,7 @@ from dap3d_core.testing.samples.random_state import (
     random_state,
     rotation,
 )
-from dap3d_core.testing.samples.sampled_type import subjects
+from dap3d_core.testing.samples.sampled_type import sampled_types
 from dap3d_forces.weight import Weight
 from dap3d_functions.polynomial import Polynomial
 from dap3d_joints.spherical import Spherical
@@ -63,7 +63,7 @@ def test_a_common_rigid_motion_keeps_distances_and_their_rates():
 
 def test_samples_on_the_manifold():
     """C = 0 and J v = nu there; the last pose has body j on ground, at rest."""
-    (subject,) = subjects(examine(Universal), seed=1, poses=3)
+    (subject,) = sampled_types(examine(Universal), seed=1, poses=3)
     assert len(subject.assembled) == 3
     for sample in subject.assembled:
         assert np.max(np.abs(sample.value("C"))) < 1e-11

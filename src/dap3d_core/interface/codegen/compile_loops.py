@@ -1,4 +1,4 @@
-"""The group loops of a type, compiled; what cannot be is an error with its reason."""
+"""Compiles the group loops of a type."""
 
 import inspect
 from collections.abc import Callable
@@ -18,8 +18,8 @@ def compiled_loop(
 
     Args:
         examined: the type.
-        what: what the loop computes.
-        announce: called with the loop's name before it is compiled anew.
+        what: the kind of the loop.
+        announce: called with the loop's name before it is compiled.
 
     Raises:
         PluginError: it cannot be compiled; names file, type, kernels, line, reason and remedy.
@@ -40,8 +40,8 @@ def compiled_loop(
 def compile_all(examined: Examined) -> None:
     """Compile all loops of a type and of its variants.
 
-    Kernels that call a function of an argument are left out: they are compiled with the function
-    that a scene gives.
+    Except kernels that call a function of an argument: they are compiled with the function of a
+    scene.
 
     Raises:
         PluginError: one of them cannot be compiled.

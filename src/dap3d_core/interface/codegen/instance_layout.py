@@ -1,6 +1,7 @@
-"""How the instances of a type are stored: which integers and which numbers each takes."""
+"""Storage of the instances of a type: integers and numbers of each."""
 
 from collections.abc import Mapping
+from math import prod
 from typing import Any
 
 import attrs
@@ -9,26 +10,26 @@ from dap3d_core.interface.fields import slot_of, specs_of
 from dap3d_core.interface.types import TypeBase
 
 SLOTS = ("i", "j", "k")
-#: Numbers that an angle takes: itself, its rate and the time, at the last accepted step.
+#: Numbers of an angle: itself, its rate and the time, at the last accepted step.
 ANGLE_WIDTH = 3
 
-#: A constant or a field in the numbers of an instance: where it begins, its shape.
+#: A constant or a field in the numbers of an instance: its offset and shape.
 Place = tuple[int, tuple[int, ...]]
 
 
 @attrs.frozen
 class Layout:
-    """Where one instance's integers and numbers stand.
+    """Indices of the integers and numbers of an instance.
 
     Attributes:
         slots: body slots, in the order of the J blocks.
         functions: function fields of time, in order; their rows of F follow the bodies in ``idx``.
         others: vector fields of no slot, in order; the bodies they are fixed in come next.
         constants: names that ``prepare`` returns.
-        numbers: name -> (offset in ``par``, shape) of what is stored for each instance.
-        tables: name -> (offset of its place and its number of rows, columns).
+        numbers: name -> (offset in ``par``, shape) of the stored numbers.
+        tables: name -> (offset of its start and its number of rows, columns).
         angles: name -> offset of the angle at the last accepted step, its rate and the time there.
-        par_width: numbers an instance takes.
+        par_width: numbers of an instance.
     """
 
     slots: tuple[str, ...]
@@ -42,29 +43,26 @@ class Layout:
 
     @property
     def integers(self) -> int:
-        """Bodies and functions that an instance has in ``idx``."""
+        """Number of bodies and functions of an instance in ``idx``."""
         return len(self.slots) + len(self.functions) + len(self.others)
 
 
 def body_slots(type_: type[TypeBase]) -> tuple[str, ...]:
     """The body slots of a type, in the order i, j, k."""
-    found = {"i"} if getattr(type_, "each_body", False) else set()
+    slots = {"i"} if getattr(type_, "each_body", False) else set()
     for name, spec in specs_of(type_).items():
         if spec.kind == "vector2":
-            found |= {"i", "j"}
+            slots |= {"i", "j"}
         elif spec.ground:
             continue
         elif spec.kind in ("body", "point", "vector") and (slot := slot_of(name)):
-            found.add(slot)
-    return tuple(s for s in SLOTS if s in found)
+            slots.add(slot)
+    return tuple(s for s in SLOTS if s in slots)
 
 
 def size(shape: tuple[int, ...]) -> int:
-    """How many numbers a shape holds."""
-    n = 1
-    for extent in shape:
-        n *= extent
-    return n
+    """Number of entries of a shape."""
+    return prod(shape)
 
 
 def shape_of(value: Any) -> tuple[int, ...]:
@@ -75,7 +73,7 @@ def shape_of(value: Any) -> tuple[int, ...]:
 
 
 def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> Layout:
-    """How instances of a type are stored, given what ``prepare`` returned for one of them."""
+    """The layout of the instances of a type, given the constants of one of them."""
     numbers: dict[str, Place] = {}
     tables: dict[str, tuple[int, int]] = {}
     angles: dict[str, int] = {}
@@ -102,8 +100,8 @@ def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> Layout:
         elif spec.kind == "angle":
             angles[name] = width
             width += ANGLE_WIDTH
-    kept = tuple(name for name in constants if name not in tables)
-    for name in kept:
+    stored = tuple(name for name in constants if name not in tables)
+    for name in stored:
         numbers[name] = width, shape_of(constants[name])
         width += size(numbers[name][1])
-    return Layout(slots, tuple(functions), tuple(others), kept, numbers, tables, angles, width)
+    return Layout(slots, tuple(functions), tuple(others), stored, numbers, tables, angles, width)

@@ -1,7 +1,7 @@
-"""Which names a type offers to its kernels, what each holds, and how a group loop computes it.
+"""Names that a type offers to its kernels, with the code by which a group loop computes each.
 
-docs/reference/names.md lists them by field. A field ``v_i`` takes the place of the velocity of that
-name; other names of a body are taken.
+docs/reference/names.md lists them by field. A field ``v_i`` replaces the velocity of that name;
+other names of a body are reserved.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -14,9 +14,9 @@ from dap3d_core.interface.codegen.instance_layout import Layout, size
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import TypeBase
 
-#: Kernels that may name quantities of the velocity level; all others see positions and time only.
+#: Kernels that may use quantities of the velocity level; all others use positions and time only.
 VELOCITY_KERNELS = ("C_dot", "gamma", "wrench", "friction", "switch")
-#: What a force ``friction`` hands to the kernel ``friction`` of its joint.
+#: Numbers of a force ``friction`` for the kernel ``friction`` of its joint.
 FRICTION_NUMBERS = ("mu", "v_tol", "radius")
 #: Suffixes of a function's value and derivatives.
 DERIVATIVES = ("", "_dot", "_ddot")
@@ -24,23 +24,23 @@ DERIVATIVES = ("", "_dot", "_ddot")
 
 @attrs.frozen
 class Quantity:
-    """One name: what it is and how a loop finds it.
+    """One name: its meaning and its code.
 
     Attributes:
-        name: as kernels write it.
+        name: the parameter name in kernels.
         shape: () number, (3,) vector, (4,) Euler parameters, (3, 3) matrix, (n,) other tuples.
-        velocity: whether it belongs to the velocity level.
-        code: Python expression over the loop's variables and ``needs`` (prefixed by ``x_``).
+        velocity: it belongs to the velocity level.
+        code: Python expression of the loop's variables and ``needs`` (prefixed by ``x_``).
         needs: names that must be computed before.
-        doc: what it is, for ``describe``.
+        doc: its meaning, for ``describe``.
         columns: of a table; 0 for all else.
-        derivative: of a function to be called, which derivative; -1 for all else.
-        rate: its rate of change as an expression over ``needs`` and the velocities ``V_i``, ``W_i``
-            of the bodies: what is derived is derived from it. "" for a constant.
-        rate_name: the name that holds its rate; "" where there is none.
-        motion: of a name of the velocity level that is the rate of no other: what it is, over the
-            same names as a rate.
-        derivable: whether formulas that use it can be derived.
+        derivative: order of the derivative of a function to be called; -1 for all else.
+        rate: its rate of change as an expression of ``needs`` and the velocities ``V_i``, ``W_i``
+            of the bodies, for derivations. "" for a constant.
+        rate_name: the name of its rate; "" where there is none.
+        motion: the expression, in the same names as a rate, of a name of the velocity level that
+            is the rate of no other.
+        derivable: formulas that use it can be derived.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Quantity:
 
 
 def namespace(type_: type[TypeBase], layout: Layout) -> dict[str, Quantity]:
-    """Every name that the kernels of a type may use, stored as the layout says."""
+    """Every name that the kernels of a type may use."""
     names: dict[str, Quantity] = {}
 
     def offer(
@@ -87,13 +87,13 @@ def namespace(type_: type[TypeBase], layout: Layout) -> dict[str, Quantity]:
 
 
 def friction_names(rows: int) -> dict[str, Quantity]:
-    """What the kernel ``friction`` of a joint may name besides; numbers stand behind its own."""
+    """Further names of the kernel ``friction`` of a joint; their numbers follow its own."""
     reaction = f"({''.join(f'-out2[row + {k}], ' for k in range(rows))})"
     docs = ("friction coefficient", "velocity below which friction fades, m/s", "of the pin, m")
-    found = {"lam": Quantity("lam", (rows,), True, reaction, doc="its multipliers")}
+    names = {"lam": Quantity("lam", (rows,), True, reaction, doc="its multipliers")}
     for name, doc in zip(FRICTION_NUMBERS, docs, strict=True):
-        found[name] = Quantity(name, (), False, "", doc=doc)
-    return found
+        names[name] = Quantity(name, (), False, "", doc=doc)
+    return names
 
 
 def _offer_body(offer: Callable[..., None], s: str) -> None:
@@ -238,7 +238,7 @@ def _tuple(pattern: str, n: int) -> str:
 
 
 def parameters(kernel: Callable[..., Any]) -> tuple[str, ...]:
-    """The names a kernel asks for."""
+    """The parameters of a kernel."""
     positional = (Parameter.POSITIONAL_OR_KEYWORD, Parameter.POSITIONAL_ONLY)
     return tuple(n for n, p in signature(kernel).parameters.items() if p.kind in positional)
 

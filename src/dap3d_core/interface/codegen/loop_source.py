@@ -1,8 +1,8 @@
-"""From a type to its group loops: gather the named quantities, call the kernels, store numbers.
+"""Source of the group loops of a type: compute quantities, call the kernels, store numbers.
 
-An instance's integers stand in ``idx`` from ``b0``: the bodies of its slots, the rows of F of its
-functions, the bodies of its vectors of no slot, then for a joint the place of its first row in the
-row vectors and for each slot the place of its block in D; its numbers stand in ``par`` from ``p1``.
+The integers of an instance are in ``idx`` from ``b0``: the bodies of its slots, the rows of F of
+its functions, the bodies of its vectors of no slot, then for a joint the index of its first row in
+the row vectors and for each slot that of its block in D; its numbers are in ``par`` from ``p1``.
 """
 
 from collections.abc import Iterable, Sequence
@@ -12,7 +12,7 @@ from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
 from dap3d_core.interface.types import Joint
 from dap3d_core.kernels.runtime.loop_modules import Loop
 
-#: What can be computed, and from which kernels; each is one loop.
+#: Kinds of loops, with the kernels that each calls.
 LOOP_KINDS = {
     "acceleration": ("J", "gamma", "nu"),
     "position": ("C",),
@@ -22,14 +22,14 @@ LOOP_KINDS = {
     "value": ("value",),
     "friction": ("friction",),
     "switch": ("switch",),
-    "angle": (),  # the angles of the type's fields, as they stand at an accepted step
-    "turned": (),  # the same angles, to be reported
+    "angle": (),  # the angles of the type's fields, at an accepted step
+    "turned": (),  # the same angles, for reports
     "knot": ("knot",),  # as switches; of functions of an argument (specialise.py)
 }
 
 
 def stride(examined: Examined) -> int:
-    """Integers that an instance takes in ``idx``."""
+    """Number of integers of an instance in ``idx``."""
     n = examined.layout.integers
     if examined.type.kind == "joint":
         return n + 1 + len(examined.layout.slots)
@@ -42,7 +42,7 @@ def write(examined: Examined, what: str) -> Loop | None:
     layout = examined.layout
     wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
     if what in ("angle", "turned"):
-        wanted += [one for name in layout.angles for one in (name, f"{name}_dot")]
+        wanted += [n for name in layout.angles for n in (name, f"{name}_dot")]
     if not kernels and not wanted:
         return None
     lines = [f"b0 = i0 + q * {stride(examined)}"]
@@ -55,9 +55,9 @@ def write(examined: Examined, what: str) -> Loop | None:
     lines += [f"x_{q.name} = {q.code}" for q in in_order(examined.names, wanted) if q.code]
     if what == "angle":
         for name, at in layout.angles.items():
-            lines += _remember(name, at)
+            lines += _store_angle(name, at)
     elif what == "turned":
-        lines += _one_behind_the_other([f"x_{name}" for name in layout.angles])
+        lines += _append([f"x_{name}" for name in layout.angles])
     for name, kernel in kernels.items():
         arguments = ", ".join(f"x_{n}" for n in parameters(kernel))
         lines.append(f"out = kernel_{name}({arguments})")
@@ -66,16 +66,16 @@ def write(examined: Examined, what: str) -> Loop | None:
     return Loop(title, {f"kernel_{n}": k for n, k in kernels.items()}, lines)
 
 
-def _remember(name: str, at: int) -> Iterable[str]:
-    """Keep an angle, its rate and the time; count in out1 where its turns are in doubt."""
-    change = f"x_{name}_dot - par[p1 + {at + 1}]"
-    yield f"out1[0] += doubtful({change}, t - par[p1 + {at + 2}])"
+def _store_angle(name: str, offset: int) -> Iterable[str]:
+    """Store an angle, its rate and the time; count in out1 where its turns are in doubt."""
+    change = f"x_{name}_dot - par[p1 + {offset + 1}]"
+    yield f"out1[0] += doubtful({change}, t - par[p1 + {offset + 2}])"
     for k, value in enumerate((f"x_{name}", f"x_{name}_dot", "t")):
-        yield f"par[p1 + {at + k}] = {value}"
+        yield f"par[p1 + {offset + k}] = {value}"
 
 
-def _one_behind_the_other(values: Sequence[str]) -> Iterable[str]:
-    """Values of all instances and groups, in their order; out2 counts the place."""
+def _append(values: Sequence[str]) -> Iterable[str]:
+    """Append values to those of other instances and groups; out2 is their number."""
     yield "place = whole(out2[0])"
     for k, value in enumerate(values):
         yield f"out1[place + {k}] = {value}"
@@ -83,35 +83,31 @@ def _one_behind_the_other(values: Sequence[str]) -> Iterable[str]:
 
 
 def _store(examined: Examined, kernel: str) -> Iterable[str]:
+    """Store the numbers that a kernel returned."""
     paths, layout, type_ = examined.outputs[kernel], examined.layout, examined.type
-    first_block = layout.integers + 1
-    if kernel == "J":
-        assert issubclass(type_, Joint)
-        for n in range(len(layout.slots)):
-            yield f"d = idx[b0 + {first_block + n}]"
-            for k in range(6 * type_.rows):
-                yield f"out1[d + {k}] = {paths[6 * type_.rows * n + k]}"
-    elif kernel == "C":
-        assert issubclass(type_, Joint)
-        for path, k in zip(paths, type_.position_rows(), strict=True):
-            yield f"out1[row + {k}] = {path}"
-    elif kernel == "C_dot":
-        assert issubclass(type_, Joint)
-        for path, k in zip(paths, type_.velocity_rows(), strict=True):
-            yield f"out1[row + {k}] = {path}"
-    elif kernel in ("gamma", "nu"):
-        for k, path in enumerate(paths):
-            yield f"{'out2' if kernel == 'gamma' else 'out3'}[row + {k}] = {path}"
+    if kernel == "energy":
+        yield f"out1[0] += {paths[0]}"
+    elif kernel == "value":
+        yield "row = idx[b0]"
+        yield from (f"F[row, {k}] = {path}" for k, path in enumerate(paths))
+    elif kernel in ("switch", "knot"):
+        yield from _append(paths)
     elif kernel in ("wrench", "friction"):
         for n, s in enumerate(layout.slots):
             yield f"d = 6 * b_{s}"
-            for k in range(6):
-                yield f"out1[d + {k}] += {paths[6 * n + k]}"
-    elif kernel == "energy":
-        yield f"out1[0] += {paths[0]}"
-    elif kernel in ("switch", "knot"):
-        yield from _one_behind_the_other(paths)
-    else:
-        yield "row = idx[b0]"
-        for k, path in enumerate(paths):
-            yield f"F[row, {k}] = {path}"
+            yield from (f"out1[d + {k}] += {paths[6 * n + k]}" for k in range(6))
+    elif issubclass(type_, Joint) and kernel == "J":
+        size = 6 * type_.rows
+        for n in range(len(layout.slots)):
+            yield f"d = idx[b0 + {layout.integers + 1 + n}]"
+            yield from (f"out1[d + {k}] = {paths[size * n + k]}" for k in range(size))
+    elif issubclass(type_, Joint):
+        every = range(type_.rows)
+        array, rows = {
+            "C": ("out1", type_.position_rows()),
+            "C_dot": ("out1", type_.velocity_rows()),
+            "gamma": ("out2", every),
+            "nu": ("out3", every),
+        }[kernel]
+        for path, k in zip(paths, rows, strict=True):
+            yield f"{array}[row + {k}] = {path}"

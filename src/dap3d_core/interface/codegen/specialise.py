@@ -1,8 +1,8 @@
-"""Types completed by what a scene gives them: functions of an argument, the friction of a joint.
+"""Completes types by a scene's functions of an argument and by the friction of a joint.
 
-A kernel that calls ``f(x)`` is compiled once for each type of function it meets: the kernel is
-copied with the function's own kernel in the place of ``f``, and the numbers of the function stand
-behind those of the element (compiled code takes no closure there; docs/decisions/0001).
+A kernel that calls ``f(x)`` is compiled once for each type of function: the kernel is copied with
+the function's own kernel in place of ``f``, and the numbers of the function follow those of the
+element (compiled code takes no closure there; docs/decisions/0001).
 """
 
 import ast
@@ -29,32 +29,32 @@ from dap3d_core.interface.errors import PluginError, where_is
 
 
 def uncalled(examined: Examined) -> str:
-    """A function that kernels call and that is not known; "" where there is none."""
+    """An unknown function that kernels call; "" where there is none."""
     names = {n for kernel in examined.kernels.values() for n in parameters(kernel)}
     return min((n for n in names if n in examined.names and examined.names[n].derivative >= 0),
                key=len, default="")  # fmt: skip
 
 
-#: Behind the name of a function: its knots.
+#: Suffix of the name of the knots of a function.
 KNOTS = "__knots"
-#: The kernels of which the first that calls a function tells what it is called with.
+#: Kernels in the order in which they are searched for the arguments of functions.
 CALLING = ("C", "C_dot", "gamma", "wrench")
 
 
 def bind_functions(
     examined: Examined, functions: Mapping[str, Examined], knots: Mapping[str, int]
 ) -> Examined:
-    """A type whose functions of an argument are known.
+    """A type with known functions of an argument.
 
     Args:
         examined: the type.
         functions: function field -> the type of the function given.
-        knots: function field -> number of arguments at which that function takes another form.
+        knots: function field -> number of arguments at which that function changes its form.
 
     Returns:
-        the type with the numbers of these functions behind its own, in the order of the fields, and
-        the knots of each behind its numbers. Where there are any it has a kernel ``knot``: how far
-        the arguments that the functions are called with are from these.
+        the type with the numbers of these functions after its own, in the order of the fields, and
+        the knots of each after its numbers. Where there are any it has a kernel ``knot``: the
+        distances of the arguments of the functions from their knots.
 
     Raises:
         PluginError: a kernel does more with a function than to call it, or has no source.
@@ -65,10 +65,10 @@ def bind_functions(
         prefix = "f" if field == "function" else field
         behind = _behind(of_argument.layout, layout.par_width)
         value = of_argument.kernels["value"]
-        asked = parameters(value)
-        own = in_order(namespace(of_argument.type, behind), [n for n in asked if n != "x"])
+        names_of_value = parameters(value)
+        own = in_order(namespace(of_argument.type, behind), [n for n in names_of_value if n != "x"])
         names |= {f"{prefix}__{q.name}": attrs.evolve(q, name=f"{prefix}__{q.name}") for q in own}
-        wanted = tuple("x" if n == "x" else f"{prefix}__{n}" for n in asked)
+        wanted = tuple("x" if n == "x" else f"{prefix}__{n}" for n in names_of_value)
         given = _Given(f"{prefix}__value", value, wanted, f"{prefix}{KNOTS}", knots[field])
         calls |= {f"{prefix}{s}": (given, order) for order, s in enumerate(DERIVATIVES)}
         width = behind.par_width
@@ -95,19 +95,20 @@ def bind_functions(
 
 
 def is_knots(name: str) -> bool:
-    """Whether a number of a layout holds the knots of a function."""
+    """True if a number of a layout holds the knots of a function."""
     return name.endswith(KNOTS)
 
 
 def _nothing() -> None:
-    """A kernel that asks for nothing."""
+    """A kernel without parameters."""
 
 
 @attrs.frozen
 class _Given:
-    """The kernel of a function that is given: its name in the copy, itself, what it is called with.
+    """The kernel of a given function.
 
-    That is the argument, ``x``, and the names of its numbers; name and number of its knots.
+    Its name in the copy, itself, its arguments (``x`` and the names of its numbers), the name and
+    number of its knots.
     """
 
     known_as: str
@@ -118,7 +119,7 @@ class _Given:
 
 
 def bind_friction(examined: Examined) -> Examined:
-    """A joint's kernel ``friction`` as an element of its own: mu, v_tol, radius behind its numbers.
+    """A joint's kernel ``friction`` as a separate element: mu, v_tol, radius follow its numbers.
 
     Raises:
         PluginError: the joint has no such kernel.
@@ -139,7 +140,7 @@ def bind_friction(examined: Examined) -> Examined:
 
 
 def _behind(layout: Layout, start: int) -> Layout:
-    """A layout whose numbers begin at ``start``."""
+    """A layout with its numbers shifted to ``start``."""
     return attrs.evolve(
         layout,
         numbers={n: (start + at, shape) for n, (at, shape) in layout.numbers.items()},
@@ -156,8 +157,8 @@ def _with_functions(
     replaced: "_Calls | None" = None,
 ) -> Callable[..., Any]:
     """The kernel with its calls of functions replaced by calls of the functions' own kernels."""
-    asked = [n for n in parameters(kernel) if n in calls]
-    if not asked:
+    called = [n for n in parameters(kernel) if n in calls]
+    if not called:
         return kernel
     who = f"{where_is(examined.type)}.{name}"
     try:
@@ -173,14 +174,14 @@ def _with_functions(
     replaced.generic_visit(definition)
     if replaced.other:
         raise PluginError(f"{who} may only call {', '.join(replaced.other)}, with one argument")
-    kept = [a for a in definition.args.args if a.arg not in asked]
-    used = dict.fromkeys(calls[n][0] for n in asked)
+    others = [a for a in definition.args.args if a.arg not in called]
+    used = dict.fromkeys(calls[n][0] for n in called)
     numbers = [n for given in used for n in (*given.wanted, *replaced.names(given)) if n != "x"]
-    definition.args.args = [*kept, *(ast.arg(n) for n in numbers)]
+    definition.args.args = [*others, *(ast.arg(n) for n in numbers)]
     definition.decorator_list = []
     plain = kernel.__globals__ | {given.known_as: given.value for given in used}
     code = compile(ast.fix_missing_locations(tree), kernel.__code__.co_filename, "exec")
-    exec(code, plain)  # the plugin's own source, as importing it did
+    exec(code, plain)  # the plugin's own source, already imported
     copied: Callable[..., Any] = plain[definition.name]
     return copied
 
@@ -203,11 +204,11 @@ class _Calls(ast.NodeTransformer):
         return ast.copy_location(ast.Subscript(call, ast.Constant(order), ast.Load()), node)
 
     def argument(self, given: _Given, node: ast.expr) -> ast.expr:
-        """What a function is called with, as it stands in the copy."""
+        """The argument of a function in the copy."""
         return node
 
     def names(self, given: _Given) -> tuple[str, ...]:
-        """What the copy asks for besides the numbers of a function."""
+        """Further parameters of the copy, besides the numbers of a function."""
         return ()
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
@@ -217,7 +218,7 @@ class _Calls(ast.NodeTransformer):
 
 
 class _Distances(_Calls):
-    """The same, but the copy returns how far each argument is from each knot of its function."""
+    """The same, but the copy returns the distance of each argument from each knot."""
 
     def __init__(self, calls: Mapping[str, tuple[_Given, int]]) -> None:
         super().__init__(calls)
@@ -227,7 +228,7 @@ class _Distances(_Calls):
 
     def argument(self, given: _Given, node: ast.expr) -> ast.expr:
         key = f"{given.known_as}({ast.dump(node)})"
-        if key not in self._known:  # f_dot(x) beside f(x) has the same
+        if key not in self._known:  # the same for f(x) and f_dot(x)
             name = self._known[key] = f"x__{len(self._known)}"
             self._new.append(ast.Assign([ast.Name(name, ast.Store())], node))
             for k in range(given.knot_count):
@@ -240,13 +241,13 @@ class _Distances(_Calls):
 
     def visit_Assign(self, node: ast.Assign) -> list[ast.AST]:
         self.generic_visit(node)
-        return [*self._taken(), node]
+        return [*self._pending(), node]
 
     def visit_Return(self, node: ast.Return) -> list[ast.AST]:
-        self.generic_visit(node)  # what is called there counts, what comes of it does not
-        return [*self._taken(), ast.Return(ast.Tuple(list(self.found), ast.Load()))]
+        self.generic_visit(node)  # its calls count, its value does not
+        return [*self._pending(), ast.Return(ast.Tuple(list(self.found), ast.Load()))]
 
-    def _taken(self) -> list[ast.stmt]:
-        """Assignments of arguments that stand before a line."""
-        taken, self._new = self._new, []
-        return taken
+    def _pending(self) -> list[ast.stmt]:
+        """Assignments of arguments that precede a line."""
+        pending, self._new = self._new, []
+        return pending

@@ -1,9 +1,9 @@
-"""Formulas that a type leaves out, derived from those that it gives.
+"""Derives missing formulas of a type from the given ones.
 
 A joint that defines ``C`` (and ``C_dot`` for the rows of the velocity level) gets ``J``, ``gamma``
-and ``nu``, a force that defines ``energy`` its ``wrench``, a function whose ``value`` is one number
-its derivatives. What a type writes by hand is kept. The derived kernels are a module in the cache
-folder, with a digest of the type's sources in its name: sympy is needed for the first use alone.
+and ``nu``, a force that defines ``energy`` its ``wrench``, a function that returns f alone its
+derivatives. Formulas written by hand are used unchanged. The derived kernels are a module in the
+cache folder, named by a digest of the type's sources: sympy is needed for the first use only.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,28 +16,28 @@ from dap3d_core.interface.types import Joint, TypeBase
 
 Kernel = Callable[..., Any]
 
-#: Which kernels others are derived from.
+#: Kernels from which others are derived.
 GIVEN = {"joint": ("C", "C_dot"), "force": ("energy",), "function": ("value",)}
 
 
 class CannotDeriveError(ValueError):
-    """A formula is missing and cannot be derived; says why and what to do."""
+    """A formula is missing and cannot be derived; gives reason and remedy."""
 
 
 def missing(type_: type[TypeBase], gives_one_number: bool = False) -> tuple[str, ...]:
-    """The kernels to be derived; none where the type defines all that it needs.
+    """The kernels to be derived.
 
     Args:
         type_: the type.
-        gives_one_number: of a function, whether its ``value`` gives f alone.
+        gives_one_number: the ``value`` of a function returns f alone.
     """
-    there = type_.kernels()
+    defined = type_.kernels()
     if issubclass(type_, Joint):
-        if {"J", "gamma"} <= set(there) or not {"C", "C_dot"} & set(there):
+        if {"J", "gamma"} <= set(defined) or not {"C", "C_dot"} & set(defined):
             return ()
-        return tuple(n for n in ("J", "gamma", "nu") if n not in there)
+        return tuple(n for n in ("J", "gamma", "nu") if n not in defined)
     if type_.kind == "force":
-        return ("wrench",) if "energy" in there and "wrench" not in there else ()
+        return ("wrench",) if "energy" in defined and "wrench" not in defined else ()
     return ("value",) if gives_one_number else ()
 
 
@@ -47,9 +47,9 @@ def derive(
     """The wanted kernels (``missing``), by name; ``nu`` only where it is not zero.
 
     Raises:
-        CannotDeriveError: says why, and what to do.
+        CannotDeriveError: gives reason and remedy.
     """
-    # here, for finding types by keyword does not need the compiler
+    # imported here: finding types by keyword does not need the compiler
     from dap3d_core.kernels.runtime import generated_modules
     from dap3d_core.kernels.runtime.cache import digest, identities, sources
 

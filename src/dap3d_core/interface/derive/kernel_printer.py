@@ -1,4 +1,4 @@
-"""Expressions as the source of a kernel: common parts once, in the words that kernels have."""
+"""Prints expressions as the source of a kernel, with common subexpressions computed once."""
 
 import itertools
 from collections import Counter
@@ -16,7 +16,7 @@ WORDS = ("sin", "cos", "tanh", "atan2")
 
 
 class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
-    """Expressions in the words of a kernel; remembers which it used."""
+    """Prints expressions in the words of kernels; ``used`` collects these."""
 
     def __init__(self) -> None:
         super().__init__({"fully_qualified_modules": False, "strict": False})
@@ -102,8 +102,8 @@ def kernel_source(
     Args:
         name: of the kernel.
         value: nested lists of expressions.
-        steps: what symbols in them stand for.
-        symbols, offered: the names that it may ask for.
+        steps: the expressions of symbols in them.
+        symbols, offered: the names that it may use.
     """
     lines, numbers = _ordered(steps, flat(value), symbols, offered)
     used = [x for _, x in lines] + numbers
@@ -115,8 +115,8 @@ def kernel_source(
             f"{name} needs {hidden}, the velocity of the body, whose name a field has taken; "
             "give the field another name"
         )
-    asked = {symbols.owner[s][0] for s in free} | called
-    wanted = [n for n in offered if n in asked]
+    needed = {symbols.owner[s][0] for s in free} | called
+    wanted = [n for n in offered if n in needed]
     printer = KernelPrinter()
     text = [f"{s} = {printer.doprint(x)}" for s, x in lines]
     text += _returned(value, iter([printer.doprint(x) for x in numbers]))
@@ -127,7 +127,7 @@ def kernel_source(
 def _ordered(
     steps: Steps, numbers: Sequence[Any], symbols: Symbols, offered: Mapping[str, Quantity]
 ) -> tuple[list[tuple[Any, Any]], list[Any]]:
-    """The steps that the numbers need, each after what it needs, and the numbers; e0, e1, ..."""
+    """The steps that the numbers need, in order of dependence (e0, e1, ...), and the numbers."""
     written = [factored(x) for x in (*steps.values(), *numbers)]
     common, reduced = sympy.cse(written, symbols=symbols.fresh)
     known = dict(common) | dict(zip(steps, reduced, strict=False))
@@ -140,7 +140,7 @@ def _ordered(
                 visit(known[s])
                 order[s] = known[s]
 
-    same: dict[Any, Any] = {}  # steps that are another by another name
+    same: dict[Any, Any] = {}  # steps that equal a symbol
     for symbol, x in known.items():
         known[symbol] = x = x.xreplace(same)
         if x.is_Atom:
@@ -155,7 +155,7 @@ def _ordered(
 
 
 def factored(expression: Any) -> Any:
-    """With the symbol that most terms of a sum share put before them, as far as that goes."""
+    """An expression with the most frequent symbol of each sum factored out, recursively."""
     if expression.is_Atom:
         return expression
     if not expression.is_Add:

@@ -1,12 +1,12 @@
-"""Formulas of a type by symbolic differentiation: its pure kernels run with sympy's symbols.
+"""Symbolic differentiation of the formulas of a type, with sympy symbols as arguments of kernels.
 
-Every name that a kernel may use says in ``Quantity.rate`` how it changes: an arm s_P_i turns with
-its body, W_i x s_P_i. With V_i, W_i the velocities of the bodies this gives, for an equation C,
+``Quantity.rate`` is the rate of every name that a kernel may use: an arm s_P_i turns with its body,
+W_i x s_P_i. With V_i, W_i the velocities of the bodies this gives, for an equation C,
 
     phi = dC/dt = J v - nu,    so J is the coefficients of V and W in phi, and nu is -phi at rest;
     d phi/dt = J v_dot - gamma, so gamma is -d phi/dt with V_dot = W_dot = 0.
 
-Only reached for a type that leaves formulas to be derived, so sympy is imported for it alone.
+Imported only for a type with formulas to be derived, as it imports sympy.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -25,7 +25,7 @@ Steps = dict[Expression, Expression]
 
 
 class DerivationError(ValueError):
-    """A formula cannot be derived; says why and what to do."""
+    """A formula cannot be derived; gives reason and remedy."""
 
 
 def turned(w: Any, A: Any) -> Any:
@@ -64,13 +64,13 @@ def flat(value: Any) -> list[Expression]:
 
 @attrs.frozen
 class Program:
-    """Expressions with common parts in steps: derivatives of steps are steps, so nothing swells.
+    """Expressions with common parts in steps, so that derivatives of steps are steps.
 
     Attributes:
         steps: symbol -> expression over the symbols before it.
         results: expressions over all of them.
-        fresh: gives symbols for further steps; numbered from zero in each derivation, for the
-            order of a sum depends on names.
+        fresh: symbols for further steps; numbered from zero in each derivation, as the order of a
+            sum depends on names.
     """
 
     steps: dict[Expression, Expression]
@@ -79,7 +79,7 @@ class Program:
 
     @classmethod
     def of(cls, results: Sequence[Expression], fresh: Iterator[Expression]) -> "Program":
-        """With a step for what occurs more than once, and for each argument of a function."""
+        """A step for each common subexpression, and for each argument of a function."""
         common, reduced = sympy.cse(results, symbols=fresh)
         steps: dict[Expression, Expression] = {}
         known: dict[Expression, Expression] = {}
@@ -105,10 +105,10 @@ class Program:
         return cls(steps, [split(x) for x in reduced], fresh)
 
     def gradient(self, result: int) -> tuple["Program", dict[Expression, Expression]]:
-        """Derivatives of one result by the symbols that are no steps (reverse accumulation).
+        """Derivatives of one result by the symbols that are not steps (reverse accumulation).
 
         Returns:
-            the program with what they need, and the derivatives by symbol.
+            the program with the steps that they need, and the derivatives by symbol.
         """
         steps = dict(self.steps)
         found: dict[Expression, list[Expression]] = {}
@@ -137,15 +137,15 @@ class Program:
 
 
 def _diff(expression: Expression, symbol: Expression) -> Expression:
-    """Derivative; a step's (of a sign, a branch) is zero where it is defined."""
+    """Derivative; that of a jump (of a sign, a branch) is zero."""
     return sympy.diff(expression, symbol).replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
 
 
 class Symbols(Mapping[str, Any]):
-    """The named quantities of a type as symbols, and how each changes in time.
+    """The named quantities of a type as symbols, with their rates.
 
-    As a mapping it holds what the rates are written with: ``x_NAME``, and the velocities ``V_i``
-    and ``W_i`` of the bodies.
+    As a mapping it is the namespace of the rates: ``x_NAME``, and the velocities ``V_i`` and
+    ``W_i`` of the bodies.
     """
 
     def __init__(self, names: Mapping[str, Quantity], slots: Sequence[str]) -> None:
@@ -158,7 +158,7 @@ class Symbols(Mapping[str, Any]):
         self.velocities = {f"{v.upper()}_{s}": self._velocity(f"{v}_{s}")
                            for s in slots for v in ("v", "w")}  # fmt: skip
         self.basic = [x for s in slots for v in ("V", "W") for x in self.velocities[f"{v}_{s}"]]
-        #: names of the velocity level, and what they are in the velocities of the bodies
+        #: names of the velocity level, as expressions of the velocities of the bodies
         self.motions = {q.name: q.motion for q in names.values() if q.motion} | {
             q.rate_name: q.rate
             for q in names.values()
@@ -185,7 +185,7 @@ class Symbols(Mapping[str, Any]):
         return tuple(sympy.Dummy(f"{name}[{k}]", real=True) for k in range(3))
 
     def value(self, name: str) -> Any:
-        """What a kernel is given for a name: symbols in tuples, or a function to be called."""
+        """The argument of a kernel for a name: symbols in tuples, or a function to be called."""
         if name not in self._values:
             quantity = self.names[name]
             if quantity.derivative >= 0:
@@ -215,7 +215,7 @@ class Symbols(Mapping[str, Any]):
         return type(name, (sympy.Function,), members)
 
     def rate(self, name: str) -> list[Expression]:
-        """The rates of a quantity's numbers, in the velocities of the bodies and in time."""
+        """The rates of a quantity's numbers, as expressions of the velocities of the bodies."""
         if name not in self._rates:
             quantity = self.names[name]
             if not quantity.derivable:
@@ -227,11 +227,11 @@ class Symbols(Mapping[str, Any]):
         return self._rates[name]
 
     def _evaluated(self, code: str) -> list[Expression]:
-        """The numbers of an expression of ``Quantity``, over symbols: text of the program."""
+        """The numbers of an expression of ``Quantity`` (text of this program), over symbols."""
         return [exact(x) for x in flat(eval(code, {"__builtins__": {}, **_WORDS}, self))]
 
     def d_dt(self, program: Program) -> Program:
-        """Rates of a program's results, at V_dot = W_dot = 0; named rates stand by their names."""
+        """Rates of a program's results, at V_dot = W_dot = 0; named rates appear by name."""
         steps = dict(program.steps)
         for symbol, expression in program.steps.items():
             if symbol not in self._steps:
@@ -255,11 +255,11 @@ class Symbols(Mapping[str, Any]):
         if name in self.motions:
             return self._d_dt(self._evaluated(self.motions[name])[k])
         rate = self.rate(name)[k]
-        known_as = self.names[name].rate_name
-        return flat(self.value(known_as))[k] if known_as in self.motions else rate
+        rate_name = self.names[name].rate_name
+        return flat(self.value(rate_name))[k] if rate_name in self.motions else rate
 
     def motion(self, symbol: Expression) -> Expression:
-        """A velocity written out in those of the bodies; None for what is of no velocity."""
+        """A velocity in terms of those of the bodies; None for other symbols."""
         if symbol in self.basic:
             return symbol
         name, k = self.owner.get(symbol, ("", 0))
@@ -283,7 +283,7 @@ def traced(kernel: Callable[..., Any], symbols: Symbols, what: str) -> list[Expr
     """The numbers that a kernel returns, as expressions.
 
     Raises:
-        DerivationError: it does with a quantity what no formula can; says what to write instead.
+        DerivationError: it cannot be evaluated symbolically; gives the remedy.
     """
     try:
         value = kernel(*(symbols.value(name) for name in parameters(kernel)))
@@ -292,8 +292,8 @@ def traced(kernel: Callable[..., Any], symbols: Symbols, what: str) -> list[Expr
         raise
     except Exception as error:
         reason = f"({type(error).__name__}: {error}){line_of(error, kernel)}; {plain_words()}"
-        said = f"{what} cannot be differentiated as a formula {reason}; or write the rest by hand"
-        raise DerivationError(said) from error
+        text = f"{what} cannot be differentiated as a formula {reason}; or write the rest by hand"
+        raise DerivationError(text) from error
 
 
 def derive_joint(
@@ -307,13 +307,13 @@ def derive_joint(
 
     Args:
         C: of the rows of the position level; None where there is none.
-        C_dot: of the other rows: what must vanish, linear in the velocities.
-        position_rows: which rows C gives.
-        rows: how many there are in all.
+        C_dot: of the other rows, linear in the velocities.
+        position_rows: the rows of C.
+        rows: number of all rows.
         symbols: the joint's names.
 
     Raises:
-        DerivationError: says why, and what to do.
+        DerivationError: gives reason and remedy.
     """
     J: list[Any] = [[None] * rows for _ in range(len(symbols.basic) // 6)]
     gamma, nu = [sympy.Integer(0)] * rows, [sympy.Integer(0)] * rows
@@ -343,7 +343,7 @@ def derive_joint(
 def _coefficients(
     gradient: Mapping[Expression, Expression], symbols: Symbols, *, of_rates: bool
 ) -> list[Expression]:
-    """Coefficients of the bodies' velocities in the rate of what has this gradient.
+    """Coefficients of the bodies' velocities in the rate of a quantity with this gradient.
 
     of_rates: the gradient is that of a form in the velocities, by the rates themselves.
     """
@@ -361,7 +361,7 @@ def _coefficients(
 
 
 def _at_rest(phi: Program, symbols: Symbols) -> Program:
-    """The program with all bodies at rest: what is left depends on time."""
+    """The program with all bodies at rest, a function of time alone."""
     used = set().union(*(x.free_symbols for x in (*phi.steps.values(), *phi.results)))
     zero = {s: sympy.Integer(0) for s in used if symbols.motion(s) is not None}
     steps: Steps = {}

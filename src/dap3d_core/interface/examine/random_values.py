@@ -1,4 +1,4 @@
-"""Random numbers for what kernels and ``prepare`` take: types are tried with them before use."""
+"""Random arguments of kernels and ``prepare``, for the examination of types."""
 
 import math
 import random
@@ -39,7 +39,7 @@ def random_value(shape: tuple[int, ...], rng: random.Random) -> Any:
 
 
 def random_quantity(quantity: Quantity, rng: random.Random) -> Any:
-    """What a kernel may be given for a name: numbers, a table, or a function to be called."""
+    """A random argument of a kernel: numbers, a table, or a function to be called."""
     if quantity.derivative >= 0:
         a, b = rng.uniform(0.5, 1.5), rng.uniform(0.5, 1.5)
         return lambda x: a + b * x
@@ -50,7 +50,7 @@ def random_quantity(quantity: Quantity, rng: random.Random) -> Any:
 
 
 def random_field(spec: FieldSpec, rng: random.Random) -> Any:
-    """What the scene may give for a field, as ``prepare`` sees it."""
+    """A random value of a field, in the form that ``prepare`` takes."""
     if spec.kind == "table":
         return tuple(float(k) + rng.uniform(0.0, 0.5) for k in range(6)) if spec.given else None
     if spec.kind == "angle":

@@ -1,4 +1,4 @@
-"""Comparing what a kernel returns with what it should be, row by row, at many poses."""
+"""Comparison of the values of a kernel with reference values, row by row, at many poses."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -8,20 +8,20 @@ import numpy as np
 
 from dap3d_core.testing.checks.findings import FAILED, LEFT_OUT, OK, Finding, Outcome
 from dap3d_core.testing.samples.random_state import Direction, Floats
-from dap3d_core.testing.samples.sampled_type import Sample, Subject
+from dap3d_core.testing.samples.sampled_type import Sample, SampledType
 
-#: Allowed of the largest number compared: a derivative by complex step has the roundings of the
-#: formula alone, some 1e-16 times its condition; differences with h = 2e-3 leave about 1e-12 of
-#: truncation and rounding, far more where functions are steep (the spread of three steps says).
+#: Tolerances relative to the largest number compared: a derivative by complex step has the rounding
+#: of the formula alone, some 1e-16 times its condition; differences with h = 2e-3 leave about 1e-12
+#: of truncation and rounding, far more where functions are steep (see the spread of three steps).
 STEP_TOLERANCE, DIFFERENCE_TOLERANCE, EXACT_TOLERANCE = 1e-9, 1e-7, 1e-9
 
 
 @attrs.frozen
 class Wrong:
-    """A number that is wrong: row (from 0), place behind it, what it is and should be."""
+    """A wrong number: row (from 0), index within the row, actual and expected value."""
 
     row: int
-    at: tuple[int, ...]
+    index: tuple[int, ...]
     is_: float
     should: float
 
@@ -33,17 +33,17 @@ class Wrong:
 
 @attrs.define
 class Comparison:
-    """The outcome of one check of a type, as it is found pose by pose.
+    """One check of a type, compared pose by pose.
 
     Attributes:
         check: its name.
-        subject: what is checked.
-        kernel: the function that is wrong where something is.
-        words: what is compared.
+        subject: the type or variant.
+        kernel: the function to blame for a wrong number.
+        words: the quantities compared, for users.
     """
 
     check: str
-    subject: Subject
+    subject: SampledType
     kernel: str
     words: str
     notes: dict[str, None] = attrs.field(factory=dict)
@@ -66,13 +66,13 @@ class Comparison:
         """Compare two arrays, the rows first.
 
         Args:
-            sample: where.
-            got, want: (rows, ...) what is, and what should be.
-            says: the finding in words.
-            tolerance: allowed, times 1 + the largest number of both.
-            bound: (rows, ...) how wrong ``want`` may be itself, which is found by differences.
-            scale: a larger number than those compared, of which they are differences.
-            rows: which rows of the kernel these are.
+            sample: the element and its state.
+            got, want: (rows, ...) actual and expected values.
+            says: the text of a finding.
+            tolerance: relative to 1 + the largest number of both.
+            bound: (rows, ...) error bound of ``want``, where it is found by differences.
+            scale: size of the terms, where the compared numbers are differences of larger ones.
+            rows: the rows of the kernel.
         """
         got, want = np.asarray(got, dtype=float), np.broadcast_to(want, got.shape)
         if not got.size:
@@ -88,25 +88,26 @@ class Comparison:
             self.differences = max(self.differences or 0.0, float(np.max(smooth, initial=0.0)))
             excess = excess - spread
         for k, row in enumerate(numbers):
-            at = np.unravel_index(np.argmax(excess[k]), excess[k].shape)
-            error = float(excess[k][at])
+            index = np.unravel_index(np.argmax(excess[k]), excess[k].shape)
+            error = float(excess[k][index])
             if not np.isfinite(error):
                 continue
-            wrong = Wrong(row, tuple(map(int, at)), float(got[k][at]), float(want[k][at]))
+            actual, expected = float(got[k][index]), float(want[k][index])
+            wrong = Wrong(row, tuple(map(int, index)), actual, expected)
             if error > tolerance and error > self._worst.get((self.kernel, row), (0.0, None))[0]:
                 self._add((self.kernel, row), error, row + 1, says(wrong), sample, wrong.error,
                           tolerance * size)  # fmt: skip
 
     def fail(self, words: str, sample: Sample | None = None, row: int = 0) -> None:
-        """Something is wrong that has no size."""
+        """Add a finding without a size."""
         self._worst.setdefault(words, (0.0, self._finding(row, words, sample, 0.0, 0.0)))
 
     def note(self, words: str) -> None:
-        """Something could not be done; said once."""
+        """Add a note, once."""
         self.notes[words] = None
 
     def outcome(self, *, sized: bool = True) -> Outcome:
-        """What the check came to."""
+        """The outcome of the check."""
         findings = tuple(finding for _, finding in self._worst.values())
         error, state = self.largest if sized else None, FAILED if findings else OK
         variant, notes = self.subject.variant, tuple(self.notes)
@@ -128,16 +129,14 @@ class Comparison:
         )
 
 
-def left_out(check: str, subject: Subject, why: str) -> Outcome:
+def left_out(check: str, subject: SampledType, why: str) -> Outcome:
     """The outcome of a check that does not apply."""
     return Outcome(check, subject.variant, LEFT_OUT, why)
 
 
 @attrs.frozen(eq=False)
 class Rate:
-    """A derivative: its values, how far they may be wrong (None for those by complex step), what is
-    allowed, and how it was found.
-    """
+    """A derivative: values, error bound (None by complex step), tolerance and method."""
 
     value: Floats
     bound: Floats | None
@@ -148,24 +147,24 @@ class Rate:
 def rates(sample: Sample, name: str, along: Direction, comparison: Comparison) -> list[Rate]:
     """The derivative of a kernel along a direction: by complex step and by differences.
 
-    Where the kernel does not take complex numbers, by differences alone; a note says so.
+    Of a kernel that does not take complex numbers, by differences alone, with a note.
     """
-    found = []
+    derivatives = []
     try:
         slope = sample.slope(name, along)
-        found.append(Rate(slope, None, STEP_TOLERANCE, "complex step"))
+        derivatives.append(Rate(slope, None, STEP_TOLERANCE, "complex step"))
     except Exception as error:
         comparison.note(
             f"{name} does not run on complex numbers ({type(error).__name__}: {error}), so its "
             "derivatives are differences alone; take the words of dap3d_core.kernels"
         )
     value, bound = sample.difference(name, along)
-    found.append(Rate(value, bound, DIFFERENCE_TOLERANCE, "differences"))
-    return found
+    derivatives.append(Rate(value, bound, DIFFERENCE_TOLERANCE, "differences"))
+    return derivatives
 
 
 def body_words(sample: Sample, slot: int, component: int) -> str:
-    """A way to move a body, in words: "the position of body i along x"."""
+    """A direction of motion of a body: "the position of body i along x"."""
     letter = sample.kernels.examined.layout.slots[slot]
     axis = "xyz"[component % 3]
     if component < 3:

@@ -1,4 +1,4 @@
-"""What the checks of a type found: findings in words, outcomes of checks, and the whole report."""
+"""Findings, outcomes of checks and the report of a type."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,16 +10,16 @@ OK, FAILED, LEFT_OUT = "ok", "failed", "not applicable"
 
 @attrs.frozen
 class Finding:
-    """One formula that is wrong.
+    """A wrong formula.
 
     Attributes:
-        check: the check that found it.
+        check: the check.
         variant: values of fields for which the type has this formula; "" where it has no variants.
-        kernel: the function it stands in.
+        kernel: the function.
         row: its row, counted from 1; 0 where there are no rows.
-        words: what is wrong, and what it should be.
-        error: by how much, where it is worst.
-        tolerance: what was allowed there.
+        words: the error and the expected value, for users.
+        error: the largest error.
+        tolerance: the tolerance there.
         pose: seed and number of the random pose, time, state of the bodies and fields, by name.
     """
 
@@ -33,23 +33,23 @@ class Finding:
     pose: Mapping[str, Any] = attrs.field(factory=dict)
 
     def __str__(self) -> str:
-        return f"{self.words}{_told(self.pose)}"
+        return f"{self.words}{_pose_text(self.pose)}"
 
 
 @attrs.frozen
 class Outcome:
-    """What one check of a type, or of one of its variants, came to.
+    """The outcome of one check of a type, or of one of its variants.
 
     Attributes:
         check: its name.
-        variant: values of fields that make the variant; "" where there are none.
+        variant: values of fields of the variant; "" where there are none.
         state: ok, failed, or not applicable.
-        words: what was compared; why it is not applicable.
-        error: the largest error relative to the size of what is compared; None for yes or no. Of
-            derivatives it is the one by complex step.
+        words: the quantities compared, or the reason why the check does not apply.
+        error: the largest relative error; None for yes or no. Of derivatives it is the one by
+            complex step.
         differences: the same by differences, away from corners; None where there are none.
-        notes: what could not be done, and what was done instead.
-        findings: what is wrong, one for each row.
+        notes: limitations of the check.
+        findings: wrong formulas, one for each row.
     """
 
     check: str
@@ -63,12 +63,12 @@ class Outcome:
 
     @property
     def ok(self) -> bool:
-        """Whether nothing is wrong."""
+        """True if there are no findings."""
         return self.state != FAILED
 
     @property
     def title(self) -> str:
-        """The check, and the variant where there is one."""
+        """The check, with the variant if any."""
         return f"{self.check} [{self.variant}]" if self.variant else self.check
 
     def __str__(self) -> str:
@@ -81,14 +81,14 @@ class Outcome:
 
 @attrs.frozen
 class Report:
-    """What all checks of a type came to.
+    """The outcomes of all checks of a type.
 
     Attributes:
         kind: joint, force or function.
         keyword: of the type.
         title: file and class.
         seed: of the random poses.
-        poses: how many of them for each check.
+        poses: number of random poses for each check.
         outcomes: one for each check of each variant.
     """
 
@@ -101,12 +101,12 @@ class Report:
 
     @property
     def ok(self) -> bool:
-        """Whether nothing is wrong."""
+        """True if there are no findings."""
         return all(outcome.ok for outcome in self.outcomes)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """All that is wrong."""
+        """The findings of all checks."""
         return tuple(finding for outcome in self.outcomes for finding in outcome.findings)
 
     def __str__(self) -> str:
@@ -114,8 +114,8 @@ class Report:
         return "\n".join([head, *map(str, self.outcomes)])
 
 
-def _told(pose: Mapping[str, Any]) -> str:
-    """The pose in words, to be put behind a finding."""
+def _pose_text(pose: Mapping[str, Any]) -> str:
+    """The pose, to follow a finding."""
     if not pose:
         return ""
     rest = "; ".join(

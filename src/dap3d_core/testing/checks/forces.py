@@ -1,4 +1,4 @@
-"""The checks of a force, and of the friction of a joint: energy, balance, rigid motions."""
+"""Checks of a force, and of the friction of a joint: energy, balance, rigid motions."""
 
 import random
 from collections.abc import Callable
@@ -10,10 +10,10 @@ from dap3d_core.interface.examine.random_values import numbers, random_pose
 from dap3d_core.testing.checks.compare import Comparison, Wrong, body_words, rates
 from dap3d_core.testing.checks.findings import Outcome
 from dap3d_core.testing.samples.random_state import Direction, Floats, State, rotation
-from dap3d_core.testing.samples.sampled_type import UNDEFINED, Sample, Subject
+from dap3d_core.testing.samples.sampled_type import UNDEFINED, Sample, SampledType
 
 
-def potential(subject: Subject) -> Outcome:
+def potential(subject: SampledType) -> Outcome:
     """At rest the wrench is minus the derivative of the energy."""
     c = Comparison("energy", subject, "energy", "the wrench at rest against -dE/dq")
     for sample in subject.samples:
@@ -43,7 +43,7 @@ def _about_energy(sample: Sample, slot: int, column: int, way: str) -> Callable[
     )
 
 
-def balance(subject: Subject, kernel: str = "wrench") -> Outcome:
+def balance(subject: SampledType, kernel: str = "wrench") -> Outcome:
     """Forces and moments on all bodies sum to zero."""
     c = Comparison("action and reaction", subject, kernel, "forces and moments sum to zero")
     for sample in subject.samples:
@@ -61,12 +61,12 @@ def balance(subject: Subject, kernel: str = "wrench") -> Outcome:
 def _about_balance(kernel: str, what: str) -> Callable[[Wrong], str]:
     return lambda x: (
         f"{kernel} has no reaction: the {what} on all bodies sum to {x.is_:.3g} along "
-        f"{'xyz'[x.at[-1]]} and should to zero, for what acts on one body acts back on the others"
+        f"{'xyz'[x.index[-1]]} and should to zero: what acts on one body acts back on the others"
     )
 
 
-def frame(subject: Subject, kernel: str = "wrench") -> Outcome:
-    """All bodies turned, shifted and moved as one: the wrench turns with them."""
+def frame(subject: SampledType, kernel: str = "wrench") -> Outcome:
+    """A common rigid motion of all bodies: the wrench turns with them."""
     c = Comparison("frame", subject, kernel, "a common rigid motion turns the wrench, no more")
     for k, sample in enumerate(subject.samples):
         wrench = sample.value(kernel)
@@ -92,7 +92,7 @@ def _about_frame(sample: Sample, kernel: str, slot: int, velocity: bool) -> Call
     how = "a common velocity of all bodies" if velocity else "a common rigid motion of all bodies"
     return lambda x: (
         f"{kernel} notices where ground is: after {how} the "
-        f"{'moment' if x.at[0] else 'force'} on body {letter} along {'xyz'[x.at[1]]} is "
+        f"{'moment' if x.index[0] else 'force'} on body {letter} along {'xyz'[x.index[1]]} is "
         f"{x.is_:.6g} and should be {x.should:.6g}, what it was, turned with the bodies"
     )
 
@@ -104,8 +104,8 @@ def _about_energy_frame(x: Wrong) -> str:
     )
 
 
-def dissipation(subject: Subject) -> Outcome:
-    """Friction takes power: its wrench never drives."""
+def dissipation(subject: SampledType) -> Outcome:
+    """The power of friction is not positive."""
     c = Comparison("friction", subject, "friction", "the power of friction is negative or zero")
     for sample in subject.samples:
         wrench = sample.value("friction")
@@ -120,7 +120,7 @@ def dissipation(subject: Subject) -> Outcome:
 def rigid_motion(
     state: State, seed: int, k: int, *, velocity: bool = False
 ) -> tuple[State, Floats]:
-    """All bodies turned and shifted as one, with ``velocity`` set in motion too; the rotation."""
+    """The state after a common rigid motion, with ``velocity`` also in motion; the rotation."""
     rng = random.Random(f"{seed} {k}")
     q, shift = np.array(random_pose(rng).p), np.array(numbers(rng, 3))
     speed, spin = (np.array(numbers(rng, 3)) * velocity for _ in range(2))
@@ -129,7 +129,7 @@ def rigid_motion(
 
 def _wrench(sample: Sample, kernel: str) -> Floats | None:
     try:
-        found = sample.value(kernel)
+        wrench = sample.value(kernel)
     except UNDEFINED:
         return None
-    return found if np.isfinite(found).all() else None
+    return wrench if np.isfinite(wrench).all() else None

@@ -1,4 +1,4 @@
-"""The check of a function: f', f'' and f''' are derivatives."""
+"""Check of a function: f', f'' and f''' are derivatives."""
 
 import random
 from collections.abc import Callable
@@ -9,15 +9,15 @@ import numpy as np
 from dap3d_core.testing.checks.compare import Comparison, Wrong, rates
 from dap3d_core.testing.checks.findings import Outcome
 from dap3d_core.testing.samples.random_state import Direction
-from dap3d_core.testing.samples.sampled_type import Subject
+from dap3d_core.testing.samples.sampled_type import SampledType
 
-#: Arguments that each random function is tried at.
+#: Arguments of each random function.
 ARGUMENTS = 8
 NAMES = ("f", "f'", "f''", "f'''")
 
 
-def derivatives(subject: Subject) -> Outcome:
-    """Each number that ``value`` returns is the derivative of the one before."""
+def derivatives(subject: SampledType) -> Outcome:
+    """Each number that ``value`` returns is the derivative of the previous one."""
     words = "f', f'' and f''' against derivatives of f, f' and f''"
     c = Comparison("derivatives", subject, "value", words)
     for k, sample in enumerate(subject.samples):

@@ -1,4 +1,4 @@
-"""The checks of a joint: J, nu and gamma against derivatives, reactions, rank, rigid motions."""
+"""Checks of a joint: J, nu and gamma against derivatives, reactions, rank, rigid motions."""
 
 from collections.abc import Callable
 
@@ -16,16 +16,16 @@ from dap3d_core.testing.checks.compare import (
 from dap3d_core.testing.checks.findings import Outcome
 from dap3d_core.testing.checks.forces import rigid_motion
 from dap3d_core.testing.samples.random_state import Direction, Floats
-from dap3d_core.testing.samples.sampled_type import Sample, Subject, position_jacobian
+from dap3d_core.testing.samples.sampled_type import Sample, SampledType, position_jacobian
 
-#: Singular values below this part of the largest count as zero.
+#: Singular values relative to the largest that count as zero.
 RANK_TOLERANCE = 1e-8
-#: Singular values of J below this count as zero where its rows are of size one off the manifold:
+#: Singular values of J that count as zero, with rows of size one off the manifold:
 #: Newton's method leaves |C| < 1e-11, where the gradient of a square is some 1e-5.
 VANISHING = 1e-3
 
 
-def jacobian(subject: Subject) -> Outcome:
+def jacobian(subject: SampledType) -> Outcome:
     """J is the derivative of C."""
     c = Comparison("J", subject, "J", "J against dC/dq, by complex step and by differences")
     rows = subject.type.position_rows()
@@ -43,31 +43,31 @@ def jacobian(subject: Subject) -> Outcome:
 def _about_jacobian(sample: Sample, slot: int, column: int, way: str) -> Callable[[Wrong], str]:
     by = body_words(sample, slot, column)
     return lambda x: (
-        f"row {x.row + 1} of J is wrong by {x.error:.3g} at this pose: {x.is_:.6g} stands in "
+        f"row {x.row + 1} of J is wrong by {x.error:.3g} at this pose: {x.is_:.6g} is in "
         f"column {column + 1} of body {by.split()[-3]}, and it should be {x.should:.6g}, the "
         f"derivative of row {x.row + 1} of C by {by} ({way})"
     )
 
 
-def velocity_side(subject: Subject) -> Outcome:
-    """The side nu is minus the rate of C where only time goes on."""
+def velocity_side(subject: SampledType) -> Outcome:
+    """The side nu is minus the rate of C in time at a fixed pose."""
     c = Comparison("nu", subject, "nu", "nu against -dC/dt at a fixed pose")
-    rows, there = subject.type.position_rows(), "nu" in subject.kernels.names()
+    rows, is_defined = subject.type.position_rows(), "nu" in subject.kernels.names()
     for sample in poses(subject):
-        nu = sample.value("nu")[list(rows)] if there else np.zeros(len(rows))
+        nu = sample.value("nu")[list(rows)] if is_defined else np.zeros(len(rows))
         for rate in rates(sample, "C", Direction.in_time(), c):
-            c.compare(sample, nu, -rate.value, _about_nu(rate.way, there),
+            c.compare(sample, nu, -rate.value, _about_nu(rate.way, is_defined),
                       tolerance=rate.tolerance, bound=rate.bound, rows=rows)  # fmt: skip
     return c.outcome()
 
 
-def _about_nu(way: str, there: bool) -> Callable[[Wrong], str]:
+def _about_nu(way: str, is_defined: bool) -> Callable[[Wrong], str]:
     def says(x: Wrong) -> str:
         n = x.row + 1
-        found = f"nu is missing, and row {n} of C depends on time: row {n} of nu is zero"
-        if there:
-            found = _is_wrong("nu", x)
-        return _should_be(found, x, f"minus the rate of row {n} of C at a fixed pose", way)
+        actual = f"nu is missing, and row {n} of C depends on time: row {n} of nu is zero"
+        if is_defined:
+            actual = _is_wrong("nu", x)
+        return _should_be(actual, x, f"minus the rate of row {n} of C at a fixed pose", way)
 
     return says
 
@@ -76,11 +76,11 @@ def _is_wrong(side: str, x: Wrong) -> str:
     return f"row {x.row + 1} of {side} is wrong by {x.error:.3g} at this pose: it is {x.is_:.6g}"
 
 
-def _should_be(found: str, x: Wrong, source: str, way: str) -> str:
-    return f"{found} and should be {x.should:.6g}, {source} ({way})"
+def _should_be(actual: str, x: Wrong, source: str, way: str) -> str:
+    return f"{actual} and should be {x.should:.6g}, {source} ({way})"
 
 
-def velocity_form(subject: Subject) -> Outcome:
+def velocity_form(subject: SampledType) -> Outcome:
     """The form C_dot that a type gives for its velocity rows is J v - nu."""
     c = Comparison("velocity form", subject, "C_dot", "C_dot against J v - nu")
     rows = subject.type.velocity_rows()
@@ -103,10 +103,10 @@ def _about_form(x: Wrong) -> str:
     )
 
 
-def acceleration_side(subject: Subject) -> Outcome:
-    """The side gamma is what d/dt (J v - nu) = 0 leaves on the right of J v_dot = gamma.
+def acceleration_side(subject: SampledType) -> Outcome:
+    """Gamma is the right-hand side of J v_dot = gamma, from d/dt (J v - nu) = 0.
 
-    Rows of which J or nu is wrong are compared with what C (or C_dot) says.
+    Rows with a wrong J or nu are compared with C (or C_dot).
     """
     c = Comparison("gamma", subject, "gamma", "gamma against the time derivative of nu - J v")
     wrong = _rows_apart(subject)
@@ -132,23 +132,23 @@ def acceleration_side(subject: Subject) -> Outcome:
                       tolerance=tolerance, bound=bound, scale=size)  # fmt: skip
         for form, rows in _forms(subject):
             if apart := [k for k in rows if wrong.get(k) == form]:
-                places = [rows.index(k) for k in apart]
+                index = [rows.index(k) for k in apart]
                 rate = sample.bend(along) if form == "C" else sample.difference(form, along)
-                value, bound = (x[places] for x in rate)
+                value, bound = (x[index] for x in rate)
                 c.compare(sample, gamma[apart], -value, _about_gamma_by(form), rows=apart,
                           tolerance=DIFFERENCE_TOLERANCE, bound=bound)  # fmt: skip
     return c.outcome()
 
 
-def _forms(subject: Subject) -> list[tuple[str, tuple[int, ...]]]:
+def _forms(subject: SampledType) -> list[tuple[str, tuple[int, ...]]]:
     """The kernels of which J, nu and gamma are derivatives, and the rows of each."""
     rows = {"C": subject.type.position_rows(), "C_dot": subject.type.velocity_rows()}
     return [(form, rows[form]) for form in rows if form in subject.kernels.names() and rows[form]]
 
 
-def _rows_apart(subject: Subject) -> dict[int, str]:
-    """Rows of which J v - nu is not the rate of C, or C_dot, that the type gives; and which."""
-    found = {}
+def _rows_apart(subject: SampledType) -> dict[int, str]:
+    """Rows with J v - nu other than the rate of C, or than C_dot; and which of these."""
+    forms = {}
     for sample in poses(subject):
         v = _velocities(sample)
         rate = np.einsum("srk,sk->r", sample.value("J"), v)
@@ -161,8 +161,8 @@ def _rows_apart(subject: Subject) -> dict[int, str]:
             size = 1.0 + float(np.max(np.abs(want)))
             for k, row in enumerate(rows):
                 if abs(rate[row] - want[k]) - bound[k] > DIFFERENCE_TOLERANCE * size:
-                    found[row] = form
-    return found
+                    forms[row] = form
+    return forms
 
 
 def _about_gamma_by(form: str) -> Callable[[Wrong], str]:
@@ -172,7 +172,7 @@ def _about_gamma_by(form: str) -> Callable[[Wrong], str]:
         "velocities", "differences")  # fmt: skip
 
 
-def _about_gamma(way: str, subject: Subject) -> Callable[[Wrong], str]:
+def _about_gamma(way: str, subject: SampledType) -> Callable[[Wrong], str]:
     def says(x: Wrong) -> str:
         n = x.row + 1
         source = f"minus the time derivative of row {n} of J, times v"
@@ -183,8 +183,8 @@ def _about_gamma(way: str, subject: Subject) -> Callable[[Wrong], str]:
     return says
 
 
-def virtual_power(subject: Subject) -> Outcome:
-    """Reactions do no work on velocities that C allows while time stands still."""
+def virtual_power(subject: SampledType) -> Outcome:
+    """Reactions do no work on velocities that C allows at a fixed time."""
     c = Comparison("virtual power", subject, "J", "reactions J^T lambda do no work where C allows")
     rows = subject.type.position_rows()
     for sample in poses(subject):
@@ -202,8 +202,8 @@ def _about_power(x: Wrong) -> str:
     )
 
 
-def frame(subject: Subject) -> Outcome:
-    """All bodies turned and shifted as one: what was allowed is allowed, turned."""
+def frame(subject: SampledType) -> Outcome:
+    """A common rigid motion of all bodies: allowed velocities turn with the bodies."""
     c = Comparison(
         "frame", subject, "C", "the same motions are allowed after a common rigid motion"
     )
@@ -248,14 +248,14 @@ def _about_frame_side(name: str) -> Callable[[Wrong], str]:
     )
 
 
-def action_and_reaction(subject: Subject) -> Outcome:
-    """What a row of J exerts on the bodies sums to zero: force, and at C = 0 moment."""
+def action_and_reaction(subject: SampledType) -> Outcome:
+    """Forces, and at C = 0 moments, of a row of J on all bodies sum to zero."""
     c = Comparison(
         "action and reaction", subject, "J", "forces and moments of each row sum to zero"
     )
     rows = subject.type.position_rows()
     if len(rows) < subject.type.rows:
-        c.note("moments are asked of rows of the position level alone")
+        c.note("moments are checked for rows of the position level only")
     for sample in subject.assembled:
         J, r = sample.value("J"), sample.state.r[1:]
         force = J[:, :, :3].sum(axis=0)
@@ -270,11 +270,11 @@ def action_and_reaction(subject: Subject) -> Outcome:
 def _about_balance(what: str) -> Callable[[Wrong], str]:
     return lambda x: (
         f"row {x.row + 1} of J has no reaction: the {what} that it exerts on all bodies together "
-        f"is {x.is_:.3g} along {'xyz'[x.at[-1]]} and should be zero"
+        f"is {x.is_:.3g} along {'xyz'[x.index[-1]]} and should be zero"
     )
 
 
-def assembly(subject: Subject) -> Outcome:
+def assembly(subject: SampledType) -> Outcome:
     """There are poses with C = 0."""
     c = Comparison("assembly", subject, "C", "C = 0 is reached from random poses")
     count = len(subject.assembled)
@@ -288,24 +288,24 @@ def assembly(subject: Subject) -> Outcome:
     return c.outcome()
 
 
-def rank(subject: Subject) -> Outcome:
-    """The rows of J are independent, at one of the poses at least."""
+def rank(subject: SampledType) -> Outcome:
+    """The rows of J are independent at one or more of the poses."""
     c = Comparison("rank", subject, "J", f"rank of J against {subject.type.rows} declared rows")
     size = np.max([np.linalg.norm(_rows_of_J(s), axis=1) for s in subject.samples], axis=0)
     size = np.where(size > 0.0, size, 1.0)[:, None]
     ranks = [(_rank(_rows_of_J(sample) / size), sample) for sample in subject.assembled]
-    found, sample = max(ranks, key=lambda pair: pair[0], default=(subject.type.rows, None))
-    if sample is not None and found < subject.type.rows:
+    best, sample = max(ranks, key=lambda pair: pair[0], default=(subject.type.rows, None))
+    if sample is not None and best < subject.type.rows:
         row = _dependent_row(_rows_of_J(sample) / size) + 1
         off = max(_rank(_rows_of_J(s) / size) for s in subject.samples)
         why = f"row {row} follows from those before it, so one row is too many"
-        if off > found:
+        if off > best:
             why = (
                 f"where C = 0 the gradient of row {row} vanishes or follows from those before it, "
                 f"though elsewhere the rank is {off}, so that nothing holds the bodies there; is C "
                 "a square, whose root would do?"
             )
-        c.fail(f"the rank of J is {found} at best, and {subject.type.rows} rows are declared: "
+        c.fail(f"the rank of J is {best} at best, and {subject.type.rows} rows are declared: "
                f"{why}", sample, row)  # fmt: skip
     return c.outcome(sized=False)
 
@@ -318,29 +318,29 @@ def _rows_of_J(sample: Sample) -> Floats:
 
 
 def _rank(rows: Floats) -> int:
-    """The rank of rows whose size is about one off the manifold."""
+    """The rank of rows with sizes of about one off the manifold."""
     return int(np.sum(np.linalg.svd(rows, compute_uv=False) > VANISHING))
 
 
 def _dependent_row(rows: Floats) -> int:
-    """The first row that those before it span."""
+    """The first row in the span of the previous ones."""
     return next(k for k in range(len(rows)) if _rank(rows[: k + 1]) <= k)
 
 
 def null_space(matrix: Floats) -> Floats:
-    """(columns, n) orthonormal velocities that a matrix takes to zero."""
+    """(columns, n) orthonormal basis of the null space of a matrix."""
     _, values, right = np.linalg.svd(matrix)
     count = int(np.sum(values > RANK_TOLERANCE * max(np.max(values, initial=0.0), 1e-300)))
     return right[count:].T
 
 
-def poses(subject: Subject) -> list[Sample]:
+def poses(subject: SampledType) -> list[Sample]:
     """Random poses off the manifold and on it."""
     return [*subject.samples, *subject.assembled]
 
 
-def against_ground(subject: Subject) -> str:
-    """Why a type is not asked to be indifferent to where ground is; "" where it is."""
+def against_ground(subject: SampledType) -> str:
+    """The reason why a type need not be invariant to rigid motions; "" where it must be."""
     specs = specs_of(subject.type)
     fixed = [name for name, spec in specs.items() if spec.kind == "vector" and spec.ground]
     if fixed:

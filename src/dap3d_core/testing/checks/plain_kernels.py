@@ -1,4 +1,4 @@
-"""Kernels run on numbers of any kind: what they do with them can be compiled and differentiated."""
+"""Check that kernels run on numbers of any kind, to be compiled and differentiated."""
 
 import random
 import sys
@@ -12,18 +12,18 @@ from dap3d_core.interface.examine.random_values import random_quantity
 from dap3d_core.testing.checks.compare import Comparison
 from dap3d_core.testing.checks.findings import Outcome
 from dap3d_core.testing.samples.complex_step import Stepped
-from dap3d_core.testing.samples.sampled_type import UNDEFINED, Subject
+from dap3d_core.testing.samples.sampled_type import UNDEFINED, SampledType
 
-#: Random inputs of each kernel: ``where`` takes one of two ways.
+#: Random inputs of each kernel, for both branches of ``where``.
 TRIES = 8
 
 
 class BranchError(TypeError):
-    """A kernel asks whether a condition on its numbers holds."""
+    """A kernel branches on a condition on its numbers."""
 
 
 class Condition:
-    """A comparison of numbers whose answer only the words of kernels may see."""
+    """A comparison of numbers with a result that only the words of kernels may read."""
 
     __slots__ = ("holds",)
 
@@ -31,8 +31,8 @@ class Condition:
         self.holds = holds
 
     def __bool__(self) -> bool:
-        asking = sys._getframe(1).f_globals.get("__name__", "")
-        if not asking.startswith("dap3d_core.kernels"):
+        caller = sys._getframe(1).f_globals.get("__name__", "")
+        if not caller.startswith("dap3d_core.kernels"):
             raise BranchError("a branch on a number")
         return self.holds
 
@@ -50,8 +50,8 @@ def _compared(name: str) -> Callable[[Any, Any], Condition]:
     return lambda self, other: Condition(compare(self, other))
 
 
-class Unknown(Stepped):
-    """A number that is no float, and tells nobody how large it is."""
+class OpaqueNumber(Stepped):
+    """A number that is no float and hides its value."""
 
     __slots__ = ()
     __hash__ = complex.__hash__
@@ -63,14 +63,14 @@ class Unknown(Stepped):
         raise BranchError("a branch on a number")
 
     def _has_no_digits(self, *_: Any) -> Any:
-        raise TypeError("the digits of a number are asked for")
+        raise TypeError("the value of a number is rounded")
 
     __floor__ = __ceil__ = __trunc__ = _has_no_digits
     __round__ = _has_no_digits  # type: ignore[assignment]
 
 
-def plain(subject: Subject) -> Outcome:
-    """Kernels branch by ``where`` alone, and take their mathematics from the words of kernels."""
+def plain(subject: SampledType) -> Outcome:
+    """Kernels branch by ``where`` only, and take their mathematics from the words of kernels."""
     words = "kernels run on numbers that are no floats, as derivatives and compilers have them"
     c = Comparison("plain", subject, "", words)
     for name, kernel in subject.examined.kernels.items():
@@ -80,8 +80,8 @@ def plain(subject: Subject) -> Outcome:
     return c.outcome(sized=False)
 
 
-def _not_plain(subject: Subject, name: str, kernel: Callable[..., Any]) -> str:
-    """What a kernel does that is not plain, with its line; "" where it is plain."""
+def _not_plain(subject: SampledType, name: str, kernel: Callable[..., Any]) -> str:
+    """The reason why a kernel is not plain, with its line; "" where it is."""
     offered, rng = subject.examined.names, random.Random(f"{subject.seed} {name}")
     if name == "friction":
         offered = friction_names(subject.type.rows) | offered
@@ -89,7 +89,7 @@ def _not_plain(subject: Subject, name: str, kernel: Callable[..., Any]) -> str:
     for _ in range(ATTEMPTS):
         values = [random_quantity(offered[n], rng) for n in parameters(kernel)]
         try:
-            kernel(*map(_unknown, values))
+            kernel(*map(_opaque, values))
         except UNDEFINED:
             continue
         except BranchError as error:
@@ -105,8 +105,8 @@ def _not_plain(subject: Subject, name: str, kernel: Callable[..., Any]) -> str:
     return ""
 
 
-def _unknown(value: Any) -> Any:
-    """The numbers of a value, made unknown; tables and functions as they are."""
+def _opaque(value: Any) -> Any:
+    """A value with opaque numbers; tables and functions are unchanged."""
     if isinstance(value, tuple) and not (value and isinstance(value[0], list)):
-        return tuple(map(_unknown, value))
-    return Unknown(value) if isinstance(value, float) else value
+        return tuple(map(_opaque, value))
+    return OpaqueNumber(value) if isinstance(value, float) else value

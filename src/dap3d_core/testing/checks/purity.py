@@ -1,4 +1,4 @@
-"""The checks that hold for kernels of every kind: they are pure, and the same when compiled."""
+"""Checks of kernels of every kind: they are pure, and the same when compiled."""
 
 import builtins
 import dis
@@ -13,22 +13,22 @@ from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
 from dap3d_core.kernels.runtime.cache import jit_is_on, reached
 from dap3d_core.testing.checks.compare import Comparison, Wrong, left_out
 from dap3d_core.testing.checks.findings import Outcome
-from dap3d_core.testing.samples.sampled_type import Sample, Subject, UndefinedError
+from dap3d_core.testing.samples.sampled_type import Sample, SampledType, UndefinedError
 
 #: Compiled and plain code round differently (a b + c in one rounding).
 COMPILED_TOLERANCE = 1e-12
-#: Modules and built-in functions that a pure function has no use for.
+#: Modules and built-in functions that no pure function uses.
 IMPURE_MODULES = ("datetime", "io", "os", "pathlib", "random", "secrets", "socket", "subprocess",
                   "sys", "tempfile", "threading", "time", "uuid")  # fmt: skip
 IMPURE_BUILTINS = ("delattr", "eval", "exec", "globals", "id", "input", "locals", "open", "print",
                    "setattr", "vars")  # fmt: skip
-#: What a kernel may read from outside: it cannot change, or is looked at in its turn.
+#: Types that a kernel may read from outside: immutable, or checked themselves.
 CONSTANTS = (bool, int, float, complex, str, bytes, type(None), type, types.FunctionType,
              types.BuiltinFunctionType, np.generic, np.ufunc)  # fmt: skip
 
 
-def purity(subject: Subject) -> Outcome:
-    """Kernels give the same numbers each time, and read and change nothing from outside."""
+def purity(subject: SampledType) -> Outcome:
+    """Kernels return the same numbers each time, and read and change nothing outside."""
     c = Comparison("purity", subject, "", "the same numbers each time, nothing from outside")
     for name in _names(subject):
         c.kernel = name
@@ -50,43 +50,43 @@ def purity(subject: Subject) -> Outcome:
     return c.outcome(sized=False)
 
 
-def differing(subject: Subject) -> dict[str, tuple[str, Sample, int]]:
-    """The kernels that give other numbers when they are called again: words, pose and row."""
-    return subject.kept("differing", lambda: dict(_differing(subject)))
+def differing(subject: SampledType) -> dict[str, tuple[str, Sample, int]]:
+    """The kernels that return other numbers in a second call: text, pose and row."""
+    return subject.cached("differing", lambda: dict(_differing(subject)))
 
 
-def _differing(subject: Subject) -> Iterator[tuple[str, tuple[str, Sample, int]]]:
+def _differing(subject: SampledType) -> Iterator[tuple[str, tuple[str, Sample, int]]]:
     for name in _names(subject):
         samples = (subject.friction if name == "friction" else subject).samples
         first = [sample.value(name) for sample in samples]
         again = [sample.value(name) for sample in reversed(samples)][::-1]
-        found = [(sample, k, one[k], other[k])
+        different = [(sample, k, one[k], other[k])
                  for sample, one, other in zip(samples, first, again, strict=True)
                  for k in range(len(one)) if not np.array_equal(one[k], other[k])]  # fmt: skip
-        if found:
-            sample, k, one, other = found[0]
-            words = f"row {k + 1} of {name} gives other numbers when it is called again: "
-            yield name, (f"{words}{_number(one)}, then {_number(other)}", sample, k + 1)
+        if different:
+            sample, k, one, other = different[0]
+            text = f"row {k + 1} of {name} gives other numbers when it is called again: "
+            yield name, (f"{text}{_number(one)}, then {_number(other)}", sample, k + 1)
 
 
-def _names(subject: Subject) -> tuple[str, ...]:
+def _names(subject: SampledType) -> tuple[str, ...]:
     """The kernels of a type, the friction of a joint among them."""
-    return (*subject.kernels.names(), *(("friction",) if _rubs(subject) else ()))
+    return (*subject.kernels.names(), *(("friction",) if _has_friction(subject) else ()))
 
 
-def compiled(subject: Subject) -> Outcome:
-    """Compiled, the kernels give the numbers of plain Python."""
+def compiled(subject: SampledType) -> Outcome:
+    """Compiled kernels return the numbers of plain Python."""
     if not jit_is_on():
         return left_out("compiled", subject, "nothing is compiled (DAP3D_PLAIN)")
     c = Comparison("compiled", subject, "", "compiled numbers against those of plain Python")
     for kind, kernels in LOOP_KINDS.items():
-        owner = subject.friction if kind == "friction" and _rubs(subject) else subject
+        owner = subject.friction if kind == "friction" and _has_friction(subject) else subject
         if any(name in owner.kernels.names() for name in kernels):
             _compare_compiled(c, owner, kind)
     return c.outcome()
 
 
-def _compare_compiled(c: Comparison, subject: Subject, kind: str) -> None:
+def _compare_compiled(c: Comparison, subject: SampledType, kind: str) -> None:
     for sample in subject.samples:
         try:
             found = subject.kernels.compiled_values(kind, sample.element, sample.state)
@@ -111,12 +111,12 @@ def _about_compiled(name: str) -> Callable[[Wrong], str]:
     )
 
 
-def _rubs(subject: Subject) -> bool:
+def _has_friction(subject: SampledType) -> bool:
     return "friction" in subject.examined.kernels and subject.type.kind == "joint"
 
 
 def _outside(kernel: Callable[..., Any]) -> Iterator[str]:
-    """What a function, and those it calls, read or change that is not theirs, in words."""
+    """Texts on the outside state that a function, and those it calls, read or change."""
     for function in reached(kernel)[0]:
         if (function.__module__ or "").partition(".")[0] == "dap3d_core":
             continue
@@ -159,7 +159,7 @@ def _about_global(name: str, names: dict[str, Any]) -> str:
 
 
 def _about_value(name: str, value: Any) -> str:
-    """Why a value from outside is no constant; "" where it is one."""
+    """The reason why an outside value is no constant; "" where it is one."""
     module = (
         value.__name__ if isinstance(value, types.ModuleType) else getattr(value, "__module__", "")
     )

@@ -1,4 +1,4 @@
-"""Complex numbers for derivatives by complex step, which kernels take for real ones.
+"""Complex numbers for derivatives by complex step, in place of real arguments of kernels.
 
 f(x + i h) = f(x) + i h f'(x) - ..., with h = 1e-100: the imaginary part over h is the derivative to
 rounding, without a difference of nearly equal numbers (Squire and Trapp, SIAM Review 40, 1998).
@@ -6,6 +6,7 @@ Branches are those of the real part.
 """
 
 import math
+import operator
 from collections.abc import Callable
 from typing import Any
 
@@ -16,11 +17,16 @@ def _wrapped(name: str) -> Callable[..., Any]:
     operation = getattr(complex, name)
 
     def method(self: "Stepped", *others: Any) -> Any:
-        found = operation(self, *others)
-        return found if found is NotImplemented else type(self)(found)
+        result = operation(self, *others)
+        return result if result is NotImplemented else type(self)(result)
 
     method.__name__ = name
     return method
+
+
+def _by_real_part(name: str) -> Callable[[Any, Any], bool]:
+    compare = getattr(operator, name)
+    return lambda self, other: bool(compare(self.real, _real(other)))
 
 
 class Stepped(complex):
@@ -45,23 +51,9 @@ class Stepped(complex):
     def __bool__(self) -> bool:
         return self.real != 0.0
 
-    def __eq__(self, other: Any) -> bool:
-        return bool(self.real == _real(other))
-
-    def __ne__(self, other: Any) -> bool:
-        return bool(self.real != _real(other))
-
-    def __lt__(self, other: Any) -> bool:
-        return bool(self.real < _real(other))
-
-    def __le__(self, other: Any) -> bool:
-        return bool(self.real <= _real(other))
-
-    def __gt__(self, other: Any) -> bool:
-        return bool(self.real > _real(other))
-
-    def __ge__(self, other: Any) -> bool:
-        return bool(self.real >= _real(other))
+    __eq__, __ne__ = _by_real_part("__eq__"), _by_real_part("__ne__")
+    __lt__, __le__ = _by_real_part("__lt__"), _by_real_part("__le__")
+    __gt__, __ge__ = _by_real_part("__gt__"), _by_real_part("__ge__")
 
     def __abs__(self) -> Any:
         return -self if self.real < 0.0 else self

@@ -1,4 +1,4 @@
-"""The function that types are given which call one: a cubic."""
+"""A cubic, the sample of a function of an argument."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The state of the bodies and functions of an element, and the ways in which it is changed."""
+"""Random states of the bodies and functions of an element, and their variations."""
 
 import math
 import random
@@ -37,7 +37,7 @@ class TimeFunction:
 
 @attrs.frozen(eq=False)
 class Direction:
-    """A way to go: rates of positions (m/s), turns (rad/s, global) and time, row 0 for ground."""
+    """A direction: rates of position (m/s), rotation (rad/s, global) and time; row 0 is ground."""
 
     move: Floats
     turn: Floats
@@ -52,7 +52,7 @@ class Direction:
 
     @classmethod
     def in_time(cls) -> "Direction":
-        """Time alone: the bodies stay where they are."""
+        """Time alone, at a fixed pose."""
         return cls(np.zeros((BODIES, 3)), np.zeros((BODIES, 3)), 1.0)
 
 
@@ -61,7 +61,7 @@ class State:
     """Time, and for ground and each slot r (4, 3), p (4, 4), velocity, angular velocity (4, 3).
 
     ``mass`` (4,) and ``Jp`` (4, 9) are the bodies' inertia, ``functions`` those of time; None
-    stands for one that is absent.
+    for an absent one.
     """
 
     t: float
@@ -102,7 +102,7 @@ class State:
         return rate
 
     def moved(self, along: Direction, h: float) -> "State":
-        """The state a finite way h along a direction: turns are finite rotations."""
+        """The state after a finite step h along a direction, with finite rotations."""
         angle = np.sqrt(np.sum(along.turn**2, axis=1, keepdims=True)) * h
         half = np.where(angle == 0.0, 0.5 * h, np.sin(angle / 2) * h / np.where(angle, angle, 1.0))
         q = np.hstack([np.cos(angle / 2), half * along.turn])
@@ -114,7 +114,7 @@ class State:
         )
 
     def together(self, q: Floats, shift: Floats, speed: Floats, spin: Floats) -> "State":
-        """All bodies turned by a quaternion and shifted as one, then set in motion as one."""
+        """The state after a common rotation (quaternion) and shift, plus a common velocity."""
         R = rotation(q[None])[0]
         r = self.r @ R.T + shift
         return attrs.evolve(
@@ -141,12 +141,12 @@ class State:
 
 
 def random_state(rng: random.Random, functions: Sequence[bool], *, grounded: bool) -> State:
-    """A state off the origin, turned and moving.
+    """A random state.
 
     Args:
-        rng: where its numbers come from.
-        functions: which functions of time are there.
-        grounded: whether slot j is on ground.
+        rng: random numbers.
+        functions: True for each function of time that is present.
+        grounded: slot j is on ground.
     """
     poses = [random_pose(rng) for _ in range(BODIES)]
     r, p = np.array([x.r for x in poses]), np.array([x.p for x in poses])
@@ -156,14 +156,14 @@ def random_state(rng: random.Random, functions: Sequence[bool], *, grounded: boo
     mass = np.array([rng.uniform(0.5, 2.0) for _ in range(BODIES)])
     for b in (0, 2) if grounded else (0,):
         r[b], p[b], v[b], w[b], mass[b], Jp[b] = 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0
-    found = (TimeFunction(numbers(rng, 5)) if there else None for there in functions)
-    return State(rng.uniform(0.1, 1.0), r, p, v, w, mass, Jp, tuple(found))
+    present = (TimeFunction(numbers(rng, 5)) if is_present else None for is_present in functions)
+    return State(rng.uniform(0.1, 1.0), r, p, v, w, mass, Jp, tuple(present))
 
 
 def quaternion_product(a: Floats, b: Floats) -> Floats:
     """The quaternion products a o b of rows of four."""
-    found: Floats = (a[:, :, None] * b[:, None, :]).reshape(-1, 16) @ _PRODUCT
-    return found
+    product: Floats = (a[:, :, None] * b[:, None, :]).reshape(-1, 16) @ _PRODUCT
+    return product
 
 
 def rotation(p: Floats) -> Floats:
@@ -172,7 +172,7 @@ def rotation(p: Floats) -> Floats:
 
 
 def _tables() -> tuple[Floats, Floats, Floats]:
-    """What products of two quaternions, rotations and skew matrices are made of.
+    """Coefficients of quaternion products, rotation matrices and skew matrices.
 
     A = (e0^2 - e . e) I + 2 e e^T + 2 e0 e~;  a o b = (a0 b0 - u . v, a0 v + b0 u + u x v).
     """

@@ -1,4 +1,4 @@
-"""What is checked: a type, or one of its variants, at random poses on and off the manifold."""
+"""A type, or one of its variants, at random poses on and off the constraint manifold."""
 
 import math
 import random
@@ -15,22 +15,22 @@ from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, examine
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.testing.samples.cubic import Cubic
-from dap3d_core.testing.samples.random_element import Element, Kernels, Refusal, draw
+from dap3d_core.testing.samples.random_element import Element, Kernels, RefusalError, draw
 from dap3d_core.testing.samples.random_state import Direction, Floats, State, random_state
 
-Kept = TypeVar("Kept")
-#: |C| below which a pose counts as assembled, and Newton steps and starts until it must be.
+Cached = TypeVar("Cached")
+#: |C| of an assembled pose; maximal numbers of Newton steps and of starts.
 ASSEMBLED, NEWTON_STEPS, STARTS = 1e-11, 40, 12
-#: Newton's method has failed where it does not halve |C| in so many steps.
+#: Newton's method has failed where it does not halve |C| in this number of steps.
 STALLED = 8
-#: Smallest singular value of J, of the largest, below which another pose is looked for.
+#: Smallest singular value of J, relative to the largest, of an acceptable pose.
 SINGULAR = 1e-3
-#: What a pose without a number is: division by zero, the square root of a negative number.
+#: Errors of kernels at poses where they are undefined.
 UNDEFINED = (ZeroDivisionError, OverflowError, FloatingPointError)
 
 
 class UndefinedError(ValueError):
-    """The kernels of a type give no finite numbers for any of many random poses."""
+    """The kernels of a type return no finite numbers at any of many random poses."""
 
 
 @attrs.frozen(eq=False)
@@ -40,10 +40,10 @@ class Sample:
     Attributes:
         kernels: of its type.
         element: the instance.
-        state: where the bodies are, and how they move.
-        grounded: whether slot j is on ground.
-        label: which of the random poses it is.
-        seed: of all of them.
+        state: poses and velocities of the bodies.
+        grounded: slot j is on ground.
+        label: name of the random pose.
+        seed: of all poses.
     """
 
     kernels: Kernels
@@ -54,15 +54,15 @@ class Sample:
     seed: int
 
     def value(self, name: str, state: State | None = None) -> Floats:
-        """What a kernel returns, here or in another state."""
+        """The value of a kernel, here or in another state."""
         return self.kernels.value(name, self.element, self.state if state is None else state)
 
     def slope(self, name: str, along: Direction) -> Floats:
-        """Its derivative by complex step; raises what the kernel raises on complex numbers."""
+        """Its derivative by complex step; a kernel may raise on complex numbers."""
         return self.kernels.slope(name, self.element, self.state, along)
 
     def difference(self, name: str, along: Direction) -> tuple[Floats, Floats]:
-        """Its derivative by sixth-order central differences, and how far it may be wrong.
+        """Its derivative by sixth-order central differences, and an error bound.
 
         The bound is large where a branch lies among the samples: ten times the difference of two
         step sizes, and of the bend between the sides that does not shrink with the step.
@@ -70,7 +70,7 @@ class Sample:
         return self._difference(lambda state: self.value(name, state), along)
 
     def bend(self, along: Direction) -> tuple[Floats, Floats]:
-        """The second derivative of C along a direction, and how far it may be wrong."""
+        """The second derivative of C along a direction, and an error bound."""
 
         def slope(state: State) -> Floats:
             try:
@@ -96,7 +96,7 @@ class Sample:
 
     @property
     def is_good(self) -> bool:
-        """Whether all kernels give finite numbers here, and the switches of the type are open."""
+        """True if all kernels return finite numbers, and no switch ends a run here."""
         names = self.kernels.names()
         type_: Any = self.kernels.examined.type
         if "switch" in names and type_.switch_words and np.min(self.value("switch")) <= 0.0:
@@ -107,28 +107,28 @@ class Sample:
         """The pose by name, for messages."""
         s = self.state
         slots = self.kernels.examined.layout.slots
-        found: dict[str, Any] = {"seed": self.seed, "pose": self.label, "t": float(s.t)}
+        pose: dict[str, Any] = {"seed": self.seed, "pose": self.label, "t": float(s.t)}
         for k, slot in enumerate(slots, start=1):
-            found |= {f"{n}_{slot}": tuple(x[k].tolist()) for n, x in
+            pose |= {f"{n}_{slot}": tuple(x[k].tolist()) for n, x in
                       (("r", s.r), ("p", s.p), ("v", s.v), ("w", s.w))}  # fmt: skip
-        return found | {n: v for n, v in self.element.fields.items() if n not in found}
+        return pose | {n: v for n, v in self.element.fields.items() if n not in pose}
 
 
 @attrs.frozen(eq=False)
-class Subject:
+class SampledType:
     """A type, or a variant of it, with its random samples.
 
     Attributes:
-        examined: the type or variant, its functions of an argument known.
-        choices: values of fields that make the variant.
-        seed, poses: of the samples, and how many of each sort.
+        examined: the type or variant, with known functions of an argument.
+        choices: values of fields of the variant.
+        seed, poses: of the samples, and the number of each sort.
     """
 
     examined: Examined
     choices: Mapping[str, Any]
     seed: int
     poses: int
-    _memory: dict[str, Any] = attrs.field(factory=dict)
+    _cache: dict[str, Any] = attrs.field(factory=dict)
 
     @property
     def type(self) -> Any:
@@ -137,21 +137,21 @@ class Subject:
 
     @property
     def variant(self) -> str:
-        """The values that make the variant, in words."""
+        """The values of the variant, for users."""
         return ", ".join(f"{n} = {str(v).lower() if isinstance(v, bool) else v}"
                          for n, v in self.choices.items())  # fmt: skip
 
     @property
     def kernels(self) -> Kernels:
         """Its kernels."""
-        return self.kept("kernels", lambda: Kernels(self.examined))
+        return self.cached("kernels", lambda: Kernels(self.examined))
 
     @property
-    def friction(self) -> "Subject":
-        """The friction of a joint as an element of its own."""
-        return self.kept(
+    def friction(self) -> "SampledType":
+        """The friction of a joint as a separate element."""
+        return self.cached(
             "friction",
-            lambda: Subject(bind_friction(self.examined), self.choices, self.seed, self.poses),
+            lambda: SampledType(bind_friction(self.examined), self.choices, self.seed, self.poses),
         )
 
     @property
@@ -161,23 +161,23 @@ class Subject:
         Raises:
             UndefinedError: there are none with finite numbers.
         """
-        return self.kept("samples", lambda: [self._sample(k) for k in range(self.poses)])
+        return self.cached("samples", lambda: [self._sample(k) for k in range(self.poses)])
 
     @property
     def assembled(self) -> list[Sample]:
-        """Random poses with C = 0 and velocities with J v = nu; fewer where none was found."""
-        return self.kept("assembled", lambda: list(self._assembled()))
+        """Random poses with C = 0 and velocities with J v = nu; fewer where Newton failed."""
+        return self.cached("assembled", lambda: list(self._assembled()))
 
     def again(self) -> list[Sample]:
         """The samples, drawn anew from the same random numbers."""
         return [self._sample(k) for k in range(self.poses)]
 
-    def kept(self, name: str, make: Callable[[], Kept]) -> Kept:
-        """What is found once and asked for often."""
-        if name not in self._memory:
-            self._memory[name] = make()
-        kept: Kept = self._memory[name]
-        return kept
+    def cached(self, name: str, make: Callable[[], Cached]) -> Cached:
+        """The value of ``make``, computed once for each name."""
+        if name not in self._cache:
+            self._cache[name] = make()
+        value: Cached = self._cache[name]
+        return value
 
     def _sample(self, k: int, start: int = 0) -> Sample:
         title = f"{self.seed} {self.type.__qualname__} {k} {start}"
@@ -190,7 +190,7 @@ class Subject:
         choices = {n: "cubic" if specs_of(self.type)[n].kind == "function" else v
                    for n, v in conditions.items() if v is not False or
                    specs_of(self.type)[n].kind == "choice"}  # fmt: skip
-        words = "its kernels give no finite numbers"
+        reason = "its kernels give no finite numbers"
         for _ in range(ATTEMPTS):
             state = random_state(rng, given, grounded=grounded)
             try:
@@ -200,11 +200,12 @@ class Subject:
                                 f"pose {k + 1} off the manifold", self.seed)  # fmt: skip
                 if sample.is_good:
                     return sample
-            except Refusal as error:
-                words = str(error)
+            except RefusalError as error:
+                reason = str(error)
             except UNDEFINED:
                 continue
-        raise UndefinedError(f"{where_is(self.type)}: {ATTEMPTS} random elements in a row: {words}")
+        who = where_is(self.type)
+        raise UndefinedError(f"{who}: {ATTEMPTS} random elements in a row: {reason}")
 
     def _assembled(self) -> Iterator[Sample]:
         starts = STARTS
@@ -212,38 +213,35 @@ class Subject:
             found = [assembled(self._sample(k, 1))]
             while (found[-1] is None or _is_singular(found[-1])) and len(found) < starts:
                 found.append(assembled(self._sample(k, len(found) + 1)))
-            starts = 1 if len(found) == STARTS else starts  # more would not help
-            there = [sample for sample in found if sample is not None]
-            if there:
-                yield attrs.evolve(there[-1], label=f"pose {k + 1} on the manifold")
+            starts = 1 if len(found) == STARTS else starts  # further ones would fail as well
+            samples = [sample for sample in found if sample is not None]
+            if samples:
+                yield attrs.evolve(samples[-1], label=f"pose {k + 1} on the manifold")
 
 
-def subjects(examined: Examined, seed: int, poses: int) -> list[Subject]:
-    """The type as it is, where no variant takes its place for all values, and its variants."""
-    found = []
+def sampled_types(examined: Examined, seed: int, poses: int) -> list[SampledType]:
+    """The type itself, unless variants replace it for all values, and its variants."""
+    variants = []
     own = own_values(examined)
     if own is not None:
-        found.append((own, examined))
-    found += [(dict(conditions), e) for conditions, e in examined.variants]
-    return [Subject(_given(e, values), values, seed, poses) for values, e in found]
+        variants.append((own, examined))
+    variants += [(dict(conditions), e) for conditions, e in examined.variants]
+    return [SampledType(_given(e, values), values, seed, poses) for values, e in variants]
 
 
 def _given(examined: Examined, values: Mapping[str, Any]) -> Examined:
-    """The type with a cubic for each of its functions of an argument that is there.
-
-    One by whose absence no variant is told from another is always there.
-    """
-    there = {f: examine(Cubic) for f in examined.argument_functions if values.get(f, True)}
-    return bind_functions(examined, there, dict.fromkeys(there, 0)) if there else examined
+    """The type with a cubic for each function of an argument, unless the variant has none."""
+    given = {f: examine(Cubic) for f in examined.argument_functions if values.get(f, True)}
+    return bind_functions(examined, given, dict.fromkeys(given, 0)) if given else examined
 
 
 def own_values(examined: Examined) -> dict[str, Any] | None:
-    """Values of choices for which no variant takes the type's place; None where there are none."""
+    """Values of choices for which no variant replaces the type; None where there are none."""
     specs = specs_of(examined.type)
-    asked = [n for n in specs if any(n in conditions for conditions, _ in examined.variants)]
-    without = [(False,) * (not specs[n].required) for n in asked]
-    ways = [specs[n].choices or way for n, way in zip(asked, without, strict=True)]
-    for values in (dict(zip(asked, way, strict=True)) for way in product(*ways)):
+    names = [n for n in specs if any(n in conditions for conditions, _ in examined.variants)]
+    without = [(False,) * (not specs[n].required) for n in names]
+    ways = [specs[n].choices or way for n, way in zip(names, without, strict=True)]
+    for values in (dict(zip(names, way, strict=True)) for way in product(*ways)):
         given = {n: v or None if specs[n].kind == "function" else v for n, v in values.items()}
         if examined.chosen(given) is examined:
             return values
@@ -293,15 +291,14 @@ def assembled(sample: Sample) -> Sample | None:
         x = np.hstack([state.v, state.w])[1 : slots + 1]
         flat = J[free].transpose(1, 0, 2).reshape(J.shape[1], -1)
         x[free] -= np.linalg.lstsq(flat, flat @ x[free].ravel() - nu, rcond=1e-10)[0].reshape(-1, 6)
-        found = attrs.evolve(sample, state=state.with_velocity(x))
-        good = found.is_good
+        result = attrs.evolve(sample, state=state.with_velocity(x))
+        return result if result.is_good else None
     except (*UNDEFINED, np.linalg.LinAlgError):
         return None
-    return found if good else None
 
 
 def _is_singular(sample: Sample) -> bool:
-    """Whether the rows of J nearly depend on each other, as Newton's method may lead to."""
+    """True if the rows of J are nearly dependent."""
     J = sample.value("J")
     values = np.linalg.svd(J.transpose(1, 0, 2).reshape(J.shape[1], -1), compute_uv=False)
     return bool(values[-1] < SINGULAR * values[0])
@@ -313,4 +310,4 @@ def _direction(x: Floats) -> Direction:
     return Direction(move, turn)
 
 
-__all__ = ["Sample", "Subject", "UndefinedError", "assembled", "own_values", "subjects"]
+__all__ = ["Sample", "SampledType", "UndefinedError", "assembled", "own_values", "sampled_types"]
