@@ -1,4 +1,4 @@
-"""Models of the MATLAB program DAP3D: their files are read, never run, and become a scene."""
+"""Import of models of the MATLAB program DAP3D, whose files are read and never run."""
 
 from dap3d_core.matlab.files.report import FileFacts, ImportReport, Remark
 from dap3d_core.matlab.import_matlab import import_matlab

@@ -1,4 +1,4 @@
-"""From a folder of a MATLAB model to a scene, with a report."""
+"""Imports a folder with a MATLAB model as a scene, with a report."""
 
 import os
 import re
@@ -17,7 +17,7 @@ from dap3d_core.registry import Registry, load_registry
 from dap3d_core.scene import Mistake, Scene, SceneError, check
 from dap3d_core.scene.errors import file_error
 
-#: What the check says of bodies that only a user's force may act on.
+#: Note of the check on bodies that only a user's force may act on.
 _LEFT_ALONE = "no joint and no force acts on it"
 
 
@@ -28,11 +28,11 @@ def import_matlab(
 
     Args:
         folder: with inBodies.m and the other files of a model (manual, "Describing A Model").
-        registry: the installed types; by default those that can be found.
+        registry: the installed types; by default all.
 
     Returns:
-        The scene, checked but for the user's force, and what was understood, defaulted, changed
-        and left out.
+        The scene, checked but for the user's force, and a report of what was read, defaulted,
+        changed and left out.
 
     Raises:
         SceneError: holds every mistake, with file and line; or the packages of the extra "matlab"
@@ -46,7 +46,7 @@ def import_matlab(
 
 
 def translate(folder: str | os.PathLike[str]) -> tuple[Scene, Fields]:
-    """The scene of a folder before its check, and what was found on the way, mistakes included.
+    """The scene of a folder before its check, and the reader with report and mistakes.
 
     Raises:
         SceneError: there is no model to read.
@@ -67,30 +67,30 @@ def translate(folder: str | os.PathLike[str]) -> tuple[Scene, Fields]:
     add_forces(scene, fields)
     add_user_forces(scene, fields)
     add_animation(scene, fields)
-    _tell_names(model, report)
+    _report_names(model, report)
     return scene, fields
 
 
-def _tell_names(model: Model, report: ImportReport) -> None:
-    """Names by the place in the array, which decides; that is told where a variable says other."""
+def _report_names(model: Model, report: ImportReport) -> None:
+    """Report names, given by the index in the array, and variables with another number."""
     for array in NAMES:
         for k, struct in enumerate(model.arrays.get(array) or [], 1):
             name = name_of(array, k)
             report.names[name] = f"{array}({k}) ({struct.variable})"
             number = re.search(r"\d+$", struct.variable)
             if number and int(number[0]) != k:
-                words = f"{struct.variable} is number {k} of {array}: {name} in the scene"
-                report.changed.append(remark(struct.place, words))
+                text = f"{struct.variable} is number {k} of {array}: {name} in the scene"
+                report.changed.append(remark(struct.place, text))
 
 
 def _in_order(mistakes: list[Mistake]) -> list[Mistake]:
-    """By file, in the order in which they were read, and by line."""
+    """Mistakes by file, in the order of reading, and by line."""
     files = {m.file: place for place, m in reversed(list(enumerate(mistakes)))}
     return sorted(mistakes, key=lambda m: (files[m.file], m.line or 0))
 
 
 def _check(scene: Scene, fields: Fields, registry: Registry) -> None:
-    """Check the scene but for the user's forces, whose type is still to be written.
+    """Check the scene but for the user's forces, which have no type yet.
 
     Raises:
         SceneError: the mistakes, at the lines of the MATLAB files.
@@ -99,14 +99,14 @@ def _check(scene: Scene, fields: Fields, registry: Registry) -> None:
     try:
         checked = check(attrs.evolve(scene, forces=forces), registry)
     except SceneError as error:
-        found = [_relocated(m, fields) for m in error.mistakes]
-        raise SceneError(_in_order(found)) from None
+        mistakes = [_relocated(m, fields) for m in error.mistakes]
+        raise SceneError(_in_order(mistakes)) from None
     has_own = len(forces) < len(scene.forces)
     fields.report.notes += [n for n in checked.notes if not (has_own and _LEFT_ALONE in n)]
 
 
 def _relocated(mistake: Mistake, fields: Fields) -> Mistake:
-    """A mistake of the scene at the line of the MATLAB file that it comes from."""
+    """A mistake of the scene, located in its MATLAB file."""
     key = mistake.key
     while key and key not in fields.places:
         key = key.rpartition(".")[0]

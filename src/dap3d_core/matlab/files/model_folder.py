@@ -1,4 +1,4 @@
-"""The files of a MATLAB model: which there are, and the arrays they leave behind."""
+"""Reads the files of a MATLAB model into arrays of structures."""
 
 from pathlib import Path
 from typing import Any
@@ -27,24 +27,24 @@ from dap3d_core.matlab.language.structures import (
 from dap3d_core.matlab.language.values import Broken, Struct, kind_of
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import MISSING, Mistake, SceneError
+from dap3d_core.scene.errors import file_error
 
-#: Files that are none of a model's and are named one by one.
+#: Number of other files that are listed by name.
 OTHERS = 50
 JOINTS_FILE, ANIMATION_FILE = "inJoints.m", "inAnimate.m"
 
 
 @attrs.define
 class Model:
-    """What the files of a folder say.
+    """Content of the files of a folder.
 
     Attributes:
         folder: of the model.
-        arrays: structures by the first name of their array; None where it could not be found,
-            which was reported.
-        absent: names of arrays whose file is not there.
-        limits: limits of the drawing by name, and where they stand.
+        arrays: structures by the first name of their array; None where a mistake was reported.
+        absent: names of arrays without a file.
+        limits: limits of the drawing by name, with their places.
         user_force: the file of the user's force, or None.
-        mistakes: what is wrong in the files.
+        mistakes: mistakes in the files.
         files, unused: as in the report.
     """
 
@@ -59,42 +59,42 @@ class Model:
 
 
 def read_folder(folder: Path) -> Model:
-    """Read the files of a model; mistakes within them are kept, to be reported with all others.
+    """Read the files of a model; ``Model.mistakes`` collects the mistakes in them.
 
     Raises:
         SceneError: there is no such folder, it holds no model, or the grammar is not installed.
     """
-    there = m_files(folder)
-    if not any(f.name in there for f in FILES):
+    names = m_files(folder)
+    if not any(f.name in names for f in FILES):
         what = f"holds no MATLAB model: there is no {REQUIRED_FILE}"
-        found = f"it holds {', '.join(there[:5])}" if there else "it holds no .m file"
-        raise SceneError([Mistake("", MISSING, what, "", found, file=str(folder))])
+        remedy = f"it holds {', '.join(names[:5])}" if names else "it holds no .m file"
+        raise file_error(folder, what, remedy=remedy)
     model = Model(folder)
     grammar = Grammar()
     for file in FILES:
-        if file.name not in there:
-            _absent(model, file, there)
+        if file.name not in names:
+            _absent(model, file, names)
             continue
         workspace = _workspace(model, folder / file.name, grammar)
         model.arrays[file.arrays[0]] = _array(model, file, workspace)
         if workspace is not None:
-            _beside(model, file, workspace)
-    if USER_FORCE_FILE in there:
+            _further_variables(model, file, workspace)
+    if USER_FORCE_FILE in names:
         try:
             model.user_force = read_source(folder / USER_FORCE_FILE)
         except SceneError as error:
             model.mistakes += error.mistakes
         model.files.append(FileFacts(USER_FORCE_FILE, "shown", "a force of your own"))
-    _others(model, there)
+    _others(model, names)
     return model
 
 
-def _absent(model: Model, file: ModelFile, there: list[str]) -> None:
-    """A file that is not there: an empty kind, or a name that is misspelt."""
+def _absent(model: Model, file: ModelFile, names: list[str]) -> None:
+    """Record a missing file: an empty array, or a misspelt name."""
     model.arrays[file.arrays[0]], nothing = [], f"no {_plural(file.noun)}"
     model.absent.add(file.arrays[0])
     known = {f.name for f in FILES}
-    others = [n for n in there if n not in known and n != USER_FORCE_FILE]
+    others = [n for n in names if n not in known and n != USER_FORCE_FILE]
     near = nearest(file.name, [n for n in others if n.lower().startswith("in")])
     if near:
         what = f"is no file of a model; {file.name} is one, and is not there"
@@ -111,7 +111,7 @@ def _absent(model: Model, file: ModelFile, there: list[str]) -> None:
 
 
 def _workspace(model: Model, path: Path, grammar: Grammar) -> Workspace | None:
-    """What the statements of a file leave behind; None where it cannot be read."""
+    """The variables of a file; None where it cannot be read."""
     try:
         source = read_source(path)
         root = grammar.tree(source)
@@ -128,7 +128,7 @@ def _workspace(model: Model, path: Path, grammar: Grammar) -> Workspace | None:
 
 
 def _array(model: Model, file: ModelFile, workspace: Workspace | None) -> list[Struct] | None:
-    """The array of a file; None where it could not be found."""
+    """The array of a file; None where a mistake is reported."""
     if workspace is None:
         model.files.append(FileFacts(file.name, "not read", "mistakes"))
         return None
@@ -143,18 +143,18 @@ def _array(model: Model, file: ModelFile, workspace: Workspace | None) -> list[S
         model.mistakes.append(Mistake("", MISSING, what, "", remedy, file=path))
         model.files.append(FileFacts(file.name, "not read", "mistakes"))
         return None
-    found = _structs(model, names[0], file.kind, workspace, path)
-    if found is not None:
-        _left_out(model, found, file.kind, names[0], workspace)
-    held = "mistakes" if found is None else _count(len(found), file.noun)
-    model.files.append(FileFacts(file.name, "not read" if found is None else "read", held))
-    return found
+    array = _structs(model, names[0], file.kind, workspace, path)
+    if array is not None:
+        _report_unused(model, array, file.kind, names[0], workspace)
+    holds = "mistakes" if array is None else _count(len(array), file.noun)
+    model.files.append(FileFacts(file.name, "not read" if array is None else "read", holds))
+    return array
 
 
 def _structs(
     model: Model, name: str, kind: str, workspace: Workspace, path: str
 ) -> list[Struct] | None:
-    """The structures in a variable; reported where it holds others."""
+    """The structures in a variable; None where it holds anything else, which is reported."""
     value = workspace.variables[name]
     line = workspace.places[name].line if name in workspace.places else None
     if isinstance(value, Struct):
@@ -175,24 +175,24 @@ def _structs(
     return list(value)
 
 
-def _left_out(
+def _report_unused(
     model: Model, array: list[Struct], kind: str, name: str, workspace: Workspace
 ) -> None:
-    """Structures that are not in the array, or were changed after they were put there."""
-    held = {v.variable: v for v in array}
+    """Report structures that are not in the array, or were changed after it was made."""
+    members = {v.variable: v for v in array}
     for variable, value in workspace.variables.items():
         if not isinstance(value, Struct) or value.structure.kind != kind or variable == name:
             continue
-        if variable not in held:
+        if variable not in members:
             if value.given:
                 model.unused.append(remark(value.place, f"{variable} is not in {name}: left out"))
-        elif held[variable].given != value.given:
+        elif members[variable].given != value.given:
             words = f"{variable} was changed after {name} was made: without effect, as in MATLAB"
             model.unused.append(remark(value.place, words))
 
 
-def _beside(model: Model, file: ModelFile, workspace: Workspace) -> None:
-    """What two of the files hold besides their array: disks, limits of the drawing."""
+def _further_variables(model: Model, file: ModelFile, workspace: Workspace) -> None:
+    """Read the disks of the joints file, and the limits of the drawing of the animation file."""
     if file.name == JOINTS_FILE and DISKS in workspace.variables:
         path = str(model.folder / file.name)
         model.arrays[DISKS] = _structs(model, DISKS, "Disk", workspace, path)
@@ -203,9 +203,9 @@ def _beside(model: Model, file: ModelFile, workspace: Workspace) -> None:
                 model.limits[name] = (workspace.variables[name], place)
 
 
-def _others(model: Model, there: list[str]) -> None:
+def _others(model: Model, names: list[str]) -> None:
     known = {f.name for f in FILES} | {USER_FORCE_FILE}
-    others = [name for name in there if name not in known]
+    others = [name for name in names if name not in known]
     for name in others[:OTHERS]:
         model.files.append(FileFacts(name, "not read", "no file of a model"))
     if len(others) > OTHERS:

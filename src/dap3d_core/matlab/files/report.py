@@ -1,4 +1,4 @@
-"""What was understood of a MATLAB model, what was filled in, and what was left out."""
+"""Report of an import: files, names, defaults, changes and omissions."""
 
 import attrs
 
@@ -7,12 +7,12 @@ from dap3d_core.matlab.language.parse import Place
 
 @attrs.frozen
 class Remark:
-    """Something worth saying, and where it stands.
+    """A remark on a place in a file.
 
     Attributes:
         file: name of the file in the folder.
         line: in that file, or None.
-        text: what there is to say.
+        text: the remark.
     """
 
     file: str
@@ -26,7 +26,7 @@ class Remark:
 
 @attrs.frozen
 class FileFacts:
-    """A file of the folder: its name, what was done with it, what it holds in words.
+    """A file of the folder: its name, its state, its content for users.
 
     ``state`` is read, absent, shown (user_force.m) or "not read".
     """
@@ -42,14 +42,14 @@ class ImportReport:
 
     Attributes:
         folder: of the MATLAB model.
-        files: the files of the model, and others that stand beside them.
-        names: name in the scene -> what MATLAB calls it, such as ``Bodies(1) (B1)``.
-        defaulted: values that the files leave out, with the manual's defaults.
-        changed: what was read in another form than it is written.
-        unused: what has no meaning here and was left out.
-        notes: what the check of the scene has to say.
+        files: the files of the model, and other files of the folder.
+        names: name in the scene -> name in MATLAB, such as ``Bodies(1) (B1)``.
+        defaulted: missing values, with the manual's defaults.
+        changed: values that were converted.
+        unused: values without a meaning here, left out.
+        notes: notes of the check of the scene.
         user_force: text of user_force.m where a force is of type user, else "".
-        stub: a ``plugin.py`` for it, to be filled in; "" where none is needed.
+        stub: a ``plugin.py`` for it, to be completed; "" where none is needed.
     """
 
     folder: str
@@ -64,6 +64,6 @@ class ImportReport:
 
 
 def remark(place: Place, text: str) -> Remark:
-    """A remark at a place; of the path only the name is kept."""
+    """A remark at a place, with the name of the file without its folder."""
     name = place.file.replace("\\", "/").rpartition("/")[2]
     return Remark(name, place.line, text)

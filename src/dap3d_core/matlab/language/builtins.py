@@ -1,4 +1,4 @@
-"""The functions and constants of MATLAB that are read."""
+"""Functions and constants of MATLAB that expressions may use."""
 
 import math
 from collections.abc import Callable
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 CONSTANTS = {"pi": math.pi}
 
-#: Element by element, of one matrix.
+#: Functions of each element of a matrix.
 _ELEMENTWISE: dict[str, Callable[[Numbers], Numbers]] = {
     "sqrt": np.sqrt,
     "abs": np.abs,

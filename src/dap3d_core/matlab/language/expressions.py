@@ -1,4 +1,4 @@
-"""Values of MATLAB expressions: a small part of the language, worked out here and never run."""
+"""Evaluates MATLAB expressions of a small part of the language."""
 
 import re
 from collections.abc import Callable
@@ -25,9 +25,9 @@ from dap3d_core.registry.suggestions import nearest
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-#: Brackets within brackets, at most.
+#: Maximal nesting of brackets.
 DEEPEST = 50
-#: Entries of all arrays that the expressions of a file come to, at most: some seconds of work.
+#: Maximal number of entries of all arrays in the expressions of a file: some seconds of work.
 MOST_ENTRIES = 3_000_000
 
 _NUMBER = re.compile(r"(\d++\.?\d*+|\.\d++)([eEdD][+-]?\d++)?")
@@ -46,27 +46,27 @@ _OUTSIDE = {
 
 
 def _length(value: Any) -> int:
-    """What a value that is no matrix costs to copy, in entries of one."""
+    """The cost of copying a value other than a matrix, in entries of a matrix."""
     return 10 * len(value) if isinstance(value, list) else 1
 
 
 def named_children(node: "Node") -> list["Node"]:
-    """The children of a node that mean something."""
+    """The children of a node with a meaning."""
     return [n for n in node.children if n.is_named and n.type not in EXTRAS]
 
 
 class Expressions:
-    """Finds the values of expressions.
+    """Evaluates expressions.
 
     Args:
-        source: the file they stand in.
+        source: their file.
         variables: values by name.
     """
 
     def __init__(self, source: Source, variables: dict[str, Any]) -> None:
         self.source, self.variables = source, variables
         self._depth = self._entries = 0
-        self._lengths: list[int] = []  # what ``end`` means, innermost last
+        self._lengths: list[int] = []  # values of ``end``, innermost last
         self._kinds: dict[str, Callable[[Node], Any]] = {
             "number": self._number,
             "string": self._text,
@@ -84,28 +84,28 @@ class Expressions:
 
         Raises:
             RefusalError: it is outside the language, or wrong.
-            ReportedError: it needs a value that could not be found.
+            ReportedError: it needs a broken value.
         """
-        find = self._kinds.get(node.type)
-        if find is None:
+        evaluate = self._kinds.get(node.type)
+        if evaluate is None:
             what = _OUTSIDE.get(node.type, f"this ({node.type.replace('_', ' ')})")
             raise RefusalError(node, f"{what} is outside the language that is read")
         if self._depth >= DEEPEST:
             raise RefusalError(node, f"more than {DEEPEST} brackets within brackets")
         self._depth += 1
         try:
-            found = find(node)
+            value = evaluate(node)
         finally:
             self._depth -= 1
-        self._entries += found.size if isinstance(found, np.ndarray) else _length(found)
+        self._entries += value.size if isinstance(value, np.ndarray) else _length(value)
         if self._entries > MOST_ENTRIES:
             words = f"more than {MOST_ENTRIES} entries of arrays in one file"
             raise RefusalError(node, f"{words}; what follows is not read")
-        return found
+        return value
 
     @property
     def are_spent(self) -> bool:
-        """Whether the file has used up what one file may."""
+        """True if the file has reached ``MOST_ENTRIES``."""
         return self._entries > MOST_ENTRIES
 
     def _number(self, node: "Node") -> Numbers:
@@ -157,28 +157,28 @@ class Expressions:
             return np.zeros((0, 0))
         check_size(sum(v.size for row in filled for v in row), node)
         try:
-            found = np.vstack([np.hstack(row) for row in filled])
+            matrix = np.vstack([np.hstack(row) for row in filled])
         except ValueError:
-            words = "; ".join(" ".join(size_of(v) for v in row) for row in filled)
-            what = f"rows and columns do not fit together (sizes {words})"
+            sizes = "; ".join(" ".join(size_of(v) for v in row) for row in filled)
+            what = f"rows and columns do not fit together (sizes {sizes})"
             raise RefusalError(node, what) from None
-        return checked(found, node)
+        return checked(matrix, node)
 
     def _array_of(self, node: "Node", parts: list[Any]) -> list[Any]:
-        """Structures in brackets, an array of them."""
-        found: list[Any] = []
+        """Structures in brackets, as an array."""
+        array: list[Any] = []
         for part in parts:
             if isinstance(part, np.ndarray) and part.size == 0:
                 continue
             if not isinstance(part, (Struct, list)):
                 raise RefusalError(node, f"structures and {kind_of(part)} in one array")
-            found += part if isinstance(part, list) else [part]
-            check_size(len(found), node)
-        kinds = {v.structure.kind for v in found if isinstance(v, Struct)}
+            array += part if isinstance(part, list) else [part]
+            check_size(len(array), node)
+        kinds = {v.structure.kind for v in array if isinstance(v, Struct)}
         if len(kinds) > 1:
             words = " and ".join(sorted(f"{k}_struct" for k in kinds))
             raise RefusalError(node, f"{words} in one array")
-        return [v if isinstance(v, Broken) else v.copy() for v in found]
+        return [v if isinstance(v, Broken) else v.copy() for v in array]
 
     # ---------------------------------------------------------------- calls and elements
 
@@ -206,11 +206,10 @@ class Expressions:
         if isinstance(value, Struct):
             value = [value]
         if isinstance(value, list):
-            (place,) = self.indices(node, arguments, (len(value),))
-            found = value[place]
-            if isinstance(found, Broken):
+            (k,) = self.indices(node, arguments, (len(value),))
+            if isinstance(value[k], Broken):
                 raise ReportedError
-            return found
+            return value[k]
         matrix = numbers(value, node)
         return np.array([[matrix[self.at(node, matrix, arguments)]]])
 
@@ -225,10 +224,10 @@ class Expressions:
     def indices(
         self, node: "Node", arguments: list["Node"], lengths: tuple[int, ...], room: int = 0
     ) -> tuple[int, ...]:
-        """Indices, from 0, of which there are as many as lengths; ``room``: how far beyond."""
+        """Indices from 0, one for each length; ``room``: allowed excess over the length."""
         if len(arguments) != len(lengths):
             raise RefusalError(node, f"{len(lengths)} indices are needed here")
-        found = []
+        indices = []
         for argument, length in zip(arguments, lengths, strict=True):
             if argument.type == "spread_operator":
                 raise RefusalError(node, "several elements at once (:) are not read")
@@ -242,8 +241,8 @@ class Expressions:
             k = int(index[0, 0])
             if not 1 <= k <= length + room:
                 raise RefusalError(node, f"index {k} is outside; there are {length} elements")
-            found.append(k - 1)
-        return tuple(found)
+            indices.append(k - 1)
+        return tuple(indices)
 
     def _end(self, node: "Node") -> Numbers:
         if not self._lengths:
@@ -259,13 +258,13 @@ class Expressions:
         if not isinstance(value, Struct):
             raise RefusalError(node, f"{text_of(owner)} is {kind_of(value)}, which has no fields")
         check_field(node, value, field)
-        found = value.value(field)
-        if isinstance(found, Broken):
+        content = value.value(field)
+        if isinstance(content, Broken):
             raise ReportedError
-        return found if arguments is None else self.element(node, found, arguments)
+        return content if arguments is None else self.element(node, content, arguments)
 
     def parts_of(self, node: "Node") -> tuple["Node", str, list["Node"] | None]:
-        """Owner, name of the field, and the indices behind it or None."""
+        """Owner, name of the field, and its indices or None."""
         owner = node.child_by_field_name("object")
         fields = node.children_by_field_name("field")
         named = [n for n in fields if n.type not in (".", *EXTRAS)]
@@ -282,12 +281,12 @@ class Expressions:
 
 def arguments_of(node: "Node") -> list["Node"]:
     """The arguments of a call."""
-    found = [n for n in node.children if n.type == "arguments"]
-    return named_children(found[0]) if found else []
+    arguments = next((n for n in node.children if n.type == "arguments"), None)
+    return [] if arguments is None else named_children(arguments)
 
 
 def check_field(node: "Node", struct: Struct, field: str) -> None:
-    """Whether a structure has a field.
+    """Check that a structure has a field.
 
     Raises:
         RefusalError: it has none of this name.

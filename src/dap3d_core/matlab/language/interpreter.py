@@ -1,4 +1,4 @@
-"""The statements of a MATLAB file, followed one by one: assignments, and nothing that acts."""
+"""Interprets the assignments of a MATLAB file; nothing else is executed."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -27,9 +27,10 @@ from dap3d_core.scene import Mistake
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-#: Structures copied in arrays: a model has hundreds, a file of 1 MiB could ask for billions.
+#: Maximal number of structures copied in arrays: a model has hundreds, a file of 1 MiB may need
+#: billions.
 MOST_COPIES = 1_000_000
-#: Words that stand as a statement of their own and have nothing to do here.
+#: Statements of one word without effect here.
 IDLE_WORDS = ("include_global",)
 #: Nodes without effect.
 _IDLE = ("global_operator",)
@@ -45,12 +46,12 @@ _BLOCKS = {
 
 @attrs.define
 class Workspace:
-    """What a file leaves behind.
+    """The variables after the statements of a file.
 
     Attributes:
-        variables: values by name; BROKEN where a value could not be found.
-        places: where variables were last assigned as a whole.
-        mistakes: what is wrong in the file.
+        variables: values by name; BROKEN where a mistake was reported.
+        places: last assignments of whole variables.
+        mistakes: mistakes in the file.
     """
 
     variables: dict[str, Any] = attrs.field(factory=dict)
@@ -59,17 +60,17 @@ class Workspace:
 
 
 def follow(source: Source, root: "Node") -> Workspace:
-    """Follow the statements of a file, which is valid MATLAB.
+    """Interpret the statements of a valid MATLAB file.
 
-    What is outside the language is reported and changes nothing; a variable that it might have
-    changed counts as broken, so that one mistake is not reported many times.
+    A statement outside the language is reported and has no effect; a variable that it might have
+    changed becomes broken, so that one mistake is reported once.
     """
-    found = _Follower(source)
-    found.top(root)
-    return found.workspace
+    interpreter = _Interpreter(source)
+    interpreter.top(root)
+    return interpreter.workspace
 
 
-class _Follower:
+class _Interpreter:
     def __init__(self, source: Source) -> None:
         self.source, self.workspace = source, Workspace()
         self.variables = self.workspace.variables
@@ -77,7 +78,7 @@ class _Follower:
         self.copied = 0  # structures, in arrays that were assigned
 
     def top(self, root: "Node") -> None:
-        """The statements of the file, inside its function where it is one."""
+        """Interpret the statements of the file, or of its function."""
         statements = named_children(root)
         functions = [n for n in statements if n.type == "function_definition"]
         if functions and statements[0] is functions[0]:
@@ -88,7 +89,7 @@ class _Follower:
             statements += [n for n in named_children(root) if n.type != "function_definition"]
         for statement in statements:
             if statement.type == "return_statement":
-                break  # MATLAB does not reach what follows
+                break  # MATLAB stops here
             if self.copied > MOST_COPIES:
                 words = f"more than {MOST_COPIES:,} structures are copied up to here"
                 self._refuse(statement, f"{words}; what follows is not read")
@@ -129,11 +130,11 @@ class _Follower:
         self.workspace.mistakes.append(self.source.mistake(node, what, remedy, nearest))
 
     def _break(self, node: "Node") -> None:
-        """Mark as broken what a statement that was not followed would have set."""
-        waiting = [node]
-        while waiting:
-            part = waiting.pop()
-            waiting += [n for n in part.children if n.is_named]
+        """Mark the variables that an ignored statement would have set as broken."""
+        pending = [node]
+        while pending:
+            part = pending.pop()
+            pending += [n for n in part.children if n.is_named]
             if part.type != "assignment":
                 continue
             target = part.child_by_field_name("left")
@@ -145,7 +146,7 @@ class _Follower:
                     self.variables[text_of(name)] = BROKEN
 
     def _break_field(self, target: "Node") -> bool:
-        """Mark one field of a structure as broken; whether there was one to mark."""
+        """Mark one field of a structure as broken; True if the target is one."""
         if target.type != "field_expression":
             return False
         try:
@@ -193,7 +194,7 @@ class _Follower:
         struct.given[field] = Given(value, self.source.place(target))
 
     def _struct(self, owner: "Node") -> Struct:
-        """The structure that a field belongs to, to be changed in its place."""
+        """The structure of a field, to be changed in place."""
         if owner.type == "identifier":
             name = text_of(owner)
             if name not in self.variables:

@@ -1,7 +1,7 @@
 """Operators of MATLAB, in MATLAB's order of precedence.
 
-The grammar gives operands and operators; which operator binds first is decided here, because the
-grammar reads ``-x^2`` as ``(-x)^2``, which in MATLAB is ``-(x^2)``. From the tightest:
+The grammar gives operands and operators; precedence is applied here, because the grammar reads
+``-x^2`` as ``(-x)^2``, which in MATLAB is ``-(x^2)``. From the tightest:
 
     transpose ' .' and power ^ .^   from left to right
     signs + -
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 SUMS, PRODUCTS, POWERS = ("+", "-"), ("*", "/", ".*", "./"), ("^", ".^")
 TRANSPOSES = ("'", ".'")
-#: Nodes of the grammar whose parts are operands and operators.
+#: Nodes of the grammar that consist of operands and operators.
 OPERATIONS = ("binary_operator", "unary_operator", "postfix_operator")
-#: Parts of a tree that mean nothing.
+#: Nodes without a meaning.
 EXTRAS = ("comment", "line_continuation")
 
 
 class RefusalError(Exception):
-    """Something outside the language, or wrong in it: where, what, and what to do."""
+    """A node outside the language, or wrong in it, with the fault and its remedy."""
 
     def __init__(self, node: "Node", what: str, remedy: str = "", nearest: str = "") -> None:
         super().__init__(what)
@@ -38,30 +38,30 @@ class RefusalError(Exception):
 
 
 class ReportedError(Exception):
-    """A value is needed that could not be found, which was reported already."""
+    """A value is needed that is broken by a mistake already reported."""
 
 
 @attrs.frozen
 class _Token:
-    """An operator, by its text, or an operand, whose text is empty."""
+    """An operator, by its text, or an operand, with an empty text."""
 
     node: "Node"
     operator: str = ""
 
 
 def tokens_of(node: "Node") -> list[_Token]:
-    """Operands and operators of an operation, from left to right. A pair of brackets is one."""
-    found: list[_Token] = []
+    """Operands and operators of an operation, from left to right; brackets are one operand."""
+    tokens: list[_Token] = []
     waiting = [node]
     while waiting:  # no recursion: a long sum is a deep tree
         part = waiting.pop()
         if part.type in OPERATIONS:
             waiting += [n for n in reversed(part.children) if n.type not in EXTRAS]
         elif part.is_named:
-            found.append(_Token(part))
+            tokens.append(_Token(part))
         else:
-            found.append(_Token(part, text_of(part)))
-    return found
+            tokens.append(_Token(part, text_of(part)))
+    return tokens
 
 
 class Operation:
@@ -69,80 +69,86 @@ class Operation:
 
     Args:
         node: the operation.
-        value: finds the value of an operand.
+        value: returns the value of an operand.
     """
 
     def __init__(self, node: "Node", value: Callable[["Node"], Any]) -> None:
-        self.tokens, self.place, self.value = tokens_of(node), 0, value
+        self.tokens, self.index, self.value = tokens_of(node), 0, value
         self.node = node
 
     def result(self) -> Numbers:
         """The value of the whole."""
-        with np.errstate(all="ignore"):  # what is not finite is refused
-            found = self._sum()
-        if self.place < len(self.tokens):
-            token = self.tokens[self.place]
+        with np.errstate(all="ignore"):  # values that are not finite are refused
+            value = self._sum()
+        if self.index < len(self.tokens):
+            token = self.tokens[self.index]
             what = f"the operator {text_of(token.node)} is not read"
             raise RefusalError(self.node, what, f"known: {' '.join((*SUMS, *PRODUCTS, *POWERS))} '")
-        return found
+        return value
 
     def _next_is(self, operators: tuple[str, ...]) -> bool:
-        here = self.place < len(self.tokens)
-        return here and self.tokens[self.place].operator in operators
+        return self.index < len(self.tokens) and self.tokens[self.index].operator in operators
 
     def _take(self) -> _Token:
-        if self.place >= len(self.tokens):
+        if self.index >= len(self.tokens):
             raise RefusalError(self.node, "an operand is missing")
-        self.place += 1
-        return self.tokens[self.place - 1]
+        self.index += 1
+        return self.tokens[self.index - 1]
 
     def _sum(self) -> Numbers:
-        found = self._product()
-        while self._next_is(SUMS):
-            operator = self._take().operator
-            other = self._product()
-            self._fits(operator, found, other)
-            found = self._checked(found + other if operator == "+" else found - other)
-        return found
+        return self._from_left(SUMS, self._product, self._added)
 
     def _product(self) -> Numbers:
-        found = self._signed()
-        while self._next_is(PRODUCTS):
+        return self._from_left(PRODUCTS, self._signed, self._multiplied)
+
+    def _from_left(
+        self,
+        operators: tuple[str, ...],
+        operand: Callable[[], Numbers],
+        apply: Callable[[str, Numbers, Numbers], Numbers],
+    ) -> Numbers:
+        value = operand()
+        while self._next_is(operators):
             operator = self._take().operator
-            found = self._multiplied(operator, found, self._signed())
-        return found
+            value = apply(operator, value, operand())
+        return value
 
     def _signed(self) -> Numbers:
-        negative = False
+        sign = self._sign()
+        value = self._power()
+        return -value if sign == "-" else value
+
+    def _sign(self) -> str:
+        """The sign of an operand; "" for none."""
+        sign = ""
         while self._next_is(SUMS):
-            negative ^= self._take().operator == "-"
-        found = self._power()
-        return -found if negative else found
+            sign = "-" if (self._take().operator == "-") != (sign == "-") else "+"
+        return sign
 
     def _power(self) -> Numbers:
-        found = self._operand()
-        signed = False
+        value, sign = self._operand(), ""
         while self._next_is((*POWERS, *TRANSPOSES)):
-            if signed:
+            if sign:
                 what = "what follows a power with a sign is read differently by different programs"
                 raise RefusalError(self.node, what, "write it with brackets, such as 2^(-1)")
             operator = self._take().operator
             if operator in TRANSPOSES:
-                found = found.T
+                value = value.T
                 continue
-            negative = False
-            while self._next_is(SUMS):
-                negative ^= self._take().operator == "-"
-                signed = True
+            sign = self._sign()
             exponent = self._operand()
-            found = self._raised(operator, found, -exponent if negative else exponent)
-        return found
+            value = self._raised(operator, value, -exponent if sign == "-" else exponent)
+        return value
 
     def _operand(self) -> Numbers:
         token = self._take()
         if token.operator:
             raise RefusalError(self.node, f"the operator {token.operator} is not read here")
         return numbers(self.value(token.node), token.node)
+
+    def _added(self, operator: str, a: Numbers, b: Numbers) -> Numbers:
+        self._fits(operator, a, b)
+        return self._checked(a + b if operator == "+" else a - b)
 
     def _multiplied(self, operator: str, a: Numbers, b: Numbers) -> Numbers:
         if operator in (".*", "./"):
@@ -153,7 +159,7 @@ class Operation:
             if a.shape[1] != b.shape[0]:
                 what = f"matrices of {size_of(a)} and {size_of(b)} cannot be multiplied"
                 raise RefusalError(self.node, what)
-            check_size(a.size * b.shape[1], self.node)  # what is multiplied
+            check_size(a.size * b.shape[1], self.node)  # the number of products
             return self._checked(a @ b)
         return self._checked(a * b if "*" in operator else a / b)
 
@@ -168,24 +174,24 @@ class Operation:
             what = f"sizes {size_of(a)} and {size_of(b)} do not fit the operator {operator}"
             raise RefusalError(self.node, what)
 
-    def _checked(self, found: Numbers) -> Numbers:
-        return checked(found, self.node)
+    def _checked(self, value: Numbers) -> Numbers:
+        return checked(value, self.node)
 
 
-def checked(found: Numbers, node: "Node") -> Numbers:
+def checked(value: Numbers, node: "Node") -> Numbers:
     """A matrix of finite numbers and reasonable size.
 
     Raises:
         RefusalError: it is none.
     """
-    check_size(found.size, node)
-    if not np.isfinite(found).all():
+    check_size(value.size, node)
+    if not np.isfinite(value).all():
         raise RefusalError(node, "the value is not a finite real number")
-    return found
+    return value
 
 
 def check_size(count: int, node: "Node") -> None:
-    """Whether an array of so many entries may be made.
+    """Check the size of an array.
 
     Raises:
         RefusalError: it would be too large.
@@ -199,7 +205,7 @@ def numbers(value: Any, node: "Node") -> Numbers:
 
     Raises:
         RefusalError: it is something else.
-        ReportedError: it could not be found, which was reported already.
+        ReportedError: it is broken by a mistake already reported.
     """
     if isinstance(value, Broken):
         raise ReportedError

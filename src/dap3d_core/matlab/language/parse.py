@@ -1,4 +1,4 @@
-"""A MATLAB file as a tree. The grammar is that of tree-sitter-matlab; nothing is ever run."""
+"""Parses MATLAB files with the grammar of tree-sitter-matlab."""
 
 import os
 import re
@@ -16,28 +16,28 @@ from dap3d_core.scene.files.text_file import read_text, unreadable
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-#: Larger files are refused before they are read: recovering from errors takes time.
+#: Maximal size of a file, bytes: recovering from errors takes time.
 LARGEST_FILE = 2**20
-#: Files of fewer bytes are parsed in a second, whatever they hold; others may take so long, s.
+#: Files of fewer bytes are parsed in a second; time limit of others, s.
 QUICK, PARSING = 8192, 10.0
-#: Names joined by dots, at most: of more the parser takes memory with the square of their number.
+#: Maximal number of names joined by dots: the parser takes memory with the square of it.
 CHAIN = 100
 _LONG_CHAIN = re.compile(rf"(?<!\w)(?:[^\W\d]\w*+\s*+\.\s*+){{{CHAIN}}}")
-#: So much more memory a parser may take, bytes.
+#: Additional memory that the parser may take, bytes.
 MEMORY = 2**29
-#: Comments of many lines, %{ to %}, at most.
+#: Maximal number of comments of many lines, %{ to %}.
 BLOCKS = 500
-#: Errors of syntax that are reported of one file: the first ones explain the others.
+#: Maximal number of reported syntax errors of a file: the first ones explain the others.
 SYNTAX_ERRORS = 5
 
 EXTRA = "matlab"
-#: Characters that a text processor or a PDF puts where MATLAB has others.
+#: Characters of text processors and PDF files in place of those of MATLAB.
 _TYPOGRAPHIC = frozenset("‘’“”–−")
 
 
 @attrs.frozen
 class Place:
-    """Where something stands: file and line, from 1."""
+    """A place: file and line, from 1."""
 
     file: str
     line: int | None = None
@@ -60,16 +60,16 @@ class Source:
         return int(node.start_point[0]) + 1
 
     def place(self, node: "Node") -> Place:
-        """Where a node stands."""
+        """The place of a node."""
         return Place(str(self.path), self.line(node))
 
     def mistake(
         self, node: "Node", what: str, remedy: str = "", nearest: str = "", key: str = ""
     ) -> Mistake:
-        """A mistake at a node; without a key the words begin with its text."""
-        words = what if key else f"{excerpt(node)}: {what}"
+        """A mistake at a node; without a key the message begins with its text."""
+        text = what if key else f"{excerpt(node)}: {what}"
         return Mistake(
-            key, MISSING, words, nearest, remedy, file=str(self.path), line=self.line(node)
+            key, MISSING, text, nearest, remedy, file=str(self.path), line=self.line(node)
         )
 
 
@@ -79,7 +79,7 @@ def text_of(node: "Node") -> str:
 
 
 def excerpt(node: "Node", width: int = 60) -> str:
-    """The text of a node in one line, cut where it is long."""
+    """The text of a node in one line, shortened where it is long."""
     words = " ".join(text_of(node)[: 4 * width].split())
     return words if len(words) <= width else f"{words[: width - 4]} ..."
 
@@ -87,11 +87,11 @@ def excerpt(node: "Node", width: int = 60) -> str:
 def read_source(path: Path) -> Source:
     """The text of a MATLAB file, which is UTF-8 and of reasonable size.
 
-    A link that leads out of its folder is not followed: a model from elsewhere makes nobody's other
-    files part of a scene.
+    A link out of its folder is refused: a model from others must not put the user's files into a
+    scene.
 
     Raises:
-        SceneError: says what is wrong with the file.
+        SceneError: the file cannot be read, or is no text.
     """
     try:
         if path.is_file() and not path.resolve().is_relative_to(path.parent.resolve()):
@@ -103,7 +103,7 @@ def read_source(path: Path) -> Source:
 
 
 class Grammar:
-    """The parser; made once for all files of a folder.
+    """The parser, one for all files of a folder.
 
     Raises:
         SceneError: tree-sitter or its MATLAB grammar is not installed, or too old.
@@ -121,19 +121,19 @@ class Grammar:
         try:
             language = tree_sitter.Language(tree_sitter_matlab.language())
             self._parser: Any = tree_sitter.Parser(language)
-        except (TypeError, ValueError) as error:  # versions that do not fit each other
+        except (TypeError, ValueError) as error:  # incompatible versions
             what = f"{needed} in versions that fit each other: {error}"
             raise SceneError([Mistake("", MISSING, what, remedy=remedy)]) from None
 
     def tree(self, source: Source) -> "Node":
-        """The root of the tree of a file, errors of syntax included.
+        """The root of the tree of a file, which may have syntax errors.
 
         Raises:
-            SceneError: finding it takes too long.
+            SceneError: parsing takes too long.
         """
         text = source.text if source.text.endswith("\n") else f"{source.text}\n"
         data = text.encode("utf-8")
-        if data.count(b"%{") > BLOCKS:  # one within the other, they are looked for again and again
+        if data.count(b"%{") > BLOCKS:  # nested ones are searched repeatedly
             raise file_error(source.path, f"holds more than {BLOCKS} comments of many lines")
         if _LONG_CHAIN.search(text):
             raise file_error(source.path, f"joins more than {CHAIN} names by dots")
@@ -143,7 +143,7 @@ class Grammar:
         return root
 
     def _try(self, data: bytes, path: Path) -> None:
-        """Parse in pieces, which can be given up, unlike parsing a text as a whole."""
+        """Parse in pieces, within limits of time and memory."""
         end, most = time.process_time() + PARSING, _peak() + MEMORY
         try:
             self._parser.parse(
@@ -152,30 +152,30 @@ class Grammar:
             )
         except ValueError:
             self._parser.reset()
-            took = f"{PARSING:g} s" if _peak() <= most else f"{MEMORY >> 20} MiB"
-            what = f"is no model: finding its statements takes more than {took}"
+            limit = f"{PARSING:g} s" if _peak() <= most else f"{MEMORY >> 20} MiB"
+            what = f"is no model: finding its statements takes more than {limit}"
             raise file_error(path, what) from None
 
 
 def _peak() -> int:
-    """Bytes of memory that this process has had at most; 0 where the system does not tell."""
+    """Peak memory of this process, bytes; 0 where the system does not report it."""
     try:
         import resource
     except ImportError:  # no POSIX
         return 0
-    found = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return found if sys.platform == "darwin" else 1024 * found
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else 1024 * peak
 
 
 def syntax_mistakes(source: Source, root: "Node") -> list[Mistake]:
-    """Where a file is not MATLAB: the first error of each line, a few of them."""
-    found: dict[int, Mistake] = {}
+    """The first syntax errors of a file, one for each line."""
+    mistakes: dict[int, Mistake] = {}
     lines = source.text.split("\n")
-    waiting = [root] if root.has_error else []
-    while waiting and len(found) < SYNTAX_ERRORS:
-        node = waiting.pop()
+    pending = [root] if root.has_error else []
+    while pending and len(mistakes) < SYNTAX_ERRORS:
+        node = pending.pop()
         if not (node.is_error or node.is_missing):
-            waiting += [n for n in reversed(node.children) if n.has_error or n.is_missing]
+            pending += [n for n in reversed(node.children) if n.has_error or n.is_missing]
             continue
         line = source.line(node)
         text = lines[line - 1].strip() if line <= len(lines) else ""
@@ -185,10 +185,10 @@ def syntax_mistakes(source: Source, root: "Node") -> list[Mistake]:
         remedy = ""
         if _TYPOGRAPHIC & set(text):
             remedy = "quotes and minus signs of typography are no MATLAB: write ' and -"
-        found.setdefault(
+        mistakes.setdefault(
             line, Mistake("", MISSING, what, "", remedy, file=str(source.path), line=line)
         )
-    return [found[line] for line in sorted(found)]
+    return [mistakes[line] for line in sorted(mistakes)]
 
 
 def m_files(folder: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""The structures of a MATLAB model (tables 3 to 16 of the manual): fields, defaults, files."""
+"""Structures of a MATLAB model (tables 3 to 16 of the manual): fields, defaults, files."""
 
 import math
 
@@ -22,11 +22,10 @@ class Structure:
 
     Attributes:
         kind: its name without ``_struct``.
-        fields: what a model gives, with the manual's defaults.
-        computed: what the MATLAB program works out itself, whatever a model gives.
-        ours: fields that the manual's structure lacks and this reader takes, with defaults; NaN:
-            left to the type.
-        slips: names that are written by mistake, and the field that is meant.
+        fields: fields of a model, with the manual's defaults.
+        computed: fields that the MATLAB program computes itself, whatever a model gives.
+        ours: additional fields of this reader, with defaults; NaN: left to the type.
+        slips: usual mistakes in names, and the correct field.
     """
 
     kind: str
@@ -37,11 +36,11 @@ class Structure:
 
     @property
     def known(self) -> tuple[str, ...]:
-        """Every field that may be written."""
+        """All fields."""
         return (*self.fields, *self.ours, *self.computed)
 
     def default(self, field: str) -> Default:
-        """The value of a field that was not given; empty for what the program works out."""
+        """The default of a field; empty for computed fields."""
         return self.fields.get(field, self.ours.get(field, EMPTY))
 
 
@@ -137,19 +136,19 @@ _FUNCT = Structure(
 
 STRUCTURES = {s.kind: s for s in (_BODY, _POINT, _VECTOR1, _VECTOR2, _JOINT, _DISK, _FORCE, _FUNCT)}
 
-#: What makes a structure: ``Body_struct``, and ``Body``, as the manual writes for disks.
+#: Functions that make a structure: ``Body_struct``, and ``Body``, as the manual writes for disks.
 MAKERS = {f"{kind}_struct": kind for kind in STRUCTURES} | {kind: kind for kind in STRUCTURES}
 
 
 @attrs.frozen
 class ModelFile:
-    """A file of a model folder, and the array it makes.
+    """A file of a model folder, and its array.
 
     Attributes:
         name: of the file.
         kind: of the structures in its array.
         arrays: names of the array; the manual writes two for the vectors of type 1.
-        noun: what the array holds, in words.
+        noun: a member of the array, for messages.
     """
 
     name: str
@@ -168,10 +167,10 @@ FILES = (
     ModelFile("inFuncts.m", "Funct", ("Functs",), "function"),
     ModelFile("inAnimate.m", "Point", ("Points_anim",), "animation point"),
 )
-#: The one file without which there is no model.
+#: The file that every model needs.
 REQUIRED_FILE = "inBodies.m"
 USER_FORCE_FILE = "user_force.m"
-#: Array of disks, which joints name by ``iDisk``; it stands in the file of the joints.
+#: Array of disks, in the file of the joints, which name them by ``iDisk``.
 DISKS = "Disks"
 #: Limits of the drawing, in the file of the animation.
 LIMITS = (("xmin", "xmax"), ("ymin", "ymax"), ("zmin", "zmax"))

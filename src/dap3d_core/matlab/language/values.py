@@ -1,4 +1,4 @@
-"""What a MATLAB expression may be worth here: numbers, text, structures and arrays of them."""
+"""Values of MATLAB expressions: numbers, text, structures and arrays of these."""
 
 from typing import Any
 
@@ -11,12 +11,12 @@ from dap3d_core.matlab.language.structures import STRUCTURES, Default, Structure
 
 #: A matrix of numbers; a single number is 1 x 1.
 Numbers = NDArray[np.float64]
-#: Larger matrices are no part of a model.
+#: Maximal number of entries of a matrix.
 LARGEST_MATRIX = 10_000
 
 
 class Broken:
-    """Stands for a value that could not be found and was reported already."""
+    """A value that is unknown because of a reported mistake."""
 
 
 BROKEN = Broken()
@@ -24,7 +24,7 @@ BROKEN = Broken()
 
 @attrs.frozen(eq=False)
 class Given:
-    """A value that a file gives to a field, and where."""
+    """A value that a file gives to a field, and its place."""
 
     value: Any
     place: Place
@@ -35,9 +35,9 @@ class Struct:
     """A structure such as ``Body_struct`` makes.
 
     Attributes:
-        structure: which fields there are.
-        place: where it was made.
-        variable: the variable it was last put into, for messages.
+        structure: its kind and fields.
+        place: the place where it was made.
+        variable: the last variable it was assigned to, for messages.
         given: the fields that the file gives.
     """
 
@@ -47,17 +47,17 @@ class Struct:
     given: dict[str, Given] = attrs.field(factory=dict)
 
     def copy(self) -> "Struct":
-        """A copy with fields of its own, as MATLAB assigns structures."""
+        """A copy with separate fields, as MATLAB assigns structures."""
         return attrs.evolve(self, given=dict(self.given))
 
     def value(self, field: str) -> Any:
-        """The value of a field: as given, or its default."""
+        """The given value of a field, or its default."""
         if field in self.given:
             return self.given[field].value
         return as_value(self.structure.default(field))
 
     def place_of(self, field: str) -> Place:
-        """Where a field was given, or where the structure was made."""
+        """The place where a field was given, or where the structure was made."""
         return self.given[field].place if field in self.given else self.place
 
 
@@ -76,7 +76,7 @@ def make(kind: str, place: Place) -> Struct:
 
 
 def copied(value: Any) -> Any:
-    """A value that shares nothing with another."""
+    """A deep copy of a value."""
     if isinstance(value, Struct):
         return value.copy()
     if isinstance(value, list):
@@ -85,12 +85,12 @@ def copied(value: Any) -> Any:
 
 
 def size_of(value: Numbers) -> str:
-    """The size of a matrix in words."""
+    """The size of a matrix, for messages."""
     return f"{value.shape[0]}x{value.shape[1]}"
 
 
 def kind_of(value: Any) -> str:
-    """What a value is, in words."""
+    """The kind of a value, for messages."""
     if isinstance(value, str):
         return "text"
     if isinstance(value, Struct):
@@ -105,7 +105,7 @@ def kind_of(value: Any) -> str:
 
 
 def plain_value(value: Any) -> Any:
-    """A value as messages show it."""
+    """A value in the form of messages."""
     if isinstance(value, np.ndarray):
         if value.size == 1:
             return shortened(float(value[0, 0]))
@@ -116,5 +116,5 @@ def plain_value(value: Any) -> Any:
 
 
 def shortened(number: float) -> float | int:
-    """A number that is an integer as one: an index is 3, not 3.0."""
+    """An integer for a whole number: an index is 3, not 3.0."""
     return int(number) if number.is_integer() and abs(number) < 1e15 else number

@@ -1,1 +1,1 @@
-"""From MATLAB structures to a scene."""
+"""Translation of MATLAB structures into a scene."""

@@ -1,4 +1,4 @@
-"""Bodies, points, vectors and what is drawn: from MATLAB structures into a scene."""
+"""Translates bodies, points, vectors and animation data."""
 
 from typing import Any
 
@@ -10,15 +10,15 @@ from dap3d_core.matlab.language.values import Numbers, Struct, plain_value
 from dap3d_core.matlab.translate.fields import Fields, name_of
 from dap3d_core.scene import MISSING, Mistake, Scene
 
-#: How far a rotation matrix may be from one, and two ways to give one thing from each other.
+#: Tolerance of a rotation matrix.
 ROTATION_TOLERANCE = 1e-6
-#: Fields of a body whose default is worth a word.
-_TELLING = ("mass", "Jp", "r")
+#: Fields of a body with reported defaults.
+_REPORTED = ("mass", "Jp", "r")
 _COLOR = 255
 
 
 def add_bodies(scene: Scene, fields: Fields) -> None:
-    """The bodies, in the order of their array."""
+    """Add the bodies, in the order of their array."""
     for k, struct in enumerate(fields.model.arrays["Bodies"] or [], 1):
         name = name_of("Bodies", k)
         values: dict[str, Any] = {
@@ -35,19 +35,19 @@ def add_bodies(scene: Scene, fields: Fields) -> None:
                 f"bodies.{name}.{field}", struct, field if field in struct.given else source
             )
         fields.placed(f"bodies.{name}", struct)
-        _tell_defaults(fields, struct)
-        _tell_computed(fields, struct)
+        _report_defaults(fields, struct)
+        _report_computed(fields, struct)
         scene.add_body(name, **values)
 
 
-def _tell_defaults(fields: Fields, struct: Struct) -> None:
-    missing = [f for f in _TELLING if f not in struct.given]
-    words = {"mass": "mass = 1", "Jp": "Jp = eye(3)", "r": "r = [0;0;0]"}
+def _report_defaults(fields: Fields, struct: Struct) -> None:
+    missing = [f for f in _REPORTED if f not in struct.given]
+    defaults = {"mass": "mass = 1", "Jp": "Jp = eye(3)", "r": "r = [0;0;0]"}
     if missing:
-        fields.defaulted(struct, ", ".join(words[f] for f in missing))
+        fields.defaulted(struct, ", ".join(defaults[f] for f in missing))
 
 
-def _tell_computed(fields: Fields, struct: Struct) -> None:
+def _report_computed(fields: Fields, struct: Struct) -> None:
     for field in struct.given:
         if field in struct.structure.computed:
             fields.left_out(struct, field, "is worked out by the program: not read")
@@ -63,7 +63,7 @@ def _inertia(fields: Fields, struct: Struct) -> Any:
 
 
 def _orientation(fields: Fields, struct: Struct) -> Any:
-    """Euler parameters, from the rotation matrix where that is given instead."""
+    """Euler parameters, or those of the rotation matrix where that is given."""
     p = fields.vector(struct, "p", 4)
     if "A" not in struct.given or p is None:
         return p
@@ -71,15 +71,15 @@ def _orientation(fields: Fields, struct: Struct) -> Any:
     if rows is None:
         return None
     A = np.array(rows)
-    found = parameters_of(A)
-    if np.abs(rotation_of(found) - A).max() > ROTATION_TOLERANCE:
+    p_of_A = parameters_of(A)
+    if np.abs(rotation_of(p_of_A) - A).max() > ROTATION_TOLERANCE:
         what = f"should be a rotation matrix (A^T A = I, det A = 1, within {ROTATION_TOLERANCE:g})"
         fields.refuse(struct, "A", what)
         return None
     if "p" not in struct.given:
         words = "gives the orientation: p is worked out from it (the MATLAB program reads p alone)"
         fields.changed(struct, "A", words)
-        return tuple(found.tolist())
+        return tuple(p_of_A.tolist())
     if np.abs(rotation_of(np.array(p) / max(np.linalg.norm(p), 1e-300)) - A).max() > 1e-3:
         fields.refuse(struct, "A", "is another orientation than p", "give one of them")
         return None
@@ -88,7 +88,7 @@ def _orientation(fields: Fields, struct: Struct) -> Any:
 
 
 def parameters_of(A: Numbers) -> Numbers:
-    """Euler parameters of a rotation matrix, e0 >= 0; of the four, the largest is found first."""
+    """Euler parameters of a rotation matrix, e0 >= 0, from the largest of the four."""
     trace = np.trace(A)
     squares = 0.25 * np.array([1.0 + trace, *(1.0 + 2.0 * np.diag(A) - trace)])
     k = int(np.argmax(squares))
@@ -113,7 +113,7 @@ def rotation_of(p: Numbers) -> Numbers:
 
 
 def _angular_velocity(fields: Fields, struct: Struct, p: Any) -> Any:
-    """Angular velocity in ground axes, from p_dot where that is given instead: w = 2 G p_dot."""
+    """Angular velocity in ground axes, or that of p_dot where that is given: w = 2 G p_dot."""
     w = fields.vector(struct, "w")
     if "p_dot" not in struct.given or w is None or p is None:
         return w
@@ -122,7 +122,7 @@ def _angular_velocity(fields: Fields, struct: Struct, p: Any) -> Any:
         return None
     p_dot, e0, e = np.array(given), p[0], np.array(p[1:])
     rates = p_dot[1:]
-    found = 2.0 * (-e * p_dot[0] + np.cross(e, rates) + e0 * rates)
+    w_of_p = 2.0 * (-e * p_dot[0] + np.cross(e, rates) + e0 * rates)
     size = max(1.0, float(np.abs(p_dot).max()))
     if abs(float(np.dot(p, p_dot))) > ROTATION_TOLERANCE * size:
         what = "should be at right angles to p: Euler parameters keep unit length"
@@ -131,8 +131,8 @@ def _angular_velocity(fields: Fields, struct: Struct, p: Any) -> Any:
     if "w" not in struct.given:
         words = "gives the rotation: w is worked out from it (the MATLAB program reads w alone)"
         fields.changed(struct, "p_dot", words)
-        return tuple(found.tolist())
-    if np.abs(found - np.array(w)).max() > 1e-3 * size:
+        return tuple(w_of_p.tolist())
+    if np.abs(w_of_p - np.array(w)).max() > 1e-3 * size:
         fields.refuse(struct, "p_dot", "is another rotation than w", "give one of them")
         return None
     fields.left_out(struct, "p_dot", "says what w says: w is read")
@@ -140,7 +140,7 @@ def _angular_velocity(fields: Fields, struct: Struct, p: Any) -> Any:
 
 
 def _color(fields: Fields, struct: Struct) -> str | None:
-    """A colour by its letter or name, or three shares of red, green and blue; "" if not given."""
+    """A colour by its letter or name, or three fractions of red, green and blue; "" for none."""
     if "color" not in struct.given:
         return ""
     if isinstance(struct.value("color"), str):
@@ -155,7 +155,7 @@ def _color(fields: Fields, struct: Struct) -> str | None:
 
 
 def add_geometry(scene: Scene, fields: Fields) -> None:
-    """Points and vectors, in the order of their arrays."""
+    """Add points and vectors, in the order of their arrays."""
     arrays = fields.model.arrays
     for array, field, table in (("Points", "sPp", "points"), ("Vectors1", "sp", "vectors")):
         for k, struct in enumerate(arrays[array] or [], 1):
@@ -172,7 +172,7 @@ def add_geometry(scene: Scene, fields: Fields) -> None:
             fields.reference(struct, f"{end}Pindex", "Points", needed=True) for end in ("i", "j")
         ]
         scene.add_vector2(name, *ends)
-        _tell_computed(fields, struct)
+        _report_computed(fields, struct)
         fields.placed(f"vectors2.{name}", struct)
         for end in ("i", "j"):
             fields.placed(f"vectors2.{name}.P_{end}", struct, f"{end}Pindex")
@@ -186,11 +186,11 @@ def _note_on_body(fields: Fields, struct: Struct, field: str) -> None:
         missing.append(f"{field} = [0;0;0]")
     if missing:
         fields.defaulted(struct, ", ".join(missing))
-    _tell_computed(fields, struct)
+    _report_computed(fields, struct)
 
 
 def add_animation(scene: Scene, fields: Fields) -> None:
-    """Points that are only drawn, and the limits of the drawing."""
+    """Add points that are only drawn, and the limits of the drawing."""
     for k, struct in enumerate(fields.model.arrays["Points_anim"] or [], 1):
         body, local = fields.body(struct), fields.vector(struct, "sPp")
         _note_on_body(fields, struct, "sPp")

@@ -1,4 +1,4 @@
-"""Joints, forces and functions: from MATLAB structures into a scene."""
+"""Translates joints, forces and functions."""
 
 from typing import Any
 
@@ -27,20 +27,20 @@ from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Scene
 from dap3d_core.scene.scene import Element
 
-#: Fields of bodies, which follow from points and vectors where a type has these.
+#: Fields of bodies, implied by points and vectors of a type.
 _BODY_FIELDS = {"iBindex": "i", "jBindex": "j"}
-#: What a disk says of a joint: field of the disk -> field of the joint.
+#: Field of a disk -> field of its joint.
 _OF_DISK = {"iBindex": "iBindex", "type": "disk", "R": "R", "mu": "mu"}
 
 
 def add_functions(scene: Scene, fields: Fields) -> None:
-    """The functions, in the order of their array."""
+    """Add the functions, in the order of their array."""
     for k, struct in enumerate(fields.model.arrays["Functs"] or [], 1):
         _add(scene.functions, "Functs", k, struct, FUNCTIONS, fields)
 
 
 def add_joints(scene: Scene, fields: Fields) -> None:
-    """The joints, in the order of their array; their friction becomes forces."""
+    """Add the joints, in the order of their array; their friction becomes forces."""
     for k, struct in enumerate(fields.model.arrays["Joints"] or [], 1):
         joint = _with_disk(struct, fields)
         element = _add(scene.joints, "Joints", k, joint, JOINTS, fields)
@@ -49,7 +49,7 @@ def add_joints(scene: Scene, fields: Fields) -> None:
 
 
 def add_forces(scene: Scene, fields: Fields) -> None:
-    """The forces, in the order of their array; after those that friction of joints became."""
+    """Add the forces, in the order of their array, before those of the friction of joints."""
     frictions = scene.forces
     scene.forces = {}
     for k, struct in enumerate(fields.model.arrays["Forces"] or [], 1):
@@ -73,7 +73,7 @@ def _add(
     types: dict[str, tuple[Rule, ...]],
     fields: Fields,
 ) -> Element | None:
-    """Add what a structure becomes; None and reported where its type is not known."""
+    """Add the element of a structure; None where its type is unknown, which is reported."""
     word = fields.word(struct, "type")
     if word is None or word not in types:
         if word is not None:
@@ -82,19 +82,19 @@ def _add(
         return None
     name = name_of(array, number)
     where = {"Joints": "joints", "Forces": "forces", "Functs": "functions"}[array]
-    found = _Values(struct, f"{where}.{name}", fields)
+    values = _Values(struct, f"{where}.{name}", fields)
     for rule in types[word]:
-        found.read(rule)
-    found.tell(word)
+        values.read(rule)
+    values.report(word)
     fields.placed(f"{where}.{name}", struct)
     fields.placed(f"{where}.{name}.type", struct, "type")
-    table[name] = Element(name, word, found.values)
+    table[name] = Element(name, word, values.values)
     return table[name]
 
 
 @attrs.define
 class _Values:
-    """The fields of one element, found rule by rule."""
+    """The fields of one element, read rule by rule."""
 
     struct: Struct
     key: str
@@ -112,7 +112,7 @@ class _Values:
         if rule is BODY_I and self._has_point():
             return
         if rule is N_J and not self.fields.differs(self.struct, N_J.field):
-            rule = attrs.evolve(rule, field="jVindex_a")  # the manual's arm may stand there
+            rule = attrs.evolve(rule, field="jVindex_a")  # the manual gives the arm there
         value = self._value(rule)
         if value is None:
             return
@@ -147,7 +147,7 @@ class _Values:
         return fields.number(struct, rule.field)
 
     def _has_point(self) -> bool:
-        """Whether a point says which body is meant."""
+        """True if a point is given in place of the body."""
         struct = self.struct
         types = {**JOINTS, **FORCES}[str(struct.value("type"))]
         return AT in types and self.fields.differs(struct, AT.field)
@@ -158,31 +158,31 @@ class _Values:
         self.used |= {D.field, P_I.field, P_J.field}
         both = [r for r in (P_I, P_J) if fields.differs(struct, r.field)]
         if fields.differs(struct, D.field) or len(both) < 2:
-            found = fields.reference(struct, D.field, D.how, needed=True)
-            if found is None:
+            name = fields.reference(struct, D.field, D.how, needed=True)
+            if name is None:
                 return
-            self.values[D.scene] = found
+            self.values[D.scene] = name
             fields.placed(f"{self.key}.{D.scene}", struct, D.field)
             vectors = fields.model.arrays["Vectors2"]
             if vectors is None:
                 return
-            vector = vectors[int(found[1:]) - 1]
+            vector = vectors[int(name[1:]) - 1]
             for rule in (P_I, P_J):
                 point = fields.reference(vector, rule.field, rule.how, needed=False)
                 self._note_body(rule, point)
                 if rule in both and fields.reference(struct, rule.field, rule.how, needed=True) != (
                     point
                 ):
-                    what = f"is another point than that of vector {found[1:]}, {D.field}"
+                    what = f"is another point than that of vector {name[1:]}, {D.field}"
                     fields.refuse(struct, rule.field, what, "leave it out")
             return
         for rule in both:
             self.read(rule)
 
-    # ---------------------------------------------------------------- bodies, left-overs
+    # ---------------------------------------------------------------- bodies, unused fields
 
     def _note_body(self, rule: Rule, value: Any) -> None:
-        """Keep which body a point or a vector says a slot is."""
+        """Record the body of a slot, as a point or a vector gives it."""
         slot = rule.scene[-1]
         array = self.fields.model.arrays.get(rule.how)
         if rule.how not in ("Points", "Vectors1") or slot not in "ij" or not array or not value:
@@ -192,7 +192,7 @@ class _Values:
         if getattr(number, "size", 0) == 1:
             self.bodies.setdefault(slot, (f"{number[0, 0]:g}", rule.field))
 
-    def tell(self, word: str) -> None:
+    def report(self, word: str) -> None:
         """Say what was defaulted, and what the structure gives that its type does not take."""
         struct, fields = self.struct, self.fields
         if "type" not in struct.given:
@@ -225,7 +225,7 @@ class _Values:
 
 
 def _with_disk(struct: Struct, fields: Fields) -> Struct:
-    """A joint that names a disk by ``iDisk``, with what the disk says; others as they are."""
+    """A joint with the fields of the disk that it names by ``iDisk``; other joints unchanged."""
     if not fields.differs(struct, "iDisk"):
         return struct
     if struct.value("type") != "disk":
@@ -251,7 +251,7 @@ def _with_disk(struct: Struct, fields: Fields) -> Struct:
 
 
 def _add_friction(scene: Scene, struct: Struct, element: Element, fields: Fields) -> None:
-    """The coefficient of friction of a joint becomes a force."""
+    """Add the friction of a joint as a force."""
     mu = fields.number(struct, "mu") if "mu" in struct.given else 0.0
     if not mu:
         return
@@ -274,12 +274,12 @@ def _add_friction(scene: Scene, struct: Struct, element: Element, fields: Fields
 def _take_radius(
     scene: Scene, element: Element, joint: str, struct: Struct, fields: Fields
 ) -> None:
-    """The radius of a friction force that gives none is that of its joint."""
+    """Give a friction force without a radius that of its joint."""
     joints = fields.model.arrays["Joints"]
     if joint not in scene.joints or not joints or scene.joints[joint].type not in PIN_FRICTION:
         return
     source = joints[int(joint[1:]) - 1]
     element.fields["radius"] = fields.number(source, "R")
-    told = "" if "R" in source.given else ", which is the default"
-    text = f"{struct.variable}: radius = R of {joint}{told}"
+    default = "" if "R" in source.given else ", which is the default"
+    text = f"{struct.variable}: radius = R of {joint}{default}"
     fields.report.defaulted.append(remark(struct.place, text))

@@ -1,4 +1,4 @@
-"""Which MATLAB field becomes which field of the scene, for each type of the manual."""
+"""Fields of MATLAB structures and their fields in the scene, for each type of the manual."""
 
 import attrs
 
@@ -10,9 +10,9 @@ class Rule:
     Attributes:
         field: in the MATLAB structure.
         scene: in the scene.
-        how: number, vec3, table, matrix, word; or the array that a number of it points into.
-        needed: whether 0 (no member of the array), or no value, is a mistake.
-        default: what a default means, in words, where it is worth telling.
+        how: number, vec3, table, matrix, word; or the array that an index refers to.
+        needed: 0 (no member of the array), or no value, is a mistake.
+        default: the default, for the report; "" where it is not reported.
     """
 
     field: str
@@ -23,7 +23,7 @@ class Rule:
 
 
 def _numbers(**fields: str) -> tuple[Rule, ...]:
-    """Numbers whose default is told: MATLAB field = "scene field: default"."""
+    """Numbers with a reported default: MATLAB field = "scene field: default"."""
     return tuple(
         Rule(field, scene, "number", default=default)
         for field, (scene, _, default) in ((f, w.partition(":")) for f, w in fields.items())
@@ -33,11 +33,11 @@ def _numbers(**fields: str) -> tuple[Rule, ...]:
 P_I, P_J = Rule("iPindex", "P_i", "Points", True), Rule("jPindex", "P_j", "Points", True)
 A_I, A_J = Rule("iVindex_a", "a_i", "Vectors1", True), Rule("jVindex_a", "a_j", "Vectors1", True)
 N_J = Rule("jVindex_n", "n_j", "Vectors1", True)
-#: Two points may be given in its place, ``iPindex`` and ``jPindex``.
+#: Or two points, ``iPindex`` and ``jPindex``.
 D = Rule("V2index", "d", "Vectors2", True)
 BODY_I = Rule("iBindex", "body_i", "Bodies", True)
 BODY_J = Rule("jBindex", "body_j", "Bodies", default="jBindex = 0, the ground")
-#: A point that stands for the body, where one is given.
+#: A point in place of the body.
 AT = Rule("iPindex", "P_i", "Points")
 FUNCTION = Rule("iFunct", "function", "Functs")
 LOCK = Rule("iFunct", "function", "Functs", default="iFunct = 0, no motion: a lock")
@@ -107,7 +107,7 @@ FUNCTIONS: dict[str, tuple[Rule, ...]] = {
     "d": (*_SPAN, Rule("fp_end", "fp_end", "number", default="fp_end = 0")),
 }
 
-#: Joints whose friction has a law: with the radius of a pin, and without.
+#: Joints with a law of friction: with the radius of a pin, and without.
 PIN_FRICTION, OTHER_FRICTION = ("rev", "sph", "cyl"), ("tran", "disk")
-#: The two ways in which the manual writes two kinds of disks.
+#: Two spellings of the manual.
 DISK_ALIASES = {"zn": "nz", "zt": "tz"}

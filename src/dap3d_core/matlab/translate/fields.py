@@ -1,4 +1,4 @@
-"""Fields of MATLAB structures as values of a scene: numbers, matrices, and numbers into names."""
+"""Reads fields of MATLAB structures as values of a scene; indices become names."""
 
 import attrs
 import numpy as np
@@ -11,7 +11,7 @@ from dap3d_core.matlab.language.values import Broken, Struct, kind_of, plain_val
 from dap3d_core.scene import MISSING, Mistake
 
 GROUND = "ground"
-#: Array -> how the scene calls its members, and what one of them is.
+#: Array -> prefix of the names of its members in the scene, and their noun.
 NAMES = {
     "Bodies": ("body", "body"),
     "Points": ("P", "point"),
@@ -26,20 +26,20 @@ _FILE_OF = {f.arrays[0]: f.name for f in FILES} | {DISKS: "inJoints.m"}
 
 
 def name_of(array: str, number: int) -> str:
-    """The name in the scene of the member of an array with this number, from 1."""
+    """The name in the scene of a member of an array, by its index from 1."""
     return f"{NAMES[array][0]}{number}"
 
 
 @attrs.define
 class Fields:
-    """Reads the fields of the structures of a model; what is wrong is kept.
+    """Reads the fields of the structures of a model; ``Model.mistakes`` collects mistakes.
 
-    What could not be read gives None: the scene is then never used, because there is a mistake.
+    An invalid field gives None: the scene is then never used, because there is a mistake.
 
     Attributes:
-        model: what the files say.
-        report: takes what is defaulted, changed and left out.
-        places: where each key of the scene was given, for mistakes that its check finds.
+        model: the content of the files.
+        report: takes defaults, changes and omissions.
+        places: place of each key of the scene, for mistakes of its check.
     """
 
     model: Model
@@ -49,7 +49,7 @@ class Fields:
     def refuse(
         self, struct: Struct, field: str, what: str, remedy: str = "", nearest: str = ""
     ) -> None:
-        """Keep a mistake at a field."""
+        """Add a mistake at a field."""
         given = struct.given.get(field)
         value = MISSING if given is None else plain_value(given.value)
         place = struct.place_of(field)
@@ -59,20 +59,20 @@ class Fields:
         )
 
     def placed(self, key: str, struct: Struct, field: str = "") -> None:
-        """Keep where a key of the scene was given."""
+        """Record the place of a key of the scene."""
         self.places[key] = struct.place_of(field)
 
     def defaulted(self, struct: Struct, words: str) -> None:
-        """Keep what was filled in."""
+        """Report a default."""
         self.report.defaulted.append(remark(struct.place, f"{struct.variable}: {words}"))
 
     def changed(self, struct: Struct, field: str, words: str) -> None:
-        """Keep what was read in another form than it is written."""
+        """Report a converted value."""
         text = f"{struct.variable}.{field} {words}"
         self.report.changed.append(remark(struct.place_of(field), text))
 
     def left_out(self, struct: Struct, field: str, words: str) -> None:
-        """Keep what has no meaning here."""
+        """Report a value that is left out."""
         text = f"{struct.variable}.{field} {words}"
         self.report.unused.append(remark(struct.place_of(field), text))
 
@@ -122,7 +122,7 @@ class Fields:
         return None
 
     def differs(self, struct: Struct, field: str) -> bool:
-        """Whether a field is given with a value that is not its default."""
+        """True if a field is given with another value than its default."""
         if field not in struct.given:
             return False
         value, default = struct.value(field), attrs.evolve(struct, given={}).value(field)
@@ -130,10 +130,10 @@ class Fields:
             return value.shape != default.shape or not np.array_equal(value, default)
         return bool(value != default) if isinstance(value, str) else True
 
-    # ---------------------------------------------------------------- numbers of other things
+    # ---------------------------------------------------------------- indices
 
     def index(self, struct: Struct, field: str, array: str) -> int | None:
-        """The number of a member of an array, 0 where none is meant; None where it is wrong."""
+        """The index of a member of an array, 0 for none; None where it is wrong."""
         number = self.number(struct, field)
         if number is None:
             return None
@@ -157,7 +157,7 @@ class Fields:
         return None
 
     def reference(self, struct: Struct, field: str, array: str, *, needed: bool) -> str | None:
-        """The name of what a number means; None where it is 0 or wrong."""
+        """The name of the member with an index; None where it is 0 or wrong."""
         k = self.index(struct, field, array)
         if k == 0 and needed:
             noun = NAMES[array][1]

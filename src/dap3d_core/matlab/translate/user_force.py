@@ -1,4 +1,4 @@
-"""The user's force, user_force.m: not translated, but shown, with a plugin to be filled in."""
+"""The user's force, user_force.m: shown, with a stub of a plugin in place of a translation."""
 
 import re
 from typing import Any
@@ -61,7 +61,7 @@ def dap3d_forces():
 
 
 def add_user_forces(scene: Scene, fields: Fields) -> None:
-    """Give the forces of type user the bodies that the file speaks of, and write the stub."""
+    """Give the forces of type user the bodies that the file uses, and write the stub."""
     forces = [f for f in scene.forces.values() if f.type == KEYWORD]
     source, report = fields.model.user_force, fields.report
     if source is None:
@@ -83,28 +83,28 @@ def add_user_forces(scene: Scene, fields: Fields) -> None:
 
 
 def _bodies_in(text: str, fields: Fields, place: Place) -> dict[str, str]:
-    """Slot -> name of the body, for the bodies that the text speaks of by number."""
-    told = [m[1] for m in _BODY.finditer(_COMMENT.sub("", text))]
-    numbers = sorted({int(w) for w in told if w.isascii() and w.isdigit() and len(w) < 10})
+    """Slot -> name of the body, for the bodies that the text uses by number."""
+    words = [m[1] for m in _BODY.finditer(_COMMENT.sub("", text))]
+    numbers = sorted({int(w) for w in words if w.isascii() and w.isdigit() and len(w) < 10})
     bodies = fields.model.arrays["Bodies"]
     if bodies is not None:
         for k in (k for k in numbers if not 1 <= k <= len(bodies)):
             what = f"Bodies({k}): there is no body {k}; Bodies has {len(bodies)}"
             fields.model.mistakes.append(Mistake("", MISSING, what, file=place.file))
-    is_computed = any(not (w.isascii() and w.isdigit()) for w in told)
+    is_computed = any(not (w.isascii() and w.isdigit()) for w in words)
     if is_computed or not 1 <= len(numbers) <= len(SLOTS):
         what = "by numbers that are worked out" if is_computed else f"{len(numbers)} in number"
-        words = (
+        text = (
             f"it speaks of bodies {what}; a force type has one to three bodies. The stub has the "
             "first ones: write a force type, and an element of it in the scene, for the others"
         )
-        fields.report.unused.append(remark(place, words))
+        fields.report.unused.append(remark(place, text))
     names = [name_of("Bodies", k) for k in (numbers or [1])]
     return dict(zip(SLOTS, names, strict=False))
 
 
 def _stub(text: str, slots: dict[str, str]) -> str:
-    """The text of a ``plugin.py`` whose force is still to be written."""
+    """The text of a ``plugin.py`` with a stub of the force."""
     names = [f"r_{s}, v_{s}" for s in slots]
     pairs = "".join("((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), " for _ in slots).rstrip()
     of = ", ".join(f"body_{s} is {body}" for s, body in slots.items())
