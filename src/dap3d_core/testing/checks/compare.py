@@ -1,6 +1,6 @@
 """Comparison of the values of a kernel with reference values, row by row, at many poses."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import attrs
@@ -27,8 +27,23 @@ class Wrong:
 
     @property
     def error(self) -> float:
-        """By how much."""
+        """Absolute error."""
         return abs(self.is_ - self.should)
+
+    @property
+    def n(self) -> int:
+        """The row, counted from 1."""
+        return self.row + 1
+
+    @property
+    def axis(self) -> str:
+        """The axis of a component of a vector."""
+        return "xyz"[self.index[-1]]
+
+    @property
+    def part(self) -> str:
+        """The part of a wrench."""
+        return "moment" if self.index[0] else "force"
 
 
 @attrs.define
@@ -56,9 +71,10 @@ class Comparison:
         sample: Sample,
         got: Floats,
         want: Any,
-        says: Callable[[Wrong], str],
+        says: str,
         *,
         tolerance: float = EXACT_TOLERANCE,
+        words: Mapping[str, Any] | None = None,
         bound: Any = None,
         scale: float = 0.0,
         rows: Iterable[int] | None = None,
@@ -68,7 +84,7 @@ class Comparison:
         Args:
             sample: the element and its state.
             got, want: (rows, ...) actual and expected values.
-            says: the text of a finding.
+            says: the text of a finding: a format of ``x``, the ``Wrong`` number, and of ``words``.
             tolerance: relative to 1 + the largest number of both.
             bound: (rows, ...) error bound of ``want``, where it is found by differences.
             scale: size of the terms, where the compared numbers are differences of larger ones.
@@ -95,7 +111,8 @@ class Comparison:
             actual, expected = float(got[k][index]), float(want[k][index])
             wrong = Wrong(row, tuple(map(int, index)), actual, expected)
             if error > tolerance and error > self._worst.get((self.kernel, row), (0.0, None))[0]:
-                self._add((self.kernel, row), error, row + 1, says(wrong), sample, wrong.error,
+                self._add((self.kernel, row), error, row + 1, says.format(x=wrong, **words or {}),
+                          sample, wrong.error,
                           tolerance * size)  # fmt: skip
 
     def fail(self, words: str, sample: Sample | None = None, row: int = 0) -> None:

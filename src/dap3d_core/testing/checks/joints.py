@@ -1,7 +1,5 @@
 """Checks of a joint: J, nu and gamma against derivatives, reactions, rank, rigid motions."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from dap3d_core.interface.fields import specs_of
@@ -9,7 +7,6 @@ from dap3d_core.testing.checks.compare import (
     DIFFERENCE_TOLERANCE,
     Comparison,
     Rate,
-    Wrong,
     body_words,
     rates,
 )
@@ -25,6 +22,59 @@ RANK_TOLERANCE = 1e-8
 VANISHING = 1e-3
 
 
+# Texts of findings: formats of the wrong number x and of further words.
+_J = (
+    "row {x.n} of J is wrong by {x.error:.3g} at this pose: {x.is_:.6g} is in column {column} of "
+    "body {letter}, and it should be {x.should:.6g}, the derivative of row {x.n} of C by {by} "
+    "({way})"
+)
+_NU = (
+    "row {x.n} of nu is wrong by {x.error:.3g} at this pose: it is {x.is_:.6g} and should be "
+    "{x.should:.6g}, minus the rate of row {x.n} of C at a fixed pose ({way})"
+)
+_NO_NU = (
+    "nu is missing, and row {x.n} of C depends on time: row {x.n} of nu is zero and should be "
+    "{x.should:.6g}, minus the rate of row {x.n} of C at a fixed pose ({way})"
+)
+_FORM = (
+    "row {x.n} of J and nu is not the form C_dot: C_dot is {x.is_:.6g} at this pose, J v - nu is "
+    "{x.should:.6g}"
+)
+_IS_GAMMA = (
+    "row {x.n} of gamma is wrong by {x.error:.3g} at this pose: it is {x.is_:.6g} and should be "
+    "{x.should:.6g}, "
+)
+_GAMMA = f"{_IS_GAMMA}minus the time derivative of row {{x.n}} of J, times v ({{way}})"
+_GAMMA_NU = (
+    f"{_IS_GAMMA}the time derivative of row {{x.n}} of nu less that of row {{x.n}} of J, times v "
+    "({way})"
+)
+_GAMMA_FORM = (
+    f"{_IS_GAMMA}minus the {{order}} of row {{x.n}} of {{form}} at constant velocities "
+    "(differences)"
+)
+_POWER = (
+    "row {x.n} of J is a reaction that does work: its power is {x.error:.3g} on a unit velocity "
+    "that keeps C as it is, and should be zero"
+)
+_FRAME_C = (
+    "row {x.n} of C notices where ground is: it was zero and is {x.is_:.3g} after a common rigid "
+    "motion of all bodies; a joint between bodies should stay assembled"
+)
+_FRAME_J = (
+    "row {x.n} of J notices where ground is: turned with the bodies, a velocity that was allowed "
+    "is no more so after a common rigid motion (by {x.error:.3g})"
+)
+_FRAME_SIDE = (
+    "row {x.n} of {name} notices where ground is: after a common rigid motion of all bodies it is "
+    "{x.is_:.6g} and should be {x.should:.6g}, as J turned with them has it"
+)
+_BALANCE = (
+    "row {x.n} of J has no reaction: the {what} that it exerts on all bodies together is "
+    "{x.is_:.3g} along {x.axis} and should be zero"
+)
+
+
 def jacobian(subject: SampledType) -> Outcome:
     """J is the derivative of C."""
     c = Comparison("J", subject, "J", "J against dC/dq, by complex step and by differences")
@@ -34,19 +84,12 @@ def jacobian(subject: SampledType) -> Outcome:
         for slot in range(J.shape[0]):
             for column in range(6):
                 for rate in rates(sample, "C", Direction.of(slot, column), c):
-                    says = _about_jacobian(sample, slot, column, rate.way)
-                    c.compare(sample, J[slot, rows, column], rate.value, says,
+                    letter = sample.kernels.examined.layout.slots[slot]
+                    by = body_words(sample, slot, column)
+                    words = dict(column=column + 1, letter=letter, by=by, way=rate.way)
+                    c.compare(sample, J[slot, rows, column], rate.value, _J, words=words,
                               tolerance=rate.tolerance, bound=rate.bound, rows=rows)  # fmt: skip
     return c.outcome()
-
-
-def _about_jacobian(sample: Sample, slot: int, column: int, way: str) -> Callable[[Wrong], str]:
-    by = body_words(sample, slot, column)
-    return lambda x: (
-        f"row {x.row + 1} of J is wrong by {x.error:.3g} at this pose: {x.is_:.6g} is in "
-        f"column {column + 1} of body {by.split()[-3]}, and it should be {x.should:.6g}, the "
-        f"derivative of row {x.row + 1} of C by {by} ({way})"
-    )
 
 
 def velocity_side(subject: SampledType) -> Outcome:
@@ -56,28 +99,10 @@ def velocity_side(subject: SampledType) -> Outcome:
     for sample in poses(subject):
         nu = sample.value("nu")[list(rows)] if is_defined else np.zeros(len(rows))
         for rate in rates(sample, "C", Direction.in_time(), c):
-            c.compare(sample, nu, -rate.value, _about_nu(rate.way, is_defined),
-                      tolerance=rate.tolerance, bound=rate.bound, rows=rows)  # fmt: skip
+            c.compare(sample, nu, -rate.value, _NU if is_defined else _NO_NU,
+                      words={"way": rate.way}, tolerance=rate.tolerance, bound=rate.bound,
+                      rows=rows)  # fmt: skip
     return c.outcome()
-
-
-def _about_nu(way: str, is_defined: bool) -> Callable[[Wrong], str]:
-    def says(x: Wrong) -> str:
-        n = x.row + 1
-        actual = f"nu is missing, and row {n} of C depends on time: row {n} of nu is zero"
-        if is_defined:
-            actual = _is_wrong("nu", x)
-        return _should_be(actual, x, f"minus the rate of row {n} of C at a fixed pose", way)
-
-    return says
-
-
-def _is_wrong(side: str, x: Wrong) -> str:
-    return f"row {x.row + 1} of {side} is wrong by {x.error:.3g} at this pose: it is {x.is_:.6g}"
-
-
-def _should_be(actual: str, x: Wrong, source: str, way: str) -> str:
-    return f"{actual} and should be {x.should:.6g}, {source} ({way})"
 
 
 def velocity_form(subject: SampledType) -> Outcome:
@@ -90,17 +115,9 @@ def velocity_form(subject: SampledType) -> Outcome:
         if "nu" in subject.kernels.names():
             form = form - sample.value("nu")[list(rows)]
         size = float(np.max(np.abs(J)) * np.max(np.abs(v)))
-        c.compare(sample, sample.value("C_dot"), form, _about_form,
+        c.compare(sample, sample.value("C_dot"), form, _FORM,
                   tolerance=1e-12, scale=size, rows=rows)  # fmt: skip
     return c.outcome()
-
-
-def _about_form(x: Wrong) -> str:
-    n = x.row + 1
-    return (
-        f"row {n} of J and nu is not the form C_dot: C_dot is {x.is_:.6g} at this pose, "
-        f"J v - nu is {x.should:.6g}"
-    )
 
 
 def acceleration_side(subject: SampledType) -> Outcome:
@@ -109,7 +126,7 @@ def acceleration_side(subject: SampledType) -> Outcome:
     Rows with a wrong J or nu are compared with C (or C_dot).
     """
     c = Comparison("gamma", subject, "gamma", "gamma against the time derivative of nu - J v")
-    wrong = _rows_apart(subject)
+    wrong, has_nu = _rows_apart(subject), "nu" in subject.kernels.names()
     good = [k for k in range(subject.type.rows) if k not in wrong]
     for row, form in wrong.items():
         c.note(f"row {row + 1} of J or nu is not what {form} says: gamma is compared with {form}")
@@ -117,7 +134,7 @@ def acceleration_side(subject: SampledType) -> Outcome:
         along, gamma, v = sample.state.motion(), sample.value("gamma"), _velocities(sample)
         J_dot = rates(sample, "J", along, c)
         still = [Rate(np.zeros(1), None, r.tolerance, r.way) for r in J_dot]
-        nu_dot = rates(sample, "nu", along, c) if "nu" in subject.kernels.names() else still
+        nu_dot = rates(sample, "nu", along, c) if has_nu else still
         for turning in J_dot:
             pushing = next((r for r in nu_dot if r.way == turning.way), nu_dot[-1])
             terms = np.einsum("srk,sk->r", turning.value, v)
@@ -128,14 +145,16 @@ def acceleration_side(subject: SampledType) -> Outcome:
             tolerance = max(turning.tolerance, pushing.tolerance)
             size = float(np.max(np.abs(turning.value), initial=0.0) * np.max(np.abs(v)))
             c.compare(sample, gamma[good], (pushing.value - terms)[good],
-                      _about_gamma(turning.way, subject), rows=good,
+                      _GAMMA_NU if has_nu else _GAMMA, words={"way": turning.way}, rows=good,
                       tolerance=tolerance, bound=bound, scale=size)  # fmt: skip
         for form, rows in _forms(subject):
             if apart := [k for k in rows if wrong.get(k) == form]:
                 index = [rows.index(k) for k in apart]
                 rate = sample.bend(along) if form == "C" else sample.difference(form, along)
                 value, bound = (x[index] for x in rate)
-                c.compare(sample, gamma[apart], -value, _about_gamma_by(form), rows=apart,
+                order = "second time derivative" if form == "C" else "time derivative"
+                c.compare(sample, gamma[apart], -value, _GAMMA_FORM, rows=apart,
+                          words={"order": order, "form": form},
                           tolerance=DIFFERENCE_TOLERANCE, bound=bound)  # fmt: skip
     return c.outcome()
 
@@ -165,24 +184,6 @@ def _rows_apart(subject: SampledType) -> dict[int, str]:
     return forms
 
 
-def _about_gamma_by(form: str) -> Callable[[Wrong], str]:
-    order = "second time derivative" if form == "C" else "time derivative"
-    return lambda x: _should_be(
-        _is_wrong("gamma", x), x, f"minus the {order} of row {x.row + 1} of {form} at constant "
-        "velocities", "differences")  # fmt: skip
-
-
-def _about_gamma(way: str, subject: SampledType) -> Callable[[Wrong], str]:
-    def says(x: Wrong) -> str:
-        n = x.row + 1
-        source = f"minus the time derivative of row {n} of J, times v"
-        if "nu" in subject.kernels.names():
-            source = f"the time derivative of row {n} of nu less that of row {n} of J, times v"
-        return _should_be(_is_wrong("gamma", x), x, source, way)
-
-    return says
-
-
 def virtual_power(subject: SampledType) -> Outcome:
     """Reactions do no work on velocities that C allows at a fixed time."""
     c = Comparison("virtual power", subject, "J", "reactions J^T lambda do no work where C allows")
@@ -190,16 +191,9 @@ def virtual_power(subject: SampledType) -> Outcome:
     for sample in poses(subject):
         J = sample.value("J")[:, rows].transpose(1, 0, 2).reshape(len(rows), -1)
         allowed = null_space(position_jacobian(sample).reshape(len(rows), -1))
-        c.compare(sample, J @ allowed, 0.0, _about_power, tolerance=1e-6,
+        c.compare(sample, J @ allowed, 0.0, _POWER, tolerance=1e-6,
                   scale=float(np.max(np.abs(J))), rows=rows)  # fmt: skip
     return c.outcome()
-
-
-def _about_power(x: Wrong) -> str:
-    return (
-        f"row {x.row + 1} of J is a reaction that does work: its power is {abs(x.is_):.3g} on a "
-        "unit velocity that keeps C as it is, and should be zero"
-    )
 
 
 def frame(subject: SampledType) -> Outcome:
@@ -212,40 +206,21 @@ def frame(subject: SampledType) -> Outcome:
         moved, R = rigid_motion(sample.state, subject.seed, k)
         if rows:
             c.kernel = "C"
-            c.compare(sample, sample.value("C", moved), 0.0, _about_frame_C, rows=rows)
+            c.compare(sample, sample.value("C", moved), 0.0, _FRAME_C, rows=rows)
         J, J_moved = sample.value("J"), sample.value("J", moved)
         turned, count = np.kron(np.eye(2 * len(J)), R), J.shape[1]
         flat, flat_moved = (x.transpose(1, 0, 2).reshape(count, -1) for x in (J, J_moved))
         c.kernel = "J"
-        c.compare(sample, flat_moved @ turned @ null_space(flat), 0.0, _about_frame_J)
+        c.compare(sample, flat_moved @ turned @ null_space(flat), 0.0, _FRAME_J)
         for name in ("nu", "gamma"):
             if name in subject.kernels.names():
                 c.kernel = name
                 side, side_moved = sample.value(name), sample.value(name, moved)
                 solution = turned @ np.linalg.lstsq(flat, side, rcond=None)[0]
-                c.compare(sample, side_moved, flat_moved @ solution, _about_frame_side(name))
+                c.compare(
+                    sample, side_moved, flat_moved @ solution, _FRAME_SIDE, words={"name": name}
+                )
     return c.outcome()
-
-
-def _about_frame_C(x: Wrong) -> str:
-    return (
-        f"row {x.row + 1} of C notices where ground is: it was zero and is {x.is_:.3g} after a "
-        "common rigid motion of all bodies; a joint between bodies should stay assembled"
-    )
-
-
-def _about_frame_J(x: Wrong) -> str:
-    return (
-        f"row {x.row + 1} of J notices where ground is: turned with the bodies, a velocity that "
-        f"was allowed is no more so after a common rigid motion (by {abs(x.is_):.3g})"
-    )
-
-
-def _about_frame_side(name: str) -> Callable[[Wrong], str]:
-    return lambda x: (
-        f"row {x.row + 1} of {name} notices where ground is: after a common rigid motion of all "
-        f"bodies it is {x.is_:.6g} and should be {x.should:.6g}, as J turned with them has it"
-    )
 
 
 def action_and_reaction(subject: SampledType) -> Outcome:
@@ -261,17 +236,11 @@ def action_and_reaction(subject: SampledType) -> Outcome:
         force = J[:, :, :3].sum(axis=0)
         arms = np.cross(r[: len(J), None, :], J[:, :, :3])
         moment = (J[:, :, 3:] + arms).sum(axis=0)
-        c.compare(sample, force, 0.0, _about_balance("force"))
-        c.compare(sample, moment[list(rows)], 0.0, _about_balance("moment about the origin"),
-                  rows=rows, scale=float(np.max(np.abs(arms))))  # fmt: skip
+        c.compare(sample, force, 0.0, _BALANCE, words={"what": "force"})
+        c.compare(sample, moment[list(rows)], 0.0, _BALANCE,
+                  words={"what": "moment about the origin"}, rows=rows,
+                  scale=float(np.max(np.abs(arms))))  # fmt: skip
     return c.outcome()
-
-
-def _about_balance(what: str) -> Callable[[Wrong], str]:
-    return lambda x: (
-        f"row {x.row + 1} of J has no reaction: the {what} that it exerts on all bodies together "
-        f"is {x.is_:.3g} along {'xyz'[x.index[-1]]} and should be zero"
-    )
 
 
 def assembly(subject: SampledType) -> Outcome:

@@ -11,7 +11,7 @@ import numpy as np
 
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
 from dap3d_core.kernels.runtime.cache import jit_is_on, reached
-from dap3d_core.testing.checks.compare import Comparison, Wrong, left_out
+from dap3d_core.testing.checks.compare import Comparison, left_out
 from dap3d_core.testing.checks.findings import Outcome
 from dap3d_core.testing.samples.sampled_type import Sample, SampledType, UndefinedError
 
@@ -86,6 +86,9 @@ def compiled(subject: SampledType) -> Outcome:
     return c.outcome()
 
 
+_COMPILED = "row {x.n} of {name} is {x.is_:.17g} compiled and {x.should:.17g} in plain Python"
+
+
 def _compare_compiled(c: Comparison, subject: SampledType, kind: str) -> None:
     for sample in subject.samples:
         try:
@@ -102,13 +105,8 @@ def _compare_compiled(c: Comparison, subject: SampledType, kind: str) -> None:
             plain = sample.value(name)
             if name == "J":  # rows first
                 value, plain = value.transpose(1, 0, 2), plain.transpose(1, 0, 2)
-            c.compare(sample, value, plain, _about_compiled(name), tolerance=COMPILED_TOLERANCE)
-
-
-def _about_compiled(name: str) -> Callable[[Wrong], str]:
-    return lambda x: (
-        f"row {x.row + 1} of {name} is {x.is_:.17g} compiled and {x.should:.17g} in plain Python"
-    )
+            c.compare(sample, value, plain, _COMPILED, words={"name": name},
+                      tolerance=COMPILED_TOLERANCE)  # fmt: skip
 
 
 def _has_friction(subject: SampledType) -> bool:
