@@ -1,4 +1,4 @@
-"""The command line: each command calls the library and shows what it says."""
+"""The command line: each command makes one call of the library and presents the result."""
 
 from collections.abc import Sequence
 

@@ -1,30 +1,28 @@
-"""``dap3d check``: validate a model and say what it is; nothing is run."""
+"""``dap3d check``: validates a model and describes it; nothing is run."""
 
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from dap3d_core.cli.app import Command
-from dap3d_core.cli.framework.completion import models as complete_models
-from dap3d_core.cli.process.exit_codes import DONE, REFUSED, Refused
+from dap3d_core.cli.framework.command import command
+from dap3d_core.cli.framework.options import ALLOW_CODE, JSON, MODEL, SETTING_OPTIONS
+from dap3d_core.cli.process.exit_codes import DONE, REFUSED, refusing
 
 if TYPE_CHECKING:
+    from dap3d_core.cli.console.console import Terminal
     from dap3d_core.simulation import CompiledModel
     from dap3d_core.simulation.redundancy.redundancy import Redundancy
 
+#: Violations below this are rounding.
+ROUNDING = 1e-10
 
-@click.command(cls=Command, short_help="Validate a model, count its degrees of freedom.")
-@click.argument("model", shell_complete=complete_models)
-@click.option("--method", metavar="NAME", help="Formulation, in place of the scene's.")
-@click.option(
-    "--correct-metric",
-    type=click.Choice(["unit", "mass"]),
-    help="The least correction is that in m and rad, or weighted by masses.",
+
+@command(
+    "Validate a model, count its degrees of freedom.",
+    MODEL,
+    SETTING_OPTIONS["method"],
+    SETTING_OPTIONS["correct_metric"],
+    ALLOW_CODE,
+    JSON,
 )
-@click.option(
-    "--allow-code", is_flag=True, help="Allow the model's own types (plugin.py in its folder)."
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 def check(
     model: str, *, method: str | None, correct_metric: str | None, allow_code: bool, as_json: bool
 ) -> int:
@@ -33,7 +31,7 @@ def check(
     All mistakes are reported at once, each with file, line, key, what is allowed and the nearest
     right spelling; the exit code is then 2. Nothing is simulated.
 
-    Where constraints are redundant: which joints share a freedom, whether that is so at other
+    Of redundant constraints it says which joints share a freedom, whether they do so at other
     poses, whether the redundant rows agree, and which reactions are unique all the same.
     """
     import dap3d_core as dap
@@ -41,31 +39,25 @@ def check(
     from dap3d_core.cli.console.progress import RunProgress
 
     with RunProgress(quiet=as_json) as progress:
-        try:
+        with refusing(dap.SimulationError):  # a method that does not fit the scene
             compiled = dap.compile(
                 model, method=method, allow_code=allow_code, announce=progress.announce
             )
-        except dap.SimulationError as error:  # a method that does not fit the scene
-            raise Refused(str(error)) from error
         progress.start()
-        found = facts_of(compiled, correct_metric)
+        data = _data(compiled, correct_metric)
     if as_json:
-        print_json(found)
+        print_json(data)
     else:
-        _show(output(), compiled, found)
-    return REFUSED if found["mistakes"] else DONE
+        _show(output(), compiled, data)
+    return REFUSED if data["mistakes"] else DONE
 
 
-def facts_of(compiled: "CompiledModel", metric: str | None = None) -> dict[str, Any]:
-    """The facts of a model: its violation as given, its rank where a run would start.
+def _data(compiled: "CompiledModel", metric: str | None) -> dict[str, Any]:
+    """The model as data: its violation as given, its rank where a run would start.
 
-    A start that cannot be corrected is the one mistake that is found only here.
-
-    Args:
-        compiled: the model.
-        metric: of the correction, in place of the scene's.
+    Initial conditions that cannot be corrected are the one mistake that compiling does not find.
     """
-    from dap3d_core.cli.console.initial_state import start_facts
+    from dap3d_core.cli.console.run_summary import correction_data
     from dap3d_core.simulation import AssemblyError
     from dap3d_core.simulation.explain import types_of
     from dap3d_core.simulation.initial.assemble import violation
@@ -78,7 +70,7 @@ def facts_of(compiled: "CompiledModel", metric: str | None = None) -> dict[str, 
         start = compiled.start(bool(settings.correct), settings.hold, metric)
         u, redundancy = start.u, start.redundancy
         if start.initial is not None and model.row_count:
-            initial = start_facts(model.body_names, model.u0, u)
+            initial = correction_data(model.body_names, model.u0, u)
     except AssemblyError as error:
         mistakes.append({"key": "joints", "what": str(error)})
         redundancy = compiled.redundancy()
@@ -93,7 +85,7 @@ def facts_of(compiled: "CompiledModel", metric: str | None = None) -> dict[str, 
         "dof": rank.dof,
         "joints": list(redundancy.joints),
         "contradiction": redundancy.contradiction,
-        **_redundancy_facts(compiled, u, redundancy, assembled=not mistakes),
+        **_redundancy_data(compiled, u, redundancy, assembled=not mistakes),
         "violation": {"position": position, "velocity": velocity},
         "initial": initial,
         "method": compiled.method,
@@ -106,7 +98,7 @@ def facts_of(compiled: "CompiledModel", metric: str | None = None) -> dict[str, 
     }
 
 
-def _redundancy_facts(
+def _redundancy_data(
     compiled: "CompiledModel", u: Any, redundancy: "Redundancy", *, assembled: bool
 ) -> dict[str, Any]:
     """Groups, other poses, contradictions, reactions; ``about`` has the same in sentences."""
@@ -117,10 +109,10 @@ def _redundancy_facts(
     rank, elsewhere = redundancy.rank, Elsewhere((), None, None)
     about: list[str] = []
     if rank.redundant:
+        about.append(redundancy.describe_groups())
         if assembled:
             elsewhere = redundancy_elsewhere(compiled.machine, u, redundancy)
             about.append(elsewhere.describe(redundancy))
-        about.insert(0, redundancy.describe_groups())
         about += redundancy.describe_contradictions()
         if redundancy.singular:
             about.append(redundancy.singular.describe())
@@ -141,36 +133,41 @@ def _redundancy_facts(
     }
 
 
-def _show(console: Any, compiled: "CompiledModel", found: dict[str, Any]) -> None:
-    from dap3d_core.cli.console.console import count, facts, say, title
-    from dap3d_core.cli.console.initial_state import show_start
-    from dap3d_core.cli.console.run_summary import show_notes
+def _show(console: "Terminal", compiled: "CompiledModel", data: dict[str, Any]) -> None:
+    from dap3d_core.cli.console.console import (
+        count,
+        facts,
+        say,
+        scene_name,
+        section,
+        some,
+        title,
+    )
+    from dap3d_core.cli.console.run_summary import degrees_of_freedom, show_correction
 
-    title(console, found["scene"] or "scene without a name")
-    bodies = count(found["bodies"], "body", "bodies")
-    names = compiled.model.body_names
-    some = ", ".join(names[:8]) + (f" and {len(names) - 8} more" if len(names) > 8 else "")
-    violation = found["violation"]
+    title(console, scene_name(data["scene"]))
+    names = some(compiled.model.body_names, 8)
     facts(
         console,
         [
-            ("bodies", f"{bodies}: {some}"),
-            ("joints", _listed(found["joint_types"])),
-            ("forces", _listed(found["force_types"])),
-            ("functions", _listed(found["function_types"])),
-            ("freedoms", _freedoms(found)),
-            ("violation", _violation(violation, compiled) if found["rows"] else ""),
-            ("method", f"{found['method']}: {found['reason']}"),
+            ("bodies", f"{count(data['bodies'], 'body', 'bodies')}: {names}"),
+            ("joints", _listed(data["joint_types"])),
+            ("forces", _listed(data["force_types"])),
+            ("functions", _listed(data["function_types"])),
+            ("freedoms", f"{count(data['rows'], 'row')}, rank {data['rank']}; "
+                         f"{degrees_of_freedom(data['dof'])}"),
+            ("violation", _violation(data["violation"], compiled) if data["rows"] else ""),
+            ("method", f"{data['method']}: {data['reason']}"),
         ],
-    )
-    if found["redundant"]:
-        _show_redundancy(console, found)
-    if found["initial"] and found["initial"]["changed"]:
-        show_start(console, found["initial"])
-    show_notes(console, found["notes"])
-    for mistake in found["mistakes"]:
+    )  # fmt: skip
+    if data["redundant"]:
+        _show_redundancy(console, data)
+    if data["initial"] and data["initial"]["changed"]:
+        show_correction(console, data["initial"])
+    section(console, "notes", data["notes"])
+    for mistake in data["mistakes"]:
         say(console, mistake["what"], "bold red")
-    if not found["mistakes"]:
+    if not data["mistakes"]:
         say(console, "no mistakes found", "green")
 
 
@@ -179,36 +176,25 @@ def _listed(types: dict[str, int]) -> str:
 
 
 def _violation(violation: dict[str, float], compiled: "CompiledModel") -> str:
-    words = f"position {violation['position']:.2g}, velocity {violation['velocity']:.2g}"
-    if max(violation.values()) < 1e-10:
-        return words
-    settings = compiled.scene.simulation
-    remedy = "a run corrects it" if settings.correct else "correct is off: a run would start so"
-    return f"{words}; {remedy}"
+    text = f"position {violation['position']:.2g}, velocity {violation['velocity']:.2g}"
+    if max(violation.values()) < ROUNDING:
+        return text
+    corrects = compiled.scene.simulation.correct
+    return f"{text}; {'a run corrects it' if corrects else 'correct is off: a run starts with it'}"
 
 
-def _freedoms(found: dict[str, Any]) -> str:
-    from dap3d_core.cli.console.console import count
+def _show_redundancy(console: "Terminal", data: dict[str, Any]) -> None:
+    from dap3d_core.cli.console.console import items, say, section
 
-    words = f"{count(found['rows'], 'row')}, rank {found['rank']}"
-    return f"{words}; {count(found['dof'], 'degree')} of freedom".replace("no degrees", "0 degrees")
-
-
-def _show_redundancy(console: Any, found: dict[str, Any]) -> None:
-    from dap3d_core.cli.console.console import items, say, title
-
-    words = (
-        f"redundant constraints: {found['redundant']} of {found['rows']} rows say what others say"
-    )
-    say(console, words, "yellow")
-    said = list(found["about"])
-    if found["contradictions"]:
-        said.append("No motion satisfies rows that contradict each other")
-    elif found["method"] == "standard":
-        said.append(
-            "The standard method refuses to run: replace a joint by one with fewer rows, or take "
+    text = f"redundant constraints: {data['redundant']} of {data['rows']} rows repeat other rows"
+    say(console, text, "yellow")
+    about = list(data["about"])
+    if data["contradictions"]:
+        about.append("No motion satisfies rows that contradict each other")
+    elif data["method"] == "standard":
+        about.append(
+            "The standard method refuses to run: replace a joint by one with fewer rows, or use "
             "--method lsq"
         )
-    items(console, said)
-    title(console, "reactions (accelerations are unique)")
-    items(console, found["about_reactions"])
+    items(console, about)
+    section(console, "reactions (accelerations are unique)", data["about_reactions"])

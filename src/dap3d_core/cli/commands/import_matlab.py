@@ -1,19 +1,22 @@
-"""``dap3d import-matlab``: a scene from the files of a model of the MATLAB program DAP3D."""
+"""``dap3d import-matlab``: a scene made of a model of the MATLAB program."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.app import Command
+from dap3d_core.cli.framework.command import command
+from dap3d_core.cli.framework.options import FORCE, JSON
+from dap3d_core.cli.framework.options import output as output_option
 from dap3d_core.cli.process.exit_codes import DONE
 
 if TYPE_CHECKING:
+    from dap3d_core.cli.console.console import Terminal
     from dap3d_core.matlab import ImportReport
     from dap3d_core.scene import Scene
 
-#: Arrays of a scene, and what one member is, in words.
-HELD = (
+#: Tables of a scene, with the nouns of their entries.
+TABLES = (
     ("bodies", "body", "bodies"),
     ("points", "point", "points"),
     ("vectors", "vector", "vectors"),
@@ -24,23 +27,17 @@ HELD = (
 )
 
 
-@click.command(
-    "import-matlab", cls=Command, saves=True, short_help="Make a scene of a MATLAB model."
-)
-@click.argument("folder")
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE",
-    default="scene.toml",
-    show_default=True,
-    help="The scene file to write, or an existing folder for its scene.toml.",
-)
-@click.option("--force", is_flag=True, help="Overwrite what exists.")
-@click.option(
-    "--stub", is_flag=True, help="Write a plugin.py for user_force.m too, to be filled in."
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+@command(
+    "Make a scene of a MATLAB model.",
+    click.argument("folder"),
+    output_option("The scene file to write, or an existing folder for its scene.toml.",
+                  default="scene.toml", show_default=True),
+    FORCE,
+    click.option("--stub", is_flag=True,
+                 help="Write a plugin.py for user_force.m too, to be filled in."),
+    JSON,
+    saves=True,
+)  # fmt: skip
 def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json: bool) -> int:
     """Make a scene of a model of the MATLAB program DAP3D.
 
@@ -55,14 +52,16 @@ def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json:
     import dap3d_core as dap
     from dap3d_core.cli.console.console import output as console
     from dap3d_core.cli.console.console import print_json
-    from dap3d_core.cli.framework.paths import write_text
+    from dap3d_core.cli.framework.paths import writable, write_text
 
     scene, report = dap.import_matlab(folder)
     sources = tuple(Path(folder) / f.name for f in report.files)
-    target = _target(output, force=force, sources=sources)
+    path = Path(output)
+    path = path / "scene.toml" if path.is_dir() else path
+    target = writable(path, force=force, sources=sources)
     plugin = None
     if stub and report.stub:
-        plugin = _target(str(target.parent / "plugin.py"), force=force, sources=sources)
+        plugin = writable(target.parent / "plugin.py", force=force, sources=sources)
     scene.save(target)
     if plugin is not None:
         write_text(plugin, report.stub)
@@ -73,15 +72,6 @@ def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json:
     return DONE
 
 
-def _target(output: str, *, force: bool, sources: tuple[Path, ...]) -> Path:
-    """The file to write; refused where it may not be written."""
-    from dap3d_core.cli.framework.paths import writable
-
-    path = Path(output)
-    path = path / "scene.toml" if path.is_dir() else path
-    return writable(path, force=force, sources=sources)
-
-
 def _data(
     scene: "Scene", report: "ImportReport", target: Path, plugin: Path | None
 ) -> dict[str, Any]:
@@ -90,13 +80,13 @@ def _data(
     return {
         "scene": target,
         "plugin": plugin,
-        "holds": {table: len(getattr(scene, table)) for table, _, _ in HELD},
+        "holds": {table: len(getattr(scene, table)) for table, _, _ in TABLES},
         **attrs.asdict(report),
     }
 
 
 def _show(
-    console: Any,
+    console: "Terminal",
     scene: "Scene",
     report: "ImportReport",
     target: Path,
@@ -104,34 +94,28 @@ def _show(
     *,
     stub: bool,
 ) -> None:
-    from dap3d_core.cli.console.console import count, facts, items, say, show, table, title
-    from dap3d_core.cli.console.run_summary import show_notes
+    from dap3d_core.cli.console.console import count, facts, say, section, show, table, title
 
     title(console, f"MATLAB model {scene.name}")
     rows = [(f.name, f.state, f.holds) for f in report.files]
     show(console, table(("file", "was", "holds"), rows, fixed=(0, 1)))
-    for heading, remarks in (
-        ("defaulted (the files leave it out)", report.defaulted),
-        ("changed", report.changed),
-        ("left out", report.unused),
-    ):
-        if remarks:
-            title(console, heading)
-            items(console, [str(r) for r in remarks])
-    show_notes(console, report.notes)
+    section(console, "defaulted (the files leave it out)", [str(r) for r in report.defaulted])
+    section(console, "changed", [str(r) for r in report.changed])
+    section(console, "left out", [str(r) for r in report.unused])
+    section(console, "notes", report.notes)
     if report.user_force:
         _show_user_force(console, report, plugin)
-    held = [count(len(getattr(scene, t)), one, many) for t, one, many in HELD if getattr(scene, t)]
-    pairs = [("scene", f"{target}: {', '.join(held)}"), ("plugin", str(plugin or ""))]
-    facts(console, pairs)
+    sizes = ((len(getattr(scene, name)), one, many) for name, one, many in TABLES)
+    holds = ", ".join(count(number, one, many) for number, one, many in sizes if number)
+    facts(console, [("scene", f"{target}: {holds}"), ("plugin", str(plugin or ""))])
     if stub and not report.stub:
         say(console, "No force is of type user: there is no plugin to fill in.")
     code = " --allow-code" if report.user_force else ""
-    say(console, "A MATLAB model says nothing of the time. Simulate it with:")
+    say(console, "A MATLAB model does not say how long to simulate. Simulate it with:")
     say(console, f"dap3d run {target} --t-end 2 --dt 0.02{code}", indent=4, whole=True)
 
 
-def _show_user_force(console: Any, report: "ImportReport", plugin: Path | None) -> None:
+def _show_user_force(console: "Terminal", report: "ImportReport", plugin: Path | None) -> None:
     from dap3d_core.cli.console.console import say, title
 
     title(console, "user_force.m (not translated)")
@@ -139,5 +123,5 @@ def _show_user_force(console: Any, report: "ImportReport", plugin: Path | None) 
     if plugin is not None:
         say(console, f"Write its law into {plugin}; until then a run is refused.", "yellow")
         return
-    title(console, "plugin.py, to be filled in (--stub writes it beside the scene)")
+    title(console, "plugin.py, to be filled in (--stub writes it next to the scene)")
     say(console, report.stub.strip("\n"), indent=4, whole=True)

@@ -1,89 +1,80 @@
-"""``dap3d info``: what a result file holds."""
+"""``dap3d info``: the contents of a result file."""
 
 from pathlib import Path
 
-import click
-
-from dap3d_core.cli.app import Command
-from dap3d_core.cli.framework.completion import results as complete_results
-from dap3d_core.cli.process.exit_codes import DONE, Refused
+from dap3d_core.cli.framework.command import command
+from dap3d_core.cli.framework.options import JSON, RESULT
+from dap3d_core.cli.process.exit_codes import DONE, refusing
 
 
-@click.command(cls=Command, short_help="Say what a result file holds.")
-@click.argument("result", shell_complete=complete_results)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+@command("Describe a result file.", RESULT, JSON)
 def info(result: str, *, as_json: bool) -> int:
-    """Say what a RESULT file, or that of a sweep, holds and how it went."""
+    """Describe a RESULT file, or that of a sweep: its contents, and how the run ended."""
     from dap3d_core.study.sweep.dataset import is_sweep
 
-    return _of_sweep(result, as_json=as_json) if is_sweep(result) else _of_run(result, as_json)
-
-
-def _of_sweep(file: str, *, as_json: bool) -> int:
-    """Tell of the points of a sweep."""
-    import dap3d_core as dap
-    from dap3d_core.cli.console.console import output, print_json, size
-    from dap3d_core.cli.console.sweep_tables import show_failing, show_sweep, sweep_facts
-    from dap3d_core.result import ResultError
-
-    try:
-        with dap.open_sweep(file) as dataset:
-            found = sweep_facts(dataset)
-            text = dataset.attrs["scene"]
-    except ResultError as error:
-        raise Refused(str(error)) from error
-    byte_count = Path(file).stat().st_size
-    if as_json:
-        print_json({"file": file, "size_bytes": byte_count, **found, "scene_text": text})
-        return DONE
-    show_sweep(output(), found, f"{file}, {size(byte_count)}")
-    show_failing(output(), found, "--json has them")
+    show = _show_sweep if is_sweep(result) else _show_run
+    show(result, as_json)
     return DONE
 
 
-def _of_run(result: str, as_json: bool) -> int:
-    """Tell of the run that made a result."""
-    from dap3d_core.cli.console.console import facts, output, print_json, size, title
-    from dap3d_core.cli.console.run_facts import facts_of
-    from dap3d_core.cli.console.run_summary import run_pairs, show_events, show_ledger, show_remarks
+def _show_sweep(file: str, as_json: bool) -> None:
+    import dap3d_core as dap
+    from dap3d_core.cli.console.console import output, print_json, size
+    from dap3d_core.cli.console.sweep_tables import show_failing, show_sweep, sweep_data
+    from dap3d_core.result import ResultError
+
+    with refusing(ResultError), dap.open_sweep(file) as dataset:
+        data = sweep_data(dataset)
+        text = dataset.attrs["scene"]
+    byte_count = Path(file).stat().st_size
+    if as_json:
+        print_json({"file": file, "size_bytes": byte_count, **data, "scene_text": text})
+        return
+    show_sweep(output(), data, f"{file}, {size(byte_count)}")
+    show_failing(output(), data, "--json has them")
+
+
+def _show_run(file: str, as_json: bool) -> None:
+    from dap3d_core.cli.console.console import (
+        facts,
+        output,
+        print_json,
+        scene_name,
+        size,
+        some,
+        title,
+    )
+    from dap3d_core.cli.console.run_summary import run_data, run_pairs, show_details
     from dap3d_core.cli.framework.paths import open_result
 
-    opened = open_result(result)
-    found = {"file": result, "size_bytes": Path(result).stat().st_size, **facts_of(opened)}
-    subject = opened.subject
+    result = open_result(file)
+    data, byte_count = run_data(result), Path(file).stat().st_size
+    subject = result.subject
     names = {
         "body_names": subject.body_names,
         "joint_names": subject.joint_names,
         "point_names": subject.point_names,
     }
     if as_json:
-        print_json({**found, **names, "scene_text": opened.scene_text})
-        return DONE
+        about = {"file": file, "size_bytes": byte_count}
+        print_json({**about, **data, **names, "scene_text": result.scene_text})
+        return
     console = output()
-    versions = ", ".join(f"{name} {number}" for name, number in opened.versions.items())
-    settings = ", ".join(f"{k} {_short(v)}" for k, v in opened.settings.items() if v is not None)
-    title(console, f"{found['scene'] or 'scene without a name'}: {found['status']}")
+    settings = (f"{k} {_short(v)}" for k, v in result.settings.items() if v is not None)
+    title(console, f"{scene_name(data['scene'])}: {data['status']}")
     facts(
         console,
         [
-            ("file", f"{result}, {size(found['size_bytes'])}"),
-            ("bodies", _some(subject.body_names)),
-            ("joints", _some(subject.joint_names)),
-            ("points", _some(subject.point_names)),
-            *run_pairs(found),
-            ("settings", settings),
-            ("made with", versions),
+            ("file", f"{file}, {size(byte_count)}"),
+            ("bodies", some(subject.body_names, 12)),
+            ("joints", some(subject.joint_names, 12)),
+            ("points", some(subject.point_names, 12)),
+            *run_pairs(data),
+            ("settings", ", ".join(settings)),
+            ("made with", ", ".join(f"{name} {v}" for name, v in result.versions.items())),
         ],
     )
-    show_events(console, found)
-    show_ledger(console, found)
-    show_remarks(console, found)
-    return DONE
-
-
-def _some(names: tuple[str, ...], most: int = 12) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+    show_details(console, data)
 
 
 def _short(value: object) -> str:

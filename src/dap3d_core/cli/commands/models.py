@@ -1,68 +1,55 @@
-"""``dap3d models``: the models that come with it."""
+"""``dap3d models``: the shipped models."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
-import click
-
-from dap3d_core.cli.app import Command
+from dap3d_core.cli.framework.command import command
+from dap3d_core.cli.framework.options import JSON
 from dap3d_core.cli.process.exit_codes import DONE
 
 
-@click.command(cls=Command, short_help="List the shipped models.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+@command("List the shipped models.", JSON)
 def models(*, as_json: bool) -> int:
     """List the shipped models."""
     from dap3d_core.cli.console.console import output, print_json, say, show, table, title
     from dap3d_core.scene import shipped_models
 
-    found = {name: _facts(folder) for name, folder in shipped_models().items()}
+    data = {name: _data(folder) for name, folder in shipped_models().items()}
     if as_json:
-        print_json({"models": found})
+        print_json({"models": data})
         return DONE
     console = output()
-    for group in dict.fromkeys(f["group"] for f in found.values()):
+    for group in dict.fromkeys(model["group"] for model in data.values()):
         rows = [
-            (name, str(f["bodies"]), ", ".join(f["joints"]) or "-", f["description"])
-            for name, f in found.items()
-            if f["group"] == group
+            (name, str(m["bodies"]), ", ".join(m["joints"]) or "-", m["description"])
+            for name, m in data.items()
+            if m["group"] == group
         ]
         if group:
             title(console, group)
         columns = ("model", "bodies", "joints", "what it is")
         show(console, table(columns, rows, right=(1,), fixed=(0,)))
-    if any(f["own_types"] for f in found.values()):
-        own = ", ".join(name for name, f in found.items() if f["own_types"])
-        say(console, f"With a type of its own, to be run with --allow-code: {own}")
+    if own := [name for name, model in data.items() if model["own_types"]]:
+        say(console, f"With a type of its own, to be run with --allow-code: {', '.join(own)}")
     return DONE
 
 
-def _facts(folder: Path) -> dict[str, Any]:
-    """Description, bodies and joints of a model; only its scene file is read."""
+def _data(folder: Path) -> dict[str, Any]:
+    """A model as data; only its scene file is read."""
     from dap3d_core.scene import SceneError, load
     from dap3d_core.scene.files.read_toml import group_of
     from dap3d_core.scene.scene import PLUGIN_FILE
 
-    group = group_of(folder)
+    data = {"group": group_of(folder), "folder": folder}
     try:
         scene = load(folder)
     except SceneError as error:
-        return {
-            "group": group,
-            "description": str(error),
-            "bodies": 0,
-            "joints": {},
-            "own_types": False,
-            "folder": folder,
-        }
-    joints: dict[str, int] = {}
-    for joint in scene.joints.values():
-        joints[str(joint.type)] = joints.get(str(joint.type), 0) + 1
-    return {
-        "group": group,
+        empty = {"description": str(error), "bodies": 0, "joints": {}, "own_types": False}
+        return data | empty
+    return data | {
         "description": str(scene.description),
         "bodies": len(scene.bodies),
-        "joints": joints,
+        "joints": dict(Counter(str(joint.type) for joint in scene.joints.values())),
         "own_types": (folder / PLUGIN_FILE).is_file(),
-        "folder": folder,
     }

@@ -1,4 +1,4 @@
-"""``dap3d new-plugin``: a package with a type of its own, ready to be installed and changed."""
+"""``dap3d new-plugin``: writes a package with a type, ready to be installed and changed."""
 
 import importlib.util
 import json
@@ -9,33 +9,35 @@ from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import Any
 
 import click
 
-from dap3d_core.cli.app import Command
+from dap3d_core.cli.framework.command import command
+from dap3d_core.cli.framework.options import JSON
+from dap3d_core.cli.framework.options import output as output_option
 from dap3d_core.cli.process.exit_codes import DONE, Refused
 
-#: What a keyword may be, so that a distribution and a module can be named after it.
+#: Keywords after which a distribution and a module can be named.
 KEYWORD = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?", re.ASCII)
 LONGEST = 60
-#: Names that the modules import: a class of such a name gets that of its kind behind it.
+#: Names that the modules import: a class of such a name is named after its kind too.
 IMPORTED = ("Force", "Function", "Joint", "Point", "Vector")
 #: Modules of dap3d itself.
 OWN = "dap3d_core"
 
 
-@click.command(
-    "new-plugin", cls=Command, saves=True, short_help="Write a package with a type of its own."
-)
-@click.argument("name")
-@click.option("--kind", type=click.Choice(("joint", "force", "function")), default="joint",
-              show_default=True, help="What the type is.")  # fmt: skip
-@click.option("-o", "--output", metavar="FOLDER", help="Where to write; by default dap3d-NAME.")
-@click.option("--author", metavar="WORDS", help="Who wrote it, for pyproject.toml.")
-@click.option("--force", is_flag=True,
-              help="Write among what a folder holds; take a keyword that is taken.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+@command(
+    "Write a package with a type of its own.",
+    click.argument("name"),
+    click.option("--kind", type=click.Choice(("joint", "force", "function")), default="joint",
+                 show_default=True, help="Kind of the type."),
+    output_option("Where to write; by default dap3d-NAME.", metavar="FOLDER"),
+    click.option("--author", metavar="WORDS", help="Author, for pyproject.toml."),
+    click.option("--force", is_flag=True,
+                 help="Write into a folder that is not empty; use a keyword that is taken."),
+    JSON,
+    saves=True,
+)  # fmt: skip
 def new_plugin(
     name: str, *, kind: str, output: str | None, author: str | None, force: bool, as_json: bool
 ) -> int:
@@ -54,52 +56,51 @@ def new_plugin(
     folder = _folder(output or names["distribution"], force=force)
     texts = _texts(names)
     _write(folder, texts)
-    then = [f"cd {shlex.quote(str(folder))}", 'pip install -e ".[test]"',
-            f"dap3d check-plugin {name}", "dap3d run scene.toml", "pytest"]  # fmt: skip
+    commands = [f"cd {shlex.quote(str(folder))}", 'pip install -e ".[test]"',
+                f"dap3d check-plugin {name}", "dap3d run scene.toml", "pytest"]  # fmt: skip
     if as_json:
         print_json({"keyword": name, "kind": kind, "folder": folder, "files": list(texts),
-                    "module": names["module"], "next": then})  # fmt: skip
+                    "module": names["module"], "next": commands})  # fmt: skip
         return DONE
-    out = console()
-    say(out, f"{folder} holds a package with the {kind} type {name}:")
-    for file in texts:
-        say(out, file, indent=4, whole=True)
-    say(out, "What comes next:")
-    for command in then:
-        say(out, command, indent=4, whole=True)
+    lists = {
+        f"{folder} holds a package with the {kind} type {name}:": texts,
+        "What comes next:": commands,
+    }
+    for heading, lines in lists.items():
+        say(console(), heading)
+        for line in lines:
+            say(console(), line, indent=4, whole=True)
     return DONE
 
 
 def _names(name: str, kind: str, author: str | None) -> dict[str, str]:
-    """What the package, its module and its class are called."""
+    """Names of the package, its module and its class."""
     if not KEYWORD.fullmatch(name) or len(name) > LONGEST:
         raise Refused(
-            f"{name!r} is no keyword for a type; take letters, digits, and - _ . between them, "
+            f"{name!r} is no keyword for a type; use letters, digits, and - _ . between them, "
             f"{LONGEST} at most"
         )
     if author and not author.isprintable():
-        raise Refused(f"{author!r} is no name of an author; take one line of text")
+        raise Refused(f"{author!r} is no name of an author; use one line of text")
     words = re.split(r"[-_.]+", name)
     class_name = "".join(w[0].upper() + w[1:] for w in words)
     if class_name in IMPORTED or python.iskeyword(class_name):
         class_name += kind.capitalize()
     if class_name[0].isdigit():
         class_name = kind.capitalize() + class_name
+    quoted = json.dumps(author, ensure_ascii=False)  # a string of JSON is one of TOML
     return {
         "keyword": name,
         "kind": kind,
         "distribution": "dap3d-" + "-".join(words).lower(),
         "module": "dap3d_" + "_".join(words).lower(),
         "class_name": class_name,
-        # a string of JSON is one of TOML
-        "authors": f"authors = [{{ name = {json.dumps(author, ensure_ascii=False)} }}]\n"
-        if author
-        else "",
+        "authors": f"authors = [{{ name = {quoted} }}]\n" if author else "",
     }
 
 
 def _check_free(names: dict[str, str], *, force: bool) -> None:
-    """Refuse a keyword that a scene could not tell from another type's, or a module that is there.
+    """Refuse an ambiguous keyword, and a module that exists.
 
     The same keyword for another kind is allowed: scenes have them in different tables. The modules
     of dap3d itself are never replaced.
@@ -107,28 +108,31 @@ def _check_free(names: dict[str, str], *, force: bool) -> None:
     import dap3d_core as dap
 
     sources, module = dap.load_registry().sources, names["module"]
-    everywhere = [s for found in sources.values() for s in found]
-    own = {OWN} | {s.module.partition(".")[0] for s in everywhere if s.distribution == "dap3d"}
+    own = {OWN} | {
+        source.module.partition(".")[0]
+        for each in sources.values()
+        for source in each
+        if source.distribution == "dap3d"
+    }
     if module in own:
-        raise Refused(f"the module {module} would stand in the way of dap3d's own; take another "
-                      "name")  # fmt: skip
+        raise Refused(f"the module {module} would hide dap3d's own; use another name")
     if force:
         return
-    key = (names["kind"], names["keyword"])
-    if rivals := sources.get(key):
+    kind, keyword = names["kind"], names["keyword"]
+    if rivals := sources.get((kind, keyword)):
         raise Refused(
-            f"there is a {key[0]} type {key[1]!r} already, from {rivals[0]}: with both installed "
-            "no scene could use either. Take another name, or --force if one of them is to go"
+            f"there is a {kind} type {keyword!r} already, from {rivals[0]}: with both installed no "
+            "scene could use either. Use another name, or --force if one of them will be removed"
         )
     if importlib.util.find_spec(module) is not None:
         raise Refused(
-            f"there is a module {module} already, which is installed; take another name, or "
-            "--force if it is to go"
+            f"a module {module} is installed already; use another name, or --force if it will be "
+            "removed"
         )
 
 
 def _folder(output: str, *, force: bool) -> Path:
-    """The folder to write into; refused where it holds something already."""
+    """The folder to write into; refused if it is not empty."""
     folder = Path(output)
     try:
         if folder.exists() and not folder.is_dir():
@@ -145,14 +149,12 @@ def _folder(output: str, *, force: bool) -> Path:
 def _texts(names: dict[str, str]) -> dict[str, str]:
     """The files of the package, by their paths in it."""
     kind, module = names["kind"], names["module"]
+    values = names | dict(line.split(" = ", 1) for line in _template(kind, "about").splitlines())
     bound = ".".join(version("dap3d").split(".")[:2])
-    about = dict(line.split(" = ", 1) for line in _template(kind, "about").splitlines())
-    values: dict[str, Any] = names | about
-    values["dependency"] = Template(about["dependency"]).substitute(bound=bound)
-    derives = "derive" in values["dependency"]
+    values["dependency"] = Template(values["dependency"]).substitute(bound=bound)
     values["about_dependencies"] = (
         '# What the type leaves out is derived when it is first used; "derive" brings sympy for it.'
-        if derives
+        if "derive" in values["dependency"]
         else "# Where formulas are left out, to be derived, this is dap3d[derive]."
     )
     places = {

@@ -8,56 +8,49 @@ from typing import Any
 
 import click
 
-from dap3d_core.cli.app import Command
-from dap3d_core.cli.framework.completion import quantities as complete_quantities
-from dap3d_core.cli.framework.completion import results as complete_results
-from dap3d_core.cli.framework.options import ALLOW_CODE, JSON, QUIET
-from dap3d_core.cli.process.exit_codes import DONE, Refused
+from dap3d_core.cli.framework import completion
+from dap3d_core.cli.framework.command import command
+from dap3d_core.cli.framework.options import (
+    ALLOW_CODE,
+    FORCE,
+    JSON,
+    MODEL_OF_RESULT,
+    QUIET,
+    RESULT,
+    output,
+)
+from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 
 ENERGIES = ("energy.kinetic", "energy.potential", "energy.total")
 MM_PER_INCH = 25.4
-#: Ending of result files, by which a word is told from a quantity.
-ENDING = ".nc"
+#: Suffix that distinguishes results from quantities.
+SUFFIX = ".nc"
 
 
-@click.command(cls=Command, saves=True, short_help="Draw curves of results, maps of sweeps.")
-@click.argument("result", shell_complete=complete_results)
-@click.argument(
-    "quantities", metavar="[RESULT | QUANTITY]...", nargs=-1, shell_complete=complete_quantities
-)
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(),
-    metavar="FILE",
-    help="Picture: .png, .svg or .pdf; RESULT.png by default.",
-)
-@click.option(
-    "--x",
-    metavar="QUANTITY",
-    shell_complete=complete_quantities,
-    help="What the curves are drawn over; time by default. Of a sweep a number or an output.",
-)
-@click.option(
-    "--at",
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="Of a sweep: only the points nearest to this value of a number; may be given several "
-    "times.",
-)
-@click.option("--show", is_flag=True, help="Open a window; writes a file only with -o.")
-@click.option(
-    "--width",
-    type=float,
-    metavar="MM",
-    help="Width of the picture in mm; 97 by default, good down to 60.",
-)
-@click.option("--height", type=float, metavar="MM", help="Height in mm; what fits by default.")
-@click.option("--force", is_flag=True, help="Overwrite an existing picture.")
-@click.option("--model", metavar="MODEL", help="The model whose own types (plugin.py) were used.")
-@ALLOW_CODE
-@JSON
-@QUIET
+@command(
+    "Draw curves of results, maps of sweeps.",
+    RESULT,
+    click.argument("quantities", metavar="[RESULT | QUANTITY]...", nargs=-1,
+                   shell_complete=completion.quantities),
+    output("Picture: .png, .svg or .pdf; RESULT.png by default."),
+    click.option("--x", metavar="QUANTITY", shell_complete=completion.quantities,
+                 help="Abscissa of the curves; time by default. Of a sweep a parameter or an "
+                      "output."),
+    click.option("--at", metavar="NAME=VALUE", multiple=True,
+                 help="Of a sweep: only the points nearest to this value of a parameter; may be "
+                      "given several times."),
+    click.option("--show", is_flag=True, help="Open a window; writes a file only with -o."),
+    click.option("--width", type=float, metavar="MM",
+                 help="Width of the picture in mm; 97 by default, good down to 60."),
+    click.option("--height", type=float, metavar="MM",
+                 help="Height in mm; what fits by default."),
+    FORCE,
+    MODEL_OF_RESULT,
+    ALLOW_CODE,
+    JSON,
+    QUIET,
+    saves=True,
+)  # fmt: skip
 def plot(
     result: str,
     quantities: tuple[str, ...],
@@ -105,41 +98,47 @@ def plot(
     dap3d plot pen1-sweep.nc --at bodies.cone.mass=2
     dap3d plot pen1-sweep.nc cone.r.z:max --x bodies.cone.mass
     """
-    files = [result, *(word for word in quantities if word.endswith(ENDING))]
-    names = tuple(w for w in quantities if not w.endswith(ENDING))
-    shown, names, cuts = _opened(files, names, x, at, types)
+    files = [result, *(word for word in quantities if word.endswith(SUFFIX))]
+    names = tuple(word for word in quantities if not word.endswith(SUFFIX))
+    data, names, cuts = _open(files, names, x, at, types)
     target = None if show and output is None else Path(output or Path(result).stem + ".png")
-    over: dict[str, Any] = {"x": x, "at": cuts}
-    size = _inches(width), _inches(height)
-    _check(shown, names, target, over, {"--width": size[0], "--height": size[1]}, files, force)
-    _draw(shown, names, target, over, show, size, force)
+    axes: dict[str, Any] = {"x": x, "at": cuts}
+    size = {"width": _inches(width), "height": _inches(height)}
+    _check(data, names, target, axes, size, files, force)
+    _draw(data, names, target, show, force, **axes, **size)
     if target is not None:
-        along = over if hasattr(shown, "data_vars") else {"x": x or "t"}
-        _tell({"file": str(target), "results": files, "quantities": names} | along, as_json, quiet)
+        drawn = axes if _is_sweep(data) else {"x": x or "t"}
+        about = {"file": str(target), "results": files, "quantities": names} | drawn
+        _report(about, as_json=as_json, quiet=quiet)
     return DONE
 
 
-def _tell(found: dict[str, Any], as_json: bool, quiet: bool) -> None:
-    from dap3d_core.cli.console.console import output as output_console
+def _report(about: dict[str, Any], *, as_json: bool, quiet: bool) -> None:
+    from dap3d_core.cli.console.console import output as console
     from dap3d_core.cli.console.console import print_json, say
 
     if as_json:
-        print_json(found)
+        print_json(about)
     elif not quiet:
-        say(output_console(), f"{found['file']} written", whole=True)
+        say(console(), f"{about['file']} written", whole=True)
 
 
-def _opened(
+def _is_sweep(data: Any) -> bool:
+    """True for the data set of a sweep."""
+    return hasattr(data, "data_vars")
+
+
+def _open(
     files: Sequence[str],
     names: tuple[str, ...],
     x: str | None,
     at: Sequence[str],
     types: Mapping[str, Any],
 ) -> tuple[Any, tuple[str, ...], dict[str, float]]:
-    """What is drawn, the names in it, and where a sweep is cut.
+    """The results or the sweep, the names to draw, and the cuts through a sweep.
 
     Raises:
-        Refused: a file cannot be read; a sweep beside other files; a cut that is none.
+        Refused: a file cannot be read; a sweep together with other files; an invalid cut.
     """
     from dap3d_core.cli.framework.paths import open_result, open_sweep
     from dap3d_core.study.sweep.dataset import is_sweep
@@ -151,46 +150,45 @@ def _opened(
         from dap3d_core.plot.sweep.sweep_table import table_of
 
         data = open_sweep(files[0])
-        try:
+        with refusing(ValueError):
             return data, names or table_of(data).usual(x), _cuts(at)
-        except ValueError as error:
-            raise Refused(str(error)) from error
     if at:
         raise Refused(f"--at chooses points of a sweep; {files[0]} is none")
-    runs = dict(zip(_told_apart(files), (open_result(f, **types) for f in files), strict=True))
+    runs = {n: open_result(f, **types) for n, f in zip(_labels(files), files, strict=True)}
     return runs if len(runs) > 1 else runs.popitem()[1], names or ENERGIES, {}
 
 
 def _cuts(at: Sequence[str]) -> dict[str, float]:
-    """Numbers and the values they are held at."""
-    found: dict[str, float] = {}
+    """Parameters and the values to which they are fixed."""
+    cuts: dict[str, float] = {}
     for word in at:
-        name, _, value = word.rpartition("=")
+        name, _, value = (part.strip() for part in word.rpartition("="))
         try:
             number = float(value)
         except ValueError:
-            number = float("nan")
-        if not name.strip() or not math.isfinite(number):
+            number = math.nan
+        if not name or not math.isfinite(number):
             raise Refused(f"--at {word!r} should be NAME=VALUE, such as bodies.crank.mass=2")
-        if name.strip() in found:
-            raise Refused(f"--at {name.strip()} is given twice")
-        found[name.strip()] = number
-    return found
+        if name in cuts:
+            raise Refused(f"--at {name} is given twice")
+        cuts[name] = number
+    return cuts
 
 
-def _told_apart(files: Sequence[str]) -> list[str]:
-    """Names of runs for the legend: their files without what all have in common.
+def _labels(files: Sequence[str]) -> list[str]:
+    """Names of runs for the legend: as many parts of their paths as distinguish them.
 
     Raises:
         Refused: a file is named twice.
     """
-    if len({Path(f).absolute() for f in files}) < len(files):
+    paths = [Path(f).absolute() for f in files]
+    if len(set(paths)) < len(files):
         raise Refused("a result is named twice; each run is drawn once")
-    parts = [Path(f).absolute().with_suffix("").parts for f in files]
+    parts = [path.with_suffix("").parts for path in paths]
     for size in range(1, max(map(len, parts)) + 1):
-        names = ["/".join(p[-size:]) for p in parts]
-        if len(set(names)) == len(files):
-            return names
+        labels = ["/".join(p[-size:]) for p in parts]
+        if len(set(labels)) == len(files):
+            return labels
     return [str(f) for f in files]
 
 
@@ -199,11 +197,11 @@ def _inches(size: float | None) -> float | None:
 
 
 def _check(
-    shown: Any,
+    data: Any,
     names: tuple[str, ...],
     target: Path | None,
-    over: Mapping[str, Any],
-    sizes: Mapping[str, float | None],
+    axes: Mapping[str, Any],
+    size: Mapping[str, float | None],
     files: Sequence[str],
     force: bool,
 ) -> None:
@@ -211,49 +209,37 @@ def _check(
     from dap3d_core.cli.framework.paths import refuse_all, writable
     from dap3d_core.plot.figure import SIDES, check_suffix, painting
 
-    def fits(option: str, size: float | None) -> None:
-        if size is not None and not SIDES[0] <= size <= SIDES[1]:
-            least, most = (round(side * MM_PER_INCH) for side in SIDES)
-            raise Refused(f"{option} is from {least} to {most} mm, not {size * MM_PER_INCH:g}")
+    def check_side(name: str, side: float | None) -> None:
+        if side is not None and not SIDES[0] <= side <= SIDES[1]:
+            least, most = (round(limit * MM_PER_INCH) for limit in SIDES)
+            raise Refused(f"--{name} is from {least} to {most} mm, not {side * MM_PER_INCH:g}")
 
-    sources = tuple(map(Path, files))
-    checks: list[Callable[[], object]] = []
-    checks += [partial(fits, option, size) for option, size in sizes.items()]
+    checks: list[Callable[[], object]] = [partial(check_side, *side) for side in size.items()]
     if target is not None:
+        sources = tuple(map(Path, files))
         checks += [partial(check_suffix, target)]
         checks += [partial(writable, target, force=force, sources=sources)]
-    if hasattr(shown, "data_vars"):
+    if _is_sweep(data):
         from dap3d_core.plot.sweep.sweep_table import table_of
 
-        checks += [partial(table_of(shown).check, name) for name in names]
-        checks += [partial(painting, shown, names, over["x"], over["at"])]
+        checks += [partial(table_of(data).check, name) for name in names]
+        checks += [partial(painting, data, names, axes["x"], axes["at"])]
     else:
-        checks += [partial(painting, shown, [name], None, None) for name in names]
-        checks += [partial(painting, shown, ["t"], over["x"], None)]
+        checks += [partial(painting, data, [name], None, None) for name in names]
+        checks += [partial(painting, data, ["t"], axes["x"], None)]
     refuse_all(*checks)
 
 
 def _draw(
-    shown: Any,
-    names: tuple[str, ...],
-    target: Path | None,
-    over: Mapping[str, Any],
-    show: bool,
-    size: tuple[float | None, float | None],
-    force: bool,
+    data: Any, names: tuple[str, ...], target: Path | None, show: bool, force: bool, **settings: Any
 ) -> None:
     from dap3d_core.plot import WIDTH, save_plot, show_plot
     from dap3d_core.result import ResultError, UnknownNameError
 
-    width, height = size[0] or WIDTH, size[1]
-    try:
-        if target is not None:
-            save_plot(shown, names, target, **over, width=width, height=height, force=force)
-    except (UnknownNameError, ValueError) as error:
-        raise Refused(str(error)) from error
-    if not show:
-        return
-    try:
-        show_plot(shown, names, **over, width=width, height=height)
-    except (UnknownNameError, ResultError, ValueError) as error:
-        raise Refused(str(error)) from error
+    settings["width"] = settings["width"] or WIDTH
+    if target is not None:
+        with refusing(UnknownNameError, ValueError):
+            save_plot(data, names, target, force=force, **settings)
+    if show:
+        with refusing(UnknownNameError, ResultError, ValueError):
+            show_plot(data, names, **settings)

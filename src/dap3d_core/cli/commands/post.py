@@ -1,17 +1,22 @@
-"""``dap3d post``: the post-processor's arrays as a table or a file with named dimensions."""
+"""``dap3d post``: the arrays of the post-processor as a table or a file with named dimensions."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.app import Command
-from dap3d_core.cli.framework.completion import quantities as complete_quantities
-from dap3d_core.cli.framework.completion import results as complete_results
-from dap3d_core.cli.process.exit_codes import DONE, Refused
+from dap3d_core.cli.framework import completion
+from dap3d_core.cli.framework.command import command
+from dap3d_core.cli.framework.options import (
+    ALLOW_CODE,
+    FORCE,
+    JSON,
+    MODEL_OF_RESULT,
+    RESULT,
+    output,
+)
+from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 
 if TYPE_CHECKING:
     from dap3d_core.result import Result
@@ -19,24 +24,24 @@ if TYPE_CHECKING:
 FORMATS = {".nc": "nc", ".csv": "csv"}
 
 
-@click.command(cls=Command, saves=True, short_help="Compute all arrays of a result.")
-@click.argument("result", shell_complete=complete_results)
-@click.argument("quantities", metavar="[QUANTITY]...", nargs=-1,
-                shell_complete=complete_quantities)  # fmt: skip
-@click.option("-o", "--output", type=click.Path(), metavar="FILE",
-              help="What is written: a .nc or a .csv file; RESULT-post.nc by default.")  # fmt: skip
-@click.option("--format", "kind", type=click.Choice(tuple(FORMATS.values())),
-              help="Form of the file, where its name does not say it.")  # fmt: skip
-@click.option("--select", "selected", metavar="QUANTITY...", multiple=True,
-              shell_complete=complete_quantities,
-              help="These quantities alone.")  # fmt: skip
-@click.option("--jacobian", "--jac", "jacobian", is_flag=True,
-              help="The constraint Jacobian as well.")  # fmt: skip
-@click.option("--model", metavar="MODEL",
-              help="The model whose own types (plugin.py) were used in the run.")  # fmt: skip
-@click.option("--allow-code", is_flag=True, help="Load the types of that model's plugin.py.")
-@click.option("--force", is_flag=True, help="Overwrite an existing file.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+@command(
+    "Compute all arrays of a result.",
+    RESULT,
+    click.argument("quantities", metavar="[QUANTITY]...", nargs=-1,
+                   shell_complete=completion.quantities),
+    output("A .nc or a .csv file; RESULT-post.nc by default."),
+    click.option("--format", "kind", type=click.Choice(tuple(FORMATS.values())),
+                 help="Format, if the name of the file does not give it."),
+    click.option("--select", "selected", metavar="QUANTITY...", multiple=True,
+                 shell_complete=completion.quantities, help="Only these quantities."),
+    click.option("--jacobian", "--jac", "jacobian", is_flag=True,
+                 help="Also the constraint Jacobian."),
+    MODEL_OF_RESULT,
+    ALLOW_CODE,
+    FORCE,
+    JSON,
+    saves=True,
+)  # fmt: skip
 def post(
     result: str,
     quantities: tuple[str, ...],
@@ -65,8 +70,7 @@ def post(
 
     Quantities are named as for dap3d plot. --json lists what was written: names, shapes, units.
     """
-    from dap3d_core.cli.console.console import items, messages, print_json, say, size
-    from dap3d_core.cli.console.console import output as output_console
+    from dap3d_core.cli.console.console import show_written
     from dap3d_core.cli.framework.paths import open_result, refuse_all, writable
     from dap3d_core.result.quantities.netcdf_export import why_no_reactions
 
@@ -81,19 +85,15 @@ def post(
     notes = [f"reactions are left out: {left_out}"] if left_out else []
     write = _write_table if kind == "csv" else _write_arrays
     arrays = write(opened, target, names, not left_out, jacobian, force)
-    instants, byte_count = len(opened.t), target.stat().st_size
-    if as_json:
-        about = {"file": str(target), "format": kind, "size_bytes": byte_count}
-        print_json({**about, "instants": instants, "arrays": arrays, "notes": notes})
-        return DONE
-    items(messages(), notes)
+    instants = len(opened.t)
     contents = f"{instants} instants, {len(arrays)} {'columns' if kind == 'csv' else 'arrays'}"
-    say(output_console(), f"{target} written ({size(byte_count)}): {contents}", whole=True)
+    data = {"format": kind, "instants": instants, "arrays": arrays}
+    show_written(target, contents, data, notes, as_json=as_json)
     return DONE
 
 
 def _target(result: str, output: str | None, kind: str | None) -> tuple[Path, str]:
-    """The file that is written, and its format."""
+    """The file to write, and its format."""
     if output is None:
         kind = kind or "nc"
         return Path(f"{Path(result).stem}-post.{kind}"), kind
@@ -114,7 +114,8 @@ def _write_table(
     jacobian: bool,
     force: bool,
 ) -> list[dict[str, Any]]:
-    """Write a CSV table; what its columns are."""
+    """Write a CSV table; returns its columns."""
+    from dap3d_core.result import ResultError, UnknownNameError
     from dap3d_core.result.quantities.csv_table import (
         columns_of,
         jacobian_columns,
@@ -122,7 +123,7 @@ def _write_table(
         write_csv,
     )
 
-    with _refused():
+    with refusing(ResultError, UnknownNameError):
         columns = selected(result, names) if names else columns_of(result, reactions)
         more = jacobian_columns(result) if jacobian else []
     write_csv(result, target, columns, more, force=force)
@@ -140,26 +141,16 @@ def _write_arrays(
     jacobian: bool,
     force: bool,
 ) -> list[dict[str, Any]]:
-    """Write a NetCDF file; what its arrays are."""
+    """Write a NetCDF file; returns its arrays."""
+    from dap3d_core.result import ResultError, UnknownNameError
     from dap3d_core.result.quantities.netcdf_export import (
         dataset_to_write,
         selection_of,
         write_netcdf,
     )
 
-    with _refused():
+    with refusing(ResultError, UnknownNameError):
         if jacobian and result.subject.row_count:
             _ = result.machine
         dataset = selection_of(result, names) if names else dataset_to_write(result, reactions)
     return write_netcdf(result, target, dataset, jacobian=jacobian, force=force)
-
-
-@contextmanager
-def _refused() -> Iterator[None]:
-    """What cannot be had from a result is a wrong request."""
-    from dap3d_core.result import ResultError, UnknownNameError
-
-    try:
-        yield
-    except (ResultError, UnknownNameError) as error:
-        raise Refused(str(error)) from error

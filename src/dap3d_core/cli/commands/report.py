@@ -1,32 +1,33 @@
 """``dap3d report``: speed against error of every method and integrator on a model."""
 
 import shlex
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.app import Command
-from dap3d_core.cli.framework.completion import models as complete_models
+from dap3d_core.cli.framework.command import command, signals_of
+from dap3d_core.cli.framework.options import (
+    ALLOW_CODE,
+    FORCE,
+    JSON,
+    MODEL,
+    SETTING_OPTIONS,
+    SETTINGS,
+    in_options,
+    output,
+)
 from dap3d_core.cli.process import exit_codes
-from dap3d_core.cli.process.exit_codes import Refused, Terminated
+from dap3d_core.cli.process.exit_codes import Refused, Terminated, refusing
 
 if TYPE_CHECKING:
-    from dap3d_core.cli.process.signals import Stopping
     from dap3d_core.report import Report
+    from dap3d_core.scene import Scene
 
-#: Settings with the options that give them, as ``in_options`` wants them.
-SETTINGS = {
-    "method": "--method",
-    "integrator": "--integrator",
-    "rtol": "--rtol",
-    "step": "--step",
-    "t_end": "--t-end",
-    "dt": "--dt",
-}
 
-_OPTIONS = (
+@command(
+    "Measure speed against error on a model.",
+    MODEL,
     click.option("--target-error", type=float, metavar="E",
                  help="Say which setting reaches this error soonest."),
     click.option("--quick", is_flag=True, help="Three rungs of each ladder, timed once."),
@@ -42,34 +43,16 @@ _OPTIONS = (
                  help="Timings of each rung, of which the median counts; 5 by default."),
     click.option("--limit", "limit_s", type=float, default=30.0, show_default=True, metavar="S",
                  help="End a run after so many seconds; it is listed as failed."),
-    click.option("--t-end", type=float, metavar="S", help="Final time in s."),
-    click.option("--dt", type=float, metavar="S", help="Reporting step in s."),
-    click.option("--correct/--no-correct", default=None,
-                 help="Correct the initial conditions so that they fulfil the constraints."),
-    click.option("--project/--no-project", default=None,
-                 help="Bring every step onto the constraints."),
+    *(SETTING_OPTIONS[name] for name in ("t_end", "dt", "correct", "project")),
     click.option("--plot", "picture", type=click.Path(), metavar="FILE",
                  help="Draw time against error: .png, .svg or .pdf."),
     click.option("--csv", "csv_file", type=click.Path(), metavar="FILE",
                  help="Write all settings as a table."),
-    click.option("-o", "--output", type=click.Path(), metavar="FILE",
-                 help="Write what --json prints to a file."),
-    click.option("--force", is_flag=True, help="Overwrite existing files."),
-    click.option("--allow-code", is_flag=True,
-                 help="Allow the model's own types (plugin.py in its folder) to run."),
-    click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else."),
+    output("Write what --json prints to a file."),
+    FORCE,
+    ALLOW_CODE,
+    JSON,
 )  # fmt: skip
-
-
-def _with_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    for option in reversed(_OPTIONS):
-        function = option(function)
-    return function
-
-
-@click.command(cls=Command, short_help="Measure speed against error on a model.")
-@click.argument("model", shell_complete=complete_models)
-@_with_options
 @click.pass_context
 def report(
     ctx: click.Context,
@@ -96,94 +79,85 @@ def report(
     Ctrl-C ends it; what was measured until then is shown and written.
     """
     import dap3d_core as dap
+    from dap3d_core.cli.console.console import messages, print_json, say
+    from dap3d_core.cli.console.console import output as console
+    from dap3d_core.cli.console.report_tables import show_report
 
     scene = dap.load(model)
-    targets = _targets(picture, csv_file, output, force=force, scene_file=scene.path)
-    found, code = _measured(scene, given, ctx.meta["dap3d.stopping"], quiet=as_json)
-    written = _write(found, targets, force=force)
-    command = _command(model, given)
-    with_target = given["target_error"] is not None
-    _tell(found, model, command, written, as_json=as_json, with_target=with_target)
+    files = {"picture": picture, "csv": csv_file, "json": output}
+    targets = _targets(files, scene.path, force=force)
+    measured, code = _measure(ctx, scene, given, quiet=as_json)
+    written = _write(measured, targets, force=force)
+    if as_json:
+        print_json({"model": model, **measured.to_dict()})
+    else:
+        with_target = given["target_error"] is not None
+        show_report(console(), measured, _run_command(model, given), with_target=with_target)
+        for path in written:
+            say(console(), f"{path} written", whole=True)
     if code != exit_codes.DONE:
-        from dap3d_core.cli.console.console import messages, say
-
         say(messages(), "ended early; what was measured until then is above", "bold red")
     return code
 
 
 def _targets(
-    picture: str | None, csv_file: str | None, output: str | None, *, force: bool, scene_file: Any
+    files: dict[str, str | None], scene_file: Path | None, *, force: bool
 ) -> dict[str, Path]:
-    """The files that are written, by what they are; refused before any work is done."""
+    """The files to write, by their contents; refused before any work is done."""
     from dap3d_core.cli.framework.paths import writable
 
-    asked = {"picture": picture, "csv": csv_file, "json": output}
-    found = {}
-    for kind, name in asked.items():
-        if name is None:
-            continue
-        if kind == "picture":
-            from dap3d_core.plot.figure import check_suffix
+    if files["picture"] is not None:
+        from dap3d_core.plot.figure import check_suffix
 
-            try:
-                check_suffix(Path(name))
-            except ValueError as error:
-                raise Refused(str(error)) from error
-        found[kind] = writable(Path(name), force=force, sources=(scene_file,))
-    if len({path.resolve() for path in found.values()}) < len(found):
+        with refusing(ValueError):
+            check_suffix(Path(files["picture"]))
+    targets = {
+        kind: writable(Path(name), force=force, sources=(scene_file,))
+        for kind, name in files.items()
+        if name is not None
+    }
+    if len({path.resolve() for path in targets.values()}) < len(targets):
         raise Refused("--plot, --csv and --output name one file twice; give each its own")
-    return found
+    return targets
 
 
-def _measured(
-    scene: Any, given: dict[str, Any], stopping: "Stopping", *, quiet: bool
+def _measure(
+    ctx: click.Context, scene: "Scene", given: dict[str, Any], *, quiet: bool
 ) -> tuple["Report", int]:
-    """The report and an exit code; one that ends early gives what was measured."""
+    """The report and an exit code; a report that ends early has what was measured."""
     import dap3d_core as dap
     from dap3d_core.cli.console.report_tables import ReportProgress
-    from dap3d_core.cli.framework.options import in_options
-    from dap3d_core.scene import SceneError
 
-    asked: dict[str, Any] = {name: None if value == () else value for name, value in given.items()}
-    with ReportProgress(quiet=quiet) as progress:
-
-        def on_progress(done: float, total: float, words: str) -> None:
-            progress.work(done, total, words)
-            stopping.between_chunks()
-
+    settings: dict[str, Any] = {name: None if v == () else v for name, v in given.items()}
+    with ReportProgress(quiet=quiet) as progress, refusing(ValueError):
         try:
-            found = dap.report(scene, progress=on_progress, announce=progress.announce, **asked)
-        except SceneError as error:
-            raise in_options(error, SETTINGS) from error
-        except ValueError as error:
-            raise Refused(str(error)) from error
+            work = signals_of(ctx).interruptible(progress.work)
+            measured = dap.report(scene, progress=work, announce=progress.announce, **settings)
+        except dap.SceneError as error:
+            raise in_options(error) from error
         except (Terminated, KeyboardInterrupt) as error:
-            kept = getattr(error, "report", None)
-            if kept is None:
+            if (partial := getattr(error, "report", None)) is None:
                 raise
-            return kept, _code(error)
-        return found, exit_codes.DONE
+            interrupted = isinstance(error, KeyboardInterrupt)
+            return partial, exit_codes.INTERRUPTED if interrupted else exit_codes.PARTIAL
+        return measured, exit_codes.DONE
 
 
-def _code(error: BaseException) -> int:
-    return exit_codes.INTERRUPTED if isinstance(error, KeyboardInterrupt) else exit_codes.PARTIAL
-
-
-def _write(found: "Report", targets: dict[str, Path], *, force: bool) -> list[Path]:
-    """Write the files asked for; a picture only where there is something to draw."""
+def _write(measured: "Report", targets: dict[str, Path], *, force: bool) -> list[Path]:
+    """Write the files; a picture only if there is something to draw."""
     from dap3d_core.cli.console.console import messages, say
     from dap3d_core.result.file.atomic_write import whole_file
 
     written = []
     for kind, target in targets.items():
         if kind == "csv":
-            found.save_csv(target, force)
+            measured.save_csv(target, force)
         elif kind == "json":
             with whole_file(target, force) as part:
-                part.write_text(found.to_json() + "\n", "utf-8")
+                part.write_text(measured.to_json() + "\n", "utf-8")
         else:
             try:
-                found.plot(target, force)
+                measured.plot(target, force)
             except ValueError as error:
                 say(messages(), f"{target} is not drawn: {error}", "red")
                 continue
@@ -191,32 +165,10 @@ def _write(found: "Report", targets: dict[str, Path], *, force: bool) -> list[Pa
     return written
 
 
-def _command(model: str, given: dict[str, Any]) -> str:
-    """What runs the model as it was measured, but for the setting."""
-    words = ["dap3d run", shlex.quote(model)]
+def _run_command(model: str, given: dict[str, Any]) -> str:
+    """The command that runs the model as it was measured, without the setting."""
     said = {name: value for name, value in given.items() if value is not None}
-    words += [f"{SETTINGS[name]} {said[name]!r}" for name in ("t_end", "dt") if name in said]
-    switches = [name for name in ("correct", "project") if name in said]
-    words += [f"--{'' if said[name] else 'no-'}{name}" for name in switches]
-    return " ".join(words + ["--allow-code"] * bool(said["allow_code"]))
-
-
-def _tell(
-    found: "Report",
-    model: str,
-    command: str,
-    written: list[Path],
-    *,
-    as_json: bool,
-    with_target: bool,
-) -> None:
-    from dap3d_core.cli.console.console import output, print_json, say
-    from dap3d_core.cli.console.report_tables import show_report
-
-    if as_json:
-        print_json({"model": model, **found.to_dict()})
-        return
-    console = output()
-    show_report(console, found, command, with_target=with_target)
-    for path in written:
-        say(console, f"{path} written", whole=True)
+    times = [f"{SETTINGS[n]} {said[n]!r}" for n in ("t_end", "dt") if n in said]
+    switches = [f"--{'' if said[n] else 'no-'}{n}" for n in ("correct", "project") if n in said]
+    code = ["--allow-code"] * said["allow_code"]
+    return " ".join(["dap3d run", shlex.quote(model), *times, *switches, *code])

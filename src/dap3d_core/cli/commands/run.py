@@ -1,24 +1,25 @@
-"""``dap3d run``: simulate a model and write its result."""
+"""``dap3d run``: simulates a model and writes its result."""
 
 import math
+import sys
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.app import Command
-from dap3d_core.cli.framework.completion import models as complete_models
-from dap3d_core.cli.framework.execute import Seconds, carry_out
+from dap3d_core.cli.framework import completion
+from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.framework.options import (
     ALLOW_CODE,
+    FORCE,
     JSON,
     QUIET,
     SETTING_OPTIONS,
-    SETTINGS,
+    STRICT,
+    Seconds,
     check_settings,
     in_options,
-    with_options,
+    output,
 )
-from dap3d_core.cli.framework.paths import named_after
 
 if TYPE_CHECKING:
     from dap3d_core.cli.framework.execute import Announce, Watch
@@ -26,29 +27,25 @@ if TYPE_CHECKING:
     from dap3d_core.scene import Scene
     from dap3d_core.simulation import CompiledModel
 
-_OPTIONS = (
-    click.option("-o", "--output", type=click.Path(), metavar="FILE",
-                 help="Result file; MODEL.nc in the current folder by default."),
-    *SETTING_OPTIONS,
+
+@command(
+    "Simulate a model, write its result.",
+    click.argument("model", required=False, shell_complete=completion.models),
+    output("Result file; MODEL.nc in the current folder by default."),
+    *SETTING_OPTIONS.values(),
     click.option("--error", "estimate_error", is_flag=True,
                  help="Estimate the error of all positions and velocities by a second run at "
                       "tolerances ten times tighter, or half the step."),
     click.option("--checkpoint", type=Seconds(), metavar="EVERY", default=math.inf,
-                 help="Write RESULT.checkpoint so often: 90, 5min, 2h; dap3d resume goes on from "
-                      "it, also where the run was killed."),
-    click.option("--strict", is_flag=True,
-                 help="Exit with 1 if there are warnings (notes that tell of a change) or the "
-                      "ledger does not close; the result is saved all the same."),
-    click.option("--force", is_flag=True, help="Overwrite an existing result."),
+                 help="Write RESULT.checkpoint so often: 90, 5min, 2h; dap3d resume continues "
+                      "from it, also after the run was killed."),
+    STRICT,
+    FORCE,
     ALLOW_CODE,
     JSON,
     QUIET,
+    saves=True,
 )  # fmt: skip
-
-
-@click.command(cls=Command, saves=True, short_help="Simulate a model, write its result.")
-@click.argument("model", required=False, shell_complete=complete_models)
-@with_options(*_OPTIONS)
 @click.pass_context
 def run(
     ctx: click.Context,
@@ -68,13 +65,14 @@ def run(
     """Simulate a MODEL and write its result.
 
     MODEL is the name of a shipped model (dap3d models), a folder with a scene.toml, or a TOML file.
-    Without it, in a terminal, dap3d asks. What no option says is taken from the scene.
+    Without it, in a terminal, dap3d asks. Settings without an option are those of the scene.
 
-    Ctrl-C ends a run; what was computed until then is saved, and dap3d resume goes on from there.
+    Ctrl-C ends a run; what was computed until then is saved, and dap3d resume continues it.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.run_outcome import tell
-    from dap3d_core.cli.framework.paths import writable
+    from dap3d_core.cli.console.run_summary import report_run
+    from dap3d_core.cli.framework.execute import execute
+    from dap3d_core.cli.framework.paths import named_after, writable
 
     if model is None:
         model, scene, force = _ask(ctx, given, output, force=force)
@@ -82,17 +80,17 @@ def run(
         scene = dap.load(model)
     target = writable(named_after(model, output), force=force, sources=(scene.path,))
     check_settings(scene, given)
-    found: list[CompiledModel] = []
+    compiled: list[CompiledModel] = []
 
     def prepare(announce: "Announce") -> "CompiledModel":
         method = given["method"]
-        found.append(dap.compile(scene, method=method, allow_code=allow_code, announce=announce))
-        return found[0]
+        compiled.append(dap.compile(scene, method=method, allow_code=allow_code, announce=announce))
+        return compiled[0]
 
-    def go(announce: "Announce", watch: "Watch") -> "Result":
+    def simulate(announce: "Announce", watch: "Watch") -> "Result":
         try:
             return dap.simulate(
-                found[0],
+                compiled[0],
                 watch=watch,
                 announce=announce,
                 output=target,
@@ -101,22 +99,21 @@ def run(
                 checkpoint=checkpoint,
                 **given,
             )
-        except dap.SceneError as error:  # settings that only the integrator can judge
-            raise in_options(error, SETTINGS) from error
+        except dap.SceneError as error:  # settings that only the integrator can check
+            raise in_options(error) from error
 
-    outcome = carry_out(ctx, prepare, go, quiet=quiet)
-    return tell(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
+    outcome = execute(ctx, prepare, simulate, quiet=quiet)
+    return report_run(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
 
 
 def _ask(
     ctx: click.Context, given: dict[str, Any], output: str | None, *, force: bool
 ) -> tuple[str, "Scene", bool]:
-    """Model, scene and settings by questions, where somebody can answer; whether to overwrite."""
-    import sys
-
+    """Ask for the model, its settings, and whether to overwrite a result, in a terminal."""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         raise click.UsageError("name a MODEL; dap3d models lists the shipped ones", ctx)
     from dap3d_core.cli.commands.run_interactive import ask
+    from dap3d_core.cli.framework.paths import named_after
 
     model, scene = ask(given)
     target = named_after(model, output)

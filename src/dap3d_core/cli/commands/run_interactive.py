@@ -1,18 +1,21 @@
-"""The manual's questions, asked where ``run`` is given no model; defaults are the scene's."""
+"""Questions of the manual, for ``run`` without a model; the defaults are the scene's."""
 
-from collections.abc import Callable
-from typing import Any
+import math
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from dap3d_core.cli.console.console import messages, say
 
+if TYPE_CHECKING:
+    from dap3d_core.scene import Scene
 
-def ask(given: dict[str, Any]) -> tuple[str, Any]:
+
+def ask(given: dict[str, Any]) -> tuple[str, "Scene"]:
     """Ask for the model and the settings of its run.
 
     Args:
-        given: settings by name; what an option says is not asked for, answers are put in.
+        given: settings by name; answers replace those that no option gives.
 
     Returns:
         The name of the model, and its scene.
@@ -23,18 +26,18 @@ def ask(given: dict[str, Any]) -> tuple[str, Any]:
         question = "Do you want to correct the initial conditions?"
         given["correct"] = click.confirm(question, default=settings.correct is not False, err=True)
     if given["t_end"] is None:
-        given["t_end"] = _number("Final time in seconds", settings.t_end, least=0.0)
+        given["t_end"] = _ask_number("Final time in seconds", settings.t_end, least=0.0)
     t_end = given["t_end"]
     if given["dt"] is None and t_end:
-        usual = settings.dt if isinstance(settings.dt, (int, float)) else t_end / 100.0
+        usual = settings.dt if isinstance(settings.dt, (int, float)) else 0.0
         usual = usual if 0.0 < usual <= t_end else t_end / 100.0
-        given["dt"] = _number("Reporting time-step in seconds", usual, above=0.0, most=t_end)
+        given["dt"] = _ask_number("Reporting time-step in seconds", usual, above=0.0, most=t_end)
     if given["method"] is None:
         given["method"] = _ask_method(str(settings.method))
     return model, scene
 
 
-def _ask_model() -> tuple[str, Any]:
+def _ask_model() -> tuple[str, "Scene"]:
     from dap3d_core.scene import SceneError, load, shipped_models
 
     console = messages()
@@ -47,23 +50,24 @@ def _ask_model() -> tuple[str, Any]:
             say(console, str(error), "red")
 
 
-def _number(
-    question: str, usual: Any, *, least: float | None = None, above: float | None = None,
-    most: float | None = None,
+def _ask_number(
+    question: str, usual: Any, *, least: float = -math.inf, above: float = -math.inf,
+    most: float = math.inf,
 ) -> float:  # fmt: skip
-    """A finite number within its bounds; asked again until it is one."""
+    """A finite number within its bounds; the question is repeated until it is one."""
 
     def read(text: Any) -> float:
         try:
             value = float(text)
         except (TypeError, ValueError):
             raise click.UsageError(f"{text!r} is not a number") from None
-        if value != value or abs(value) == float("inf"):
+        if not math.isfinite(value):
             raise click.UsageError("the number must be finite")
-        if (least is not None and value < least) or (above is not None and value <= above):
-            bound = f"at least {least:g}" if above is None else f"above {above:g}"
-            raise click.UsageError(f"the number must be {bound}")
-        if most is not None and value > most:
+        if value < least:
+            raise click.UsageError(f"the number must be at least {least:g}")
+        if value <= above:
+            raise click.UsageError(f"the number must be above {above:g}")
+        if value > most:
             raise click.UsageError(f"the number must be at most {most:g}")
         return value
 
@@ -72,16 +76,15 @@ def _number(
 
 
 def _ask_method(usual: str) -> str:
-    """The formulation; a first letter will do, as in the manual."""
+    """The formulation; its first letters are enough, as in the manual."""
     from dap3d_core.scene import METHODS
 
     def read(text: str) -> str:
-        found = [m for m in METHODS if m.startswith(text.strip().lower())]
-        if text.strip() and len(found) == 1:
-            return found[0]
+        matches = [m for m in METHODS if m.startswith(text.strip().lower())]
+        if text.strip() and len(matches) == 1:
+            return matches[0]
         raise click.UsageError(f"one of {', '.join(METHODS)}")
 
-    read_: Callable[[str], str] = read
     default = usual if usual in METHODS else "auto"
     question = f"Solution method ({', '.join(METHODS)})"
-    return str(click.prompt(question, default=default, value_proc=read_, err=True))
+    return str(click.prompt(question, default=default, value_proc=read, err=True))

@@ -1,4 +1,4 @@
-"""``dap3d sweep``: run a model at many combinations of its numbers."""
+"""``dap3d sweep``: runs a model at many combinations of its parameters."""
 
 import shlex
 from pathlib import Path
@@ -6,19 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.app import Command
-from dap3d_core.cli.framework.completion import models as complete_models
-from dap3d_core.cli.framework.completion import numbers as complete_numbers
+from dap3d_core.cli.framework import completion
+from dap3d_core.cli.framework.command import command, signals_of
 from dap3d_core.cli.framework.options import (
     ALLOW_CODE,
     JSON,
+    MODEL,
     QUIET,
     SETTING_OPTIONS,
-    SETTINGS,
     in_options,
-    with_options,
+    options_of,
+    output,
 )
-from dap3d_core.cli.framework.paths import named_after
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.exit_codes import Refused
 
@@ -26,36 +25,32 @@ if TYPE_CHECKING:
     import xarray
 
     from dap3d_core.cli.console.progress import PointsProgress
-    from dap3d_core.scene import SceneError
+    from dap3d_core.scene import Scene, SceneError
 
-#: What the command line calls the arguments of ``dap.sweep``.
-OPTIONS = SETTINGS | {
-    "vary": "--vary",
-    "outputs": "--keep",
-    "sample": "--sample",
-    "design": "--design",
-    "seed": "--seed",
-    "threads": "--threads",
-    "pack": "--pack",
+#: Arguments of ``dap.sweep`` with the options that give them.
+OPTIONS = {"vary": "--vary", "outputs": "--keep"} | {
+    name: f"--{name}" for name in ("sample", "design", "seed", "threads", "pack")
 }
 
-_OPTIONS = (
-    click.option("--vary", multiple=True, metavar="NUMBER=FORM", shell_complete=complete_numbers,
-                 help="A number that varies: bodies.crank.mass=1:5:9 (from:to:count), 1:100:5:log, "
-                      "10,50,100; may be given again. Samples: 1:5, 1:100:log, 3~0.1 "
+
+@command(
+    "Run a model at many values of its parameters.",
+    MODEL,
+    click.option("--vary", multiple=True, metavar="NUMBER=FORM",
+                 shell_complete=completion.parameters,
+                 help="A parameter that varies: bodies.crank.mass=1:5:9 (from:to:count), "
+                      "1:100:5:log, 10,50,100; may be given again. Samples: 1:5, 1:100:log, 3~0.1 "
                       "(mean~deviation), 10,50,100."),
     click.option("--keep", multiple=True, metavar="QUANTITY[:WHAT]",
-                 help="What is kept of each run: crank.r.z:max; end (by default), min, max, mean "
-                      "or series; may be given again."),
+                 help="An output of each run: crank.r.z:max; end (by default), min, max, mean or "
+                      "series; may be given again."),
     click.option("--sample", type=int, metavar="N",
                  help="Run N samples instead of the grid of all combinations."),
-    click.option("--design", metavar="NAME", default=None,
+    click.option("--design", metavar="NAME",
                  help="How samples are drawn: lhs (by default), random, sobol, halton."),
-    click.option("--seed", type=int, metavar="S", default=None,
-                 help="Seed of the samples; 0 by default."),
-    click.option("-o", "--output", type=click.Path(), metavar="FILE",
-                 help="File of the sweep; MODEL-sweep.nc in the current folder by default."),
-    *SETTING_OPTIONS,
+    click.option("--seed", type=int, metavar="S", help="Seed of the samples; 0 by default."),
+    output("File of the sweep; MODEL-sweep.nc in the current folder by default."),
+    *SETTING_OPTIONS.values(),
     click.option("--threads", type=int, metavar="N",
                  help="Points that run at once; by default one for each core."),
     click.option("--pack", type=int, metavar="N", default=1,
@@ -64,19 +59,15 @@ _OPTIONS = (
     click.option("--scheduler", metavar="ADDRESS",
                  help="Run the points on the dask cluster of this scheduler: tcp://node7:8786."),
     click.option("--resume", is_flag=True,
-                 help="Go on with FILE.part of a sweep that was ended."),
+                 help="Continue an interrupted sweep from FILE.part."),
     click.option("--strict", is_flag=True, help="Exit with 1 if a point went wrong."),
     click.option("--force", is_flag=True,
                  help="Overwrite an existing file, and the part of another sweep."),
     ALLOW_CODE,
     JSON,
     QUIET,
+    saves=True,
 )  # fmt: skip
-
-
-@click.command(cls=Command, saves=True, short_help="Run a model at many values of its numbers.")
-@click.argument("model", shell_complete=complete_models)
-@with_options(*_OPTIONS)
 @click.pass_context
 def sweep(
     ctx: click.Context,
@@ -90,70 +81,62 @@ def sweep(
     quiet: bool,
     **given: Any,
 ) -> int:
-    """Run a MODEL at many combinations of its numbers and keep some numbers of each run.
+    """Run a MODEL at many combinations of its parameters and store some outputs of each run.
 
     \b
     dap3d sweep pen1 --vary bodies.cone.mass=1:5:9 --keep cone.r.z:max
     dap3d sweep pen1 --vary bodies.cone.w.y=-10~1 --sample 100 --keep cone.r
 
-    Numbers are named as in the scene file, a component behind a further dot: bodies.crank.mass,
+    Parameters are named as in the scene file, a component after a further dot: bodies.crank.mass,
     points.A.sPp.x, forces.spring.k, simulation.rtol. Quantities are named as for dap3d plot. Points
     that go wrong do not end the others; they are listed.
 
-    Ctrl-C ends a sweep; what was computed stays in FILE.part, and --resume goes on from there.
+    Ctrl-C ends a sweep; what was computed stays in FILE.part, and --resume continues from there.
     """
     import dap3d_core as dap
     from dap3d_core.cli.console.progress import PointsProgress
-    from dap3d_core.cli.framework.execute import what_is_left
-    from dap3d_core.cli.framework.paths import writable
+    from dap3d_core.cli.framework.execute import partial_result
+    from dap3d_core.cli.framework.paths import named_after, writable
 
-    _check_usage(ctx, given, scheduler)
+    _complete(ctx, given, scheduler)
     scene = dap.load(model)
-    target = writable(
-        named_after(model, output, "-sweep"), force=given["force"], sources=(scene.path,)
-    )
+    target = named_after(model, output, "-sweep")
+    writable(target, force=given["force"], sources=(scene.path,))
     code, reason = exit_codes.DONE, ""
     with PointsProgress(quiet=quiet) as progress:
         try:
-            dataset = _swept(ctx, scene, target, scheduler, progress, given)
+            dataset = _sweep(ctx, scene, target, scheduler, progress, given)
         except (Exception, KeyboardInterrupt) as error:
-            dataset, code, reason = what_is_left(ctx, error)
-    return _tell(ctx, dataset, target, progress, code, reason, strict=strict, as_json=as_json,
-                 quiet=quiet)  # fmt: skip
+            dataset, code, reason = partial_result(ctx, error)
+    return _report(ctx, dataset, target, progress, code, reason, strict=strict, as_json=as_json,
+                   quiet=quiet)  # fmt: skip
 
 
-def _check_usage(ctx: click.Context, given: dict[str, Any], scheduler: str | None) -> None:
-    """Refuse options that say nothing without another; fill in what is left out."""
-    for name in ("design", "seed"):
-        if given["sample"] is None and given[name] is not None:
+def _complete(ctx: click.Context, given: dict[str, Any], scheduler: str | None) -> None:
+    """Refuse options that have no meaning without another; set the defaults of samples."""
+    for name, default in (("design", "lhs"), ("seed", 0)):
+        if given[name] is None:
+            given[name] = default
+        elif given["sample"] is None:
             raise click.UsageError(f"--{name} is of samples: give --sample N as well", ctx)
     if scheduler is not None and given["threads"] is not None:
-        words = "--threads is of this machine; with --scheduler the workers have their own"
-        raise click.UsageError(words, ctx)
-    given["design"] = "lhs" if given["design"] is None else given["design"]
-    given["seed"] = 0 if given["seed"] is None else given["seed"]
+        text = "--threads is of this machine; with --scheduler the workers have their own"
+        raise click.UsageError(text, ctx)
 
 
-def _swept(
+def _sweep(
     ctx: click.Context,
-    scene: Any,
+    scene: "Scene",
     target: Path,
     scheduler: str | None,
     progress: "PointsProgress",
     given: dict[str, Any],
 ) -> "xarray.Dataset":
-    """The sweep; what cannot be begun is refused."""
+    """The sweep; refused if it cannot begin."""
     import dap3d_core as dap
     from dap3d_core.result import ResultError
 
-    stopping = ctx.meta["dap3d.stopping"]
-    asked = dict(given)
-    vary, keep = asked.pop("vary"), asked.pop("keep")
-
-    def count(done: int, total: int) -> None:
-        progress.count(done, total)
-        stopping.between_chunks()
-
+    settings = {name: value for name, value in given.items() if name not in ("vary", "keep")}
     client = None
     try:
         if scheduler is not None:
@@ -161,8 +144,9 @@ def _swept(
 
             client = connect(scheduler)
         return dap.sweep(
-            scene, vary, outputs=keep, client=client, output=target, progress=count,
-            announce=progress.announce, **asked,
+            scene, given["vary"], outputs=given["keep"], client=client, output=target,
+            progress=signals_of(ctx).interruptible(progress.count),
+            announce=progress.announce, **settings,
         )  # fmt: skip
     except dap.SceneError as error:
         raise _in_options(error, given) from error
@@ -181,16 +165,15 @@ def _in_options(error: "SceneError", given: dict[str, Any]) -> "SceneError":
 
     from dap3d_core.scene import SceneError
 
-    said = {name for name, value in given.items() if value is not None} | {"outputs"}
-    said |= {"step"} if "integrator" in said else set()
-    renamed = in_options(error, said, OPTIONS)
+    names = {name: option for name, option in OPTIONS.items() if given.get(name) is not None}
+    renamed = in_options(error, options_of(given) | names | {"outputs": OPTIONS["outputs"]})
     return SceneError(
         attrs.evolve(m, key=f"--{m.key}") if m.key.startswith("vary ") else m
         for m in renamed.mistakes
     )
 
 
-def _tell(
+def _report(
     ctx: click.Context,
     dataset: "xarray.Dataset",
     target: Path,
@@ -202,31 +185,29 @@ def _tell(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Tell how a sweep ended; returns the exit code."""
+    """Report a sweep; returns the exit code."""
     from dap3d_core.cli.console.console import messages, output, print_json, say
-    from dap3d_core.cli.console.sweep_tables import show_failing, show_sweep, sweep_facts
+    from dap3d_core.cli.console.sweep_tables import show_failing, show_sweep, sweep_data
 
     file = target.with_name(f"{target.name}.part") if reason else target
-    found = sweep_facts(dataset)
-    found["wall_time_s"] = progress.elapsed
-    found["points_per_second"] = progress.ran / progress.elapsed if progress.elapsed else None
-    wrong = found["stopped"] + found["failed"]
-    if not reason and found["failed"] == found["points"]:
+    data = sweep_data(dataset)
+    data["wall_time_s"] = progress.elapsed
+    data["points_per_second"] = progress.ran / progress.elapsed if progress.elapsed else None
+    if not reason and data["failed"] == data["points"]:
         code, reason = exit_codes.PARTIAL, "all points failed"
-    elif not reason and strict and wrong:
+    elif not reason and strict and data["stopped"] + data["failed"]:
         code = exit_codes.FAILED
-    if as_json:
-        print_json({"file": str(file), **found, "reason": reason, "exit_code": code})
-    elif not quiet:
-        show_sweep(output(), found, str(file))
     console = messages()
-    if not as_json:
-        others = f"dap3d info {shlex.quote(str(file))} --json has them"
-        show_failing(console, found, others)
+    if as_json:
+        print_json({"file": str(file), **data, "reason": reason, "exit_code": code})
+    else:
+        if not quiet:
+            show_sweep(output(), data, str(file))
+        show_failing(console, data, f"dap3d info {shlex.quote(str(file))} --json has them")
     if reason:
         say(console, reason, "bold red")
     if file != target:
-        say(console, f"what was computed until then is in {file}; to go on from there:", whole=True)
+        say(console, f"what was computed until then is in {file}; to continue:", whole=True)
         words = [w for w in ctx.meta["dap3d.words"] if w != "--resume"]
         command = shlex.join(["dap3d", "sweep", *words, "--resume"])
         say(console, command, "green", indent=2, whole=True)

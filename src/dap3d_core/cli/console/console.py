@@ -1,13 +1,14 @@
-"""Consoles, and the few shapes that all output takes: paragraphs, facts, tables, JSON.
+"""Consoles, and the forms that all output has: paragraphs, lists, tables, JSON.
 
-Text is plain where it goes to a file or another program. What was asked for is wrapped at 80
-columns then; messages keep their lines, for programs that look for places in them.
+Text is plain where it goes to a file or another program. Results are wrapped at 80 columns then;
+messages keep their lines, for programs that look for places in them.
 """
 
 import json
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
@@ -18,12 +19,12 @@ from rich.text import Text
 
 from dap3d_core.cli.process.streams import json_stream, leave_stderr, leave_stdout
 
-#: Bits of an integer; Python refuses to write the decimal digits of some 14000.
+#: Bits of an integer; Python refuses to write more than some 14000 of them in decimal digits.
 LONGEST_INTEGER = 4096
 
 
 class Terminal(Console):
-    """A console without markup, which goes quiet when its reader has gone or its disk is full."""
+    """A console without markup, which falls silent when its reader is gone or its disk is full."""
 
     def __init__(self, *, stderr: bool = False) -> None:
         super().__init__(
@@ -37,7 +38,7 @@ class Terminal(Console):
             self._leave(error)
 
     def on_broken_pipe(self) -> None:
-        """Write nothing any more; the command goes on to its end."""
+        """Write nothing more; the command runs to its end."""
         self._leave(None)
 
     def _leave(self, error: OSError | None) -> None:
@@ -49,28 +50,28 @@ class Terminal(Console):
 
     @property
     def wraps(self) -> bool:
-        """Whether lines are wrapped: but for messages that go elsewhere than to a terminal."""
+        """True if lines are wrapped: all but messages that do not go to a terminal."""
         return not self.stderr or self.has_width
 
     @property
     def has_width(self) -> bool:
-        """Whether there is a width to keep: on a terminal, or where one is given."""
+        """True on a terminal, or if the environment gives a width."""
         return self.is_terminal or "COLUMNS" in os.environ
 
 
 def _without_colors() -> bool | None:
-    """True where ``--no-color`` was given; None leaves it to the environment (NO_COLOR)."""
+    """True after ``--no-color``; None leaves it to the environment (NO_COLOR)."""
     ctx = click.get_current_context(silent=True)
     return True if ctx is not None and ctx.color is False else None
 
 
 def output() -> Terminal:
-    """The console of what a command was asked for."""
+    """The console of results: stdout."""
     return Terminal()
 
 
 def messages() -> Terminal:
-    """The console of everything else: errors, progress."""
+    """The console of everything else, such as errors and progress: stderr."""
     return Terminal(stderr=True)
 
 
@@ -83,9 +84,9 @@ def say(
         console: where.
         words: the text.
         style: of rich.
-        indent: columns it is moved to the right.
-        whole: for text with paths and commands: broken only where there is a width to keep.
-            Without an indent it is one line, whatever a path holds.
+        indent: in columns.
+        whole: True for text with paths and commands: broken only if the console has a width.
+            Without an indent it is one line, whatever a path contains.
     """
     text = Text(clean(words) if not whole or indent else line_of(words), style=style)
     if console.has_width or (console.wraps and not whole):
@@ -97,7 +98,7 @@ def say(
 
 
 def show(console: Terminal, shape: RenderableType) -> None:
-    """Print a table or another shape; where it is no terminal, without spaces at line ends."""
+    """Print a table or another shape, without spaces at line ends unless on a terminal."""
     if console.is_terminal:
         console.print(shape, overflow="fold")
         return
@@ -137,7 +138,7 @@ def _indented(shape: RenderableType, indent: int) -> RenderableType:
 
 
 def items(console: Terminal, texts: Iterable[str], style: str = "") -> None:
-    """Print a list, each of its texts behind a dash."""
+    """Print a list, each text after a dash."""
     for words in texts:
         if console.wraps:
             grid = Table.grid(padding=(0, 1))
@@ -154,20 +155,27 @@ def title(console: Terminal, words: str) -> None:
     say(console, line_of(words), "bold")
 
 
+def section(console: Terminal, heading: str, texts: Sequence[str], style: str = "") -> None:
+    """Print a heading and a list; nothing if the list is empty."""
+    if texts:
+        title(console, heading)
+        items(console, texts, style)
+
+
 def facts(console: Terminal, pairs: Iterable[tuple[str, str]]) -> None:
-    """Print names and what there is to say of each; empty ones are left out."""
-    there = [(name, words) for name, words in pairs if words]
-    if not there:
+    """Print names with their descriptions; empty ones are left out."""
+    rows = [(name, words) for name, words in pairs if words]
+    if not rows:
         return
-    width = max(len(name) for name, _ in there)
+    width = max(len(name) for name, _ in rows)
     if not console.wraps:
-        for name, words in there:
+        for name, words in rows:
             console.print(Text(f"  {name:{width}}  {line_of(words)}"), soft_wrap=True)
         return
     grid = Table.grid(padding=(0, 2))
     grid.add_column(no_wrap=True, min_width=width)
     grid.add_column(overflow="fold")
-    for name, words in there:
+    for name, words in rows:
         grid.add_row(Text(name, style="cyan"), Text(clean(words)))
     show(console, _indented(grid, 2))
 
@@ -184,8 +192,8 @@ def table(
     Args:
         columns: headings.
         rows: a text for each column.
-        right: columns set to the right.
-        fixed: columns that are not broken into lines as long as the others can be.
+        right: columns aligned to the right.
+        fixed: columns that are broken into lines only if no other column can be.
     """
     grid = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="cyan")
     for k, name in enumerate(columns):
@@ -194,6 +202,34 @@ def table(
     for row in rows:
         grid.add_row(*(Text(clean(c)) if isinstance(c, str) else c for c in row))
     return _indented(grid, 2)
+
+
+def show_written(
+    target: Path,
+    contents: str,
+    data: Mapping[str, Any],
+    notes: Sequence[str] = (),
+    *,
+    as_json: bool,
+    quiet: bool = False,
+) -> None:
+    """Report a file that was written.
+
+    Args:
+        target: the file.
+        contents: what it holds, in words.
+        data: the same for JSON.
+        notes: of its making.
+        as_json: True to print one JSON object.
+        quiet: True to print nothing else.
+    """
+    byte_count = target.stat().st_size
+    if as_json:
+        about = {"file": str(target), "size_bytes": byte_count}
+        print_json({**about, **data, "notes": list(notes)})
+    elif not quiet:
+        items(messages(), notes)
+        say(output(), f"{target} written ({size(byte_count)}): {contents}", whole=True)
 
 
 def print_json(data: Any) -> None:
@@ -207,7 +243,7 @@ def print_json(data: Any) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Data as JSON has it: numpy's numbers and arrays, tuples and paths become plain."""
+    """Data as JSON holds it; numpy's numbers and arrays, tuples and paths are converted."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, float) and not math.isfinite(value):
@@ -229,7 +265,7 @@ def clean(words: str) -> str:
 
 
 def line_of(words: str) -> str:
-    """The same in one line: what a file holds makes no line that looks like one of ours."""
+    """The same in one line: the contents of a file cannot imitate a line of the program."""
     return clean(words.replace("\n", " "))
 
 
@@ -237,10 +273,21 @@ def _escaped(character: str) -> str:
     return " " if character in "\t\r" else character.encode("unicode_escape", "replace").decode()
 
 
+def scene_name(name: str) -> str:
+    """The name of a scene in a heading."""
+    return name or "scene without a name"
+
+
 def count(number: int, word: str, plural: str = "") -> str:
     """A number with its noun: "1 body", "3 bodies"."""
     noun = word if number == 1 else plural or f"{word}s"
     return f"{number:,} {noun}" if number else f"no {plural or word + 's'}"
+
+
+def some(names: Sequence[str], most: int) -> str:
+    """The first of several names, and the number of the others."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
 
 def seconds(duration: float) -> str:
@@ -254,10 +301,12 @@ def seconds(duration: float) -> str:
     return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
 
 
-def size(byte_count: int) -> str:
-    """A size of a file for people."""
-    for unit in ("bytes", "kB", "MB"):
+def size(byte_count: float) -> str:
+    """The size of a file for people."""
+    if byte_count < 1000:
+        return f"{byte_count} bytes"
+    for unit in ("kB", "MB"):
+        byte_count /= 1000
         if byte_count < 1000:
-            return f"{byte_count:.3g} {unit}" if unit != "bytes" else f"{byte_count} bytes"
-        byte_count = byte_count / 1000  # type: ignore[assignment]
-    return f"{byte_count:.3g} GB"
+            return f"{byte_count:.3g} {unit}"
+    return f"{byte_count / 1000:.3g} GB"

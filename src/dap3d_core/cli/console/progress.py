@@ -1,9 +1,9 @@
-"""What a run shows while it works: a bar on a terminal, now and then a line elsewhere."""
+"""Progress of a run: a bar on a terminal, lines at growing intervals otherwise."""
 
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -17,57 +17,50 @@ if TYPE_CHECKING:
     from dap3d_core.simulation import Standing
 
 ONCE = "compiling for the first time; this happens once"
-#: Lines of progress come after this time, then ever more rarely, s.
+#: Time of the first line of progress, and the longest time between two lines, s.
 FIRST_LINE, LONGEST_PAUSE = 1.0, 60.0
-#: Work that has no progress to show is spoken of after this time, s.
+#: Time of the first line about work without progress, s.
 SILENCE = 10.0
-#: Columns beside the live line: the spinner and a gap.
-BESIDE = 2
+#: Columns of the spinner and a gap.
+SPINNER_WIDTH = 2
 
 
 class _Waiting:
-    """Says now and then, elsewhere than on a terminal, that work without progress goes on."""
+    """Reports at growing intervals, from a thread, that work without progress continues."""
 
-    def __init__(self, words: str, tell: Callable[[str], None]) -> None:
-        self._words, self._tell = words, tell
+    def __init__(self, words: str, report: Callable[[str], None]) -> None:
+        self._words, self._report = words, report
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._work, name="dap3d-progress", daemon=True)
         self._thread.start()
 
     def end(self) -> None:
-        """It has ended, or tells of itself from now on; nothing is said after this call."""
+        """End the thread; nothing is printed after this call."""
         self._ended.set()
         self._thread.join()
 
     def _work(self) -> None:
-        begun, pause = time.monotonic(), SILENCE
+        begin, pause = time.monotonic(), SILENCE
         while not self._ended.wait(pause):
-            elapsed = time.monotonic() - begun
-            self._tell(f"{self._words}, for {seconds(elapsed)} so far")
+            elapsed = time.monotonic() - begin
+            self._report(f"{self._words}, for {seconds(elapsed)} so far")
             pause = min(elapsed, LONGEST_PAUSE)
 
 
-class Preparing:
-    """Shows on stderr what is prepared; a context manager.
-
-    ``announce`` is told the names of kernels that are compiled, ``start`` says that the model is
-    ready.
-    """
+class PreparationProgress:
+    """Context manager that shows on stderr the preparation of a model."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._console: Terminal = messages()
         self._quiet = quiet
-        self._bar: Progress | None = None
         self._task: Any = None
-        self._told_once = False
+        self._announced = False
         self._waiting: _Waiting | None = None
         self._next_line = FIRST_LINE
-        live = self._console.file.isatty() and not self._console.is_dumb_terminal
-        if live and not quiet:
-            self._bar = self._display()
+        self._bar = None if quiet or not _is_live(self._console) else self._make_bar()
 
-    def _display(self) -> Progress:
-        """What stands on a terminal: a line that says all in words."""
+    def _make_bar(self) -> Progress:
+        """The line on a terminal: a description in words."""
         columns = SpinnerColumn("line"), TextColumn("{task.description}", markup=False)
         return _transient(*columns, console=self._console)
 
@@ -88,15 +81,21 @@ class Preparing:
             self._bar.stop()
 
     def announce(self, kernel: str) -> None:
-        """A kernel is about to be compiled."""
+        """Show that a kernel is about to be compiled."""
         self._end_waiting()
-        self._tell_once()
-        self._describe(f"compiling {kernel}", line=f"  {kernel}")
+        if not self._announced:
+            self._announced = True
+            self._print(ONCE)
+        if self._bar is not None:
+            self._bar.update(self._task, description=clean(f"compiling {kernel}"))
+        else:
+            self._print(f"  {kernel}")
 
     def start(self) -> None:
-        """The model is ready; its initial conditions are next."""
-        self._describe("starting")
-        if self._bar is None and not self._quiet:
+        """Show that the model is ready; its initial conditions are next."""
+        if self._bar is not None:
+            self._bar.update(self._task, description="starting")
+        elif not self._quiet:
             self._waiting = _Waiting("finding the initial conditions", self._print)
 
     def _end_waiting(self) -> None:
@@ -104,121 +103,121 @@ class Preparing:
             self._waiting.end()
             self._waiting = None
 
-    def _tell_once(self) -> None:
-        if not self._told_once:
-            self._told_once = True
-            self._print(ONCE)
-
-    def _describe(self, words: str, line: str = "") -> None:
+    def _show(self, line: Callable[[int], str], lasting: Callable[[], str], elapsed: float) -> None:
+        """Show progress: a line of a width on the bar, or a printed one if it is time for it."""
         if self._bar is not None:
-            self._bar.update(self._task, description=clean(words))
-        elif line:
-            self._print(line)
-
-    def _print_line(self, words: str, elapsed: float) -> None:
-        """A line of progress, after which there is none for a while."""
-        self._print(words)
-        self._next_line = elapsed + min(max(elapsed, FIRST_LINE), LONGEST_PAUSE)
+            width = self._console.width - SPINNER_WIDTH
+            self._bar.update(self._task, description=line(width))
+        elif not self._quiet and elapsed >= self._next_line:
+            self._print(lasting())
+            self._next_line = elapsed + min(max(elapsed, FIRST_LINE), LONGEST_PAUSE)
 
     def _print(self, words: str) -> None:
         if not self._quiet:
             say(self._console, words)
 
 
-class RunProgress(Preparing):
-    """Shows how far a run is: ``advance`` is told how far the simulated time is."""
+class RunProgress(PreparationProgress):
+    """Shows the progress of a run."""
 
     def __init__(self, *, quiet: bool) -> None:
         super().__init__(quiet=quiet)
-        self._begun: tuple[float, float] | None = None
+        self._begin: tuple[float, float] | None = None
         self._reached = 0.0
 
     def advance(self, run: "Standing") -> None:
-        """The run stands so."""
+        """Show a snapshot of the run."""
         self._end_waiting()
         now = time.monotonic()
-        if self._begun is None or run.t < self._reached:  # a second run begins
-            self._begun, self._next_line = (now, run.t), FIRST_LINE
+        if self._begin is None or run.t < self._reached:  # a second run begins
+            self._begin, self._next_line = (now, run.t), FIRST_LINE
         self._reached = run.t
-        elapsed, done = now - self._begun[0], run.t - self._begun[1]
-        rate = done / elapsed if elapsed > 0.0 else 0.0
-        if self._bar is not None:
-            words = live_line(run, rate, self._console.width - BESIDE)
-            self._bar.update(self._task, description=words)
-        elif not self._quiet and elapsed >= self._next_line and run.t < run.t_end:
-            self._print_line(plain_line(run, rate), elapsed)
+        elapsed, simulated = now - self._begin[0], run.t - self._begin[1]
+        rate = simulated / elapsed if elapsed > 0.0 else 0.0
+        if self._bar is not None or run.t < run.t_end:
+            self._show(
+                lambda width: live_line(run, rate, width), lambda: plain_line(run, rate), elapsed
+            )
 
 
-class PointsProgress(Preparing):
-    """Shows how far a study is: ``count`` is told how many of its points have been run.
+class PointsProgress(PreparationProgress):
+    """Shows the progress of a study.
 
     Attributes:
-        ran: how many were run here.
-        elapsed: seconds that took.
+        ran: points that were run by this command.
+        elapsed: time for them in s.
     """
 
     def __init__(self, *, quiet: bool) -> None:
         super().__init__(quiet=quiet)
-        self._begun: tuple[float, int] | None = None
+        self._begin: tuple[float, int] | None = None
         self.ran, self.elapsed = 0, 0.0
 
     def count(self, done: int, total: int) -> None:
-        """So many of all points are done."""
+        """Show the number of points that are done."""
         now = time.monotonic()
-        if self._begun is None:
-            self._begun = (now, done)
-        self.elapsed, self.ran = now - self._begun[0], done - self._begun[1]
+        if self._begin is None:
+            self._begin = (now, done)
+        self.elapsed, self.ran = now - self._begin[0], done - self._begin[1]
         rate = self.ran / self.elapsed if self.elapsed > 0.0 else 0.0
-        if self._bar is not None:
-            words = points_line(done, total, rate, self._console.width - BESIDE)
-            self._bar.update(self._task, description=words)
-        elif not self._quiet and self.elapsed >= self._next_line and done < total:
-            self._print_line(points_line(done, total, rate), self.elapsed)
+        if self._bar is not None or done < total:
+            self._show(
+                lambda width: points_line(done, total, rate, width),
+                lambda: points_line(done, total, rate),
+                self.elapsed,
+            )
 
 
 def points_line(done: int, total: int, rate: float, width: int = 80) -> str:
-    """How a study stands on one line: the fullest of several forms that fits.
+    """Progress of a study in one line: the longest of several forms that fits.
 
     Args:
         done, total: points.
-        rate: points a second, 0 where it is not known yet.
-        width: columns there are.
+        rate: points a second, 0 if not known yet.
+        width: columns available.
     """
-    part, left = f"{done / total:4.0%}", f"{clock((total - done) / rate) if rate else '-:--'} left"
+    percent, left = f"{done / total:4.0%}", f"{_left(total - done, rate)} left"
     now, pace = f"{done:{len(f'{total:,}')},}", f"{rate:.3g} points/s" if rate else "- points/s"
-    forms = [
-        f"{part}  {now} of {total:,} points  {pace:>13}  {left}",
-        f"{part} {now}/{total:,} {pace} {left}",
-        f"{part} {pace} {left}",
-    ]
-    return next((words for words in forms if len(words) <= width), part)
+    return _longest(
+        (
+            f"{percent}  {now} of {total:,} points  {pace:>13}  {left}",
+            f"{percent} {now}/{total:,} {pace} {left}",
+            f"{percent} {pace} {left}",
+            percent,
+        ),
+        width,
+    )
 
 
 def live_line(run: "Standing", rate: float, width: int) -> str:
-    """How a run stands on one line: the fullest of several forms that fits.
+    """Progress of a run in one line: the longest of several forms that fits.
 
-    Simulated time, step, simulated time in a second of ours, drift of the energy, time left.
-    Numbers keep their widths, so that the line does not jump.
+    Simulated time, step, simulated time per wall time, energy drift, time left. Numbers have fixed
+    widths, so that the line does not jump.
 
     Args:
-        run: how it stands.
-        rate: simulated time over time, 0 where it is not known yet.
-        width: columns there are.
+        run: snapshot of the run.
+        rate: simulated time per wall time, 0 if not known yet.
+        width: columns available.
     """
-    part, end = f"{run.t / run.t_end if run.t_end else 1.0:4.0%}", f"{run.t_end:.4g}"
+    percent, end = f"{run.t / run.t_end if run.t_end else 1.0:4.0%}", f"{run.t_end:.4g}"
     digits = max(0, 3 - math.floor(math.log10(run.t_end or 1.0)))
     now = f"{run.t:{len(f'{run.t_end:.{digits}f}')}.{digits}f}"
     pace = f"{rate:.3g}" if rate else "-"
-    step, drift, left = f"{run.step:.1e}", f"drift {run.drift:.0e}", f"{_left(run, rate)} left"
-    forms = [
-        f"{part}  t = {now} of {end} s  step {run.steps:,}: {step} s  {pace:>5}x real time  "
-        f"{drift}  {left}",
-        f"{part} {now} of {end} s, step {step} s, {pace:>5}x real time, {drift}, {left}",
-        f"{now}/{end} s step {step} {pace:>5}x {drift} {left}",
-        f"{part} {now}/{end} s {pace}x {drift} {left}",
-        f"{part} {left}",
-    ]
-    return next((words for words in forms if len(words) <= width), part[:width])
+    step, drift = f"{run.step:.1e}", f"drift {run.drift:.0e}"
+    left = f"{_left(run.t_end - run.t, rate)} left"
+    return _longest(
+        (
+            f"{percent}  t = {now} of {end} s  step {run.steps:,}: {step} s  {pace:>5}x real time  "
+            f"{drift}  {left}",
+            f"{percent} {now} of {end} s, step {step} s, {pace:>5}x real time, {drift}, {left}",
+            f"{now}/{end} s step {step} {pace:>5}x {drift} {left}",
+            f"{percent} {now}/{end} s {pace}x {drift} {left}",
+            f"{percent} {left}",
+            percent[:width],
+        ),
+        width,
+    )
 
 
 def plain_line(run: "Standing", rate: float) -> str:
@@ -230,31 +229,33 @@ def plain_line(run: "Standing", rate: float) -> str:
     )
 
 
-def _left(run: "Standing", rate: float) -> str:
-    """The time that is left at this rate, as a clock shows it."""
-    return clock((run.t_end - run.t) / rate) if rate else "-:--"
+def _longest(forms: Sequence[str], width: int) -> str:
+    """The first of several forms, from long to short, that fits; else the last one."""
+    return next((form for form in forms if len(form) <= width), forms[-1])
 
 
-def clock(duration: float) -> str:
-    """A time in s as a clock shows it."""
-    minutes, rest = divmod(math.ceil(duration), 60)
+def _left(amount: float, rate: float) -> str:
+    """The time left for an amount of work, as h:mm:ss or m:ss."""
+    if not rate:
+        return "-:--"
+    minutes, rest = divmod(math.ceil(amount / rate), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
 @contextmanager
 def counting(word: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    """Progress by numbers: a bar on a terminal, nothing elsewhere.
+    """Progress by numbers: a bar on a terminal, nothing otherwise.
 
     Args:
         word: what is counted.
-        quiet: whether nothing is shown on a terminal either.
+        quiet: True to show nothing on a terminal either.
 
     Yields:
-        what is to be called with what is done and how much there is in all.
+        function of the number that is done and the total.
     """
     console = messages()
-    if quiet or not console.file.isatty() or console.is_dumb_terminal:
+    if quiet or not _is_live(console):
         yield lambda done, total: None
         return
     with bar_of(console) as bar:
@@ -264,8 +265,13 @@ def counting(word: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
         )
 
 
+def _is_live(console: Terminal) -> bool:
+    """True on a terminal that can redraw a line."""
+    return console.file.isatty() and not console.is_dumb_terminal
+
+
 class _Left(TextColumn):
-    """The estimate of the time that is left, empty as long as there is none."""
+    """The estimated time left; empty while there is no estimate."""
 
     def __init__(self) -> None:
         super().__init__("")
@@ -277,14 +283,13 @@ class _Left(TextColumn):
 
 
 def bar_of(console: Terminal) -> Progress:
-    """Spinner, what is done, bar, percentage, estimate: 60 columns hold it."""
-    narrow = console.width < 50
+    """Spinner, description, bar, percentage, estimate, in 60 columns."""
     columns: list[Any] = [SpinnerColumn("line"), TextColumn("{task.description}", markup=False)]
-    if not narrow:
+    if console.width >= 50:
         columns.append(BarColumn(bar_width=14 if console.width < 72 else 24))
     return _transient(*columns, TaskProgressColumn(), _Left(), console=console)
 
 
 def _transient(*columns: Any, console: Terminal) -> Progress:
-    """Progress that leaves nothing behind on the screen."""
+    """Progress that is erased from the screen at its end."""
     return Progress(*columns, console=console, transient=True, refresh_per_second=8)

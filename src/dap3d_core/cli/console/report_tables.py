@@ -1,4 +1,4 @@
-"""What ``dap3d report`` shows: a bar while it works, tables that 60 columns hold."""
+"""Output of ``dap3d report``: progress of its work, and tables that fit into 60 columns."""
 
 import time
 from typing import TYPE_CHECKING
@@ -11,9 +11,10 @@ from dap3d_core.cli.console.console import (
     clean,
     count,
     facts,
-    items,
     say,
+    scene_name,
     seconds,
+    section,
     show,
     table,
     title,
@@ -23,99 +24,106 @@ from dap3d_core.cli.console.progress import LONGEST_PAUSE, RunProgress, bar_of
 if TYPE_CHECKING:
     from dap3d_core.report import Report, Run
 
-#: From this width on there is room for the counts and the constraints.
+#: Width from which the counts and the constraints are shown.
 WIDE = 76
-#: Errors that settings are named for where no target is given.
+#: Errors for which settings are recommended by default.
 TARGETS = (1e-3, 1e-6, 1e-9)
-#: Seconds between lines of progress where no terminal is.
+#: Time to the first line of progress without a terminal, s.
 PAUSE = 5.0
 
 
 class ReportProgress(RunProgress):
-    """Shows how much of a report's work is done, on stderr."""
+    """Shows the progress of a report on stderr."""
 
     def __init__(self, *, quiet: bool) -> None:
         super().__init__(quiet=quiet)
-        self._told = time.monotonic()
+        self._last_line = time.monotonic()
         self._pause = PAUSE
 
-    def _display(self) -> Progress:
+    def _make_bar(self) -> Progress:
         return bar_of(self._console)
 
     def work(self, done: float, total: float, words: str) -> None:
-        """Of ``total`` seconds of work, ``done`` are over; what is going on."""
+        """Show that ``done`` of ``total`` seconds of work are over, and the current work."""
         if self._bar is not None:
             shown = clean(words)[: max(12, self._console.width - 44)]
-            if total > done:  # of a part, as a changing total would make rich forget its estimate
+            if total > done:  # as a fraction: rich drops its estimate when a total changes
                 self._bar.update(self._task, total=1.0, completed=done / total, description=shown)
             else:
                 self._bar.update(self._task, description=shown)
-        elif time.monotonic() - self._told > self._pause:
-            self._told = time.monotonic()
+        elif time.monotonic() - self._last_line > self._pause:
+            self._last_line = time.monotonic()
             self._pause = min(2.0 * self._pause, LONGEST_PAUSE)
             left = f", about {seconds(total - done)} left" if total > done else ""
             self._print(f"{words}{left}")
 
 
-def show_report(console: Terminal, found: "Report", command: str, *, with_target: bool) -> None:
-    """A whole report: what was run, the reference, the runs by series, what to take.
+def show_report(console: Terminal, report: "Report", command: str, *, with_target: bool) -> None:
+    """Print a report: reference, runs by method and integrator, failures, recommendations.
 
     Args:
         console: where.
-        found: the report.
-        command: what runs the model, to which the flags of a setting are added.
-        with_target: whether an error was asked for.
+        report: of the measurements.
+        command: runs the model, once the flags of a setting are appended.
+        with_target: True if a target error is given.
     """
-    words = "" if found.status == "done" else f": {found.status}"
-    title(console, f"speed against error: {found.scene or 'scene without a name'}{words}")
+    status = "" if report.status == "done" else f": {report.status}"
+    title(console, f"speed against error: {scene_name(report.scene)}{status}")
     facts(
         console,
         [
-            ("simulated", f"t = 0 to {found.t_end:g} s, reported every {found.dt:g} s"),
-            ("reference", _reference(found)),
-            ("uncertainty", _uncertainty(found)),
-            ("expected", _expected(found)),
+            ("simulated", f"t = 0 to {report.t_end:g} s, reported every {report.dt:g} s"),
+            ("reference", _reference(report)),
+            ("uncertainty", _uncertainty(report)),
+            ("expected", _expected(report)),
         ],
     )
-    for method, integrator in dict.fromkeys((r.method, r.integrator) for r in found.runs):
-        runs = [r for r in found.runs if (r.method, r.integrator) == (method, integrator)]
+    for method, integrator in dict.fromkeys((r.method, r.integrator) for r in report.runs):
         title(console, f"{method}, {integrator}")
+        runs = [r for r in report.runs if (r.method, r.integrator) == (method, integrator)]
         _show_runs(console, runs)
-    if found.runs:
-        words = "* no faster run has a smaller error"
-        if any(run.below_uncertainty for run in found.runs):
-            words += "; < below the uncertainty of the reference"
-        say(console, words)
-    _show_failures(console, found)
-    if found.notes or found.reference.notes:
-        title(console, "notes")
-        items(console, (*found.reference.notes, *found.notes))
-    _show_recommended(console, found, command, with_target=with_target)
+    if report.runs:
+        legend = "* no faster run has a smaller error"
+        if any(run.below_uncertainty for run in report.runs):
+            legend += "; < below the uncertainty of the reference"
+        say(console, legend)
+    failed = [f"{each.setting}: {each.reason}" for each in report.failed]
+    section(console, "settings that gave no result", failed, "red")
+    refused = [f"{each.method}: {each.reason}" for each in report.refused]
+    section(console, "methods that do not fit", refused)
+    section(console, "notes", (*report.reference.notes, *report.notes))
+    title(console, "recommended")
+    for target in (None,) if with_target else TARGETS:
+        advice = report.recommended(target)
+        say(console, f"for an error of {advice.target_error:g}: {advice.reason}", indent=2)
+        if advice.flags:
+            say(console, f"{command} {advice.flags}", "green", indent=4, whole=True)
 
 
-def _reference(found: "Report") -> str:
-    first, *second = found.reference.settings
+def _reference(report: "Report") -> str:
+    first, *second = report.reference.settings
     return str(first) + (f"; compared with {second[0]}" if second else "; a single run")
 
 
-def _uncertainty(found: "Report") -> str:
-    reference = found.reference
+def _uncertainty(report: "Report") -> str:
+    reference = report.reference
     if reference.uncertainty is None:
         return "not known"
-    words = f"{reference.uncertainty:.1e}, the difference of the two"
+    text = f"{reference.uncertainty:.1e}, the difference of the two"
     if reference.meaningless_from is not None:
-        words += f" up to t = {reference.t[-1]:.6g} s; later they part, and errors mean nothing"
-    return words
+        last = f"{reference.t[-1]:.6g} s"
+        text += f" up to t = {last}; later they diverge, and errors are meaningless"
+    return text
 
 
-def _expected(found: "Report") -> str:
-    expected = found.reference.expected
+def _expected(report: "Report") -> str:
+    expected = report.reference.expected
     if expected is None:
         return ""
     verdict = "within" if expected.within else "NOT within"
-    numbers = count(expected.count, "independent value")
+    values = count(expected.count, "independent value")
     return (
-        f"{numbers} of expected.toml, largest deviation {expected.deviation:.1e}, {verdict} the "
+        f"{values} of expected.toml, largest deviation {expected.deviation:.1e}, {verdict} the "
         "tolerances there"
     )
 
@@ -130,36 +138,12 @@ def _show_runs(console: Terminal, runs: "list[Run]") -> None:
 
 
 def _row(run: "Run", *, wide: bool) -> list[str | Text]:
-    error = f"{'<' if run.below_uncertainty else ''}{run.error:.1e}"
-    cells: list[str | Text] = [
+    return [
         Text("*" if run.on_front else "", style="bold green"),
         run.setting.control,
         seconds(run.time_s),
-        error,
+        f"{'<' if run.below_uncertainty else ''}{run.error:.1e}",
         f"{run.energy_error:.1e}",
+        *([f"{run.constraint_error:.0e}", f"{run.counts['steps']:,}"] if wide else []),
+        f"{run.counts['rhs']:,}",
     ]
-    rhs = f"{run.counts['rhs']:,}"
-    if not wide:
-        return [*cells, rhs]
-    return [*cells, f"{run.constraint_error:.0e}", f"{run.counts['steps']:,}", rhs]
-
-
-def _show_failures(console: Terminal, found: "Report") -> None:
-    if found.failed:
-        title(console, "settings that gave no result")
-        items(console, [f"{each.setting}: {each.reason}" for each in found.failed], "red")
-    if found.refused:
-        title(console, "methods that do not fit")
-        items(console, [f"{each.method}: {each.reason}" for each in found.refused])
-
-
-def _show_recommended(
-    console: Terminal, found: "Report", command: str, *, with_target: bool
-) -> None:
-    title(console, "what to take")
-    targets = (None,) if with_target else TARGETS
-    for target in targets:
-        advice = found.recommended(target)
-        say(console, f"for an error of {advice.target_error:g}: {advice.reason}", indent=2)
-        if advice.flags:
-            say(console, f"{command} {advice.flags}", "green", indent=4, whole=True)

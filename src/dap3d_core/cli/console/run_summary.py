@@ -1,104 +1,269 @@
-"""The facts of a run, rendered: 60 columns hold them."""
+"""Summary of a run, as JSON data and as text: for ``run``, ``resume``, ``info`` and ``check``.
 
-from typing import Any
+60 columns are wide enough for all of it.
+"""
 
+import shlex
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
 from rich.text import Text
 
 from dap3d_core.cli.console.console import (
     Terminal,
     count,
+    facts,
     items,
+    messages,
+    output,
+    plain,
+    print_json,
     say,
+    scene_name,
     seconds,
+    section,
     show,
+    size,
     table,
     title,
 )
-from dap3d_core.cli.console.run_facts import reason_of, remarks_of, violations_of
+from dap3d_core.cli.process import exit_codes
 
-#: Events that a summary shows.
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dap3d_core.cli.framework.execute import Outcome
+    from dap3d_core.result import Occurrence, Result
+
+#: Events that are printed.
 MOST_EVENTS = 6
+#: Bodies whose corrected initial conditions are printed, those that were changed most.
+MOST_BODIES = 5
+#: Smaller changes, relative for numbers larger than one, are not printed.
+PRINTED = 1e-9
+#: Smaller changes are rounding.
+CHANGED = 1e-12
 
 
-def run_pairs(found: dict[str, Any]) -> list[tuple[str, str]]:
-    """What was modelled, how it was solved, what it cost: names and words."""
+# ---------------------------------------------------------------------------- data
+
+
+def run_data(result: "Result") -> dict[str, Any]:
+    """The summary of a result as data."""
+    subject = result.subject
+    instants = len(result.t)
+    dof = 6 * subject.body_count - result.settings.get("rank", subject.row_count)
+    return {
+        "scene": result.record.title,
+        "status": result.status,
+        "bodies": subject.body_count,
+        "joints": len(subject.joint_names),
+        "rows": subject.row_count,
+        "dof": dof,
+        "points": len(subject.point_names),
+        "method": result.method,
+        "integrator": result.integrator,
+        "settings": result.settings,
+        "instants": instants,
+        "t_start": float(result.t[0]) if instants else None,
+        "t_end": float(result.t[-1]) if instants else None,
+        **attrs.asdict(result.stats),
+        "error_estimate": _error_estimate(result),
+        "events": [_event(event) for event in result.events],
+        "ledger": {name: attrs.asdict(entry) for name, entry in result.ledger.items()},
+        "notes": result.notes,
+        "versions": result.versions,
+    }
+
+
+def _event(event: "Occurrence") -> dict[str, Any]:
+    """An event record without its state, with its text."""
+    data = attrs.asdict(event, filter=lambda field, _: field.name != "u")
+    return {**data, "text": event.words}
+
+
+def _error_estimate(result: "Result") -> dict[str, Any] | None:
+    """The largest estimated errors by symbol, and the time from which they are meaningless."""
+    error = result.error
+    if error is None:
+        return None
+    return {**error.largest, "meaningless_from": error.meaningless_from, "tenfold": error.tenfold}
+
+
+def _split_notes(data: dict[str, Any]) -> tuple[str, list[str]]:
+    """The reason of the choice of the method, and the other notes."""
+    choice = f"method {data['method']}: "
+    reasons = [n.removeprefix(choice) for n in data["notes"] if n.startswith(choice)]
+    return reasons[0] if reasons else "", [n for n in data["notes"] if not n.startswith(choice)]
+
+
+def _warnings(data: dict[str, Any]) -> list[str]:
+    """The notes that report a change of the request; others are information."""
+    from dap3d_core.result import INFORMATION
+
+    return [n for n in _split_notes(data)[1] if not n.startswith(INFORMATION)]
+
+
+def _violations(data: dict[str, Any]) -> list[str]:
+    """The entries of the ledger that are beyond their limits."""
     return [
-        ("modelled", modelled(found)),
-        ("method", method(found)),
-        ("integrator", integrator(found)),
-        ("simulated", simulated(found)),
-        ("steps", f"{found['steps']:,} taken, {found['rejected']:,} rejected"),
-        ("evaluations", evaluations(found)),
-        ("duration", duration(found)),
-        ("error", error_estimate(found)),
+        f"{name} is {e['value']:.2g}, its limit {e['limit']:.2g}: {e['text']}"
+        for name, e in data["ledger"].items()
+        if e["ok"] is False
     ]
 
 
-def show_ledger(console: Terminal, found: dict[str, Any]) -> None:
-    """The ledger as a table; what is beyond its limit is explained."""
-    if not found["ledger"]:
-        return
-    title(console, "ledger")
-    rows = []
-    for name, entry in found["ledger"].items():
-        limit = "-" if entry["limit"] is None else f"{entry['limit']:.1e}"
-        rows.append((name, f"{entry['value']:.1e}", limit, _verdict(entry["ok"])))
-    columns = ("quantity", "value", "limit", "ok")
-    show(console, table(columns, rows, right=(1, 2), fixed=(0, 1, 2, 3)))
-    items(console, violations_of(found), "red")
+def correction_data(
+    names: Sequence[str], given: "NDArray[np.float64]", u: "NDArray[np.float64]"
+) -> dict[str, Any]:
+    """The correction of initial conditions as data.
+
+    Args:
+        names: of the bodies.
+        given: (13 n,) the state of the scene.
+        u: (13 n,) the state from which a run starts.
+
+    Returns:
+        changed: True if anything was; changed_bodies: names of the bodies with printable changes;
+        most_changed: those of them that are printed; bodies: name -> r, p, r_dot, w of all.
+    """
+    import numpy as np
+
+    from dap3d_core.model.rotations import split
+
+    change = np.abs(u - given) / (1.0 + np.abs(given))
+    parts = split(change, len(names))
+    largest = np.max([np.max(part, axis=1) for part in parts], axis=0)
+    most = np.argsort(-largest, kind="stable")[:MOST_BODIES]
+    arrays = dict(zip(("r", "p", "r_dot", "w"), split(u, len(names)), strict=True))
+    return {
+        "changed": bool(np.any(change > CHANGED)),
+        "changed_bodies": [n for n, x in zip(names, largest, strict=True) if x > PRINTED],
+        "most_changed": [names[k] for k in most if largest[k] > PRINTED],
+        "bodies": {
+            name: {symbol: plain(values[k]) for symbol, values in arrays.items()}
+            for k, name in enumerate(names)
+        },
+    }
 
 
-def show_notes(console: Terminal, notes: list[str]) -> None:
-    """Notes as a list, under a heading."""
-    if notes:
-        title(console, "notes")
-        items(console, notes)
+def _correction(outcome: "Outcome") -> dict[str, Any] | None:
+    """The correction of a run; None if there was none to make."""
+    result = outcome.result
+    if not (result.settings.get("correct") and result.subject.row_count and len(result.t)):
+        return None
+    first = result.arrays.part(slice(1)).u[0]
+    return correction_data(result.subject.body_names, outcome.compiled.model.u0, first)
 
 
-def show_events(console: Terminal, found: dict[str, Any]) -> None:
-    """What happened at instants that were located: the first few, and how many more."""
-    events = [event["text"] for event in found["events"]]
-    if events:
-        title(console, "events")
-        items(console, events[:MOST_EVENTS])
-        if len(events) > MOST_EVENTS:
-            say(console, f"and {len(events) - MOST_EVENTS} more", indent=2)
+# ---------------------------------------------------------------------------- a finished run
 
 
-def show_remarks(console: Terminal, found: dict[str, Any]) -> None:
-    """The notes of a run besides the choice of its method."""
-    show_notes(console, remarks_of(found))
+def report_run(
+    outcome: "Outcome", model: str, target: Path, *, strict: bool, as_json: bool, quiet: bool
+) -> int:
+    """Report a run that was saved; returns the exit code."""
+    data = run_data(outcome.result)
+    initial = _correction(outcome)
+    violations = _violations(data)
+    code = outcome.code
+    if strict and code == exit_codes.DONE and (violations or _warnings(data)):
+        code = exit_codes.FAILED
+    if as_json:
+        about = {"model": model, "file": str(target), **data, "initial": initial}
+        checkpoint = str(outcome.checkpoint) if outcome.checkpoint else None
+        end = {"reason": outcome.reason, "checkpoint": checkpoint, "exit_code": code}
+        print_json(about | end)
+    elif not quiet:
+        _show_run(outcome, data, initial, target)
+    if quiet and not as_json:
+        items(messages(), violations, "red")
+    if outcome.reason:
+        _show_early_end(outcome, target)
+    if code != outcome.code:
+        say(messages(), "--strict: there are warnings, or the ledger does not close; exit code 1")
+    return code
 
 
-def modelled(found: dict[str, Any]) -> str:
-    """Bodies, joints, rows, freedoms."""
-    words = count(found["bodies"], "body", "bodies")
-    if found["joints"]:
-        rows = count(found["rows"], "row")
-        words += f", {count(found['joints'], 'joint')} ({rows})"
-    dof = count(found["dof"], "degree").replace("no degrees", "0 degrees")
-    return f"{words}; {dof} of freedom"
+def _show_run(
+    outcome: "Outcome", data: dict[str, Any], initial: dict[str, Any] | None, target: Path
+) -> None:
+    console = output()
+    name = scene_name(data["scene"])
+    title(console, name if data["status"] == "done" else f"{name}: {data['status']}")
+    if outcome.compiled.scene.description:
+        say(console, str(outcome.compiled.scene.description), indent=2)
+    facts(console, run_pairs(data))
+    if initial is not None:
+        show_correction(console, initial)
+    show_details(console, data)
+    say(console, f"{target} written ({size(target.stat().st_size)}). Next:", whole=True)
+    file = shlex.quote(str(target))
+    quantity = shlex.quote(f"{outcome.result.subject.body_names[0]}.r")
+    commands = (f"plot {file} {quantity}", f"view {file} --open", f"animate {file}", f"info {file}")
+    for command in commands:
+        say(console, f"dap3d {command}", "green", indent=2, whole=True)
 
 
-def method(found: dict[str, Any]) -> str:
-    """The formulation and why."""
-    reason = reason_of(found)
-    return f"{found['method']}: {reason}" if reason else str(found["method"])
+def _show_early_end(outcome: "Outcome", target: Path) -> None:
+    console = messages()
+    say(console, outcome.reason, "bold red")
+    last = f"t = {outcome.result.t[-1]:.6g} s"
+    say(console, f"what was computed until then, up to {last}, is in {target}")
+    if outcome.checkpoint is not None:
+        say(console, "to continue from there:")
+        command = f"dap3d resume {shlex.quote(str(outcome.checkpoint))}"
+        say(console, command, "green", indent=2, whole=True)
 
 
-def integrator(found: dict[str, Any]) -> str:
-    """The integrator and what controls it."""
-    settings = found["settings"]
+# ---------------------------------------------------------------------------- text
+
+
+def run_pairs(data: dict[str, Any]) -> list[tuple[str, str]]:
+    """Model, method and cost of a run: names and texts."""
+    reason = _split_notes(data)[0]
+    rhs, projections = f"{data['rhs']:,} of the right-hand side", ""
+    if data["rows"]:
+        projections = f", {count(data['projections'], 'projection')}"
+    wall, preparation = seconds(data["wall_time_s"]), seconds(data["compile_time_s"])
+    return [
+        ("modelled", _modelled(data)),
+        ("method", f"{data['method']}: {reason}" if reason else str(data["method"])),
+        ("integrator", _integrator(data)),
+        ("simulated", _simulated(data)),
+        ("steps", f"{data['steps']:,} taken, {data['rejected']:,} rejected"),
+        ("evaluations", rhs + projections),
+        ("duration", f"{wall}; to prepare {preparation}"),
+        ("error", _error_text(data["error_estimate"])),
+    ]
+
+
+def _modelled(data: dict[str, Any]) -> str:
+    text = count(data["bodies"], "body", "bodies")
+    if data["joints"]:
+        text += f", {count(data['joints'], 'joint')} ({count(data['rows'], 'row')})"
+    return f"{text}; {degrees_of_freedom(data['dof'])}"
+
+
+def degrees_of_freedom(number: int) -> str:
+    """Degrees of freedom in words."""
+    return count(number, "degree").replace("no degrees", "0 degrees") + " of freedom"
+
+
+def _integrator(data: dict[str, Any]) -> str:
+    """The integrator, and the control of its step."""
+    settings = data["settings"]
+    text = str(data["integrator"])
     if settings.get("step"):
-        control = f"steps of {settings['step']:g} s"
+        text += f", steps of {settings['step']:g} s"
     elif settings.get("rtol") is not None:
-        control = f"rtol {settings['rtol']:g}, atol {_atol(settings['atol'])}"
-    else:
-        control = ""
-    words = ", ".join(w for w in (str(found["integrator"]), control) if w)
-    if found["rows"]:
-        words += ", projected" if settings.get("project") else ", not projected"
-    return words
+        text += f", rtol {settings['rtol']:g}, atol {_atol(settings['atol'])}"
+    if data["rows"]:
+        text += ", projected" if settings.get("project") else ", not projected"
+    return text
 
 
 def _atol(atol: Any) -> str:
@@ -107,67 +272,78 @@ def _atol(atol: Any) -> str:
     return f"{atol:g}"
 
 
-def simulated(found: dict[str, Any]) -> str:
-    """The time span and the number of instants."""
-    if not found["instants"]:
+def _simulated(data: dict[str, Any]) -> str:
+    """The time span and the number of reported instants."""
+    if not data["instants"]:
         return "nothing"
-    span = f"t = {found['t_start']:g} to {found['t_end']:.6g} s"
-    if found["t_start"] == found["t_end"]:
-        span = f"t = {found['t_start']:g} s"
-    return f"{span}, {count(found['instants'], 'instant')} reported"
+    span = f"t = {data['t_start']:g} to {data['t_end']:.6g} s"
+    if data["t_start"] == data["t_end"]:
+        span = f"t = {data['t_start']:g} s"
+    return f"{span}, {count(data['instants'], 'instant')} reported"
 
 
-def evaluations(found: dict[str, Any]) -> str:
-    """Right-hand sides and projections."""
-    words = f"{found['rhs']:,} of the right-hand side"
-    return words + (f", {count(found['projections'], 'projection')}" if found["rows"] else "")
-
-
-def duration(found: dict[str, Any]) -> str:
-    """Wall time of the run and of what came before."""
-    return f"{seconds(found['wall_time_s'])}; to prepare {seconds(found['compile_time_s'])}"
-
-
-def error_estimate(found: dict[str, Any]) -> str:
-    """The largest estimated errors; "" where none were asked for."""
-    error = found["error_estimate"]
+def _error_text(error: dict[str, Any] | None) -> str:
+    """The largest estimated errors; "" without an estimate."""
     if error is None:
         return ""
-    words = (
+    text = (
         f"estimated, at most {error['r']:.1e} m and {error['rd']:.1e} m/s of mass centres, "
         f"{error['p']:.1e} of Euler parameters, {error['w']:.1e} rad/s; no bound"
     )
-    when = error["meaningless_from"]
-    if when is None:
-        return words
-    words = f"{words}. From t = {when:.6g} s on beyond 1e-3 of the size: no longer meaningful"
-    tenfold = error["tenfold"]
-    return words if tenfold is None else f"{words}; until then tenfold every {tenfold:.3g} s"
+    if error["meaningless_from"] is None:
+        return text
+    text += f". From t = {error['meaningless_from']:.6g} s on beyond 1e-3 of the size: no longer "
+    text += "meaningful"
+    if error["tenfold"] is None:
+        return text
+    return f"{text}; until then tenfold every {error['tenfold']:.3g} s"
 
 
-def _verdict(ok: bool | None) -> Text:
-    if ok is None:
-        return Text("-")
-    return Text("yes", style="green") if ok else Text("NO", style="bold red")
+def show_details(console: Terminal, data: dict[str, Any]) -> None:
+    """Print events, ledger and notes of a run, but for the choice of its method."""
+    events = [event["text"] for event in data["events"]]
+    section(console, "events", events[:MOST_EVENTS])
+    if len(events) > MOST_EVENTS:
+        say(console, f"and {len(events) - MOST_EVENTS} more", indent=2)
+    if data["ledger"]:
+        _show_ledger(console, data)
+    section(console, "notes", _split_notes(data)[1])
 
 
-def show_state(console: Terminal, title_words: str, bodies: dict[str, Any]) -> None:
-    """Coordinates and velocities of bodies, as the manual reports them.
+def _show_ledger(console: Terminal, data: dict[str, Any]) -> None:
+    title(console, "ledger")
+    verdicts = {None: Text("-"), True: Text("yes", "green"), False: Text("NO", "bold red")}
+    rows = [
+        (name, f"{e['value']:.1e}", "-" if e["limit"] is None else f"{e['limit']:.1e}",
+         verdicts[e["ok"]])
+        for name, e in data["ledger"].items()
+    ]  # fmt: skip
+    columns = ("quantity", "value", "limit", "ok")
+    show(console, table(columns, rows, right=(1, 2), fixed=(0, 1, 2, 3)))
+    items(console, _violations(data), "red")
 
-    Args:
-        console: where.
-        title_words: the heading.
-        bodies: name -> {"r": 3, "p": 4, "r_dot": 3, "w": 3 numbers}.
-    """
-    title(console, title_words)
+
+def show_correction(console: Terminal, initial: dict[str, Any]) -> None:
+    """Print the initial conditions of the bodies that were changed, as the manual reports them."""
+    if not initial["changed"]:
+        say(console, "initial conditions: they fulfil the constraints, nothing was changed")
+        return
+    changed, printed = initial["changed_bodies"], initial["most_changed"]
+    if not changed:
+        say(console, f"initial conditions: corrected by less than {PRINTED:g}")
+        return
+    title(console, "corrected initial conditions (SI, global axes)")
     say(console, _line("", ["x, e0", "y, e1", "z, e2", "e3"]))
-    for name, state in bodies.items():
+    for name in printed:
         say(console, name, "cyan", indent=2)
-        for symbol, values in state.items():
-            say(console, _line(symbol, [_short(x) for x in values]))
+        for symbol, values in initial["bodies"][name].items():
+            say(console, _line(symbol, map(_short, values)))
+    if len(changed) > len(printed):
+        more = count(len(changed) - len(printed), "body", "bodies")
+        say(console, f"and {more} more, changed less; --json prints all", indent=2)
 
 
-def _line(symbol: str, words: list[str]) -> str:
+def _line(symbol: str, words: Iterable[str]) -> str:
     """A row of at most 53 columns."""
     return f"    {symbol:5}" + "".join(f"{word:>11}" for word in words)
 

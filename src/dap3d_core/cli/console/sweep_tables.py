@@ -1,9 +1,19 @@
-"""What is said of a sweep: how its points ended, the extremes of its outputs, what failed."""
+"""Summary of a sweep: status of its points, extremes of its outputs, failures."""
 
 import json
 from typing import TYPE_CHECKING, Any
 
-from dap3d_core.cli.console.console import Terminal, facts, items, say, seconds, show, table, title
+from dap3d_core.cli.console.console import (
+    Terminal,
+    facts,
+    items,
+    say,
+    scene_name,
+    seconds,
+    show,
+    table,
+    title,
+)
 from dap3d_core.result.file.lazy_arrays import LARGE
 
 if TYPE_CHECKING:
@@ -11,13 +21,16 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
-#: Points that went wrong which are listed, and which JSON holds.
+#: Failed points that are printed, and that JSON holds.
 LISTED, MOST_FAILING = 10, 1000
-WORDS = {2: "stopped", 3: "failed"}
+#: Status of a failed point -> word.
+FAILURES = {2: "stopped", 3: "failed"}
+#: Status -> its text in the summary.
+COUNTS = {"done": "done", "stopped": "stopped early", "failed": "failed", "open": "not run"}
 
 
-def sweep_facts(dataset: "xarray.Dataset") -> dict[str, Any]:
-    """What there is to say of a sweep, as JSON has it."""
+def sweep_data(dataset: "xarray.Dataset") -> dict[str, Any]:
+    """The summary of a sweep as data."""
     import numpy as np
 
     status = dataset["status"].values
@@ -32,9 +45,9 @@ def sweep_facts(dataset: "xarray.Dataset") -> dict[str, Any]:
         "seed": about.get("seed"),
         "varied": json.loads(about["varied"]),
         "outputs": [
-            _output(dataset, one)
-            for one in json.loads(about["outputs"])
-            if one["name"] in dataset.variables
+            _output(dataset, output)
+            for output in json.loads(about["outputs"])
+            if output["name"] in dataset.variables
         ],
         "failing": _failing(dataset, status),
         "versions": json.loads(about["versions"]),
@@ -42,20 +55,20 @@ def sweep_facts(dataset: "xarray.Dataset") -> dict[str, Any]:
 
 
 def _output(dataset: "xarray.Dataset", about: dict[str, str]) -> dict[str, Any]:
-    """An output with its least and greatest value, and the points where they are."""
+    """An output with its extremes and the points where they occur."""
     variable = dataset[about["name"]]
-    found: dict[str, Any] = dict(about)
+    data: dict[str, Any] = dict(about)
     for word, (value, index) in _extremes(variable).items():
-        found[word] = value
-        found[f"at_{word}"] = None if index is None else _where(dataset, variable.dims, index)
-    return found
+        data[word] = value
+        data[f"at_{word}"] = None if index is None else _point(dataset, variable.dims, index)
+    return data
 
 
 def _extremes(variable: "xarray.DataArray") -> dict[str, tuple[Any, Any]]:
-    """Least and greatest value, and where they are, found block by block; None for none."""
+    """Minimum and maximum with their indices, read block by block; None if there are none."""
     import numpy as np
 
-    found: dict[str, tuple[Any, Any]] = {"min": (None, None), "max": (None, None)}
+    extremes: dict[str, tuple[Any, Any]] = {"min": (None, None), "max": (None, None)}
     rows = len(variable)
     step = max(1, LARGE * rows // max(variable.nbytes, 1))
     for first in range(0, rows, step):
@@ -64,63 +77,63 @@ def _extremes(variable: "xarray.DataArray") -> dict[str, tuple[Any, Any]]:
             continue
         for word, place in (("min", np.nanargmin(values)), ("max", np.nanargmax(values))):
             row, *rest = np.unravel_index(place, values.shape)
-            value, best = float(values.flat[place]), found[word][0]
+            value, best = float(values.flat[place]), extremes[word][0]
             if best is None or (value < best if word == "min" else value > best):
-                found[word] = value, (int(row) + first, *map(int, rest))
-    return found
+                extremes[word] = value, (int(row) + first, *map(int, rest))
+    return extremes
 
 
-def _where(
+def _point(
     dataset: "xarray.Dataset", dimensions: tuple[Any, ...], index: tuple[int, ...]
 ) -> dict[str, Any]:
-    """The values of the numbers, and the time, at an index."""
+    """The values of the parameters, and the time, at an index."""
     places = dict(zip(dimensions, index, strict=True))
-    found: dict[str, Any] = {"point": places["point"]} if "point" in places else {}
+    point: dict[str, Any] = {"point": places["point"]} if "point" in places else {}
     for name, coordinate in dataset.coords.items():
         if set(coordinate.dims) <= places.keys():
             place = tuple(places[dimension] for dimension in coordinate.dims)
-            found[str(name)] = float(coordinate.values[place])
-    return found
+            point[str(name)] = float(coordinate.values[place])
+    return point
 
 
 def _failing(dataset: "xarray.Dataset", status: "NDArray[np.int8]") -> list[dict[str, Any]]:
-    """The first points that went wrong."""
+    """The first points that stopped early or failed."""
     import numpy as np
 
-    found = []
+    failing = []
     for row in np.argwhere(status >= 2)[:MOST_FAILING]:
         index = tuple(map(int, row))
-        at = _where(dataset, dataset["status"].dims, index)
+        at = _point(dataset, dataset["status"].dims, index)
         note = str(dataset["note"][index].values)
-        found.append({"at": at, "status": WORDS[min(int(status[index]), 3)], "note": note})
-    return found
+        failing.append({"at": at, "status": FAILURES[min(int(status[index]), 3)], "note": note})
+    return failing
 
 
-def show_sweep(console: Terminal, found: dict[str, Any], name: str = "") -> None:
-    """Print what there is to say of a sweep.
+def show_sweep(console: Terminal, data: dict[str, Any], file: str = "") -> None:
+    """Print the summary of a sweep.
 
     Args:
         console: where.
-        found: as ``sweep_facts`` has it, perhaps with ``wall_time_s`` and ``points_per_second``.
-        name: file that holds it.
+        data: of ``sweep_data``, perhaps with ``wall_time_s`` and ``points_per_second``.
+        file: that holds the sweep.
     """
-    total = found["points"]
-    words = found["model"] or "scene without a name"
-    title(console, f"{words}: {total:,} {'point' if total == 1 else 'points'}")
-    counts = [f"{found[key]:,} {said}" for key, said in _COUNTS.items() if found[key]]
+    total = data["points"]
+    title(console, f"{scene_name(data['model'])}: {total:,} {'point' if total == 1 else 'points'}")
+    rate = data.get("points_per_second")
+    time = f"{seconds(data['wall_time_s'])}, {rate:.3g} points/s" if rate else ""
     facts(
         console,
         [
-            ("points", ", ".join(counts)),
-            ("design", _design(found)),
-            *((f"{v['name']}", _spec(v["spec"])) for v in found["varied"]),
-            ("time", _time(found)),
-            ("file", name),
+            ("points", ", ".join(f"{data[k]:,} {text}" for k, text in COUNTS.items() if data[k])),
+            ("design", _design(data)),
+            *((f"{v['name']}", _values(v["spec"])) for v in data["varied"]),
+            ("time", time),
+            ("file", file),
         ],
     )
     rows = [
-        (label if word == "min" else "", word, f"{one[word]:.6g}", at_words(one[f"at_{word}"]))
-        for one in found["outputs"]
+        (label if word == "min" else "", word, f"{one[word]:.6g}", _in_words(one[f"at_{word}"]))
+        for one in data["outputs"]
         for label in [one["name"] + (f" [{one['unit']}]" if one["unit"] not in ("", "1") else "")]
         for word in ("min", "max")
         if one[word] is not None
@@ -129,47 +142,32 @@ def show_sweep(console: Terminal, found: dict[str, Any], name: str = "") -> None
         show(console, table(("output", "", "value", "where"), rows, right=(2,), fixed=(1, 2)))
 
 
-_COUNTS = {
-    "done": "done",
-    "stopped": "stopped early",
-    "failed": "failed",
-    "open": "not run",
-}
-
-
-def show_failing(console: Terminal, found: dict[str, Any], others: str) -> None:
-    """Print the first points that went wrong, and how to see the others."""
-    failing = found["failing"]
+def show_failing(console: Terminal, data: dict[str, Any], others: str) -> None:
+    """Print the first failed points, and how to list the others."""
+    failing = data["failing"]
     if not failing:
         return
-    count = found["stopped"] + found["failed"]
-    say(console, f"{count:,} of {found['points']:,} points went wrong:", "red")
-    items(console, [f"{at_words(f['at'])}: {f['status']}: {f['note']}" for f in failing[:LISTED]])
+    count = data["stopped"] + data["failed"]
+    say(console, f"{count:,} of {data['points']:,} points went wrong:", "red")
+    items(console, [f"{_in_words(f['at'])}: {f['status']}: {f['note']}" for f in failing[:LISTED]])
     if count > LISTED:
         say(console, f"and {count - LISTED:,} more: {others}", whole=True)
 
 
-def at_words(at: dict[str, Any]) -> str:
+def _in_words(at: dict[str, Any]) -> str:
     """A point in words."""
     head = [f"point {at['point']}"] if "point" in at else []
     return ", ".join([*head, *(f"{k} = {v:.6g}" for k, v in at.items() if k != "point")])
 
 
-def _design(found: dict[str, Any]) -> str:
-    if found["seed"] is None:
-        return f"{found['design']} {' x '.join(f'{n:,}' for n in found['shape'])}"
-    return f"{found['design']}, {found['points']:,} samples, seed {found['seed']}"
+def _design(data: dict[str, Any]) -> str:
+    if data["seed"] is None:
+        return f"{data['design']} {' x '.join(f'{n:,}' for n in data['shape'])}"
+    return f"{data['design']}, {data['points']:,} samples, seed {data['seed']}"
 
 
-def _spec(spec: Any) -> str:
-    return (
-        spec
-        if isinstance(spec, str)
-        else ", ".join(f"{x:.6g}" for x in spec[:12]) + (", ..." if len(spec) > 12 else "")
-    )
-
-
-def _time(found: dict[str, Any]) -> str:
-    if not found.get("points_per_second"):
-        return ""
-    return f"{seconds(found['wall_time_s'])}, {found['points_per_second']:.3g} points/s"
+def _values(spec: Any) -> str:
+    """The values of a varied parameter: its form, or a list."""
+    if isinstance(spec, str):
+        return spec
+    return ", ".join(f"{x:.6g}" for x in spec[:12]) + (", ..." if len(spec) > 12 else "")

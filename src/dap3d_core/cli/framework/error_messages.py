@@ -1,4 +1,4 @@
-"""What goes wrong, in words and as an exit code; a traceback only with ``--debug``."""
+"""Error messages with their exit codes; a traceback only with ``--debug``."""
 
 import contextlib
 import os
@@ -11,26 +11,26 @@ from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.streams import leave_stderr
 
 
-def report(error: BaseException, *, debug: bool, as_json: bool) -> int:
-    """Tell what went wrong, on stderr and with ``as_json`` as one JSON object on stdout.
+def report_error(error: BaseException, *, debug: bool, as_json: bool) -> int:
+    """Print an error to stderr and, with ``as_json``, as one JSON object to stdout.
 
     Returns:
         The exit code.
     """
     if debug:
         traceback.print_exception(error, file=sys.stderr)
-    code, words = _judge(error)
+    code, text = _judge(error)
     mistakes = mistakes_of(error)
     if as_json:
-        found: dict[str, Any] = {"error": words, "exit_code": code}
+        data: dict[str, Any] = {"error": text, "exit_code": code}
         with contextlib.suppress(OSError):
-            print_json({"mistakes": mistakes, **found} if mistakes else found)
+            print_json({"mistakes": mistakes, **data} if mistakes else data)
     try:
         console = messages()
         if mistakes:
-            _tell_mistakes(console, error)
+            _show_mistakes(console, error)
         else:
-            say(console, words, "bold red")
+            say(console, text, "bold red")
         if code == exit_codes.FAILED and not debug and _is_unexpected(error):
             say(console, "run the command again with --debug to see where it happened")
     except OSError:  # stderr is closed or full: the exit code remains
@@ -39,26 +39,20 @@ def report(error: BaseException, *, debug: bool, as_json: bool) -> int:
 
 
 def mistakes_of(error: BaseException) -> list[dict[str, Any]]:
-    """The mistakes of a scene as JSON has them; none for other errors."""
+    """The mistakes of a scene as JSON data; empty for other errors."""
     from dap3d_core.scene import MISSING, SceneError
 
     if not isinstance(error, SceneError):
         return []
+    names = ("file", "line", "key", "value", "what", "nearest", "remedy")
     return [
-        {
-            "file": m.file,
-            "line": m.line,
-            "key": m.key,
-            "value": None if m.value is MISSING else plain(m.value),
-            "what": m.what,
-            "nearest": m.nearest,
-            "remedy": m.remedy,
-        }
+        {name: getattr(m, name) for name in names}
+        | {"value": None if m.value is MISSING else plain(m.value)}
         for m in error.mistakes
     ]
 
 
-def _tell_mistakes(console: Terminal, error: Any) -> None:
+def _show_mistakes(console: Terminal, error: Any) -> None:
     number = len(error.mistakes)
     if number > 1:
         say(console, f"{number} mistakes:", "bold red")
@@ -68,13 +62,13 @@ def _tell_mistakes(console: Terminal, error: Any) -> None:
 
 
 def _judge(error: BaseException) -> tuple[int, str]:
-    """Exit code and words for an error."""
+    """Exit code and text of an error."""
     from dap3d_core.interface import PluginError
     from dap3d_core.scene import SceneError
 
     if isinstance(error, KeyboardInterrupt):
-        doing = f" {error}" if str(error) else ""
-        return exit_codes.INTERRUPTED, f"interrupted{doing}; nothing was computed yet"
+        work = f" {error}" if str(error) else ""
+        return exit_codes.INTERRUPTED, f"interrupted{work}; nothing was computed yet"
     if isinstance(error, exit_codes.Terminated):
         return exit_codes.FAILED, f"{error}; nothing was computed yet"
     if isinstance(error, (SceneError, PluginError, exit_codes.Refused)):
@@ -82,20 +76,16 @@ def _judge(error: BaseException) -> tuple[int, str]:
     if isinstance(error, MemoryError):
         return exit_codes.FAILED, "there is not enough memory for this"
     if _is_unexpected(error):
-        words = " ".join(str(error).split())
-        return exit_codes.FAILED, f"unexpected {type(error).__name__}" + (
-            f": {words}" if words else ""
-        )
+        text = " ".join(str(error).split())
+        return exit_codes.FAILED, f"unexpected {type(error).__name__}{text and f': {text}'}"
     if isinstance(error, FileNotFoundError) and _folder_is_gone():
-        return (
-            exit_codes.REFUSED,
-            "the current folder is no longer there; change to another one (cd)",
-        )
-    if part := getattr(error, "part", None):  # a disk that filled up under a run
-        words = f"{error}; what was computed until then is in {part}"
+        text = "the current folder no longer exists; change to another one (cd)"
+        return exit_codes.REFUSED, text
+    if part := getattr(error, "part", None):  # a disk that filled up during a run
+        text = f"{error}; what was computed until then is in {part}"
         if checkpoint := getattr(error, "checkpoint", None):
-            words += f"; once there is room, dap3d resume {checkpoint} goes on with the run"
-        return exit_codes.PARTIAL, words
+            text += f"; once there is room, dap3d resume {checkpoint} continues the run"
+        return exit_codes.PARTIAL, text
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""
         return exit_codes.FAILED, f"cannot read or write: {file}{error.strerror}"
@@ -103,7 +93,7 @@ def _judge(error: BaseException) -> tuple[int, str]:
 
 
 def _folder_is_gone() -> bool:
-    """Whether the folder in which the command was given was removed."""
+    """True if the working folder of the command was removed."""
     try:
         os.getcwd()
     except FileNotFoundError:
@@ -112,12 +102,19 @@ def _folder_is_gone() -> bool:
 
 
 def _is_unexpected(error: BaseException) -> bool:
-    """Whether an error is none of those that the library raises on purpose."""
+    """True if the library does not raise such an error on purpose."""
     if isinstance(error, (OSError, MemoryError, exit_codes.Terminated)):
         return False
-    # Asked without importing it: what is broken may be the library itself.
+    # Looked up, not imported: the broken module may be of the library itself.
     module = sys.modules.get("dap3d_core.simulation.errors")
     return module is None or not isinstance(error, module.SimulationError)
 
 
-__all__ = ["mistakes_of", "report"]
+def type_hint(name: str, names: list[str]) -> str:
+    """The end of a message about an unknown type: how to install it, or the nearest name."""
+    from dap3d_core.registry.declared_types import not_yet_installed
+    from dap3d_core.registry.suggestions import nearest
+
+    near = nearest(name, names)
+    hint = not_yet_installed(name) or (f"did you mean {near!r}?" if near else "")
+    return f"; {hint}" if hint else ""

@@ -1,35 +1,24 @@
-"""The settings of runs as options: for every command that makes runs of a scene."""
+"""Arguments and options of commands, each defined once."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from dap3d_core.cli.framework import completion
+from dap3d_core.cli.framework.command import Option
+
 if TYPE_CHECKING:
     from dap3d_core.scene import Scene, SceneError
 
-#: Settings of a run that the command line overrides, with the options that do.
-SETTINGS = {
-    "t_end": "--t-end",
-    "dt": "--dt",
-    "method": "--method",
-    "integrator": "--integrator",
-    "rtol": "--rtol",
-    "atol": "--atol",
-    "step": "--step",
-    "correct": "--correct",
-    "project": "--project",
-    "correct_metric": "--correct-metric",
-}
 
-
-class _Tolerance(click.ParamType):  # type: ignore[type-arg]
-    """A number, or numbers by quantity."""
+class Tolerance(click.ParamType):  # type: ignore[type-arg]
+    """A number, or numbers by quantity: what ``Simulation.atol`` accepts."""
 
     name = "tolerance"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """As ``Simulation.atol`` takes it."""
+        """Convert r=1e-12,v=1e-9 to a dictionary."""
         if not isinstance(value, str):
             return value
         try:
@@ -42,75 +31,117 @@ class _Tolerance(click.ParamType):  # type: ignore[type-arg]
                       param, ctx)  # fmt: skip
 
 
-ATOL = _Tolerance()
+class Seconds(click.ParamType):  # type: ignore[type-arg]
+    """A duration in s, written as 90, 90s, 5min or 2h."""
 
-SETTING_OPTIONS = (
-    click.option("--t-end", type=float, metavar="S",
-                 help="Final time in s; 0 solves once at t = 0."),
-    click.option("--dt", type=float, metavar="S", help="Reporting step in s."),
-    click.option("--method", metavar="NAME",
-                 help="Formulation: auto, unconstrained, standard, penalty, lsq."),
-    click.option("--integrator", metavar="NAME",
-                 help="dop853, dopri5, adams, radau for stiff scenes, or rk4 with --step."),
-    click.option("--rtol", type=float, metavar="X", help="Relative tolerance."),
-    click.option("--atol", type=ATOL, metavar="X",
-                 help="Absolute tolerance: a number, or r=1e-12,p=1e-10,v=1e-12,w=1e-10 or some."),
-    click.option("--step", type=float, metavar="S",
-                 help="Fixed step in s, without error control."),
-    click.option("--correct/--no-correct", default=None,
-                 help="Correct the initial conditions so that they fulfil the constraints."),
-    click.option("--correct-metric", type=click.Choice(["unit", "mass"]), default=None,
-                 help="The least correction is that in m and rad, or weighted by masses."),
-    click.option("--project/--no-project", default=None,
-                 help="Bring every step onto the constraints."),
+    name = "time"
+    _UNITS = (("min", 60.0), ("s", 1.0), ("h", 3600.0), ("", 1.0))
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Convert to a number of seconds."""
+        import math
+
+        if isinstance(value, float):
+            return value
+        unit, factor = next((u, f) for u, f in self._UNITS if value.endswith(u))
+        try:
+            seconds = float(value.removesuffix(unit)) * factor
+        except ValueError:
+            seconds = math.nan
+        if not 0.0 < seconds < math.inf:
+            self.fail(f"{value!r} is no time; write 90, 90s, 5min or 2h", param, ctx)
+        return seconds
+
+
+#: Settings of a run that the command line overrides: name in the scene -> option.
+SETTING_OPTIONS = {
+    "t_end": click.option("--t-end", type=float, metavar="S",
+                          help="Final time in s; 0 solves once at t = 0."),
+    "dt": click.option("--dt", type=float, metavar="S", help="Reporting step in s."),
+    "method": click.option("--method", metavar="NAME",
+                           help="Formulation: auto, unconstrained, standard, penalty, lsq."),
+    "integrator": click.option(
+        "--integrator", metavar="NAME",
+        help="dop853, dopri5, adams, radau for stiff scenes, or rk4 with --step."),
+    "rtol": click.option("--rtol", type=float, metavar="X", help="Relative tolerance."),
+    "atol": click.option(
+        "--atol", type=Tolerance(), metavar="X",
+        help="Absolute tolerance: a number, or r=1e-12,p=1e-10,v=1e-12,w=1e-10 or some."),
+    "step": click.option("--step", type=float, metavar="S",
+                         help="Fixed step in s, without error control."),
+    "correct": click.option(
+        "--correct/--no-correct", default=None,
+        help="Correct the initial conditions so that they fulfil the constraints."),
+    "correct_metric": click.option(
+        "--correct-metric", type=click.Choice(["unit", "mass"]), default=None,
+        help="The smallest correction is that in m and rad, or weighted by masses."),
+    "project": click.option("--project/--no-project", default=None,
+                            help="Project every step onto the constraints."),
+}  # fmt: skip
+#: Names of these options.
+SETTINGS = {name: f"--{name.replace('_', '-')}" for name in SETTING_OPTIONS}
+
+RESULT = click.argument("result", type=click.Path())
+MODEL = click.argument("model", shell_complete=completion.models)
+MODEL_OF_RESULT = click.option(
+    "--model", metavar="MODEL",
+    help="The model whose own types (plugin.py) and meshes the run used.",
 )  # fmt: skip
 ALLOW_CODE = click.option(
     "--allow-code", is_flag=True,
     help="Allow the model's own types (plugin.py in its folder) to run.",
 )  # fmt: skip
+FPS = click.option("--fps", type=float, metavar="NUMBER",
+                   help="Frames a second; every reported instant by default.")  # fmt: skip
+STRICT = click.option(
+    "--strict", is_flag=True,
+    help="Exit with 1 if there are warnings (notes of a change) or the ledger does not close; the "
+    "result is saved all the same.",
+)  # fmt: skip
+FORCE = click.option("--force", is_flag=True, help="Overwrite existing files.")
 JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
-QUIET = click.option("-q", "--quiet", is_flag=True, help="Print what went wrong alone.")
+QUIET = click.option("-q", "--quiet", is_flag=True, help="Print errors and warnings only.")
 
 
-def with_options(*options: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
-    """A decorator that adds options to a command, in this order."""
-
-    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        for option in reversed(options):
-            function = option(function)
-        return function
-
-    return decorate
+def output(help_text: str, metavar: str = "FILE", **settings: Any) -> Option:
+    """The option ``--output``."""
+    return click.option("-o", "--output", type=click.Path(), metavar=metavar, help=help_text,
+                        **settings)  # fmt: skip
 
 
 def check_settings(scene: "Scene", given: dict[str, Any]) -> None:
-    """Refuse what the options say before the model is compiled; names the options."""
+    """Refuse settings of options before the model is compiled, under the names of the options."""
     import attrs
 
     from dap3d_core.scene import SceneError, check_simulation
 
-    said = {name: value for name, value in given.items() if value is not None}
+    values = {name: value for name, value in given.items() if value is not None}
     try:
-        check_simulation(attrs.evolve(scene.simulation, **said), scene.bodies)
+        check_simulation(attrs.evolve(scene.simulation, **values), scene.bodies)
     except SceneError as error:
-        options = said.keys() | ({"step"} if "integrator" in said else set())
-        about = options | ({"dt"} if "t_end" in said else set())
-        mistakes = [m for m in error.mistakes if m.key in about]
-        if mistakes:  # others are found again with the whole scene, with their lines
-            raise in_options(SceneError(mistakes), options) from error
+        names = options_of(given)
+        checked = names.keys() | ({"dt"} if "t_end" in values else set())
+        mistakes = [m for m in error.mistakes if m.key in checked]
+        if mistakes:  # others are reported with the whole scene, with their lines
+            raise in_options(SceneError(mistakes), names) from error
 
 
-def in_options(
-    error: "SceneError", said: Collection[str], options: Mapping[str, str] = SETTINGS
-) -> "SceneError":
-    """The same mistakes, those of some settings under the names of their options."""
+def options_of(given: Mapping[str, Any]) -> dict[str, str]:
+    """Names of the options of settings that are given; an integrator may need ``--step``."""
+    names = {name for name, value in given.items() if value is not None}
+    names |= {"step"} if "integrator" in names else set()
+    return {name: SETTINGS[name] for name in SETTINGS.keys() & names}
+
+
+def in_options(error: "SceneError", options: Mapping[str, str] = SETTINGS) -> "SceneError":
+    """The same mistakes; those of settings, outside of a file, under the names of options."""
     import attrs
 
     from dap3d_core.scene import MISSING, SceneError
 
     return SceneError(
         attrs.evolve(m, key=options[m.key], value=MISSING if m.value is None else m.value)
-        if m.key in said and not m.file
+        if m.key in options and not m.file
         else m
         for m in error.mistakes
     )

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dap3d_core.cli.process.exit_codes import Refused
+from dap3d_core.cli.process.exit_codes import Refused, refusing
 
 if TYPE_CHECKING:
     import xarray
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 
 def named_after(model: str, output: str | None, tail: str = "") -> Path:
-    """Where a result goes: MODEL.nc in the current folder if nothing else is said.
+    """The file of a result: ``output``, by default MODEL.nc in the current folder.
 
     Args:
-        model: as the command was given it.
-        output: what is said.
-        tail: what follows the name of the model.
+        model: as given on the command line.
+        output: as given on the command line.
+        tail: appended to the name of the model.
     """
     if output is not None:
         return Path(output)
@@ -31,12 +31,17 @@ def named_after(model: str, output: str | None, tail: str = "") -> Path:
     return Path(f"{path.resolve().name if path.exists() else path.name}{tail}.nc")
 
 
+def beside(result: str, output: str | None, ending: str) -> Path:
+    """The file made from a result: ``output``, by default RESULT with another ending."""
+    return Path(output) if output is not None else Path(f"{Path(result).stem}{ending}")
+
+
 def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) -> Path:
-    """A path that can be written to.
+    """Returns the path if it can be written.
 
     Args:
-        path: what is to be written.
-        force: whether an existing file is overwritten.
+        path: of the output.
+        force: True to overwrite an existing file.
         sources: files that are read, which are never overwritten.
 
     Raises:
@@ -50,40 +55,40 @@ def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) 
             raise Refused(f"{path} exists; --force overwrites it, -o writes another file")
         target = check_target(path, force)
     except OSError as error:
-        told = error if isinstance(error, ResultError) else cannot("write", path, error)
-        raise Refused(str(told)) from error
+        reason = error if isinstance(error, ResultError) else cannot("write", path, error)
+        raise Refused(str(reason)) from error
     for source in sources:
         if source is not None and path.exists() and source.exists() and path.samefile(source):
-            raise Refused(f"{path} is what is read; name another file with -o")
+            raise Refused(f"{path} is the input file; name another file with -o")
     if _is_stdout(target):
-        raise Refused(f"{path} is where the words of this command go; name another file with -o")
+        raise Refused(f"{path} is the standard output of this command; name another file with -o")
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise Refused(f"cannot write {path}: no permission to write in its folder; use -o")
     return path
 
 
 def _is_stdout(target: Path) -> bool:
-    """Whether the standard output leads to a file: words written there later would be lost."""
+    """True if the standard output is this file: text printed later would be lost."""
     try:
         return os.path.samestat(target.stat(), os.fstat(sys.stdout.fileno()))
-    except (OSError, ValueError):  # one of them does not exist, or is none of the system's
+    except (OSError, ValueError):  # no such file, or no stream of the system
         return False
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file whole, in place of what stands there; a link is replaced, never followed.
+    """Replace a file as a whole; a link is replaced, never followed.
 
     Raises:
         Refused: it cannot be written; says why.
     """
-    aside = path.with_name(f".{uuid.uuid4().hex}.part")
+    temporary = path.with_name(f".{uuid.uuid4().hex}.part")
     try:
         try:
-            with aside.open("x", encoding="utf-8", newline="\n") as file:
+            with temporary.open("x", encoding="utf-8", newline="\n") as file:
                 file.write(text)
-            os.replace(aside, path)
+            os.replace(temporary, path)
         finally:
-            aside.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
     except OSError as error:
         raise Refused(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -92,9 +97,9 @@ def open_result(path: str, *, model: str | None = None, allow_code: bool = False
     """The result in a file.
 
     Args:
-        path: the file.
+        path: of the file.
         model: the model whose own types the run used.
-        allow_code: whether they may be loaded.
+        allow_code: True if they may be loaded.
 
     Raises:
         Refused: it cannot be read; says why.
@@ -102,10 +107,8 @@ def open_result(path: str, *, model: str | None = None, allow_code: bool = False
     import dap3d_core as dap
     from dap3d_core.result import ResultError
 
-    try:
+    with refusing(ResultError):
         return dap.open(path, model=model, allow_code=allow_code)
-    except ResultError as error:
-        raise Refused(str(error)) from error
 
 
 def open_sweep(path: str) -> "xarray.Dataset":
@@ -117,17 +120,15 @@ def open_sweep(path: str) -> "xarray.Dataset":
     import dap3d_core as dap
     from dap3d_core.result import ResultError
 
-    try:
+    with refusing(ResultError):
         return dap.open_sweep(path)
-    except ResultError as error:
-        raise Refused(str(error)) from error
 
 
 def refuse_all(*checks: Callable[[], object]) -> None:
-    """Make checks, and refuse what any of them refuses: all mistakes at once.
+    """Make all checks, and report everything that they refuse at once.
 
     Raises:
-        Refused: one line for each.
+        Refused: one line for each fault.
     """
     from dap3d_core.result import ResultError, UnknownNameError
 

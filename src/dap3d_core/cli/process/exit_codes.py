@@ -1,11 +1,13 @@
-"""Exit codes, and the one exception that is the command line's own."""
+"""Exit codes, and the exceptions that the command line itself raises."""
 
-#: All went well.
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+#: Success.
 DONE = 0
-#: The run failed and left nothing to keep, or something unexpected happened; with --strict, notes.
-#: A type whose formulas are wrong.
+#: Failure without a result, unexpected error, warnings with --strict, type with wrong formulas.
 FAILED = 1
-#: Usage, or mistakes in the scene.
+#: Wrong usage, or mistakes in the scene.
 REFUSED = 2
 #: The run stopped early; what was computed is saved.
 PARTIAL = 3
@@ -13,9 +15,18 @@ PARTIAL = 3
 INTERRUPTED = 130
 
 
-class Terminated(Exception):  # noqa: N818 - not an error of anyone
-    """A signal asks the program to end: SIGTERM, or SIGHUP where a terminal was closed."""
+class Terminated(Exception):  # noqa: N818 - a request, not an error
+    """A signal requests the end of the program: SIGTERM, or SIGHUP of a closed terminal."""
 
 
-class Refused(Exception):  # noqa: N818 - a verdict, told in a sentence
-    """The command cannot be carried out as asked; the message says why and what to do."""
+class Refused(Exception):  # noqa: N818 - the user's mistake, not the program's
+    """Invalid request; the message says why, and what to do."""
+
+
+@contextmanager
+def refusing(*errors: type[Exception]) -> Iterator[None]:
+    """Turns errors of these types into ``Refused`` with the same message."""
+    try:
+        yield
+    except errors as error:
+        raise Refused(str(error)) from error
