@@ -57,7 +57,7 @@ def test_what_cannot_be_animated_is_refused(refuse, dap3d, runs, monkeypatch):
     assert "no single time" in refuse("animate", "pen1.nc", "--at", "0.5")
     assert "from 0 s to 1 s" in refuse("animate", "pen1.nc", "-o", "a.png", "--at", "7")
     assert "an animation is one of" in refuse("animate", "pen1.nc", "-o", "a.avi")
-    assert "is what is read" in refuse("animate", "pen1.nc", "-o", "pen1.nc", "--force")
+    assert "is the input file" in refuse("animate", "pen1.nc", "-o", "pen1.nc", "--force")
     assert "cannot read" in refuse("animate", "gone.nc")
     monkeypatch.setenv("PATH", str(dap3d.folder))
     assert "ffmpeg" in refuse("animate", "pen1.nc", "-o", "a.mp4")

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.cli import app, main
+from dap3d_core.cli import main
+from dap3d_core.cli.framework.command import Command
 
 from .conftest import COMMAND, environment
 
@@ -109,7 +110,7 @@ def test_a_full_disk_is_named_and_what_was_computed_is_kept(scene_file):
     assert lines[16:] == ["resumed", "0", "large.nc", "small.nc"], found
     first, *others = found.stderr.splitlines()
     assert "what was computed until then is in large.nc.part" in first
-    assert "dap3d resume large.nc.checkpoint goes on with the run" in first
+    assert "dap3d resume large.nc.checkpoint continues the run" in first
     names = ("a.nc", "a.csv", "b.nc", "a.html", "a.png")
     assert others == [f"cannot write {name}: No space left on device" for name in names]
     assert dap.open(folder / "large.nc").t[-1] == 600.0
@@ -166,7 +167,7 @@ def test_a_link_of_the_system_stays_and_its_pipe_is_refused(scene_file):
     assert "cannot write stdout: it is no regular file but a pipe" in piped.stderr
     to_file = in_shell("$DAP3D run fall.toml --t-end 0.1 -o stdout --force > r.nc", folder)
     assert to_file.returncode == 2
-    assert "stdout is where the words of this command go" in to_file.stderr
+    assert "stdout is the standard output of this command" in to_file.stderr
     assert (folder / "stdout").is_symlink()
     assert sorted(p.name for p in folder.iterdir()) == ["fall.toml", "r.nc", "stdout"]
 
@@ -178,7 +179,7 @@ def test_a_link_of_the_system_stays_and_its_pipe_is_refused(scene_file):
 def test_a_current_folder_that_is_gone_is_named(tmp_path):
     found = in_shell("mkdir gone && cd gone && rmdir ../gone && $DAP3D check pen1", tmp_path)
     assert (found.returncode, found.stdout) == (2, "")
-    assert found.stderr == "the current folder is no longer there; change to another one (cd)\n"
+    assert found.stderr == "the current folder no longer exists; change to another one (cd)\n"
 
 
 def test_ctrl_c_while_options_are_parsed_is_an_interruption(monkeypatch, capfd):
@@ -187,6 +188,6 @@ def test_ctrl_c_while_options_are_parsed_is_an_interruption(monkeypatch, capfd):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(app.Command, "parse_args", interrupted)
+    monkeypatch.setattr(Command, "parse_args", interrupted)
     assert main(["models"]) == 130
     assert capfd.readouterr().err.strip() == "interrupted"

@@ -162,7 +162,7 @@ def test_rerun_says_what_differs(dap3d, monkeypatch, capfd):
 
 
 def test_times_are_written_as_people_do():
-    from dap3d_core.cli.framework.execute import Seconds
+    from dap3d_core.cli.framework.options import Seconds
 
     found = [Seconds().convert(text, None, None) for text in ("90", "90s", "5min", "2h", "0.5h")]
     assert np.array_equal(found, [90.0, 90.0, 300.0, 7200.0, 1800.0])

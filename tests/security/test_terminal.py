@@ -90,7 +90,7 @@ def test_warnings_of_libraries_are_plain_text(say, monkeypatch):
         warnings.warn("glyph \x1b[31m\nno mistakes found", stacklevel=1)
         return {"group": "", "bodies": 0, "joints": {}, "description": "", "own_types": False}
 
-    monkeypatch.setattr(command, "_facts", warn)
+    monkeypatch.setattr(command, "_data", warn)
     with warnings.catch_warnings():
         warnings.simplefilter("always")
         code, _, err = say("models")

@@ -13,10 +13,10 @@ from click.testing import CliRunner
 from dap3d_core.cli import main
 from dap3d_core.cli.app import dap3d
 from dap3d_core.cli.console.console import clean, count, plain, seconds, size
-from dap3d_core.cli.framework.error_messages import report
+from dap3d_core.cli.framework.error_messages import report_error
 from dap3d_core.cli.framework.options import SETTINGS
 from dap3d_core.cli.process import exit_codes
-from dap3d_core.cli.process.signals import Stopping
+from dap3d_core.cli.process.signals import SignalHandler
 from dap3d_core.scene import INTEGRATORS, METHODS, Mistake, SceneError, Simulation
 
 COMMANDS = ("run", "resume", "rerun", "sweep", "check", "models", "plugins", "describe",
@@ -61,7 +61,7 @@ def told(error, **options):
     @click.command()
     def command():
         click.get_current_context().exit(
-            report(error, **{"debug": False, "as_json": True} | options)
+            report_error(error, **{"debug": False, "as_json": True} | options)
         )
 
     done = CliRunner().invoke(command)
@@ -117,19 +117,19 @@ def test_mistakes_are_told_and_listed():
 
 
 def test_a_signal_before_the_run_raises_at_once():
-    with pytest.raises(KeyboardInterrupt), Stopping():
+    with pytest.raises(KeyboardInterrupt), SignalHandler():
         signal.raise_signal(signal.SIGINT)
-    with pytest.raises(exit_codes.Terminated, match="SIGTERM"), Stopping():
+    with pytest.raises(exit_codes.Terminated, match="SIGTERM"), SignalHandler():
         signal.raise_signal(signal.SIGTERM)
 
 
 def test_during_a_run_it_waits_for_the_end_of_the_chunk_once():
-    with Stopping() as stopping:
-        stopping.between_chunks()
+    with SignalHandler() as stopping:
+        stopping.raise_pending()
         signal.raise_signal(signal.SIGTERM)
         with pytest.raises(exit_codes.Terminated):
-            stopping.between_chunks()
-        stopping.between_chunks()  # told once
+            stopping.raise_pending()
+        stopping.raise_pending()  # told once
         signal.raise_signal(signal.SIGINT)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
@@ -141,13 +141,13 @@ def test_an_interrupt_that_a_package_swallowed_is_not_forgotten():
             signal.raise_signal(signal.SIGINT)
         raise AttributeError("half imported")
 
-    with pytest.raises(KeyboardInterrupt), Stopping():
+    with pytest.raises(KeyboardInterrupt), SignalHandler():
         stumble()
 
 
 def test_handlers_are_put_back():
     before = signal.getsignal(signal.SIGTERM)
-    with Stopping():
+    with SignalHandler():
         assert signal.getsignal(signal.SIGTERM) != before
     assert signal.getsignal(signal.SIGTERM) == before
 

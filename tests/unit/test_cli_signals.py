@@ -9,7 +9,7 @@ import time
 import pytest
 
 from dap3d_core.cli.process.exit_codes import Terminated
-from dap3d_core.cli.process.signals import Stopping
+from dap3d_core.cli.process.signals import SignalHandler
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
 
@@ -31,7 +31,7 @@ def test_a_signal_that_a_callback_swallows_comes_again(capfd, number, expected):
             time.sleep(0.01)
 
     before = sys.unraisablehook
-    with pytest.raises(expected), Stopping():
+    with pytest.raises(expected), SignalHandler():
         work()
     assert sys.unraisablehook is before
     assert capfd.readouterr().err == ""
@@ -44,6 +44,6 @@ def test_other_exceptions_of_callbacks_are_still_printed(capfd, monkeypatch):
     def callback():
         raise ValueError("a fault of the callback")
 
-    with Stopping():
+    with SignalHandler():
         callback()
     assert "a fault of the callback" in capfd.readouterr().err

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from dap3d_core.cli.console.console import output
-from dap3d_core.cli.console.initial_state import MOST_BODIES, show_start, start_facts
-from dap3d_core.model.state_layout import join
+from dap3d_core.cli.console.console import stdout
+from dap3d_core.cli.console.run_summary import MOST_BODIES, correction_data, show_correction
+from dap3d_core.model.rotations import join
 
 
 def corrected(shifts):
@@ -15,7 +15,7 @@ def corrected(shifts):
     moved = zero.copy()
     moved[:, 0] = shifts
     names = [f"link{k}" for k in range(n)]
-    return start_facts(names, join(zero, p, zero, zero), join(moved, p, zero, zero))
+    return correction_data(names, join(zero, p, zero, zero), join(moved, p, zero, zero))
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def printed(monkeypatch, capsys):
     monkeypatch.delenv("COLUMNS", raising=False)
 
     def show(initial):
-        show_start(output(), initial)
+        show_correction(stdout(), initial)
         return capsys.readouterr().out
 
     return show

@@ -261,12 +261,12 @@ def test_a_large_file_is_read_when_it_is_asked_for(swept, tmp_path, monkeypatch)
     """Lazily, with the same numbers; so are its extremes, block by block."""
     path = tmp_path / "a.nc"
     dap.sweep(spring(), VARY, outputs=OUTPUTS, output=path, **TIMES)
-    expected = sweep_tables.sweep_facts(swept)
+    expected = sweep_tables.sweep_data(swept)
     monkeypatch.setattr("dap3d_core.study.sweep.dataset.LARGE", 0)
     monkeypatch.setattr(sweep_tables, "LARGE", 1)
     with dap.open_sweep(path) as found:
         assert found["block.r.x"].variable._in_memory is False
-        assert sweep_tables.sweep_facts(found) == expected
+        assert sweep_tables.sweep_data(found) == expected
         assert found.load().identical(swept)
 
 

@@ -26,7 +26,7 @@ def pages() -> Iterator[tuple[str, str]]:
     registry = load_registry()
     for kind in GROUPS:
         found = [
-            describe.type_facts(registry, kind, keyword) for keyword in shipped(registry, kind)
+            describe.type_data(registry, kind, keyword) for keyword in shipped(registry, kind)
         ]
         yield f"reference/{kind}s/index.md", _index(kind, found)
         for facts in found:
@@ -55,15 +55,15 @@ def _index(kind: str, found: list[dict[str, Any]]) -> str:
 
 def type_page(facts: dict[str, Any]) -> str:
     """The page of a type: equations, fields, variants, names for kernels, a scene that runs."""
-    about = [f"acts on: {describe._acts_on(facts)}", f"class: {_home(facts)}"]
+    about = [f"acts on: {describe.bodies_text(facts)}", f"class: {_home(facts)}"]
     if facts["kind"] == "joint":
-        about.insert(0, f"rows: {describe._rows(facts)}")
+        about.insert(0, f"rows: {describe.rows_text(facts)}")
     if facts["kernels"]:
         about.append(f"kernels: {', '.join(code(name) for name in facts['kernels'])}")
     listed = "\n".join(f"- {line}" for line in about)
     parts = [facts["doc"], listed, "## Fields", _fields(facts)]
     if facts["variants"]:
-        columns, rows = describe._variants(facts)
+        columns, rows = describe.variants_table(facts)
         parts += ["## Variants", "Where fields have certain values, another class stands for it.",
                   table(columns, [[code(where), *rest] for where, *rest in rows])]  # fmt: skip
     parts += ["## Example", "A scene that runs as it stands:", fenced(facts["example"], "toml")]
@@ -78,20 +78,20 @@ def words_of(name: str) -> str:
 
 def _fields(facts: dict[str, Any]) -> str:
     rows = [
-        (code(f["name"]), f["kind"], _default(f), f["unit"], describe._about(f))
+        (code(f["name"]), f["kind"], _default(f), f["unit"], describe.meaning_text(f))
         for f in facts["fields"]
     ]
     return table(("field", "kind", "default", "unit", "meaning"), rows) if rows else "None."
 
 
 def _default(field: dict[str, Any]) -> str:
-    word = describe._default(field)
+    word = describe.default_text(field)
     return word if word in ("required", "-") else code(word)
 
 
 def _names(facts: dict[str, Any]) -> list[tuple[str, ...]]:
     return [
-        (code(n["name"]), describe._shape(n["shape"]), n["level"], n["doc"]) for n in facts["names"]
+        (code(n["name"]), describe.shape_text(n["shape"]), n["level"], n["doc"]) for n in facts["names"]
     ]
 
 

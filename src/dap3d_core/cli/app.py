@@ -102,9 +102,9 @@ def run_line(argv: Sequence[str] | None) -> int:
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """Print a warning of a library, which may quote a name of a scene, as any other message."""
-    from dap3d_core.cli.console.console import messages, say
+    from dap3d_core.cli.console.console import stderr
 
-    say(messages(), f"warning: {message}", "yellow", whole=True)
+    stderr().say(f"warning: {message}", "yellow", whole=True)
 
 
 def _run_words(words: list[str], *, as_json: bool) -> int:
@@ -128,16 +128,16 @@ def _run_words(words: list[str], *, as_json: bool) -> int:
 
 
 def _report_usage(error: click.ClickException, *, as_json: bool) -> None:
-    from dap3d_core.cli.console.console import messages, print_json, say
+    from dap3d_core.cli.console.console import print_json, stderr
 
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         error.show()
         return
     if as_json:
         print_json({"error": error.format_message(), "exit_code": error.exit_code})
-    console = messages()
+    console = stderr()
     ctx = getattr(error, "ctx", None)
     if ctx is not None:
         click.echo(ctx.get_usage(), err=True)
-        say(console, f"Try '{ctx.command_path} --help' for help.\n")
-    say(console, f"Error: {error.format_message()}", "red")
+        console.say(f"Try '{ctx.command_path} --help' for help.\n")
+    console.say(f"Error: {error.format_message()}", "red")

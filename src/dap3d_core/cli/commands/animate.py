@@ -6,16 +6,16 @@ from typing import Any
 
 import click
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import FORCE, JSON, QUIET, RESULT, output
 from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, Refused, refusing
 
 
 @command(
     "Draw the motion of a result as a film.",
-    RESULT,
-    output("A .gif or .mp4, or a snapshot: .png, .svg, .pdf. RESULT.gif by default; RESULT.png "
-           "where the run was at t = 0 alone."),
+    options.RESULT,
+    options.output("A .gif or .mp4, or a snapshot: .png, .svg, .pdf. RESULT.gif by default; "
+                   "RESULT.png where the run was at t = 0 alone."),
     click.option("--fps", type=float, metavar="N", help="Pictures a second; 25 by default."),
     click.option("--speed", type=float, metavar="X",
                  help="1 is real time, 0.1 ten times slower; by default films last 2 s to 10 s."),
@@ -28,9 +28,7 @@ from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, Refused, refusi
     click.option("--fit", is_flag=True,
                  help="Frame the whole motion, whatever limits the scene gives."),
     click.option("--model", metavar="MODEL", help="The model in whose folder meshes lie."),
-    FORCE,
-    JSON,
-    QUIET,
+    options.FORCE, options.JSON, options.QUIET,
     saves=True,
 )  # fmt: skip
 def animate(
@@ -57,7 +55,7 @@ def animate(
 
     Ctrl-C leaves no file behind.
     """
-    from dap3d_core.cli.console.console import count, messages, say, show_written
+    from dap3d_core.cli.console.console import count, show_written, stderr
     from dap3d_core.cli.console.progress import counting
     from dap3d_core.cli.framework.paths import beside, open_result, writable
     from dap3d_core.plot import animate as draw
@@ -76,7 +74,7 @@ def animate(
         ):
             film = draw(opened, target, progress=progress, fit=fit, force=force, **options)
     except KeyboardInterrupt:
-        say(messages(), f"interrupted; {target} was not written", "bold red")
+        stderr().say(f"interrupted; {target} was not written", "bold red")
         return INTERRUPTED
     width, height = film.size
     contents = f"{width} x {height}, {count(film.frames, 'frame')}"

@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import ALLOW_CODE, JSON, MODEL, SETTING_OPTIONS
 from dap3d_core.cli.process.exit_codes import DONE, REFUSED, refusing
 
 if TYPE_CHECKING:
@@ -17,11 +17,11 @@ ROUNDING = 1e-10
 
 @command(
     "Validate a model, count its degrees of freedom.",
-    MODEL,
-    SETTING_OPTIONS["method"],
-    SETTING_OPTIONS["correct_metric"],
-    ALLOW_CODE,
-    JSON,
+    options.MODEL,
+    options.SETTING_OPTIONS["method"],
+    options.SETTING_OPTIONS["correct_metric"],
+    options.ALLOW_CODE,
+    options.JSON,
 )
 def check(
     model: str, *, method: str | None, correct_metric: str | None, allow_code: bool, as_json: bool
@@ -35,7 +35,7 @@ def check(
     poses, whether the redundant rows agree, and which reactions are unique all the same.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import output, print_json
+    from dap3d_core.cli.console.console import print_json, stdout
     from dap3d_core.cli.console.progress import RunProgress
 
     with RunProgress(quiet=as_json) as progress:
@@ -48,7 +48,7 @@ def check(
     if as_json:
         print_json(data)
     else:
-        _show(output(), compiled, data)
+        _show(stdout(), compiled, data)
     return REFUSED if data["mistakes"] else DONE
 
 
@@ -134,22 +134,12 @@ def _redundancy_data(
 
 
 def _show(console: "Terminal", compiled: "CompiledModel", data: dict[str, Any]) -> None:
-    from dap3d_core.cli.console.console import (
-        count,
-        facts,
-        say,
-        scene_name,
-        section,
-        some,
-        title,
-    )
+    from dap3d_core.cli.console.console import count, scene_name, some
     from dap3d_core.cli.console.run_summary import degrees_of_freedom, show_correction
 
-    title(console, scene_name(data["scene"]))
+    console.title(scene_name(data["scene"]))
     names = some(compiled.model.body_names, 8)
-    facts(
-        console,
-        [
+    console.facts([
             ("bodies", f"{count(data['bodies'], 'body', 'bodies')}: {names}"),
             ("joints", _listed(data["joint_types"])),
             ("forces", _listed(data["force_types"])),
@@ -164,11 +154,11 @@ def _show(console: "Terminal", compiled: "CompiledModel", data: dict[str, Any]) 
         _show_redundancy(console, data)
     if data["initial"] and data["initial"]["changed"]:
         show_correction(console, data["initial"])
-    section(console, "notes", data["notes"])
+    console.section("notes", data["notes"])
     for mistake in data["mistakes"]:
-        say(console, mistake["what"], "bold red")
+        console.say(mistake["what"], "bold red")
     if not data["mistakes"]:
-        say(console, "no mistakes found", "green")
+        console.say("no mistakes found", "green")
 
 
 def _listed(types: dict[str, int]) -> str:
@@ -184,10 +174,9 @@ def _violation(violation: dict[str, float], compiled: "CompiledModel") -> str:
 
 
 def _show_redundancy(console: "Terminal", data: dict[str, Any]) -> None:
-    from dap3d_core.cli.console.console import items, say, section
 
     text = f"redundant constraints: {data['redundant']} of {data['rows']} rows repeat other rows"
-    say(console, text, "yellow")
+    console.say(text, "yellow")
     about = list(data["about"])
     if data["contradictions"]:
         about.append("No motion satisfies rows that contradict each other")
@@ -196,5 +185,5 @@ def _show_redundancy(console: "Terminal", data: dict[str, Any]) -> None:
             "The standard method refuses to run: replace a joint by one with fewer rows, or use "
             "--method lsq"
         )
-    items(console, about)
-    section(console, "reactions (accelerations are unique)", data["about_reactions"])
+    console.items(about)
+    console.section("reactions (accelerations are unique)", data["about_reactions"])

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import JSON, QUIET
 from dap3d_core.cli.process.exit_codes import DONE, FAILED, Refused
 
 if TYPE_CHECKING:
@@ -31,8 +31,7 @@ NO_FORMULAS = {"purity", "plain", "compiled"}
     click.option("--seed", type=int, default=1, show_default=True,
                  help="Seed of the random poses."),
     click.option("--allow-code", is_flag=True, help="Allow the named Python files to run."),
-    JSON,
-    QUIET,
+    options.JSON, options.QUIET,
 )  # fmt: skip
 def check_plugin(
     names: tuple[str, ...],
@@ -56,12 +55,12 @@ def check_plugin(
     import attrs
 
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import count, output, print_json, say
+    from dap3d_core.cli.console.console import count, print_json, stdout
 
     if every == bool(names):
         raise Refused("name what is to be checked, or give --all for all installed types")
     registry, types = _named_types(dap.load_registry(), names, allow_code=allow_code)
-    console, reports = output(), []
+    console, reports = stdout(), []
     for kind, keyword in types:
         report = _check(registry, kind, keyword, poses, seed)
         reports.append(report)
@@ -75,9 +74,9 @@ def check_plugin(
     elif wrong:
         for verdict, number in Counter(map(_verdict, reports)).items():
             if verdict:
-                say(console, verdict.format(f"{number} of {total}"), "bold red")
+                console.say(verdict.format(f"{number} of {total}"), "bold red")
     elif not quiet:
-        say(console, f"{total} checked: nothing is wrong", "green")
+        console.say(f"{total} checked: nothing is wrong", "green")
     return FAILED if wrong else DONE
 
 
@@ -148,20 +147,18 @@ def _check(registry: "Registry", kind: str, keyword: str, poses: int, seed: int)
 def _show(console: "Terminal", report: "Report", *, quiet: bool) -> None:
     from rich.text import Text
 
-    from dap3d_core.cli.console.console import items, say, show, table, title
-
-    title(console, f"{report.keyword}, a {report.kind}")
+    console.title(f"{report.keyword}, a {report.kind}")
     if not quiet:
-        say(console, report.title, indent=2, whole=True)
+        console.say(report.title, indent=2, whole=True)
         rows = [
             (Text(*STATES[o.state]), o.title, _size(o.error), _size(o.differences), o.words)
             for o in report.outcomes
         ]
         columns = ("", "check", "error", "by diff.", "what was compared; why it does not apply")
-        show(console, table(columns, rows, fixed=(0, 2, 3)))
-        items(console, dict.fromkeys(f"{o.title}: {n}" for o in report.outcomes for n in o.notes))
+        console.table(columns, rows, fixed=(0, 2, 3))
+        console.items(dict.fromkeys(f"{o.title}: {n}" for o in report.outcomes for n in o.notes))
     findings = (f"{f'with {f.variant}: ' if f.variant else ''}{f}" for f in report.findings)
-    items(console, dict.fromkeys(findings), "red")
+    console.items(dict.fromkeys(findings), "red")
     if not quiet:
         console.print()
 

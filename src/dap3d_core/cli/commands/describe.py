@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import JSON
 from dap3d_core.cli.process.exit_codes import DONE, Refused
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     click.argument("keyword"),
     click.option("--names", is_flag=True, help="Also list the names that its kernels may use."),
     click.option("--source", is_flag=True, help="Also show its kernels, written or derived."),
-    JSON,
+    options.JSON,
 )
 def describe(keyword: str, *, names: bool, source: bool, as_json: bool) -> int:
     """Explain the type with a KEYWORD: equations, fields, units, defaults, an example.
@@ -30,14 +30,14 @@ def describe(keyword: str, *, names: bool, source: bool, as_json: bool) -> int:
     A keyword may belong to a joint, a force and a function; all of them are shown.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import output, print_json
+    from dap3d_core.cli.console.console import print_json, stdout
 
     registry = dap.load_registry()
     types = [type_data(registry, kind, keyword) for kind in _kinds(registry, keyword)]
     if as_json:
         print_json({"types": types})
         return DONE
-    console = output()
+    console = stdout()
     for k, data in enumerate(types):
         if k:
             console.print()
@@ -175,44 +175,41 @@ def _allowed(spec: Any) -> str:
 
 
 def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
-    from dap3d_core.cli.console.console import facts, prose, say, show, table, title
 
-    title(console, f"{data['keyword']}, a {data['kind']}")
-    prose(console, data["doc"].replace("``", ""))
+    console.title(f"{data['keyword']}, a {data['kind']}")
+    console.prose(data["doc"].replace("``", ""))
     if not console.wraps:
         console.print()
     origin = f"{data['distribution']} {data['version']}".strip() or "the model's own file"
     pairs = [("acts on", bodies_text(data)), ("from", f"{origin}, {data['module']}")]
     if data["kind"] == "joint":
         pairs[:1] = [("rows", rows_text(data)), ("bodies", bodies_text(data))]
-    facts(console, pairs)
-    title(console, "fields")
+    console.facts(pairs)
+    console.title("fields")
     if data["fields"]:
         rows = [(f["name"], f["kind"], default_text(f), f["unit"] or "-", meaning_text(f))
                 for f in data["fields"]]  # fmt: skip
         columns = ("field", "kind", "default", "unit", "meaning")
-        show(console, table(columns, rows, fixed=(0, 1, 3)))
+        console.table(columns, rows, fixed=(0, 1, 3))
     else:
-        say(console, "none", indent=2)
+        console.say("none", indent=2)
     if data["variants"]:
-        title(console, "variants")
-        show(console, table(*variants_table(data), fixed=(0,)))
+        console.title("variants")
+        console.table(*variants_table(data), fixed=(0,))
     if names:
-        title(console, f"names for its kernels ({', '.join(data['kernels'])})")
+        console.title(f"names for its kernels ({', '.join(data['kernels'])})")
         rows_ = [(n["name"], shape_text(n["shape"]), n["level"], n["doc"]) for n in data["names"]]
-        show(console, table(("name", "shape", "level", "meaning"), rows_, fixed=(0, 1, 2)))
-    title(console, "example")
-    say(console, data["example"].rstrip(), indent=2)
+        console.table(("name", "shape", "level", "meaning"), rows_, fixed=(0, 1, 2))
+    console.title("example")
+    console.say(data["example"].rstrip(), indent=2)
 
 
 def _show_source(console: "Terminal", data: dict[str, Any]) -> None:
     """Print the kernels of a type and of its variants, unfolded so that they can be copied."""
-    from dap3d_core.cli.console.console import title
-
     for each in (data, *data["variants"]):
         for name, text in each["source"].items():
             how = "derived" if name in each["derived"] else "as written"
-            title(console, f"{name} of {each['class']}, {how}")
+            console.title(f"{name} of {each['class']}, {how}")
             console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 

@@ -5,32 +5,19 @@ from pathlib import Path
 
 import click
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import (
-    ALLOW_CODE,
-    FORCE,
-    FPS,
-    JSON,
-    MODEL_OF_RESULT,
-    QUIET,
-    RESULT,
-    output,
-)
 from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, refusing
 
 
 @command(
     "Write a result for ParaView, Blender, MATLAB or a table.",
-    RESULT,
+    options.RESULT,
     click.option("-f", "--format", "kind", type=click.Choice(("vtk", "gltf", "mat", "csv")),
                  help="Format, if the name of the file does not give it; vtk by default."),
-    output("A .vtkhdf, .glb, .mat or .csv file; RESULT and the suffix by default."),
-    FPS,
-    MODEL_OF_RESULT,
-    ALLOW_CODE,
-    FORCE,
-    JSON,
-    QUIET,
+    options.output("A .vtkhdf, .glb, .mat or .csv file; RESULT and the suffix by default."),
+    options.FPS, options.MODEL_OF_RESULT, options.ALLOW_CODE, options.FORCE, options.JSON,
+    options.QUIET,
 )  # fmt: skip
 def export(
     result: str,
@@ -56,7 +43,7 @@ def export(
 
     Ctrl-C leaves no file behind.
     """
-    from dap3d_core.cli.console.console import count, messages, say, show_written
+    from dap3d_core.cli.console.console import count, show_written, stderr
     from dap3d_core.cli.console.progress import counting
     from dap3d_core.cli.framework.paths import beside, open_result, refuse_all, writable
     from dap3d_core.exchange import FORMATS, check_fps, format_of
@@ -78,7 +65,7 @@ def export(
             made = write(opened, target, format=kind, fps=fps, model=model, progress=progress,
                          force=force)  # fmt: skip
     except KeyboardInterrupt:
-        say(messages(), f"interrupted; {target} was not written", "bold red")
+        stderr().say(f"interrupted; {target} was not written", "bold red")
         return INTERRUPTED
     data = {"format": made.format, "instants": made.instants}
     contents = count(made.instants, "instant")

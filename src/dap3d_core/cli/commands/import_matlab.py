@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import FORCE, JSON
-from dap3d_core.cli.framework.options import output as output_option
 from dap3d_core.cli.process.exit_codes import DONE
 
 if TYPE_CHECKING:
@@ -30,12 +29,12 @@ TABLES = (
 @command(
     "Make a scene of a MATLAB model.",
     click.argument("folder"),
-    output_option("The scene file to write, or an existing folder for its scene.toml.",
+    options.output("The scene file to write, or an existing folder for its scene.toml.",
                   default="scene.toml", show_default=True),
-    FORCE,
+    options.FORCE,
     click.option("--stub", is_flag=True,
                  help="Write a plugin.py for user_force.m too, to be filled in."),
-    JSON,
+    options.JSON,
     saves=True,
 )  # fmt: skip
 def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json: bool) -> int:
@@ -50,8 +49,7 @@ def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json:
     The report says what was read, defaulted, changed and left out. Needs the extra "matlab".
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import output as console
-    from dap3d_core.cli.console.console import print_json
+    from dap3d_core.cli.console.console import print_json, stdout
     from dap3d_core.cli.framework.paths import writable, write_text
 
     scene, report = dap.import_matlab(folder)
@@ -68,7 +66,7 @@ def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json:
     if as_json:
         print_json(_data(scene, report, target, plugin))
     else:
-        _show(console(), scene, report, target, plugin, stub=stub)
+        _show(stdout(), scene, report, target, plugin, stub=stub)
     return DONE
 
 
@@ -94,34 +92,33 @@ def _show(
     *,
     stub: bool,
 ) -> None:
-    from dap3d_core.cli.console.console import count, facts, say, section, show, table, title
+    from dap3d_core.cli.console.console import count
 
-    title(console, f"MATLAB model {scene.name}")
+    console.title(f"MATLAB model {scene.name}")
     rows = [(f.name, f.state, f.holds) for f in report.files]
-    show(console, table(("file", "was", "holds"), rows, fixed=(0, 1)))
-    section(console, "defaulted (the files leave it out)", [str(r) for r in report.defaulted])
-    section(console, "changed", [str(r) for r in report.changed])
-    section(console, "left out", [str(r) for r in report.unused])
-    section(console, "notes", report.notes)
+    console.table(("file", "was", "holds"), rows, fixed=(0, 1))
+    console.section("defaulted (the files leave it out)", [str(r) for r in report.defaulted])
+    console.section("changed", [str(r) for r in report.changed])
+    console.section("left out", [str(r) for r in report.unused])
+    console.section("notes", report.notes)
     if report.user_force:
         _show_user_force(console, report, plugin)
     sizes = ((len(getattr(scene, name)), one, many) for name, one, many in TABLES)
     holds = ", ".join(count(number, one, many) for number, one, many in sizes if number)
-    facts(console, [("scene", f"{target}: {holds}"), ("plugin", str(plugin or ""))])
+    console.facts([("scene", f"{target}: {holds}"), ("plugin", str(plugin or ""))])
     if stub and not report.stub:
-        say(console, "No force is of type user: there is no plugin to fill in.")
+        console.say("No force is of type user: there is no plugin to fill in.")
     code = " --allow-code" if report.user_force else ""
-    say(console, "A MATLAB model does not say how long to simulate. Simulate it with:")
-    say(console, f"dap3d run {target} --t-end 2 --dt 0.02{code}", indent=4, whole=True)
+    console.say("A MATLAB model does not say how long to simulate. Simulate it with:")
+    console.say(f"dap3d run {target} --t-end 2 --dt 0.02{code}", indent=4, whole=True)
 
 
 def _show_user_force(console: "Terminal", report: "ImportReport", plugin: Path | None) -> None:
-    from dap3d_core.cli.console.console import say, title
 
-    title(console, "user_force.m (not translated)")
-    say(console, report.user_force.strip("\n"), indent=4, whole=True)
+    console.title("user_force.m (not translated)")
+    console.say(report.user_force.strip("\n"), indent=4, whole=True)
     if plugin is not None:
-        say(console, f"Write its law into {plugin}; until then a run is refused.", "yellow")
+        console.say(f"Write its law into {plugin}; until then a run is refused.", "yellow")
         return
-    title(console, "plugin.py, to be filled in (--stub writes it next to the scene)")
-    say(console, report.stub.strip("\n"), indent=4, whole=True)
+    console.title("plugin.py, to be filled in (--stub writes it next to the scene)")
+    console.say(report.stub.strip("\n"), indent=4, whole=True)

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import JSON, RESULT
 from dap3d_core.cli.process.exit_codes import DONE, refusing
 
 
-@command("Describe a result file.", RESULT, JSON)
+@command("Describe a result file.", options.RESULT, options.JSON)
 def info(result: str, *, as_json: bool) -> int:
     """Describe a RESULT file, or that of a sweep: its contents, and how the run ended."""
     from dap3d_core.study.sweep.dataset import is_sweep
@@ -19,7 +19,7 @@ def info(result: str, *, as_json: bool) -> int:
 
 def _show_sweep(file: str, as_json: bool) -> None:
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import output, print_json, size
+    from dap3d_core.cli.console.console import print_json, size, stdout
     from dap3d_core.cli.console.sweep_tables import show_failing, show_sweep, sweep_data
     from dap3d_core.result import ResultError
 
@@ -30,20 +30,12 @@ def _show_sweep(file: str, as_json: bool) -> None:
     if as_json:
         print_json({"file": file, "size_bytes": byte_count, **data, "scene_text": text})
         return
-    show_sweep(output(), data, f"{file}, {size(byte_count)}")
-    show_failing(output(), data, "--json has them")
+    show_sweep(stdout(), data, f"{file}, {size(byte_count)}")
+    show_failing(stdout(), data, "--json has them")
 
 
 def _show_run(file: str, as_json: bool) -> None:
-    from dap3d_core.cli.console.console import (
-        facts,
-        output,
-        print_json,
-        scene_name,
-        size,
-        some,
-        title,
-    )
+    from dap3d_core.cli.console.console import print_json, scene_name, size, some, stdout
     from dap3d_core.cli.console.run_summary import run_data, run_pairs, show_details
     from dap3d_core.cli.framework.paths import open_result
 
@@ -59,11 +51,10 @@ def _show_run(file: str, as_json: bool) -> None:
         about = {"file": file, "size_bytes": byte_count}
         print_json({**about, **data, **names, "scene_text": result.scene_text})
         return
-    console = output()
+    console = stdout()
     settings = (f"{k} {_short(v)}" for k, v in result.settings.items() if v is not None)
-    title(console, f"{scene_name(data['scene'])}: {data['status']}")
-    facts(
-        console,
+    console.title(f"{scene_name(data['scene'])}: {data['status']}")
+    console.facts(
         [
             ("file", f"{file}, {size(byte_count)}"),
             ("bodies", some(subject.body_names, 12)),

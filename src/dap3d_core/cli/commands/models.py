@@ -4,22 +4,22 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import JSON
 from dap3d_core.cli.process.exit_codes import DONE
 
 
-@command("List the shipped models.", JSON)
+@command("List the shipped models.", options.JSON)
 def models(*, as_json: bool) -> int:
     """List the shipped models."""
-    from dap3d_core.cli.console.console import output, print_json, say, show, table, title
+    from dap3d_core.cli.console.console import print_json, stdout
     from dap3d_core.scene import shipped_models
 
     data = {name: _data(folder) for name, folder in shipped_models().items()}
     if as_json:
         print_json({"models": data})
         return DONE
-    console = output()
+    console = stdout()
     for group in dict.fromkeys(model["group"] for model in data.values()):
         rows = [
             (name, str(m["bodies"]), ", ".join(m["joints"]) or "-", m["description"])
@@ -27,11 +27,11 @@ def models(*, as_json: bool) -> int:
             if m["group"] == group
         ]
         if group:
-            title(console, group)
+            console.title(group)
         columns = ("model", "bodies", "joints", "what it is")
-        show(console, table(columns, rows, right=(1,), fixed=(0,)))
+        console.table(columns, rows, right=(1,), fixed=(0,))
     if own := [name for name, model in data.items() if model["own_types"]]:
-        say(console, f"With a type of its own, to be run with --allow-code: {', '.join(own)}")
+        console.say(f"With a type of its own, to be run with --allow-code: {', '.join(own)}")
     return DONE
 
 

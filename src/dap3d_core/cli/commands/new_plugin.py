@@ -12,9 +12,8 @@ from string import Template
 
 import click
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import JSON
-from dap3d_core.cli.framework.options import output as output_option
 from dap3d_core.cli.process.exit_codes import DONE, Refused
 
 #: Keywords after which a distribution and a module can be named.
@@ -31,11 +30,11 @@ OWN = "dap3d_core"
     click.argument("name"),
     click.option("--kind", type=click.Choice(("joint", "force", "function")), default="joint",
                  show_default=True, help="Kind of the type."),
-    output_option("Where to write; by default dap3d-NAME.", metavar="FOLDER"),
+    options.output("Where to write; by default dap3d-NAME.", metavar="FOLDER"),
     click.option("--author", metavar="WORDS", help="Author, for pyproject.toml."),
     click.option("--force", is_flag=True,
                  help="Write into a folder that is not empty; use a keyword that is taken."),
-    JSON,
+    options.JSON,
     saves=True,
 )  # fmt: skip
 def new_plugin(
@@ -48,8 +47,7 @@ def new_plugin(
     The package is complete: a type that works, its tests, a scene that runs, a README. Make the
     type your own, and let dap3d check-plugin say whether its formulas are right.
     """
-    from dap3d_core.cli.console.console import output as console
-    from dap3d_core.cli.console.console import print_json, say
+    from dap3d_core.cli.console.console import print_json, stdout
 
     names = _names(name, kind, author)
     _check_free(names, force=force)
@@ -67,9 +65,9 @@ def new_plugin(
         "What comes next:": commands,
     }
     for heading, lines in lists.items():
-        say(console(), heading)
+        stdout().say(heading)
         for line in lines:
-            say(console(), line, indent=4, whole=True)
+            stdout().say(line, indent=4, whole=True)
     return DONE
 
 

@@ -8,17 +8,8 @@ from typing import Any
 
 import click
 
-from dap3d_core.cli.framework import completion
+from dap3d_core.cli.framework import completion, options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import (
-    ALLOW_CODE,
-    FORCE,
-    JSON,
-    MODEL_OF_RESULT,
-    QUIET,
-    RESULT,
-    output,
-)
 from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 
 ENERGIES = ("energy.kinetic", "energy.potential", "energy.total")
@@ -29,10 +20,10 @@ SUFFIX = ".nc"
 
 @command(
     "Draw curves of results, maps of sweeps.",
-    RESULT,
+    options.RESULT,
     click.argument("quantities", metavar="[RESULT | QUANTITY]...", nargs=-1,
                    shell_complete=completion.quantities),
-    output("Picture: .png, .svg or .pdf; RESULT.png by default."),
+    options.output("Picture: .png, .svg or .pdf; RESULT.png by default."),
     click.option("--x", metavar="QUANTITY", shell_complete=completion.quantities,
                  help="Abscissa of the curves; time by default. Of a sweep a parameter or an "
                       "output."),
@@ -44,11 +35,7 @@ SUFFIX = ".nc"
                  help="Width of the picture in mm; 97 by default, good down to 60."),
     click.option("--height", type=float, metavar="MM",
                  help="Height in mm; what fits by default."),
-    FORCE,
-    MODEL_OF_RESULT,
-    ALLOW_CODE,
-    JSON,
-    QUIET,
+    options.FORCE, options.MODEL_OF_RESULT, options.ALLOW_CODE, options.JSON, options.QUIET,
     saves=True,
 )  # fmt: skip
 def plot(
@@ -114,13 +101,12 @@ def plot(
 
 
 def _report(about: dict[str, Any], *, as_json: bool, quiet: bool) -> None:
-    from dap3d_core.cli.console.console import output as console
-    from dap3d_core.cli.console.console import print_json, say
+    from dap3d_core.cli.console.console import print_json, stdout
 
     if as_json:
         print_json(about)
     elif not quiet:
-        say(console(), f"{about['file']} written", whole=True)
+        stdout().say(f"{about['file']} written", whole=True)
 
 
 def _is_sweep(data: Any) -> bool:

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import JSON
 from dap3d_core.cli.process.exit_codes import DONE
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     click.option("--no-compile", is_flag=True, help="Do not check that kernels compile."),
     click.option("--limit", type=click.FloatRange(min=0.0, min_open=True), metavar="SECONDS",
                  help="Time in which a plugin must load (60 by default)."),
-    JSON,
+    options.JSON,
 )  # fmt: skip
 def plugins(*, no_compile: bool, limit: float | None, as_json: bool) -> int:
     """List the types of joints, forces and functions that are installed.
@@ -30,7 +30,7 @@ def plugins(*, no_compile: bool, limit: float | None, as_json: bool) -> int:
     import attrs
 
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import output, print_json, section, show, table
+    from dap3d_core.cli.console.console import print_json, stdout
     from dap3d_core.registry import LOAD_LIMIT
 
     registry = dap.load_registry()
@@ -38,13 +38,13 @@ def plugins(*, no_compile: bool, limit: float | None, as_json: bool) -> int:
     if as_json:
         print_json({"types": [attrs.asdict(t) for t in types], "notes": registry.notes})
         return DONE
-    console = output()
+    console = stdout()
     rows = [(t.kind or "?", t.keyword or "?", _origin(t), t.module, t.state) for t in types]
     columns = ("kind", "keyword", "distribution", "module", "state")
-    show(console, table(columns, rows, fixed=(0, 1, 4)))
+    console.table(columns, rows, fixed=(0, 1, 4))
     faults = [f"{t.keyword or t.distribution}: {t.reason}" for t in types if t.reason]
-    section(console, "not usable", faults, "red")
-    section(console, "notes", registry.notes)
+    console.section("not usable", faults, "red")
+    console.section("notes", registry.notes)
     return DONE
 
 

@@ -6,16 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.framework import completion
+from dap3d_core.cli.framework import completion, options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import (
-    ALLOW_CODE,
-    FORCE,
-    JSON,
-    MODEL_OF_RESULT,
-    RESULT,
-    output,
-)
 from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 
 if TYPE_CHECKING:
@@ -26,20 +18,17 @@ FORMATS = {".nc": "nc", ".csv": "csv"}
 
 @command(
     "Compute all arrays of a result.",
-    RESULT,
+    options.RESULT,
     click.argument("quantities", metavar="[QUANTITY]...", nargs=-1,
                    shell_complete=completion.quantities),
-    output("A .nc or a .csv file; RESULT-post.nc by default."),
+    options.output("A .nc or a .csv file; RESULT-post.nc by default."),
     click.option("--format", "kind", type=click.Choice(tuple(FORMATS.values())),
                  help="Format, if the name of the file does not give it."),
     click.option("--select", "selected", metavar="QUANTITY...", multiple=True,
                  shell_complete=completion.quantities, help="Only these quantities."),
     click.option("--jacobian", "--jac", "jacobian", is_flag=True,
                  help="Also the constraint Jacobian."),
-    MODEL_OF_RESULT,
-    ALLOW_CODE,
-    FORCE,
-    JSON,
+    options.MODEL_OF_RESULT, options.ALLOW_CODE, options.FORCE, options.JSON,
     saves=True,
 )  # fmt: skip
 def post(

@@ -6,17 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command, signals_of
-from dap3d_core.cli.framework.options import (
-    ALLOW_CODE,
-    FORCE,
-    JSON,
-    MODEL,
-    SETTING_OPTIONS,
-    SETTINGS,
-    in_options,
-    output,
-)
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.exit_codes import Refused, Terminated, refusing
 
@@ -27,7 +18,7 @@ if TYPE_CHECKING:
 
 @command(
     "Measure speed against error on a model.",
-    MODEL,
+    options.MODEL,
     click.option("--target-error", type=float, metavar="E",
                  help="Say which setting reaches this error soonest."),
     click.option("--quick", is_flag=True, help="Three rungs of each ladder, timed once."),
@@ -43,15 +34,13 @@ if TYPE_CHECKING:
                  help="Timings of each rung, of which the median counts; 5 by default."),
     click.option("--limit", "limit_s", type=float, default=30.0, show_default=True, metavar="S",
                  help="End a run after so many seconds; it is listed as failed."),
-    *(SETTING_OPTIONS[name] for name in ("t_end", "dt", "correct", "project")),
+    *(options.SETTING_OPTIONS[name] for name in ("t_end", "dt", "correct", "project")),
     click.option("--plot", "picture", type=click.Path(), metavar="FILE",
                  help="Draw time against error: .png, .svg or .pdf."),
     click.option("--csv", "csv_file", type=click.Path(), metavar="FILE",
                  help="Write all settings as a table."),
-    output("Write what --json prints to a file."),
-    FORCE,
-    ALLOW_CODE,
-    JSON,
+    options.output("Write what --json prints to a file."),
+    options.FORCE, options.ALLOW_CODE, options.JSON,
 )  # fmt: skip
 @click.pass_context
 def report(
@@ -79,8 +68,7 @@ def report(
     Ctrl-C ends it; what was measured until then is shown and written.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import messages, print_json, say
-    from dap3d_core.cli.console.console import output as console
+    from dap3d_core.cli.console.console import print_json, stderr, stdout
     from dap3d_core.cli.console.report_tables import show_report
 
     scene = dap.load(model)
@@ -92,11 +80,11 @@ def report(
         print_json({"model": model, **measured.to_dict()})
     else:
         with_target = given["target_error"] is not None
-        show_report(console(), measured, _run_command(model, given), with_target=with_target)
+        show_report(stdout(), measured, _run_command(model, given), with_target=with_target)
         for path in written:
-            say(console(), f"{path} written", whole=True)
+            stdout().say(f"{path} written", whole=True)
     if code != exit_codes.DONE:
-        say(messages(), "ended early; what was measured until then is above", "bold red")
+        stderr().say("ended early; what was measured until then is above", "bold red")
     return code
 
 
@@ -134,7 +122,7 @@ def _measure(
             work = signals_of(ctx).interruptible(progress.work)
             measured = dap.report(scene, progress=work, announce=progress.announce, **settings)
         except dap.SceneError as error:
-            raise in_options(error) from error
+            raise options.in_options(error) from error
         except (Terminated, KeyboardInterrupt) as error:
             if (partial := getattr(error, "report", None)) is None:
                 raise
@@ -145,7 +133,7 @@ def _measure(
 
 def _write(measured: "Report", targets: dict[str, Path], *, force: bool) -> list[Path]:
     """Write the files; a picture only if there is something to draw."""
-    from dap3d_core.cli.console.console import messages, say
+    from dap3d_core.cli.console.console import stderr
     from dap3d_core.result.file.atomic_write import whole_file
 
     written = []
@@ -159,7 +147,7 @@ def _write(measured: "Report", targets: dict[str, Path], *, force: bool) -> list
             try:
                 measured.plot(target, force)
             except ValueError as error:
-                say(messages(), f"{target} is not drawn: {error}", "red")
+                stderr().say(f"{target} is not drawn: {error}", "red")
                 continue
         written.append(target)
     return written
@@ -168,7 +156,7 @@ def _write(measured: "Report", targets: dict[str, Path], *, force: bool) -> list
 def _run_command(model: str, given: dict[str, Any]) -> str:
     """The command that runs the model as it was measured, without the setting."""
     said = {name: value for name, value in given.items() if value is not None}
-    times = [f"{SETTINGS[n]} {said[n]!r}" for n in ("t_end", "dt") if n in said]
+    times = [f"{options.SETTINGS[n]} {said[n]!r}" for n in ("t_end", "dt") if n in said]
     switches = [f"--{'' if said[n] else 'no-'}{n}" for n in ("correct", "project") if n in said]
     code = ["--allow-code"] * said["allow_code"]
     return " ".join(["dap3d run", shlex.quote(model), *times, *switches, *code])

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command, signals_of
-from dap3d_core.cli.framework.options import ALLOW_CODE, JSON, MODEL_OF_RESULT, QUIET, RESULT
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.exit_codes import refusing
 
@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
 
 @command(
-    "Repeat a run from its result, and compare.", RESULT, MODEL_OF_RESULT, ALLOW_CODE, JSON, QUIET
-)
+    "Repeat a run from its result, and compare.",
+    options.RESULT, options.MODEL_OF_RESULT, options.ALLOW_CODE, options.JSON, options.QUIET,
+)  # fmt: skip
 @click.pass_context
 def rerun(
     ctx: click.Context,
@@ -55,19 +56,17 @@ def rerun(
 
 
 def _show(repetition: "Repetition", result: str, *, quiet: bool) -> None:
-    from dap3d_core.cli.console.console import items, messages, output, say
+    from dap3d_core.cli.console.console import stderr, stdout
 
     compared = f"{repetition.instants:,} instants compared"
-    console = messages()
+    console = stderr()
     if not repetition.equal:
-        say(console, f"{result}: repeated, not equal; {compared}", "bold red")
-        items(
-            console, [f"{n}: differs by up to {x:.3g}" for n, x in repetition.differences.items()]
-        )
+        console.say(f"{result}: repeated, not equal; {compared}", "bold red")
+        console.items([f"{n}: differs by up to {x:.3g}" for n, x in repetition.differences.items()])
     elif not quiet:
-        say(output(), f"{result}: repeated, equal bit for bit; {compared}", "green")
+        stdout().say(f"{result}: repeated, equal bit for bit; {compared}", "green")
     if repetition.types:
-        say(console, f"the formulas of {', '.join(repetition.types)} have changed since")
+        console.say(f"the formulas of {', '.join(repetition.types)} have changed since")
     if not repetition.equal and repetition.versions:
         other = [f"{name} {a}, here {b}" for name, (a, b) in repetition.versions.items()]
-        say(console, f"it was made with other versions: {'; '.join(other)}")
+        console.say(f"it was made with other versions: {'; '.join(other)}")

@@ -6,17 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import (
-    ALLOW_CODE,
-    FORCE,
-    JSON,
-    MODEL_OF_RESULT,
-    QUIET,
-    STRICT,
-    Seconds,
-    output,
-)
 from dap3d_core.cli.process.exit_codes import refusing
 
 if TYPE_CHECKING:
@@ -29,15 +20,11 @@ if TYPE_CHECKING:
 @command(
     "Continue an interrupted run.",
     click.argument("checkpoint", type=click.Path()),
-    output("Result file; by default that of the run, next to the checkpoint."),
-    click.option("--checkpoint", "every", type=Seconds(), metavar="EVERY", default=math.inf,
+    options.output("Result file; by default that of the run, next to the checkpoint."),
+    click.option("--checkpoint", "every", type=options.Seconds(), metavar="EVERY", default=math.inf,
                  help="Write a checkpoint so often: 90, 5min, 2h."),
-    MODEL_OF_RESULT,
-    ALLOW_CODE,
-    STRICT,
-    FORCE,
-    JSON,
-    QUIET,
+    options.MODEL_OF_RESULT, options.ALLOW_CODE, options.STRICT, options.FORCE, options.JSON,
+    options.QUIET,
     saves=True,
 )  # fmt: skip
 @click.pass_context

@@ -6,20 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.framework import completion
+from dap3d_core.cli.framework import completion, options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.framework.options import (
-    ALLOW_CODE,
-    FORCE,
-    JSON,
-    QUIET,
-    SETTING_OPTIONS,
-    STRICT,
-    Seconds,
-    check_settings,
-    in_options,
-    output,
-)
 
 if TYPE_CHECKING:
     from dap3d_core.cli.framework.execute import Announce, Watch
@@ -31,19 +19,15 @@ if TYPE_CHECKING:
 @command(
     "Simulate a model, write its result.",
     click.argument("model", required=False, shell_complete=completion.models),
-    output("Result file; MODEL.nc in the current folder by default."),
-    *SETTING_OPTIONS.values(),
+    options.output("Result file; MODEL.nc in the current folder by default."),
+    *options.SETTING_OPTIONS.values(),
     click.option("--error", "estimate_error", is_flag=True,
                  help="Estimate the error of all positions and velocities by a second run at "
                       "tolerances ten times tighter, or half the step."),
-    click.option("--checkpoint", type=Seconds(), metavar="EVERY", default=math.inf,
+    click.option("--checkpoint", type=options.Seconds(), metavar="EVERY", default=math.inf,
                  help="Write RESULT.checkpoint so often: 90, 5min, 2h; dap3d resume continues "
                       "from it, also after the run was killed."),
-    STRICT,
-    FORCE,
-    ALLOW_CODE,
-    JSON,
-    QUIET,
+    options.STRICT, options.FORCE, options.ALLOW_CODE, options.JSON, options.QUIET,
     saves=True,
 )  # fmt: skip
 @click.pass_context
@@ -79,7 +63,7 @@ def run(
     else:
         scene = dap.load(model)
     target = writable(named_after(model, output), force=force, sources=(scene.path,))
-    check_settings(scene, given)
+    options.check_settings(scene, given)
     compiled: list[CompiledModel] = []
 
     def prepare(announce: "Announce") -> "CompiledModel":
@@ -100,7 +84,7 @@ def run(
                 **given,
             )
         except dap.SceneError as error:  # settings that only the integrator can check
-            raise in_options(error) from error
+            raise options.in_options(error) from error
 
     outcome = execute(ctx, prepare, simulate, quiet=quiet)
     return report_run(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.console.console import messages, say
+from dap3d_core.cli.console.console import stderr
 
 if TYPE_CHECKING:
     from dap3d_core.scene import Scene
@@ -40,14 +40,14 @@ def ask(given: dict[str, Any]) -> tuple[str, "Scene"]:
 def _ask_model() -> tuple[str, "Scene"]:
     from dap3d_core.scene import SceneError, load, shipped_models
 
-    console = messages()
-    say(console, f"Shipped models: {', '.join(shipped_models()) or 'none'}")
+    console = stderr()
+    console.say(f"Shipped models: {', '.join(shipped_models()) or 'none'}")
     while True:
         model = click.prompt("Which model (a name, a folder or a file)", type=str, err=True)
         try:
             return model, load(model)
         except SceneError as error:
-            say(console, str(error), "red")
+            console.say(str(error), "red")
 
 
 def _ask_number(

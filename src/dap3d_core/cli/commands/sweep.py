@@ -6,18 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.framework import completion
+from dap3d_core.cli.framework import completion, options
 from dap3d_core.cli.framework.command import command, signals_of
-from dap3d_core.cli.framework.options import (
-    ALLOW_CODE,
-    JSON,
-    MODEL,
-    QUIET,
-    SETTING_OPTIONS,
-    in_options,
-    options_of,
-    output,
-)
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.exit_codes import Refused
 
@@ -35,7 +25,7 @@ OPTIONS = {"vary": "--vary", "outputs": "--keep"} | {
 
 @command(
     "Run a model at many values of its parameters.",
-    MODEL,
+    options.MODEL,
     click.option("--vary", multiple=True, metavar="NUMBER=FORM",
                  shell_complete=completion.parameters,
                  help="A parameter that varies: bodies.crank.mass=1:5:9 (from:to:count), "
@@ -49,8 +39,8 @@ OPTIONS = {"vary": "--vary", "outputs": "--keep"} | {
     click.option("--design", metavar="NAME",
                  help="How samples are drawn: lhs (by default), random, sobol, halton."),
     click.option("--seed", type=int, metavar="S", help="Seed of the samples; 0 by default."),
-    output("File of the sweep; MODEL-sweep.nc in the current folder by default."),
-    *SETTING_OPTIONS.values(),
+    options.output("File of the sweep; MODEL-sweep.nc in the current folder by default."),
+    *options.SETTING_OPTIONS.values(),
     click.option("--threads", type=int, metavar="N",
                  help="Points that run at once; by default one for each core."),
     click.option("--pack", type=int, metavar="N", default=1,
@@ -63,9 +53,7 @@ OPTIONS = {"vary": "--vary", "outputs": "--keep"} | {
     click.option("--strict", is_flag=True, help="Exit with 1 if a point went wrong."),
     click.option("--force", is_flag=True,
                  help="Overwrite an existing file, and the part of another sweep."),
-    ALLOW_CODE,
-    JSON,
-    QUIET,
+    options.ALLOW_CODE, options.JSON, options.QUIET,
     saves=True,
 )  # fmt: skip
 @click.pass_context
@@ -166,7 +154,8 @@ def _in_options(error: "SceneError", given: dict[str, Any]) -> "SceneError":
     from dap3d_core.scene import SceneError
 
     names = {name: option for name, option in OPTIONS.items() if given.get(name) is not None}
-    renamed = in_options(error, options_of(given) | names | {"outputs": OPTIONS["outputs"]})
+    names |= options.of_settings(given) | {"outputs": OPTIONS["outputs"]}
+    renamed = options.in_options(error, names)
     return SceneError(
         attrs.evolve(m, key=f"--{m.key}") if m.key.startswith("vary ") else m
         for m in renamed.mistakes
@@ -186,7 +175,7 @@ def _report(
     quiet: bool,
 ) -> int:
     """Report a sweep; returns the exit code."""
-    from dap3d_core.cli.console.console import messages, output, print_json, say
+    from dap3d_core.cli.console.console import print_json, stderr, stdout
     from dap3d_core.cli.console.sweep_tables import show_failing, show_sweep, sweep_data
 
     file = target.with_name(f"{target.name}.part") if reason else target
@@ -197,20 +186,20 @@ def _report(
         code, reason = exit_codes.PARTIAL, "all points failed"
     elif not reason and strict and data["stopped"] + data["failed"]:
         code = exit_codes.FAILED
-    console = messages()
+    console = stderr()
     if as_json:
         print_json({"file": str(file), **data, "reason": reason, "exit_code": code})
     else:
         if not quiet:
-            show_sweep(output(), data, str(file))
+            show_sweep(stdout(), data, str(file))
         show_failing(console, data, f"dap3d info {shlex.quote(str(file))} --json has them")
     if reason:
-        say(console, reason, "bold red")
+        console.say(reason, "bold red")
     if file != target:
-        say(console, f"what was computed until then is in {file}; to continue:", whole=True)
+        console.say(f"what was computed until then is in {file}; to continue:", whole=True)
         words = [w for w in ctx.meta["dap3d.words"] if w != "--resume"]
         command = shlex.join(["dap3d", "sweep", *words, "--resume"])
-        say(console, command, "green", indent=2, whole=True)
+        console.say(command, "green", indent=2, whole=True)
     if strict and code == exit_codes.FAILED:
-        say(console, "--strict: points went wrong; exit code 1")
+        console.say("--strict: points went wrong; exit code 1")
     return code

@@ -7,17 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command, signals_of
-from dap3d_core.cli.framework.options import (
-    ALLOW_CODE,
-    FORCE,
-    FPS,
-    JSON,
-    MODEL_OF_RESULT,
-    QUIET,
-    RESULT,
-    output,
-)
 from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 
 if TYPE_CHECKING:
@@ -26,17 +17,13 @@ if TYPE_CHECKING:
 
 @command(
     "Make a page with the moving scene of a result.",
-    RESULT,
-    output("The page; RESULT.html by default."),
+    options.RESULT,
+    options.output("The page; RESULT.html by default."),
     click.option("--quantity", "quantities", metavar="QUANTITY", multiple=True,
                  help="A curve that is drawn at once; may be given several times."),
-    FPS,
-    MODEL_OF_RESULT,
-    ALLOW_CODE,
+    options.FPS, options.MODEL_OF_RESULT, options.ALLOW_CODE,
     click.option("--open/--no-open", "opens", default=False, help="Open the page in a browser."),
-    FORCE,
-    JSON,
-    QUIET,
+    options.FORCE, options.JSON, options.QUIET,
     saves=True,
 )  # fmt: skip
 @click.pass_context
@@ -143,7 +130,7 @@ def _open(target: Path) -> None:
     """Open the page; report if there is no browser, since the page is written all the same."""
     import webbrowser
 
-    from dap3d_core.cli.console.console import messages, say
+    from dap3d_core.cli.console.console import stderr
 
     if not webbrowser.open(target.resolve().as_uri()):
-        say(messages(), f"no browser could be started; open {target} in one", whole=True)
+        stderr().say(f"no browser could be started; open {target} in one", whole=True)

@@ -8,6 +8,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,114 @@ class Terminal(Console):
         """True on a terminal, or if the environment gives a width."""
         return self.is_terminal or "COLUMNS" in os.environ
 
+    def say(self, words: str, style: str = "", indent: int = 0, *, whole: bool = False) -> None:
+        """Print a paragraph.
+
+        Args:
+            words: the text.
+            style: of rich.
+            indent: in columns.
+            whole: True for text with paths and commands: broken only if the console has a width.
+                Without an indent it is one line, whatever a path contains.
+        """
+        text = Text(clean(words) if not whole or indent else line_of(words), style=style)
+        if self.has_width or (self.wraps and not whole):
+            self.show(_indented(text, indent) if indent else text)
+        else:
+            for line in text.split("\n", allow_blank=True):
+                line.pad_left(indent)
+                self.print(line, soft_wrap=True)
+
+    def show(self, shape: RenderableType) -> None:
+        """Print a shape of rich, without spaces at line ends unless on a terminal."""
+        if self.is_terminal:
+            self.print(shape, overflow="fold")
+            return
+        with self.capture() as capture:
+            self.print(shape, overflow="fold")
+        lines = capture.get().splitlines()
+        self.print(Text("\n".join(line.rstrip() for line in lines)), soft_wrap=True)
+
+    def prose(self, words: str) -> None:
+        """Print a docstring: paragraphs are filled, indented lines stay lines."""
+        if not self.wraps:
+            self.say(words)
+            return
+        for block in words.split("\n\n"):
+            lines = block.splitlines()
+            for is_indented, group in groupby(lines, lambda line: line.startswith(" ")):
+                if not is_indented:
+                    self.say(" ".join(group))
+                    continue
+                for line in group:
+                    self._hang(" " * (len(line) - len(line.lstrip())), line.strip())
+            self.print()
+
+    def _hang(self, lead: str, words: str, style: str = "") -> None:
+        """Print text with a hanging indent of the width of its lead."""
+        grid = Table.grid()
+        grid.add_column(width=len(lead))
+        grid.add_column(overflow="fold")
+        grid.add_row(lead, Text(clean(words), style=style))
+        self.show(grid)
+
+    def items(self, texts: Iterable[str], style: str = "") -> None:
+        """Print a list, each text after a dash."""
+        for words in texts:
+            if self.wraps:
+                self._hang("  - ", words, style)
+            else:
+                self.print(Text(f"  - {line_of(words)}", style=style), soft_wrap=True)
+
+    def title(self, words: str) -> None:
+        """Print a heading, one line."""
+        self.say(line_of(words), "bold")
+
+    def section(self, heading: str, texts: Sequence[str], style: str = "") -> None:
+        """Print a heading and a list; nothing if the list is empty."""
+        if texts:
+            self.title(heading)
+            self.items(texts, style)
+
+    def facts(self, pairs: Iterable[tuple[str, str]]) -> None:
+        """Print names with their descriptions; empty ones are left out."""
+        rows = [(name, words) for name, words in pairs if words]
+        width = max((len(name) for name, _ in rows), default=0)
+        if not self.wraps:
+            for name, words in rows:
+                self.print(Text(f"  {name:{width}}  {line_of(words)}"), soft_wrap=True)
+        elif rows:
+            grid = Table.grid(padding=(0, 2))
+            grid.add_column(no_wrap=True, min_width=width)
+            grid.add_column(overflow="fold")
+            for name, words in rows:
+                grid.add_row(Text(name, style="cyan"), Text(clean(words)))
+            self.show(_indented(grid, 2))
+
+    def table(
+        self,
+        columns: Sequence[str],
+        rows: Iterable[Sequence[str | Text]],
+        *,
+        right: Sequence[int] = (),
+        fixed: Sequence[int] = (),
+    ) -> None:
+        """Print a table without lines.
+
+        Args:
+            columns: headings.
+            rows: a text for each column.
+            right: columns aligned to the right.
+            fixed: columns that are broken into lines only if no other column can be.
+        """
+        grid = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="cyan")
+        for k, name in enumerate(columns):
+            justify: Any = "right" if k in right else "left"
+            grid.add_column(name, justify=justify, no_wrap=k in fixed, overflow="fold")
+        for row in rows:
+            grid.add_row(*(Text(clean(c)) if isinstance(c, str) else c for c in row))
+        self.show(_indented(grid, 2))
+
 
 def _without_colors() -> bool | None:
     """True after ``--no-color``; None leaves it to the environment (NO_COLOR)."""
@@ -65,143 +174,18 @@ def _without_colors() -> bool | None:
     return True if ctx is not None and ctx.color is False else None
 
 
-def output() -> Terminal:
-    """The console of results: stdout."""
-    return Terminal()
-
-
-def messages() -> Terminal:
-    """The console of everything else, such as errors and progress: stderr."""
-    return Terminal(stderr=True)
-
-
-def say(
-    console: Terminal, words: str, style: str = "", indent: int = 0, *, whole: bool = False
-) -> None:
-    """Print a paragraph.
-
-    Args:
-        console: where.
-        words: the text.
-        style: of rich.
-        indent: in columns.
-        whole: True for text with paths and commands: broken only if the console has a width.
-            Without an indent it is one line, whatever a path contains.
-    """
-    text = Text(clean(words) if not whole or indent else line_of(words), style=style)
-    if console.has_width or (console.wraps and not whole):
-        show(console, _indented(text, indent) if indent else text)
-    else:
-        for line in text.split("\n", allow_blank=True):
-            line.pad_left(indent)
-            console.print(line, soft_wrap=True)
-
-
-def show(console: Terminal, shape: RenderableType) -> None:
-    """Print a table or another shape, without spaces at line ends unless on a terminal."""
-    if console.is_terminal:
-        console.print(shape, overflow="fold")
-        return
-    with console.capture() as capture:
-        console.print(shape, overflow="fold")
-    lines = capture.get().splitlines()
-    console.print(Text("\n".join(line.rstrip() for line in lines)), soft_wrap=True)
-
-
-def prose(console: Terminal, words: str) -> None:
-    """Print a docstring: paragraphs are filled, indented lines stay lines."""
-    if not console.wraps:
-        say(console, words)
-        return
-    for block in words.split("\n\n"):
-        paragraph: list[str] = []
-        for line in block.splitlines():
-            indent = len(line) - len(line.lstrip())
-            if not indent:
-                paragraph.append(line)
-                continue
-            if paragraph:
-                say(console, " ".join(paragraph))
-                paragraph = []
-            hanging = Table.grid()
-            hanging.add_column(width=indent)
-            hanging.add_column(overflow="fold")
-            hanging.add_row("", Text(clean(line.strip())))
-            show(console, hanging)
-        if paragraph:
-            say(console, " ".join(paragraph))
-        console.print()
-
-
 def _indented(shape: RenderableType, indent: int) -> RenderableType:
     return Padding(shape, (0, 0, 0, indent), expand=False)
 
 
-def items(console: Terminal, texts: Iterable[str], style: str = "") -> None:
-    """Print a list, each text after a dash."""
-    for words in texts:
-        if console.wraps:
-            grid = Table.grid(padding=(0, 1))
-            grid.add_column(width=3)
-            grid.add_column(overflow="fold")
-            grid.add_row("  -", Text(clean(words), style=style))
-            show(console, grid)
-        else:
-            console.print(Text(f"  - {line_of(words)}", style=style), soft_wrap=True)
+def stdout() -> Terminal:
+    """The console of results: stdout."""
+    return Terminal()
 
 
-def title(console: Terminal, words: str) -> None:
-    """Print a heading, one line."""
-    say(console, line_of(words), "bold")
-
-
-def section(console: Terminal, heading: str, texts: Sequence[str], style: str = "") -> None:
-    """Print a heading and a list; nothing if the list is empty."""
-    if texts:
-        title(console, heading)
-        items(console, texts, style)
-
-
-def facts(console: Terminal, pairs: Iterable[tuple[str, str]]) -> None:
-    """Print names with their descriptions; empty ones are left out."""
-    rows = [(name, words) for name, words in pairs if words]
-    if not rows:
-        return
-    width = max(len(name) for name, _ in rows)
-    if not console.wraps:
-        for name, words in rows:
-            console.print(Text(f"  {name:{width}}  {line_of(words)}"), soft_wrap=True)
-        return
-    grid = Table.grid(padding=(0, 2))
-    grid.add_column(no_wrap=True, min_width=width)
-    grid.add_column(overflow="fold")
-    for name, words in rows:
-        grid.add_row(Text(name, style="cyan"), Text(clean(words)))
-    show(console, _indented(grid, 2))
-
-
-def table(
-    columns: Sequence[str],
-    rows: Iterable[Sequence[str | Text]],
-    *,
-    right: Sequence[int] = (),
-    fixed: Sequence[int] = (),
-) -> RenderableType:
-    """A table without lines.
-
-    Args:
-        columns: headings.
-        rows: a text for each column.
-        right: columns aligned to the right.
-        fixed: columns that are broken into lines only if no other column can be.
-    """
-    grid = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="cyan")
-    for k, name in enumerate(columns):
-        justify: Any = "right" if k in right else "left"
-        grid.add_column(name, justify=justify, no_wrap=k in fixed, overflow="fold")
-    for row in rows:
-        grid.add_row(*(Text(clean(c)) if isinstance(c, str) else c for c in row))
-    return _indented(grid, 2)
+def stderr() -> Terminal:
+    """The console of everything else, such as errors and progress: stderr."""
+    return Terminal(stderr=True)
 
 
 def show_written(
@@ -228,8 +212,8 @@ def show_written(
         about = {"file": str(target), "size_bytes": byte_count}
         print_json({**about, **data, "notes": list(notes)})
     elif not quiet:
-        items(messages(), notes)
-        say(output(), f"{target} written ({size(byte_count)}): {contents}", whole=True)
+        stderr().items(notes)
+        stdout().say(f"{target} written ({size(byte_count)}): {contents}", whole=True)
 
 
 def print_json(data: Any) -> None:

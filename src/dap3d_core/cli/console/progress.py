@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 from rich.progress import BarColumn, Progress, SpinnerColumn, Task, TaskProgressColumn, TextColumn
 from rich.text import Text
 
-from dap3d_core.cli.console.console import Terminal, clean, messages, say, seconds
+from dap3d_core.cli.console.console import Terminal, clean, seconds, stderr
 
 if TYPE_CHECKING:
     from dap3d_core.simulation import Standing
@@ -51,7 +51,7 @@ class PreparationProgress:
     """Context manager that shows on stderr the preparation of a model."""
 
     def __init__(self, *, quiet: bool) -> None:
-        self._console: Terminal = messages()
+        self._console: Terminal = stderr()
         self._quiet = quiet
         self._task: Any = None
         self._announced = False
@@ -114,7 +114,7 @@ class PreparationProgress:
 
     def _print(self, words: str) -> None:
         if not self._quiet:
-            say(self._console, words)
+            self._console.say(words)
 
 
 class RunProgress(PreparationProgress):
@@ -254,7 +254,7 @@ def counting(word: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
     Yields:
         function of the number that is done and the total.
     """
-    console = messages()
+    console = stderr()
     if quiet or not _is_live(console):
         yield lambda done, total: None
         return

@@ -6,19 +6,7 @@ from typing import TYPE_CHECKING
 from rich.progress import Progress
 from rich.text import Text
 
-from dap3d_core.cli.console.console import (
-    Terminal,
-    clean,
-    count,
-    facts,
-    say,
-    scene_name,
-    seconds,
-    section,
-    show,
-    table,
-    title,
-)
+from dap3d_core.cli.console.console import Terminal, clean, count, scene_name, seconds
 from dap3d_core.cli.console.progress import LONGEST_PAUSE, RunProgress, bar_of
 
 if TYPE_CHECKING:
@@ -68,9 +56,8 @@ def show_report(console: Terminal, report: "Report", command: str, *, with_targe
         with_target: True if a target error is given.
     """
     status = "" if report.status == "done" else f": {report.status}"
-    title(console, f"speed against error: {scene_name(report.scene)}{status}")
-    facts(
-        console,
+    console.title(f"speed against error: {scene_name(report.scene)}{status}")
+    console.facts(
         [
             ("simulated", f"t = 0 to {report.t_end:g} s, reported every {report.dt:g} s"),
             ("reference", _reference(report)),
@@ -79,25 +66,25 @@ def show_report(console: Terminal, report: "Report", command: str, *, with_targe
         ],
     )
     for method, integrator in dict.fromkeys((r.method, r.integrator) for r in report.runs):
-        title(console, f"{method}, {integrator}")
+        console.title(f"{method}, {integrator}")
         runs = [r for r in report.runs if (r.method, r.integrator) == (method, integrator)]
         _show_runs(console, runs)
     if report.runs:
         legend = "* no faster run has a smaller error"
         if any(run.below_uncertainty for run in report.runs):
             legend += "; < below the uncertainty of the reference"
-        say(console, legend)
+        console.say(legend)
     failed = [f"{each.setting}: {each.reason}" for each in report.failed]
-    section(console, "settings that gave no result", failed, "red")
+    console.section("settings that gave no result", failed, "red")
     refused = [f"{each.method}: {each.reason}" for each in report.refused]
-    section(console, "methods that do not fit", refused)
-    section(console, "notes", (*report.reference.notes, *report.notes))
-    title(console, "recommended")
+    console.section("methods that do not fit", refused)
+    console.section("notes", (*report.reference.notes, *report.notes))
+    console.title("recommended")
     for target in (None,) if with_target else TARGETS:
         advice = report.recommended(target)
-        say(console, f"for an error of {advice.target_error:g}: {advice.reason}", indent=2)
+        console.say(f"for an error of {advice.target_error:g}: {advice.reason}", indent=2)
         if advice.flags:
-            say(console, f"{command} {advice.flags}", "green", indent=4, whole=True)
+            console.say(f"{command} {advice.flags}", "green", indent=4, whole=True)
 
 
 def _reference(report: "Report") -> str:
@@ -134,7 +121,7 @@ def _show_runs(console: Terminal, runs: "list[Run]") -> None:
     columns += ["|C|", "steps", "rhs"] if wide else ["rhs"]
     rows = [_row(run, wide=wide) for run in runs]
     every = range(len(columns))
-    show(console, table(columns, rows, right=tuple(every)[2:], fixed=tuple(every)))
+    console.table(columns, rows, right=tuple(every)[2:], fixed=tuple(every))
 
 
 def _row(run: "Run", *, wide: bool) -> list[str | Text]:

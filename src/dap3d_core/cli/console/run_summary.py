@@ -14,20 +14,13 @@ from rich.text import Text
 from dap3d_core.cli.console.console import (
     Terminal,
     count,
-    facts,
-    items,
-    messages,
-    output,
     plain,
     print_json,
-    say,
     scene_name,
     seconds,
-    section,
-    show,
     size,
-    table,
-    title,
+    stderr,
+    stdout,
 )
 from dap3d_core.cli.process import exit_codes
 
@@ -35,8 +28,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dap3d_core.cli.framework.execute import Outcome
     from dap3d_core.result import Occurrence, Result
+    from dap3d_core.simulation import CompiledModel
 
 #: Events that are printed.
 MOST_EVENTS = 6
@@ -132,13 +125,13 @@ def correction_data(
     """
     import numpy as np
 
-    from dap3d_core.model.rotations import split
+    from dap3d_core.model.state_layout import split
 
     change = np.abs(u - given) / (1.0 + np.abs(given))
-    parts = split(change, len(names))
+    parts = split(change)
     largest = np.max([np.max(part, axis=1) for part in parts], axis=0)
     most = np.argsort(-largest, kind="stable")[:MOST_BODIES]
-    arrays = dict(zip(("r", "p", "r_dot", "w"), split(u, len(names)), strict=True))
+    arrays = dict(zip(("r", "p", "r_dot", "w"), split(u), strict=True))
     return {
         "changed": bool(np.any(change > CHANGED)),
         "changed_bodies": [n for n, x in zip(names, largest, strict=True) if x > PRINTED],
@@ -150,7 +143,29 @@ def correction_data(
     }
 
 
-def _correction(outcome: "Outcome") -> dict[str, Any] | None:
+# ---------------------------------------------------------------------------- a finished run
+
+
+@attrs.frozen(eq=False)
+class Outcome:
+    """A run that has a result.
+
+    Attributes:
+        compiled: the model.
+        result: what was computed.
+        code: the exit code without ``--strict``.
+        reason: why it ended early; "" otherwise.
+        checkpoint: file from which ``resume`` continues, or None.
+    """
+
+    compiled: "CompiledModel"
+    result: "Result"
+    code: int
+    reason: str
+    checkpoint: Path | None
+
+
+def _correction(outcome: Outcome) -> dict[str, Any] | None:
     """The correction of a run; None if there was none to make."""
     result = outcome.result
     if not (result.settings.get("correct") and result.subject.row_count and len(result.t)):
@@ -159,11 +174,8 @@ def _correction(outcome: "Outcome") -> dict[str, Any] | None:
     return correction_data(result.subject.body_names, outcome.compiled.model.u0, first)
 
 
-# ---------------------------------------------------------------------------- a finished run
-
-
 def report_run(
-    outcome: "Outcome", model: str, target: Path, *, strict: bool, as_json: bool, quiet: bool
+    outcome: Outcome, model: str, target: Path, *, strict: bool, as_json: bool, quiet: bool
 ) -> int:
     """Report a run that was saved; returns the exit code."""
     data = run_data(outcome.result)
@@ -180,43 +192,43 @@ def report_run(
     elif not quiet:
         _show_run(outcome, data, initial, target)
     if quiet and not as_json:
-        items(messages(), violations, "red")
+        stderr().items(violations, "red")
     if outcome.reason:
         _show_early_end(outcome, target)
     if code != outcome.code:
-        say(messages(), "--strict: there are warnings, or the ledger does not close; exit code 1")
+        stderr().say("--strict: there are warnings, or the ledger does not close; exit code 1")
     return code
 
 
 def _show_run(
-    outcome: "Outcome", data: dict[str, Any], initial: dict[str, Any] | None, target: Path
+    outcome: Outcome, data: dict[str, Any], initial: dict[str, Any] | None, target: Path
 ) -> None:
-    console = output()
+    console = stdout()
     name = scene_name(data["scene"])
-    title(console, name if data["status"] == "done" else f"{name}: {data['status']}")
+    console.title(name if data["status"] == "done" else f"{name}: {data['status']}")
     if outcome.compiled.scene.description:
-        say(console, str(outcome.compiled.scene.description), indent=2)
-    facts(console, run_pairs(data))
+        console.say(str(outcome.compiled.scene.description), indent=2)
+    console.facts(run_pairs(data))
     if initial is not None:
         show_correction(console, initial)
     show_details(console, data)
-    say(console, f"{target} written ({size(target.stat().st_size)}). Next:", whole=True)
+    console.say(f"{target} written ({size(target.stat().st_size)}). Next:", whole=True)
     file = shlex.quote(str(target))
     quantity = shlex.quote(f"{outcome.result.subject.body_names[0]}.r")
     commands = (f"plot {file} {quantity}", f"view {file} --open", f"animate {file}", f"info {file}")
     for command in commands:
-        say(console, f"dap3d {command}", "green", indent=2, whole=True)
+        console.say(f"dap3d {command}", "green", indent=2, whole=True)
 
 
-def _show_early_end(outcome: "Outcome", target: Path) -> None:
-    console = messages()
-    say(console, outcome.reason, "bold red")
+def _show_early_end(outcome: Outcome, target: Path) -> None:
+    console = stderr()
+    console.say(outcome.reason, "bold red")
     last = f"t = {outcome.result.t[-1]:.6g} s"
-    say(console, f"what was computed until then, up to {last}, is in {target}")
+    console.say(f"what was computed until then, up to {last}, is in {target}")
     if outcome.checkpoint is not None:
-        say(console, "to continue from there:")
+        console.say("to continue from there:")
         command = f"dap3d resume {shlex.quote(str(outcome.checkpoint))}"
-        say(console, command, "green", indent=2, whole=True)
+        console.say(command, "green", indent=2, whole=True)
 
 
 # ---------------------------------------------------------------------------- text
@@ -302,16 +314,16 @@ def _error_text(error: dict[str, Any] | None) -> str:
 def show_details(console: Terminal, data: dict[str, Any]) -> None:
     """Print events, ledger and notes of a run, but for the choice of its method."""
     events = [event["text"] for event in data["events"]]
-    section(console, "events", events[:MOST_EVENTS])
+    console.section("events", events[:MOST_EVENTS])
     if len(events) > MOST_EVENTS:
-        say(console, f"and {len(events) - MOST_EVENTS} more", indent=2)
+        console.say(f"and {len(events) - MOST_EVENTS} more", indent=2)
     if data["ledger"]:
         _show_ledger(console, data)
-    section(console, "notes", _split_notes(data)[1])
+    console.section("notes", _split_notes(data)[1])
 
 
 def _show_ledger(console: Terminal, data: dict[str, Any]) -> None:
-    title(console, "ledger")
+    console.title("ledger")
     verdicts = {None: Text("-"), True: Text("yes", "green"), False: Text("NO", "bold red")}
     rows = [
         (name, f"{e['value']:.1e}", "-" if e["limit"] is None else f"{e['limit']:.1e}",
@@ -319,28 +331,28 @@ def _show_ledger(console: Terminal, data: dict[str, Any]) -> None:
         for name, e in data["ledger"].items()
     ]  # fmt: skip
     columns = ("quantity", "value", "limit", "ok")
-    show(console, table(columns, rows, right=(1, 2), fixed=(0, 1, 2, 3)))
-    items(console, _violations(data), "red")
+    console.table(columns, rows, right=(1, 2), fixed=(0, 1, 2, 3))
+    console.items(_violations(data), "red")
 
 
 def show_correction(console: Terminal, initial: dict[str, Any]) -> None:
     """Print the initial conditions of the bodies that were changed, as the manual reports them."""
     if not initial["changed"]:
-        say(console, "initial conditions: they fulfil the constraints, nothing was changed")
+        console.say("initial conditions: they fulfil the constraints, nothing was changed")
         return
     changed, printed = initial["changed_bodies"], initial["most_changed"]
     if not changed:
-        say(console, f"initial conditions: corrected by less than {PRINTED:g}")
+        console.say(f"initial conditions: corrected by less than {PRINTED:g}")
         return
-    title(console, "corrected initial conditions (SI, global axes)")
-    say(console, _line("", ["x, e0", "y, e1", "z, e2", "e3"]))
+    console.title("corrected initial conditions (SI, global axes)")
+    console.say(_line("", ["x, e0", "y, e1", "z, e2", "e3"]))
     for name in printed:
-        say(console, name, "cyan", indent=2)
+        console.say(name, "cyan", indent=2)
         for symbol, values in initial["bodies"][name].items():
-            say(console, _line(symbol, map(_short, values)))
+            console.say(_line(symbol, map(_short, values)))
     if len(changed) > len(printed):
         more = count(len(changed) - len(printed), "body", "bodies")
-        say(console, f"and {more} more, changed less; --json prints all", indent=2)
+        console.say(f"and {more} more, changed less; --json prints all", indent=2)
 
 
 def _line(symbol: str, words: Iterable[str]) -> str:

@@ -3,17 +3,7 @@
 import json
 from typing import TYPE_CHECKING, Any
 
-from dap3d_core.cli.console.console import (
-    Terminal,
-    facts,
-    items,
-    say,
-    scene_name,
-    seconds,
-    show,
-    table,
-    title,
-)
+from dap3d_core.cli.console.console import Terminal, scene_name, seconds
 from dap3d_core.result.file.lazy_arrays import LARGE
 
 if TYPE_CHECKING:
@@ -118,11 +108,10 @@ def show_sweep(console: Terminal, data: dict[str, Any], file: str = "") -> None:
         file: that holds the sweep.
     """
     total = data["points"]
-    title(console, f"{scene_name(data['model'])}: {total:,} {'point' if total == 1 else 'points'}")
+    console.title(f"{scene_name(data['model'])}: {total:,} {'point' if total == 1 else 'points'}")
     rate = data.get("points_per_second")
     time = f"{seconds(data['wall_time_s'])}, {rate:.3g} points/s" if rate else ""
-    facts(
-        console,
+    console.facts(
         [
             ("points", ", ".join(f"{data[k]:,} {text}" for k, text in COUNTS.items() if data[k])),
             ("design", _design(data)),
@@ -139,7 +128,7 @@ def show_sweep(console: Terminal, data: dict[str, Any], file: str = "") -> None:
         if one[word] is not None
     ]
     if rows:
-        show(console, table(("output", "", "value", "where"), rows, right=(2,), fixed=(1, 2)))
+        console.table(("output", "", "value", "where"), rows, right=(2,), fixed=(1, 2))
 
 
 def show_failing(console: Terminal, data: dict[str, Any], others: str) -> None:
@@ -148,10 +137,10 @@ def show_failing(console: Terminal, data: dict[str, Any], others: str) -> None:
     if not failing:
         return
     count = data["stopped"] + data["failed"]
-    say(console, f"{count:,} of {data['points']:,} points went wrong:", "red")
-    items(console, [f"{_in_words(f['at'])}: {f['status']}: {f['note']}" for f in failing[:LISTED]])
+    console.say(f"{count:,} of {data['points']:,} points went wrong:", "red")
+    console.items([f"{_in_words(f['at'])}: {f['status']}: {f['note']}" for f in failing[:LISTED]])
     if count > LISTED:
-        say(console, f"and {count - LISTED:,} more: {others}", whole=True)
+        console.say(f"and {count - LISTED:,} more: {others}", whole=True)
 
 
 def _in_words(at: dict[str, Any]) -> str:

@@ -102,9 +102,9 @@ class Command(click.Command):
         """The exit code of a finished command, after a message if its output was lost."""
         if not (fault := stdout_fault()):
             return code
-        from dap3d_core.cli.console.console import messages, say
+        from dap3d_core.cli.console.console import stderr
 
         saves = ctx.params.get("output") is not None or self.saves
         saved = "; the files of the command are saved" if saves else ""
-        say(messages(), f"cannot write to the standard output: {fault}{saved}", "bold red")
+        stderr().say(f"cannot write to the standard output: {fault}{saved}", "bold red")
         return code if saves else code or exit_codes.FAILED

@@ -6,7 +6,7 @@ import sys
 import traceback
 from typing import Any
 
-from dap3d_core.cli.console.console import Terminal, messages, plain, print_json, say
+from dap3d_core.cli.console.console import Terminal, plain, print_json, stderr
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.streams import leave_stderr
 
@@ -26,13 +26,13 @@ def report_error(error: BaseException, *, debug: bool, as_json: bool) -> int:
         with contextlib.suppress(OSError):
             print_json({"mistakes": mistakes, **data} if mistakes else data)
     try:
-        console = messages()
+        console = stderr()
         if mistakes:
             _show_mistakes(console, error)
         else:
-            say(console, text, "bold red")
+            console.say(text, "bold red")
         if code == exit_codes.FAILED and not debug and _is_unexpected(error):
-            say(console, "run the command again with --debug to see where it happened")
+            console.say("run the command again with --debug to see where it happened")
     except OSError:  # stderr is closed or full: the exit code remains
         leave_stderr()
     return code
@@ -55,10 +55,10 @@ def mistakes_of(error: BaseException) -> list[dict[str, Any]]:
 def _show_mistakes(console: Terminal, error: Any) -> None:
     number = len(error.mistakes)
     if number > 1:
-        say(console, f"{number} mistakes:", "bold red")
+        console.say(f"{number} mistakes:", "bold red")
     for line in str(error).split("\n"):
         indented = line.startswith("    ")
-        say(console, line.strip(), "" if indented else "red", indent=4 if indented else 0)
+        console.say(line.strip(), "" if indented else "red", indent=4 if indented else 0)
 
 
 def _judge(error: BaseException) -> tuple[int, str]:

@@ -1,10 +1,8 @@
 """Runs of a command: progress, signals, and what is saved when a run ends early."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import attrs
 import click
 
 from dap3d_core.cli.framework.command import signals_of
@@ -12,30 +10,12 @@ from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.exit_codes import Terminated, refusing
 
 if TYPE_CHECKING:
+    from dap3d_core.cli.console.run_summary import Outcome
     from dap3d_core.result import Result
     from dap3d_core.simulation import CompiledModel, Standing
 
     Announce = Callable[[str], None]
     Watch = Callable[[Standing], None]
-
-
-@attrs.frozen(eq=False)
-class Outcome:
-    """A run that has a result.
-
-    Attributes:
-        compiled: the model.
-        result: what was computed.
-        code: the exit code without ``--strict``.
-        reason: why it ended early; "" otherwise.
-        checkpoint: file from which ``resume`` continues, or None.
-    """
-
-    compiled: "CompiledModel"
-    result: "Result"
-    code: int
-    reason: str
-    checkpoint: Path | None
 
 
 def execute(
@@ -44,7 +24,7 @@ def execute(
     run: "Callable[[Announce, Watch], Result]",
     *,
     quiet: bool,
-) -> Outcome:
+) -> "Outcome":
     """Compile a model and run it; a run that ends early returns what it computed.
 
     Args:
@@ -55,6 +35,7 @@ def execute(
     """
     import dap3d_core as dap
     from dap3d_core.cli.console.progress import RunProgress
+    from dap3d_core.cli.console.run_summary import Outcome
 
     with RunProgress(quiet=quiet) as progress:
         with refusing(dap.SimulationError):  # a method that does not fit the scene

@@ -119,14 +119,14 @@ def check_settings(scene: "Scene", given: dict[str, Any]) -> None:
     try:
         check_simulation(attrs.evolve(scene.simulation, **values), scene.bodies)
     except SceneError as error:
-        names = options_of(given)
+        names = of_settings(given)
         checked = names.keys() | ({"dt"} if "t_end" in values else set())
         mistakes = [m for m in error.mistakes if m.key in checked]
         if mistakes:  # others are reported with the whole scene, with their lines
             raise in_options(SceneError(mistakes), names) from error
 
 
-def options_of(given: Mapping[str, Any]) -> dict[str, str]:
+def of_settings(given: Mapping[str, Any]) -> dict[str, str]:
     """Names of the options of settings that are given; an integrator may need ``--step``."""
     names = {name for name, value in given.items() if value is not None}
     names |= {"step"} if "integrator" in names else set()
