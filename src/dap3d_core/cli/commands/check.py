@@ -101,7 +101,7 @@ def _data(compiled: "CompiledModel", metric: str | None) -> dict[str, Any]:
 def _redundancy_data(
     compiled: "CompiledModel", u: Any, redundancy: "Redundancy", *, assembled: bool
 ) -> dict[str, Any]:
-    """Groups, other poses, contradictions, reactions; ``about`` has the same in sentences."""
+    """Redundancy as data; ``about`` has the same in sentences."""
     import attrs
 
     from dap3d_core.simulation.redundancy.other_poses import Elsewhere, redundancy_elsewhere

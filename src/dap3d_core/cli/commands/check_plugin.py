@@ -150,10 +150,10 @@ def _show(console: "Terminal", report: "Report", *, quiet: bool) -> None:
     console.title(f"{report.keyword}, a {report.kind}")
     if not quiet:
         console.say(report.title, indent=2, whole=True)
-        rows = [
-            (Text(*STATES[o.state]), o.title, _size(o.error), _size(o.differences), o.words)
-            for o in report.outcomes
-        ]
+        rows: list[tuple[str | Text, ...]] = []
+        for o in report.outcomes:
+            errors = ("" if x is None else f"{x:.0e}" for x in (o.error, o.differences))
+            rows.append((Text(*STATES[o.state]), o.title, *errors, o.words))
         columns = ("", "check", "error", "by diff.", "what was compared; why it does not apply")
         console.table(columns, rows, fixed=(0, 2, 3))
         console.items(dict.fromkeys(f"{o.title}: {n}" for o in report.outcomes for n in o.notes))
@@ -161,7 +161,3 @@ def _show(console: "Terminal", report: "Report", *, quiet: bool) -> None:
     console.items(dict.fromkeys(findings), "red")
     if not quiet:
         console.print()
-
-
-def _size(error: float | None) -> str:
-    return "" if error is None else f"{error:.0e}"

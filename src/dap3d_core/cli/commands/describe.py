@@ -87,7 +87,19 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
         "file": where_is(type_).removesuffix(f": {type_.__name__}"),
         "bodies": list(examined.layout.slots),
         **_class_data(examined),
-        "fields": [_field(name, spec) for name, spec in specs_of(type_).items() if spec.given],
+        "fields": [
+            {
+                "name": name,
+                "kind": spec.kind,
+                "required": spec.required,
+                "default": None if spec.required else spec.default,
+                "unit": spec.unit,
+                "doc": spec.doc,
+                "allowed": _allowed(spec),
+            }
+            for name, spec in specs_of(type_).items()
+            if spec.given
+        ],
         "names": [
             {
                 "name": argument.name,
@@ -134,41 +146,25 @@ def _source(kernel: Any) -> str:
     return textwrap.dedent(text).rstrip()
 
 
-def _field(name: str, spec: Any) -> dict[str, Any]:
-    return {
-        "name": name,
-        "kind": spec.kind,
-        "required": spec.required,
-        "default": None if spec.required else spec.default,
-        "unit": spec.unit,
-        "doc": spec.doc,
-        "allowed": _allowed(spec),
-    }
-
-
 def _allowed(spec: Any) -> str:
     """The conditions on a value besides its kind."""
+    bounds = {">": 0.0 if spec.positive else None, ">=": spec.minimum, "<=": spec.maximum}
+    usual = _bounds({">=": spec.usual[0], "<=": spec.usual[1]})
     words = [f"of {spec.argument}"] if spec.argument else []
     if spec.choices:
         words.append(", ".join(map(_word, spec.choices)))
         words += [f"{word} is {other}" for word, other in spec.aliases.items()]
-    if spec.positive:
-        words.append("> 0")
-    if spec.minimum is not None:
-        words.append(f">= {spec.minimum:g}")
-    if spec.maximum is not None:
-        words.append(f"<= {spec.maximum:g}")
-    if spec.whole:
-        words.append("a whole number")
-    low, high = spec.usual
-    if low is not None or high is not None:
-        least = "" if low is None else f" >= {low:g}"
-        words.append(f"usually{least}" + ("" if high is None else f" <= {high:g}"))
+    words += _bounds(bounds)
+    words += ["a whole number"] * bool(spec.whole)
+    words += [f"usually {' '.join(usual)}"] * bool(usual)
     if spec.direction:
         words.append("of unit length" if spec.kind == "vec3" else "not of zero length")
-    if spec.across:
-        words.append(f"not along {spec.across}")
+    words += [f"not along {spec.across}"] * bool(spec.across)
     return ", ".join(words)
+
+
+def _bounds(bounds: Mapping[str, float | None]) -> list[str]:
+    return [f"{sign} {value:g}" for sign, value in bounds.items() if value is not None]
 
 
 # ---------------------------------------------------------------------------- text

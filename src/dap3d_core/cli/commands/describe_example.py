@@ -25,9 +25,8 @@ ALONG = ("a", "")
 def example_of(examined: "Examined", registry: "Registry") -> str:
     """The text of a scene file with one element of a type and all that it needs.
 
-    It has the required fields of the type, and its numbers with their defaults. Functions of time,
-    the element that a function drives and the joint that a force acts through are of the first
-    suitable types in the registry.
+    It has the required fields of the type, and its numbers with their defaults. Other elements that
+    it needs are of the first suitable types in the registry.
     """
     scene = _Example(registry)
     type_: Any = examined.type
@@ -78,13 +77,7 @@ class _Example:
         raise PluginError(f"an example needs a {kind} that no installed package brings")
 
     def add(self, examined: "Examined", name: str, motor: str = "motor") -> None:
-        """Add an element and all that it refers to.
-
-        Args:
-            examined: its type.
-            name: of the element.
-            motor: name of the function that drives it.
-        """
+        """Add an element of a type and all that it refers to; ``motor`` names its function."""
         from dap3d_core.interface.fields import specs_of
 
         type_: Any = examined.type
@@ -121,7 +114,9 @@ class _Example:
             yield name, f'"{self._body_named(owner)}"'
         elif spec.kind == "function":
             if spec.required or not spec.argument:  # it would replace other fields
-                yield name, f'"{self._motor(motor)}"'
+                if f"function.{motor}" not in self.elements:
+                    self.add(self.first("function", lambda _: True), motor)
+                yield name, f'"{motor}"'
         elif spec.kind == "joint":
             self.add(self.first("joint", _has_friction), "J1")
             yield name, '"J1"'
@@ -141,11 +136,6 @@ class _Example:
         height = HEIGHT if owner == "ground" else 0.0
         place = _toml((MEETING - PLACES[self._body_named(owner)], 0.0, height))
         self.points[name] = f'[points.{name}]\nbody = "{owner}"\nsPp = {place}\n'
-        return name
-
-    def _motor(self, name: str) -> str:
-        if f"function.{name}" not in self.elements:
-            self.add(self.first("function", lambda _: True), name)
         return name
 
 

@@ -98,10 +98,9 @@ def _names(name: str, kind: str, author: str | None) -> dict[str, str]:
 
 
 def _check_free(names: dict[str, str], *, force: bool) -> None:
-    """Refuse an ambiguous keyword, and a module that exists.
+    """Refuse a keyword that its kind has already, and a module that exists.
 
-    The same keyword for another kind is allowed: scenes have them in different tables. The modules
-    of dap3d itself are never replaced.
+    The modules of dap3d itself are never replaced.
     """
     import dap3d_core as dap
 
@@ -133,14 +132,13 @@ def _folder(output: str, *, force: bool) -> Path:
     """The folder to write into; refused if it is not empty."""
     folder = Path(output)
     try:
-        if folder.exists() and not folder.is_dir():
-            raise Refused(f"{folder} is a file; name a folder with -o")
-        if folder.is_dir() and any(folder.iterdir()) and not force:
-            raise Refused(
-                f"{folder} holds files; --force writes among them, -o names another folder"
-            )
+        is_empty = not folder.exists() or not any(folder.iterdir())
+    except NotADirectoryError as error:
+        raise Refused(f"{folder} is a file; name a folder with -o") from error
     except OSError as error:
         raise Refused(f"cannot read {folder}: {error.strerror or error}") from error
+    if not (is_empty or force):
+        raise Refused(f"{folder} holds files; --force writes among them, -o names another folder")
     return folder
 
 

@@ -85,33 +85,22 @@ def plot(
     dap3d plot pen1-sweep.nc --at bodies.cone.mass=2
     dap3d plot pen1-sweep.nc cone.r.z:max --x bodies.cone.mass
     """
+    from dap3d_core.cli.console.console import show_written
+
     files = [result, *(word for word in quantities if word.endswith(SUFFIX))]
     names = tuple(word for word in quantities if not word.endswith(SUFFIX))
     data, names, cuts = _open(files, names, x, at, types)
     target = None if show and output is None else Path(output or Path(result).stem + ".png")
     axes: dict[str, Any] = {"x": x, "at": cuts}
-    size = {"width": _inches(width), "height": _inches(height)}
+    sides = {"width": width, "height": height}.items()
+    size = {side: None if mm is None else mm / MM_PER_INCH for side, mm in sides}
     _check(data, names, target, axes, size, files, force)
     _draw(data, names, target, show, force, **axes, **size)
     if target is not None:
-        drawn = axes if _is_sweep(data) else {"x": x or "t"}
-        about = {"file": str(target), "results": files, "quantities": names} | drawn
-        _report(about, as_json=as_json, quiet=quiet)
+        drawn = axes if hasattr(data, "data_vars") else {"x": x or "t"}
+        about = {"results": files, "quantities": names} | drawn
+        show_written(target, ", ".join(names), about, as_json=as_json, quiet=quiet)
     return DONE
-
-
-def _report(about: dict[str, Any], *, as_json: bool, quiet: bool) -> None:
-    from dap3d_core.cli.console.console import print_json, stdout
-
-    if as_json:
-        print_json(about)
-    elif not quiet:
-        stdout().say(f"{about['file']} written", whole=True)
-
-
-def _is_sweep(data: Any) -> bool:
-    """True for the data set of a sweep."""
-    return hasattr(data, "data_vars")
 
 
 def _open(
@@ -178,10 +167,6 @@ def _labels(files: Sequence[str]) -> list[str]:
     return [str(f) for f in files]
 
 
-def _inches(size: float | None) -> float | None:
-    return None if size is None else size / MM_PER_INCH
-
-
 def _check(
     data: Any,
     names: tuple[str, ...],
@@ -205,7 +190,7 @@ def _check(
         sources = tuple(map(Path, files))
         checks += [partial(check_suffix, target)]
         checks += [partial(writable, target, force=force, sources=sources)]
-    if _is_sweep(data):
+    if hasattr(data, "data_vars"):  # a sweep
         from dap3d_core.plot.sweep.sweep_table import table_of
 
         checks += [partial(table_of(data).check, name) for name in names]

@@ -13,6 +13,7 @@ from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 if TYPE_CHECKING:
     from dap3d_core.result import Result
 
+Names = tuple[str, ...]
 FORMATS = {".nc": "nc", ".csv": "csv"}
 
 
@@ -33,11 +34,11 @@ FORMATS = {".nc": "nc", ".csv": "csv"}
 )  # fmt: skip
 def post(
     result: str,
-    quantities: tuple[str, ...],
+    quantities: Names,
     *,
     output: str | None,
     kind: str | None,
-    selected: tuple[str, ...],
+    selected: Names,
     jacobian: bool,
     model: str | None,
     allow_code: bool,
@@ -96,12 +97,7 @@ def _target(result: str, output: str | None, kind: str | None) -> tuple[Path, st
 
 
 def _write_table(
-    result: "Result",
-    target: Path,
-    names: tuple[str, ...],
-    reactions: bool,
-    jacobian: bool,
-    force: bool,
+    result: "Result", target: Path, names: Names, reactions: bool, jacobian: bool, force: bool
 ) -> list[dict[str, Any]]:
     """Write a CSV table; returns its columns."""
     from dap3d_core.result import ResultError, UnknownNameError
@@ -123,12 +119,7 @@ def _write_table(
 
 
 def _write_arrays(
-    result: "Result",
-    target: Path,
-    names: tuple[str, ...],
-    reactions: bool,
-    jacobian: bool,
-    force: bool,
+    result: "Result", target: Path, names: Names, reactions: bool, jacobian: bool, force: bool
 ) -> list[dict[str, Any]]:
     """Write a NetCDF file; returns its arrays."""
     from dap3d_core.result import ResultError, UnknownNameError

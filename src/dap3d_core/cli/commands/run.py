@@ -37,8 +37,6 @@ def run(
     model: str | None,
     *,
     output: str | None,
-    estimate_error: bool,
-    checkpoint: float,
     strict: bool,
     force: bool,
     allow_code: bool,
@@ -79,8 +77,6 @@ def run(
                 announce=announce,
                 output=target,
                 force=force,
-                estimate_error=estimate_error,
-                checkpoint=checkpoint,
                 **given,
             )
         except dap.SceneError as error:  # settings that only the integrator can check

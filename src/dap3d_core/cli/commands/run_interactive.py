@@ -26,12 +26,14 @@ def ask(given: dict[str, Any]) -> tuple[str, "Scene"]:
         question = "Do you want to correct the initial conditions?"
         given["correct"] = click.confirm(question, default=settings.correct is not False, err=True)
     if given["t_end"] is None:
-        given["t_end"] = _ask_number("Final time in seconds", settings.t_end, least=0.0)
+        given["t_end"] = _ask_number("Final time in seconds", settings.t_end, min=0.0)
     t_end = given["t_end"]
     if given["dt"] is None and t_end:
         usual = settings.dt if isinstance(settings.dt, (int, float)) else 0.0
         usual = usual if 0.0 < usual <= t_end else t_end / 100.0
-        given["dt"] = _ask_number("Reporting time-step in seconds", usual, above=0.0, most=t_end)
+        given["dt"] = _ask_number(
+            "Reporting time-step in seconds", usual, min=0.0, min_open=True, max=t_end
+        )
     if given["method"] is None:
         given["method"] = _ask_method(str(settings.method))
     return model, scene
@@ -50,29 +52,18 @@ def _ask_model() -> tuple[str, "Scene"]:
             console.say(str(error), "red")
 
 
-def _ask_number(
-    question: str, usual: Any, *, least: float = -math.inf, above: float = -math.inf,
-    most: float = math.inf,
-) -> float:  # fmt: skip
-    """A finite number within its bounds; the question is repeated until it is one."""
+class _Finite(click.FloatRange):
+    """A finite number within bounds."""
 
-    def read(text: Any) -> float:
-        try:
-            value = float(text)
-        except (TypeError, ValueError):
-            raise click.UsageError(f"{text!r} is not a number") from None
-        if not math.isfinite(value):
-            raise click.UsageError("the number must be finite")
-        if value < least:
-            raise click.UsageError(f"the number must be at least {least:g}")
-        if value <= above:
-            raise click.UsageError(f"the number must be above {above:g}")
-        if value > most:
-            raise click.UsageError(f"the number must be at most {most:g}")
-        return value
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)
+        return number if math.isfinite(number) else self.fail("the number must be finite")
 
+
+def _ask_number(question: str, usual: Any, **bounds: Any) -> float:
+    """A number within its bounds; the question is repeated until it is one."""
     default = f"{usual:g}" if isinstance(usual, (int, float)) else None
-    return float(click.prompt(question, default=default, value_proc=read, err=True))
+    return float(click.prompt(question, default=default, type=_Finite(**bounds), err=True))
 
 
 def _ask_method(usual: str) -> str:

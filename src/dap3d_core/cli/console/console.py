@@ -44,10 +44,7 @@ class Terminal(Console):
 
     def _leave(self, error: OSError | None) -> None:
         self.quiet = True
-        if self.stderr:
-            leave_stderr()
-        else:
-            leave_stdout(error)
+        leave_stderr() if self.stderr else leave_stdout(error)
 
     @property
     def wraps(self) -> bool:
@@ -60,14 +57,10 @@ class Terminal(Console):
         return self.is_terminal or "COLUMNS" in os.environ
 
     def say(self, words: str, style: str = "", indent: int = 0, *, whole: bool = False) -> None:
-        """Print a paragraph.
+        """Print a paragraph in a style of rich, indented by columns.
 
-        Args:
-            words: the text.
-            style: of rich.
-            indent: in columns.
-            whole: True for text with paths and commands: broken only if the console has a width.
-                Without an indent it is one line, whatever a path contains.
+        ``whole`` is for text with paths and commands: it is broken only if the console has a width,
+        and without an indent it is one line, whatever a path contains.
         """
         text = Text(clean(words) if not whole or indent else line_of(words), style=style)
         if self.has_width or (self.wraps and not whole):
@@ -153,11 +146,8 @@ class Terminal(Console):
     ) -> None:
         """Print a table without lines.
 
-        Args:
-            columns: headings.
-            rows: a text for each column.
-            right: columns aligned to the right.
-            fixed: columns that are broken into lines only if no other column can be.
+        Columns ``right`` are aligned to the right; columns ``fixed`` are broken into lines only if
+        no other column can be.
         """
         grid = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="cyan")
         for k, name in enumerate(columns):
@@ -197,16 +187,7 @@ def show_written(
     as_json: bool,
     quiet: bool = False,
 ) -> None:
-    """Report a file that was written.
-
-    Args:
-        target: the file.
-        contents: what it holds, in words.
-        data: the same for JSON.
-        notes: of its making.
-        as_json: True to print one JSON object.
-        quiet: True to print nothing else.
-    """
+    """Report a file that was written: its contents in words, or the same as JSON data."""
     byte_count = target.stat().st_size
     if as_json:
         about = {"file": str(target), "size_bytes": byte_count}

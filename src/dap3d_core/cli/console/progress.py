@@ -8,7 +8,15 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from rich.progress import BarColumn, Progress, SpinnerColumn, Task, TaskProgressColumn, TextColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    Task,
+    TaskProgressColumn,
+    TextColumn,
+)
 from rich.text import Text
 
 from dap3d_core.cli.console.console import Terminal, clean, seconds, stderr
@@ -86,16 +94,14 @@ class PreparationProgress:
         if not self._announced:
             self._announced = True
             self._print(ONCE)
-        if self._bar is not None:
-            self._bar.update(self._task, description=clean(f"compiling {kernel}"))
-        else:
+        self._update(f"compiling {kernel}")
+        if self._bar is None:
             self._print(f"  {kernel}")
 
     def start(self) -> None:
         """Show that the model is ready; its initial conditions are next."""
-        if self._bar is not None:
-            self._bar.update(self._task, description="starting")
-        elif not self._quiet:
+        self._update("starting")
+        if self._bar is None and not self._quiet:
             self._waiting = _Waiting("finding the initial conditions", self._print)
 
     def _end_waiting(self) -> None:
@@ -103,13 +109,19 @@ class PreparationProgress:
             self._waiting.end()
             self._waiting = None
 
-    def _show(self, line: Callable[[int], str], lasting: Callable[[], str], elapsed: float) -> None:
-        """Show progress: a line of a width on the bar, or a printed one if it is time for it."""
+    @property
+    def _width(self) -> int:
+        return self._console.width - SPINNER_WIDTH
+
+    def _update(self, words: str) -> None:
+        """Describe the current work on the bar."""
         if self._bar is not None:
-            width = self._console.width - SPINNER_WIDTH
-            self._bar.update(self._task, description=line(width))
-        elif not self._quiet and elapsed >= self._next_line:
-            self._print(lasting())
+            self._bar.update(self._task, description=clean(words))
+
+    def _print_at_times(self, words: str, elapsed: float) -> None:
+        """Print a line of progress if the last one is long enough ago."""
+        if elapsed >= self._next_line:
+            self._print(words)
             self._next_line = elapsed + min(max(elapsed, FIRST_LINE), LONGEST_PAUSE)
 
     def _print(self, words: str) -> None:
@@ -134,10 +146,10 @@ class RunProgress(PreparationProgress):
         self._reached = run.t
         elapsed, simulated = now - self._begin[0], run.t - self._begin[1]
         rate = simulated / elapsed if elapsed > 0.0 else 0.0
-        if self._bar is not None or run.t < run.t_end:
-            self._show(
-                lambda width: live_line(run, rate, width), lambda: plain_line(run, rate), elapsed
-            )
+        if self._bar is not None:
+            self._update(live_line(run, rate, self._width))
+        elif run.t < run.t_end:
+            self._print_at_times(plain_line(run, rate), elapsed)
 
 
 class PointsProgress(PreparationProgress):
@@ -160,22 +172,14 @@ class PointsProgress(PreparationProgress):
             self._begin = (now, done)
         self.elapsed, self.ran = now - self._begin[0], done - self._begin[1]
         rate = self.ran / self.elapsed if self.elapsed > 0.0 else 0.0
-        if self._bar is not None or done < total:
-            self._show(
-                lambda width: points_line(done, total, rate, width),
-                lambda: points_line(done, total, rate),
-                self.elapsed,
-            )
+        if self._bar is not None:
+            self._update(points_line(done, total, rate, self._width))
+        elif done < total:
+            self._print_at_times(points_line(done, total, rate), self.elapsed)
 
 
 def points_line(done: int, total: int, rate: float, width: int = 80) -> str:
-    """Progress of a study in one line: the longest of several forms that fits.
-
-    Args:
-        done, total: points.
-        rate: points a second, 0 if not known yet.
-        width: columns available.
-    """
+    """Progress of a study in one line of a width; ``rate`` in points a second, 0 if not known."""
     percent, left = f"{done / total:4.0%}", f"{_left(total - done, rate)} left"
     now, pace = f"{done:{len(f'{total:,}')},}", f"{rate:.3g} points/s" if rate else "- points/s"
     return _longest(
@@ -190,15 +194,9 @@ def points_line(done: int, total: int, rate: float, width: int = 80) -> str:
 
 
 def live_line(run: "Standing", rate: float, width: int) -> str:
-    """Progress of a run in one line: the longest of several forms that fits.
+    """Progress of a run in one line of a width; ``rate`` is 0 if it is not known yet.
 
-    Simulated time, step, simulated time per wall time, energy drift, time left. Numbers have fixed
-    widths, so that the line does not jump.
-
-    Args:
-        run: snapshot of the run.
-        rate: simulated time per wall time, 0 if not known yet.
-        width: columns available.
+    Numbers have fixed widths, so that the line does not jump.
     """
     percent, end = f"{run.t / run.t_end if run.t_end else 1.0:4.0%}", f"{run.t_end:.4g}"
     digits = max(0, 3 - math.floor(math.log10(run.t_end or 1.0)))
@@ -245,15 +243,7 @@ def _left(amount: float, rate: float) -> str:
 
 @contextmanager
 def counting(word: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    """Progress by numbers: a bar on a terminal, nothing otherwise.
-
-    Args:
-        word: what is counted.
-        quiet: True to show nothing on a terminal either.
-
-    Yields:
-        function of the number that is done and the total.
-    """
+    """A bar on a terminal, unless quiet; yields a function of the number done and the total."""
     console = stderr()
     if quiet or not _is_live(console):
         yield lambda done, total: None
@@ -270,11 +260,8 @@ def _is_live(console: Terminal) -> bool:
     return console.file.isatty() and not console.is_dumb_terminal
 
 
-class _Left(TextColumn):
+class _Left(ProgressColumn):
     """The estimated time left; empty while there is no estimate."""
-
-    def __init__(self) -> None:
-        super().__init__("")
 
     def render(self, task: Task) -> Text:
         left = task.time_remaining

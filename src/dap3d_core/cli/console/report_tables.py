@@ -39,22 +39,14 @@ class ReportProgress(RunProgress):
                 self._bar.update(self._task, total=1.0, completed=done / total, description=shown)
             else:
                 self._bar.update(self._task, description=shown)
-        elif time.monotonic() - self._last_line > self._pause:
-            self._last_line = time.monotonic()
-            self._pause = min(2.0 * self._pause, LONGEST_PAUSE)
+        elif (now := time.monotonic()) - self._last_line > self._pause:
+            self._last_line, self._pause = now, min(2.0 * self._pause, LONGEST_PAUSE)
             left = f", about {seconds(total - done)} left" if total > done else ""
             self._print(f"{words}{left}")
 
 
 def show_report(console: Terminal, report: "Report", command: str, *, with_target: bool) -> None:
-    """Print a report: reference, runs by method and integrator, failures, recommendations.
-
-    Args:
-        console: where.
-        report: of the measurements.
-        command: runs the model, once the flags of a setting are appended.
-        with_target: True if a target error is given.
-    """
+    """Print a report; ``command`` runs the model once the flags of a setting are appended."""
     status = "" if report.status == "done" else f": {report.status}"
     console.title(f"speed against error: {scene_name(report.scene)}{status}")
     console.facts(

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dap3d_core.result import Occurrence, Result
+    from dap3d_core.result import Result
     from dap3d_core.simulation import CompiledModel
 
 #: Events that are printed.
@@ -46,7 +46,7 @@ CHANGED = 1e-12
 
 def run_data(result: "Result") -> dict[str, Any]:
     """The summary of a result as data."""
-    subject = result.subject
+    subject, error = result.subject, result.error
     instants = len(result.t)
     dof = 6 * subject.body_count - result.settings.get("rank", subject.row_count)
     return {
@@ -64,26 +64,20 @@ def run_data(result: "Result") -> dict[str, Any]:
         "t_start": float(result.t[0]) if instants else None,
         "t_end": float(result.t[-1]) if instants else None,
         **attrs.asdict(result.stats),
-        "error_estimate": _error_estimate(result),
-        "events": [_event(event) for event in result.events],
+        "error_estimate": error
+        and {
+            **error.largest,
+            "meaningless_from": error.meaningless_from,
+            "tenfold": error.tenfold,
+        },
+        "events": [
+            {**attrs.asdict(event, filter=lambda field, _: field.name != "u"), "text": event.words}
+            for event in result.events
+        ],
         "ledger": {name: attrs.asdict(entry) for name, entry in result.ledger.items()},
         "notes": result.notes,
         "versions": result.versions,
     }
-
-
-def _event(event: "Occurrence") -> dict[str, Any]:
-    """An event record without its state, with its text."""
-    data = attrs.asdict(event, filter=lambda field, _: field.name != "u")
-    return {**data, "text": event.words}
-
-
-def _error_estimate(result: "Result") -> dict[str, Any] | None:
-    """The largest estimated errors by symbol, and the time from which they are meaningless."""
-    error = result.error
-    if error is None:
-        return None
-    return {**error.largest, "meaningless_from": error.meaningless_from, "tenfold": error.tenfold}
 
 
 def _split_notes(data: dict[str, Any]) -> tuple[str, list[str]]:
@@ -118,10 +112,6 @@ def correction_data(
         names: of the bodies.
         given: (13 n,) the state of the scene.
         u: (13 n,) the state from which a run starts.
-
-    Returns:
-        changed: True if anything was; changed_bodies: names of the bodies with printable changes;
-        most_changed: those of them that are printed; bodies: name -> r, p, r_dot, w of all.
     """
     import numpy as np
 
@@ -237,9 +227,9 @@ def _show_early_end(outcome: Outcome, target: Path) -> None:
 def run_pairs(data: dict[str, Any]) -> list[tuple[str, str]]:
     """Model, method and cost of a run: names and texts."""
     reason = _split_notes(data)[0]
-    rhs, projections = f"{data['rhs']:,} of the right-hand side", ""
+    evaluations = f"{data['rhs']:,} of the right-hand side"
     if data["rows"]:
-        projections = f", {count(data['projections'], 'projection')}"
+        evaluations += f", {count(data['projections'], 'projection')}"
     wall, preparation = seconds(data["wall_time_s"]), seconds(data["compile_time_s"])
     return [
         ("modelled", _modelled(data)),
@@ -247,7 +237,7 @@ def run_pairs(data: dict[str, Any]) -> list[tuple[str, str]]:
         ("integrator", _integrator(data)),
         ("simulated", _simulated(data)),
         ("steps", f"{data['steps']:,} taken, {data['rejected']:,} rejected"),
-        ("evaluations", rhs + projections),
+        ("evaluations", evaluations),
         ("duration", f"{wall}; to prepare {preparation}"),
         ("error", _error_text(data["error_estimate"])),
     ]
@@ -304,11 +294,10 @@ def _error_text(error: dict[str, Any] | None) -> str:
     )
     if error["meaningless_from"] is None:
         return text
-    text += f". From t = {error['meaningless_from']:.6g} s on beyond 1e-3 of the size: no longer "
-    text += "meaningful"
-    if error["tenfold"] is None:
-        return text
-    return f"{text}; until then tenfold every {error['tenfold']:.3g} s"
+    since = f"From t = {error['meaningless_from']:.6g} s on beyond 1e-3 of the size"
+    text = f"{text}. {since}: no longer meaningful"
+    tenfold = error["tenfold"]
+    return text if tenfold is None else f"{text}; until then tenfold every {tenfold:.3g} s"
 
 
 def show_details(console: Terminal, data: dict[str, Any]) -> None:

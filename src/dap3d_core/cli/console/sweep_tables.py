@@ -45,19 +45,10 @@ def sweep_data(dataset: "xarray.Dataset") -> dict[str, Any]:
 
 
 def _output(dataset: "xarray.Dataset", about: dict[str, str]) -> dict[str, Any]:
-    """An output with its extremes and the points where they occur."""
-    variable = dataset[about["name"]]
-    data: dict[str, Any] = dict(about)
-    for word, (value, index) in _extremes(variable).items():
-        data[word] = value
-        data[f"at_{word}"] = None if index is None else _point(dataset, variable.dims, index)
-    return data
-
-
-def _extremes(variable: "xarray.DataArray") -> dict[str, tuple[Any, Any]]:
-    """Minimum and maximum with their indices, read block by block; None if there are none."""
+    """An output with its extremes and their points, read block by block; None if there are none."""
     import numpy as np
 
+    variable = dataset[about["name"]]
     extremes: dict[str, tuple[Any, Any]] = {"min": (None, None), "max": (None, None)}
     rows = len(variable)
     step = max(1, LARGE * rows // max(variable.nbytes, 1))
@@ -70,7 +61,11 @@ def _extremes(variable: "xarray.DataArray") -> dict[str, tuple[Any, Any]]:
             value, best = float(values.flat[place]), extremes[word][0]
             if best is None or (value < best if word == "min" else value > best):
                 extremes[word] = value, (int(row) + first, *map(int, rest))
-    return extremes
+    data: dict[str, Any] = dict(about)
+    for word, (value, index) in extremes.items():
+        data[word] = value
+        data[f"at_{word}"] = None if index is None else _point(dataset, variable.dims, index)
+    return data
 
 
 def _point(
@@ -100,13 +95,7 @@ def _failing(dataset: "xarray.Dataset", status: "NDArray[np.int8]") -> list[dict
 
 
 def show_sweep(console: Terminal, data: dict[str, Any], file: str = "") -> None:
-    """Print the summary of a sweep.
-
-    Args:
-        console: where.
-        data: of ``sweep_data``, perhaps with ``wall_time_s`` and ``points_per_second``.
-        file: that holds the sweep.
-    """
+    """Print the summary of a sweep in a file, perhaps with its ``points_per_second``."""
     total = data["points"]
     console.title(f"{scene_name(data['model'])}: {total:,} {'point' if total == 1 else 'points'}")
     rate = data.get("points_per_second")

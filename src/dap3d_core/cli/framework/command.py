@@ -32,8 +32,8 @@ def command(
 
     Args:
         short_help: its line in the list of commands.
-        options: of the command, in the order of its help; ``--debug`` and ``--no-color`` follow.
-        saves: True if the command always writes files; see ``Command``.
+        options: in the order of its help; ``--debug`` and ``--no-color`` follow.
+        saves: see ``Command``.
     """
 
     def decorate(function: Callable[..., int]) -> Command:

@@ -25,14 +25,7 @@ def execute(
     *,
     quiet: bool,
 ) -> "Outcome":
-    """Compile a model and run it; a run that ends early returns what it computed.
-
-    Args:
-        ctx: of the command.
-        prepare: compiles the model.
-        run: runs it.
-        quiet: True to show no progress.
-    """
+    """Compile a model and run it; a run that ends early returns what it computed."""
     import dap3d_core as dap
     from dap3d_core.cli.console.progress import RunProgress
     from dap3d_core.cli.console.run_summary import Outcome

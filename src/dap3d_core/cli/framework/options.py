@@ -115,7 +115,7 @@ def check_settings(scene: "Scene", given: dict[str, Any]) -> None:
 
     from dap3d_core.scene import SceneError, check_simulation
 
-    values = {name: value for name, value in given.items() if value is not None}
+    values = {name: given[name] for name in SETTINGS if given[name] is not None}
     try:
         check_simulation(attrs.evolve(scene.simulation, **values), scene.bodies)
     except SceneError as error:

@@ -4,6 +4,7 @@ import os
 import sys
 import uuid
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,13 +17,7 @@ if TYPE_CHECKING:
 
 
 def named_after(model: str, output: str | None, tail: str = "") -> Path:
-    """The file of a result: ``output``, by default MODEL.nc in the current folder.
-
-    Args:
-        model: as given on the command line.
-        output: as given on the command line.
-        tail: appended to the name of the model.
-    """
+    """The file of a result: ``output``, by default MODEL and a tail in the current folder."""
     if output is not None:
         return Path(output)
     path = Path(model)
@@ -37,12 +32,7 @@ def beside(result: str, output: str | None, ending: str) -> Path:
 
 
 def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) -> Path:
-    """Returns the path if it can be written.
-
-    Args:
-        path: of the output.
-        force: True to overwrite an existing file.
-        sources: files that are read, which are never overwritten.
+    """Returns the path if it can be written; ``sources`` are never overwritten.
 
     Raises:
         Refused: says why, and what to do.
@@ -57,30 +47,21 @@ def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) 
     except OSError as error:
         reason = error if isinstance(error, ResultError) else cannot("write", path, error)
         raise Refused(str(reason)) from error
+    is_stdout = False
     for source in sources:
         if source is not None and path.exists() and source.exists() and path.samefile(source):
             raise Refused(f"{path} is the input file; name another file with -o")
-    if _is_stdout(target):
+    with suppress(OSError, ValueError):  # no such file, or no stream of the system
+        is_stdout = os.path.samestat(target.stat(), os.fstat(sys.stdout.fileno()))
+    if is_stdout:
         raise Refused(f"{path} is the standard output of this command; name another file with -o")
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise Refused(f"cannot write {path}: no permission to write in its folder; use -o")
     return path
 
 
-def _is_stdout(target: Path) -> bool:
-    """True if the standard output is this file: text printed later would be lost."""
-    try:
-        return os.path.samestat(target.stat(), os.fstat(sys.stdout.fileno()))
-    except (OSError, ValueError):  # no such file, or no stream of the system
-        return False
-
-
 def write_text(path: Path, text: str) -> None:
-    """Replace a file as a whole; a link is replaced, never followed.
-
-    Raises:
-        Refused: it cannot be written; says why.
-    """
+    """Replace a file as a whole; a link is replaced, never followed."""
     temporary = path.with_name(f".{uuid.uuid4().hex}.part")
     try:
         try:
@@ -94,16 +75,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def open_result(path: str, *, model: str | None = None, allow_code: bool = False) -> "Result":
-    """The result in a file.
-
-    Args:
-        path: of the file.
-        model: the model whose own types the run used.
-        allow_code: True if they may be loaded.
-
-    Raises:
-        Refused: it cannot be read; says why.
-    """
+    """The result in a file, with the types of a model; refused if it cannot be read."""
     import dap3d_core as dap
     from dap3d_core.result import ResultError
 
@@ -112,11 +84,7 @@ def open_result(path: str, *, model: str | None = None, allow_code: bool = False
 
 
 def open_sweep(path: str) -> "xarray.Dataset":
-    """The data set of a sweep in a file.
-
-    Raises:
-        Refused: it cannot be read; says why.
-    """
+    """The data set of a sweep in a file; refused if it cannot be read."""
     import dap3d_core as dap
     from dap3d_core.result import ResultError
 
@@ -125,11 +93,7 @@ def open_sweep(path: str) -> "xarray.Dataset":
 
 
 def refuse_all(*checks: Callable[[], object]) -> None:
-    """Make all checks, and report everything that they refuse at once.
-
-    Raises:
-        Refused: one line for each fault.
-    """
+    """Make all checks; refuse with one line for each fault."""
     from dap3d_core.result import ResultError, UnknownNameError
 
     faults: dict[str, None] = {}

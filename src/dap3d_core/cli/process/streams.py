@@ -31,13 +31,10 @@ def prepare_streams() -> None:
 
 @contextlib.contextmanager
 def reserve_stdout_for_json(*, permanently: bool = False) -> Iterator[None]:
-    """Reserve stdout for ``json_stream``.
+    """Reserve stdout for ``json_stream``; ``permanently``: also while the process ends.
 
     Other output (of plugins, processes that they start, kernels that print) goes to stderr.
     Streams that are not those of the process are left as they are.
-
-    Args:
-        permanently: also for what is written when the process ends.
     """
     global _json_stdout
     try:
@@ -68,11 +65,7 @@ def json_stream() -> TextIO:
 
 
 def leave_stdout(error: OSError | None = None) -> None:
-    """Discard further output on stdout, after its reader has gone or it has failed.
-
-    Args:
-        error: of the failure, for ``stdout_fault``.
-    """
+    """Discard further output on stdout; ``error`` is why, unless its reader has gone."""
     global _fault
     if error is not None and not isinstance(error, BrokenPipeError):
         _fault = error

@@ -1,5 +1,6 @@
-"""Signals while a command works: none is lost, and none is told of by a traceback."""
+"""Signals while a command works: none is lost, and none shows a traceback."""
 
+import contextlib
 import ctypes
 import os
 import signal
@@ -12,11 +13,45 @@ from dap3d_core.cli.process.exit_codes import Terminated
 from dap3d_core.cli.process.signals import SignalHandler
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
-
-
-@pytest.mark.parametrize(
+each = pytest.mark.parametrize(
     ("number", "expected"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, Terminated)]
 )
+
+
+@each
+def test_a_signal_before_the_run_raises_at_once(number, expected):
+    before = signal.getsignal(number)
+    with pytest.raises(expected), SignalHandler():
+        signal.raise_signal(number)
+    assert signal.getsignal(number) == before
+
+
+def test_during_a_run_it_waits_for_the_end_of_the_chunk_once():
+    calls = []
+    with SignalHandler() as signals:
+        callback = signals.interruptible(calls.append)
+        callback(1)
+        signal.raise_signal(signal.SIGTERM)
+        with pytest.raises(Terminated, match="SIGTERM"):
+            callback(2)
+        callback(3)  # raised once
+        signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert calls == [1, 2, 3]
+
+
+def test_an_interrupt_that_a_package_swallowed_is_not_forgotten():
+    def import_half():
+        with contextlib.suppress(BaseException):
+            signal.raise_signal(signal.SIGINT)
+        raise AttributeError("half imported")
+
+    with pytest.raises(KeyboardInterrupt), SignalHandler():
+        import_half()
+
+
+@each
 def test_a_signal_that_a_callback_swallows_comes_again(capfd, number, expected):
     """An exception cannot leave a callback of a C library: Python prints and forgets it."""
 

@@ -1,0 +1,26 @@
+"""Text, numbers and JSON of the console."""
+
+import numpy as np
+
+from dap3d_core.cli.console.console import clean, count, plain, seconds, size, some
+
+
+def test_control_characters_do_not_reach_the_terminal():
+    assert clean("a\x1b[31mb\tc\r\nd") == "a\\x1b[31mb c \nd"
+
+
+def test_json_data_have_only_types_of_json():
+    data = {"a": np.array([1.0, np.nan]), 2: (float("inf"), np.int64(3)), "p": {1}}
+    assert plain(data) == {"a": [1.0, None], "2": [None, 3], "p": [1]}
+    too_long_in_decimal = 16**5000 - 1
+    assert plain(too_long_in_decimal) == "0x" + "f" * 5000
+
+
+def test_numbers_for_people():
+    durations = [seconds(s) for s in (0.0123, 1.234, 119.0, 125.0, 7300.0)]
+    assert durations == ["12.3 ms", "1.23 s", "119 s", "2 min 5 s", "2 h 1 min"]
+    sizes = [size(n) for n in (999, 1500, 2_345_000, 5e9)]
+    assert sizes == ["999 bytes", "1.5 kB", "2.35 MB", "5 GB"]
+    counts = [count(n, "body", "bodies") for n in (0, 1, 2000)]
+    assert counts == ["no bodies", "1 body", "2,000 bodies"]
+    assert some("abc", 2) == "a, b and 1 more"

@@ -1,0 +1,67 @@
+"""Errors as messages, JSON and exit codes."""
+
+import json
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from dap3d_core.cli.framework.error_messages import report_error
+from dap3d_core.cli.process.exit_codes import Refused, Terminated
+from dap3d_core.scene import Mistake, SceneError
+
+
+def reported(error, debug=False):
+    """Exit code, JSON object and text on stderr of an error."""
+
+    @click.command()
+    def command():
+        click.get_current_context().exit(report_error(error, debug=debug, as_json=True))
+
+    done = CliRunner().invoke(command)
+    return done.exit_code, json.loads(done.stdout), done.stderr
+
+
+def test_an_unexpected_error_is_one_line_and_a_hint():
+    code, data, err = reported(RuntimeError("two\nlines"))
+    assert (code, data["exit_code"]) == (1, 1)
+    assert data["error"] == "unexpected RuntimeError: two lines"
+    assert "--debug" in err
+    assert "Traceback" not in err
+
+
+def test_debug_shows_the_traceback():
+    code, _, err = reported(RuntimeError("here"), debug=True)
+    assert code == 1
+    assert "RuntimeError: here" in err
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (KeyboardInterrupt(), 130),
+        (Terminated("ended by SIGTERM"), 1),
+        (Refused("no"), 2),
+        (MemoryError(), 1),
+        (OSError("disk full"), 1),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else str(value),
+)
+def test_errors_have_their_exit_codes(error, code):
+    found, data, err = reported(error)
+    assert found == data["exit_code"] == code
+    assert len(err.splitlines()) == 1
+
+
+def test_all_mistakes_of_a_scene_are_listed():
+    mistakes = [
+        Mistake("a.b", float("nan"), "wrong", "ab", "do", "f.toml", 3),
+        Mistake("c", 1, "x"),
+    ]
+    code, data, err = reported(SceneError(mistakes))
+    assert code == 2
+    assert data["mistakes"][0] == {
+        "file": "f.toml", "line": 3, "key": "a.b", "value": None, "what": "wrong",
+        "nearest": "ab", "remedy": "do",
+    }  # fmt: skip
+    assert err.splitlines()[:2] == ["2 mistakes:", "f.toml:3: a.b = nan: wrong; did you mean 'ab'?"]

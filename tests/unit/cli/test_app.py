@@ -1,0 +1,48 @@
+"""The group of commands, its exit codes, and what a start imports."""
+
+import subprocess
+import sys
+
+from click.testing import CliRunner
+
+from dap3d_core.cli import main
+from dap3d_core.cli.app import COMMANDS, dap3d
+from dap3d_core.cli.process import exit_codes
+from dap3d_core.scene import INTEGRATORS, METHODS
+
+
+def test_every_command_has_help_and_the_common_options():
+    assert list(dap3d.commands) == list(COMMANDS)
+    for name, command in dap3d.commands.items():
+        assert command.name == name
+        done = CliRunner().invoke(dap3d, [name, "--help"])
+        assert done.exit_code == 0
+        assert "--debug" in done.output
+        assert "--no-color" in done.output
+
+
+def test_main_takes_the_words_and_returns_the_exit_code(capsys):
+    assert main(["--version"]) == exit_codes.DONE
+    assert capsys.readouterr().out.startswith("dap3d, version")
+    assert main(["nothing"]) == exit_codes.REFUSED
+    assert "there is no command 'nothing'" in capsys.readouterr().err
+
+
+def test_help_names_every_method_and_integrator():
+    text = CliRunner().invoke(dap3d, ["run", "--help"]).output
+    for word in (*METHODS, *INTEGRATORS):
+        assert word in text
+
+
+def test_help_is_quick_to_import():
+    """Help loads none of the heavy packages, and the module of no other command."""
+    script = (
+        "import sys; from dap3d_core.cli import main; code = main(['run', '--help']);"
+        "heavy = {'numpy', 'scipy', 'llvmlite', 'matplotlib', 'netCDF4', 'xarray', 'rich'};"
+        "other = {'dap3d_core.cli.commands.plot'}; main(['--help']) if sys.argv[1:] else None;"
+        "print(sorted(((heavy | other) - set(sys.argv)) & sys.modules.keys()), code, "
+        "file=sys.stderr)"
+    )
+    for words in ([], ["dap3d_core.cli.commands.plot"]):  # the list of commands has them all
+        run = [sys.executable, "-c", script, *words]
+        assert subprocess.run(run, capture_output=True, text=True).stderr.strip() == "[] 0"
