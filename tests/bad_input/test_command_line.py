@@ -81,40 +81,25 @@ QUIET = ("-o", "new.nc")
 REFUSED = [
     # settings
     (("run", "fall.toml", "--t-end", "-1"), "--t-end = -1.0: should be at least 0"),
-    (("run", "fall.toml", "--t-end", "nan"), "finite number"),
-    (("run", "fall.toml", "--t-end", "1e999"), "finite number"),
-    (("run", "fall.toml", "--t-end", "1e308"), "products of larger ones overflow"),
     (("run", "fall.toml", "--t-end", "soon"), "'soon' is not a valid float"),
     (("run", "fall.toml", "--dt", "0"), "greater than 0"),
-    (("run", "fall.toml", "--dt", "-0.1"), "greater than 0"),
-    (("run", "fall.toml", "--dt", "nan"), "finite number"),
     (("run", "fall.toml", "--dt", "5"), "longer than the run"),
     (("run", "fall.toml", "--t-end", "1e12", "--dt", "1"), "9.69e+04 GiB"),
     (("run", "fall.toml", "--dt", "1e-50"), "at most 5e+07 times are reported"),
     (("run", "fall.toml", "--rtol", "0"), "at least 1e-14"),
-    (("run", "fall.toml", "--rtol", "-1"), "at least 1e-14"),
-    (("run", "fall.toml", "--rtol", "1e-20"), "at least 1e-14"),
-    (("run", "fall.toml", "--rtol", "2"), "at most 1"),
-    (("run", "fall.toml", "--rtol", "nan"), "finite number"),
     (("run", "fall.toml", "--atol", "-1"), "at least 0"),
-    (("run", "fall.toml", "--atol", "inf"), "finite number"),
     (("run", "fall.toml", "--step", "0"), "greater than 0"),
     (("run", "fall.toml", "--step", "1e-50"), "the rounding of time"),
     (("run", "fall.toml", "--integrator", "cvode"), '"dopri5", "dop853", "adams", "rk4", "radau"'),
-    (("run", "fall.toml", "--integrator", "DOP853"), "did you mean 'dop853'"),
     (("run", "fall.toml", "--integrator", "rk4"), "rk4 does not choose its step"),
-    (("run", "fall.toml", "--integrator", "adams", "--step", "0.1"), "chooses its step itself"),
     (("run", "fall.toml", "--method", "lagrange"), '"standard", "penalty", "lsq"'),
     (("run", "pen1", "--method", "unconstrained"), "use standard or auto"),
     (("run", "fall.toml", "--checkpoint", "0"), "'0' is no time; write 90, 90s, 5min or 2h"),
-    (("run", "fall.toml", "--checkpoint", "-3min"), "'-3min' is no time"),
-    (("run", "fall.toml", "--checkpoint", "nan"), "'nan' is no time"),
     # going on, and again
     (("resume",), "Missing argument 'CHECKPOINT'"),
     (("resume", "none.checkpoint"), "there is no such file"),
     (("resume", "."), "it is a folder"),
     (("resume", "fall.toml"), "it is no checkpoint of dap3d"),
-    (("resume", "fall.toml", "--checkpoint", "soon"), "'soon' is no time"),
     (("rerun",), "Missing argument 'RESULT'"),
     (("rerun", "none.nc"), "there is no such file"),
     (("rerun", "fall.toml"), "it is not a NetCDF-4 file"),
@@ -126,37 +111,22 @@ REFUSED = [
     ((*SWEEP, "--vary", "", *KEEP), "'--vary' is an empty word"),
     ((*SWEEP, "--vary", "bodies.stone.mass", *KEEP), "what varies is NAME=FORM"),
     ((*SWEEP, "--vary", "bodies.stnoe.mass=1,2", *KEEP), "did you mean 'bodies.stone.mass'"),
-    ((*SWEEP, "--vary", "stone.mass=1,2", *KEEP), "did you mean 'bodies.stone.mass'"),
-    ((*SWEEP, "--vary", "bodies.stone.color=1,2", *KEEP), "has no number 'color'"),
     ((*SWEEP, "--vary", "bodies.stone.r=1,2", *KEEP), "bodies.stone.r.x"),
     ((*SWEEP, "--vary", "bodies.stone.mass=one", *KEEP), "no finite number"),
-    ((*SWEEP, "--vary", "bodies.stone.mass=nan", *KEEP), "no finite number"),
-    ((*SWEEP, "--vary", "bodies.stone.mass=1e999", *KEEP), "no finite number"),
     ((*SWEEP, "--vary", "bodies.stone.mass=1:2", *KEEP), "or sample"),
-    ((*SWEEP, "--vary", "bodies.stone.mass=1:2:0", *KEEP), "no points"),
-    ((*SWEEP, "--vary", "bodies.stone.mass=2:2:3", *KEEP), "begins where it ends"),
-    ((*SWEEP, "--vary", "bodies.stone.mass=0:2:3:log", *KEEP), "of positive numbers"),
-    ((*SWEEP, "--vary", "bodies.stone.mass=1,1", *KEEP), "stands in the list twice"),
-    ((*SWEEP, "--vary", "bodies.stone.mass=1~2", *KEEP), "a normal distribution is sampled"),
-    ((*SWEEP, "--vary", "bodies.stone.mass=1:2:1000000000000", *KEEP), "at most 1e+08"),
     ((*SWEEP, *VARY, *VARY, *KEEP), "a number is varied only once"),
     ((*SWEEP, *VARY, *KEEP, *KEEP), "an output is named once only"),
     ((*SWEEP, *VARY, "--keep", "stnoe.r.z"), "did you mean 'stone.r.z'"),
     ((*SWEEP, *VARY, "--keep", "stone.r.z:maximum"), "did you mean 'stone.r.z:max'"),
     ((*SWEEP, *VARY, *KEEP, "--sample", "0"), "--sample = 0: the number of samples"),
-    ((*SWEEP, *VARY, *KEEP, "--sample", "1000000000000"), "from 1 to 1e+08"),
     ((*SWEEP, *VARY, *KEEP, "--sample", "two"), "'two' is not a valid integer"),
-    ((*SWEEP, "--vary", "bodies.stone.mass=1:2:3", *KEEP, "--sample", "4"), "leave the count out"),
     ((*SWEEP, *VARY, *KEEP, "--sample", "4", "--design", "lsh"), "did you mean 'lhs'"),
     ((*SWEEP, *VARY, *KEEP, "--sample", "4", "--seed", "-1"), "--seed = -1: the seed"),
     ((*SWEEP, *VARY, *KEEP, "--design", "lhs"), "--design is of samples"),
     ((*SWEEP, *VARY, *KEEP, "--seed", "3"), "--seed is of samples"),
-    ((*SWEEP, *VARY, *KEEP, "--t-end", "-1"), "--t-end = -1.0: should be at least 0"),
-    ((*SWEEP, *VARY, *KEEP, "--integrator", "cvode"), '"dopri5", "dop853"'),
     ((*SWEEP, *VARY, *KEEP, "--resume"), "there is no fall-sweep.nc.part"),
     ((*SWEEP, *VARY, *KEEP, "-o", R), "--force overwrites it"),
     ((*SWEEP, *VARY, *KEEP, "-o", "fall.toml", "--force"), "is the input file"),
-    ((*SWEEP, *VARY, *KEEP, "-o", "sub"), "it is a folder"),
     ((*SWEEP, *VARY, *KEEP, "-o", "swept.nc"), "resume goes on with it"),
     ((*SWEEP, *VARY, *KEEP, "-o", "swept.nc", "--resume"), "is of another sweep"),
     ((*SWEEP, *VARY, *KEEP, "-o", "foreign.nc", "--resume"), "not a NetCDF-4 file"),
@@ -166,7 +136,6 @@ REFUSED = [
     (("plot", S, "stone.r.zz"), "did you mean 'stone.r.z'"),
     (("plot", S, "--at", "bodies.stone.mas=1"), "did you mean 'bodies.stone.mass'"),
     (("plot", S, "--at", "bodies.stone.mass"), "should be NAME=VALUE"),
-    (("plot", S, "--at", "bodies.stone.mass=one"), "should be NAME=VALUE"),
     (("plot", S, "--at", "bodies.stone.mass=1", "--at", "bodies.stone.mass=2"), "given twice"),
     (("plot", S, "--x", "bodies.stone.r.x"), "no number or output 'bodies.stone.r.x'"),
     (("plot", S, R), "is a sweep, which is drawn alone"),
@@ -175,7 +144,6 @@ REFUSED = [
     (("view", S, "--quantity", "stnoe.r.z"), "did you mean 'stone.r.z'"),
     (("view", S, "--model", "nothing"), "nothing"),
     (("view", S, "-o", "x.txt"), "a page is a .html file"),
-    (("view", S, "--fps", "0"), "greater than 0"),
     # options and arguments
     (("run", "fall.toml", "--bogus"), "No such option '--bogus'"),
     (("run", "fall.toml", "--t-ned", "1"), "'--t-end'"),
@@ -183,7 +151,6 @@ REFUSED = [
     (("run", "fall.toml", "--t-end"), "requires an argument"),
     (("run", "--", "fall.toml", "--t-end", "1"), "unexpected extra arguments (--t-end 1)"),
     (("run", "fall.toml", "--", "-o", "x.nc"), "unexpected extra arguments (-o x.nc)"),
-    (("run", "fall.toml", "pen1"), "unexpected extra argument (pen1)"),
     (("run", ""), "is an empty word"),
     (("run", "fall.toml", "-o", ""), "'--output' is an empty word"),
     (("rnu", "fall.toml"), "did you mean 'run'"),
@@ -194,27 +161,18 @@ REFUSED = [
     (("run", R), "it holds NUL bytes"),
     (("run", "/dev/null"), "is not a regular file"),
     (("run", "https://example.org/scene.toml"), "a URL cannot be loaded"),
-    (("check", "pne1"), "did you mean 'pen1'"),
     (("check", "fall.toml", "--methd", "lsq"), "'--method'"),
-    (("report", "pne1"), "did you mean 'pen1'"),
     (("report", "fall.toml", "--integrator", "foo"), "should be one of"),
-    (("report", "fall.toml", "--t-end", "nan"), "finite number"),
     (("report", "fall.toml", "--target-error", "-1"), "positive number"),
     (("report", "fall.toml", "--plot", "x.txt"), ".png, .svg, .pdf"),
     (("report", "fall.toml", "--csv", "x", "-o", "x"), "name one file twice"),
-    (("report", "fall.toml", "--csv", "sub"), "it is a folder"),
     # outputs
     (("run", "fall.toml", "-o", R), "--force overwrites it"),
     (("run", "fall.toml", "-o", "fall.toml", "--force"), "is the input file"),
-    (("run", "fall.toml", "-o", "sub"), "it is a folder"),
-    (("run", "fall.toml", "-o", "."), "it is a folder"),
     (("run", "fall.toml", "-o", "words/x.nc"), "there is no folder words"),
-    (("run", "fall.toml", "-o", "nowhere/x.nc"), "there is no folder nowhere"),
     (("run", "fall.toml", "-o", "/dev/full", "--force"), "it is no regular file"),
-    (("run", "fall.toml", "-o", "/dev/null"), "it is no regular file"),
     (("run", "fall.toml", "-o", "leads-nowhere.nc"), "a link that leads nowhere"),
     (("run", "fall.toml", "-o", "x" * 300), "File name too long"),
-    (("run", "fall.toml", "-o", "https://example.org/x.nc"), "there is no folder"),
     # results
     *(((c, "nothing.nc"), "there is no such file") for c in ("info", "post", "plot", "view")),
     *(((c, "words"), "not a NetCDF-4 file") for c in OF_RESULTS),
@@ -229,32 +187,24 @@ REFUSED = [
     (("post", R, "-o", "x.csv", "--format", "nc"), "leave one out"),
     (("post", R, "--format", "xls"), "'xls' is not one of 'nc', 'csv'"),
     (("post", R, "-o", R, "--force"), "is the input file"),
-    (("post", "link.nc", "-o", R, "--force"), "is the input file"),
     (("export", R, "-o", "x.txt"), ".vtkhdf, .glb, .mat, .csv"),
     (("export", R, "-o", "x.csv", "--format", "mat"), "its name says csv"),
     (("export", R, "--format", "xls"), "'xls' is not one of"),
     (("export", R, "--fps", "0"), "a number above 0"),
     (("export", R, "-o", "sub"), "or a format"),
-    (("export", R, "-f", "csv", "-o", R, "--force"), "is the input file"),
     (("export", S), "the points of a sweep"),
     (("plot", R, "stnoe.r.z"), "did you mean 'stone.r.z'"),
     (("plot", R, "stone.q"), "not 'q'"),
     (("plot", R, R), "named twice"),
     (("plot", R, "stone.r", "--x", "stone.r"), "name one of stone.r.x"),
     (("plot", R, "-o", "x.bmp"), ".png, .svg, .pdf"),
-    (("plot", R, "-o", "sub"), "it is a folder"),
     (("plot", R, "--width", "0"), "--width is from 13 to 2540 mm, not 0"),
-    (("plot", R, "--width", "nan"), "--width is from 13 to 2540 mm, not nan"),
-    (("plot", R, "--height", "-5"), "--height is from 13 to 2540 mm, not -5"),
     (("animate", R, "-o", "x.txt"), ".gif, .mp4, .png"),
     (("animate", R, "--size", "big"), "such as 640x480"),
-    (("animate", R, "--size", "0"), "from 100 to 4096"),
     (("animate", R, "--fps", "nan"), "from 1 to 50"),
     (("animate", R, "--speed", "0"), "above 0"),
     (("animate", R, "--view", "q"), "AZIMUTH,ELEVATION"),
     (("animate", R, "--at", "99", "-o", "x.png"), "nothing to see at t = 99 s"),
-    (("view", R, "-o", "x.txt"), "a page is a .html file"),
-    (("view", R, "--quantity", "stnoe.r.z"), "did you mean 'stone.r.z'"),
     (("view", R, "--fps", "0"), "greater than 0"),
     # types and packages
     (("plugins", "x"), "unexpected extra argument (x)"),
@@ -262,7 +212,6 @@ REFUSED = [
     (("describe",), "Missing argument"),
     (("describe", "shp"), "did you mean 'sph'"),
     (("check-plugin", "shp"), "did you mean 'sph'"),
-    (("check-plugin", ""), "is an empty word"),
     (("check-plugin", "nothing.py"), "there is no file nothing.py"),
     (("check-plugin",), "give --all"),
     (("new-plugin",), "Missing argument"),
@@ -272,7 +221,6 @@ REFUSED = [
     (("import-matlab", "nothing"), "there is no such folder"),
     (("import-matlab", "words"), "a MATLAB model is a folder"),
     (("import-matlab", "sub"), "there is no inBodies.m"),
-    (("import-matlab", ""), "is an empty word"),
 ]
 
 
@@ -502,63 +450,6 @@ def test_a_reader_that_leaves_does_not_spoil_the_run(folder):
 
 
 # ------------------------------------------------------------------ what other programs do quietly
-
-PEERS = {
-    "a mass that is NaN": ("mass = 2.0", "mass = nan", "finite number"),
-    "a time step below zero": ("dt = 0.01", "dt = -0.01", "greater than 0"),
-    "a misspelt table": ("[forces.gravity]", "[force.gravity]", "forces"),
-    "a misspelt key": ("mass = 2.0", "masss = 2.0", "mass"),
-    "an unknown key of a run": ("dt = 0.01", "dt = 0.01\nuseNewtonSolver = 1", "unknown key"),
-}
-
-
-@pytest.mark.parametrize(("old", "new", "words"), PEERS.values(), ids=PEERS)
-def test_what_mujoco_drake_and_exudyn_let_pass_is_refused(call, folder, old, new, words):
-    """MuJoCo replaces a NaN mass and takes a negative time step; Drake's URDF reader leaves a
-    misspelt tag out; Exudyn sets unknown keys without a word."""
-    (folder / "fall.toml").write_text(SCENE.replace(old, new))
-    code, out, err = call("run", "fall.toml", *QUIET)
-    assert (code, out) == (2, "")
-    assert words in " ".join(err.split())
-    assert "fall.toml:" in err
-
-
-WELDED = """
-[bodies.box]
-mass = 1.0
-Jp = [1.0, 1.0, 1.0]
-
-[points.left]
-body = "box"
-sPp = [-1.0, 0.0, 0.0]
-
-[points.right]
-body = "ground"
-sPp = [5.0, 0.0, 0.0]
-
-[joints.one]
-type = "sph"
-P_i = "left"
-P_j = "ground.O"
-
-[joints.two]
-type = "sph"
-P_i = "left"
-P_j = "right"
-
-[simulation]
-t_end = 1.0
-"""
-
-
-def test_contradictory_welds_are_refused_as_mujoco_does_not(call, folder):
-    (folder / "welded.toml").write_text(WELDED)
-    code, _, err = call("run", "welded.toml", *QUIET)
-    assert code in (1, 2)
-    assert "one" in err
-    assert "two" in err
-    assert not (folder / "new.nc").exists()
-
 
 EXPLODING = """
 [bodies.rocket]

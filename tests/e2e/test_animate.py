@@ -47,24 +47,6 @@ def test_a_run_at_t_0_alone_gives_a_snapshot(dap3d):
     assert (dap3d.folder / "a.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_what_cannot_be_animated_is_refused(refuse, dap3d, runs, monkeypatch):
-    (dap3d.folder / "there.gif").write_text("mine")
-    assert "--force overwrites" in refuse("animate", "pen1.nc", "-o", "there.gif")
-    assert "640x480" in refuse("animate", "pen1.nc", "--size", "big")
-    assert "a view is x, y or z" in refuse("animate", "pen1.nc", "--view", "top")
-    assert "from 1 to 50" in refuse("animate", "pen1.nc", "--fps", "1000")
-    assert "above 0" in refuse("animate", "pen1.nc", "--speed", "-1")
-    assert "no single time" in refuse("animate", "pen1.nc", "--at", "0.5")
-    assert "from 0 s to 1 s" in refuse("animate", "pen1.nc", "-o", "a.png", "--at", "7")
-    assert "an animation is one of" in refuse("animate", "pen1.nc", "-o", "a.avi")
-    assert "is the input file" in refuse("animate", "pen1.nc", "-o", "pen1.nc", "--force")
-    assert "cannot read" in refuse("animate", "gone.nc")
-    monkeypatch.setenv("PATH", str(dap3d.folder))
-    assert "ffmpeg" in refuse("animate", "pen1.nc", "-o", "a.mp4")
-    assert sorted(os.listdir(dap3d.folder)) == ["pen1.nc", "sub", "there.gif"]
-    assert (dap3d.folder / "there.gif").read_text() == "mine"
-
-
 @pytest.mark.slow
 def test_ctrl_c_leaves_no_file(dap3d, runs):
     process = dap3d.start("animate", "pen1.nc", "--speed", "0.005", "--fps", "50", "-o", "a.gif")

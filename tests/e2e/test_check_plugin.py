@@ -78,13 +78,6 @@ def test_a_type_that_cannot_be_loaded_is_wrong(dap3d):
     assert "wrong formulas" not in said
 
 
-def test_names_are_keywords_distributions_and_modules(refuse):
-    assert "did you mean 'rev'" in refuse("check-plugin", "rve")
-    assert "there is no file nothing.py" in refuse("check-plugin", "nothing.py", "--allow-code")
-    assert "--all" in refuse("check-plugin")
-    assert "--all" in refuse("check-plugin", "rev", "--all")
-
-
 @pytest.mark.slow
 def test_all_installed_types_pass(dap3d):
     """So does the distribution that brings them, by its name."""

@@ -83,26 +83,6 @@ def test_check_names_joints_that_contradict_each_other(dap3d):
 
 
 @pytest.mark.slow
-def test_check_prints_all_mistakes_as_json(dap3d, scene_file):
-    scene_file(("mass = 2.0", "mass = -2.0"), ("dt = 0.01", "dt = 0.01\nrtoll = 1e-6"))
-    refused = dap3d("check", "fall.toml", "--json")
-    assert refused.returncode == 2
-    mistakes = json.loads(refused.stdout)["mistakes"]
-    assert [m["key"] for m in mistakes] == ["bodies.stone.mass", "simulation.rtoll"]
-    assert mistakes[0]["value"] == -2.0
-    assert mistakes[1]["nearest"] == "rtol"
-
-
-def test_check_of_what_is_no_scene(dap3d, refuse):
-    (dap3d.folder / "empty").mkdir()
-    (dap3d.folder / "image.toml").write_bytes(b"\x89PNG\r\n\x1a\n\0\0")
-    (dap3d.folder / "cut.toml").write_text("[bodies.a]\nmass = [1.0,\n")
-    for name in ("empty", "image.toml", "cut.toml", "https://a.org/b.toml", ""):
-        refuse("check", name)
-    assert "did you mean" in refuse("check", "pen9")
-
-
-@pytest.mark.slow
 def test_models_and_plugins_are_listed(dap3d):
     shown = dap3d("models")
     listed = json.loads(dap3d("models", "--json").stdout)["models"]
@@ -135,20 +115,6 @@ def test_a_blocked_type_is_listed_with_the_reason(dap3d):
     assert done.returncode == 0
     assert "blocked" in done.stdout
     assert "DAP3D_BLOCK" in done.stdout
-
-
-@pytest.mark.slow
-def test_describe_explains_a_type(dap3d):
-    shown = dap3d("describe", "rev", "--names").stdout
-    for words in ("gamma =", "5 constraint equations", "1 of 6 freedoms", "required", "r_P_i",
-                  'type = "rev"'):  # fmt: skip
-        assert words in shown
-    (rev,) = json.loads(dap3d("describe", "rev", "--json").stdout)["types"]
-    assert (rev["rows"], rev["freedoms"]) == (5, 1)
-    assert [f["name"] for f in rev["fields"]] == ["P_i", "P_j", "a_i", "a_j"]
-    unknown = dap3d("describe", "revolt")
-    assert unknown.returncode == 2
-    assert "did you mean 'rev'" in unknown.stderr
 
 
 @pytest.fixture(scope="module")
@@ -185,23 +151,6 @@ def test_plot_draws_into_files(dap3d, result):
     curves = dap3d("plot", "pen1.nc", "cone.r.z", "J1.force", "--x", "cone.r.y", "-o", "a.svg")
     assert curves.returncode == 0, curves.stderr
     assert "position of cone" in (dap3d.folder / "a.svg").read_text()
-
-
-def test_results_that_cannot_be_read_or_drawn_are_refused(refuse, dap3d, result):
-    (dap3d.folder / "there.png").write_text("mine")
-    (dap3d.folder / "text.nc").write_text("no result")
-    for name in ("gone.nc", ".", "text.nc"):
-        for command in (("info",), ("plot",), ("post", "-o", "a.csv")):
-            assert "cannot read" in refuse(*command, name)
-    assert "did you mean 'cone.r.z'" in refuse("plot", "pen1.nc", "cone.rr.z", "-o", "b.png")
-    for target in ("b.bmp", "there.png", "no/b.png", "pen1.nc"):
-        refuse("plot", "pen1.nc", "cone.r.z", "-o", target)
-    refuse("plot", "pen1.nc", "cone.r.z", "--x", "cone.r")
-    for target in ("there.png", "a.xls", "pen1.nc"):
-        refuse("post", "pen1.nc", "-o", target)
-    refuse("post", "pen1.nc", "-o", "pen1.nc", "--force")
-    assert not (dap3d.folder / "b.png").exists()
-    assert (dap3d.folder / "there.png").read_text() == "mine"
 
 
 @pytest.mark.slow

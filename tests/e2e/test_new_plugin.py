@@ -106,7 +106,7 @@ def test_a_keyword_that_is_taken_is_refused_and_may_be_forced(refuse, dap3d):
 
 def test_modules_of_dap3d_are_never_replaced(refuse):
     for name in ("core", "joints"):
-        assert "in the way of dap3d's own" in refuse("new-plugin", name, "--force")
+        assert "would hide dap3d's own" in refuse("new-plugin", name, "--force")
 
 
 def test_a_folder_that_holds_files_is_refused_and_kept(refuse, dap3d):

@@ -189,18 +189,3 @@ def test_reactions_that_cannot_be_had_are_left_out_and_told(dap3d, result):
     assert told["notes"][0].startswith("reactions are left out")
     assert dap3d("post", "pen1.nc", "--jac", "-o", "c.nc", DAP3D_BLOCK="dap3d").returncode == 2
     assert not (dap3d.folder / "c.nc").exists()
-
-
-@pytest.mark.slow
-def test_requests_that_are_refused_leave_nothing(refuse, dap3d, result):
-    (dap3d.folder / "there.csv").write_text("mine")
-    assert "--force overwrites it" in refuse("post", "pen1.nc", "-o", "there.csv")
-    assert "give --format" in refuse("post", "pen1.nc", "-o", "a.txt")
-    assert "differ" in refuse("post", "pen1.nc", "-o", "a.nc", "--format", "csv")
-    assert "did you mean 'cone.r.z'" in refuse("post", "pen1.nc", "-o", "a.csv", "cone.rr.z")
-    assert "did you mean 'cone.r.z'" in refuse("post", "pen1.nc", "-o", "a.nc", "cone.rr.z")
-    before = {"pen1.nc", "bodies2.nc", "ball1.nc", "there.csv"}
-    assert {file.name for file in dap3d.folder.iterdir()} == before
-    assert (dap3d.folder / "there.csv").read_text() == "mine"
-    assert dap3d("post", "pen1.nc", "-o", "there.csv", "t", "--force").returncode == 0
-    assert (dap3d.folder / "there.csv").read_text().startswith("t [s]\n0.0\n")

@@ -6,7 +6,6 @@ import subprocess
 import sys
 
 import attrs
-import numpy as np
 import pytest
 from tests.e2e.conftest import environment
 
@@ -159,10 +158,3 @@ def test_rerun_says_what_differs(dap3d, monkeypatch, capfd):
     found = json.loads(capfd.readouterr().out)
     assert found["equal"] is False
     assert found["differences"]["u"] == pytest.approx(1e-9, rel=1e-6)
-
-
-def test_times_are_written_as_people_do():
-    from dap3d_core.cli.framework.options import Seconds
-
-    found = [Seconds().convert(text, None, None) for text in ("90", "90s", "5min", "2h", "0.5h")]
-    assert np.array_equal(found, [90.0, 90.0, 300.0, 7200.0, 1800.0])

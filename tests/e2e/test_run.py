@@ -1,7 +1,6 @@
 """``dap3d run`` as a user meets it: what it writes, what it says, its exit codes."""
 
 import json
-import os
 import re
 
 import numpy as np
@@ -106,94 +105,10 @@ def test_the_metric_of_the_correction_can_be_chosen(dap3d):
     assert dap3d("run", "rough.toml", "--correct-metric", "energy").returncode == 2
 
 
-@pytest.mark.slow
-def test_output_that_exists_is_refused_before_running(dap3d):
-    (dap3d.folder / "pen1.nc").write_text("mine")
-    refused = dap3d("run", "pen1", "--t-end", "0.1")
-    assert refused.returncode == 2
-    assert "--force" in refused.stderr
-    assert (dap3d.folder / "pen1.nc").read_text() == "mine"
-    assert dap3d("run", "pen1", "--t-end", "0.1", "--force").returncode == 0
-    assert dap.open(dap3d.folder / "pen1.nc").status == "done"
-
-
-def test_output_that_cannot_be_written_is_refused_before_running(refuse, scene_file):
-    scene = scene_file()
-    text = scene.read_text()
-    for target in ("nowhere/a.nc", "fall.toml/a.nc", ".", "fall.toml", "/dev/full", "x" * 300):
-        assert len(refuse("run", "fall.toml", "-o", target, "--force").splitlines()) == 1
-    assert scene.read_text() == text
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_without_permission_is_refused(dap3d):
-    folder = dap3d.folder / "locked"
-    folder.mkdir(mode=0o500)
-    refused = dap3d("run", "pen1", "-o", "locked/a.nc")
-    assert refused.returncode == 2
-    assert "permission" in refused.stderr
-
-
 def test_without_a_model_and_without_a_terminal_it_is_a_usage_error(dap3d):
     refused = dap3d("run")
     assert refused.returncode == 2
     assert "MODEL" in refused.stderr
-
-
-def test_settings_are_refused_before_compiling_and_by_their_option(refuse):
-    for option, value in (("--t-end", "inf"), ("--t-end", "-1"), ("--rtol", "0"), ("--dt", "nan"),
-                          ("--atol", "-1"), ("--step", "0"), ("--dt", "100")):  # fmt: skip
-        assert refuse("run", "pen1", option, value).startswith(option)
-    assert "did you mean 'dop853'" in refuse("run", "pen1", "--integrator", "dop85")
-    assert refuse("run", "pen1", "--integrator", "rk4").startswith("--step")
-    assert "unconstrained does not fit" in refuse("run", "pen1", "--method", "unconstrained")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("run", "pen1", "--t_end", "1"), "--t-end"),
-        (("run", "pen1", "--dt", "0.1", "--dt", "0.2"), "--dt is given more than once"),
-        (("run", "pen1", "--correct", "--no-correct"), "more than once"),
-        (("run", "pen1", "pen2"), "pen2"),
-        (("run", "pen1", "--dt", "1,5"), "1,5"),
-        (("run", "pen1", "-o"), "-o"),
-        (("rnu", "pen1"), "did you mean 'run'"),
-        (("check",), "MODEL"),
-        ((), "Commands:"),
-    ],
-)
-def test_usage_errors(refuse, arguments, words):
-    assert words in refuse(*arguments)
-
-
-@pytest.mark.slow
-def test_mistakes_of_a_scene_are_all_told_with_place_and_remedy(dap3d, scene_file):
-    scene_file(("mass = 2.0", "mas = 2.0"), ('type = "weight"', 'type = "wieght"'))
-    refused = dap3d("run", "fall.toml")
-    assert refused.returncode == 2
-    assert "fall.toml:5: bodies.stone.mas = 2.0" in refused.stderr
-    assert "did you mean 'mass'" in refused.stderr
-    assert "fall.toml:9: forces.gravity.type" in refused.stderr
-    assert "did you mean 'weight'" in refused.stderr
-    assert not (dap3d.folder / "fall.nc").exists()
-    as_json = dap3d("run", "fall.toml", "--json")
-    assert as_json.returncode == 2
-    found = json.loads(as_json.stdout)
-    assert found["exit_code"] == 2
-    assert (found["mistakes"][0]["line"], found["mistakes"][0]["nearest"]) == (5, "mass")
-
-
-@pytest.mark.slow
-def test_a_missing_point_and_a_missing_file(dap3d, scene_file):
-    scene_file(("[simulation]", '[joints.J]\ntype = "sph"\nP_i = "tip"\nP_j = "ground.O"\n'
-                                "[simulation]"))  # fmt: skip
-    refused = dap3d("run", "fall.toml")
-    assert refused.returncode == 2
-    assert "joints.J.P_i" in refused.stderr
-    missing = dap3d("run", "no/such.toml")
-    assert missing.returncode == 2
-    assert "no/such.toml" in missing.stderr
 
 
 @pytest.mark.slow
@@ -203,27 +118,3 @@ def test_file_names_of_any_kind(dap3d, scene_file):
         done = dap3d("run", "--", name)
         assert done.returncode == 0, done.stderr
         assert (dap3d.folder / f"{name.removesuffix('.toml')}.nc").is_file()
-
-
-@pytest.mark.slow
-def test_a_run_that_cannot_be_assembled_leaves_nothing(dap3d, scene_file):
-    scene_file(("[simulation]", '[points.P]\nbody = "ground"\nsPp = [0.0, 0.0, 1.0]\n'
-                '[joints.J]\ntype = "sph"\nP_i = "stone.O"\nP_j = "ground.O"\n'
-                '[joints.K]\ntype = "sph"\nP_i = "stone.O"\nP_j = "P"\n[simulation]'))  # fmt: skip
-    failed = dap3d("run", "fall.toml", "--json")
-    assert failed.returncode == 1
-    assert "J" in failed.stderr
-    assert json.loads(failed.stdout)["exit_code"] == 1
-    assert not (dap3d.folder / "fall.nc").exists()
-
-
-@pytest.mark.slow
-def test_a_reader_that_leaves_early_is_no_failure(dap3d):
-    dap3d("run", "pen1", "--t-end", "0.1", "-o", "first.nc")  # compiles, where nobody did before
-    process = dap3d.start("run", "pen1", "--t-end", "0.1")
-    process.stdout.close()
-    with process.stderr:
-        said = process.stderr.read()
-    assert process.wait() == 0
-    assert said == ""
-    assert dap.open(dap3d.folder / "pen1.nc").status == "done"
