@@ -25,9 +25,7 @@ def pages() -> Iterator[tuple[str, str]]:
     """The pages of all types that come with dap3d: (path, text)."""
     registry = load_registry()
     for kind in GROUPS:
-        found = [
-            describe.type_data(registry, kind, keyword) for keyword in shipped(registry, kind)
-        ]
+        found = [describe.type_data(registry, kind, keyword) for keyword in shipped(registry, kind)]
         yield f"reference/{kind}s/index.md", _index(kind, found)
         for facts in found:
             yield f"reference/{kind}s/{facts['keyword']}.md", type_page(facts)
@@ -91,7 +89,8 @@ def _default(field: dict[str, Any]) -> str:
 
 def _names(facts: dict[str, Any]) -> list[tuple[str, ...]]:
     return [
-        (code(n["name"]), describe.shape_text(n["shape"]), n["level"], n["doc"]) for n in facts["names"]
+        (code(n["name"]), describe.shape_text(n["shape"]), n["level"], n["doc"])
+        for n in facts["names"]
     ]
 
 
