@@ -34,6 +34,7 @@ class Torsion(Force):
     """
 
     keyword = "rot_sda"
+    symbol = "ring"
     energy_where = "where the bodies turn about the common axis, and without n_a"
     v_i: Vector = vector(across="axis", doc="direction the angle is measured from, on body i")
     v_j: Vector = vector(across="axis", doc="direction it is measured to, on body j")

@@ -28,6 +28,7 @@ class Cylindrical(Joint):
     """
 
     keyword, rows = "cyl", 4
+    symbol = "sleeve"
     a_i: Vector = vector(doc="axis on body i")
     a_j: Vector = vector(doc="axis on body j")
     d: Vector2 = vector2(doc="from a point of the axis on body i to one on body j")

@@ -26,6 +26,7 @@ class DrivenRotation(Joint):
     """
 
     keyword, rows = "drive-rot", 1
+    symbol = "ring"
     drives = True
     body_i: Body = body(doc="body whose rotation the driver is measured from")
     body_j: Body = body(default="ground", doc="body that is turned")

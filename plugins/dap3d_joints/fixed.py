@@ -22,6 +22,7 @@ class Fixed(Joint):
     """
 
     keyword, rows = "fix", 6
+    symbol = "block"
     body_i: Body = body(doc="the body that is fixed")
 
     def prepare(self, bodies):

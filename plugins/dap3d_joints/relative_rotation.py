@@ -21,6 +21,7 @@ class RelativeRotation(Joint):
     """
 
     keyword, rows, holonomic = "rel-rot", 1, False
+    symbol = "ring"
     drives = True
     body_i: Body = body(doc="body whose rotation the driver is measured from")
     body_j: Body = body(default="ground", doc="body that is turned")

@@ -19,6 +19,7 @@ class SphericalSpherical(Joint):
     """
 
     keyword, rows = "sph-sph", 1
+    symbol = "link"
     d: Vector2 = vector2(direction=True, doc="from the link's end on body i to its end on body j")
     length: float = number(
         default=None, unit="m", positive=True, doc="length of the link; left out, as at the start"

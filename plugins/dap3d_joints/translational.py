@@ -44,6 +44,7 @@ class Translational(Joint):
     """
 
     keyword, rows = "tran", 5
+    symbol = "slider"
     a_j: Vector = vector(doc="direction of sliding, on body j")
     d: Vector2 = vector2(doc="from a point of the axis on body i to one on body j")
     A_c: tuple = matrix(default=NO_TURN, doc="constant orientation A_i^T A_j, a rotation")

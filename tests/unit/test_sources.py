@@ -88,12 +88,13 @@ def test_a_digest_covers_what_a_type_uses_of_its_package(tmp_path, monkeypatch):
     package = tmp_path / "pack_of_types"
     package.mkdir()
     (package / "__init__.py").touch()
-    (package / "kinds.py").write_text(
-        "from pack_of_types.laws import law\n\nclass Kind:\n    f = law\n"
-    )
     monkeypatch.syspath_prepend(tmp_path)
 
-    def digest(law, other):
+    def digest(law, other, symbol="ball"):
+        (package / "kinds.py").write_text(
+            "from pack_of_types.laws import law\n\n"
+            f"class Kind:\n    symbol = {symbol!r}\n    f = law\n"
+        )
         (package / "laws.py").write_text(f"def law(x):\n    return {law} * x\n")
         (package / "others.py").write_text(f"number = {other}\n")
         for name in [name for name in sys.modules if name.startswith("pack_of_types")]:
@@ -105,4 +106,5 @@ def test_a_digest_covers_what_a_type_uses_of_its_package(tmp_path, monkeypatch):
     first = digest(1.0, 1)
     assert first
     assert digest(1.0, 2) == first
+    assert digest(1.0, 1, symbol="ring") == first
     assert digest(10.0, 1) != first

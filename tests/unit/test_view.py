@@ -8,32 +8,16 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from support.own_types import registry_of
-from support.scenes import scene_for
-from unit.test_result import model_of, result_of, rows_of
 
 import dap3d_core as dap
-from dap3d_core.interface import Body, Force, Joint, Point, Vector, body, point, vector
-from dap3d_core.interface.fields import specs_of
-from dap3d_core.kernels import dot, sub
-from dap3d_core.model import build_model
 from dap3d_core.model.rotations import to_global
-from dap3d_core.registry import load_registry
 from dap3d_core.result import ResultError, UnknownNameError
-from dap3d_core.scene import check
 from dap3d_core.view.page import PROGRAM
 from dap3d_core.view.scene3d.bodies import inertia_ellipsoid
 from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.colors import CYCLE, chains_of, colors
 from dap3d_core.view.scene3d.primitives import turned_to
 from dap3d_core.view.scene3d.sampled_motion import Extent, chosen
-from dap3d_core.view.scene3d.scene_data import elements_of, geometry_of
-
-TYPES = [
-    (row.kind, row.keyword)
-    for row in load_registry().listing()
-    if row.kind in ("joint", "force") and row.state == "ok"
-]
 
 
 def numbers(text, kind="<f4"):
@@ -134,100 +118,12 @@ def test_what_cannot_be_shown_is_refused(four):
 # ---------------------------------------------------------------- what is drawn
 
 
-def test_joints_look_like_their_kind(page):
-    pin, collar = marks_of(page, "J1")
-    assert {pin["kind"], collar["kind"]} == {"cylinder"}
-    assert (pin["body"], pin["at"]) == (1, [0.0, 0.0, -1.0])
-    np.testing.assert_allclose(quaternion_axis(pin["q"]), [1, 0, 0], atol=1e-6)
-    assert pin["size"][2] > 4 * pin["size"][0]
-    (ball,) = marks_of(page, "J2")
-    assert (ball["kind"], ball["body"], ball["at"]) == ("sphere", 1, [0.0, 0.0, 1.0])
-    (ring,) = marks_of(page, "J5")  # the motor stands at the hinge it turns, about its axis
-    assert (ring["kind"], ring["body"]) == ("ring", 0)
-    np.testing.assert_allclose(ring["at"], [0, 0, 0], atol=1e-6)
-    np.testing.assert_allclose(quaternion_axis(ring["q"]), [1, 0, 0], atol=1e-6)
-
-
 def test_bodies_without_shapes_are_links_between_their_points(page):
     rods = [m for m in marks_of(page, "coupler", "bodies") if m["kind"] == "cylinder"]
     ends = sorted(m["at"][2] for m in rods)
     np.testing.assert_allclose(ends, [-1.6, 1.6])
     assert all(m["size"][2] == pytest.approx(3.2) for m in rods)
     assert {m["color"] for m in rods} == {"#ff7f0e"}
-
-
-def test_springs_run_between_their_ends(page):
-    (spring,) = page.data["spans"]
-    assert (spring["kind"], spring["layer"], spring["owner"]) == ("spring", "forces", "spring1")
-    assert spring["start"] == (2, (0.0, 0.0, 3.2))
-    assert spring["end"] == (0, (0.0, 0.0, 0.0))
-
-
-def sliding():
-    scene = dap.Scene(name="sliding")
-    scene.add_body("block", r=(0.5, 0.0, 0.0))
-    scene.add_joint("tran", "rail", P_i="block.O", P_j="ground.O", a_j="ground.x")
-    scene.add_force("f", "push", body_i="block", f=(1.0, 0.0, 0.0))
-    return dap.simulate(scene, t_end=2.0, dt=0.5)
-
-
-def test_a_rail_is_as_long_as_the_motion():
-    result = sliding()
-    rail, sleeve = marks_of(dap.view(result), "rail")
-    low, high = rail["at"][0] - 0.5 * rail["size"][2], rail["at"][0] + 0.5 * rail["size"][2]
-    assert low < 0.0 < 0.5 + 2.0 < high
-    assert (sleeve["kind"], sleeve["body"]) == ("box", 1)
-
-
-class Hook(Joint):
-    """A type of somebody's own: a point stays in a plane."""
-
-    keyword, rows = "test-hook", 1
-    P_i: Point = point()
-    Q_j: Point = point()
-    n_j: Vector = vector()
-
-    def C(r_P_i, r_Q_j, n_j):
-        return (dot(sub(r_P_i, r_Q_j), n_j),)
-
-
-@pytest.mark.parametrize("ground", [None, "j"])
-@pytest.mark.parametrize(("kind", "keyword"), TYPES)
-def test_every_installed_type_is_drawn_with_finite_sizes(kind, keyword, ground):
-    """In any pose, free or tied to ground: numbers are finite, axes of unit length."""
-    registry = load_registry()
-    examined = registry.get(kind, keyword)
-    if any(spec.kind == "joint" for spec in specs_of(examined.type).values()):
-        pytest.skip("it acts in a joint, which is drawn itself")
-    scene = scene_for(examined, np.random.default_rng(5), ground=ground)
-    model = model_of(scene)
-    t = np.array([0.0, 1.0])
-    v_dot, Lam = np.zeros((2, 18)), np.zeros((2, model.row_count))
-    result = result_of(scene, rows_of(model, t, np.stack([model.u0, model.u0]), v_dot, Lam), model)
-    found = geometry_of(result, scene, elements_of(result))
-    assert [one["type"] for one in (*found["joints"], *found["forces"])] in ([keyword], [])
-    for row in found["marks"]:
-        values = np.array([*row[3], *row[4], *row[5]], dtype=float)
-        assert np.all(np.isfinite(values))
-        assert np.all(np.array(row[4]) > 0.0)
-        assert np.linalg.norm(row[5]) == pytest.approx(1.0, abs=1e-6)
-    drawn = [row for row in found["marks"] if row[-1] == "element"]
-    drawn += [span for span in found["spans"] if span["owner"] == "element"]
-    loads = {"f", "fp", "n", "np"}  # these are arrows alone
-    assert drawn or keyword in loads or getattr(examined.type, "each_body", False)
-
-
-def test_types_of_third_parties_are_drawn_by_what_they_declare():
-    from dap3d_core.view.scene3d.elements import joints_of
-
-    scene = dap.Scene()
-    scene.add_body("b")
-    scene.add_point("P", "b", (0.1, 0.2, 0.3))
-    scene.add_joint("test-hook", "hook", P_i="P", Q_j="ground.O", n_j="ground.z")
-    (hook,) = joints_of(build_model(check(scene, registry_of(Hook))))
-    assert hook.bodies == {"i": 1, "j": 0}
-    assert hook.points == {"i": (1, (0.1, 0.2, 0.3)), "j": (0, (0.0, 0.0, 0.0))}
-    assert hook.vectors == {"n_j": (0, (0.0, 0.0, 1.0))}
 
 
 def test_a_bare_body_is_the_ellipsoid_of_its_inertia():
@@ -273,33 +169,6 @@ def test_of_many_bodies_a_chain_has_one_hue():
     star = colors(["", "#123456", *[""] * 10], [(1, k) for k in range(2, 13)])
     assert star[1] == "#123456"
     assert chains_of(3, [(1, 2)]) == [[1, 2], [3]]
-
-
-def test_a_contact_is_no_rod():
-    """A force between bodies whose type declares no place on them does not join them."""
-
-    class Contact(Force):
-        keyword = "touch"
-        body_i: Body = body()
-        body_j: Body = body()
-
-        def wrench(r_i, r_j):
-            return ((sub(r_j, r_i), (0.0, 0.0, 0.0)), (sub(r_i, r_j), (0.0, 0.0, 0.0)))
-
-    scene = dap.Scene(name="balls")
-    for name, x in (("a", 0.0), ("b", 5.0)):
-        scene.add_body(name, r=[x, 0.0, 0.0])
-        scene.add_shape("sphere", f"s{name}", body=name, radius=1.0)
-    scene.add_force("touch", "t", body_i="a", body_j="b")
-    model = build_model(check(scene, registry_of(Contact)))
-    u = np.zeros((1, 26))
-    u[0, [3, 10]], u[0, 7] = 1.0, 5.0
-    result = result_of(
-        scene, rows_of(model, np.zeros(1), u, np.zeros((1, 12)), np.zeros((1, 0))), model
-    )
-    found = geometry_of(result, scene, elements_of(result))
-    assert found["spans"] == []
-    assert {mark[0] for mark in found["marks"]} == {"shapes"}
 
 
 def test_up_is_against_gravity_and_planar_motion_is_seen_squarely():

@@ -12,6 +12,21 @@ import attrs
 
 #: Increased by one when a type written for the old interface no longer works.
 INTERFACE_VERSION = 1
+#: Symbols that pictures have for joints and forces -> the body slots, fields and kinds of fields
+#: that each is drawn from (view/scene3d/symbols.py).
+SYMBOLS: Mapping[str, tuple[str, ...]] = {
+    "ball": ("i",),
+    "block": ("i",),
+    "cross": ("i", "a_i", "n_j"),
+    "hinge": ("i", "a_i"),
+    "link": ("i", "j"),
+    "plate": ("i", "a_j"),
+    "ring": ("vector",),
+    "sleeve": ("i", "j", "a_j"),
+    "slider": ("i", "j", "a_j"),
+    "spring": ("i", "j"),
+    "wheel": ("i", "radius"),
+}
 
 
 class TypeBase:
@@ -25,6 +40,7 @@ class TypeBase:
     #: True for a type of two bodies or more that uses the axes of ground in its formulas: it need
     #: not be invariant to a common rigid motion of its bodies (docs/check-plugin.md).
     ground_axes: ClassVar[bool] = False
+    symbol: ClassVar[str] = ""
 
     def __init_subclass__(cls, **conditions: Any) -> None:
         super().__init_subclass__()
@@ -84,12 +100,13 @@ class Joint(TypeBase):
     Attributes:
         keyword: the name of the type in a scene.
         rows: number of constraint equations.
-        holonomic: True, False, or one truth value a row: the rows of the position level.
-        drives: it prescribes a freedom that other joints leave; where there are none between its
-            bodies a scene gets a note.
-        unilateral: rows, from 0, with multipliers that are not negative in a valid motion: ground
-            carries and does not pull. A run where one is gets a note with the instant.
-        unilateral_words: the meaning of a negative multiplier, for that note.
+        holonomic: True, False, or one truth value a row: which rows exist at position level.
+        drives: whether it prescribes a freedom that other joints leave; where there are none
+            between its bodies a scene gets a note.
+        unilateral: rows, from 0, whose multiplier is not negative in what the type stands for: a
+            ground that carries and does not pull. A run where one is gets a note with the instant.
+        unilateral_words: what it means that one is negative; stands in that note.
+        symbol: how pictures show it, one of SYMBOLS; "": by the fields that it declares.
     """
 
     kind = "joint"
@@ -125,10 +142,12 @@ class Force(TypeBase):
     the friction of that joint; one with a ``wrench`` does not.
 
     Attributes:
-        keyword: the name of the type in a scene.
-        each_body: True if the element acts on every body of the scene (slot i in turn).
-        energy_where: the condition, to follow "only", for the energy to be the potential of the
-            wrench; "" for no condition.
+        keyword: the word that names the type in a scene.
+        each_body: True when the element acts on every body of the scene (slot i in turn).
+        symbol: how pictures show it, one of SYMBOLS; "": a spring between its two ends, where it
+            has such, else the fields that it declares.
+        energy_where: where alone the energy is the potential of the wrench, in words that follow
+            "only"; "" where it is so everywhere.
     """
 
     kind = "force"

@@ -34,7 +34,8 @@ from dap3d_core.interface.examine.random_values import (
     random_quantity,
 )
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.interface.types import Function, Joint, TypeBase
+from dap3d_core.interface.source_location import line_of, no_field
+from dap3d_core.interface.types import SYMBOLS, Function, Joint, TypeBase
 
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
 ATTEMPTS = 200
@@ -53,6 +54,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
     _check_class(type_, is_abstract=bool(variants))
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
+    _check_symbol(type_, layout)
     names = namespace(type_, layout)
     kernels, outputs = type_.kernels(), {}
 
@@ -291,6 +293,22 @@ def _check_members(type_: type[TypeBase]) -> None:
             choice = f"a {kind} may define {', '.join(allowed)}"
             hint = f"did you mean {near[0]}?" if near else choice
             raise PluginError(f"{where_is(type_)} defines {name}, which nothing calls; {hint}")
+
+
+def _check_symbol(type_: type[TypeBase], layout: Layout) -> None:
+    if not type_.symbol:
+        return
+    who, symbol = where_is(type_), f"symbol = {type_.symbol!r}"
+    if type_.symbol not in SYMBOLS:
+        raise PluginError(f"{who}: {symbol} is not one of {', '.join(SYMBOLS)}")
+    stored = {name: s.kind for name, s in specs_of(type_).items() if name in layout.numbers}
+    offered = {*layout.slots, *stored, *stored.values()}
+    lacking = [name for name in SYMBOLS[type_.symbol] if name not in offered]
+    if lacking:
+        raise PluginError(
+            f"{who}: {symbol} is drawn from {', '.join(lacking)}, which the type does not have; "
+            'name another symbol, or leave "" to draw what it declares'
+        )
 
 
 def _check_names(

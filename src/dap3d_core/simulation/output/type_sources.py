@@ -67,8 +67,8 @@ def _package(of: Mapping[str, str]) -> str:
 def digest_of(type_: Any) -> str:
     """A digest of the code of a type: of its own file, and of those of its package that it uses.
 
-    Comments and docstrings are left out. "" where there is no file, such as of a type that was
-    typed at a prompt.
+    Comments, docstrings and symbols of pictures are left out. "" where there is no file, such as
+    of a type that was typed at a prompt.
     """
     waiting = [sys.modules.get(base.__module__) for base in type_.__mro__]
     root = type_.__module__.partition(".")[0]
@@ -96,18 +96,27 @@ def digest_of(type_: Any) -> str:
 
 
 def _code_of(path: Path) -> bytes:
-    """The content of a source file without comments and docstrings; of another file, all of it."""
+    """The content of a source file without what changes no formula; of another file, all of it."""
     content = path.read_bytes()
     try:
         tree = ast.parse(content)
     except (SyntaxError, ValueError):
         return content
-    return ast.unparse(_WithoutDocstrings().visit(tree)).encode()
+    return ast.unparse(_Formulas().visit(tree)).encode()
 
 
-class _WithoutDocstrings(ast.NodeTransformer):
-    """Removes statements that are a text alone."""
+class _Formulas(ast.NodeTransformer):
+    """Removes statements that are a text alone, and what a class says of its picture."""
 
     def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
         """The statement, or None where it does nothing."""
         return None if isinstance(node.value, ast.Constant) else node
+
+    def visit_ClassDef(self, node: ast.ClassDef) -> ast.AST:
+        """The class without its ``symbol``, from which nothing is computed."""
+        node.body = [
+            one
+            for one in node.body
+            if not (isinstance(one, ast.Assign) and ast.unparse(one.targets[0]) == "symbol")
+        ]
+        return self.generic_visit(node)

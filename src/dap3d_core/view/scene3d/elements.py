@@ -19,6 +19,7 @@ class Placed:
 
     Attributes:
         name, keyword: its own, and that of its type.
+        symbol: what its type declares, of ``interface.types.SYMBOLS``; "" where it declares none.
         bodies: slot -> body index, ground 0.
         points: slot -> the point ``P_i``, ``P_j``, ... on that body.
         vectors: field -> body index and direction there.
@@ -28,6 +29,7 @@ class Placed:
 
     name: str
     keyword: str
+    symbol: str
     bodies: dict[str, int]
     points: dict[str, Located]
     vectors: dict[str, Located]
@@ -92,7 +94,9 @@ def _placed(group: Group, place: int, name: str) -> Placed:
             vectors[field] = on[field], values
         elif shape == () and kind == "number":
             numbers[field] = values[0]
-    return Placed(name, group.keyword, bodies, points, vectors, numbers, has_ends)
+    return Placed(
+        name, group.keyword, group.examined.type.symbol, bodies, points, vectors, numbers, has_ends
+    )
 
 
 def _bodies_of_vectors(

@@ -101,10 +101,10 @@ def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeo
     reach = max([reach, *(j.numbers.get("radius", 0.0) for j in elements.joints)])
     extent = motion.extent(points, reach + 2.0 * unit)
     drawer = Drawer(motion, unit, elements.joints)
-    drawings = [drawer.joint(j) for j in elements.joints]
-    drawings += [drawer.force(f) for f in elements.forces]
-    marks += [*ellipsoids, *shapes.marks, *(m for d in drawings for m in d.marks)]
-    spans = [s for d in drawings for s in d.spans]
+    pieces = [piece for j in elements.joints for piece in drawer.joint(j)]
+    pieces += [piece for f in elements.forces for piece in drawer.force(f)]
+    marks += [*ellipsoids, *shapes.marks, *(p for p in pieces if isinstance(p, Mark))]
+    spans = [p for p in pieces if isinstance(p, Span)]
     return SceneGeometry(subject.body_names, hues, marks, spans, shapes, extent, unit)
 
 
@@ -164,7 +164,7 @@ def _bare_bodies(
 ) -> list[Mark]:
     """Bodies that nothing is attached to; a wheel is drawn by its joint."""
     subject = result.subject
-    wheels = {j.bodies["i"] for j in joints if j.keyword == "disk"}
+    wheels = {j.bodies["i"] for j in joints if j.symbol == "wheel"}
     most = 0.2 * size if size > 0.0 else np.inf
     return [
         inertia_ellipsoid(
