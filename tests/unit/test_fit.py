@@ -369,7 +369,7 @@ def test_a_fit_is_drawn(tmp_path):
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    from dap3d_core.plot.fit import save_fit
+    from dap3d_core.plot import save_plot
 
     t = np.linspace(0.0, 1.0, 21)
     data = {"t": t, "mass.r.x": swing(t), "mass.rd.x": np.gradient(swing(t), t)}
@@ -389,7 +389,7 @@ def test_a_fit_is_drawn(tmp_path):
     assert [a.get_ylabel() for a in ax.figure.axes][1] == "residual\n[m]"
     assert len(dap.plot(fit, "mass.rd.x").figure.axes) == 2
     pyplot.close("all")
-    assert save_fit(fit, tmp_path / "fit.png").stat().st_size > 5000
+    assert save_plot(fit, [], tmp_path / "fit.png").stat().st_size > 5000
     with pytest.raises(KeyError, match=r"mass\.r\.x"):
         dap.plot(fit, "mass.r.z")
     with pytest.raises(ValueError, match="over time"):

@@ -1,39 +1,97 @@
-"""Figures as files, without a window."""
+"""``plot``, ``save_plot`` and ``show_plot``: a result, several, a fit or a sweep as a figure."""
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, cast
 
 import matplotlib
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
-from dap3d_core.plot.curves import WIDTH, draw, gather, height_of
-from dap3d_core.result import ResultError
-from dap3d_core.result.file.atomic_write import whole_file
+from dap3d_core.plot.curves import curve_picture
+from dap3d_core.plot.figure_file import check_suffix, save_figure
+from dap3d_core.plot.style import WIDTH, Picture
+from dap3d_core.result import Result, ResultError
 
-#: Suffix -> what keeps the time of day out of the file: equal figures give equal files.
-FORMATS: dict[str, dict[str, Any]] = {
-    ".png": {},
-    ".svg": {"Date": None},
-    ".pdf": {"CreationDate": None},
-}
-#: Least and largest side of a figure, inches; dots an inch.
-SIDES, DENSITIES = (0.5, 100.0), (10.0, 1200.0)
-#: What matplotlib falls back on where it cannot open windows.
-FILES_ALONE = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
-#: A window shows a figure larger than paper does.
-WINDOW_DPI = 170.0
+if TYPE_CHECKING:
+    import xarray
+
+    from dap3d_core.study.fit.fit_result import Fit
+
+    Drawable = Result | Mapping[str, Result] | Fit | xarray.Dataset
+
+#: Backends that matplotlib falls back on where it cannot open windows.
+FILE_BACKENDS = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
+#: Dots an inch of a figure of a script, and of a window, which shows it larger than paper does.
+SCRIPT_DPI, WINDOW_DPI = 150.0, 170.0
 NO_WINDOW = (
     "cannot open a window: there is no display, or no package that opens windows (pip install "
     "PyQt6); -o writes a file instead"
 )
 
 
+def picture_of(
+    result: "Drawable", quantities: Sequence[str], x: str | None, at: Mapping[str, float] | None
+) -> Picture:
+    """The picture of a result, of several by name, of a fit or of a sweep; errors as ``plot``."""
+    names = [quantities] if isinstance(quantities, str) else list(quantities)
+    if hasattr(result, "data_vars"):  # a data set of xarray, which is a mapping as well
+        from dap3d_core.plot.sweep.sweep_plot import sweep_picture
+
+        return sweep_picture(cast("xarray.Dataset", result), names, x, at)
+    if at:
+        raise ValueError("at chooses points of a sweep; this is none")
+    if isinstance(result, (Result, Mapping)):
+        return curve_picture(cast("Result | Mapping[str, Result]", result), names, x)
+    from dap3d_core.plot.fit import fit_picture
+
+    if x is not None:
+        raise ValueError("a fit is drawn over time, on a figure of its own: leave x, ax out")
+    return fit_picture(result, names)
+
+
+def plot(
+    result: "Drawable",
+    *quantities: str,
+    x: str | None = None,
+    at: Mapping[str, float] | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw quantities of a result, or outputs of a sweep, in panels below one another.
+
+    Args:
+        result: a ``Result``; several as names and results, {"rtol 1e-6": result, ...}; a ``Fit``:
+            its data, its curves and its residuals; or the data set of a sweep.
+        quantities: names such as ``crank.r.z``, ``crank.w`` (all components), ``energy.total``;
+            each unit has a panel of its own. Of a fit its outputs, by default all. Of a sweep as
+            well: lines over one number, a map over two, parallel coordinates over more, curves
+            over time (docs/how-to/look-at-sweeps.md).
+        x: the quantity on the x axis, one number an instant; by default time. A path, a length
+            over a length, has one scale on both axes; a circle marks its start. Of a sweep a
+            number or an output.
+        at: of a sweep: number -> value; only the nearest points are drawn.
+        ax: the axes; by default a new pyplot figure.
+
+    Returns:
+        The axes, of the first panel where there are several (``ax.figure.axes`` has all).
+        ``matplotlib.pyplot.show()`` shows them. A result of one instant is drawn as markers.
+
+    Raises:
+        UnknownNameError: there is no such quantity; names the nearest.
+        ValueError: no runs, no quantities, no instants, ``x`` has components, or ``ax`` is to take
+            several units; a sweep without values, or a data set that is no sweep.
+    """
+    picture = picture_of(result, quantities, x, at)
+    if ax is not None:
+        return picture.draw_on(ax)
+    from matplotlib import pyplot
+
+    size = (WIDTH, picture.height)
+    return picture.draw(pyplot.figure(figsize=size, layout="constrained", dpi=SCRIPT_DPI))[0]
+
+
 def save_plot(
-    result: Any,
+    result: "Drawable",
     quantities: str | Sequence[str],
     path: str | os.PathLike[str],
     *,
@@ -44,107 +102,28 @@ def save_plot(
     dpi: float = 200.0,
     force: bool = False,
 ) -> Path:
-    """Draw quantities of a result or a sweep as ``plot`` does, into a file; needs no display.
+    """Draw quantities as ``plot`` does, into a file; needs no display. Returns the path.
 
     Args:
-        result: what to draw from; several runs as names and results; a sweep.
-        quantities: one name or several.
-        path: the file; its suffix says what it is, .png, .svg or .pdf.
-        x: the quantity they are drawn over; time when left out.
-        at: of a sweep: number -> value, as ``plot`` has it.
-        width, height: size in inches; the height fits the number of panels when left out.
+        result, quantities, x, at: as for ``plot``; one name or several.
+        path: the file; its suffix gives the format, .png, .svg or .pdf.
+        width, height: size in inches; by default a height that suits the number of panels.
         dpi: dots an inch of a PNG.
-        force: whether an existing file is overwritten.
-
-    Returns:
-        The path.
+        force: overwrites an existing file.
 
     Raises:
-        UnknownNameError, ValueError: as ``plot``; also for a suffix or a size that cannot be.
+        UnknownNameError, ValueError: as ``plot``; also for an invalid suffix or size.
         ResultError: the file cannot be written, or exists and ``force`` is off.
     """
     target = Path(path)
     check_suffix(target)
-    paint, fitting = painting(result, quantities, x, at)
-    size = (width, fitting if height is None else height)
-    return save_figure(paint, target, size, dpi, force=force)
-
-
-def painting(
-    result: Any, quantities: str | Sequence[str], x: str | None, at: Mapping[str, float] | None
-) -> tuple[Callable[[Figure], object], float]:
-    """What draws a figure of a result or a sweep, and a good height for it, inches.
-
-    Raises:
-        UnknownNameError, ValueError: as ``plot``.
-    """
-    names = [quantities] if isinstance(quantities, str) else list(quantities)
-    if hasattr(result, "data_vars"):
-        from dap3d_core.plot.sweep.sweep_plot import draw_sweep, gather_sweep
-
-        found = gather_sweep(result, names, x, at)
-        return (lambda figure: draw_sweep(figure, found)), found.height
-    drawing = gather(result, names, x)
-    return (lambda figure: draw(figure, drawing)), height_of(drawing)
-
-
-def check_suffix(target: Path) -> str:
-    """The suffix of a picture's file.
-
-    Raises:
-        ValueError: it is none of FORMATS.
-    """
-    suffix = target.suffix.lower()
-    if suffix not in FORMATS:
-        raise ValueError(f"cannot write {target}: a figure is one of {', '.join(FORMATS)}")
-    return suffix
-
-
-def save_figure(
-    paint: Callable[[Figure], object],
-    target: Path,
-    size: tuple[float, float],
-    dpi: float,
-    *,
-    force: bool,
-) -> Path:
-    """Let something be drawn on an empty figure of a size (inches), and write it to a file.
-
-    Raises:
-        ValueError: a suffix or a size that cannot be.
-        ResultError: the file cannot be written, or exists and ``force`` is off.
-    """
-    suffix = check_suffix(target)
-    if not all(SIDES[0] <= s <= SIDES[1] for s in size):
-        raise ValueError(
-            f"a figure of {size[0]:g} x {size[1]:g} inches cannot be: each side is from "
-            f"{SIDES[0]:g} to {SIDES[1]:g}"
-        )
-    if not DENSITIES[0] <= dpi <= DENSITIES[1]:
-        raise ValueError(f"dpi is from {DENSITIES[0]:g} to {DENSITIES[1]:g}, not {dpi:g}")
-    with fixed_files():
-        figure = Figure(figsize=size, layout="constrained")
-        FigureCanvasAgg(figure)
-        paint(figure)
-        with whole_file(target, force) as part:
-            figure.savefig(part, format=suffix[1:], dpi=dpi, metadata=FORMATS[suffix])
-    return target
-
-
-@contextmanager
-def fixed_files() -> Iterator[None]:
-    """Text in an SVG stays text; its identifiers do not change from run to run.
-
-    No text is TeX, whatever the user's settings: names of a scene would be source code.
-    """
-    with matplotlib.rc_context(
-        {"svg.hashsalt": "dap3d", "svg.fonttype": "none", "text.usetex": False}
-    ):
-        yield
+    picture = picture_of(result, quantities, x, at)
+    size = (width, picture.height if height is None else height)
+    return save_figure(picture.draw, target, size, dpi, force=force)
 
 
 def show_plot(
-    result: Any,
+    result: "Drawable",
     quantities: str | Sequence[str],
     *,
     x: str | None = None,
@@ -152,26 +131,23 @@ def show_plot(
     width: float = WIDTH,
     height: float | None = None,
 ) -> None:
-    """Draw quantities of a result as ``plot`` does, in a window; returns when it is closed.
-
-    Args:
-        result, quantities, x, at, width, height: as ``save_plot`` has them.
+    """Draw quantities as ``plot`` does, in a window; returns when it is closed.
 
     Raises:
         UnknownNameError, ValueError: as ``plot``.
-        ResultError: there is no display, or nothing to open windows with.
+        ResultError: there is no display, or no package that opens windows.
     """
-    paint, fitting = painting(result, quantities, x, at)
+    picture = picture_of(result, quantities, x, at)
     from matplotlib import pyplot
 
-    size = (width, fitting if height is None else height)
+    size = (width, picture.height if height is None else height)
     try:
         figure = pyplot.figure(figsize=size, layout="constrained", dpi=WINDOW_DPI)
-    except ImportError as error:  # the environment names a way that does not work here
+    except ImportError as error:  # the environment names a backend that is not installed
         raise ResultError(NO_WINDOW) from error
-    if matplotlib.get_backend().lower() in FILES_ALONE:
+    if matplotlib.get_backend().lower() in FILE_BACKENDS:
         pyplot.close(figure)
         raise ResultError(NO_WINDOW)
-    paint(figure)
+    picture.draw(figure)
     pyplot.show()
     pyplot.close(figure)

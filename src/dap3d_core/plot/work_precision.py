@@ -10,16 +10,26 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from dap3d_core.plot.curves import DASHES, MARKERS, PALETTE, shown_text
-from dap3d_core.plot.figure import save_figure
+from dap3d_core.plot.figure_file import save_figure
+from dap3d_core.plot.style import (
+    DASHES,
+    LETTERS,
+    MARKERS,
+    PALETTE,
+    WIDTH,
+    legend_below,
+    shown_text,
+    style_axes,
+)
 
-#: Inches. Letters of 8 points are still 5 points high where the picture is set 60 mm wide.
-WIDTH, HEIGHT = 3.8, 4.0
-LETTERS = 8.0
+#: Inches.
+HEIGHT = 4.0
+#: Grey of the line of the fastest runs, and of the band below the reference's uncertainty.
+FRONT, BAND = "0.82", "0.93"
 
 
 class Mark(NamedTuple):
-    """One run: its method, its integrator, its error, its wall time (s), whether on the front."""
+    """One run: its method, its integrator, its error, its wall time (s), True on the front."""
 
     method: str
     integrator: str
@@ -39,22 +49,19 @@ def save_work_precision(
     dpi: float = 200.0,
     force: bool = False,
 ) -> Path:
-    """Draw runs as time against error into a file; needs no display.
+    """Draw runs as time against error into a file; needs no display. Returns the path.
 
     Args:
         marks: the runs; those of one method and integrator make a line, in their order.
-        path: the file; its suffix says what it is, .png, .svg or .pdf.
+        path: the file; its suffix gives the format, .png, .svg or .pdf.
         title: of the picture.
-        uncertainty: of the reference: errors below it cannot be told, which a band shows.
+        uncertainty: of the reference; a band shows errors below it, which mean nothing.
         width, height: size in inches.
         dpi: dots an inch of a PNG.
-        force: whether an existing file is overwritten.
-
-    Returns:
-        The path.
+        force: overwrites an existing file.
 
     Raises:
-        ValueError: no runs; a suffix or a size that cannot be.
+        ValueError: no runs; an invalid suffix or size.
         ResultError: the file cannot be written, or exists and ``force`` is off.
     """
     drawn = [mark for mark in marks if mark.error > 0.0 and mark.time_s > 0.0]
@@ -70,62 +77,55 @@ def save_work_precision(
 def draw_work_precision(
     figure: Figure, marks: Sequence[Mark], title: str, uncertainty: float | None
 ) -> Axes:
-    """Draw on an empty figure: colours tell integrators, dashes and markers tell methods."""
+    """Draw on an empty figure: colours for integrators, dashes and markers for methods."""
     ax = figure.subplots()
     integrators = list(dict.fromkeys(mark.integrator for mark in marks))
     methods = list(dict.fromkeys(mark.method for mark in marks))
     front = sorted((m for m in marks if m.on_front), key=lambda m: m.time_s)
-    ax.plot([m.error for m in front], [m.time_s for m in front], color="0.82", linewidth=7.0,
+    ax.plot([m.error for m in front], [m.time_s for m in front], color=FRONT, linewidth=7.0,
             solid_capstyle="round", zorder=1, label="_front")  # fmt: skip
     for i, integrator in enumerate(integrators):
         for j, method in enumerate(methods):
             line = [m for m in marks if (m.method, m.integrator) == (method, integrator)]
             if line:
-                ax.plot(
-                    [m.error for m in line],
-                    [m.time_s for m in line],
-                    **_look(i, j),
-                    label=f"{method}, {integrator}".strip("_"),
-                )
+                ax.plot([m.error for m in line], [m.time_s for m in line], **_line_style(i, j),
+                        label=f"{method}, {integrator}".strip("_"))  # fmt: skip
     ax.set_xscale("log")
     ax.set_yscale("log")
-    _tick(ax)
+    _set_ticks(ax)
     if uncertainty:
         low, high = ax.get_xlim()
-        ax.axvspan(min(low, uncertainty), uncertainty, color="0.93", zorder=0)
+        ax.axvspan(min(low, uncertainty), uncertainty, color=BAND, zorder=0)
         ax.set_xlim(low, high)
     ax.set_xlabel("error e", fontsize=LETTERS)
     ax.set_ylabel("wall time", fontsize=LETTERS)
-    ax.tick_params(labelsize=LETTERS)
-    ax.grid(True, alpha=0.3, linewidth=0.6)
-    ax.spines[["top", "right"]].set_visible(False)
-    figure.legend(
-        handles=_keys(integrators, methods, banded=bool(uncertainty)),
-        loc="outside lower center", ncols=2, fontsize=LETTERS, frameon=False,
-        handlelength=2.4, columnspacing=1.0, borderaxespad=0.1,
-    )  # fmt: skip
+    style_axes(ax)
+    keys = [Line2D([], [], color=PALETTE[i % len(PALETTE)], linewidth=2.5, label=name)
+            for i, name in enumerate(integrators)]  # fmt: skip
+    keys += [Line2D([], [], **(_line_style(0, j) | {"color": "0.25"}), label=name)
+             for j, name in enumerate(methods)]  # fmt: skip
+    greys = [(FRONT, "fastest"), (BAND, "below uncertainty")][: 2 if uncertainty else 1]
+    keys += [Line2D([], [], color=grey, linewidth=7.0, label=label) for grey, label in greys]
+    legend_below(figure, keys, 2, line_length=2.4)
     if title:
         ax.set_title(shown_text(title), fontsize=LETTERS + 1)
     return ax
 
 
-def _tick(ax: Axes) -> None:
+def _set_ticks(ax: Axes) -> None:
     """Few ticks with few letters: powers of ten; of times that span little also 2 and 5."""
     low, high = ax.get_ylim()
     between = (1.0, 2.0, 5.0) if high < 300.0 * low else (1.0,)
     ax.yaxis.set_major_locator(LogLocator(subs=between, numticks=12))
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _time(value)))
+    ax.yaxis.set_major_formatter(
+        FuncFormatter(lambda s, _: f"{1e3 * s:g} ms" if s < 1.0 else f"{s:g} s")
+    )
     ax.xaxis.set_major_locator(LogLocator(numticks=7))
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_minor_locator(NullLocator())
 
 
-def _time(value: float) -> str:
-    """A time on the axis."""
-    return f"{1e3 * value:g} ms" if value < 1.0 else f"{value:g} s"
-
-
-def _look(integrator: int, method: int) -> dict[str, Any]:
+def _line_style(integrator: int, method: int) -> dict[str, Any]:
     return {
         "color": PALETTE[integrator % len(PALETTE)],
         "linestyle": DASHES[method % len(DASHES)],
@@ -134,16 +134,3 @@ def _look(integrator: int, method: int) -> dict[str, Any]:
         "markerfacecolor": "white",
         "linewidth": 1.4,
     }
-
-
-def _keys(integrators: Sequence[str], methods: Sequence[str], *, banded: bool) -> list[Line2D]:
-    """The legend: a colour for each integrator, a marker for each method, the front, the band."""
-    keys = []
-    for i, name in enumerate(integrators):
-        keys.append(Line2D([], [], color=PALETTE[i % len(PALETTE)], linewidth=2.5, label=name))
-    for j, name in enumerate(methods):
-        keys.append(Line2D([], [], **(_look(0, j) | {"color": "0.25"}), label=name))
-    keys.append(Line2D([], [], color="0.82", linewidth=7.0, label="fastest"))
-    if banded:
-        keys.append(Line2D([], [], color="0.93", linewidth=7.0, label="below uncertainty"))
-    return keys

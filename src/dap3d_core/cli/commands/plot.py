@@ -125,8 +125,10 @@ def _open(
         from dap3d_core.plot.sweep.sweep_table import table_of
 
         data = open_sweep(files[0])
-        with refusing(ValueError):
-            return data, names or table_of(data).usual(x), _cuts(at)
+        try:
+            return data, names or table_of(data).default_outputs(x), _cuts(at)
+        except ValueError as error:
+            raise Refused(str(error)) from error
     if at:
         raise Refused(f"--at chooses points of a sweep; {files[0]} is none")
     runs = {n: open_result(f, **types) for n, f in zip(_labels(files), files, strict=True)}
@@ -178,7 +180,8 @@ def _check(
 ) -> None:
     """Refuse what cannot be drawn or written, for all reasons at once."""
     from dap3d_core.cli.framework.paths import refuse_all, writable
-    from dap3d_core.plot.figure import SIDES, check_suffix, painting
+    from dap3d_core.plot.figure import picture_of
+    from dap3d_core.plot.figure_file import SIDES, check_suffix
 
     def check_side(name: str, side: float | None) -> None:
         if side is not None and not SIDES[0] <= side <= SIDES[1]:
@@ -193,11 +196,11 @@ def _check(
     if hasattr(data, "data_vars"):  # a sweep
         from dap3d_core.plot.sweep.sweep_table import table_of
 
-        checks += [partial(table_of(data).check, name) for name in names]
-        checks += [partial(painting, data, names, axes["x"], axes["at"])]
+        checks += [partial(table_of(shown).check, name) for name in names]
+        checks += [partial(picture_of, shown, names, over["x"], over["at"])]
     else:
-        checks += [partial(painting, data, [name], None, None) for name in names]
-        checks += [partial(painting, data, ["t"], axes["x"], None)]
+        checks += [partial(picture_of, shown, [name], None, None) for name in names]
+        checks += [partial(picture_of, shown, ["t"], over["x"], None)]
     refuse_all(*checks)
 
 

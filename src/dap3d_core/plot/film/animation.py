@@ -10,8 +10,8 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.plot.figure import FORMATS as PICTURES
-from dap3d_core.plot.figure import fixed_files
+from dap3d_core.plot.figure_file import FORMATS as PICTURES
+from dap3d_core.plot.figure_file import fixed_files
 from dap3d_core.plot.film.encoding import FILMS, write_film
 from dap3d_core.plot.film.frame import Stage
 from dap3d_core.plot.film.projection import camera_of, leaves, round_number, shown, with_margin

@@ -11,7 +11,6 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.plot.curves import LETTERS, columns_of, shown_text
 from dap3d_core.plot.film.projection import (
     AXES,
     PLANES,
@@ -21,6 +20,7 @@ from dap3d_core.plot.film.projection import (
     grid_spacing,
 )
 from dap3d_core.plot.film.stick_figure import Sticks
+from dap3d_core.plot.style import LETTERS, columns_of, shown_text
 
 #: More bodies have no names in the picture.
 MOST_NAMES = 8

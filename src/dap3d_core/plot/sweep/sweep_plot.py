@@ -1,4 +1,4 @@
-"""Pictures of sweeps: which picture fits what varies, and the figure they stand in."""
+"""Plots of sweeps: the panels that suit what varies, and their figure."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -8,56 +8,89 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dap3d_core.plot.curves import LETTERS, WIDTH, shown_text
+from dap3d_core.plot.style import LETTERS, Picture, folded, shown_text
 from dap3d_core.plot.sweep.panels import Band, Heat, Lines, Scatter, Strands
 from dap3d_core.plot.sweep.parallel_coordinates import Parallel
-from dap3d_core.plot.sweep.style import Fates, Panel, folded
-from dap3d_core.plot.sweep.sweep_table import TIME, Column, Table, table_of, unknown
+from dap3d_core.plot.sweep.style import Panel, StatusLegend
+from dap3d_core.plot.sweep.sweep_table import TIME, Table, Variable, table_of, unknown
 
 if TYPE_CHECKING:
     import xarray
 
 #: Points that are drawn at most, by what draws them; others are left out evenly.
 MOST_ON_LINE, MOST_ON_MAP, MOST_SCATTERED, MOST_PARALLEL = 20_000, 360_000, 20_000, 2_000
-#: Curves that are told apart by colour; of more the median and a band are drawn, where no axis
-#: of a grid orders them. Numbers that a band is made of.
+#: Curves that colours tell apart; of more the median and a band are drawn, where no axis of a
+#: grid orders them. Numbers that a band is made of.
 MOST_CURVES, MOST_ORDERED, MOST_IN_BAND = 40, 200, 20_000_000
 #: More panels are no picture.
 MOST_PANELS = 24
 
+#: Panels, each with the table of the points that it shows.
+Panels = list[tuple[Panel, Table]]
+
 
 @attrs.frozen(eq=False)
-class SweepDrawing:
-    """What a figure shows of a sweep.
-
-    Attributes:
-        panels: below one another.
-        words: above them.
-    """
+class SweepPicture(Picture):
+    """Panels of a sweep below one another, and lines of text above them."""
 
     panels: list[Panel]
     words: tuple[str, ...]
 
     @property
     def height(self) -> float:
-        """A good height, inches."""
+        """A suitable height of the figure, inches."""
         return sum(panel.height for panel in self.panels) + 0.25 + 0.13 * len(self.words)
 
+    def draw(self, figure: Figure) -> list[Axes]:
+        """Draw all panels on an empty figure; returns their axes, those of colour bars left out."""
+        ratios = [panel.height for panel in self.panels]
+        grid = figure.subplots(len(ratios), 1, squeeze=False, height_ratios=ratios)
+        scale = figure.get_figheight() / sum(ratios)
+        axes, legend = list(grid[:, 0]), StatusLegend()
+        for k, (ax, panel) in enumerate(zip(axes, self.panels, strict=True)):
+            panel.paint(ax, (figure.get_figwidth(), panel.height * scale), legend)
+            if k and _share_x(self.panels[k - 1], panel):
+                ax.sharex(axes[k - 1])
+                axes[k - 1].set_xlabel("")
+                axes[k - 1].tick_params(labelbottom=False)
+        if self.words:
+            room = 14.5 * figure.get_figwidth()
+            lines = [folded(shown_text(word), room) for word in self.words]
+            figure.suptitle("\n".join(lines), fontsize=LETTERS + (len(lines) == 1))
+        legend.draw(figure)
+        return axes
 
-def gather_sweep(
+    def draw_on(self, ax: Axes) -> Axes:
+        """Draw on axes of the user; a ValueError where there are several panels."""
+        if len(self.panels) > 1:
+            raise ValueError(f"one axes takes one panel, not {len(self.panels)}: leave ax out")
+        box, dpi, legend = ax.get_window_extent(), ax.figure.dpi, StatusLegend()
+        self.panels[0].paint(ax, (box.width / dpi, box.height / dpi), legend)
+        if legend.handles:
+            ax.legend(handles=legend.handles, fontsize="small", framealpha=0.8)
+        return ax
+
+
+def _share_x(above: Panel, below: Panel) -> bool:
+    """True where the label of the x axis below the lower panel serves both."""
+    plain = Lines, Scatter
+    return isinstance(above, plain) and isinstance(below, plain) and above.x.name == below.x.name
+
+
+def sweep_picture(
     data: "xarray.Dataset",
     outputs: Sequence[str],
     x: str | None = None,
     at: Mapping[str, float] | None = None,
-) -> SweepDrawing:
-    """What a figure of these outputs shows.
+) -> SweepPicture:
+    """Picture of outputs of a sweep.
 
     Raises:
         UnknownNameError: the sweep has no such output, number or dimension; names the nearest.
         ValueError: this is no sweep, there is nothing to draw, or it cannot be drawn so.
     """
     table = table_of(data, at)
-    names = tuple(dict.fromkeys(outputs)) or table.usual(x)
+    names = tuple(dict.fromkeys(outputs)) or table.default_outputs(x)
     for name in names:
         table.check(name)
     if not names:
@@ -66,69 +99,14 @@ def gather_sweep(
     scalars = [n for n in names if not table.is_series(n)]
     series = [n for n in names if table.is_series(n)]
     if x is not None:
-        found = _over(table, x, scalars, series)
+        panels = _over(table, x, scalars, series)
     else:
-        found = (_of_points(table, scalars) if scalars else []) + [
-            _over_time(table, name) for name in series
-        ]
-    if len(found) > MOST_PANELS:
-        raise ValueError(f"{len(found)} panels are too many; name at most {MOST_PANELS} outputs")
-    words = dict.fromkeys(word for _, thin in found for word in thin.words)
-    return SweepDrawing([panel for panel, _ in found], tuple(words))
-
-
-def draw_sweep(figure: Figure, drawing: SweepDrawing) -> list[Axes]:
-    """Draw all panels on an empty figure; returns their axes, those of colour bars left out."""
-    ratios = [panel.height for panel in drawing.panels]
-    grid = figure.subplots(len(ratios), 1, squeeze=False, height_ratios=ratios)
-    share = figure.get_figheight() / sum(ratios)
-    axes, fates = list(grid[:, 0]), Fates()
-    for k, (ax, panel) in enumerate(zip(axes, drawing.panels, strict=True)):
-        size = figure.get_figwidth(), panel.height * share
-        ax.tick_params(labelsize=LETTERS)
-        panel.paint(ax, size, fates)
-        if k and _share_x(drawing.panels[k - 1], panel):
-            ax.sharex(axes[k - 1])
-            axes[k - 1].set_xlabel("")
-            axes[k - 1].tick_params(labelbottom=False)
-        for offset in (ax.xaxis.get_offset_text(), ax.yaxis.get_offset_text()):
-            offset.set_fontsize(LETTERS)
-    if drawing.words:
-        room = int(14.5 * figure.get_figwidth())
-        lines = [folded(shown_text(word), room) for word in drawing.words]
-        figure.suptitle("\n".join(lines), fontsize=LETTERS + (len(lines) == 1))
-    fates.legend(figure)
-    return axes
-
-
-def _share_x(above: Panel, below: Panel) -> bool:
-    """Whether what one panel is drawn over needs to be told below the other alone."""
-    plain = Lines, Scatter
-    return isinstance(above, plain) and isinstance(below, plain) and above.x.name == below.x.name
-
-
-def plot_sweep(
-    data: "xarray.Dataset",
-    outputs: Sequence[str],
-    x: str | None,
-    at: Mapping[str, float] | None,
-    ax: Axes | None,
-) -> Axes:
-    """What ``plot`` does with a sweep; the axes of the first panel."""
-    drawing = gather_sweep(data, outputs, x, at)
-    if ax is None:
-        from matplotlib import pyplot
-
-        size = (WIDTH, drawing.height)
-        figure = pyplot.figure(figsize=size, layout="constrained", dpi=150)
-        return draw_sweep(figure, drawing)[0]
-    if len(drawing.panels) > 1:
-        raise ValueError(f"one axes takes one panel, not {len(drawing.panels)}: leave ax out")
-    box, dpi, fates = ax.get_window_extent(), ax.figure.dpi, Fates()
-    drawing.panels[0].paint(ax, (box.width / dpi, box.height / dpi), fates)
-    if fates.handles:
-        ax.legend(handles=fates.handles, fontsize="small", framealpha=0.8)
-    return ax
+        panels = _of_points(table, scalars) if scalars else []
+        panels += [_over_time(table, name) for name in series]
+    if len(panels) > MOST_PANELS:
+        raise ValueError(f"{len(panels)} panels are too many; name at most {MOST_PANELS} outputs")
+    words = dict.fromkeys(word for _, thin in panels for word in thin.words)
+    return SweepPicture([panel for panel, _ in panels], tuple(words))
 
 
 def _check_values(table: Table, names: Sequence[str]) -> None:
@@ -138,17 +116,14 @@ def _check_values(table: Table, names: Sequence[str]) -> None:
         return
     counts = np.bincount(few.status.ravel().clip(0, 3), minlength=4)
     words = ("not run so far", "without a value", "stopped", "failed")
-    told = ", ".join(f"{n} {word}" for n, word in zip(counts, words, strict=True) if n)
+    listed = ", ".join(f"{n} {word}" for n, word in zip(counts, words, strict=True) if n)
     raise ValueError(
-        f"there is nothing to draw: of {table.size} points none has a value ({told}); dap3d info "
+        f"there is nothing to draw: of {table.size} points none has a value ({listed}); dap3d info "
         "shows why"
     )
 
 
-Found = list[tuple[Panel, Table]]
-
-
-def _of_points(table: Table, names: Sequence[str]) -> Found:
+def _of_points(table: Table, names: Sequence[str]) -> Panels:
     """Panels of outputs that have one value at each point."""
     if len(table.numbers) == 1:
         most = MOST_SCATTERED if table.sampled else MOST_ON_LINE
@@ -158,40 +133,36 @@ def _of_points(table: Table, names: Sequence[str]) -> Found:
         y, x = map(thin.number, thin.numbers)
         return [(Heat(x, y, thin.output(name), thin.status), thin) for name in names]
     thin = table.thinned(MOST_PARALLEL)
-    columns = [thin.flat(name) for name in (*thin.numbers, *names)]
-    panel = Parallel(columns, len(thin.numbers), thin.status.ravel())
-    return [(panel, thin)]
+    variables = [thin.flat(name) for name in (*thin.numbers, *names)]
+    return [(Parallel(variables, len(thin.numbers), thin.status.ravel()), thin)]
 
 
 def _panels_by_unit(
     thin: Table, x: str, names: Sequence[str], kind: Callable[..., Panel] | None = None
-) -> Found:
-    by_unit: dict[str, list[Column]] = {}
+) -> Panels:
+    by_unit: dict[str, list[Variable]] = {}
     for name in names:
-        column = thin.flat(name)
-        by_unit.setdefault(column.unit, []).append(column)
+        output = thin.flat(name)
+        by_unit.setdefault(output.unit, []).append(output)
     make: Any = kind or (Scatter if thin.sampled else Lines)
     over, status = thin.flat(x), thin.status.ravel()
-    return [(make(over, columns, status), thin) for columns in by_unit.values()]
+    return [(make(over, outputs, status), thin) for outputs in by_unit.values()]
 
 
 def _over_time(table: Table, name: str) -> tuple[Panel, Table]:
     """The curves of a series: coloured by a number, or of many the median and a band."""
     ordered = not table.sampled and len(table.numbers) == 1
-    if table.size > MOST_CURVES and not ordered:
-        thin = table.thinned(MOST_IN_BAND // table.data.sizes[TIME])
-        return Band(thin.number(TIME), _rows(thin.output(name)), thin.status.ravel()), thin
-    thin = table.thinned(MOST_ORDERED)
-    by = thin.flat(thin.numbers[0])
-    return Strands(thin.number(TIME), _rows(thin.output(name)), by, thin.status.ravel()), thin
+    is_band = table.size > MOST_CURVES and not ordered
+    most = MOST_IN_BAND // table.data.sizes[TIME] if is_band else MOST_ORDERED
+    thin = table.thinned(most)
+    output, status = thin.output(name), thin.status.ravel()
+    rows = attrs.evolve(output, values=output.values.reshape(-1, output.values.shape[-1]))
+    if is_band:
+        return Band(thin.number(TIME), rows, status), thin
+    return Strands(thin.number(TIME), rows, thin.flat(thin.numbers[0]), status), thin
 
 
-def _rows(column: Column) -> Column:
-    """An output of each point as a row."""
-    return attrs.evolve(column, values=column.values.reshape(-1, column.values.shape[-1]))
-
-
-def _over(table: Table, x: str, scalars: Sequence[str], series: Sequence[str]) -> Found:
+def _over(table: Table, x: str, scalars: Sequence[str], series: Sequence[str]) -> Panels:
     """Panels of outputs over a number, or over another output."""
     choices = [*table.numbers, *(n for n in table.outputs if not table.is_series(n))]
     if series:
@@ -199,8 +170,7 @@ def _over(table: Table, x: str, scalars: Sequence[str], series: Sequence[str]) -
     if x not in choices:
         raise unknown("number or output", x, choices)
     if table.sampled or x in table.outputs:
-        thin = table.thinned(MOST_SCATTERED)
-        return _panels_by_unit(thin, x, scalars, Scatter)
+        return _panels_by_unit(table.thinned(MOST_SCATTERED), x, scalars, Scatter)
     if len(table.numbers) == 1:
         return _panels_by_unit(table.thinned(MOST_ON_LINE), x, scalars)
     if len(table.numbers) > 2:
@@ -209,12 +179,12 @@ def _over(table: Table, x: str, scalars: Sequence[str], series: Sequence[str]) -
             "(at, --at)"
         )
     thin = table.thinned(MOST_ON_MAP)
-    place = table.numbers.index(x)
-    over, by = thin.number(x), thin.number(table.numbers[1 - place])
-    found: Found = []
+    axis = table.numbers.index(x)
+    over, by = thin.number(x), thin.number(table.numbers[1 - axis])
+    status = np.moveaxis(thin.status, axis, 1)
+    panels: Panels = []
     for name in scalars:
         output = thin.output(name)
-        rows = attrs.evolve(output, values=np.moveaxis(output.values, place, 1))
-        status = np.moveaxis(thin.status, place, 1)
-        found.append((Strands(over, rows, by, status), thin))
-    return found
+        rows = attrs.evolve(output, values=np.moveaxis(output.values, axis, 1))
+        panels.append((Strands(over, rows, by, status), thin))
+    return panels

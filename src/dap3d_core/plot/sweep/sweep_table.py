@@ -1,4 +1,4 @@
-"""What is drawn of a sweep's data set: its numbers, its outputs, how its points ended."""
+"""The data set of a sweep as plots need it: its numbers, its outputs, the status of its points."""
 
 import json
 import math
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.plot.curves import unit_text
+from dap3d_core.plot.style import unit_text
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result import UnknownNameError
 from dap3d_core.result.file.schema import SWEEP
@@ -27,20 +27,13 @@ POINT, TIME = "point", "time"
 FAR, EVEN = 10.0, 1e-6
 #: Names that an error lists.
 LISTED = 12
-#: What was computed at a point: outputs of other points are not drawn as values.
+#: Status of a point with a result: outputs of other points are not drawn as values.
 DONE = PointStatus.DONE.value
 
 
 @attrs.frozen(eq=False)
-class Column:
-    """A number or an output of all points that are drawn.
-
-    Attributes:
-        name: of the data set.
-        label, unit: what stands at its axis.
-        values: of the points; of an axis of a grid its values.
-        is_log: whether its scale is logarithmic.
-    """
+class Variable:
+    """A number or an output: its name in the data set, label and unit of its axis, values."""
 
     name: str
     label: str
@@ -51,13 +44,12 @@ class Column:
 
 @attrs.frozen(eq=False)
 class Table:
-    """A sweep, perhaps cut and thinned.
+    """A sweep, or a part of it.
 
     Attributes:
-        data: its data set; dimensions of one value are gone.
-        sampled: whether its points are samples.
-        numbers: names of the numbers that still vary.
-        outputs: names of the outputs.
+        data: its data set, without dimensions of one value.
+        sampled: True where its points are samples.
+        numbers, outputs: names of the numbers that still vary, and of the outputs.
         words: title, and what was cut or left out.
     """
 
@@ -69,22 +61,20 @@ class Table:
 
     @property
     def status(self) -> NDArray[np.int8]:
-        """How each point ended, over the axes of the numbers."""
+        """Status of each point, over the axes of the numbers."""
         if "status" in self.data:
-            kept = self.data["status"].transpose(*self.dimensions, missing_dims="ignore")
-            return np.asarray(kept.values).reshape(self.shape)
+            status = self.data["status"].transpose(*self.dimensions, missing_dims="ignore")
+            return np.asarray(status.values).reshape(self.shape)
         return np.full(self.shape, DONE, dtype=np.int8)
 
     @property
     def dimensions(self) -> tuple[str, ...]:
-        """Of the points."""
-        if self.sampled:
-            return (POINT,)
-        return self.numbers
+        """Dimensions of the points."""
+        return (POINT,) if self.sampled else self.numbers
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the points."""
+        """Points along each dimension."""
         return tuple(self.data.sizes.get(d, 1) for d in self.dimensions)
 
     @property
@@ -93,33 +83,30 @@ class Table:
         return math.prod(self.shape)
 
     def check(self, output: str) -> None:
-        """Refuse a name of no output.
-
-        Raises:
-            UnknownNameError: names the nearest.
-        """
+        """Refuse a name of no output: an UnknownNameError names the nearest."""
         if output not in self.outputs:
             raise unknown("output", output, self.outputs)
 
-    def usual(self, x: str | None) -> tuple[str, ...]:
-        """The outputs that are drawn where none is named: over something else no series."""
+    def default_outputs(self, x: str | None) -> tuple[str, ...]:
+        """The outputs that are drawn where none is named: no series, unless over time."""
         return tuple(n for n in self.outputs if x is None or not self.is_series(n))
 
     def is_series(self, name: str) -> bool:
-        """Whether an output has a value at each instant."""
+        """True for an output with a value at each instant."""
         return TIME in self.data[name].dims
 
-    def number(self, name: str) -> Column:
+    def number(self, name: str) -> Variable:
         """A varied number, an axis of a grid or over all samples; also ``time``."""
         values = np.asarray(self.data[name].values, dtype=float)
         unit = self.data[name].attrs.get("units", "")
-        return Column(name, name, unit, values, self._is_log(name, values))
+        return Variable(name, name, unit, values, self._is_log(name, values))
 
-    def output(self, name: str) -> Column:
+    def output(self, name: str) -> Variable:
         """An output (points..., [time]); NaN where the run did not go to its end."""
         about = self.data[name].attrs
-        kept = self.data[name].transpose(*self.dimensions, ..., missing_dims="ignore")
-        values = np.array(kept.values, dtype=float).reshape(*self.shape, *self._instants(name))
+        ordered = self.data[name].transpose(*self.dimensions, ..., missing_dims="ignore")
+        shape = (*self.shape, self.data.sizes[TIME]) if self.is_series(name) else self.shape
+        values = np.array(ordered.values, dtype=float).reshape(shape)
         values[~np.isfinite(values)] = np.nan
         if not self.is_series(name):
             values[self.status != DONE] = np.nan
@@ -127,34 +114,31 @@ class Table:
         word = name.rpartition(":")[2]
         if ":" in name and word in REDUCTIONS and word != "series":
             label = f"{label}, {word}"
-        return Column(name, label, str(about.get("units", "")), values)
+        return Variable(name, label, str(about.get("units", "")), values)
 
-    def flat(self, name: str) -> Column:
+    def flat(self, name: str) -> Variable:
         """A number or an output over all points in one row (n,)."""
         if name in self.outputs:
-            column = self.output(name)
-            return attrs.evolve(column, values=column.values.ravel())
-        column = self.number(name)
+            output = self.output(name)
+            return attrs.evolve(output, values=output.values.ravel())
+        number = self.number(name)
         if self.sampled or not self.numbers:
-            return column
-        place = self.numbers.index(name)
+            return number
         axes = [self.number(n).values for n in self.numbers]
-        return attrs.evolve(column, values=np.meshgrid(*axes, indexing="ij")[place].ravel())
+        grid = np.meshgrid(*axes, indexing="ij")[self.numbers.index(name)]
+        return attrs.evolve(number, values=grid.ravel())
 
     def thinned(self, most: int) -> "Table":
-        """With so many points at most, evenly chosen; says so."""
+        """The table with so many points at most, evenly chosen; its ``words`` say so."""
         if self.size <= most:
             return self
         chosen = zip(self.dimensions, evenly(self.shape, most), strict=True)
-        places = {axis: there for axis, there in chosen if axis in self.data.dims}
-        fewer = attrs.evolve(self, data=at_places(self.data, places))
+        index = {axis: k for axis, k in chosen if axis in self.data.dims}
+        fewer = attrs.evolve(self, data=at_places(self.data, index))
         return attrs.evolve(fewer, words=(*self.words, f"{fewer.size} of {self.size} points"))
 
-    def _instants(self, name: str) -> tuple[int, ...]:
-        return (self.data.sizes[TIME],) if self.is_series(name) else ()
-
     def _is_log(self, name: str, values: Floats) -> bool:
-        """Whether a number was varied evenly in its logarithm."""
+        """True for a number that varies evenly in its logarithm."""
         spec = _varied(self.data).get(name, "")
         if isinstance(spec, str) and spec.replace(" ", "").endswith(":log"):
             return bool(np.all(values > 0.0))
@@ -171,10 +155,10 @@ def table_of(data: "xarray.Dataset", at: Mapping[str, float] | None = None) -> T
 
     Args:
         data: of a sweep, perhaps with points chosen by xarray.
-        at: dimension -> value; the nearest one there is stays.
+        at: dimension -> value; the nearest one remains.
 
     Raises:
-        ValueError: this is no sweep, it has no points, or a value cannot be.
+        ValueError: this is no sweep, it has no points, or a value is not finite.
         UnknownNameError: the sweep has no such dimension.
     """
     if SWEEP not in data.attrs:
@@ -216,7 +200,7 @@ def _varied(data: "xarray.Dataset") -> dict[str, Any]:
 def _cut(
     data: "xarray.Dataset", at: Mapping[str, float], varied: Sequence[str], sampled: bool
 ) -> tuple["xarray.Dataset", list[str]]:
-    """The data set at the values nearest to some, and what to say of it."""
+    """The data set at the values nearest to ``at``, and words for it."""
     words = []
     axes = [n for n in (*varied, TIME) if n in data.dims]
     for name, value in at.items():
@@ -241,7 +225,7 @@ def _unit(data: "xarray.Dataset", name: str) -> str:
 
 
 def unknown(what: str, name: str, known: Sequence[str]) -> UnknownNameError:
-    """The error for a name that a sweep does not have: lists what it has where that is little."""
+    """The error for a name that a sweep does not have; lists the names that it has."""
     shown = ", ".join(known[:LISTED]) + (", ..." if len(known) > LISTED else "")
     words = f"the sweep has no {what} {name!r}" + (f" ({what}s: {shown})" if known else "")
     return UnknownNameError(words, nearest(name, known))

@@ -10,11 +10,11 @@ from matplotlib.collections import LineCollection, QuadMesh
 
 import dap3d_core as dap
 from dap3d_core.plot import save_plot
+from dap3d_core.plot.style import folded
 from dap3d_core.plot.sweep.panels import Band, Heat, Lines, Scatter, Strands, edges
 from dap3d_core.plot.sweep.parallel_coordinates import Parallel
-from dap3d_core.plot.sweep.style import folded
-from dap3d_core.plot.sweep.sweep_plot import gather_sweep
-from dap3d_core.plot.sweep.sweep_table import Column, table_of
+from dap3d_core.plot.sweep.sweep_plot import sweep_picture
+from dap3d_core.plot.sweep.sweep_table import Variable, table_of
 from dap3d_core.result import UnknownNameError
 from dap3d_core.study.sweep.subsample import evenly
 
@@ -99,37 +99,37 @@ def kinds(drawing):
 def test_the_picture_follows_what_varies():
     """One panel for each unit over one number, a map each over two, all in one over more."""
     one, two = grid(mass=[1, 2, 3]), grid(mass=[1, 2, 3], k=[5, 6])
-    assert kinds(gather_sweep(one, [])) == [Lines, Lines, Strands]
-    assert kinds(gather_sweep(two, [])) == [Heat, Heat, Heat, Strands]
+    assert kinds(sweep_picture(one, [])) == [Lines, Lines, Strands]
+    assert kinds(sweep_picture(two, [])) == [Heat, Heat, Heat, Strands]
     three = grid(mass=[1, 2, 3], length=[1, 2], k=[5, 6])
-    assert kinds(gather_sweep(three, [])) == [Parallel, Strands]
-    assert kinds(gather_sweep(samples(30), [])) == [Scatter, Scatter, Strands]
-    assert kinds(gather_sweep(samples(300), [])) == [Scatter, Scatter, Band]
-    assert kinds(gather_sweep(samples(30, (MASS, K)), [])) == [Parallel, Strands]
-    assert kinds(gather_sweep(two, ["bob.r.z:min"], x=K)) == [Strands]
-    assert kinds(gather_sweep(samples(30, (MASS, K)), [], x=K)) == [Scatter, Scatter]
+    assert kinds(sweep_picture(three, [])) == [Parallel, Strands]
+    assert kinds(sweep_picture(samples(30), [])) == [Scatter, Scatter, Strands]
+    assert kinds(sweep_picture(samples(300), [])) == [Scatter, Scatter, Band]
+    assert kinds(sweep_picture(samples(30, (MASS, K)), [])) == [Parallel, Strands]
+    assert kinds(sweep_picture(two, ["bob.r.z:min"], x=K)) == [Strands]
+    assert kinds(sweep_picture(samples(30, (MASS, K)), [], x=K)) == [Scatter, Scatter]
 
 
 def test_an_axis_of_one_value_is_told_in_words():
-    drawing = gather_sweep(grid(mass=[1, 2, 3], k=[5]), ["bob.r.z:min"])
+    drawing = sweep_picture(grid(mass=[1, 2, 3], k=[5]), ["bob.r.z:min"])
     assert kinds(drawing) == [Lines]
     assert drawing.words == ("swing", f"{K} = 5 kg")
-    alone = gather_sweep(grid(mass=[2], k=[5]), ["bob.r.z:min"])
+    alone = sweep_picture(grid(mass=[2], k=[5]), ["bob.r.z:min"])
     assert kinds(alone) == [Lines]
     assert alone.panels[0].x.values.tolist() == [5.0]
 
 
 def test_a_grid_is_cut_at_the_nearest_value():
     data = grid(mass=[1, 2, 3], length=[1, 2], k=[5, 6])
-    drawing = gather_sweep(data, ["bob.r.z:min"], at={MASS: 1.8})
+    drawing = sweep_picture(data, ["bob.r.z:min"], at={MASS: 1.8})
     assert kinds(drawing) == [Heat]
     np.testing.assert_array_equal(drawing.panels[0].output.values, [[-10, -12], [-20, -24]])
     assert f"{MASS} = 2 kg" in drawing.words
-    lines = gather_sweep(data, ["bob.r.z:min"], at={MASS: 9.0, K: 5.0})
+    lines = sweep_picture(data, ["bob.r.z:min"], at={MASS: 9.0, K: 5.0})
     np.testing.assert_array_equal(lines.panels[0].outputs[0].values, [-15, -30])
-    instant = gather_sweep(grid(mass=[1, 2, 3]), ["bob.r.z:series"], at={"time": 0.5})
+    instant = sweep_picture(grid(mass=[1, 2, 3]), ["bob.r.z:series"], at={"time": 0.5})
     np.testing.assert_array_equal(instant.panels[0].outputs[0].values, [0.5, 1.0, 1.5])
-    chosen = gather_sweep(data.sel({MASS: 3.0, K: 6.0}), ["bob.r.z:min"])
+    chosen = sweep_picture(data.sel({MASS: 3.0, K: 6.0}), ["bob.r.z:min"])
     np.testing.assert_array_equal(chosen.panels[0].outputs[0].values, [-18, -36])
 
 
@@ -167,7 +167,7 @@ def test_numbers_even_in_their_logarithm_have_such_a_scale():
     ax = dap.plot(grid(mass=np.geomspace(1.0, 1e3, 4)), "bob.r.z:min")
     assert ax.get_xscale() == "log"
     assert dap.plot(grid(mass=[1, 2, 3]), "bob.r.z:min").get_xscale() == "linear"
-    axis = Column("k", "k", "", np.array([1.0, 100.0]), is_log=True)
+    axis = Variable("k", "k", "", np.array([1.0, 100.0]), is_log=True)
     np.testing.assert_allclose(edges(axis), [0.1, 10.0, 1000.0])
 
 
@@ -266,7 +266,7 @@ def test_a_steep_map_has_colours_of_the_logarithm():
 
 
 def test_too_many_points_are_thinned_and_told():
-    drawing = gather_sweep(grid(mass=np.arange(1, 1001), k=np.arange(1, 901)), ["bob.r.z:min"])
+    drawing = sweep_picture(grid(mass=np.arange(1, 1001), k=np.arange(1, 901)), ["bob.r.z:min"])
     panel = drawing.panels[0]
     assert panel.output.values.shape == (600, 600)
     assert drawing.words == ("swing", "360000 of 900000 points")

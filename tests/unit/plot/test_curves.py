@@ -18,7 +18,8 @@ from unit.test_result import circling, drifting, model_of, result_of
 
 import dap3d_core as dap
 from dap3d_core.plot import FORMATS, plot, save_plot, show_plot
-from dap3d_core.plot.curves import draw, gather, height_of
+from dap3d_core.plot.curves import curve_picture
+from dap3d_core.plot.style import PlainOffset, show_rounding_flat
 from dap3d_core.result import ResultError, UnknownNameError
 from dap3d_core.scene import Scene
 
@@ -137,8 +138,6 @@ def test_curves_between_instants_follow_the_rates():
 )
 def test_an_axis_says_what_its_numbers_are(values, words):
     """Not 1e-9-4.3e1; and rounding is no curve."""
-    from dap3d_core.plot.ticks import PlainOffset, show_rounding_flat
-
     axes = matplotlib.figure.Figure().subplots()
     axes.plot([0.0, 1.0], values)
     axes.yaxis.set_major_formatter(PlainOffset())
@@ -197,10 +196,10 @@ def test_it_can_be_read_at_60_mm(result, names):
     """The usual picture set 60 mm wide has letters of 5 points; one made so wide has 8."""
     usual = plot(result, *names).figure
     assert min(letters(usual)) * 60.0 / 25.4 / usual.get_figwidth() >= 4.9
-    drawing = gather(result, names, None)
-    small = matplotlib.figure.Figure(figsize=(60 / 25.4, height_of(drawing)), layout="constrained")
+    picture = curve_picture(result, names, None)
+    small = matplotlib.figure.Figure(figsize=(60 / 25.4, picture.height), layout="constrained")
     FigureCanvasAgg(small)
-    draw(small, drawing)
+    picture.draw(small)
     small.canvas.draw()
     assert min(letters(small)) >= 8.0
     for ax in small.axes:
@@ -226,7 +225,7 @@ def test_a_window_shows_the_figure(tmp_path):
         "    from matplotlib import pyplot\n"
         "    print(pyplot.gcf().axes[0].get_ylabel())\n"
     )
-    tests = Path(__file__).parents[1]
+    tests = Path(__file__).parents[2]
     code = (
         "import sys; sys.path[:0] = sys.argv[1:]\n"
         "from unit.test_result import circling\n"
@@ -375,7 +374,7 @@ def test_saving_needs_no_window_and_the_module_can_be_called(tmp_path):
         matplotlib.use("Agg")
         print(dap3d_core.plot(circling()[0], "work").get_ylabel())
     """
-    tests = Path(__file__).parents[1]
+    tests = Path(__file__).parents[2]
     out = subprocess.run(
         [sys.executable, "-c", code, str(tests)], cwd=tmp_path, capture_output=True, text=True,
         check=True,
