@@ -19,30 +19,32 @@ from dap3d_core.plot.film.stick_figure import pose_at, sticks_of
 from dap3d_core.result import Result
 from dap3d_core.result.file.atomic_write import whole_file
 
-#: Pixels; a height of 0 becomes what fits the motion.
+#: Pixels; a height of 0 becomes one that suits the motion.
 SIZE = (640, 0)
 FPS = 25.0
 #: Films of motions that last this long, s, are in real time, others last ABOUT seconds.
 SHORTEST, LONGEST, ABOUT = 2.0, 10.0, 5.0
-#: More frames are refused: somebody mistook a number.
+#: More frames are refused as a mistake.
 MOST_FRAMES = 20_000
 BEYOND = "the motion leaves the limits of the scene's [animation]; fit (--fit) frames it all"
 SUFFIXES = (*FILMS, *PICTURES)
+#: Suffix -> media type of what notebooks show.
+MEDIA = {".gif": "image/gif", ".png": "image/png", ".svg": "image/svg+xml", ".mp4": "video/mp4"}
 
 Progress = Callable[[int, int], None]
 
 
 @attrs.frozen
 class Film:
-    """What ``animate`` wrote; a notebook shows it.
+    """A file that ``animate`` wrote; notebooks show it.
 
     Attributes:
         path: the file, from the root of the file system.
-        frames: how many pictures it has; 1 for a snapshot.
+        frames: number of pictures; 1 for a snapshot.
         fps: pictures a second; GIF rounds their time to 10 ms.
         speed: simulated time over time of the film.
         size: width and height, pixels.
-        notes: what the reader of the film should know.
+        notes: warnings.
     """
 
     path: Path
@@ -53,9 +55,7 @@ class Film:
     notes: tuple[str, ...] = ()
 
     def _repr_html_(self) -> str:
-        kinds = {".gif": "image/gif", ".png": "image/png", ".svg": "image/svg+xml",
-                 ".mp4": "video/mp4"}  # fmt: skip
-        kind = kinds.get(self.path.suffix.lower(), "")
+        kind = MEDIA.get(self.path.suffix.lower(), "")
         if not kind:
             return ""
         data = f"data:{kind};base64,{base64.b64encode(self.path.read_bytes()).decode()}"
@@ -86,48 +86,53 @@ def animate(
     springs are dashed, points that a joint keeps apart (a massless link) joined by a thin line.
 
     Args:
-        result: what is drawn.
+        result: the result.
         path: the file: .gif; .mp4, which needs ffmpeg; .png, .svg or .pdf for a snapshot.
         fps: pictures a second, 1 to 50 for a GIF, to 240 for an MP4.
         speed: simulated seconds in a second of the film; by default 1 for motions of 2 s to 10 s,
-            else what makes the film last some 5 s. The film says what it is.
-        size: width and height, pixels; a height of 0 becomes what fits the motion.
+            else such that the film lasts some 5 s. The film shows it.
+        size: width and height, pixels; a height of 0 becomes one that suits the motion.
         view: "x", "y" or "z" looks along that axis, "AZIMUTH,ELEVATION" from there (degrees); by
             default along the axis across a plane motion, else from the side and above.
         at: time of a snapshot, s; by default the first instant.
         fit: frame the whole motion, whatever limits the scene's [animation] gives.
         model: the model (a name, a folder, a file) in whose folder meshes of shapes lie.
         progress: called as progress(done, frames).
-        force: whether an existing file is overwritten.
-
-    Returns:
-        The film: path, frames, fps, speed, size. A result of one instant gives one picture.
+        force: overwrites an existing file.
 
     Raises:
-        ValueError: no instants; a suffix, a number or a view that cannot be.
+        ValueError: no instants; an invalid suffix, number or view.
         ResultError: the file cannot be written, or exists and ``force`` is off; no ffmpeg.
     """
     target = Path(path)
     suffix = target.suffix.lower()
     _check(result, target, fps, speed, size, at)
-    stage, notes = _set_up(result, view, size, model, fit=fit)
+    stage, notes = _stage_of(result, view, size, model, fit=fit)
     duration = float(result.t[-1] - result.t[0])
-    speed, times = speed or usual_speed(duration), _instant(result, at)
+    speed, times = speed or usual_speed(duration), np.array([result.t[0] if at is None else at])
     if suffix in FILMS:
         fps = FILMS[suffix].fps(fps)
         times = frame_times(result.t, fps, speed)
-    words = _clock(duration or float(times[0]), speed if len(times) > 1 else 1.0)
+    clock = _clock(duration or float(times[0]), speed if len(times) > 1 else 1.0)
+
+    def frames() -> Iterator[Any]:
+        """The pictures, each valid until the next is requested."""
+        for k, t in enumerate(map(float, times)):
+            stage.place(*pose_at(result, t), clock(t))
+            yield stage.pixels()
+            if progress is not None:
+                progress(k + 1, len(times))
+
     with whole_file(target, force) as part:
         if suffix in FILMS:
-            frames = _frames(result, stage, times, words, progress)
-            write_film(FILMS[suffix], part, target, frames, fps)
+            write_film(FILMS[suffix], part, target, frames(), fps)
         else:
-            stage.place(*pose_at(result, float(times[0])), words(float(times[0])))
-            _write_picture(stage, part, target)
+            stage.place(*pose_at(result, float(times[0])), clock(float(times[0])))
+            stage.figure.savefig(part, format=suffix[1:], metadata=PICTURES[suffix])
     return Film(target.absolute(), len(times), fps, speed, stage.size, notes)
 
 
-def _set_up(
+def _stage_of(
     result: Result,
     view: str | None,
     size: tuple[int, int],
@@ -135,7 +140,7 @@ def _set_up(
     *,
     fit: bool,
 ) -> tuple[Stage, tuple[str, ...]]:
-    """The stage, and what is to be said of what it shows."""
+    """The stage, and notes on what it shows."""
     sticks = sticks_of(result, model)
     extent = sticks.extent(result, np.eye(3))
     camera = camera_of(view, extent)
@@ -146,21 +151,6 @@ def _set_up(
     return stage, (*notes, BEYOND) if leaves(limits, extent, camera) else notes
 
 
-def _frames(
-    result: Result,
-    stage: Stage,
-    times: Floats,
-    words: Callable[[float], str],
-    progress: Progress | None,
-) -> Iterator[Any]:
-    """The pictures at some times, each good until the next is asked for."""
-    for k, t in enumerate(times):
-        stage.place(*pose_at(result, float(t)), words(float(t)))
-        yield stage.pixels()
-        if progress is not None:
-            progress(k + 1, len(times))
-
-
 def _check(
     result: Result,
     target: Path,
@@ -169,19 +159,21 @@ def _check(
     size: tuple[int, int],
     at: float | None,
 ) -> None:
-    suffix = target.suffix.lower()
-    if suffix not in SUFFIXES:
+    film = FILMS.get(target.suffix.lower())
+    if target.suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot write {target}: an animation is one of {', '.join(SUFFIXES)}")
     if not len(result.t):
         raise ValueError("the result has no instants: there is nothing to draw")
-    if suffix in FILMS and not 1.0 <= fps <= FILMS[suffix].most_fps:
-        most = FILMS[suffix].most_fps
-        raise ValueError(f"fps of a {suffix} file is a number from 1 to {most:g}, not {fps:g}")
+    if film and not 1.0 <= fps <= film.most_fps:
+        raise ValueError(
+            f"fps of a {target.suffix.lower()} file is a number from 1 to {film.most_fps:g}, not "
+            f"{fps:g}"
+        )
     if speed is not None and not 0.0 < speed < float("inf"):
         raise ValueError(f"speed is a number above 0 (1 is real time), not {speed:g}")
     if not (100 <= size[0] <= 4096 and (size[1] == 0 or 100 <= size[1] <= 4096)):
         raise ValueError(f"width and height are from 100 to 4096 pixels, not {size[0]} x {size[1]}")
-    if at is not None and suffix in FILMS:
+    if at is not None and film:
         raise ValueError(f"a film has no single time; name a picture ({', '.join(PICTURES)})")
     if at is not None and not result.t[0] <= at <= result.t[-1]:
         raise ValueError(
@@ -190,12 +182,8 @@ def _check(
         )
 
 
-def _instant(result: Result, at: float | None) -> Floats:
-    return np.array([result.t[0] if at is None else at], dtype=float)
-
-
 def usual_speed(duration: float) -> float:
-    """1 for motions that one likes to see in real time, else a round number."""
+    """1 for motions of a length that suits real time, else a round number."""
     if duration <= 0.0 or SHORTEST <= duration <= LONGEST:
         return 1.0
     return round_number(duration / ABOUT)
@@ -218,12 +206,7 @@ def frame_times(t: Floats, fps: float, speed: float) -> Floats:
 
 
 def _clock(duration: float, speed: float) -> Callable[[float], str]:
-    """Words for a time, with as many digits as a motion of this length needs."""
+    """Text for a time, with as many digits as a motion of this length needs."""
     digits = int(max(0.0, 2.0 - np.floor(np.log10(duration or 1.0))))
     pace = "" if speed == 1.0 else f"  ({speed:g} × real time)"
     return lambda t: f"t = {t:.{digits}f} s{pace}"
-
-
-def _write_picture(stage: Stage, part: Path, target: Path) -> None:
-    suffix = target.suffix.lower()
-    stage.figure.savefig(part, format=suffix[1:], metadata=PICTURES[suffix])

@@ -1,4 +1,4 @@
-"""The picture of a stick figure at an instant; what does not move is drawn once."""
+"""Picture of a stick figure at an instant; the parts that do not move are drawn once."""
 
 from typing import Any
 
@@ -20,15 +20,15 @@ from dap3d_core.plot.film.projection import (
     grid_spacing,
 )
 from dap3d_core.plot.film.stick_figure import Sticks
-from dap3d_core.plot.style import LETTERS, columns_of, shown_text
+from dap3d_core.plot.style import LETTERS, WIDTH, columns_of, shown_text
 
 #: More bodies have no names in the picture.
 MOST_NAMES = 8
-#: Inches: the width, as that of plots; room for the title above, and for the numbers of an axis.
-WIDTH, TOP, LEFT, BOTTOM, ROW = 3.8, 0.26, 0.58, 0.42, 0.17
-#: Height of the axes, where it follows from what is shown, as part of their width.
+#: Inches: room for the title above, for the numbers of axes, for a row of the legend.
+TOP, LEFT, BOTTOM, ROW = 0.26, 0.58, 0.42, 0.17
+#: Height of the axes, where it follows from the motion, as a fraction of their width.
 LOWEST, HIGHEST = 0.25, 0.85
-SHADOW, GRID, DARK = "0.86", "0.90", "0.25"
+SHADOW, GRID, DARK, PALE = "0.86", "0.90", "0.25", "0.4"
 DASHED = (0, (2.2, 1.2))
 #: Points squared: areas of the markers of mass centres, points and points of the ground.
 MARKER, DOT, ANCHOR = 34.0, 9.0, 26.0
@@ -37,15 +37,15 @@ SMALLER = 0.6
 
 
 class Stage:
-    """A figure with everything that stands still, and the moving parts, ready to be placed.
+    """A figure with everything that does not move, and the moving parts, ready to be placed.
 
     Args:
-        sticks: what is drawn.
-        camera: from where.
+        sticks: the stick figure.
+        camera: the camera.
         limits: (3, 2) of the room, whose floor is drawn, m.
-        shown: (2, 2) what is to be seen, in the axes of the picture, m.
-        size: width and height, pixels; a height of 0 becomes what fits.
-        title: words in the upper left corner.
+        shown: (2, 2) visible rectangle, in the axes of the picture, m.
+        size: width and height, pixels; a height of 0 becomes one that suits the motion.
+        title: text in the upper left corner.
     """
 
     def __init__(
@@ -59,11 +59,13 @@ class Stage:
     ) -> None:
         self.sticks, self.camera, self.limits = sticks, camera, limits
         self._few = len(sticks.names) <= MOST_NAMES
+        shaped = sticks.shapes.hues if sticks.shapes is not None else {}
+        self._bare = np.array([k not in shaped for k in range(1, len(sticks.names) + 1)], bool)
         dpi = size[0] / WIDTH
         self.figure = Figure(figsize=(WIDTH, WIDTH), dpi=dpi)
         self.canvas: Any = FigureCanvasAgg(self.figure)
         self._still: Any = None
-        self._has_room = not self._few
+        self._has_marker_size = not self._few
         self.ax = self._axes(shown, size[1] / dpi)
         self._colors = np.array(sticks.colors, dtype=object)
         if not camera.plane:
@@ -75,20 +77,13 @@ class Stage:
         self._solids = self._add(PolyCollection([], zorder=2.2, linewidths=0.6))
         self.ax.add_collection(self._solids, autolim=False)
         self._sticks = self._lines("black", 2.0, zorder=3, capstyle="round")
-        self._dots = self._marks("o", DOT, zorder=4)
-        shaped = sticks.shapes.hues if sticks.shapes is not None else ()
-        self._bare = np.array(
-            [k not in shaped for k in range(1, len(sticks.names) + 1)], dtype=bool
-        )
-        self._centres = {
-            m: self._marks(m, MARKER, zorder=5) for m in dict.fromkeys(sticks.markers) if self._few
-        }
-        self._time = self._add(
-            self.figure.text(0.985, 1.0 - 0.06 / self.figure.get_figheight(), "", ha="right",
-                             va="top", fontsize=LETTERS)
-        )  # fmt: skip
+        self._dots = self._markers("o", DOT, zorder=4)
+        markers = dict.fromkeys(sticks.markers) if self._few else ()
+        self._centres = {m: self._markers(m, MARKER, zorder=5) for m in markers}
+        top = 1.0 - 0.06 / self.figure.get_figheight()
+        self._time = self._add(self._text(0.985, top, "", "right", "top"))
         if title:
-            self._title(title)
+            self._text(0.02, top, shown_text(title), "left", "top")
 
     @property
     def size(self) -> tuple[int, int]:
@@ -96,11 +91,11 @@ class Stage:
         width, height = self.canvas.get_width_height()
         return int(width), int(height)
 
-    def place(self, r: Floats, p: Floats, words: str) -> None:
-        """Put the moving parts where they are at poses r (n, 3), p (n, 4); words for the time."""
+    def place(self, r: Floats, p: Floats, clock: str) -> None:
+        """Put the moving parts at poses r (n, 3), p (n, 4), and set the text of the time."""
         sticks = self.sticks
-        places = sticks.positions(r, p)
-        flat, depth = self.camera.project(places), self.camera.depth(places)
+        points = sticks.positions(r, p)
+        flat, depth = self.camera.project(points), self.camera.depth(points)
         lines = sticks.lines
         order = np.argsort(depth[lines].mean(axis=1), kind="stable")
         self._sticks.set_segments(list(flat[lines[order]]))
@@ -114,35 +109,34 @@ class Stage:
         self._springs.set_segments(list(flat[sticks.springs]))
         self._dots.set_offsets(flat[sticks.points])
         self._dots.set_facecolor(list(self._colors[sticks.body[sticks.points] - 1]))
-        shapes = np.array(sticks.markers)
-        for shape, marks in self._centres.items():
-            which = np.flatnonzero((shapes == shape) & self._bare)
-            marks.set_offsets(flat[which])
-            marks.set_edgecolor(list(self._colors[which]))
-        self._make_room(flat[: len(sticks.names)][self._bare])
+        for marker, centres in self._centres.items():
+            which = np.flatnonzero((np.array(sticks.markers) == marker) & self._bare)
+            centres.set_offsets(flat[which])
+            centres.set_edgecolor(list(self._colors[which]))
+        self._fit_markers(flat[: len(sticks.names)][self._bare])
         if self._shadows is not None:
-            on_floor = places.copy()
+            on_floor = points.copy()
             on_floor[:, 2] = self.limits[2, 0]
-            both = np.concatenate([lines, sticks.links, sticks.springs])
-            self._shadows.set_segments(list(self.camera.project(on_floor)[both]))
-        self._time.set_text(words)
+            every = np.concatenate([lines, sticks.links, sticks.springs])
+            self._shadows.set_segments(list(self.camera.project(on_floor)[every]))
+        self._time.set_text(clock)
 
-    def _make_room(self, centres: Floats) -> None:
-        """Make markers as small as their usual distance in the first picture asks for."""
-        if self._has_room or len(centres) < 2:
+    def _fit_markers(self, centres: Floats) -> None:
+        """Shrink markers to the usual distance of mass centres in the first picture."""
+        if self._has_marker_size or len(centres) < 2:
             return
-        self._has_room = True
+        self._has_marker_size = True
         apart = np.linalg.norm(centres[:, None] - centres, axis=2)
         np.fill_diagonal(apart, np.inf)
         box, (x0, x1) = self.ax.get_position(), self.ax.get_xlim()
         points = 72.0 * WIDTH * box.width / (x1 - x0)  # in one metre
         room = float(np.median(apart.min(axis=0))) * points
-        for marks in (*self._centres.values(), self._dots):
-            area = marks.get_sizes()
-            marks.set_sizes(area * np.clip(room**2 / (3.0 * MARKER), SMALLER**4, 1.0))
+        for markers in (*self._centres.values(), self._dots):
+            area = markers.get_sizes()
+            markers.set_sizes(area * np.clip(room**2 / (3.0 * MARKER), SMALLER**4, 1.0))
 
     def pixels(self) -> Any:
-        """The picture as it stands, (height, width, 4) bytes; good until the next call."""
+        """The present picture, (height, width, 4) bytes; valid until the next call."""
         if self._still is None:
             for part in self._moving:
                 part.set_animated(True)
@@ -153,14 +147,10 @@ class Stage:
             self.figure.draw_artist(part) if part.axes is None else part.axes.draw_artist(part)
         return np.asarray(self.canvas.buffer_rgba())
 
-    # ------------------------------------------------------------------ what stands still
-
     def _axes(self, shown: Floats, height: float) -> Axes:
         """Axes of one scale that fill the figure, with the legend below; sets the height."""
         plane = self.camera.plane
-        handles, labels = self._keys()
-        rows = self._legend(handles, labels) if handles else 0
-        below = 0.08 + rows * ROW + (BOTTOM if plane else 0.0)
+        below = 0.08 + self._draw_legend() * ROW + (BOTTOM if plane else 0.0)
         left = LEFT if plane else 0.08
         wide, (across, along) = WIDTH - left - 0.1, shown[:, 1] - shown[:, 0]
         if not height:
@@ -190,46 +180,37 @@ class Stage:
         return ax
 
     def _draw_floor(self) -> None:
-        """The grid on the floor, its spacing in words, and the directions of the axes."""
+        """The grid on the floor, the text of its spacing, and the directions of the axes."""
         spacing = grid_spacing(self.limits)
         lines = self.camera.project(floor_grid(self.limits, spacing))
         self.ax.add_collection(
             LineCollection(list(lines), colors=GRID, linewidths=0.7, zorder=0), autolim=False
         )
-        low = self.ax.get_position()
-        height = self.figure.get_figheight()
-        words = f"grid {spacing:g} m"
-        self.figure.text(0.985, low.y0, words, ha="right", va="bottom", fontsize=LETTERS,
-                         color="0.4")  # fmt: skip
-        length, corner = 0.24, np.array([0.3, 0.2 + low.y0 * height])  # inches
+        bottom, height = self.ax.get_position().y0, self.figure.get_figheight()
+        self._text(0.985, bottom, f"grid {spacing:g} m", "right", "bottom", color=PALE)
+        length, corner = 0.24, np.array([0.3, 0.2 + bottom * height])  # inches
+        scale = np.array([WIDTH, height])
         for k, name in enumerate(AXES):
             tip = length * self.camera.project(np.eye(3)[k])
             if np.linalg.norm(tip) < 0.2 * length:
                 continue
-            end, beyond = corner + tip, corner + tip * (1.0 + 0.08 / np.linalg.norm(tip))
-            scale = np.array([WIDTH, height])
-            xs, ys = np.stack([corner, end] / scale, axis=1)
-            self.figure.add_artist(Line2D(xs, ys, color="0.4", linewidth=1.0))
-            x, y = beyond / scale
-            self.figure.text(x, y, name, ha="center", va="center",
-                             fontsize=LETTERS, color="0.4")  # fmt: skip
+            xs, ys = np.stack([corner, corner + tip] / scale, axis=1)
+            self.figure.add_artist(Line2D(xs, ys, color=PALE, linewidth=1.0))
+            x, y = (corner + tip * (1.0 + 0.08 / np.linalg.norm(tip))) / scale
+            self._text(x, y, name, "center", "center", color=PALE)
 
-    def _keys(self) -> tuple[list[Any], list[str]]:
-        """What the legend shows: bodies by colour and marker, ground, force elements."""
+    def _draw_legend(self) -> int:
+        """Bodies by colour and marker, ground, springs, at the foot; returns the number of rows."""
         sticks = self.sticks
         if not self._few:
-            return [], []
+            return 0
         handles: list[Any] = []
-        shaped = sticks.shapes.hues if sticks.shapes is not None else ()
-        for k, (color, marker) in enumerate(zip(sticks.colors, sticks.markers, strict=True), 1):
-            width = 6.0 if k in shaped else 2.0
-            line = Line2D([], [], color=color, linewidth=width, solid_capstyle="butt")
-            if k in shaped:
-                handles.append(line)
-                continue
+        for color, marker, bare in zip(sticks.colors, sticks.markers, self._bare, strict=True):
+            line = Line2D([], [], color=color, linewidth=2.0 if bare else 6.0,
+                          solid_capstyle="butt")  # fmt: skip
             centre = Line2D([], [], color=color, marker=marker, markersize=5.0, linewidth=0,
                             markerfacecolor="white", markeredgewidth=1.3)  # fmt: skip
-            handles.append((line, centre))
+            handles.append((line, centre) if bare else line)
         labels = [shown_text(name) for name in sticks.names]
         if len(sticks.anchors):
             handles.append(Line2D([], [], color=DARK, marker="s", markersize=4.5, linewidth=0))
@@ -237,10 +218,8 @@ class Stage:
         if len(sticks.springs):
             handles.append(Line2D([], [], color=DARK, linewidth=1.2, linestyle=DASHED))
             labels.append("spring")
-        return handles, labels
-
-    def _legend(self, handles: list[Any], labels: list[str]) -> int:
-        """Draw the legend at the foot of the figure; the number of its rows."""
+        if not handles:
+            return 0
         columns = columns_of(labels, WIDTH)
         self.figure.legend(
             handles, labels, loc="lower center", ncols=columns, fontsize=LETTERS, frameon=False,
@@ -249,11 +228,9 @@ class Stage:
         )  # fmt: skip
         return -(-len(handles) // columns)
 
-    def _title(self, title: str) -> None:
-        self.figure.text(0.02, 1.0 - 0.06 / self.figure.get_figheight(), shown_text(title),
-                         ha="left", va="top", fontsize=LETTERS)  # fmt: skip
-
-    # ------------------------------------------------------------------ what moves
+    def _text(self, x: float, y: float, text: str, ha: str, va: str, **style: Any) -> Any:
+        """Text at fractions of the figure."""
+        return self.figure.text(x, y, text, ha=ha, va=va, fontsize=LETTERS, **style)
 
     def _add(self, part: Any) -> Any:
         self._moving.append(part)
@@ -262,17 +239,18 @@ class Stage:
     def _area(self, area: float) -> float:
         return area if self._few else area * SMALLER**4
 
-    def _lines(self, color: str, width: float, **look: Any) -> LineCollection:
-        lines = LineCollection(
-            [], colors=color, linewidths=width * (1.0 if self._few else SMALLER), **look
+    def _lines(self, color: str, width: float, **style: Any) -> LineCollection:
+        scale = 1.0 if self._few else SMALLER
+        lines: LineCollection = self._add(
+            LineCollection([], colors=color, linewidths=width * scale, **style)
         )
         self.ax.add_collection(lines, autolim=False)
-        found: LineCollection = self._add(lines)
-        return found
+        return lines
 
-    def _marks(self, marker: str, area: float, zorder: float) -> PathCollection:
-        marks = self.ax.scatter([], [], s=self._area(area), marker=marker, zorder=zorder,
-                                linewidths=0.0 if area == DOT else 1.3)  # fmt: skip
-        marks.set_facecolor("white")
-        found: PathCollection = self._add(marks)
-        return found
+    def _markers(self, marker: str, area: float, zorder: float) -> PathCollection:
+        markers: PathCollection = self._add(
+            self.ax.scatter([], [], s=self._area(area), marker=marker, zorder=zorder,
+                            linewidths=0.0 if area == DOT else 1.3)
+        )  # fmt: skip
+        markers.set_facecolor("white")
+        return markers

@@ -1,6 +1,7 @@
-"""From where a motion is looked at, and what of it fits into the picture: a parallel projection."""
+"""Camera of animations: a parallel projection, and the part of the motion that the picture shows."""
 
 import re
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -8,15 +9,13 @@ import numpy as np
 from dap3d_core.model.groups import Floats
 
 AXES = "xyz"
-#: Where the viewer stands who is told nothing else: azimuth about z from x, elevation, degrees.
+#: Default view: azimuth about z from x, elevation, degrees.
 AZIMUTH, ELEVATION = -60.0, 22.0
-#: A motion thinner than this part of its size is plane.
+#: A motion thinner than this fraction of its size is plane.
 THIN = 1e-3
-#: Room around a motion whose scene gives no limits, as part of its size.
-MARGIN = 0.06
-#: Room around what is shown of a motion in space, as part of its size.
-EDGE = 0.03
-#: Axis that is looked along -> axes to the right and up.
+#: Margins as fractions of the size: around a motion without limits; around one in space.
+MARGIN, EDGE = 0.06, 0.03
+#: Axis along which the camera looks -> axes to the right and up.
 PLANES = {"x": (1, 2), "y": (0, 2), "z": (0, 1)}
 
 
@@ -25,7 +24,7 @@ class Camera(NamedTuple):
 
     Attributes:
         right, up, towards: (3,) unit vectors: to the right and up in the picture, to the viewer.
-        plane: "x", "y" or "z" where it is looked along that axis, else "".
+        plane: "x", "y" or "z" where the camera looks along that axis, else "".
     """
 
     right: Floats
@@ -36,22 +35,19 @@ class Camera(NamedTuple):
     @property
     def axes(self) -> Floats:
         """(3, 2) directions of the picture's axes."""
-        axes: Floats = np.stack([self.right, self.up], axis=1)
-        return axes
+        return np.asarray(np.stack([self.right, self.up], axis=1))
 
-    def project(self, places: Floats) -> Floats:
-        """Places (..., 3) in the picture (..., 2), m."""
-        flat: Floats = places @ self.axes
-        return flat
+    def project(self, points: Floats) -> Floats:
+        """Points (..., 3) in the picture (..., 2), m."""
+        return np.asarray(points @ self.axes)
 
-    def depth(self, places: Floats) -> Floats:
-        """How near places (..., 3) are to the viewer, m; larger is nearer."""
-        depth: Floats = places @ self.towards
-        return depth
+    def depth(self, points: Floats) -> Floats:
+        """Coordinates of points (..., 3) towards the viewer, m; larger is nearer."""
+        return np.asarray(points @ self.towards)
 
 
 def camera_of(view: str | None, extent: Floats) -> Camera:
-    """The camera that a word asks for.
+    """The camera of a view of a motion.
 
     Args:
         view: "x", "y", "z": along that axis; "AZIMUTH,ELEVATION" in degrees; None: along the axis
@@ -59,7 +55,7 @@ def camera_of(view: str | None, extent: Floats) -> Camera:
         extent: (3, 2) of the motion, m.
 
     Raises:
-        ValueError: any other word.
+        ValueError: any other view.
     """
     word = _thin_axis(extent) if view is None else view.strip().lower()
     if word in PLANES:
@@ -84,21 +80,17 @@ def camera_of(view: str | None, extent: Floats) -> Camera:
 def _thin_axis(extent: Floats) -> str:
     """The axis in which a motion has no extent, "" where it has one in all or in none."""
     sizes = extent[:, 1] - extent[:, 0]
-    for k in (2, 1, 0):
-        if sizes[k] < THIN * sizes.max():
-            return AXES[k]
-    return ""
+    return next((AXES[k] for k in (2, 1, 0) if sizes[k] < THIN * sizes.max()), "")
 
 
 def with_margin(extent: Floats) -> Floats:
     """Limits (3, 2) around an extent, never empty, m."""
     room = MARGIN * float(np.max(extent[:, 1] - extent[:, 0])) or 1.0
-    limits: Floats = extent + np.array([-room, room])
-    return limits
+    return np.asarray(extent + np.array([-room, room]))
 
 
 def leaves(limits: Floats, extent: Floats, camera: Camera) -> bool:
-    """Whether a motion leaves limits, beyond rounding, in what the camera sees of them."""
+    """True where the visible part of a motion leaves limits, beyond rounding."""
     seen = [k for k in range(3) if AXES[k] != camera.plane]
     slack = 1e-9 * float(np.max(limits[:, 1] - limits[:, 0]))
     low, high = limits[seen, 0] - slack, limits[seen, 1] + slack
@@ -106,31 +98,25 @@ def leaves(limits: Floats, extent: Floats, camera: Camera) -> bool:
 
 
 def shown(camera: Camera, limits: Floats, motion: Floats) -> Floats:
-    """What is to be seen, (2, 2): least and largest in the two directions of the picture, m.
+    """The visible rectangle (2, 2): least and largest in the directions of the picture, m.
 
     Args:
-        camera: from where.
-        limits: (3, 2) of the room, m: all of it in a plane; else its floor and what stands on it.
+        camera: the camera.
+        limits: (3, 2) of the room, m: all of it in a plane; else its floor and the motion above.
         motion: (2, 2) extent of the motion in the picture, m.
     """
-    room = _extent(camera.project(_corners(limits)))
+    corners = camera.project(np.array(list(product(*limits))))  # every other one on the floor
+    room, floor = _extent(corners), _extent(corners[::2])
     if camera.plane:
         return room
-    floor = _extent(camera.project(_corners(limits)[::2]))
     low = np.maximum(room[:, 0], np.minimum(floor[:, 0], motion[:, 0]))
     high = np.minimum(room[:, 1], np.maximum(floor[:, 1], motion[:, 1]))
     edge = EDGE * float(np.max(high - low))
     return np.stack([low - edge, high + edge], axis=1)
 
 
-def _corners(limits: Floats) -> Floats:
-    """(8, 3) corners of a box (3, 2), every other one on its floor."""
-    return np.array([[x, y, z] for x in limits[0] for y in limits[1] for z in limits[2]])
-
-
 def _extent(points: Floats) -> Floats:
-    found: Floats = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
-    return found
+    return np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
 
 
 def filling(rectangle: Floats, width: float, height: float) -> Floats:
@@ -141,9 +127,8 @@ def filling(rectangle: Floats, width: float, height: float) -> Floats:
 
 
 def grid_spacing(limits: Floats) -> float:
-    """A round distance of lines, m, of which some four to ten cover the floor of a box (3, 2)."""
-    size = float(np.max(limits[:2, 1] - limits[:2, 0]))
-    return round_number(size / 6.0)
+    """A round distance, m, of some four to ten lines on the floor of a box (3, 2)."""
+    return round_number(float(np.max(limits[:2, 1] - limits[:2, 0])) / 6.0)
 
 
 def round_number(x: float) -> float:
@@ -156,11 +141,10 @@ def round_number(x: float) -> float:
 def floor_grid(limits: Floats, spacing: float) -> Floats:
     """(q, 2, 3) lines at multiples of a spacing on the floor of a box (3, 2)."""
     z, lines = limits[2, 0], []
-    for axis in (0, 1):
-        other = 1 - axis
+    for axis, other in ((0, 1), (1, 0)):
         first, last = np.ceil(limits[axis, 0] / spacing), np.floor(limits[axis, 1] / spacing)
-        for place in spacing * np.arange(first, last + 1):
+        for at in spacing * np.arange(first, last + 1):
             line = np.full((2, 3), z)
-            line[:, axis], line[:, other] = place, limits[other]
+            line[:, axis], line[:, other] = at, limits[other]
             lines.append(line)
     return np.array(lines).reshape(-1, 2, 3)
