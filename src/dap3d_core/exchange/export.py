@@ -1,4 +1,4 @@
-"""``export``: a result as a file that another program reads."""
+"""``export``: a result as a file of another program."""
 
 import os
 from collections.abc import Callable
@@ -8,6 +8,7 @@ import attrs
 
 from dap3d_core.result import Result, ResultError
 from dap3d_core.result.file.atomic_write import whole_file
+from dap3d_core.scene import Scene
 from dap3d_core.view.scene3d.sampled_motion import chosen, thinned
 from dap3d_core.view.scene3d.scene_data import scene_of
 
@@ -24,10 +25,9 @@ class Export:
     """A file that ``export`` wrote.
 
     Attributes:
-        path: the file.
-        format: one of FORMATS.
-        instants: how many it holds.
-        notes: what it does not hold, and why.
+        path, format: the file, and one of FORMATS.
+        instants: number of instants in it.
+        notes: contents that are left out, and why.
     """
 
     path: Path
@@ -53,16 +53,16 @@ def export(
     holds all arrays for MATLAB and Octave, ``csv`` a column for each component.
 
     Args:
-        result: what to write.
+        result: the result.
         path: the file.
-        format: "vtk", "gltf", "mat" or "csv"; by default what the suffix says.
+        format: "vtk", "gltf", "mat" or "csv"; by default that of the suffix.
         fps: instants a second, the nearest reported ones; every instant by default.
         model: the model (a name, a folder, a file) in whose folder meshes of shapes lie.
         progress: called as progress(done, total).
-        force: whether an existing file is overwritten.
+        force: overwrites an existing file.
 
     Raises:
-        ValueError: no instants; a format, a suffix or an fps that cannot be.
+        ValueError: no instants; an invalid format, suffix or fps.
         ResultError: the file cannot be written, or exists and ``force`` is off.
     """
     target = Path(path)
@@ -71,18 +71,16 @@ def export(
         raise ValueError("the result has no instants: there is nothing to export")
     check_fps(fps)
     shown = result if fps is None else thinned(result, chosen(result.t, 1, fps))
-    write = _scene if kind in ("vtk", "gltf") else _arrays
     with whole_file(target, force) as part:
-        notes = write(shown, part, kind, model, progress)
+        if kind in ("vtk", "gltf"):
+            notes = _write_scene(shown, scene_of(shown, model), part, kind, progress)
+        else:
+            notes = _write_arrays(shown, part, kind)
     return Export(target.absolute(), kind, len(shown.t), tuple(notes))
 
 
 def format_of(target: Path, format: str | None) -> str:
-    """The format that is written to a path.
-
-    Raises:
-        ValueError: there is no such format, or the suffix names none or another.
-    """
+    """The format of a path; a ValueError where there is none, or the suffix names another."""
     named = {suffix: kind for kind, suffix in FORMATS.items()}.get(target.suffix.lower())
     if format is not None and format not in FORMATS:
         raise ValueError(f"{format!r} is no format; one of {', '.join(FORMATS)}")
@@ -95,48 +93,34 @@ def format_of(target: Path, format: str | None) -> str:
 
 
 def check_fps(fps: float | None) -> None:
-    """Refuse a number of instants a second that cannot be.
-
-    Raises:
-        ValueError: it is not above 0.
-    """
+    """Refuse, by a ValueError, an fps that is not above 0."""
     if fps is not None and not 0.0 < fps <= 1e6:
         raise ValueError(f"fps is a number above 0, at most 1e6, not {fps:g}")
 
 
-def _scene(
-    result: Result,
-    part: Path,
-    kind: str,
-    model: str | os.PathLike[str] | None,
-    progress: Progress | None,
+def _write_scene(
+    result: Result, scene: Scene, part: Path, kind: str, progress: Progress | None
 ) -> list[str]:
     """Write the moving scene; returns notes."""
     from dap3d_core.exchange.gltf import write_gltf
     from dap3d_core.exchange.moving_solids import MovingScene
     from dap3d_core.exchange.vtkhdf import point_count, write_vtkhdf
 
-    scene = MovingScene.of(result, scene_of(result, model))
+    moving = MovingScene.of(result, scene)
     if kind == "gltf":
-        write_gltf(scene, part, progress)
-        return scene.notes
-    size = 24 * point_count(scene) * len(result.t)
+        write_gltf(moving, part, progress)
+        return moving.notes
+    size = 24 * point_count(moving) * len(result.t)
     if size > LARGEST:
         raise ResultError(
-            f"{point_count(scene):,} points at {len(result.t):,} instants are {size / 1e9:.1f} GB, "
-            f"more than {LARGEST / 1e9:.1f}: a smaller fps leaves instants out"
+            f"{point_count(moving):,} points at {len(result.t):,} instants are "
+            f"{size / 1e9:.1f} GB, more than {LARGEST / 1e9:.1f}: a smaller fps leaves instants out"
         )
-    write_vtkhdf(scene, part, progress)
-    return scene.notes
+    write_vtkhdf(moving, part, progress)
+    return moving.notes
 
 
-def _arrays(
-    result: Result,
-    part: Path,
-    kind: str,
-    model: str | os.PathLike[str] | None,
-    progress: Progress | None,
-) -> list[str]:
+def _write_arrays(result: Result, part: Path, kind: str) -> list[str]:
     """Write arrays or columns; returns notes."""
     from dap3d_core.exchange.matlab_file import write_mat
     from dap3d_core.result.quantities.csv_table import columns_of, write_csv

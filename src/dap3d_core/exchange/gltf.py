@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.exchange.moving_solids import MovingScene, Part, Polyline, Stretched
+from dap3d_core.exchange.moving_solids import MovingScene, Stretched, rgb
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import euler_rates
 from dap3d_core.result import ResultError
 from dap3d_core.result.file.atomic_write import cannot
 from dap3d_core.view.scene3d.primitives import turned_to
+from dap3d_core.view.scene3d.shapes import Line, Part
 from dap3d_core.view.scene3d.solids import Triangles
 
 Progress = Callable[[int, int], None]
@@ -30,7 +31,7 @@ LINE_STRIP = 3
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 #: A file says its own length in 32 bits.
 LARGEST = 2**32 - 1
-#: What can be seen through, as pages show it.
+#: Layers that are translucent, as in pages.
 OPACITY = {"inertia": 0.32}
 
 
@@ -64,7 +65,7 @@ def _padded(data: bytes, filler: bytes) -> bytes:
 
 
 class _Document:
-    """The parts of a file: a tree for JSON, and numbers."""
+    """The two chunks of a file: a tree for JSON, and numbers."""
 
     def __init__(self, scene: MovingScene, progress: Progress) -> None:
         self.data = bytearray()
@@ -91,7 +92,7 @@ class _Document:
         nodes = [root, *(self._body(scene, k, name) for k, name in enumerate(names))]
         children: list[list[int]] = [[] for _ in nodes]
         children[0] += nodes[1:]
-        pieces: list[Part | Polyline] = [*scene.parts, *scene.lines]
+        pieces: list[Part | Line] = [*scene.parts, *scene.lines]
         for done, one in enumerate(pieces, 1):
             children[one.body].append(self._piece(one))
             progress(done, len(pieces))
@@ -101,16 +102,16 @@ class _Document:
                 self.tree["nodes"][node]["children"] = below
 
     def _body(self, scene: MovingScene, k: int, name: str) -> int:
-        """The node of a body: what it does at the first instant, and its motion."""
+        """The node of a body: its first pose, and its motion."""
         r, p = scene.result.r[:, k], scene.result.p[:, k]
-        rates = scene.result.rd[:, k], euler_rates(p, scene.result.w[:, k])
+        p_dot = euler_rates(p, scene.result.w[:, k])
         node = self._add("nodes", {"name": name, "translation": r[0].tolist(),
                                    "rotation": _xyzw(p[:1])[0].tolist()})  # fmt: skip
-        self._moves(node, "translation", r, rates[0])
-        self._moves(node, "rotation", _xyzw(p), _xyzw(rates[1]))
+        self._move(node, "translation", r, scene.result.rd[:, k])
+        self._move(node, "rotation", _xyzw(p), _xyzw(p_dot))
         return node
 
-    def _piece(self, one: Part | Polyline) -> int:
+    def _piece(self, one: Part | Line) -> int:
         node: dict[str, Any] = {"name": one.owner, "mesh": self._mesh(one)}
         if isinstance(one, Part):
             node |= {"translation": list(one.at), "rotation": _xyzw(np.array([one.q]))[0].tolist(),
@@ -122,40 +123,37 @@ class _Document:
         for path, values in (("translation", one.at), ("rotation", _xyzw(one.q)),
                              ("scale", one.size)):  # fmt: skip
             self.tree["nodes"][node][path] = values[0].tolist()
-            self._moves(node, path, values)
+            self._move(node, path, values)
         return node
 
-    def _moves(self, node: int, path: str, values: Floats, rates: Floats | None = None) -> None:
-        """The course of a node: a cubic where its rate is known, else straight between instants.
+    def _move(self, node: int, path: str, values: Floats, rates: Floats | None = None) -> None:
+        """The motion of a node: cubic where its rate is known, else linear between instants.
 
         An instant that an event reports twice has a rate before it and one after it.
         """
         course, kind = values[self._last], "LINEAR"
         if rates is not None:
-            before, after = rates[self._first], rates[self._last]
-            course = np.stack([before, course, after], axis=1).reshape(-1, values.shape[1])
-            kind = "CUBICSPLINE"
-        sampler = {"input": self._clock, "output": self._accessor(course), "interpolation": kind}
-        self._animation["samplers"].append(sampler)
-        target = {"node": node, "path": path}
-        place = len(self._animation["samplers"]) - 1
-        self._animation["channels"].append({"sampler": place, "target": target})
-
-    def _mesh(self, one: Part | Polyline | Stretched) -> int:
-        """The mesh of a piece; one of many parts that look alike."""
-        key = (
-            ("mesh", one.key, one.color, one.layer) if isinstance(one, Part) else ("mesh", id(one))
+            course = np.stack([rates[self._first], course, rates[self._last]], axis=1)
+            course, kind = course.reshape(-1, values.shape[1]), "CUBICSPLINE"
+        samplers, channels = self._animation["samplers"], self._animation["channels"]
+        channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
+        samplers.append(
+            {"input": self._clock, "output": self._accessor(course), "interpolation": kind}
         )
+
+    def _mesh(self, one: Part | Line | Stretched) -> int:
+        """The mesh of a piece; parts that look alike share it."""
+        color = rgb(one.color)
+        form_key = one.key if isinstance(one, Part) else id(one)
+        key = ("mesh", form_key, color, one.layer)
         if key not in self._shared:
-            if isinstance(one, Polyline):
+            if isinstance(one, Line):
                 corners = self._accessor(one.vertices, VERTICES, bounds=True)
-                primitive: dict[str, Any] = {
-                    "attributes": {"POSITION": corners},
-                    "mode": LINE_STRIP,
-                }
+                primitive: dict[str, Any] = {"attributes": {"POSITION": corners}}
+                primitive["mode"] = LINE_STRIP
             else:
-                primitive = self._primitive(one.key if isinstance(one, Part) else id(one), one.form)
-            primitive["material"] = self._material(one.color, OPACITY.get(one.layer, 1.0))
+                primitive = self._primitive(form_key, one.form)
+            primitive["material"] = self._material(color, OPACITY.get(one.layer, 1.0))
             self._shared[key] = self._add("meshes", {"primitives": [primitive]})
         return self._shared[key]
 
@@ -179,7 +177,7 @@ class _Document:
         return self._shared[key]
 
     def _accessor(self, values: Floats | Integers, target: int = 0, *, bounds: bool = False) -> int:
-        """Numbers (n,) or (n, width) as single-precision floats, places of vertices as integers."""
+        """Numbers (n,) or (n, width) as single-precision floats, indices as integers."""
         whole = np.issubdtype(values.dtype, np.integer)
         with np.errstate(over="ignore"):
             data = np.ascontiguousarray(values, dtype="<u4" if whole else "<f4")
@@ -215,16 +213,14 @@ def _xyzw(p: Floats) -> Floats:
 
 
 def _upright(up: tuple[float, ...]) -> list[float]:
-    """The rotation after which ``up`` points along y, as the format has it."""
+    """The rotation (x, y, z, w) that turns ``up`` to y, which is up in the format."""
     to_z = np.array(turned_to(up)) * (1.0, -1.0, -1.0, -1.0)
     half = np.sqrt(0.5)
     w, x, y, z = to_z  # then z to y: a quarter turn about -x
-    turned = half * np.array([w + x, x - w, y + z, z - y])
-    found: list[float] = _xyzw(turned[None])[0].tolist()
-    return found
+    return list(map(float, half * np.array([x - w, y + z, z - y, w + x])))
 
 
 def _linear(level: int) -> float:
-    """A part of a colour, 0 to 255 as screens have it, as an amount of light."""
+    """A part of an sRGB colour, 0 to 255, as linear intensity."""
     c = level / 255.0
     return c / 12.92 if c <= 0.04045 else float(((c + 0.055) / 1.055) ** 2.4)

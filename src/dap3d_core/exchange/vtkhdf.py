@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.exchange.moving_solids import MovingScene, Part, Polyline
+from dap3d_core.exchange.moving_solids import MovingScene, rgb
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.rotations import rotation
 from dap3d_core.result.file.library import NETCDF, guarded
 from dap3d_core.view.scene3d.primitives import LAYERS
+from dap3d_core.view.scene3d.shapes import Line, Part
 
 Progress = Callable[[int, int], None]
 
@@ -42,7 +43,7 @@ def write_vtkhdf(scene: MovingScene, path: Path, progress: Progress | None = Non
 
 
 def point_count(scene: MovingScene) -> int:
-    """How many points the scene has at each instant."""
+    """Number of points at each instant."""
     rigid = sum(len(one.vertices) for one in _by_body(scene))
     return rigid + sum(len(one.form.vertices) for one in scene.stretched)
 
@@ -73,21 +74,21 @@ def _fill(file: Any, scene: MovingScene, progress: Progress | None) -> None:
 
 
 def _cells(root: Any, scene: MovingScene) -> None:
-    """Lines, then triangles, with what they belong to."""
+    """Write lines, then triangles, with their bodies, layers and colours."""
     rigid = _by_body(scene)
     counts = [len(one.vertices) for one in rigid] + [len(s.form.vertices) for s in scene.stretched]
-    triangles, lines = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    none = np.zeros(0, dtype=np.int64)
+    triangles, lines = [none.reshape(0, 3)], [none]
     faces: list[Any] = []
     edges: list[Any] = []
     for one, end, count in zip([*rigid, *scene.stretched], np.cumsum(counts), counts, strict=True):
-        if isinstance(one, Polyline):
+        if isinstance(one, Line):
             lines.append(end - count + np.arange(count))
             edges.append(one)
         else:
             triangles.append(end - count + one.form.triangles)
             faces.append(one)
     corners = np.concatenate(triangles)
-    none = np.zeros(0, dtype=np.int64)
     cells = {
         "Vertices": (none, none),
         "Lines": (np.concatenate(lines), np.cumsum([len(line) for line in lines[1:]])),
@@ -105,19 +106,19 @@ def _cells(root: Any, scene: MovingScene) -> None:
     owners, data = [*edges, *faces], root.createGroup("CellData")
     body = np.array([getattr(one, "body", -1) for one in owners], dtype=np.int64)
     layer = np.array([LAYERS.index(one.layer) for one in owners], dtype=np.int64)
-    color = np.array([one.color for one in owners], dtype=np.uint8).reshape(-1, 3)
+    color = np.array([rgb(one.color) for one in owners], dtype=np.uint8).reshape(-1, 3)
     _column(data, "body", body[each])
     _column(data, "layer", layer[each])
     _column(data, "color", color[each], "u1")
 
 
-def _by_body(scene: MovingScene) -> list[Part | Polyline]:
-    """What is fixed in bodies, that of each body beside one another."""
+def _by_body(scene: MovingScene) -> list[Part | Line]:
+    """Parts and lines in the order of their bodies."""
     return sorted([*scene.parts, *scene.lines], key=lambda one: one.body)
 
 
 def _blocks(scene: MovingScene, count: int) -> Iterator[Floats]:
-    """Points (instants, count, 3), m, of some instants at a time."""
+    """Points (instants, count, 3), m, of several instants at a time."""
     bodies = [
         (body, np.concatenate([one.vertices for one in ones]))
         for body, ones in groupby(_by_body(scene), key=lambda one: one.body)
@@ -147,15 +148,14 @@ def _column(group: Any, name: str, values: Iterable[Any], kind: str = "i8") -> N
 def _array(
     group: Any, name: str, kind: str, shape: tuple[int, ...], chunk: int | None = None
 ) -> Any:
-    """A variable with dimensions of its own, which stand outside of what VTK reads."""
+    """A variable; its dimensions are in the root group, which VTK does not read."""
     file = group
     while file.parent is not None:
         file = file.parent
-    names = []
-    for size in shape:
-        names.append(f"size_{size}")
-        if names[-1] not in file.dimensions:
-            file.createDimension(names[-1], size or None)
+    names = [f"size_{size}" for size in shape]
+    for name_of_size, size in zip(names, shape, strict=True):
+        if name_of_size not in file.dimensions:
+            file.createDimension(name_of_size, size or None)
     chunks = None if chunk is None else (max(1, min(chunk, 200_000)), shape[1])
     return group.createVariable(
         name, kind, tuple(names), fill_value=False, zlib=chunk is not None, complevel=1,

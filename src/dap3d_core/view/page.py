@@ -1,4 +1,4 @@
-"""The page: one file of HTML that holds its data, its program and three.js, and loads nothing."""
+"""The page: one HTML file with its data, its program and three.js, which loads nothing."""
 
 import base64
 import hashlib
@@ -19,32 +19,16 @@ from dap3d_core.view.scene3d.scene_data import scene_of
 
 #: The program of the page, in the order in which its parts build on one another.
 PROGRAM = (
-    "data",
-    "motion",
-    "stage",
-    "marks",
-    "arrows",
-    "traces",
-    "labels",
-    "quantities",
-    "plots",
-    "transport",
-    "panel",
-    "keyboard",
-    "sweep",
-    "main",
-)
+    "data", "motion", "stage", "marks", "arrows", "traces", "labels", "quantities", "plots",
+    "transport", "panel", "keyboard", "sweep", "main",
+)  # fmt: skip
 #: Height of the frame in a notebook, pixels.
 NOTEBOOK_HEIGHT = 620
 
 
 @attrs.frozen(eq=False)
 class View:
-    """A result as a page; a notebook shows it where it stands last in a cell.
-
-    Attributes:
-        data: what the page holds, as plain data.
-    """
+    """A result as a page, with its plain data; a notebook shows the last one of a cell."""
 
     data: dict[str, Any] = attrs.field(repr=False)
 
@@ -66,10 +50,6 @@ class View:
     def save(self, path: str | os.PathLike[str], force: bool = False) -> Path:
         """Write the page to a file, whole or not at all; returns the path.
 
-        Args:
-            path: the file.
-            force: whether an existing file is overwritten.
-
         Raises:
             ResultError: the file cannot be written, or exists and ``force`` is off.
         """
@@ -79,7 +59,7 @@ class View:
         return target
 
     def _repr_html_(self) -> str:
-        """The page in a frame, for notebooks, from which it reaches nothing of theirs."""
+        """The page in a frame for notebooks, from which it reaches nothing of theirs."""
         return (
             f'<iframe srcdoc="{html.escape(self.html)}" title="{html.escape(self.title)}" '
             'sandbox="allow-scripts allow-forms" allowfullscreen '
@@ -101,13 +81,13 @@ def view(
     The points of a sweep, some 50 of many, are run again; in the page they are chosen by sliders.
 
     Args:
-        result: what to show: a ``Result``, or the data set of a sweep.
-        quantities: curves that are drawn at once, such as ``crank.r.z``; more can be chosen in the
-            page. Without any: energies, and motion of the first body; of a sweep what it kept.
+        result: a ``Result``, or the data set of a sweep.
+        quantities: curves that are shown at first, such as ``crank.r.z``; more can be chosen in
+            the page. By default energies, and motion of the first body; of a sweep its outputs.
         fps: frames a second of the page, nearest reported instants; by default every instant.
         model: the model (a name, a folder, a file) in whose folder meshes of shapes lie; of a
             sweep also that of its own types.
-        allow_code: of a sweep: whether types of that model's ``plugin.py`` may be loaded.
+        allow_code: of a sweep: permits types of that model's ``plugin.py``.
         progress: of a sweep: called as progress(done, total). announce: as ``compile``.
 
     Returns:
@@ -115,28 +95,28 @@ def view(
 
     Raises:
         UnknownNameError: there is no such quantity; names the nearest.
-        ValueError: the result has no instants, fps cannot be, or no point of a sweep runs.
+        ValueError: the result has no instants, fps is not positive, or no point of a sweep runs.
         SceneError: there is no such model, or the scene of a sweep cannot be used.
     """
     if hasattr(result, "data_vars"):  # a data set of xarray
         from dap3d_core.view.sweep_page import sweep_data
 
-        how: dict[str, Any] = dict(model=model, allow_code=allow_code)
-        return View(
-            sweep_data(result, quantities, fps, progress=progress, announce=announce, **how)
-        )
+        return View(sweep_data(result, quantities, fps, model=model, allow_code=allow_code,
+                               progress=progress, announce=announce))  # fmt: skip
     return View(page_data(result, scene_of(result, model), quantities, fps))
 
 
 def _page(data: dict[str, Any]) -> str:
     """The template with everything put in."""
-    assets = files("dap3d_core.view") / "assets"
-    vendor = files("dap3d_core.view") / "vendor"
-    program = "\n".join(_text(assets / "js" / f"{part}.js") for part in PROGRAM)
-    style, three = _text(assets / "view.css"), _text(vendor / "three.min.js")
+
+    def text_of(name: str) -> str:
+        return (files("dap3d_core.view") / name).read_text(encoding="utf-8")
+
+    program = "\n".join(text_of(f"assets/js/{part}.js") for part in PROGRAM)
+    style, three = text_of("assets/view.css"), text_of("vendor/three.min.js")
     try:
         text = json.dumps(data, separators=(",", ":"), allow_nan=False)
-    except ValueError:  # of a result that no run of ours has left behind
+    except ValueError:  # no run of ours leaves such a result
         raise ResultError(
             "the result holds numbers that are not finite: no page shows it"
         ) from None
@@ -145,28 +125,24 @@ def _page(data: dict[str, Any]) -> str:
         "scripts": f"{_hash(three)} {_hash(program)}",
         "styles": _hash(style),
         "style": style,
-        "licence": html.escape(_text(vendor / "LICENSE").strip()),
+        "licence": html.escape(text_of("vendor/LICENSE").strip()),
         "three": three,
         "data": text.replace("<", "\\u003c"),
         "program": program,
     }
-    return _filled(_text(assets / "page.html"), parts)
+    return _filled(text_of("assets/page.html"), parts)
 
 
 def _hash(text: str) -> str:
-    """What a content security policy names a script or a style by: no other one is run."""
+    """The name of a script or a style in a content security policy: no other one is run."""
     digest = hashlib.sha256(text.encode("utf-8")).digest()
     return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
 
 
 def _filled(template: str, parts: dict[str, str]) -> str:
-    """A template whose ``{{name}}`` are replaced, each once, none within what was put in."""
+    """A template with its ``{{name}}`` replaced, each once, none within inserted text."""
     pieces: list[str] = []
     for piece in template.split("{{"):
         name, closed, rest = piece.partition("}}")
         pieces.append(parts[name] + rest if closed else piece)
     return "".join(pieces)
-
-
-def _text(file: Any) -> str:
-    return str(file.read_text(encoding="utf-8"))

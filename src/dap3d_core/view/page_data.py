@@ -1,4 +1,4 @@
-"""The data of a page: motion, drawing, arrows, curves, and what the run says of itself."""
+"""The data of a page: motion, solids, arrows, curves, and metadata of the run."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -25,18 +25,18 @@ def page_data(
     *,
     share: int = 1,
 ) -> dict[str, Any]:
-    """Everything that the page knows, ready for JSON.
+    """The data of a page, ready for JSON.
 
     Args:
-        result: what is shown.
-        scene: what was run.
-        quantities: curves that are shown at once, by name.
+        result: the result.
+        scene: its scene.
+        quantities: curves that are shown at first, by name.
         fps: frames a second; None for all instants, as far as they fit.
-        share: how many results share the page.
+        share: number of results on the page.
 
     Raises:
         UnknownNameError: there is no such quantity.
-        ValueError: there is no instant, or fps cannot be.
+        ValueError: there is no instant, or fps is not positive.
     """
     if not len(result.t):
         raise ValueError("the result has no instants: there is nothing to show")
@@ -76,7 +76,7 @@ def _series(result: Result, name: str) -> dict[str, Any]:
 
 def _about(result: Result, scene: Scene, notes: list[str]) -> dict[str, Any]:
     ledger = {name: attrs.asdict(entry) for name, entry in result.ledger.items()}
-    found: dict[str, Any] = _finite(
+    about: dict[str, Any] = _finite(
         {
             "title": result.record.title or "scene without a name",
             "description": str(scene.description),
@@ -94,11 +94,11 @@ def _about(result: Result, scene: Scene, notes: list[str]) -> dict[str, Any]:
             "scene": result.scene_text,
         }
     )
-    return found
+    return about
 
 
 def _finite(value: Any) -> Any:
-    """The same with words for numbers that JSON does not have."""
+    """The same value with text for numbers that JSON does not have."""
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     if isinstance(value, Mapping):

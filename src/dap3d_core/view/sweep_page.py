@@ -1,7 +1,4 @@
-"""The data of a page of a sweep: the motions of its points, run again, and what was kept of each.
-
-Numbers of the scene and outputs stand beside the motion of the point that is chosen.
-"""
+"""The data of a page of a sweep: motions of its points, run again, with numbers and outputs."""
 
 import json
 import math
@@ -16,55 +13,54 @@ from dap3d_core.result import Result, ResultError, UnknownNameError, find
 from dap3d_core.result.file.schema import SWEEP
 from dap3d_core.scene import Mistake, SceneError, load, parse
 from dap3d_core.simulation import CompiledModel, SimulationError, simulate
-from dap3d_core.simulation.output.type_sources import digests_of
 from dap3d_core.study import REDUCTIONS, Number, PointStatus, numbers_named, with_values
 from dap3d_core.study.sweep.subsample import at_places, evenly
 from dap3d_core.view.page_data import page_data
 from dap3d_core.view.scene3d.camera import stage
+from dap3d_core.view.scene3d.sampled_motion import Extent
 
 if TYPE_CHECKING:
     import xarray
 
 #: Points of a page at most; and characters of their data, beyond which there are fewer.
 MOST_POINTS, MOST_CHARACTERS = 50, 40_000_000
-#: Reports of a run whose sweep had reports at its end alone.
+#: Reported instants of a run where the sweep reported at its end alone.
 REPORTS = 200
-#: How points ended, as the page says it.
+#: Status of a point -> word on the page.
 WORDS = {status.value: status.name.lower() for status in PointStatus}
 
 
 @attrs.frozen(eq=False)
-class Points:
+class SweepPoints:
     """The points of a sweep that a page shows.
 
     Attributes:
-        data: the sweep's data set, with these points alone.
+        data: the sweep's data set, reduced to these points.
         names: of the numbers that vary.
-        sampled: whether the points are samples.
-        total: how many points the sweep has.
-        places: (k,) of samples: their places in the sweep.
+        sampled: True where the points are samples.
+        total: number of points of the sweep.
+        samples: (k,) indices of samples in the sweep.
     """
 
     data: "xarray.Dataset"
     names: tuple[str, ...]
     sampled: bool
     total: int
-    places: tuple[int, ...] = ()
+    samples: tuple[int, ...] = ()
 
     @classmethod
-    def of(cls, data: "xarray.Dataset", most: int) -> "Points":
-        """So many points at most, evenly chosen along each axis; the first and last are there."""
-        names = _names(data)
-        sampled = "point" in data.dims
+    def of(cls, data: "xarray.Dataset", most: int) -> "SweepPoints":
+        """So many points at most, evenly chosen along each axis, with the first and the last."""
+        names, sampled = _names(data), "point" in data.dims
         axes = ["point"] if sampled else [n for n in names if n in data.dims]
         sizes = [data.sizes[axis] for axis in axes]
-        places = dict(zip(axes, evenly(sizes, most), strict=True))
-        shown = tuple(map(int, places["point"])) if sampled else ()
-        return cls(at_places(data, places), names, sampled, math.prod(sizes), shown)
+        index = dict(zip(axes, evenly(sizes, most), strict=True))
+        samples = tuple(map(int, index["point"])) if sampled else ()
+        return cls(at_places(data, index), names, sampled, math.prod(sizes), samples)
 
     @property
     def axes(self) -> list[str]:
-        """What a slider is for."""
+        """The dimensions, each of which has a slider."""
         return ["point"] if self.sampled else [n for n in self.names if n in self.data.dims]
 
     @property
@@ -72,10 +68,15 @@ class Points:
         """Points along each axis."""
         return tuple(self.data.sizes[axis] for axis in self.axes)
 
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return math.prod(self.shape)
+
     def __iter__(self) -> Iterator["xarray.Dataset"]:
         """The data sets of the single points, the last axis fastest."""
-        for place in np.ndindex(*self.shape):
-            yield self.data.isel(dict(zip(self.axes, place, strict=True)))
+        for index in np.ndindex(*self.shape):
+            yield self.data.isel(dict(zip(self.axes, index, strict=True)))
 
 
 def _names(data: "xarray.Dataset") -> tuple[str, ...]:
@@ -95,27 +96,8 @@ def _names(data: "xarray.Dataset") -> tuple[str, ...]:
     return names
 
 
-def _check_types(data: "xarray.Dataset", compiled: CompiledModel) -> None:
-    """Refuse to run points again with other formulas than those of the outputs beside them."""
-    try:
-        known = dict(json.loads(data.attrs.get("types", "{}")))
-    except (TypeError, ValueError) as error:
-        raise ResultError(f"the sweep does not say which types it used: {error}") from error
-    here = digests_of(compiled.checked)
-    changed = [name for name, digest in known.items() if here.get(name) != digest]
-    if changed:
-        raise ResultError(
-            f"the formulas of {', '.join(changed)} have changed since the sweep: its points cannot "
-            "be run again with them. Bring back the files of these types, or run the sweep again"
-        )
-
-
-class Runs:
-    """The scene of a sweep, whose points are run again.
-
-    Attributes:
-        scene: with the settings of the runs.
-    """
+class SweepRuns:
+    """The scene of a sweep, whose points are run again; ``between`` is called during runs."""
 
     def __init__(
         self,
@@ -126,12 +108,7 @@ class Runs:
         announce: Callable[[str], None] | None,
         between: Callable[[float, float], None] | None = None,
     ) -> None:
-        """Check and compile the scene; ``between`` is called now and then during a run.
-
-        Raises:
-            SceneError: the scene cannot be used, as where its types are not allowed.
-            ResultError: formulas of its types have changed since the sweep.
-        """
+        """Check and compile the scene; a SceneError where its types are not allowed here."""
         self.scene = parse(str(data.attrs.get("scene", "")))
         if model is not None:
             self.scene.path = load(model).path
@@ -148,7 +125,7 @@ class Runs:
         self._numbers: tuple[Number, ...] = numbers_named(compiled.checked, names)
 
     def result(self, values: Sequence[float]) -> tuple[Result | None, str]:
-        """The result of a point as far as it went, and why it went no further."""
+        """The result of a point, perhaps a part of it, and why it went no further."""
         scene = with_values(self.scene, self._numbers, values)
         try:
             compiled = CompiledModel(scene, registry=self._registry)
@@ -175,55 +152,55 @@ def sweep_data(
     progress: Callable[[int, int], None] | None = None,
     announce: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
-    """Everything that the page of a sweep knows, ready for JSON: that of one point, and all others.
+    """The data of the page of a sweep, ready for JSON: that of one point, and of all others.
 
     Args:
         data: of the sweep.
-        quantities: curves that are shown at once; without any those that the sweep kept.
+        quantities: curves that are shown at first; by default those of the sweep's outputs.
         fps: frames a second.
-        model, allow_code: the model whose own types and meshes are used, and whether they may be.
-        progress: called as progress(done, total), now and then during runs as well.
-        announce: told the names of kernels that are compiled.
+        model, allow_code: the model whose own types and meshes are used, and permission for them.
+        progress: called as progress(done, total), repeatedly during runs as well.
+        announce: called with the names of kernels that are compiled.
 
     Raises:
         UnknownNameError, ValueError: as ``view``; no point can be run.
         SceneError: the scene of the sweep cannot be used here.
     """
-    points = Points.of(data, MOST_POINTS)
-    if not math.prod(points.shape):
+    points = SweepPoints.of(data, MOST_POINTS)
+    if not points.count:
         raise ValueError("the sweep has no points: there is nothing to show")
-    counts = [0, math.prod(points.shape)]
+    counts = [0, points.count]
 
-    def tell(*_: float) -> None:
+    def report(*_: float) -> None:
         if progress is not None:
             progress(*counts)
 
-    runs = Runs(data, points.names, model, allow_code, announce, tell)
-    pages = _Pages(runs, points.names, quantities, fps)
+    runs = SweepRuns(data, points.names, model, allow_code, announce, report)
+    pages = _PointPages(runs, points.names, quantities, fps)
     first = next((page for page in map(pages.of, points) if page is not None), None)
     if first is None:
-        why = next((words for words in pages.faults.values() if words), "")
+        why = next((fault for fault in pages.faults.values() if fault), "")
         raise ValueError(f"there is nothing to show: none of {points.total} points runs: {why}")
     size = len(json.dumps(first))
-    points = Points.of(data, max(2, min(MOST_POINTS, MOST_CHARACTERS // size)))
-    found: list[dict[str, Any] | None] = []
-    counts[1] = math.prod(points.shape)
+    points = SweepPoints.of(data, max(2, min(MOST_POINTS, MOST_CHARACTERS // size)))
+    made: list[dict[str, Any] | None] = []
+    counts[1] = points.count
     for point in points:
-        found.append(pages.of(point))
+        made.append(pages.of(point))
         counts[0] += 1
-        tell()
-    return _together(points, found, pages)
+        report()
+    return _joined(points, made, pages)
 
 
-class _Pages:
-    """The data of the pages of single points, each run once."""
+class _PointPages:
+    """The data of the pages of single points, each run once; ``faults`` by the point's values."""
 
     def __init__(
-        self, runs: Runs, names: Sequence[str], quantities: Sequence[str], fps: float | None
+        self, runs: SweepRuns, names: Sequence[str], quantities: Sequence[str], fps: float | None
     ) -> None:
         self._runs, self._names = runs, names
         self._quantities, self._fps = list(quantities), fps
-        self._found: dict[tuple[float, ...], dict[str, Any] | None] = {}
+        self._pages: dict[tuple[float, ...], dict[str, Any] | None] = {}
         self.faults: dict[tuple[float, ...], str] = {}
 
     def values(self, point: "xarray.Dataset") -> tuple[float, ...]:
@@ -233,128 +210,105 @@ class _Pages:
     def of(self, point: "xarray.Dataset") -> dict[str, Any] | None:
         """Data of a point; None where it does not run."""
         values = self.values(point)
-        if values not in self._found:
+        if values not in self._pages:
+            page = None
             result, self.faults[values] = self._runs.result(values)
-            there = result is not None and len(result.t)
-            self._found[values] = self._page(result, point) if result and there else None
-        return self._found[values]
-
-    def _page(self, result: Result, point: "xarray.Dataset") -> dict[str, Any]:
-        scene = parse(result.scene_text)
-        scene.path = self._runs.scene.path
-        names = self._quantities or _kept(result, point)
-        return page_data(result, scene, names, self._fps, share=MOST_POINTS)
+            if result is not None and len(result.t):
+                scene = parse(result.scene_text)
+                scene.path = self._runs.scene.path
+                names = self._quantities or _outputs_of(result, point)
+                page = page_data(result, scene, names, self._fps, share=MOST_POINTS)
+            self._pages[values] = page
+        return self._pages[values]
 
 
-def _kept(result: Result, point: "xarray.Dataset") -> list[str]:
-    """The quantities that the outputs of a sweep are made of."""
+def _outputs_of(result: Result, point: "xarray.Dataset") -> list[str]:
+    """The quantities from which the outputs of a sweep are computed."""
     found = []
     for name in map(str, point.data_vars):
         quantity, _, reduction = name.rpartition(":")
-        wanted = quantity if reduction in REDUCTIONS else name
         try:
-            found.append(find(result, wanted).name)
+            found.append(find(result, quantity if reduction in REDUCTIONS else name).name)
         except (UnknownNameError, ResultError):
             continue
     return list(dict.fromkeys(found))
 
 
-def _together(points: Points, pages: list[dict[str, Any] | None], made: _Pages) -> dict[str, Any]:
+def _joined(
+    points: SweepPoints, pages: list[dict[str, Any] | None], made: _PointPages
+) -> dict[str, Any]:
     """The page of the first point that has one, with those of all."""
-    there = [page for page in pages if page is not None]
-    common = {"stage": _stage(there), "scales": _scales(there)}
-    first = {**there[0], **common}
-    data, shown = points.data, math.prod(points.shape)
+    present = [page for page in pages if page is not None]
+    common = {"stage": _stage(present), "scales": _scales(present)}
+    first, data = {**present[0], **common}, points.data
     outputs = [
         str(n) for n in data.data_vars if n not in ("status", "note") and "time" not in data[n].dims
     ]
-    notes = []
-    if shown < points.total:
-        notes = [f"{shown} of {points.total} points of the sweep are on this page, evenly chosen"]
-    sliders = [_slider(points, axis) for axis in points.axes]
-    return {
-        **first,
-        "sweep": {
-            "notes": notes,
-            "sliders": sliders,
-            "numbers": [_about(data, name) for name in points.names],
-            "outputs": [_about(data, name) for name in outputs],
-            "points": [
-                _point(point, page, first, common, outputs, made)
-                for point, page in zip(points, pages, strict=True)
-            ],
-        },
+
+    def row(point: "xarray.Dataset", page: dict[str, Any] | None) -> dict[str, Any]:
+        """A point; of its page only what differs from the first."""
+        values = made.values(point)
+        status = int(point["status"].values) if "status" in point else PointStatus.DONE.value
+        own = None
+        if page is not None:
+            own_stage = {**common["stage"], "gravity": page["stage"]["gravity"]}
+            own = {**page, **common, "stage": own_stage}
+            own = {key: value for key, value in own.items() if value != first[key]}
+        return {
+            "values": list(values),
+            "outputs": [_number(point[name].values) for name in outputs],
+            "status": WORDS.get(status, str(status)),
+            "note": (str(point["note"].values) if "note" in point else "") or made.faults[values],
+            "data": own,
+        }
+
+    note = f"{points.count} of {points.total} points of the sweep are on this page, evenly chosen"
+    sweep = {
+        "notes": [note] if points.count < points.total else [],
+        "sliders": [_slider(points, axis) for axis in points.axes],
+        "numbers": [_axis(data, name) for name in points.names],
+        "outputs": [_axis(data, name) for name in outputs],
+        "points": [row(point, page) for point, page in zip(points, pages, strict=True)],
     }
+    return {**first, "sweep": sweep}
 
 
-def _slider(points: Points, axis: str) -> dict[str, Any]:
-    """A slider along an axis: its values; along samples their places among all."""
+def _slider(points: SweepPoints, axis: str) -> dict[str, Any]:
+    """A slider along an axis: its values; of samples their indices."""
     if points.sampled:
-        return {"name": axis, "values": list(points.places), "of": points.total}
-    return {**_about(points.data, axis), "values": [float(v) for v in points.data[axis].values]}
+        return {"name": axis, "values": list(points.samples), "of": points.total}
+    return {**_axis(points.data, axis), "values": [float(v) for v in points.data[axis].values]}
 
 
-def _about(data: "xarray.Dataset", name: str) -> dict[str, Any]:
+def _axis(data: "xarray.Dataset", name: str) -> dict[str, Any]:
     about = data[name].attrs
-    return {
-        "name": name,
-        "label": str(about.get("long_name", name)),
-        "unit": str(about.get("units", "")),
-    }
-
-
-def _point(
-    point: "xarray.Dataset",
-    page: dict[str, Any] | None,
-    first: dict[str, Any],
-    common: dict[str, Any],
-    outputs: Sequence[str],
-    made: _Pages,
-) -> dict[str, Any]:
-    """What the page says of a point; of its own data what differs from the first point's."""
-    values = made.values(point)
-    status = int(point["status"].values) if "status" in point else PointStatus.DONE.value
-    note = str(point["note"].values) if "note" in point else ""
-    own = None
-    if page is not None:
-        stage_here = {**common["stage"], "gravity": page["stage"]["gravity"]}
-        mine = {**page, **common, "stage": stage_here}
-        own = {k: v for k, v in mine.items() if v != first[k]}
-    return {
-        "values": list(values),
-        "outputs": [_number(point[name].values) for name in outputs],
-        "status": WORDS.get(status, str(status)),
-        "note": note or made.faults[values],
-        "data": own,
-    }
+    label, unit = str(about.get("long_name", name)), str(about.get("units", ""))
+    return {"name": name, "label": label, "unit": unit}
 
 
 def _number(value: Any) -> float | None:
-    number = float(value)
-    return number if math.isfinite(number) else None
+    return float(value) if math.isfinite(float(value)) else None
 
 
 def _stage(pages: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """One stage for the motions of all points: the camera stays where it is."""
+    """One stage for the motions of all points: the camera does not move between them."""
     stages = [page["stage"] for page in pages]
     center, extent = (np.array([s[k] for s in stages]) for k in ("center", "extent"))
     low, high = (center - 0.5 * extent).min(axis=0), (center + 0.5 * extent).max(axis=0)
     farthest = np.concatenate([np.array(s["farthest"]).reshape(-1, 3) for s in stages])
-    toward = np.array([stages[0]["eye"], stages[0]["up"]])
-    sides = np.concatenate([np.eye(3), toward, np.cross(toward[:1], toward[1:])])
-    places = farthest @ np.concatenate([sides, -sides]).T
-    farthest = farthest[np.unique(places.argmax(axis=0))]
-    found = stage((low, high, farthest), stages[0]["gravity"])  # type: ignore[arg-type]
-    return {**found, "unit": float(np.median([s["unit"] for s in stages]))}
+    view = np.array([stages[0]["eye"], stages[0]["up"]])
+    sides = np.concatenate([np.eye(3), view, np.cross(view[:1], view[1:])])
+    distance = farthest @ np.concatenate([sides, -sides]).T
+    farthest = farthest[np.unique(distance.argmax(axis=0))]
+    common = stage(Extent(low, high, farthest), stages[0]["gravity"])
+    return {**common, "unit": float(np.median([s["unit"] for s in stages]))}
 
 
 def _scales(pages: Sequence[dict[str, Any]]) -> dict[str, float]:
     """One scale for the arrows of all points: the longest one stays on the page."""
-    kinds = [{arrow["what"] for arrow in page["arrows"]} for page in pages]
-    return {
-        what: min(
-            (p["scales"][what] for p, kind in zip(pages, kinds, strict=True) if what in kind),
-            default=1.0,
-        )
-        for what in ("force", "moment")
-    }
+
+    def scale(what: str) -> float:
+        shown = (p for p in pages if any(arrow["what"] == what for arrow in p["arrows"]))
+        return min((float(page["scales"][what]) for page in shown), default=1.0)
+
+    return {what: scale(what) for what in ("force", "moment")}

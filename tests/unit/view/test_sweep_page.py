@@ -11,7 +11,7 @@ from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import ResultError
 from dap3d_core.scene import SceneError
 from dap3d_core.view import sweep_page
-from dap3d_core.view.sweep_page import Points
+from dap3d_core.view.sweep_page import SweepPoints
 
 #: Rest length and start of the spring below, m.
 LENGTH, START = 1.0, 1.25
@@ -116,11 +116,11 @@ def test_of_many_points_some_are_shown_and_the_page_says_so(monkeypatch):
 
 
 def test_points_of_a_grid_are_chosen_along_each_axis(grid):
-    few = Points.of(grid, 4)
+    few = SweepPoints.of(grid, 4)
     assert few.shape == (2, 2)
     assert few.data[K].values.tolist() == [4.0, 16.0]
     assert few.total == 6
-    cut = Points.of(grid.isel({MASS: 1}), 50)
+    cut = SweepPoints.of(grid.isel({MASS: 1}), 50)
     assert cut.axes == [K]
     assert len(dap.view(grid.isel({MASS: 1})).data["sweep"]["points"]) == 3
 

@@ -1,4 +1,4 @@
-"""Camera of animations: a parallel projection, and the part of the motion that the picture shows."""
+"""Camera of animations: a parallel projection, and the visible part of the motion."""
 
 import re
 from itertools import product

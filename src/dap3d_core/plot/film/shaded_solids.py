@@ -1,7 +1,6 @@
 """Shapes of bodies in films and snapshots: triangles, shaded, the nearest drawn last."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
@@ -11,8 +10,7 @@ from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import to_global
 from dap3d_core.plot.film.projection import Camera
 from dap3d_core.scene.scene import Scene
-from dap3d_core.view.scene3d.shapes import GROUND_COLOR, Drawn, drawn
-from dap3d_core.view.scene3d.solids import solid
+from dap3d_core.view.scene3d.shapes import GROUND_COLOR, drawn, parts_of
 
 #: Shapes of more triangles are not drawn: every picture of a film draws all of them.
 MOST_TRIANGLES = 30_000
@@ -30,10 +28,10 @@ class Shapes:
     Attributes:
         body: (k,) body of each vertex, 0 for ground.
         local: (k, 3) vertices in the axes of the body, m.
-        triangles: (q, 3) places of vertices.
+        triangles: (q, 3) indices of vertices.
         colors: (q, 3) red, green, blue from 0 to 1.
         hues: index of a body that has a shape -> colour of its first one.
-        notes: what is not drawn, and why.
+        notes: shapes that are not drawn, and why.
     """
 
     body: Integers
@@ -45,13 +43,13 @@ class Shapes:
 
     @property
     def corners(self) -> Integers:
-        """Places of the vertices that bound each body's shapes, for the frame of the picture."""
-        found = []
+        """Indices of vertices that bound the shapes of each body, for the frame of the picture."""
+        ends = [np.zeros(0, dtype=np.int64)]
         for k in np.unique(self.body):
-            places = np.flatnonzero(self.body == k)
-            ends = self.local[places]
-            found += [places[ends.argmin(axis=0)], places[ends.argmax(axis=0)]]
-        return np.unique(np.concatenate(found)) if found else np.zeros(0, dtype=np.int64)
+            index = np.flatnonzero(self.body == k)
+            local = self.local[index]
+            ends += [index[local.argmin(axis=0)], index[local.argmax(axis=0)]]
+        return np.unique(np.concatenate(ends))
 
     def seen(self, r: Floats, p: Floats, camera: Camera) -> tuple[Floats, Floats]:
         """Triangles (q, 3, 2) in the picture, from back to front, and their colours (q, 3)."""
@@ -70,24 +68,16 @@ class Shapes:
 
 
 def shapes_of(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Shapes:
-    """The shapes of a scene; arguments as ``view.shapes.drawn`` has them."""
-    found: Drawn = drawn(scene, names, colors)
+    """The shapes of a scene; arguments as of ``view.scene3d.shapes.drawn``."""
+    found = drawn(scene, names, colors)
     notes = list(found.notes)
-    pieces = []
-    for mark in found.marks:
-        form = solid(mark.kind)
-        local = np.asarray(mark.at) + to_global(mark.q, form.vertices * mark.size)
-        pieces.append((mark.body, local, form.triangles, mark.color))
-    for mesh in found.meshes:
-        local = np.asarray(mesh.at) + to_global(mesh.q, mesh.vertices * mesh.scale)
-        pieces.append((mesh.body, local, mesh.triangles, mesh.color))
-    pieces = [(body, *_divided(local, triangles, _size(pieces)), hue)
-              for body, local, triangles, hue in pieces]  # fmt: skip
-    for line in found.lines:  # triangles without an area, of which their edges are seen
+    parts = [(part, part.vertices) for part in parts_of(found.marks, found.meshes)]
+    size = max((float(np.max(np.ptp(local, axis=0))) for _, local in parts), default=0.0)
+    pieces = [(part.body, *_divided(local, part.form.triangles, size), part.color)
+              for part, local in parts]  # fmt: skip
+    for line in found.lines:  # triangles without an area, whose edges are visible
         k = np.arange(len(line.points) - 1)
-        pieces.append(
-            (line.body, np.array(line.points), np.stack([k, k + 1, k + 1], axis=1), line.color)
-        )
+        pieces.append((line.body, line.vertices, np.stack([k, k + 1, k + 1], axis=1), line.color))
     if sum(len(piece[2]) for piece in pieces) > MOST_TRIANGLES:
         notes.append(
             f"shapes of more than {MOST_TRIANGLES} triangles in all are not drawn; dap3d view and "
@@ -113,11 +103,6 @@ def shapes_of(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Shap
 def _rgb(color: str) -> tuple[float, float, float]:
     """Red, green, blue of a colour; grey for a word that is none."""
     return to_rgb(color) if is_color_like(color) else to_rgb(GROUND_COLOR)
-
-
-def _size(pieces: Sequence[Any]) -> float:
-    """The largest extent of a shape, m."""
-    return max(float(np.max(np.ptp(local, axis=0))) for _, local, _, _ in pieces)
 
 
 def _divided(local: Floats, triangles: Integers, size: float) -> tuple[Floats, Integers]:

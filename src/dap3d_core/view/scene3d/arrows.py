@@ -1,4 +1,4 @@
-"""Reactions of joints and what forces exert, as arrows: forces and moments over the instants."""
+"""Reactions of joints and forces of force elements as arrows over the instants."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -12,9 +12,9 @@ from dap3d_core.view.scene3d.elements import ORIGIN, Placed
 from dap3d_core.view.scene3d.primitives import packed
 from dap3d_core.view.scene3d.scene_data import Elements
 
-#: An arrow below this part of the largest of its kind is not there.
+#: An arrow below this fraction of the largest of its kind is left out.
 SMALLEST = 1e-9
-#: The longest arrow and the usual one are to be no longer than these parts of the scene's size.
+#: Greatest lengths of the longest arrow and of the usual one, as fractions of the scene's size.
 LONGEST, USUAL = 0.36, 0.16
 
 
@@ -34,25 +34,22 @@ def arrows_of(result: Result, elements: Elements, size: float) -> dict[str, Any]
         N m, global axes; ``scales``: m for one N, m for one N m; ``notes``.
     """
     notes: list[str] = []
-    found = [*_reactions(result, elements), *_applied(result, elements, notes)]
+    every = [*_reactions(result, elements), *_applied(result, elements, notes)]
     scales, arrows, least = {}, [], 0.0
     for what in ("force", "moment"):
-        alike = [arrow for arrow in found if arrow["what"] == what]
-        lengths = [np.linalg.norm(arrow["values"], axis=1) for arrow in alike]
-        largest = max((float(length.max()) for length in lengths), default=0.0)
-        least = max(least * size, SMALLEST * largest)  # forces that cancel leave rounding moments
-        kept = [
-            (arrow, length)
-            for arrow, length in zip(alike, lengths, strict=True)
-            if length.max() > least
+        alike = [
+            (one, np.linalg.norm(one["values"], axis=1)) for one in every if one["what"] == what
         ]
-        scales[what] = _scale([length for _, length in kept], size)
-        arrows += [{**arrow, "values": packed(arrow["values"])} for arrow, _ in kept]
+        largest = max((float(length.max()) for _, length in alike), default=0.0)
+        least = max(least * size, SMALLEST * largest)  # forces that cancel leave rounding moments
+        visible = [(arrow, length) for arrow, length in alike if length.max() > least]
+        scales[what] = _scale([length for _, length in visible], size)
+        arrows += [{**arrow, "values": packed(arrow["values"])} for arrow, _ in visible]
     return {"arrows": arrows, "scales": scales, "notes": notes}
 
 
 def _scale(lengths: list[Floats], size: float) -> float:
-    """Metres for one N or N m: peaks, as of impacts, may be longer than what is usual."""
+    """Metres for one N or N m: peaks, as of impacts, may be longer than usual."""
     if not lengths:
         return 1.0
     peak = max(float(np.max(length)) for length in lengths)
@@ -90,8 +87,4 @@ def _pair(layer: str, one: Placed, slot: str, action: Reaction) -> Iterator[dict
     about = {"layer": layer, "name": one.name, "body": body, "at": at}
     for what, values in (("force", action.force), ("moment", moment)):
         if values is not None and np.all(np.isfinite(values)):
-            yield {**about, "what": what, "values": _floats(values)}
-
-
-def _floats(values: Floats) -> Floats:
-    return np.asarray(values, dtype=np.float64)
+            yield {**about, "what": what, "values": np.asarray(values, dtype=np.float64)}

@@ -1,4 +1,4 @@
-"""How a body looks without shapes: links from its origin to its points, or its inertia."""
+"""Bodies without shapes: links from the origin to points, or the ellipsoid of inertia."""
 
 from collections.abc import Iterable
 
@@ -10,15 +10,14 @@ from dap3d_core.view.scene3d.elements import ORIGIN, Placed
 from dap3d_core.view.scene3d.primitives import Located, Mark, ball, plain, rod
 from dap3d_core.view.scene3d.sampled_motion import Motion
 
-#: Coordinates this near, relative to the largest, are one place.
+#: Points this near, relative to the largest coordinate, are one.
 _SAME = 1e-6
 
 
 def attached(subject: Subject, elements: Iterable[Placed]) -> list[list[tuple[float, ...]]]:
-    """The places (m, body axes) where something is attached to each body, ground first.
+    """The points (m, body axes) of each body, ground first: its own, and those of elements.
 
-    Those are its declared points, its animation points, and where joints and forces take hold.
-    The origin is not among them, and nothing twice.
+    The origin is left out, and so are duplicates.
     """
     found: list[list[tuple[float, ...]]] = [[] for _ in range(subject.body_count + 1)]
     for body, at in zip(subject.point_body, subject.point_local, strict=True):
@@ -39,12 +38,7 @@ def _distinct(places: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
 
 
 def unit_of(places: list[list[tuple[float, ...]]], size: float) -> float:
-    """Radius of a link, m: a part of the usual length of links, bounded by the whole scene's size.
-
-    Args:
-        places: as ``attached`` gives them.
-        size: of the scene, m.
-    """
+    """Radius of a link, m, by the usual length of links and the size of the scene, m."""
     lengths = [float(np.linalg.norm(at)) for on_body in places[1:] for at in on_body]
     usual = 0.05 * float(np.median(lengths)) if lengths else 0.01 * size
     return float(np.clip(usual, 0.0012 * size, 0.008 * size))
@@ -52,13 +46,9 @@ def unit_of(places: list[list[tuple[float, ...]]], size: float) -> float:
 
 def links(body: int, places: list[tuple[float, ...]], unit: float, color: str, name: str,
           *, ends: Iterable[tuple[float, ...]] = ()) -> list[Mark]:  # fmt: skip
-    """Links from the origin of a body to its places, and a ball at its origin.
+    """Links of a radius ``unit`` from the origin of a body to points, and a ball at its origin.
 
-    Args:
-        body, places: which, and where.
-        unit: radius of a link, m.
-        color, name: of the body.
-        ends: places that get a ball, as no joint is drawn there.
+    ``ends`` are the points that have a ball, as no joint is drawn there.
     """
     marks = [rod("bodies", body, ORIGIN, at, unit, color=color, owner=name) for at in places]
     marks.append(ball("bodies", body, ORIGIN, 1.5 * unit, color=color, owner=name))
@@ -68,15 +58,10 @@ def links(body: int, places: list[tuple[float, ...]], unit: float, color: str, n
 
 def inertia_ellipsoid(body: int, mass: float, Jp: Floats, most: float, color: str,
                       name: str) -> Mark:  # fmt: skip
-    """A body that nothing is attached to, as the ellipsoid of its mass and inertia.
+    """The homogeneous ellipsoid of a mass (kg) and an inertia (3, 3) in body axes (kg m^2).
 
-    Its semi-axes are a_k^2 = 5 (J_1 + J_2 + J_3 - 2 J_k) / (2 m) along the principal axes.
-
-    Args:
-        body, color, name: which body, how it is drawn.
-        mass: kg.
-        Jp: (3, 3) inertia matrix in body axes, kg m^2.
-        most: longest semi-axis that is drawn, m; longer ones are all scaled down.
+    Its semi-axes are a_k^2 = 5 (J_1 + J_2 + J_3 - 2 J_k) / (2 m) along the principal axes, all
+    scaled down where one is longer than ``most``, m.
     """
     J, axes = np.linalg.eigh(Jp)
     semi = np.sqrt(np.maximum(2.5 * (J.sum() - 2.0 * J) / mass, 0.0))
@@ -101,6 +86,6 @@ def _quaternion(A: Floats) -> tuple[float, ...]:
 
 
 def framing(motion: Motion, places: list[list[tuple[float, ...]]]) -> list[Located]:
-    """The points that the page must show: origins and places of all bodies."""
-    moving = [(k, at) for k, on in enumerate(places) for at in on]
-    return [*((k, ORIGIN) for k in range(1, len(motion.result.subject.body_names) + 1)), *moving]
+    """The points that the page must show: origins and points of all bodies."""
+    points = [(k, at) for k, on in enumerate(places) for at in on]
+    return [*((k, ORIGIN) for k in range(1, motion.result.subject.body_count + 1)), *points]

@@ -1,4 +1,4 @@
-"""Which way is up, where the ground grid lies, and where the page is looked at from."""
+"""Camera of pages: the upward direction, the ground grid, the place of the eye."""
 
 from typing import Any
 
@@ -8,20 +8,20 @@ from dap3d_core.model.groups import Floats
 from dap3d_core.view.scene3d.primitives import plain
 from dap3d_core.view.scene3d.sampled_motion import Extent
 
-#: A motion is taken for planar where one of its extents is below this part of the largest.
+#: A motion is planar where one of its extents is below this fraction of the largest.
 PLANAR = 0.12
 
 
 def stage(reached: Extent, gravity: tuple[float, ...] | None) -> dict[str, Any]:
-    """What the page needs to stand in the right place.
+    """The stage of a page.
 
     Args:
-        reached: by the motion.
+        reached: extent of the motion.
         gravity: (3,) m/s^2, or None.
 
     Returns:
         ``center``, ``extent``, ``size``: of the box that holds the motion; ``farthest``: (k, 3)
-        places that must be seen; ``up``: (3,) unit vector; ``ground``: height of the grid
+        points that must be visible; ``up``: (3,) unit vector; ``ground``: height of the grid
         along up; ``eye``: (3,) direction from the centre to the eye; ``gravity``.
     """
     low, high, farthest = reached
@@ -52,11 +52,11 @@ def _up(gravity: tuple[float, ...] | None, flat: int | None) -> Floats:
 
 
 def _eye(up: Floats, flat: int | None) -> Floats:
-    """From where x, or else y, points to the right; planar motion is looked at nearly squarely."""
+    """From where x, or else y, points to the right; nearly normal to the plane of planar motion."""
     across = np.eye(3)[flat if flat is not None else 1]
     upright = abs(float(across @ up)) < 0.5
     if flat is not None and upright:
-        # x to the right and up upwards: the eye stands where x cross up points.
+        # x to the right and up upwards: the eye is in the direction of x cross up
         right = np.eye(3)[0 if flat != 0 else 1]
         across = across * (1.0 if float(np.cross(right, up) @ across) > 0.0 else -1.0)
         eye = across + 0.22 * up + 0.3 * np.cross(up, across)

@@ -1,4 +1,4 @@
-"""Colours of bodies: those the scene names, else a cycle that colour-blind readers can tell."""
+"""Colours of bodies: those of the scene, else a cycle that colour-blind readers can tell."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -7,39 +7,19 @@ from collections.abc import Iterable, Mapping, Sequence
 CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 #: Names that scenes use, which a browser does not know.
 NAMED = {
-    "tab:blue": "#1f77b4",
-    "tab:orange": "#ff7f0e",
-    "tab:green": "#2ca02c",
-    "tab:red": "#d62728",
-    "tab:purple": "#9467bd",
-    "tab:brown": "#8c564b",
-    "tab:pink": "#e377c2",
-    "tab:gray": "#7f7f7f",
-    "tab:olive": "#bcbd22",
-    "tab:cyan": "#17becf",
-    "r": "#d62728",
-    "g": "#2ca02c",
-    "b": "#1f77b4",
-    "c": "#17becf",
-    "m": "#c03bc0",
-    "y": "#bcbd22",
-    "k": "#404040",
-    "w": "#d8d8d8",
-    "black": "#404040",
-    "white": "#d8d8d8",
-}
-#: So much white is in the last link of a chain.
+    "tab:blue": "#1f77b4", "tab:orange": "#ff7f0e", "tab:green": "#2ca02c", "tab:red": "#d62728",
+    "tab:purple": "#9467bd", "tab:brown": "#8c564b", "tab:pink": "#e377c2", "tab:gray": "#7f7f7f",
+    "tab:olive": "#bcbd22", "tab:cyan": "#17becf",
+    "r": "#d62728", "g": "#2ca02c", "b": "#1f77b4", "c": "#17becf", "m": "#c03bc0", "y": "#bcbd22",
+    "k": "#404040", "w": "#d8d8d8", "black": "#404040", "white": "#d8d8d8",
+}  # fmt: skip
+#: Fraction of white in the last link of a chain.
 LIGHTEST = 0.55
 _WRITTEN = re.compile(r"#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})|[a-z]{3,24}")
 
 
 def color(name: object, usual: str) -> str:
-    """A colour as a browser writes it: "#1f77b4", or a word of CSS.
-
-    Args:
-        name: as a scene writes it; what is no colour counts as none.
-        usual: the colour where the name says nothing.
-    """
+    """A colour of a scene as a browser writes it, "#1f77b4" or a word of CSS; else ``usual``."""
     word = name.strip().lower() if isinstance(name, str) else ""
     word = NAMED.get(word, word)
     return word if _WRITTEN.fullmatch(word) else usual
@@ -48,8 +28,8 @@ def color(name: object, usual: str) -> str:
 def colors(names: Sequence[object], joints: Iterable[Sequence[int]] = ()) -> list[str]:
     """A colour for each body: its own, or one of the cycle that no body took by name.
 
-    So few bodies as the cycle has colours differ in it. Of more those of a chain of joints have one
-    hue, lighter from link to link: each body its own would say nothing.
+    Of more bodies than the cycle has colours, those of a chain of joints have one hue, lighter from
+    link to link.
 
     Args:
         names: colours as the scene names them, of bodies 1, 2, ...
@@ -69,11 +49,10 @@ def colors(names: Sequence[object], joints: Iterable[Sequence[int]] = ()) -> lis
 
 
 def chains_of(count: int, joints: Iterable[Sequence[int]]) -> list[list[int]]:
-    """Bodies 1 to ``count`` by the chain of joints that they belong to, in the order of its links.
+    """Bodies 1 to ``count`` by chains of joints, in the order of their links.
 
-    Chains end where a body has more than two neighbours. Of more than a few such pieces, as in a
-    net, all bodies that are connected count as one chain; bodies without a joint to another are
-    one group.
+    Chains end where a body has more than two neighbours. Where they are many, as in a net, all
+    connected bodies are one chain; bodies without a joint to another are one group.
     """
     near: dict[int, set[int]] = {k: set() for k in range(1, count + 1)}
     for bodies in joints:

@@ -1,4 +1,4 @@
-"""Joints and forces of a model as geometry: the points, vectors and numbers their types declare."""
+"""Joints and forces of a model as geometry: points, vectors and numbers of their fields."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -15,16 +15,16 @@ ORIGIN = (0.0, 0.0, 0.0)
 
 @attrs.frozen
 class Placed:
-    """A joint or a force with its geometry, whatever its type.
+    """A joint or a force with its geometry.
 
     Attributes:
         name, keyword: its own, and that of its type.
-        symbol: what its type declares, of ``interface.types.SYMBOLS``; "" where it declares none.
+        symbol: declared by its type, one of ``interface.types.SYMBOLS``; "" where there is none.
         bodies: slot -> body index, ground 0.
         points: slot -> the point ``P_i``, ``P_j``, ... on that body.
         vectors: field -> body index and direction there.
         numbers: field -> number.
-        has_ends: whether the type declares a vector between two points.
+        has_ends: True where the type declares a vector between two points.
     """
 
     name: str
@@ -53,9 +53,9 @@ def forces_of(model: Model) -> list[Placed]:
 
 
 def gravity_of(model: Model) -> tuple[float, ...] | None:
-    """(3,) gravitational acceleration, m/s^2, as forces on each body declare it; None without.
+    """(3,) gravitational acceleration, m/s^2, or None.
 
-    That is a force with the number ``gravity`` and the direction ``wgt``, as ``weight`` has them.
+    It is that of a force on each body with ``gravity`` and the direction ``wgt``, as ``weight``.
     """
     for group in model.forces:
         numbers = group.examined.layout.numbers

@@ -1,4 +1,4 @@
-"""What the page draws: solids fixed in bodies, spans between two of them, packed numbers."""
+"""Solids fixed in bodies, spans between two of them, packed numbers."""
 
 import base64
 from typing import Any
@@ -12,7 +12,7 @@ from dap3d_core.model.groups import Floats, Integers
 Located = tuple[int, tuple[float, ...]]
 #: Solids of unit size about their origin; axes along z. A cone stands on the origin.
 SOLIDS = ("sphere", "cylinder", "cone", "box", "ring")
-#: What a user switches on and off; inertia is translucent, what it surrounds is seen.
+#: Groups that a user switches on and off; inertia is translucent.
 LAYERS = ("bodies", "inertia", "shapes", "joints", "forces")
 
 
@@ -23,11 +23,11 @@ class Mark:
     Attributes:
         layer, kind: one of LAYERS, one of SOLIDS.
         body: index, ground 0.
-        at: (3,) place of its centre in the body, m.
+        at: (3,) its centre in the body, m.
         size: (3,) factors along its own axes: radius, radius, length; of a box its edges.
         q: (4,) Euler parameters of its axes in the body.
         color: as a browser writes it.
-        owner: name of the body, joint, force or shape it stands for.
+        owner: name of its body, joint, force or shape.
     """
 
     layer: str

@@ -1,4 +1,4 @@
-"""Where things are at the instants that the page shows: instants, points, the extent of it all."""
+"""Motion at the instants of a page: instants, points, extent."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -8,29 +8,25 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import to_body, to_global
-from dap3d_core.model.state_layout import split
 from dap3d_core.result import Result
 from dap3d_core.result.post.point_motion import motion_of
 from dap3d_core.view.scene3d.primitives import Located
 
 #: Without ``fps`` the page holds every instant, up to so many numbers of poses (16 MB).
 MOST_NUMBERS = 4_000_000
-#: More frames than this are every instant: nobody asks for so many otherwise.
+#: More frames than this mean every instant.
 _MOST_FRAMES = 1e6
-#: Instants that the extent of a motion is found from.
-_LOOKED_AT = 200
+#: Number of instants from which the extent of a motion is computed.
+_EXTENT_INSTANTS = 200
 
 
 def chosen(t: Floats, bodies: int, fps: float | None) -> Integers:
-    """Places of the instants that the page shows, among those that were reported.
+    """(k,) increasing indices of the instants of a page; the first and the last are among them.
 
     Args:
         t: (nt,) reported instants, s.
         bodies: number of bodies.
         fps: frames a second; None for every instant, as far as they fit a page.
-
-    Returns:
-        (k,) increasing; the first and the last are among them.
     """
     last = len(t) - 1
     if fps is None:
@@ -49,7 +45,7 @@ def chosen(t: Floats, bodies: int, fps: float | None) -> Integers:
 
 
 def thinned(result: Result, places: Integers) -> Result:
-    """A result with some of its instants alone, whose model is that of the whole."""
+    """A result reduced to some of its instants, with the model of the whole."""
     if len(places) == len(result.t):
         return result
     return Result.of_parts(
@@ -61,7 +57,7 @@ def thinned(result: Result, places: Integers) -> Result:
 
 
 class Extent(NamedTuple):
-    """Least and largest coordinates (3,) of a motion, and the places (k, 3) farthest out, m."""
+    """Least and largest coordinates (3,) of a motion, and the points (k, 3) farthest out, m."""
 
     low: Floats
     high: Floats
@@ -80,10 +76,10 @@ class Motion:
         return np.asarray(np.concatenate([self.result.r, self.result.p], axis=2))
 
     def points(self, located: Iterable[Located]) -> Floats:
-        """(nt, k, 3) places of points, global axes, m."""
-        found = list(located)
-        body = np.array([b for b, _ in found], dtype=np.int64)
-        local = np.array([at for _, at in found], dtype=float).reshape(-1, 3)
+        """(nt, k, 3) points, global axes, m."""
+        points = list(located)
+        body = np.array([b for b, _ in points], dtype=np.int64)
+        local = np.array([at for _, at in points], dtype=float).reshape(-1, 3)
         return motion_of(body, local, self.result.u, self.result.v_dot, 0)
 
     def direction(self, vector: Located) -> Floats:
@@ -94,26 +90,20 @@ class Motion:
         return np.asarray(to_global(self.result.p[:, body - 1], np.asarray(local, dtype=float)))
 
     def point_in(self, body: int, place: Floats) -> Floats:
-        """(3,) coordinates in a body of a place (3,) as it is at the first instant."""
+        """(3,) coordinates in a body of a global point (3,) at the first instant."""
         if body == 0:
             return place
         return self.vector_in(body, place - self.result.r[0, body - 1])
 
     def vector_in(self, body: int, direction: Floats) -> Floats:
-        """(3,) components in a body of a direction (3,) as it is at the first instant."""
+        """(3,) components in a body of a global direction (3,) at the first instant."""
         if body == 0:
             return direction
-        _, p, _, _ = split(self.result.u[:1])
-        return np.asarray(to_body(p[0, body - 1], direction))
+        return np.asarray(to_body(self.result.p[0, body - 1], direction))
 
     def extent(self, located: Iterable[Located], reach: float = 0.0) -> Extent:
-        """What points reach over the motion.
-
-        Args:
-            located: the points.
-            reach: how far things stand out beyond them, m.
-        """
-        places = np.linspace(0, len(self.result.t) - 1, min(_LOOKED_AT, len(self.result.t)))
+        """The extent of points over the motion, enlarged by ``reach``, m."""
+        places = np.linspace(0, len(self.result.t) - 1, min(_EXTENT_INSTANTS, len(self.result.t)))
         few = thinned(self.result, np.unique(places.round().astype(np.int64)))
         found = Motion(few).points(located).reshape(-1, 3)
         farthest = found[np.argmax(found @ _DIRECTIONS.T, axis=0)] + reach * _DIRECTIONS

@@ -1,4 +1,4 @@
-"""What the page draws of a result: bodies, shapes, joints, forces, ground, and from where."""
+"""Solids that show a result: bodies, shapes, joints, forces, ground; and the camera."""
 
 import os
 from collections.abc import Iterable, Sequence
@@ -14,7 +14,7 @@ from dap3d_core.view.scene3d.bodies import attached, framing, inertia_ellipsoid,
 from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.colors import colors
 from dap3d_core.view.scene3d.elements import ORIGIN, Placed, forces_of, gravity_of, joints_of
-from dap3d_core.view.scene3d.primitives import Located, Mark, Span, packed
+from dap3d_core.view.scene3d.primitives import Mark, Span, packed
 from dap3d_core.view.scene3d.sampled_motion import Extent, Motion
 from dap3d_core.view.scene3d.shapes import Drawn, Mesh, drawn
 from dap3d_core.view.scene3d.symbols import Drawer
@@ -25,7 +25,7 @@ GROUND = "#9aa3ad"
 
 @attrs.frozen
 class Elements:
-    """Joints and forces, where the model can be had; else why not."""
+    """Joints and forces; none, and why, where the model cannot be made again."""
 
     joints: list[Placed]
     forces: list[Placed]
@@ -34,7 +34,7 @@ class Elements:
 
 
 def scene_of(result: Result, model: str | os.PathLike[str] | None = None) -> Scene:
-    """The scene that was run; its folder is that of the model, where one is named."""
+    """The scene of a result; its folder is that of the model, where one is named."""
     try:
         scene = parse(result.scene_text)
     except SceneError:  # a result made by a script, without the text of a scene
@@ -58,13 +58,13 @@ def elements_of(result: Result) -> Elements:
 
 @attrs.frozen(eq=False)
 class SceneGeometry:
-    """What stands for a scene in pictures of it, all but arrows.
+    """The solids that show a scene.
 
     Attributes:
         names, colors: of the bodies, without ground.
         marks, spans: solids fixed in bodies, and those between two.
         shapes: lines, meshes and notes of the scene's shapes; its solids are among the marks.
-        extent: of the motion, with what is drawn.
+        extent: of the motion, with the solids.
         unit: radius of a thin link, m.
     """
 
@@ -78,13 +78,7 @@ class SceneGeometry:
 
 
 def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeometry:
-    """What stands for the scene of a result.
-
-    Args:
-        result: whose motion rails and extent follow.
-        scene: what was run; its folder, where known, holds its meshes.
-        elements: of the result.
-    """
+    """The solids of a result with its scene, whose folder, where known, holds its meshes."""
     subject, motion = result.subject, Motion(result)
     hues = colors([scene.bodies[n].color for n in subject.body_names], _pairs(elements.joints))
     shapes = drawn(scene, subject.body_names, hues)
@@ -95,7 +89,7 @@ def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeo
     low, high, _ = motion.extent(points)
     size = float(np.linalg.norm(high - low))
     unit = unit_of(places, size or 1.0)
-    marks = _bodies(result, places, shapes.bodies, unit, hues, _joined(elements.joints))
+    marks = _bodies(result, places, shapes.bodies, unit, hues, elements.joints)
     ellipsoids = _bare_bodies(result, bare, elements.joints, size, hues)
     reach = max((max(m.size) for m in ellipsoids), default=0.0)
     reach = max([reach, *(j.numbers.get("radius", 0.0) for j in elements.joints)])
@@ -109,24 +103,27 @@ def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeo
 
 
 def _pairs(joints: Iterable[Placed]) -> list[tuple[int, ...]]:
-    """The bodies that each joint couples, ground left out."""
+    """The bodies of each joint, without ground."""
     return [tuple(body for body in joint.bodies.values() if body) for joint in joints]
 
 
 def geometry_of(result: Result, scene: Scene, elements: Elements) -> dict[str, Any]:
-    """What stands for a scene, as plain data for the page; arguments as ``scene_geometry``."""
-    found = scene_geometry(result, scene, elements)
+    """The solids of a result, as plain data for the page; arguments as ``scene_geometry``."""
+    geometry = scene_geometry(result, scene, elements)
+    bodies = zip(geometry.names, geometry.colors, strict=True)
     return {
-        "stage": {**stage(found.extent, elements.gravity), "unit": found.unit},
-        "bodies": [{"name": n, "color": c} for n, c in zip(found.names, found.colors, strict=True)],
+        "stage": {**stage(geometry.extent, elements.gravity), "unit": geometry.unit},
+        "bodies": [
+            {"name": n, "color": c} for n, c in zip(geometry.names, geometry.colors, strict=True)
+        ],
         "points": _points(result),
-        "joints": [_about(j, found.names) for j in elements.joints],
-        "forces": [_about(f, found.names) for f in elements.forces],
-        "marks": [_row(m) for m in found.marks],
-        "spans": [attrs.asdict(s) for s in found.spans],
-        "lines": [attrs.asdict(line) for line in found.shapes.lines],
-        "meshes": [_packed_mesh(mesh) for mesh in found.shapes.meshes],
-        "notes": notes_of(elements, found.shapes),
+        "joints": [_about(j, geometry.names) for j in elements.joints],
+        "forces": [_about(f, geometry.names) for f in elements.forces],
+        "marks": [_row(m) for m in geometry.marks],
+        "spans": [attrs.asdict(s) for s in geometry.spans],
+        "lines": [attrs.asdict(line) for line in geometry.shapes.lines],
+        "meshes": [_packed_mesh(mesh) for mesh in geometry.shapes.meshes],
+        "notes": notes_of(elements, geometry.shapes),
     }
 
 
@@ -142,10 +139,11 @@ def _bodies(
     shaped: set[int],
     unit: float,
     hues: Sequence[str],
-    joined: set[Located],
+    joints: list[Placed],
 ) -> list[Mark]:
-    """Links of the bodies without shapes; of ground short posts where joints stand."""
-    marks = []
+    """Links of the bodies without shapes; of ground short posts at joints."""
+    marks: list[Mark] = []
+    joined = {point for joint in joints for point in joint.points.values()}
     for k, name in enumerate(result.subject.body_names, 1):
         if k not in shaped and places[k]:
             ends = [at for at in places[k] if (k, at) not in joined]
@@ -162,7 +160,7 @@ def _bodies(
 def _bare_bodies(
     result: Result, bare: list[int], joints: list[Placed], size: float, hues: Sequence[str]
 ) -> list[Mark]:
-    """Bodies that nothing is attached to; a wheel is drawn by its joint."""
+    """Bodies without points; a wheel is drawn by its joint."""
     subject = result.subject
     wheels = {j.bodies["i"] for j in joints if j.symbol == "wheel"}
     most = 0.2 * size if size > 0.0 else np.inf
@@ -175,11 +173,6 @@ def _bare_bodies(
     ]
 
 
-def _joined(joints: list[Placed]) -> set[Located]:
-    """Where joints stand, which draw something there themselves."""
-    return {point for joint in joints for point in joint.points.values()}
-
-
 def _points(result: Result) -> list[dict[str, Any]]:
     subject = result.subject
     columns = zip(subject.point_names, subject.point_body, subject.point_local, strict=True)
@@ -189,24 +182,17 @@ def _points(result: Result) -> list[dict[str, Any]]:
 def _about(one: Placed, names: Sequence[str]) -> dict[str, Any]:
     bodies = [names[b - 1] if b else "ground" for b in one.bodies.values()]
     place = one.place(next(iter(one.bodies)))
-    return {
-        "name": one.name, "type": one.keyword, "bodies": bodies, "body": place[0], "at": place[1]
-    }  # fmt: skip
+    return {"name": one.name, "type": one.keyword, "bodies": bodies, "body": place[0],
+            "at": place[1]}  # fmt: skip
 
 
 def _row(mark: Mark) -> list[Any]:
-    """A mark without the names of its attributes: there are many."""
-    return [
-        mark.layer, mark.kind, mark.body, *(_short(v) for v in (mark.at, mark.size, mark.q)),
-        mark.color, mark.owner,
-    ]  # fmt: skip
-
-
-def _short(values: tuple[float, ...]) -> list[float]:
-    return [float(f"{x:.7g}") for x in values]
+    """A mark without the names of its attributes, in seven digits: there are many."""
+    numbers = ([float(f"{x:.7g}") for x in values] for values in (mark.at, mark.size, mark.q))
+    return [mark.layer, mark.kind, mark.body, *numbers, mark.color, mark.owner]
 
 
 def notes_of(elements: Elements, shapes: Drawn) -> list[str]:
-    """What of a scene is not drawn, and why."""
-    missing = f"joints and forces are not drawn: {elements.missing}" if elements.missing else ""
-    return [*([missing] if missing else []), *shapes.notes]
+    """Notes on parts of a scene that are not drawn."""
+    missing = f"joints and forces are not drawn: {elements.missing}"
+    return [*([missing] if elements.missing else []), *shapes.notes]

@@ -1,11 +1,11 @@
-"""Shapes of the scene as marks, lines and meshes."""
+"""Shapes of a scene as marks, lines and meshes; marks and meshes as triangles."""
 
 import re
 from collections.abc import Sequence
 from io import BytesIO
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -18,6 +18,7 @@ from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.shapes import Shape, mesh_file, read_shapes
 from dap3d_core.view.scene3d.colors import color
 from dap3d_core.view.scene3d.primitives import Located, Mark, plain, turned_to
+from dap3d_core.view.scene3d.solids import Triangles, solid
 
 #: Meshes of more triangles are not put into a page.
 MOST_TRIANGLES = 300_000
@@ -41,7 +42,7 @@ class Mesh:
         at, q: place (3,), m, and Euler parameters (4,) of the axes of the file in the body.
         scale: m for one unit of the file.
         vertices: (k, 3) in units of the file.
-        triangles: (m, 3) places of vertices.
+        triangles: (m, 3) indices of vertices.
         color, owner: as of a mark.
     """
 
@@ -59,19 +60,62 @@ class Mesh:
 class Line:
     """A line through points (k, 3), m, of a body."""
 
+    layer: ClassVar[str] = "shapes"
     body: int
     points: tuple[tuple[float, ...], ...]
     color: str
     owner: str
 
+    @property
+    def vertices(self) -> Floats:
+        """(k, 3) in the axes of the body, m."""
+        return np.array(self.points)
+
+
+@attrs.frozen(eq=False)
+class Part:
+    """A mark or a mesh as triangles in the axes at, q of a body, enlarged by ``size`` (3,).
+
+    Parts with the same triangles have equal keys.
+    """
+
+    key: object
+    form: Triangles
+    body: int
+    at: tuple[float, ...]
+    q: tuple[float, ...]
+    size: tuple[float, ...]
+    color: str
+    layer: str
+    owner: str
+
+    @property
+    def vertices(self) -> Floats:
+        """(k, 3) in the axes of the body, m."""
+        return np.asarray(np.asarray(self.at) + to_global(self.q, self.form.vertices * self.size))
+
+
+def parts_of(marks: Sequence[Mark], meshes: Sequence[Mesh]) -> list[Part]:
+    """Marks, then meshes, as triangles."""
+    parts = [
+        Part(m.kind, solid(m.kind), m.body, m.at, m.q, m.size, m.color, m.layer, m.owner)
+        for m in marks
+    ]
+    for k, mesh in enumerate(meshes):
+        form, size = Triangles(mesh.vertices, mesh.triangles), (mesh.scale,) * 3
+        parts.append(
+            Part(k, form, mesh.body, mesh.at, mesh.q, size, mesh.color, "shapes", mesh.owner)
+        )
+    return parts
+
 
 @attrs.define
 class Drawn:
-    """The shapes of a scene as pictures of it show them.
+    """The shapes of a scene.
 
     Attributes:
         marks, lines, meshes: solids, lines and triangles.
-        corners: (body, place) pairs that the shapes reach to, for the camera.
+        corners: points that bound the shapes, for the camera.
         bodies: indices of the bodies that have a shape.
         notes: shapes that are not drawn, and why.
     """
@@ -88,14 +132,14 @@ def drawn(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Drawn:
     """The shapes of a scene.
 
     Args:
-        scene: checked when it was run; its folder, where it is known, holds its meshes.
+        scene: a valid one; its folder, where known, holds its meshes.
         names, colors: of the bodies, without ground.
     """
     index = {"ground": 0} | {name: k for k, name in enumerate(names, 1)}
     found = Drawn()
     for shape in read_shapes(Collector(scene), index):
         usual = colors[shape.body - 1] if shape.body else GROUND_COLOR
-        with np.errstate(over="ignore", invalid="ignore"):  # what is too large is told
+        with np.errstate(over="ignore", invalid="ignore"):  # a fault where too large
             fault = _add(found, shape, color(shape.values["color"], usual), scene.folder)
         if fault:
             found.notes.append(f"shape {shape.name} is not drawn: {fault}")
@@ -103,7 +147,7 @@ def drawn(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Drawn:
 
 
 def _add(found: Drawn, shape: Shape, hue: str, folder: Path | None) -> str:
-    """Add a shape to those that are drawn; "", or why it is not."""
+    """Add a shape; returns "", or why it is not drawn."""
     values = shape.values
     about: dict[str, Any] = {"body": shape.body, "color": hue, "owner": shape.name}
     piece: Mark | Line | Mesh
@@ -153,7 +197,7 @@ def _solid(shape: Shape, hue: str) -> Mark:
 
 
 def _mesh(folder: Path | None, name: str) -> tuple[Floats, Any] | str:
-    """Vertices (k, 3) and triangles (m, 3) of a mesh file, or why they cannot be had."""
+    """Vertices (k, 3) and triangles (m, 3) of a mesh file, or why there are none."""
     if folder is None:
         return f"where {name} lies is not known; name the model (--model, model=)"
     path = mesh_file(folder, name)
@@ -179,22 +223,20 @@ def _mesh(folder: Path | None, name: str) -> tuple[Floats, Any] | str:
         triangles = np.asarray(mesh.faces, dtype=np.int64)
     except Exception as error:  # a broken file makes a reader fail in any way
         return f"{name} cannot be read: {error or type(error).__name__}"
-    if not len(triangles) or not np.all(np.isfinite(vertices)):
-        return (
-            f"{name} holds no triangles; is it a mesh?"
-            if not len(triangles)
-            else f"{name} holds no numbers"
-        )
+    if not len(triangles):
+        return f"{name} holds no triangles; is it a mesh?"
+    if not np.all(np.isfinite(vertices)):
+        return f"{name} holds no numbers"
     if len(triangles) > MOST_TRIANGLES:
         return f"{name} has {len(triangles)} triangles; at most {MOST_TRIANGLES} are drawn"
     return vertices, triangles
 
 
 def _without_groups(data: bytes) -> bytes:
-    """The vertices and faces of an OBJ file alone.
+    """An OBJ file reduced to vertices and faces.
 
-    Of each group, object and material the reader makes a mesh of its own, and the time it takes
-    to join them grows with the square of their number.
+    The reader makes a mesh of each group, object and material, and the time to join them grows
+    with the square of their number.
     """
     text = data.replace(b"\r\n", b"\n").replace(b"\\\n", b"")
     lines = re.findall(rb"^[ \t]*[vf][ \t][^\n#]*", text, re.MULTILINE)

@@ -1,4 +1,4 @@
-"""Triangles of the solids that stand for bodies, joints and springs."""
+"""Triangles of the solids that show bodies, joints and springs."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -15,7 +15,7 @@ TURNS, END, WIRE = 7, 0.125, 0.2
 
 
 class Triangles(NamedTuple):
-    """Vertices (k, 3), m, and triangles (m, 3) of their places; edges have vertices twice."""
+    """Vertices (k, 3), m, and triangles (m, 3) of their indices; edges have vertices twice."""
 
     vertices: Floats
     triangles: Integers
@@ -35,7 +35,7 @@ class Triangles(NamedTuple):
 
 @cache
 def solid(kind: str) -> Triangles:
-    """A solid of unit size as ``view.marks`` has it, by its name there."""
+    """A solid of unit size, one of ``primitives.SOLIDS``."""
     if kind == "box":
         return _box()
     turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 13)
