@@ -114,18 +114,10 @@ def animate(
         fps = FILMS[suffix].fps(fps)
         times = frame_times(result.t, fps, speed)
     clock = _clock(duration or float(times[0]), speed if len(times) > 1 else 1.0)
-
-    def frames() -> Iterator[Any]:
-        """The pictures, each valid until the next is requested."""
-        for k, t in enumerate(map(float, times)):
-            stage.place(*pose_at(result, t), clock(t))
-            yield stage.pixels()
-            if progress is not None:
-                progress(k + 1, len(times))
-
     with whole_file(target, force) as part:
         if suffix in FILMS:
-            write_film(FILMS[suffix], part, target, frames(), fps)
+            frames = _frames(result, stage, times, clock, progress)
+            write_film(FILMS[suffix], part, target, frames, fps)
         else:
             stage.place(*pose_at(result, float(times[0])), clock(float(times[0])))
             stage.figure.savefig(part, format=suffix[1:], metadata=PICTURES[suffix])
@@ -149,6 +141,21 @@ def _stage_of(
     stage = Stage(sticks, camera, limits, seen, size, result.record.title)
     notes = () if sticks.shapes is None else sticks.shapes.notes
     return stage, (*notes, BEYOND) if leaves(limits, extent, camera) else notes
+
+
+def _frames(
+    result: Result,
+    stage: Stage,
+    times: Floats,
+    clock: Callable[[float], str],
+    progress: Progress | None,
+) -> Iterator[Any]:
+    """The pictures, each valid until the next is requested."""
+    for k, t in enumerate(map(float, times)):
+        stage.place(*pose_at(result, t), clock(t))
+        yield stage.pixels()
+        if progress is not None:
+            progress(k + 1, len(times))
 
 
 def _check(

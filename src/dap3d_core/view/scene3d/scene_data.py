@@ -110,7 +110,6 @@ def _pairs(joints: Iterable[Placed]) -> list[tuple[int, ...]]:
 def geometry_of(result: Result, scene: Scene, elements: Elements) -> dict[str, Any]:
     """The solids of a result, as plain data for the page; arguments as ``scene_geometry``."""
     geometry = scene_geometry(result, scene, elements)
-    bodies = zip(geometry.names, geometry.colors, strict=True)
     return {
         "stage": {**stage(geometry.extent, elements.gravity), "unit": geometry.unit},
         "bodies": [
