@@ -60,9 +60,6 @@ def nearest(points, wanted):
     return np.linalg.norm(wanted[:, None] - points[None], axis=2).min(axis=1).max()
 
 
-# ---------------------------------------------------------------- VTK
-
-
 def test_vtk_shows_the_scene_where_the_result_has_it(result, folder, tmp_path):
     """VTK's own reader finds every instant, and the bodies there."""
     hdf = pytest.importorskip("vtkmodules.vtkIOHDF", reason="pip install -e '.[test]'")
@@ -112,9 +109,6 @@ def test_a_vtk_file_holds_its_cells_once(result, folder, tmp_path):
             assert len(root["Points"]) == made.instants * root["NumberOfPoints"][0]
             assert root["Steps"].NSteps == made.instants
     assert sizes[0] == sizes[1]
-
-
-# ---------------------------------------------------------------- glTF
 
 
 class Document:
@@ -221,9 +215,6 @@ def test_solids_are_closed_and_look_outwards(form):
     assert (len(open_edges) == 0) or form.vertices[:, 2].max() <= 0.51
 
 
-# ---------------------------------------------------------------- MATLAB, CSV
-
-
 def test_matlab_finds_every_array_with_its_unit(result, tmp_path):
     dap.export(result, tmp_path / "kite.mat")
     found = loadmat(tmp_path / "kite.mat", simplify_cells=True)
@@ -242,9 +233,6 @@ def test_a_table_is_that_of_the_post_processor(result, tmp_path):
     dap.export(result, tmp_path / "a.csv")
     write_csv(result, tmp_path / "b.csv", columns_of(result))
     assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
-
-
-# ---------------------------------------------------------------- refusals
 
 
 @pytest.mark.parametrize(

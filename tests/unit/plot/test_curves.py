@@ -1,11 +1,7 @@
 """Plots show the named quantities, in files of each kind, and refuse what they cannot show."""
 
 import itertools
-import os
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import matplotlib
 import matplotlib.figure
@@ -13,14 +9,12 @@ import matplotlib.image
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from support.plain import in_another_process
 from unit.test_result import circling, drifting, model_of, result_of
 
 import dap3d_core as dap
-from dap3d_core.plot import FORMATS, plot, save_plot, show_plot
+from dap3d_core.plot import plot, save_plot
 from dap3d_core.plot.curves import curve_picture
-from dap3d_core.plot.style import PlainOffset, show_rounding_flat
-from dap3d_core.result import ResultError, UnknownNameError
+from dap3d_core.result import UnknownNameError
 from dap3d_core.scene import Scene
 
 matplotlib.use("Agg")
@@ -127,25 +121,6 @@ def test_curves_between_instants_follow_the_rates():
     assert len(lines(plot(fall, "stone.rdd.z"))["stone.rdd.z"]) == len(fall.t)  # no rate is known
 
 
-@pytest.mark.parametrize(
-    ("values", "words"),
-    [
-        ([-43.0, -43.0 - 4e-9], r"×10⁻⁹ − 43"),
-        ([1e9, 3e9], r"×10⁹"),
-        ([0.0, 1.0], ""),
-        ([43.0, 43.0 + 2e-14], ""),
-    ],
-)
-def test_an_axis_says_what_its_numbers_are(values, words):
-    """Not 1e-9-4.3e1; and rounding is no curve."""
-    axes = matplotlib.figure.Figure().subplots()
-    axes.plot([0.0, 1.0], values)
-    axes.yaxis.set_major_formatter(PlainOffset())
-    show_rounding_flat(axes)
-    axes.figure.draw_without_rendering()
-    assert axes.yaxis.get_offset_text().get_text() == words
-
-
 def test_a_unit_stays_on_one_line(result):
     """A bracket on each of two lines is no unit."""
     ax = plot(result, "J1.moment_body", "J1.moment_at_point")
@@ -209,46 +184,6 @@ def test_it_can_be_read_at_60_mm(result, names):
         assert ax.get_window_extent().width > 0.45 * small.bbox.width
 
 
-def test_without_a_display_there_is_no_window(result):
-    with pytest.raises(ResultError, match=r"cannot open a window.*-o writes a file"):
-        show_plot(result, "bob.r")
-
-
-@pytest.mark.slow
-@in_another_process
-def test_a_window_shows_the_figure(tmp_path):
-    """With a way to show windows that only says what it would show."""
-    (tmp_path / "says.py").write_text(
-        "from matplotlib.backends.backend_agg import FigureCanvasAgg as FigureCanvas\n"
-        "from matplotlib.backend_bases import FigureManagerBase as FigureManager\n"
-        "def show(*args, **options):\n"
-        "    from matplotlib import pyplot\n"
-        "    print(pyplot.gcf().axes[0].get_ylabel())\n"
-    )
-    tests = Path(__file__).parents[2]
-    code = (
-        "import sys; sys.path[:0] = sys.argv[1:]\n"
-        "from unit.test_result import circling\n"
-        "from dap3d_core.plot import show_plot\n"
-        "show_plot(circling()[0], 'bob.r.x')\n"
-    )
-    out = subprocess.run(
-        [sys.executable, "-c", code, str(tests), str(tmp_path)], capture_output=True, text=True,
-        env=os.environ | {"MPLBACKEND": "module://says"}, check=True,
-    )  # fmt: skip
-    assert out.stdout.strip() == "position of bob, x [m]"
-
-
-def test_on_axes_that_are_given(result):
-    from matplotlib import pyplot
-
-    _, given = pyplot.subplots()
-    assert plot(result, "bob.r.x", "bob.r.y", ax=given) is given
-    assert len(given.get_lines()) == 2
-    with pytest.raises(ValueError, match=r"one unit.*m, J"):
-        plot(result, "bob.r.x", "work", ax=given)
-
-
 def test_one_instant_is_drawn_as_markers():
     single = circling(nt=1)[0]
     for line in plot(single, "bob.rdd").get_lines():
@@ -262,26 +197,6 @@ def test_many_curves_differ_in_colour_or_dash():
     assert len(set(looks)) == len(looks) == 8
 
 
-@pytest.mark.parametrize("suffix", [*FORMATS, ".PNG"])
-def test_files_of_each_kind(result, tmp_path, suffix):
-    path = save_plot(result, ["bob.r", "energy.total", "J1.force.norm"], tmp_path / f"a{suffix}")
-    data = path.read_bytes()
-    begin = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}[suffix.lower()]
-    assert data.startswith(begin)
-    assert len(data) > 5000
-    assert [p.name for p in tmp_path.iterdir()] == [path.name]
-    again = save_plot(result, ["bob.r", "energy.total", "J1.force.norm"], tmp_path / f"b{suffix}")
-    assert again.read_bytes() == data  # equal figures, equal files
-
-
-def test_a_picture_is_not_blank_and_has_the_size_asked_for(result, tmp_path):
-    path = save_plot(result, "bob.r", tmp_path / "a.png", width=3, height=2, dpi=100)
-    pixels = matplotlib.image.imread(path)
-    assert pixels.shape[:2] == (200, 300)
-    colours = np.unique((pixels[..., :3] * 255).round().reshape(-1, 3), axis=0)
-    assert len(colours) > 50
-
-
 def test_nothing_is_cut_off_at_a_small_width(tmp_path):
     """The margin of the picture is white all around, legends of two panels included."""
     result = drifting()
@@ -290,44 +205,6 @@ def test_nothing_is_cut_off_at_a_small_width(tmp_path):
     pixels = matplotlib.image.imread(path)[..., :3]
     for edge in (pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]):
         assert (edge == 1.0).all()
-
-
-def test_a_file_is_overwritten_only_when_forced(result, tmp_path):
-    path = tmp_path / "a.png"
-    path.write_text("precious")
-    with pytest.raises(ResultError, match="the file exists"):
-        save_plot(result, "work", path)
-    assert path.read_text() == "precious"
-    save_plot(result, "work", path, force=True)
-    assert path.read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (dict(path="a.bmp"), r"a figure is one of \.png, \.svg, \.pdf"),
-        (dict(path="a"), "a figure is one of"),
-        (dict(quantities=[]), "at least one quantity"),
-        (dict(x="bob.r"), r"x = bob\.r has components; name one of bob\.r\.x, bob\.r\.y"),
-        (dict(width=0), "cannot be"),
-        (dict(dpi=1e9), "dpi is from 10 to 1200"),
-        (dict(width=float("nan")), "cannot be"),
-    ],
-)
-def test_what_cannot_be_drawn_is_refused(result, tmp_path, options, words):
-    given = dict(quantities=["work"], path="a.png") | options
-    given["path"] = tmp_path / given["path"]
-    with pytest.raises(ValueError, match=words):
-        save_plot(result, **given)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_an_unknown_quantity_is_answered_before_anything_is_written(result, tmp_path):
-    with pytest.raises(UnknownNameError, match=r"did you mean 'bob\.r\.z'"):
-        save_plot(result, "bbo.r.z", tmp_path / "a.png")
-    with pytest.raises(ResultError, match="there is no folder"):
-        save_plot(result, "work", tmp_path / "no" / "a.png")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_result_without_instants_cannot_be_drawn():
@@ -356,27 +233,3 @@ def test_names_are_shown_as_they_are(tmp_path, name):
         f"{name}.r.{axis}" for axis in "xyz"
     ]
     save_plot(result, f"{name}.r", tmp_path / "a.png")
-
-
-@pytest.mark.slow
-@in_another_process
-def test_saving_needs_no_window_and_the_module_can_be_called(tmp_path):
-    """pyplot, which opens windows, stays out; dap3d_core.plot(...) works with the module loaded."""
-    code = """if True:
-        import sys
-        sys.path.insert(0, sys.argv[1])
-        from unit.test_result import circling
-        import dap3d_core
-        import dap3d_core.plot
-        dap3d_core.plot.save_plot(circling()[0], "work", "a.png")
-        assert "matplotlib.pyplot" not in sys.modules
-        import matplotlib
-        matplotlib.use("Agg")
-        print(dap3d_core.plot(circling()[0], "work").get_ylabel())
-    """
-    tests = Path(__file__).parents[2]
-    out = subprocess.run(
-        [sys.executable, "-c", code, str(tests)], cwd=tmp_path, capture_output=True, text=True,
-        check=True,
-    )  # fmt: skip
-    assert out.stdout.strip() == "work of forces and drivers [J]"

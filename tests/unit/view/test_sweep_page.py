@@ -8,7 +8,6 @@ import pytest
 
 import dap3d_core as dap
 from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.result import ResultError
 from dap3d_core.scene import SceneError
 from dap3d_core.view import sweep_page
 from dap3d_core.view.sweep_page import SweepPoints
@@ -174,19 +173,3 @@ def test_types_of_the_models_own_need_leave():
     with pytest.raises(SceneError, match="is not run unless it is allowed"):
         dap.view(data, model="ball1")
     assert len(dap.view(data, model="ball1", allow_code=True).data["sweep"]["points"]) == 2
-
-
-def test_the_page_of_a_result_has_no_points():
-    """Its page is that of one run."""
-    assert "sweep" not in dap.view(dap.simulate(spring(), **TIMES)).data
-
-
-def test_points_are_not_run_again_with_other_formulas(grid, tmp_path):
-    """The motions of a page would be no more those of the outputs beside them."""
-    types = json.loads(grid.attrs["types"])
-    assert list(types) == ["force ptp"]
-    other = grid.assign_attrs(types=json.dumps({"force ptp": "0123456789"}))
-    with pytest.raises(ResultError, match=r"formulas of force ptp have changed since the sweep"):
-        dap.view(other)
-    with pytest.raises(ResultError, match="does not say which types"):
-        dap.view(grid.assign_attrs(types="{"))

@@ -10,7 +10,6 @@ from matplotlib.collections import LineCollection, QuadMesh
 
 import dap3d_core as dap
 from dap3d_core.plot import save_plot
-from dap3d_core.plot.style import folded
 from dap3d_core.plot.sweep.panels import Band, Heat, Lines, Scatter, Strands, edges
 from dap3d_core.plot.sweep.parallel_coordinates import Parallel
 from dap3d_core.plot.sweep.sweep_plot import sweep_picture
@@ -93,9 +92,6 @@ def kinds(drawing):
     return [type(panel) for panel in drawing.panels]
 
 
-# ---------------------------------------------------------------- which picture
-
-
 def test_the_picture_follows_what_varies():
     """One panel for each unit over one number, a map each over two, all in one over more."""
     one, two = grid(mass=[1, 2, 3]), grid(mass=[1, 2, 3], k=[5, 6])
@@ -131,9 +127,6 @@ def test_a_grid_is_cut_at_the_nearest_value():
     np.testing.assert_array_equal(instant.panels[0].outputs[0].values, [0.5, 1.0, 1.5])
     chosen = sweep_picture(data.sel({MASS: 3.0, K: 6.0}), ["bob.r.z:min"])
     np.testing.assert_array_equal(chosen.panels[0].outputs[0].values, [-18, -36])
-
-
-# ---------------------------------------------------------------- what is drawn
 
 
 def test_lines_have_the_values_and_gaps_where_runs_failed():
@@ -286,20 +279,6 @@ def test_points_are_chosen_evenly(shape):
         assert len(steps) == 0 or steps.max() - steps.min() <= 1
 
 
-def test_long_names_are_folded_at_their_dots():
-    words = folded("bodies.the_connecting_rod.Jp.x [kg m²]", 16)
-    assert max(map(len, words.split("\n"))) <= 16
-    assert words.replace("\n", "").replace(" ", "") == "bodies.the_connecting_rod.Jp.x[kgm²]"
-    assert folded("a" * 50, 20).replace("\n", "") == "a" * 50
-
-
-def test_equal_sweeps_give_equal_files(tmp_path):
-    """Drawn in the same order; what the kinds of files add: test_plot.py."""
-    data = spoilt(grid(mass=[1, 2, 3], k=[5, 6]), {(1, 0): 3, (0, 0): 0})
-    files = [save_plot(data, [], tmp_path / f"{k}.svg") for k in range(2)]
-    assert files[0].read_bytes() == files[1].read_bytes()
-
-
 @pytest.mark.slow
 def test_narrow_pictures_of_all_kinds_can_be_made(tmp_path):
     """60 mm, as beside a text: nothing is left without room, which matplotlib warns of."""
@@ -307,9 +286,6 @@ def test_narrow_pictures_of_all_kinds_can_be_made(tmp_path):
     many = samples(50, tuple(f"{long}{k}" for k in range(12)))
     for k, data in enumerate((grid(mass=[1]), grid(mass=[1, 2], k=[1, 2]), many)):
         save_plot(data, [], tmp_path / f"{k}.png", width=60 / 25.4)
-
-
-# ---------------------------------------------------------------- what cannot be drawn
 
 
 def test_what_cannot_be_drawn_is_refused():

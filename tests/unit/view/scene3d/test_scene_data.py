@@ -1,0 +1,161 @@
+"""Solids of bodies and shapes, arrows, colours, camera and instants follow the result."""
+
+import numpy as np
+import pytest
+from unit.view.test_page import numbers, shaped
+
+import dap3d_core as dap
+from dap3d_core.model.rotations import to_global
+from dap3d_core.view.scene3d.bodies import inertia_ellipsoid
+from dap3d_core.view.scene3d.camera import stage
+from dap3d_core.view.scene3d.colors import CYCLE, chains_of, colors
+from dap3d_core.view.scene3d.primitives import turned_to
+from dap3d_core.view.scene3d.sampled_motion import Extent, chosen
+
+
+@pytest.fixture(scope="module")
+def four():
+    return dap.simulate("fourbar3", t_end=0.1, dt=0.01)
+
+
+@pytest.fixture(scope="module")
+def page(four):
+    return dap.view(four)
+
+
+def test_arrows_are_reactions_and_forces_of_the_result(four, page):
+    found = {(a["layer"], a["what"], a["name"], a["body"]): a for a in page.data["arrows"]}
+    force = numbers(found["reactions", "force", "J1", 1]["values"]).reshape(-1, 3)
+    np.testing.assert_allclose(force, four.reaction("J1")["i"].force, rtol=1e-6)
+    assert found["reactions", "force", "J1", 1]["at"] == (0.0, 0.0, -1.0)
+    moment = numbers(found["reactions", "moment", "J1", 1]["values"]).reshape(-1, 3)
+    expected = four.reaction("J1")["i"].moment_at_point
+    np.testing.assert_allclose(moment, expected, rtol=1e-6, atol=1e-6)
+    spring = numbers(found["forces", "force", "spring1", 2]["values"]).reshape(-1, 3)
+    np.testing.assert_allclose(spring, four.force("spring1").on["i"].force, rtol=1e-6)
+    assert ("reactions", "moment", "J2", 1) not in found  # a ball joint passes none but rounding
+    assert not any(body == 0 for *_, body in found)
+
+
+@pytest.mark.parametrize("fps", [1.0, 30.0, 77.0, 1e6])
+def test_frames_are_the_nearest_reported_instants(fps):
+    t = np.cumsum(np.random.default_rng(0).uniform(0.001, 0.02, 400))
+    places = chosen(t, 3, fps)
+    assert places[0] == 0
+    assert places[-1] == len(t) - 1
+    assert np.all(np.diff(places) > 0)
+    wanted = np.arange(t[0], t[-1], 1.0 / fps) if fps < 1e3 else t
+    off = np.abs(t[places][None] - wanted[:, None]).min(axis=1)
+    np.testing.assert_allclose(off, np.abs(t[None] - wanted[:, None]).min(axis=1), atol=1e-15)
+
+
+def test_without_fps_all_instants_are_there_as_far_as_they_fit():
+    t = np.linspace(0.0, 1.0, 5001)
+    np.testing.assert_array_equal(chosen(t, 4, None), np.arange(5001))
+    thinned = chosen(t, 1000, None)
+    assert 500 < len(thinned) < 600
+    assert (thinned[0], thinned[-1]) == (0, 5000)
+    assert list(chosen(t[:1], 4, 10.0)) == [0]
+
+
+def test_bodies_without_shapes_are_links_between_their_points(page):
+    marks = [m for m in page.data["marks"] if (m[0], m[7]) == ("bodies", "coupler")]
+    rods = [m for m in marks if m[1] == "cylinder"]
+    np.testing.assert_allclose(sorted(at[2] for _, _, _, at, *_ in rods), [-1.6, 1.6])
+    assert all(size[2] == pytest.approx(3.2) for _, _, _, _, size, *_ in rods)
+    assert {color for *_, color, _ in rods} == {"#ff7f0e"}
+
+
+def test_a_bare_body_is_the_ellipsoid_of_its_inertia():
+    """A solid ellipsoid with semi-axes a, b, c has J = m/5 (b^2+c^2, ...)."""
+    a, b, c, mass = 0.3, 0.2, 0.1, 5.0
+    J = np.diag([b * b + c * c, a * a + c * c, a * a + b * b]) * mass / 5.0
+    p = np.array([0.5, 0.1, -0.7, 0.4])
+    A = to_global(p / np.linalg.norm(p), np.eye(3)).T
+    mark = inertia_ellipsoid(1, mass, A @ J @ A.T, np.inf, "red", "b")
+    assert sorted(mark.size) == pytest.approx([c, b, a])
+    axis = to_global(mark.q, np.eye(3)[int(np.argmax(mark.size))])
+    assert abs(axis @ A[:, 0]) == pytest.approx(1.0)
+    assert max(inertia_ellipsoid(1, mass, J, 0.06, "red", "b").size) == pytest.approx(0.06)
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 1), (0, 0, -2), (1, 0, 0), (0.3, -4.0, 0.5)])
+def test_marks_turn_to_their_axes(axis):
+    found = to_global(turned_to(axis), [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(found, np.array(axis) / np.linalg.norm(axis), atol=1e-12)
+
+
+def test_colours_are_those_of_the_scene_or_differ():
+    found = colors(["tab:blue", "", "#123456", "", "javascript:alert(1)", "rot{}"])
+    assert found[0] == "#1f77b4"
+    assert found[2] == "#123456"
+    assert [found[k] for k in (1, 3, 4, 5)] == list(CYCLE[:4])
+
+
+def test_of_many_bodies_a_chain_has_one_hue():
+    """Fifty links in six colours in turn say nothing; light tells the first from the last."""
+    chain = [(k, k + 1) for k in range(1, 50)]
+    found = colors([""] * 50, chain)
+    levels = np.array([[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in found], dtype=float)
+    depth = 255.0 - levels  # all of one hue: in one ratio
+    np.testing.assert_allclose(
+        depth / depth[:, :1], np.tile(depth[0] / depth[0, 0], (50, 1)), atol=0.02
+    )
+    assert (np.diff(levels.sum(axis=1)) > 0.0).all()
+    two = colors([""] * 20, [(k, k + 1) for k in range(1, 20) if k != 10])
+    assert two[0] == CYCLE[0]
+    assert two[10] == CYCLE[1]
+    assert len(set(two)) == 20
+    star = colors(["", "#123456", *[""] * 10], [(1, k) for k in range(2, 13)])
+    assert star[1] == "#123456"
+    assert chains_of(3, [(1, 2)]) == [[1, 2], [3]]
+
+
+def test_up_is_against_gravity_and_planar_motion_is_seen_squarely():
+    low, high = np.array([-1.0, -1.0, 0.0]), np.array([1.0, 1.0, 0.01])
+    found = stage(Extent(low, high, np.zeros((1, 3))), (0.0, -9.81, 0.0))
+    assert found["up"] == (0.0, 1.0, 0.0)
+    assert found["eye"][2] > 0.9
+    assert found["ground"] < -1.0
+    rising = stage(Extent(np.zeros(3), np.array([1.0, 1.0, 1.0]), np.zeros((1, 3))), None)
+    assert (rising["up"], rising["ground"]) == ((0.0, 0.0, 1.0), 0.0)
+
+
+def test_shapes_take_the_place_of_links(tmp_path):
+    pytest.importorskip("trimesh")
+    result = dap.simulate(shaped(tmp_path), t_end=0.1, dt=0.05)
+    data = dap.view(result, model=tmp_path).data
+    ((layer, kind, body, at, size, *_, color, owner),) = data["marks"]
+    assert (layer, kind, body, at, owner) == ("shapes", "box", 1, [0.0, 0.0, 0.5], "case")
+    assert (size, color) == ([0.1, 0.2, 0.3], "#d62728")
+    assert data["lines"][0]["points"] == ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    (mesh,) = data["meshes"]
+    assert len(numbers(mesh["vertices"])) == 9
+    assert sorted(numbers(mesh["triangles"], "<u4")) == [0, 1, 2]
+    assert data["about"]["view_notes"] == []
+
+
+def test_the_camera_sees_shapes_as_large_as_they_are():
+    """A flat plate on the ground at height 0: the grid stays there, and the plate is in view."""
+    scene = dap.Scene(name="plate")
+    scene.add_body("b", Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1.0))
+    scene.add_shape("disk", body="ground", radius=2.0)
+    scene.add_shape("cone", body="b", radius=0.1, length=0.5, axis=(0.0, 0.0, 1.0))
+    found = dap.view(dap.simulate(scene, t_end=0.0)).data["stage"]
+    assert found["ground"] == 0.0
+    low = np.subtract(found["center"], np.multiply(0.5, found["extent"]))
+    high = np.add(found["center"], np.multiply(0.5, found["extent"]))
+    np.testing.assert_allclose(high, [2.0, 2.0, 1.5], atol=0.15)
+    np.testing.assert_allclose(low, [-2.0, -2.0, 0.0], atol=0.15)
+
+
+def test_a_result_does_not_know_where_meshes_lie_and_says_so(tmp_path):
+    result = dap.simulate(shaped(tmp_path), t_end=0.1, dt=0.05)
+    page = dap.view(result)
+    assert page.data["meshes"] == []
+    (note,) = page.data["about"]["view_notes"]
+    assert "shape part is not drawn" in note
+    assert "--model" in note
+    (tmp_path / "cube.stl").write_bytes(b"\x00\x01nonsense")
+    (note,) = dap.view(result, model=tmp_path).data["about"]["view_notes"]
+    assert "shape part is not drawn" in note
