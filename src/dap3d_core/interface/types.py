@@ -12,6 +12,7 @@ import attrs
 
 #: Increased by one when a type written for the old interface no longer works.
 INTERFACE_VERSION = 1
+
 #: Symbols that pictures have for joints and forces -> the body slots, fields and kinds of fields
 #: that each is drawn from (view/scene3d/symbols.py).
 SYMBOLS: Mapping[str, tuple[str, ...]] = {
@@ -100,13 +101,13 @@ class Joint(TypeBase):
     Attributes:
         keyword: the name of the type in a scene.
         rows: number of constraint equations.
-        holonomic: True, False, or one truth value a row: which rows exist at position level.
-        drives: whether it prescribes a freedom that other joints leave; where there are none
-            between its bodies a scene gets a note.
-        unilateral: rows, from 0, whose multiplier is not negative in what the type stands for: a
-            ground that carries and does not pull. A run where one is gets a note with the instant.
-        unilateral_words: what it means that one is negative; stands in that note.
-        symbol: how pictures show it, one of SYMBOLS; "": by the fields that it declares.
+        holonomic: True, False, or one truth value a row: the rows of the position level.
+        drives: it prescribes a freedom that other joints leave; where there are none between its
+            bodies a scene gets a note.
+        unilateral: rows, from 0, with multipliers that are not negative in a valid motion: ground
+            carries and does not pull. A run where one is gets a note with the instant.
+        unilateral_words: the meaning of a negative multiplier, for that note.
+        symbol: symbol in pictures, one of SYMBOLS; "": drawn from the declared fields.
     """
 
     kind = "joint"
@@ -142,12 +143,12 @@ class Force(TypeBase):
     the friction of that joint; one with a ``wrench`` does not.
 
     Attributes:
-        keyword: the word that names the type in a scene.
-        each_body: True when the element acts on every body of the scene (slot i in turn).
-        symbol: how pictures show it, one of SYMBOLS; "": a spring between its two ends, where it
-            has such, else the fields that it declares.
-        energy_where: where alone the energy is the potential of the wrench, in words that follow
-            "only"; "" where it is so everywhere.
+        keyword: the name of the type in a scene.
+        each_body: True if the element acts on every body of the scene (slot i in turn).
+        symbol: symbol in pictures, one of SYMBOLS; "": a spring between two ends, if it has them,
+            else drawn from the declared fields.
+        energy_where: the condition, to follow "only", for the energy to be the potential of the
+            wrench; "" for no condition.
     """
 
     kind = "force"

@@ -13,6 +13,7 @@ from dap3d_core.result import Result, ResultError, UnknownNameError, find
 from dap3d_core.result.file.schema import SWEEP
 from dap3d_core.scene import Mistake, SceneError, load, parse
 from dap3d_core.simulation import CompiledModel, SimulationError, simulate
+from dap3d_core.simulation.output.type_sources import digests_of
 from dap3d_core.study import REDUCTIONS, Number, PointStatus, numbers_named, with_values
 from dap3d_core.study.sweep.subsample import at_places, evenly
 from dap3d_core.view.page_data import page_data
@@ -28,6 +29,21 @@ MOST_POINTS, MOST_CHARACTERS = 50, 40_000_000
 REPORTS = 200
 #: Status of a point -> word on the page.
 WORDS = {status.value: status.name.lower() for status in PointStatus}
+
+
+def _check_types(data: "xarray.Dataset", compiled: CompiledModel) -> None:
+    """Refuse to run points again with other formulas than those of the outputs beside them."""
+    try:
+        known = dict(json.loads(data.attrs.get("types", "{}")))
+    except (TypeError, ValueError) as error:
+        raise ResultError(f"the sweep does not say which types it used: {error}") from error
+    here = digests_of(compiled.checked)
+    changed = [name for name, digest in known.items() if here.get(name) != digest]
+    if changed:
+        raise ResultError(
+            f"the formulas of {', '.join(changed)} have changed since the sweep: its points cannot "
+            "be run again with them. Bring back the files of these types, or run the sweep again"
+        )
 
 
 @attrs.frozen(eq=False)

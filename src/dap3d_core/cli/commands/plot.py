@@ -125,10 +125,8 @@ def _open(
         from dap3d_core.plot.sweep.sweep_table import table_of
 
         data = open_sweep(files[0])
-        try:
+        with refusing(ValueError):
             return data, names or table_of(data).default_outputs(x), _cuts(at)
-        except ValueError as error:
-            raise Refused(str(error)) from error
     if at:
         raise Refused(f"--at chooses points of a sweep; {files[0]} is none")
     runs = {n: open_result(f, **types) for n, f in zip(_labels(files), files, strict=True)}
@@ -196,11 +194,11 @@ def _check(
     if hasattr(data, "data_vars"):  # a sweep
         from dap3d_core.plot.sweep.sweep_table import table_of
 
-        checks += [partial(table_of(shown).check, name) for name in names]
-        checks += [partial(picture_of, shown, names, over["x"], over["at"])]
+        checks += [partial(table_of(data).check, name) for name in names]
+        checks += [partial(picture_of, data, names, axes["x"], axes["at"])]
     else:
-        checks += [partial(picture_of, shown, [name], None, None) for name in names]
-        checks += [partial(picture_of, shown, ["t"], over["x"], None)]
+        checks += [partial(picture_of, data, [name], None, None) for name in names]
+        checks += [partial(picture_of, data, ["t"], axes["x"], None)]
     refuse_all(*checks)
 
 

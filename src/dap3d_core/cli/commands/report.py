@@ -94,13 +94,8 @@ def _targets(
     """The files to write, by their contents; refused before any work is done."""
     from dap3d_core.cli.framework.paths import writable
 
-    asked = {"picture": picture, "csv": csv_file, "json": output}
-    found = {}
-    for kind, name in asked.items():
-        if name is None:
-            continue
-        if kind == "picture":
-            from dap3d_core.plot.figure_file import check_suffix
+    if files["picture"] is not None:
+        from dap3d_core.plot.figure_file import check_suffix
 
         with refusing(ValueError):
             check_suffix(Path(files["picture"]))

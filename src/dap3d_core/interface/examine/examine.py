@@ -16,7 +16,7 @@ import attrs
 
 from dap3d_core.interface.body_pose import BodyPose
 from dap3d_core.interface.codegen.examined import Examined
-from dap3d_core.interface.codegen.instance_layout import body_slots, layout_of, size
+from dap3d_core.interface.codegen.instance_layout import Layout, body_slots, layout_of, size
 from dap3d_core.interface.codegen.kernel_arguments import (
     VELOCITY_KERNELS,
     Quantity,
@@ -34,7 +34,6 @@ from dap3d_core.interface.examine.random_values import (
     random_quantity,
 )
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.interface.source_location import line_of, no_field
 from dap3d_core.interface.types import SYMBOLS, Function, Joint, TypeBase
 
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
@@ -162,6 +161,22 @@ def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
     if lacking := sorted(needed - set(constants)):
         raise broken(f"returns no {', '.join(lacking)}")
     return {name: _constant(name, value, broken) for name, value in constants.items()}
+
+
+def _check_symbol(type_: type[TypeBase], layout: Layout) -> None:
+    if not type_.symbol:
+        return
+    who, symbol = where_is(type_), f"symbol = {type_.symbol!r}"
+    if type_.symbol not in SYMBOLS:
+        raise PluginError(f"{who}: {symbol} is not one of {', '.join(SYMBOLS)}")
+    stored = {name: s.kind for name, s in specs_of(type_).items() if name in layout.numbers}
+    offered = {*layout.slots, *stored, *stored.values()}
+    lacking = [name for name in SYMBOLS[type_.symbol] if name not in offered]
+    if lacking:
+        raise PluginError(
+            f"{who}: {symbol} is drawn from {', '.join(lacking)}, which the type does not have; "
+            'name another symbol, or leave "" to draw what it declares'
+        )
 
 
 def _constant(name: Any, value: Any, broken: Callable[[str], PluginError]) -> Any:
@@ -293,22 +308,6 @@ def _check_members(type_: type[TypeBase]) -> None:
             choice = f"a {kind} may define {', '.join(allowed)}"
             hint = f"did you mean {near[0]}?" if near else choice
             raise PluginError(f"{where_is(type_)} defines {name}, which nothing calls; {hint}")
-
-
-def _check_symbol(type_: type[TypeBase], layout: Layout) -> None:
-    if not type_.symbol:
-        return
-    who, symbol = where_is(type_), f"symbol = {type_.symbol!r}"
-    if type_.symbol not in SYMBOLS:
-        raise PluginError(f"{who}: {symbol} is not one of {', '.join(SYMBOLS)}")
-    stored = {name: s.kind for name, s in specs_of(type_).items() if name in layout.numbers}
-    offered = {*layout.slots, *stored, *stored.values()}
-    lacking = [name for name in SYMBOLS[type_.symbol] if name not in offered]
-    if lacking:
-        raise PluginError(
-            f"{who}: {symbol} is drawn from {', '.join(lacking)}, which the type does not have; "
-            'name another symbol, or leave "" to draw what it declares'
-        )
 
 
 def _check_names(
