@@ -81,16 +81,8 @@ def compiled(folder):
 # ------------------------------------------------------------------ kernels
 
 KERNELS = {
-    "raises": ("raise ValueError('no')", "ValueError: no"),
     "raises later": (f"if t > 0.3:\n    raise ValueError('no')\n{GOOD}", "ValueError: no"),
-    "returns nothing": ("return None", r"it returned shape \(\)"),
     "returns nothing later": (f"if t > -5.0:\n    return None\n{GOOD}", r"it returned shape \(\)"),
-    "one vector": ("return (0.0, 0.0, 1.0)", r"it returned shape \(3,\)"),
-    "ragged": ("return (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0)", "differ in length"),
-    "text": ("return ('a', 0.0, 1.0), (0.0, 0.0, 0.0)", "returned 'a' where a finite number"),
-    "complex": ("return (1j, 0.0, 1.0), (0.0, 0.0, 0.0)", "returned 1j where a finite number"),
-    "truth": ("return (True, 0.0, 1.0), (0.0, 0.0, 0.0)", "returned True where a finite number"),
-    "never a number": ("return (t / t - 1.0 + 1e999, 0.0, 1.0), (0.0, 0.0, 0.0)", "returned inf"),
     "writes to its input": (f"r_i[0] = 5.0\n{GOOD}", "does not support item assignment"),
     "exits": ("sys.exit(3)", "SystemExit: 3"),
     "calls itself": ("return Mine.wrench(t, r_i)", "RecursionError"),
@@ -292,12 +284,8 @@ def test_what_a_models_file_changes_is_put_back_or_told(model):
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("sys.exit(0)", "SystemExit"),
         ("raise GeneratorExit", "GeneratorExit"),
-        ("import no_such_package", "No module named 'no_such_package'"),
         ("def f(:", "SyntaxError"),
-        ("interface_version = 99", "install a newer dap3d"),
-        ("interface_version = None", "interface_version = 1"),
         ("x = [0] * 10**15", "MemoryError"),
         ("def f(): return f()\nf()", "RecursionError"),
         ("\0", "null bytes|SyntaxError|ValueError"),

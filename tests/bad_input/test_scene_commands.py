@@ -87,15 +87,6 @@ def test_what_types_refuse_is_told_for_all_elements(run, tmp_path, command):
     assert not (tmp_path / "scene.nc").exists()
 
 
-@pytest.mark.parametrize("command", ["check", "run"])
-def test_a_direction_that_is_undefined_is_refused(run, tmp_path, command):
-    text = pushed(SPRING, ("r = [1.0, 0.0, 0.0]", "r = [0.0, 0.0, 0.0]"), base=PAIR)
-    code, out, err = run(text, command, "scene.toml")
-    assert (code, out) == (2, "")
-    assert f"scene.toml:{1 + text.splitlines().index('[forces.F]')}: forces.F: its points" in err
-    assert not (tmp_path / "scene.nc").exists()
-
-
 def test_joints_that_contradict_each_other_leave_nothing(run, tmp_path):
     text = changed(
         PENDULUM,

@@ -472,10 +472,3 @@ def test_a_model_file_without_types_or_missing_is_refused(tmp_path):
         load_registry().with_file(write(tmp_path, "interface_version = 1\n"))
     with pytest.raises(PluginError, match="cannot be read"):
         load_registry().with_file(tmp_path / "nothing.py")
-
-
-def test_a_model_file_does_not_replace_an_installed_type_quietly(tmp_path):
-    file = write(tmp_path, GOOD.replace('"push"', '"weight"'))
-    said = message(keyword="weight", registry=load_registry().with_file(file))
-    assert str(file) in said
-    assert "rename" in said
