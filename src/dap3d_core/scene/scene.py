@@ -317,9 +317,10 @@ class Scene(SceneDisplay):
     def _add(self, table: str, name: str, fields: dict[str, Any]) -> str:
         named, class_ = getattr(self, table), NAMED[table]
         self._check_name(table, named, name)
-        mistakes = MistakeList()
-        mistakes.add_unknown_keys((table, name), fields, keys_of(class_))
-        mistakes.raise_mistakes()
+        if not fields.keys() <= keys_of(class_):
+            mistakes = MistakeList()
+            mistakes.add_unknown_keys((table, name), fields, keys_of(class_))
+            mistakes.raise_mistakes()
         named[name] = class_(name, **{k: v for k, v in fields.items() if v is not None})
         return name
 

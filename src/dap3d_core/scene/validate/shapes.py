@@ -136,9 +136,11 @@ def _shape(report: Collector, index: Mapping[str, int], element: Element) -> Sha
     return Shape(element.name, str(word), body, values)
 
 
-def _mesh_of(folder: Path | None, value: Any) -> Path | Fault:
+def _mesh_of(folder: Path | None, value: Any) -> str | Fault:
+    """The name of a mesh file that exists."""
     name = text_of(value)
-    return name if isinstance(name, Fault) else mesh_file(folder, name)
+    path = name if isinstance(name, Fault) else mesh_file(folder, name)
+    return path if isinstance(path, Fault) else name
 
 
 def mesh_file(folder: Path | None, name: str) -> Path | Fault:

@@ -151,6 +151,14 @@ def test_a_mesh_does_not_leave_the_folder_by_a_link(tmp_path):
         assert "leads out of the folder" in mesh_file(folder, name).what
 
 
+def test_a_mesh_is_read_by_its_name(tmp_path):
+    """The folder may differ where the shape is drawn: with a result, the scene has none."""
+    (tmp_path / "crank.stl").write_text("solid")
+    mesh = '[shapes.m]\ntype = "mesh"\nbody = "crank"\nfile = "crank.stl"\n'
+    (shape,) = read_shapes(Collector(written(tmp_path, mesh)), {"ground": 0, "crank": 1})
+    assert shape.values["file"] == "crank.stl"
+
+
 def test_a_mesh_that_is_not_there_is_told_with_the_nearest_name(tmp_path):
     (tmp_path / "crank.stl").write_text("solid")
     assert mesh_file(tmp_path, "crank.stl") == tmp_path / "crank.stl"
