@@ -45,10 +45,6 @@ class _Commands(Mapping[str, click.Command]):
 class App(click.Group):
     """The group of commands; suggests the right spelling of a command."""
 
-    def __init__(self, *args: Any, **options: Any) -> None:
-        super().__init__(*args, **options)
-        self.commands = _Commands()  # type: ignore[assignment]  # none is added at run time
-
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the commands, in the order of the table."""
         return list(COMMANDS)
@@ -67,7 +63,11 @@ class App(click.Group):
         return super().resolve_command(ctx, args)
 
 
-@click.group(cls=App, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=App,
+    commands=_Commands(),
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(package_name="dap3d", prog_name="dap3d")
 @DEBUG
 @NO_COLOR

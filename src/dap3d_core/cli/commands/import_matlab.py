@@ -1,7 +1,7 @@
 """``dap3d import-matlab``: a scene made of a model of the MATLAB program."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -48,6 +48,8 @@ def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json:
 
     The report says what was read, defaulted, changed and left out. Needs the extra "matlab".
     """
+    import attrs
+
     import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json, stdout
     from dap3d_core.cli.framework.paths import writable, write_text
@@ -64,23 +66,12 @@ def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json:
     if plugin is not None:
         write_text(plugin, report.stub)
     if as_json:
-        print_json(_data(scene, report, target, plugin))
+        holds = {table: len(getattr(scene, table)) for table, _, _ in TABLES}
+        about = {"scene": target, "plugin": plugin, "holds": holds}
+        print_json(about | attrs.asdict(report))
     else:
         _show(stdout(), scene, report, target, plugin, stub=stub)
     return DONE
-
-
-def _data(
-    scene: "Scene", report: "ImportReport", target: Path, plugin: Path | None
-) -> dict[str, Any]:
-    import attrs
-
-    return {
-        "scene": target,
-        "plugin": plugin,
-        "holds": {table: len(getattr(scene, table)) for table, _, _ in TABLES},
-        **attrs.asdict(report),
-    }
 
 
 def _show(

@@ -60,12 +60,9 @@ def new_plugin(
         print_json({"keyword": name, "kind": kind, "folder": folder, "files": list(texts),
                     "module": names["module"], "next": commands})  # fmt: skip
         return DONE
-    lists = {
-        f"{folder} holds a package with the {kind} type {name}:": texts,
-        "What comes next:": commands,
-    }
-    for heading, lines in lists.items():
-        stdout().say(heading)
+    heading = f"{folder} holds a package with the {kind} type {name}:"
+    for title, lines in ((heading, texts), ("What comes next:", commands)):
+        stdout().say(title)
         for line in lines:
             stdout().say(line, indent=4, whole=True)
     return DONE

@@ -86,6 +86,8 @@ def plot(
     dap3d plot pen1-sweep.nc cone.r.z:max --x bodies.cone.mass
     """
     from dap3d_core.cli.console.console import show_written
+    from dap3d_core.plot import WIDTH, save_plot, show_plot
+    from dap3d_core.result import ResultError, UnknownNameError
 
     files = [result, *(word for word in quantities if word.endswith(SUFFIX))]
     names = tuple(word for word in quantities if not word.endswith(SUFFIX))
@@ -93,9 +95,15 @@ def plot(
     target = None if show and output is None else Path(output or Path(result).stem + ".png")
     axes: dict[str, Any] = {"x": x, "at": cuts}
     sides = {"width": width, "height": height}.items()
-    size = {side: None if mm is None else mm / MM_PER_INCH for side, mm in sides}
+    size: dict[str, Any] = {side: None if mm is None else mm / MM_PER_INCH for side, mm in sides}
     _check(data, names, target, axes, size, files, force)
-    _draw(data, names, target, show, force, **axes, **size)
+    size["width"] = size["width"] or WIDTH
+    if target is not None:
+        with refusing(UnknownNameError, ValueError):
+            save_plot(data, names, target, force=force, **axes, **size)
+    if show:
+        with refusing(UnknownNameError, ResultError, ValueError):
+            show_plot(data, names, **axes, **size)
     if target is not None:
         drawn = axes if hasattr(data, "data_vars") else {"x": x or "t"}
         about = {"results": files, "quantities": names} | drawn
@@ -200,18 +208,3 @@ def _check(
         checks += [partial(picture_of, data, [name], None, None) for name in names]
         checks += [partial(picture_of, data, ["t"], axes["x"], None)]
     refuse_all(*checks)
-
-
-def _draw(
-    data: Any, names: tuple[str, ...], target: Path | None, show: bool, force: bool, **settings: Any
-) -> None:
-    from dap3d_core.plot import WIDTH, save_plot, show_plot
-    from dap3d_core.result import ResultError, UnknownNameError
-
-    settings["width"] = settings["width"] or WIDTH
-    if target is not None:
-        with refusing(UnknownNameError, ValueError):
-            save_plot(data, names, target, force=force, **settings)
-    if show:
-        with refusing(UnknownNameError, ResultError, ValueError):
-            show_plot(data, names, **settings)

@@ -3,16 +3,13 @@
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command, signals_of
 from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
-
-if TYPE_CHECKING:
-    from dap3d_core.view import View
 
 
 @command(
@@ -34,11 +31,13 @@ def view(
     *,
     output: str | None,
     quantities: tuple[str, ...],
+    fps: float | None,
+    model: str | None,
+    allow_code: bool,
     opens: bool,
     force: bool,
     as_json: bool,
     quiet: bool,
-    **settings: Any,
 ) -> int:
     """Make a page of a RESULT or a sweep: the moving scene, plots, the ledger, settings.
 
@@ -54,76 +53,51 @@ def view(
 
     Points of a sweep are run again, 50 of many, and chosen in the page by sliders.
     """
+    from dap3d_core.cli.console.console import show_written
+    from dap3d_core.cli.console.progress import PointsProgress
     from dap3d_core.cli.framework.paths import beside, writable
-    from dap3d_core.study.sweep.dataset import is_sweep
+    from dap3d_core.result import UnknownNameError
+    from dap3d_core.view import view as make_view
 
     target = beside(result, output, ".html")
     if target.suffix.lower() not in (".html", ".htm"):
         raise Refused(f"cannot write {target}: a page is a .html file")
     check_target = partial(writable, target, force=force, sources=(Path(result),))
-    if is_sweep(result):
-        page = _view_sweep(ctx, result, check_target, quantities, quiet=quiet or as_json,
-                           **settings)  # fmt: skip
-    else:
-        page = _view_result(result, check_target, quantities, **settings)
+    data = _data(result, quantities, check_target, model=model, allow_code=allow_code)
+    with (
+        PointsProgress(quiet=quiet or as_json) as progress,
+        refusing(UnknownNameError, ValueError),
+    ):
+        count = signals_of(ctx).interruptible(progress.count)
+        page = make_view(data, *quantities, fps=fps, model=model, allow_code=allow_code,
+                         progress=count, announce=progress.announce)  # fmt: skip
     page.save(target, force=force)
-    _report(page, target, as_json=as_json, quiet=quiet)
+    about = {"instants": page.instants, "quantities": list(page.data["asked"])}
+    contents = f"{page.instants} instants"
+    if "sweep" in page.data:
+        about["points"] = len(page.data["sweep"]["points"])
+        contents = f"{about['points']} points"
+    notes = page.data["about"]["view_notes"]
+    show_written(target, contents, about, notes, as_json=as_json, quiet=quiet)
     if opens:
         _open(target)
     return DONE
 
 
-def _report(page: "View", target: Path, *, as_json: bool, quiet: bool) -> None:
-    from dap3d_core.cli.console.console import show_written
+def _data(
+    file: str, quantities: tuple[str, ...], check_target: Callable[[], object], **types: Any
+) -> Any:
+    """The result or the sweep in a file; refused together with other faults."""
+    from dap3d_core.cli.framework.paths import open_result, open_sweep, refuse_all
+    from dap3d_core.study.sweep.dataset import is_sweep
 
-    data = {"instants": page.instants, "quantities": list(page.data["asked"])}
-    contents = f"{page.instants} instants"
-    if "sweep" in page.data:
-        data["points"] = len(page.data["sweep"]["points"])
-        contents = f"{data['points']} points"
-    notes = page.data["about"]["view_notes"]
-    show_written(target, contents, data, notes, as_json=as_json, quiet=quiet)
-
-
-def _view_result(
-    file: str,
-    check_target: Callable[[], object],
-    quantities: tuple[str, ...],
-    *,
-    fps: float | None,
-    model: str | None,
-    allow_code: bool,
-) -> "View":
-    from dap3d_core.cli.framework.paths import open_result, refuse_all
-    from dap3d_core.result import UnknownNameError
-    from dap3d_core.view import view as make_view
-
-    result = open_result(file, model=model, allow_code=allow_code)
-    refuse_all(check_target, *(partial(result.quantity, name) for name in quantities))
-    with refusing(UnknownNameError, ValueError):
-        return make_view(result, *quantities, fps=fps, model=model)
-
-
-def _view_sweep(
-    ctx: click.Context,
-    file: str,
-    check_target: Callable[[], object],
-    quantities: tuple[str, ...],
-    *,
-    quiet: bool,
-    **settings: Any,
-) -> "View":
-    """The page of a sweep; its points are run again."""
-    from dap3d_core.cli.console.progress import PointsProgress
-    from dap3d_core.cli.framework.paths import open_sweep
-    from dap3d_core.result import UnknownNameError
-    from dap3d_core.view import view as make_view
-
-    data = open_sweep(file)
-    check_target()
-    with PointsProgress(quiet=quiet) as progress, refusing(UnknownNameError, ValueError):
-        count = signals_of(ctx).interruptible(progress.count)
-        return make_view(data, *quantities, progress=count, announce=progress.announce, **settings)
+    if is_sweep(file):
+        data: Any = open_sweep(file)
+        check_target()
+    else:
+        data = open_result(file, **types)
+        refuse_all(check_target, *(partial(data.quantity, name) for name in quantities))
+    return data
 
 
 def _open(target: Path) -> None:

@@ -257,21 +257,17 @@ def degrees_of_freedom(number: int) -> str:
 
 def _integrator(data: dict[str, Any]) -> str:
     """The integrator, and the control of its step."""
-    settings = data["settings"]
-    text = str(data["integrator"])
+    settings, text = data["settings"], str(data["integrator"])
     if settings.get("step"):
         text += f", steps of {settings['step']:g} s"
     elif settings.get("rtol") is not None:
-        text += f", rtol {settings['rtol']:g}, atol {_atol(settings['atol'])}"
+        atol = settings["atol"]
+        parts = atol.items() if isinstance(atol, dict) else [("", atol)]
+        limits = ", ".join(f"{name and f'{name} = '}{value:g}" for name, value in parts)
+        text += f", rtol {settings['rtol']:g}, atol {limits}"
     if data["rows"]:
         text += ", projected" if settings.get("project") else ", not projected"
     return text
-
-
-def _atol(atol: Any) -> str:
-    if isinstance(atol, dict):
-        return ", ".join(f"{name} = {value:g}" for name, value in atol.items())
-    return f"{atol:g}"
 
 
 def _simulated(data: dict[str, Any]) -> str:

@@ -7,9 +7,7 @@ from dap3d_core.cli.console.console import Terminal, scene_name, seconds
 from dap3d_core.result.file.lazy_arrays import LARGE
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray
-    from numpy.typing import NDArray
 
 #: Failed points that are printed, and that JSON holds.
 LISTED, MOST_FAILING = 10, 1000
@@ -25,7 +23,7 @@ def sweep_data(dataset: "xarray.Dataset") -> dict[str, Any]:
 
     status = dataset["status"].values
     counts = np.bincount(status.ravel().clip(0, 3), minlength=4).tolist()
-    about = dataset.attrs
+    about, failing = dataset.attrs, np.argwhere(status >= 2)
     return {
         "model": about["model"],
         "points": int(status.size),
@@ -39,7 +37,7 @@ def sweep_data(dataset: "xarray.Dataset") -> dict[str, Any]:
             for output in json.loads(about["outputs"])
             if output["name"] in dataset.variables
         ],
-        "failing": _failing(dataset, status),
+        "failing": [_failure(dataset, tuple(map(int, row))) for row in failing[:MOST_FAILING]],
         "versions": json.loads(about["versions"]),
     }
 
@@ -81,17 +79,11 @@ def _point(
     return point
 
 
-def _failing(dataset: "xarray.Dataset", status: "NDArray[np.int8]") -> list[dict[str, Any]]:
-    """The first points that stopped early or failed."""
-    import numpy as np
-
-    failing = []
-    for row in np.argwhere(status >= 2)[:MOST_FAILING]:
-        index = tuple(map(int, row))
-        at = _point(dataset, dataset["status"].dims, index)
-        note = str(dataset["note"][index].values)
-        failing.append({"at": at, "status": FAILURES[min(int(status[index]), 3)], "note": note})
-    return failing
+def _failure(dataset: "xarray.Dataset", index: tuple[int, ...]) -> dict[str, Any]:
+    """A point that stopped early or failed."""
+    status = dataset["status"]
+    at, word = _point(dataset, status.dims, index), FAILURES[min(int(status[index]), 3)]
+    return {"at": at, "status": word, "note": str(dataset["note"][index].values)}
 
 
 def show_sweep(console: Terminal, data: dict[str, Any], file: str = "") -> None:
@@ -134,8 +126,7 @@ def show_failing(console: Terminal, data: dict[str, Any], others: str) -> None:
 
 def _in_words(at: dict[str, Any]) -> str:
     """A point in words."""
-    head = [f"point {at['point']}"] if "point" in at else []
-    return ", ".join([*head, *(f"{k} = {v:.6g}" for k, v in at.items() if k != "point")])
+    return ", ".join(f"point {v}" if k == "point" else f"{k} = {v:.6g}" for k, v in at.items())
 
 
 def _design(data: dict[str, Any]) -> str:

@@ -5,7 +5,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any
 
 from dap3d_core.cli.process.exit_codes import Terminated
@@ -41,12 +41,7 @@ class SignalHandler:
         self._hook, sys.unraisablehook = sys.unraisablehook, self._resend
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         sys.unraisablehook = self._hook
         for number, before in self._before.items():
             signal.signal(number, before)
