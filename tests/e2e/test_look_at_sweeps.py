@@ -66,10 +66,12 @@ def test_plot_draws_a_sweep(dap3d, refuse, file):
     cut = dap3d("plot", file, "J1.force.norm:max", "--at", f"{MASS}=2", "-o", "a.svg", "--json")
     assert json.loads(cut.stdout) == {
         "file": "a.svg",
+        "size_bytes": (dap3d.folder / "a.svg").stat().st_size,
         "results": [file],
         "quantities": ["J1.force.norm:max"],
         "x": None,
         "at": {MASS: 2.0},
+        "notes": [],
     }
     drawn = (dap3d.folder / "a.svg").read_text()
     assert f"{MASS} = 2 kg" in drawn

@@ -1,9 +1,9 @@
 """Error messages with their exit codes; a traceback only with ``--debug``."""
 
 import contextlib
+import os
 import sys
 import traceback
-from pathlib import Path
 from typing import Any
 
 from dap3d_core.cli.console.console import Terminal, plain, print_json, stderr
@@ -78,7 +78,7 @@ def _judge(error: BaseException) -> tuple[int, str]:
     if _is_unexpected(error):
         text = " ".join(str(error).split())
         return exit_codes.FAILED, f"unexpected {type(error).__name__}{text and f': {text}'}"
-    if isinstance(error, FileNotFoundError) and not Path().exists():
+    if isinstance(error, FileNotFoundError) and _folder_is_gone():
         text = "the current folder no longer exists; change to another one (cd)"
         return exit_codes.REFUSED, text
     if part := getattr(error, "part", None):  # a disk that filled up during a run
@@ -90,6 +90,15 @@ def _judge(error: BaseException) -> tuple[int, str]:
         file = f"{error.filename}: " if error.filename else ""
         return exit_codes.FAILED, f"cannot read or write: {file}{error.strerror}"
     return exit_codes.FAILED, str(error)
+
+
+def _folder_is_gone() -> bool:
+    """True if the working folder was removed; its entry "." exists all the same."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return True
+    return False
 
 
 def _is_unexpected(error: BaseException) -> bool:
