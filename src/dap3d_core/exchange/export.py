@@ -9,7 +9,7 @@ import attrs
 from dap3d_core.result import Result, ResultError
 from dap3d_core.result.file.atomic_write import whole_file
 from dap3d_core.scene import Scene
-from dap3d_core.view.scene3d.sampled_motion import chosen, thinned
+from dap3d_core.view.scene3d.sampled_motion import at_instants, instants_to_show
 from dap3d_core.view.scene3d.scene_data import scene_of
 
 #: Format -> suffix of its files.
@@ -70,7 +70,7 @@ def export(
     if not len(result.t):
         raise ValueError("the result has no instants: there is nothing to export")
     check_fps(fps)
-    shown = result if fps is None else thinned(result, chosen(result.t, 1, fps))
+    shown = result if fps is None else at_instants(result, instants_to_show(result.t, 1, fps))
     with whole_file(target, force) as part:
         if kind in ("vtk", "gltf"):
             notes = _write_scene(shown, scene_of(shown, model), part, kind, progress)

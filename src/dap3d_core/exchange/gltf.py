@@ -183,7 +183,7 @@ class _Document:
             data = np.ascontiguousarray(values, dtype="<u4" if whole else "<f4")
         if not np.all(np.isfinite(data)):
             raise ResultError(
-                "the motion reaches places that the single precision of glTF does not hold: export "
+                "the motion reaches points that the single precision of glTF does not hold: export "
                 "it as vtk, or its arrays as mat or csv"
             )
         view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.data)}

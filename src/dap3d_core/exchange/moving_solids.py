@@ -8,9 +8,10 @@ from dap3d_core.model.rotations import to_global
 from dap3d_core.result import Result
 from dap3d_core.scene.scene import Scene
 from dap3d_core.view.scene3d.camera import stage
+from dap3d_core.view.scene3d.elements import elements_of
 from dap3d_core.view.scene3d.primitives import Span, turned_to
 from dap3d_core.view.scene3d.sampled_motion import Motion
-from dap3d_core.view.scene3d.scene_data import elements_of, notes_of, scene_geometry
+from dap3d_core.view.scene3d.scene_data import notes_of, scene_geometry
 from dap3d_core.view.scene3d.shapes import Line, Part, parts_of
 from dap3d_core.view.scene3d.solids import Triangles, solid, spring
 

@@ -129,14 +129,14 @@ def _blocks(scene: MovingScene, count: int) -> Iterator[Floats]:
         some = slice(start, min(start + step, len(r)))
         out, end = np.empty((some.stop - start, count, 3)), 0
         for body, local in bodies:
-            places = slice(end, end := end + len(local))
-            out[:, places] = local
+            index = slice(end, end := end + len(local))
+            out[:, index] = local
             if body:
                 A = rotation(p[some, body - 1])
-                out[:, places] = r[some, body - 1, None] + local @ A.transpose(0, 2, 1)
+                out[:, index] = r[some, body - 1, None] + local @ A.transpose(0, 2, 1)
         for one in scene.stretched:
-            places = slice(end, end := end + len(one.form.vertices))
-            out[:, places] = [one.vertices(k) for k in range(some.start, some.stop)]
+            index = slice(end, end := end + len(one.form.vertices))
+            out[:, index] = [one.vertices(k) for k in range(some.start, some.stop)]
         yield out
 
 

@@ -9,9 +9,10 @@ import attrs
 from dap3d_core.result import Result, find
 from dap3d_core.scene.scene import Scene
 from dap3d_core.view.scene3d.arrows import arrows_of
-from dap3d_core.view.scene3d.primitives import packed
-from dap3d_core.view.scene3d.sampled_motion import Motion, chosen, thinned
-from dap3d_core.view.scene3d.scene_data import elements_of, geometry_of
+from dap3d_core.view.scene3d.elements import elements_of
+from dap3d_core.view.scene3d.primitives import pack
+from dap3d_core.view.scene3d.sampled_motion import Motion, at_instants, instants_to_show
+from dap3d_core.view.scene3d.scene_data import geometry_of
 
 #: Curves that every page can draw besides those derived from motion and reactions.
 USUAL = ("energy.kinetic", "energy.potential", "energy.total")
@@ -42,18 +43,18 @@ def page_data(
         raise ValueError("the result has no instants: there is nothing to show")
     if fps is not None and not (math.isfinite(fps) and 0.0 < fps <= 1e6):
         raise ValueError(f"fps = {fps:g}: the number of frames a second is greater than 0")
-    places = chosen(result.t, share * result.subject.body_count, fps)
-    shown = thinned(result, places)
+    index = instants_to_show(result.t, share * result.subject.body_count, fps)
+    shown = at_instants(result, index)
     elements = elements_of(result)
     geometry = geometry_of(shown, scene, elements)
     arrows = arrows_of(shown, elements, geometry["stage"]["size"])
     notes = [*geometry.pop("notes"), *arrows.pop("notes")]
-    if len(places) < len(result.t):
-        notes.append(f"{len(places)} of {len(result.t)} reported instants are on this page")
+    if len(index) < len(result.t):
+        notes.append(f"{len(index)} of {len(result.t)} reported instants are on this page")
     return {
-        "instants": len(places),
-        "t": packed(shown.t, "<f8"),
-        "poses": packed(Motion(shown).poses),
+        "instants": len(index),
+        "t": pack(shown.t, "<f8"),
+        "poses": pack(Motion(shown).poses),
         **geometry,
         **arrows,
         "series": [_series(shown, name) for name in dict.fromkeys((*USUAL, *quantities))],
@@ -63,14 +64,14 @@ def page_data(
 
 
 def _series(result: Result, name: str) -> dict[str, Any]:
-    found = find(result, name)
+    quantity = find(result, name)
     return {
         "name": name,
-        "label": found.label,
-        "unit": found.unit,
-        "components": list(found.components),
-        "values": packed(found.values, "<f8"),
-        "rates": packed(find(result, found.rate).values, "<f8") if found.rate else None,
+        "label": quantity.label,
+        "unit": quantity.unit,
+        "components": list(quantity.components),
+        "values": pack(quantity.values, "<f8"),
+        "rates": pack(find(result, quantity.rate).values, "<f8") if quantity.rate else None,
     }
 
 

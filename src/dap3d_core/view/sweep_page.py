@@ -240,14 +240,14 @@ class _PointPages:
 
 def _outputs_of(result: Result, point: "xarray.Dataset") -> list[str]:
     """The quantities from which the outputs of a sweep are computed."""
-    found = []
+    names = []
     for name in map(str, point.data_vars):
         quantity, _, reduction = name.rpartition(":")
         try:
-            found.append(find(result, quantity if reduction in REDUCTIONS else name).name)
+            names.append(find(result, quantity if reduction in REDUCTIONS else name).name)
         except (UnknownNameError, ResultError):
             continue
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(names))
 
 
 def _joined(

@@ -14,7 +14,13 @@ from dap3d_core.plot.figure_file import FORMATS as PICTURES
 from dap3d_core.plot.figure_file import fixed_files
 from dap3d_core.plot.film.encoding import FILMS, write_film
 from dap3d_core.plot.film.frame import Stage
-from dap3d_core.plot.film.projection import camera_of, leaves, round_number, shown, with_margin
+from dap3d_core.plot.film.projection import (
+    camera_of,
+    leaves,
+    round_number,
+    visible_rectangle,
+    with_margin,
+)
 from dap3d_core.plot.film.stick_figure import pose_at, sticks_of
 from dap3d_core.result import Result
 from dap3d_core.result.file.atomic_write import whole_file
@@ -137,7 +143,7 @@ def _stage_of(
     extent = sticks.extent(result, np.eye(3))
     camera = camera_of(view, extent)
     limits = with_margin(extent) if sticks.limits is None or fit else sticks.limits
-    seen = shown(camera, limits, sticks.extent(result, camera.axes))
+    seen = visible_rectangle(camera, limits, sticks.extent(result, camera.axes))
     stage = Stage(sticks, camera, limits, seen, size, result.record.title)
     notes = () if sticks.shapes is None else sticks.shapes.notes
     return stage, (*notes, BEYOND) if leaves(limits, extent, camera) else notes

@@ -32,7 +32,7 @@ class FilmFormat(NamedTuple):
 
 
 def write_film(form: FilmFormat, part: Path, target: Path, frames: Frames, fps: float) -> None:
-    """Write frames, (height, width, 4) bytes each, which are used before the next is asked for.
+    """Write frames, (height, width, 4) bytes each, each used before the next is requested.
 
     Raises:
         ResultError: the disk or the encoder refuses; no ffmpeg.

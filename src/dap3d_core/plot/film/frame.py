@@ -15,7 +15,7 @@ from dap3d_core.plot.film.projection import (
     AXES,
     PLANES,
     Camera,
-    filling,
+    fill_limits,
     floor_grid,
     grid_spacing,
 )
@@ -159,7 +159,7 @@ class Stage:
         self.figure.set_figheight(height)
         high = max(0.3, height - TOP - below)
         ax = self.figure.add_axes((left / WIDTH, below / height, wide / WIDTH, high / height))
-        (x0, x1), (y0, y1) = filling(shown, wide, high)
+        (x0, x1), (y0, y1) = fill_limits(shown, wide, high)
         ax.set_xlim(x0, x1)
         ax.set_ylim(y0, y1)
         if plane:

@@ -97,7 +97,7 @@ def leaves(limits: Floats, extent: Floats, camera: Camera) -> bool:
     return bool(np.any(extent[seen, 0] < low) or np.any(extent[seen, 1] > high))
 
 
-def shown(camera: Camera, limits: Floats, motion: Floats) -> Floats:
+def visible_rectangle(camera: Camera, limits: Floats, motion: Floats) -> Floats:
     """The visible rectangle (2, 2): least and largest in the directions of the picture, m.
 
     Args:
@@ -119,7 +119,7 @@ def _extent(points: Floats) -> Floats:
     return np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
 
 
-def filling(rectangle: Floats, width: float, height: float) -> Floats:
+def fill_limits(rectangle: Floats, width: float, height: float) -> Floats:
     """The limits (2, 2) around a rectangle (2, 2) that have the shape of width x height."""
     middle, size = rectangle.mean(axis=1), rectangle[:, 1] - rectangle[:, 0]
     half = 0.5 * max(size[0] / width, size[1] / height) * np.array([width, height])

@@ -10,15 +10,15 @@ from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import to_global
 from dap3d_core.plot.film.projection import Camera
 from dap3d_core.scene.scene import Scene
-from dap3d_core.view.scene3d.shapes import GROUND_COLOR, drawn, parts_of
+from dap3d_core.view.scene3d.shapes import GROUND_COLOR, parts_of, scene_shapes
 
 #: Shapes of more triangles are not drawn: every picture of a film draws all of them.
 MOST_TRIANGLES = 30_000
 #: Longer edges, as parts of the largest shape, are divided: the middle of a large triangle says
 #: little of what it hides.
 LONGEST = 0.12
-#: The darkest face of a shape, as part of its colour; where light comes from beside the viewer.
-DARKEST, BESIDE = 0.55, (0.3, 0.5)
+#: The darkest face of a shape, as a fraction of its colour; obliqueness of the light.
+DARKEST, OBLIQUE = 0.55, (0.3, 0.5)
 
 
 @attrs.frozen(eq=False)
@@ -53,14 +53,14 @@ class Shapes:
 
     def seen(self, r: Floats, p: Floats, camera: Camera) -> tuple[Floats, Floats]:
         """Triangles (q, 3, 2) in the picture, from back to front, and their colours (q, 3)."""
-        places = self.local.copy()
+        points = self.local.copy()
         moving = self.body > 0
         on = self.body[moving] - 1
-        places[moving] = r[on] + to_global(p[on], self.local[moving])
-        corners = places[self.triangles]
+        points[moving] = r[on] + to_global(p[on], self.local[moving])
+        corners = points[self.triangles]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normal, axis=1)
-        light = camera.towards + BESIDE[0] * camera.right + BESIDE[1] * camera.up
+        light = camera.towards + OBLIQUE[0] * camera.right + OBLIQUE[1] * camera.up
         bright = np.abs(normal @ (light / np.linalg.norm(light))) / np.where(length, length, 1.0)
         order = np.argsort(camera.depth(corners).mean(axis=1), kind="stable")
         shade = DARKEST + (1.0 - DARKEST) * bright[order, None]
@@ -68,14 +68,14 @@ class Shapes:
 
 
 def shapes_of(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Shapes:
-    """The shapes of a scene; arguments as of ``view.scene3d.shapes.drawn``."""
-    found = drawn(scene, names, colors)
-    notes = list(found.notes)
-    parts = [(part, part.vertices) for part in parts_of(found.marks, found.meshes)]
+    """The shapes of a scene; arguments as of ``view.scene3d.shapes.scene_shapes``."""
+    shapes = scene_shapes(scene, names, colors)
+    notes = list(shapes.notes)
+    parts = [(part, part.vertices) for part in parts_of(shapes.marks, shapes.meshes)]
     size = max((float(np.max(np.ptp(local, axis=0))) for _, local in parts), default=0.0)
     pieces = [(part.body, *_divided(local, part.form.triangles, size), part.color)
               for part, local in parts]  # fmt: skip
-    for line in found.lines:  # triangles without an area, whose edges are visible
+    for line in shapes.lines:  # triangles without an area, whose edges are visible
         k = np.arange(len(line.points) - 1)
         pieces.append((line.body, line.vertices, np.stack([k, k + 1, k + 1], axis=1), line.color))
     if sum(len(piece[2]) for piece in pieces) > MOST_TRIANGLES:
@@ -106,7 +106,7 @@ def _rgb(color: str) -> tuple[float, float, float]:
 
 
 def _divided(local: Floats, triangles: Integers, size: float) -> tuple[Floats, Integers]:
-    """Triangles whose edges are short: each long one becomes four, some times."""
+    """Triangles with short edges: long ones are divided into four, repeatedly."""
     corners = local[triangles]
     for _ in range(4):
         edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)

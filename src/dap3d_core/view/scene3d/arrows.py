@@ -8,9 +8,8 @@ import numpy as np
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import Result, ResultError, UnknownNameError
 from dap3d_core.result.post.reactions import Reaction
-from dap3d_core.view.scene3d.elements import ORIGIN, Placed
-from dap3d_core.view.scene3d.primitives import packed
-from dap3d_core.view.scene3d.scene_data import Elements
+from dap3d_core.view.scene3d.elements import ORIGIN, ElementGeometry, Elements
+from dap3d_core.view.scene3d.primitives import pack
 
 #: An arrow below this fraction of the largest of its kind is left out.
 SMALLEST = 1e-9
@@ -44,7 +43,7 @@ def arrows_of(result: Result, elements: Elements, size: float) -> dict[str, Any]
         least = max(least * size, SMALLEST * largest)  # forces that cancel leave rounding moments
         visible = [(arrow, length) for arrow, length in alike if length.max() > least]
         scales[what] = _scale([length for _, length in visible], size)
-        arrows += [{**arrow, "values": packed(arrow["values"])} for arrow, _ in visible]
+        arrows += [{**arrow, "values": pack(arrow["values"])} for arrow, _ in visible]
     return {"arrows": arrows, "scales": scales, "notes": notes}
 
 
@@ -79,7 +78,9 @@ def _applied(result: Result, elements: Elements, notes: list[str]) -> Iterator[d
                 yield from _pair("forces", force, slot, action)
 
 
-def _pair(layer: str, one: Placed, slot: str, action: Reaction) -> Iterator[dict[str, Any]]:
+def _pair(
+    layer: str, one: ElementGeometry, slot: str, action: Reaction
+) -> Iterator[dict[str, Any]]:
     body, at = one.place(slot)
     moment = action.moment if action.local is None else action.moment_at_point
     if action.local is None:

@@ -6,51 +6,50 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.result.model_summary import Subject
-from dap3d_core.view.scene3d.elements import ORIGIN, Placed
-from dap3d_core.view.scene3d.primitives import Located, Mark, ball, plain, rod
-from dap3d_core.view.scene3d.sampled_motion import Motion
+from dap3d_core.view.scene3d.elements import ORIGIN, ElementGeometry
+from dap3d_core.view.scene3d.primitives import Mark, Point, ball, plain, rod
 
 #: Points this near, relative to the largest coordinate, are one.
 _SAME = 1e-6
 
 
-def attached(subject: Subject, elements: Iterable[Placed]) -> list[list[tuple[float, ...]]]:
+def attachment_points(subject: Subject, elements: Iterable[ElementGeometry]) -> list[list[Point]]:
     """The points (m, body axes) of each body, ground first: its own, and those of elements.
 
     The origin is left out, and so are duplicates.
     """
-    found: list[list[tuple[float, ...]]] = [[] for _ in range(subject.body_count + 1)]
+    attached: list[list[Point]] = [[] for _ in range(subject.body_count + 1)]
     for body, at in zip(subject.point_body, subject.point_local, strict=True):
-        found[int(body)].append(plain(at))
+        attached[int(body)].append(plain(at))
     for one in elements:
         for body, at in one.points.values():
-            found[body].append(at)
-    return [_distinct(places) for places in found]
+            attached[body].append(at)
+    return [_distinct(points) for points in attached]
 
 
-def _distinct(places: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-    size = max((abs(x) for place in places for x in place), default=0.0)
-    kept: dict[tuple[int, ...], tuple[float, ...]] = {}
-    for place in places:
-        if size > 0.0 and max(map(abs, place)) > _SAME * size:
-            kept.setdefault(tuple(round(x / (_SAME * size)) for x in place), place)
+def _distinct(points: list[Point]) -> list[Point]:
+    size = max((abs(x) for point in points for x in point), default=0.0)
+    kept: dict[tuple[int, ...], Point] = {}
+    for point in points:
+        if size > 0.0 and max(map(abs, point)) > _SAME * size:
+            kept.setdefault(tuple(round(x / (_SAME * size)) for x in point), point)
     return list(kept.values())
 
 
-def unit_of(places: list[list[tuple[float, ...]]], size: float) -> float:
+def unit_of(points: list[list[Point]], size: float) -> float:
     """Radius of a link, m, by the usual length of links and the size of the scene, m."""
-    lengths = [float(np.linalg.norm(at)) for on_body in places[1:] for at in on_body]
+    lengths = [float(np.linalg.norm(at)) for on_body in points[1:] for at in on_body]
     usual = 0.05 * float(np.median(lengths)) if lengths else 0.01 * size
     return float(np.clip(usual, 0.0012 * size, 0.008 * size))
 
 
-def links(body: int, places: list[tuple[float, ...]], unit: float, color: str, name: str,
-          *, ends: Iterable[tuple[float, ...]] = ()) -> list[Mark]:  # fmt: skip
+def links(body: int, points: list[Point], unit: float, color: str, name: str,
+          *, ends: Iterable[Point] = ()) -> list[Mark]:  # fmt: skip
     """Links of a radius ``unit`` from the origin of a body to points, and a ball at its origin.
 
     ``ends`` are the points that have a ball, as no joint is drawn there.
     """
-    marks = [rod("bodies", body, ORIGIN, at, unit, color=color, owner=name) for at in places]
+    marks = [rod("bodies", body, ORIGIN, at, unit, color=color, owner=name) for at in points]
     marks.append(ball("bodies", body, ORIGIN, 1.5 * unit, color=color, owner=name))
     marks += [ball("bodies", body, at, 1.25 * unit, color=color, owner=name) for at in ends]
     return marks
@@ -71,7 +70,7 @@ def inertia_ellipsoid(body: int, mass: float, Jp: Floats, most: float, color: st
     return Mark("inertia", "sphere", body, ORIGIN, plain(semi), _quaternion(axes), color, name)
 
 
-def _quaternion(A: Floats) -> tuple[float, ...]:
+def _quaternion(A: Floats) -> Point:
     """Euler parameters of a rotation matrix (3, 3): of the four forms the best conditioned."""
     trace = np.array([A.trace(), *A.diagonal()])
     k = int(np.argmax(trace))
@@ -83,9 +82,3 @@ def _quaternion(A: Floats) -> tuple[float, ...]:
         square[n + 1, n + 1] = 1 + 2 * A[n, n] - A.trace()
     row = square[k]
     return plain(row / np.linalg.norm(row))
-
-
-def framing(motion: Motion, places: list[list[tuple[float, ...]]]) -> list[Located]:
-    """The points that the page must show: origins and points of all bodies."""
-    points = [(k, at) for k, on in enumerate(places) for at in on]
-    return [*((k, ORIGIN) for k in range(1, motion.result.subject.body_count + 1)), *points]

@@ -1,4 +1,4 @@
-"""Camera of pages: the upward direction, the ground grid, the place of the eye."""
+"""Camera of pages: the upward direction, the ground grid, the position of the eye."""
 
 from typing import Any
 
@@ -35,7 +35,7 @@ def stage(reached: Extent, gravity: tuple[float, ...] | None) -> dict[str, Any]:
         "center": plain(0.5 * (low + high)),
         "extent": plain(extent),
         "size": size,
-        "farthest": [[float(f"{x:.6g}") for x in place] for place in farthest],
+        "farthest": [[float(f"{x:.6g}") for x in point] for point in farthest],
         "up": plain(up + 0.0),
         "ground": 0.0 if near_zero else least - 0.02 * size,
         "eye": plain(_eye(up, flat)),

@@ -39,13 +39,13 @@ def colors(names: Sequence[object], joints: Iterable[Sequence[int]] = ()) -> lis
     free = [c for c in CYCLE if c not in given] or list(CYCLE)
     unnamed = [k for k, word in enumerate(given, 1) if not word]
     chains = [[k] for k in unnamed] if len(unnamed) <= len(CYCLE) else chains_of(len(given), joints)
-    found = list(given)
+    result = list(given)
     for number, chain in enumerate(chains):
         links = [k for k in chain if not given[k - 1]]
-        for place, k in enumerate(links):
-            share = LIGHTEST * place / max(1, len(links) - 1)
-            found[k - 1] = _lighter(free[number % len(free)], share)
-    return found
+        for number_in_chain, k in enumerate(links):
+            share = LIGHTEST * number_in_chain / max(1, len(links) - 1)
+            result[k - 1] = _lighter(free[number % len(free)], share)
+    return result
 
 
 def chains_of(count: int, joints: Iterable[Sequence[int]]) -> list[list[int]]:

@@ -8,13 +8,14 @@ import attrs
 from dap3d_core.interface.fields import slot_of, specs_of
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Group
-from dap3d_core.view.scene3d.primitives import Located, plain
+from dap3d_core.result import Result, ResultError
+from dap3d_core.view.scene3d.primitives import Located, Point, plain
 
 ORIGIN = (0.0, 0.0, 0.0)
 
 
 @attrs.frozen
-class Placed:
+class ElementGeometry:
     """A joint or a force with its geometry.
 
     Attributes:
@@ -41,18 +42,37 @@ class Placed:
         return self.points.get(slot, (self.bodies[slot], ORIGIN))
 
 
-def joints_of(model: Model) -> list[Placed]:
+@attrs.frozen
+class Elements:
+    """Joints and forces; none, and why, where the model cannot be made again."""
+
+    joints: list[ElementGeometry]
+    forces: list[ElementGeometry]
+    gravity: Point | None
+    missing: str
+
+
+def elements_of(result: Result) -> Elements:
+    """The joints and forces of a result."""
+    try:
+        model = result.model
+    except ResultError as error:
+        return Elements([], [], None, str(error))
+    return Elements(joints_of(model), forces_of(model), gravity_of(model), "")
+
+
+def joints_of(model: Model) -> list[ElementGeometry]:
     """The joints of a model, in file order."""
     return _in_order(model.joints, model.joint_names)
 
 
-def forces_of(model: Model) -> list[Placed]:
+def forces_of(model: Model) -> list[ElementGeometry]:
     """The forces of a model that act on bodies of their own, in file order."""
     groups = [g for g in model.forces if not getattr(g.examined.type, "each_body", False)]
     return _in_order(groups, model.force_names)
 
 
-def gravity_of(model: Model) -> tuple[float, ...] | None:
+def gravity_of(model: Model) -> Point | None:
     """(3,) gravitational acceleration, m/s^2, or None.
 
     It is that of a force on each body with ``gravity`` and the direction ``wgt``, as ``weight``.
@@ -66,25 +86,25 @@ def gravity_of(model: Model) -> tuple[float, ...] | None:
     return None
 
 
-def _in_order(groups: Any, names: tuple[str, ...]) -> list[Placed]:
-    found = {
-        int(member): _placed(group, k, names[int(member)])
+def _in_order(groups: Any, names: tuple[str, ...]) -> list[ElementGeometry]:
+    elements = {
+        int(member): _geometry(group, k, names[int(member)])
         for group in groups
         for k, member in enumerate(group.members)
     }
-    return [found[member] for member in sorted(found)]
+    return [elements[member] for member in sorted(elements)]
 
 
-def _placed(group: Group, place: int, name: str) -> Placed:
+def _geometry(group: Group, member: int, name: str) -> ElementGeometry:
     layout, specs = group.examined.layout, specs_of(group.examined.type)
-    bodies = dict(zip(layout.slots, map(int, group.bodies[place]), strict=True))
+    bodies = dict(zip(layout.slots, map(int, group.bodies[member]), strict=True))
     has_ends = any(spec.kind == "vector2" for spec in specs.values())
-    on = dict(_bodies_of_vectors(group, place, bodies))
+    on = dict(_bodies_of_vectors(group, member, bodies))
     points: dict[str, Located] = {}
     vectors: dict[str, Located] = {}
     numbers: dict[str, float] = {}
     for field, (at, shape) in layout.numbers.items():
-        values = plain(group.numbers[place, at : at + (3 if shape else 1)])
+        values = plain(group.numbers[member, at : at + (3 if shape else 1)])
         kind = specs[field].kind if field in specs else ""
         slot = slot_of(field)
         is_end = has_ends and field in ("P_i", "P_j")
@@ -94,17 +114,17 @@ def _placed(group: Group, place: int, name: str) -> Placed:
             vectors[field] = on[field], values
         elif shape == () and kind == "number":
             numbers[field] = values[0]
-    return Placed(
+    return ElementGeometry(
         name, group.keyword, group.examined.type.symbol, bodies, points, vectors, numbers, has_ends
     )
 
 
 def _bodies_of_vectors(
-    group: Group, place: int, bodies: dict[str, int]
+    group: Group, member: int, bodies: dict[str, int]
 ) -> Iterator[tuple[str, int]]:
     """The body of each vector field: that of its slot, ground, or the one the scene names."""
     layout = group.examined.layout
-    others = dict(zip(layout.others, group.functions[place, len(layout.functions) :], strict=True))
+    others = dict(zip(layout.others, group.functions[member, len(layout.functions) :], strict=True))
     for field, spec in specs_of(group.examined.type).items():
         slot = slot_of(field)
         if spec.kind != "vector":

@@ -8,8 +8,9 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
 
-#: A point: body index (ground 0) and its coordinates there, m.
-Located = tuple[int, tuple[float, ...]]
+#: Coordinates in a body, m; a point with its body (ground 0).
+Point = tuple[float, ...]
+Located = tuple[int, Point]
 #: Solids of unit size about their origin; axes along z. A cone stands on the origin.
 SOLIDS = ("sphere", "cylinder", "cone", "box", "ring")
 #: Groups that a user switches on and off; inertia is translucent.
@@ -92,6 +93,6 @@ def plain(values: Any) -> tuple[float, ...]:
     return tuple(float(x) for x in values)
 
 
-def packed(values: Floats | Integers, kind: str = "<f4") -> str:
+def pack(values: Floats | Integers, kind: str = "<f4") -> str:
     """Numbers as base64 text of little-endian floats ("<f4", "<f8") or integers ("<u4")."""
     return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -20,7 +20,7 @@ _MOST_FRAMES = 1e6
 _EXTENT_INSTANTS = 200
 
 
-def chosen(t: Floats, bodies: int, fps: float | None) -> Integers:
+def instants_to_show(t: Floats, bodies: int, fps: float | None) -> Integers:
     """(k,) increasing indices of the instants of a page; the first and the last are among them.
 
     Args:
@@ -44,13 +44,13 @@ def chosen(t: Floats, bodies: int, fps: float | None) -> Integers:
     return np.unique(np.concatenate([[0], nearest, [last]])).astype(np.int64)
 
 
-def thinned(result: Result, places: Integers) -> Result:
+def at_instants(result: Result, index: Integers) -> Result:
     """A result reduced to some of its instants, with the model of the whole."""
-    if len(places) == len(result.t):
+    if len(index) == len(result.t):
         return result
     return Result.of_parts(
         result.subject,
-        result.arrays.at(places),
+        result.arrays.at(index),
         result.record,
         lambda: (result.model, lambda: result.machine),
     )
@@ -89,11 +89,11 @@ class Motion:
             return np.broadcast_to(np.asarray(local, dtype=float), (len(self.result.t), 3))
         return np.asarray(to_global(self.result.p[:, body - 1], np.asarray(local, dtype=float)))
 
-    def point_in(self, body: int, place: Floats) -> Floats:
+    def point_in(self, body: int, point: Floats) -> Floats:
         """(3,) coordinates in a body of a global point (3,) at the first instant."""
         if body == 0:
-            return place
-        return self.vector_in(body, place - self.result.r[0, body - 1])
+            return point
+        return self.vector_in(body, point - self.result.r[0, body - 1])
 
     def vector_in(self, body: int, direction: Floats) -> Floats:
         """(3,) components in a body of a global direction (3,) at the first instant."""
@@ -103,11 +103,11 @@ class Motion:
 
     def extent(self, located: Iterable[Located], reach: float = 0.0) -> Extent:
         """The extent of points over the motion, enlarged by ``reach``, m."""
-        places = np.linspace(0, len(self.result.t) - 1, min(_EXTENT_INSTANTS, len(self.result.t)))
-        few = thinned(self.result, np.unique(places.round().astype(np.int64)))
-        found = Motion(few).points(located).reshape(-1, 3)
-        farthest = found[np.argmax(found @ _DIRECTIONS.T, axis=0)] + reach * _DIRECTIONS
-        return Extent(found.min(axis=0) - reach, found.max(axis=0) + reach, farthest)
+        index = np.linspace(0, len(self.result.t) - 1, min(_EXTENT_INSTANTS, len(self.result.t)))
+        few = at_instants(self.result, np.unique(index.round().astype(np.int64)))
+        points = Motion(few).points(located).reshape(-1, 3)
+        farthest = points[np.argmax(points @ _DIRECTIONS.T, axis=0)] + reach * _DIRECTIONS
+        return Extent(points.min(axis=0) - reach, points.max(axis=0) + reach, farthest)
 
 
 def _directions(count: int) -> Floats:

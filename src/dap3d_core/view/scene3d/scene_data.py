@@ -7,30 +7,20 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.result import Result, ResultError
+from dap3d_core.result import Result
 from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.scene.scene import Scene
-from dap3d_core.view.scene3d.bodies import attached, framing, inertia_ellipsoid, links, unit_of
+from dap3d_core.view.scene3d.bodies import attachment_points, inertia_ellipsoid, links, unit_of
 from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.colors import colors
-from dap3d_core.view.scene3d.elements import ORIGIN, Placed, forces_of, gravity_of, joints_of
-from dap3d_core.view.scene3d.primitives import Mark, Span, packed
+from dap3d_core.view.scene3d.elements import ORIGIN, ElementGeometry, Elements
+from dap3d_core.view.scene3d.primitives import Mark, Point, Span, pack
 from dap3d_core.view.scene3d.sampled_motion import Extent, Motion
-from dap3d_core.view.scene3d.shapes import Drawn, Mesh, drawn
+from dap3d_core.view.scene3d.shapes import Mesh, SceneShapes, scene_shapes
 from dap3d_core.view.scene3d.symbols import Drawer
 
 #: The colour of what belongs to ground.
 GROUND = "#9aa3ad"
-
-
-@attrs.frozen
-class Elements:
-    """Joints and forces; none, and why, where the model cannot be made again."""
-
-    joints: list[Placed]
-    forces: list[Placed]
-    gravity: tuple[float, ...] | None
-    missing: str
 
 
 def scene_of(result: Result, model: str | os.PathLike[str] | None = None) -> Scene:
@@ -45,15 +35,6 @@ def scene_of(result: Result, model: str | os.PathLike[str] | None = None) -> Sce
         if name not in scene.bodies:
             scene.add_body(name)
     return scene
-
-
-def elements_of(result: Result) -> Elements:
-    """The joints and forces of a result, none where its model cannot be made again."""
-    try:
-        model = result.model
-    except ResultError as error:
-        return Elements([], [], None, str(error))
-    return Elements(joints_of(model), forces_of(model), gravity_of(model), "")
 
 
 @attrs.frozen(eq=False)
@@ -72,7 +53,7 @@ class SceneGeometry:
     colors: list[str]
     marks: list[Mark]
     spans: list[Span]
-    shapes: Drawn
+    shapes: SceneShapes
     extent: Extent
     unit: float
 
@@ -81,19 +62,21 @@ def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeo
     """The solids of a result with its scene, whose folder, where known, holds its meshes."""
     subject, motion = result.subject, Motion(result)
     hues = colors([scene.bodies[n].color for n in subject.body_names], _pairs(elements.joints))
-    shapes = drawn(scene, subject.body_names, hues)
+    shapes = scene_shapes(scene, subject.body_names, hues)
     every = [*elements.joints, *elements.forces]
-    places = attached(subject, every)
-    points = [*framing(motion, places), *shapes.corners]
-    bare = [k for k in range(1, subject.body_count + 1) if not places[k] and k not in shapes.bodies]
-    low, high, _ = motion.extent(points)
+    points = attachment_points(subject, every)
+    bodies = range(1, subject.body_count + 1)
+    bounds = [(k, ORIGIN) for k in bodies] + shapes.corners
+    bounds += [(k, at) for k, on_body in enumerate(points) for at in on_body]
+    bare = [k for k in bodies if not points[k] and k not in shapes.bodies]
+    low, high, _ = motion.extent(bounds)
     size = float(np.linalg.norm(high - low))
-    unit = unit_of(places, size or 1.0)
-    marks = _bodies(result, places, shapes.bodies, unit, hues, elements.joints)
+    unit = unit_of(points, size or 1.0)
+    marks = _bodies(result, points, shapes.bodies, unit, hues, elements.joints)
     ellipsoids = _bare_bodies(result, bare, elements.joints, size, hues)
     reach = max((max(m.size) for m in ellipsoids), default=0.0)
     reach = max([reach, *(j.numbers.get("radius", 0.0) for j in elements.joints)])
-    extent = motion.extent(points, reach + 2.0 * unit)
+    extent = motion.extent(bounds, reach + 2.0 * unit)
     drawer = Drawer(motion, unit, elements.joints)
     pieces = [piece for j in elements.joints for piece in drawer.joint(j)]
     pieces += [piece for f in elements.forces for piece in drawer.force(f)]
@@ -102,7 +85,7 @@ def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeo
     return SceneGeometry(subject.body_names, hues, marks, spans, shapes, extent, unit)
 
 
-def _pairs(joints: Iterable[Placed]) -> list[tuple[int, ...]]:
+def _pairs(joints: Iterable[ElementGeometry]) -> list[tuple[int, ...]]:
     """The bodies of each joint, without ground."""
     return [tuple(body for body in joint.bodies.values() if body) for joint in joints]
 
@@ -128,36 +111,36 @@ def geometry_of(result: Result, scene: Scene, elements: Elements) -> dict[str, A
 
 def _packed_mesh(mesh: Mesh) -> dict[str, Any]:
     about = attrs.asdict(mesh, filter=lambda a, _: a.name not in ("vertices", "triangles"))
-    about |= {"vertices": packed(mesh.vertices), "triangles": packed(mesh.triangles, "<u4")}
+    about |= {"vertices": pack(mesh.vertices), "triangles": pack(mesh.triangles, "<u4")}
     return {**about, "count": len(mesh.triangles)}
 
 
 def _bodies(
     result: Result,
-    places: list[list[tuple[float, ...]]],
+    points: list[list[Point]],
     shaped: set[int],
     unit: float,
     hues: Sequence[str],
-    joints: list[Placed],
+    joints: list[ElementGeometry],
 ) -> list[Mark]:
     """Links of the bodies without shapes; of ground short posts at joints."""
     marks: list[Mark] = []
     joined = {point for joint in joints for point in joint.points.values()}
     for k, name in enumerate(result.subject.body_names, 1):
-        if k not in shaped and places[k]:
-            ends = [at for at in places[k] if (k, at) not in joined]
-            marks += links(k, places[k], unit, hues[k - 1], name, ends=ends)
+        if k not in shaped and points[k]:
+            ends = [at for at in points[k] if (k, at) not in joined]
+            marks += links(k, points[k], unit, hues[k - 1], name, ends=ends)
     if 0 not in shaped:
         marks += [
             Mark("bodies", "box", 0, at, (4.5 * unit,) * 3, color=GROUND, owner="ground")
-            for at in [*places[0], ORIGIN]
+            for at in [*points[0], ORIGIN]
             if (0, at) in joined
         ]
     return marks
 
 
 def _bare_bodies(
-    result: Result, bare: list[int], joints: list[Placed], size: float, hues: Sequence[str]
+    result: Result, bare: list[int], joints: list[ElementGeometry], size: float, hues: Sequence[str]
 ) -> list[Mark]:
     """Bodies without points; a wheel is drawn by its joint."""
     subject = result.subject
@@ -178,7 +161,7 @@ def _points(result: Result) -> list[dict[str, Any]]:
     return [{"name": n, "body": int(b), "at": at.tolist()} for n, b, at in columns]
 
 
-def _about(one: Placed, names: Sequence[str]) -> dict[str, Any]:
+def _about(one: ElementGeometry, names: Sequence[str]) -> dict[str, Any]:
     bodies = [names[b - 1] if b else "ground" for b in one.bodies.values()]
     place = one.place(next(iter(one.bodies)))
     return {"name": one.name, "type": one.keyword, "bodies": bodies, "body": place[0],
@@ -191,7 +174,7 @@ def _row(mark: Mark) -> list[Any]:
     return [mark.layer, mark.kind, mark.body, *numbers, mark.color, mark.owner]
 
 
-def notes_of(elements: Elements, shapes: Drawn) -> list[str]:
+def notes_of(elements: Elements, shapes: SceneShapes) -> list[str]:
     """Notes on parts of a scene that are not drawn."""
     missing = f"joints and forces are not drawn: {elements.missing}"
     return [*([missing] if elements.missing else []), *shapes.notes]

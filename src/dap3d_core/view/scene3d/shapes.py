@@ -39,7 +39,7 @@ class Mesh:
 
     Attributes:
         body: index, ground 0.
-        at, q: place (3,), m, and Euler parameters (4,) of the axes of the file in the body.
+        at, q: origin (3,), m, and Euler parameters (4,) of the axes of the file in the body.
         scale: m for one unit of the file.
         vertices: (k, 3) in units of the file.
         triangles: (m, 3) indices of vertices.
@@ -110,7 +110,7 @@ def parts_of(marks: Sequence[Mark], meshes: Sequence[Mesh]) -> list[Part]:
 
 
 @attrs.define
-class Drawn:
+class SceneShapes:
     """The shapes of a scene.
 
     Attributes:
@@ -128,7 +128,7 @@ class Drawn:
     notes: list[str] = attrs.Factory(list)
 
 
-def drawn(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Drawn:
+def scene_shapes(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> SceneShapes:
     """The shapes of a scene.
 
     Args:
@@ -136,23 +136,23 @@ def drawn(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Drawn:
         names, colors: of the bodies, without ground.
     """
     index = {"ground": 0} | {name: k for k, name in enumerate(names, 1)}
-    found = Drawn()
+    shapes = SceneShapes()
     for shape in read_shapes(Collector(scene), index):
         usual = colors[shape.body - 1] if shape.body else GROUND_COLOR
         with np.errstate(over="ignore", invalid="ignore"):  # a fault where too large
-            fault = _add(found, shape, color(shape.values["color"], usual), scene.folder)
+            fault = _add(shapes, shape, color(shape.values["color"], usual), scene.folder)
         if fault:
-            found.notes.append(f"shape {shape.name} is not drawn: {fault}")
-    return found
+            shapes.notes.append(f"shape {shape.name} is not drawn: {fault}")
+    return shapes
 
 
-def _add(found: Drawn, shape: Shape, hue: str, folder: Path | None) -> str:
+def _add(shapes: SceneShapes, shape: Shape, hue: str, folder: Path | None) -> str:
     """Add a shape; returns "", or why it is not drawn."""
     values = shape.values
     about: dict[str, Any] = {"body": shape.body, "color": hue, "owner": shape.name}
     piece: Mark | Line | Mesh
     if shape.type == "mesh":
-        if sum(len(mesh.triangles) for mesh in found.meshes) >= MOST_IN_ALL:
+        if sum(len(mesh.triangles) for mesh in shapes.meshes) >= MOST_IN_ALL:
             return f"the picture holds {MOST_IN_ALL} triangles already, or more"
         mesh = _mesh(folder, values["file"])
         if isinstance(mesh, str):
@@ -170,13 +170,13 @@ def _add(found: Drawn, shape: Shape, hue: str, folder: Path | None) -> str:
         high = np.multiply(half, piece.size)
         low = high * (-1.0, -1.0, 0.0 if piece.kind == "cone" else -1.0)
         corners = _corners(shape.body, piece.at, piece.q, np.array([low, high]))
-    farthest = float(np.nan_to_num(np.abs([place for _, place in corners]), nan=np.inf).max())
+    farthest = float(np.nan_to_num(np.abs([point for _, point in corners]), nan=np.inf).max())
     if farthest > FARTHEST:
         return f"it reaches {farthest:.3g} m from the origin of its body, more than {FARTHEST:g} m"
-    kinds: dict[type, list[Any]] = {Mark: found.marks, Line: found.lines, Mesh: found.meshes}
+    kinds: dict[type, list[Any]] = {Mark: shapes.marks, Line: shapes.lines, Mesh: shapes.meshes}
     kinds[type(piece)].append(piece)
-    found.corners += corners
-    found.bodies.add(shape.body)
+    shapes.corners += corners
+    shapes.bodies.add(shape.body)
     return ""
 
 
@@ -244,7 +244,7 @@ def _without_groups(data: bytes) -> bytes:
 
 
 def _one_solid(data: bytes) -> bytes:
-    """An STL file whose solids are one, for the same reason; a binary file holds one anyway."""
+    """An STL file with all facets in one solid, for the same reason; a binary file has one."""
     if len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
         return data
     first, *others = data.lower().split(b"endsolid")

@@ -61,8 +61,8 @@ def spring(slenderness: float) -> Triangles:
     z = END - 0.5 + (1.0 - 2.0 * END) * share
     coil = np.column_stack([out * np.cos(angle), out * np.sin(angle), z * slenderness])
     ends = np.array([[0.0, 0.0, -0.5 * slenderness], [0.0, 0.0, 0.5 * slenderness]])
-    found = _tube(np.vstack([ends[:1], coil, ends[1:]]), WIRE)
-    return Triangles(found.vertices / (1.0, 1.0, slenderness), found.triangles)
+    tube = _tube(np.vstack([ends[:1], coil, ends[1:]]), WIRE)
+    return Triangles(tube.vertices / (1.0, 1.0, slenderness), tube.triangles)
 
 
 def _joined(pieces: Sequence[Triangles]) -> Triangles:
@@ -94,8 +94,8 @@ def _tube(path: Floats, radius: float) -> Triangles:
 def _sheet(points: Floats) -> Triangles:
     """A grid (n, k, 3) of points as triangles, without those of no area."""
     n, k = points.shape[:2]
-    place = np.arange(n * k).reshape(n, k)
-    a, b, c, d = place[:-1, :-1], place[1:, :-1], place[1:, 1:], place[:-1, 1:]
+    index = np.arange(n * k).reshape(n, k)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
     triangles = np.concatenate(
         [np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))]
     )

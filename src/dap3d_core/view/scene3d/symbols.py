@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.fields import slot_of
-from dap3d_core.view.scene3d.elements import ORIGIN, Placed
+from dap3d_core.view.scene3d.elements import ORIGIN, ElementGeometry
 from dap3d_core.view.scene3d.primitives import Located, Mark, Span, ball, bar, plain, turned_to
 from dap3d_core.view.scene3d.sampled_motion import Motion
 
@@ -29,16 +29,16 @@ class Drawer:
 
     motion: Motion
     unit: float
-    joints: Sequence[Placed]
+    joints: Sequence[ElementGeometry]
 
-    def joint(self, one: Placed) -> list[Mark | Span]:
+    def joint(self, one: ElementGeometry) -> list[Mark | Span]:
         """The solids of a joint."""
         return self._draw(one, one.symbol, "joints", JOINT)
 
-    def force(self, one: Placed) -> list[Mark | Span]:
+    def force(self, one: ElementGeometry) -> list[Mark | Span]:
         """The solids of a force: a spring between its ends, or what its type declares.
 
-        A force between two bodies whose type declares no place on them, such as a contact, has no
+        A force between two bodies whose type declares no point on them, such as a contact, has no
         solids: bodies that it does not touch would look joined. Its arrow shows where it acts.
         """
         if not (one.symbol or one.points or one.vectors):
@@ -46,16 +46,16 @@ class Drawer:
         symbol = one.symbol or ("spring" if one.has_ends else "")
         return self._draw(one, symbol, "forces", FORCE)
 
-    def _draw(self, one: Placed, symbol: str, layer: str, color: str) -> list[Mark | Span]:
+    def _draw(self, one: ElementGeometry, symbol: str, layer: str, color: str) -> list[Mark | Span]:
         pieces = DRAWINGS[symbol](self, one)
         return [attrs.evolve(p, layer=layer, color=color, owner=one.name) for p in pieces]
 
     def start(self, body: int, point: Located) -> Located:
-        """Where a point is at the first instant, as coordinates in a body."""
+        """A point of another body at the first instant, in coordinates of a body."""
         return body, plain(self.motion.point_in(body, self.motion.points([point])[0, 0]))
 
-    def home(self, one: Placed, body: int) -> Located:
-        """The place on a body of an element without points.
+    def home(self, one: ElementGeometry, body: int) -> Located:
+        """The point on a body of an element without points.
 
         It is at the driven joint, one with a point between the same bodies; else at the origin of
         the element's first moving body.
@@ -66,8 +66,8 @@ class Drawer:
                 return self.start(body, next(iter(other.points.values())))
         return self.start(body, (next((b for b in one.bodies.values() if b), 0), ORIGIN))
 
-    def base(self, one: Placed, field: str) -> Located:
-        """Where the vector of a field is drawn: at the point of its slot, or at the home."""
+    def base(self, one: ElementGeometry, field: str) -> Located:
+        """The start of the vector of a field: the point of its slot, or the home."""
         slot, body = slot_of(field) or "", one.vectors[field][0]
         point = one.points.get(slot)
         if point is not None and point[0] == body:
@@ -77,16 +77,16 @@ class Drawer:
         return self.home(one, body)
 
 
-def _ball(to: Drawer, one: Placed) -> Pieces:
+def _ball(to: Drawer, one: ElementGeometry) -> Pieces:
     yield ball("", *one.place("i"), 1.8 * to.unit)
 
 
-def _block(to: Drawer, one: Placed) -> Pieces:
+def _block(to: Drawer, one: ElementGeometry) -> Pieces:
     edge = 4.5 * to.unit
     yield Mark("", "box", one.bodies["i"], ORIGIN, (edge, edge, edge))
 
 
-def _cross(to: Drawer, one: Placed) -> Pieces:
+def _cross(to: Drawer, one: ElementGeometry) -> Pieces:
     """The two arms of the cross, each fixed in its body."""
     yield ball("", *one.place("i"), 1.5 * to.unit)
     for field in ("a_i", "n_j"):
@@ -94,7 +94,7 @@ def _cross(to: Drawer, one: Placed) -> Pieces:
         yield bar(body, to.base(one, field)[1], axis, 0.9 * to.unit, 8.0 * to.unit)
 
 
-def _hinge(to: Drawer, one: Placed) -> Pieces:
+def _hinge(to: Drawer, one: ElementGeometry) -> Pieces:
     """A pin along the axis, with a collar at its middle."""
     body, at = one.place("i")
     axis = one.vectors["a_i"][1]
@@ -102,35 +102,35 @@ def _hinge(to: Drawer, one: Placed) -> Pieces:
     yield bar(body, at, axis, 2.0 * to.unit, 2.6 * to.unit)
 
 
-def _link(to: Drawer, one: Placed) -> Pieces:
+def _link(to: Drawer, one: ElementGeometry) -> Pieces:
     start, end = one.place("i"), one.place("j")
     yield Span("", "rod", start, end, 0.8 * to.unit)
     yield ball("", *start, 1.6 * to.unit)
     yield ball("", *end, 1.6 * to.unit)
 
 
-def _plate(to: Drawer, one: Placed) -> Pieces:
+def _plate(to: Drawer, one: ElementGeometry) -> Pieces:
     """A ball on the body and a plate on ground, both at the point."""
     yield ball("", *one.place("i"), 2.0 * to.unit)
     at = to.motion.points([one.place("i")])[0, 0]
     yield bar(0, at, one.vectors["a_j"][1], 7.0 * to.unit, 0.3 * to.unit)
 
 
-def _ring(to: Drawer, one: Placed) -> Pieces:
+def _ring(to: Drawer, one: ElementGeometry) -> Pieces:
     """A ring about the first vector, the axis of a rotation."""
     field, (_, axis) = next(iter(one.vectors.items()))
     yield Mark("", "ring", *to.base(one, field), (4.0 * to.unit,) * 3, turned_to(axis))
 
 
-def _sleeve(to: Drawer, one: Placed) -> Pieces:
+def _sleeve(to: Drawer, one: ElementGeometry) -> Pieces:
     yield from _on_rail(to, one, "cylinder", 2.2 * to.unit)
 
 
-def _slider(to: Drawer, one: Placed) -> Pieces:
+def _slider(to: Drawer, one: ElementGeometry) -> Pieces:
     yield from _on_rail(to, one, "box", 4.0 * to.unit)
 
 
-def _on_rail(to: Drawer, one: Placed, kind: str, width: float) -> Pieces:
+def _on_rail(to: Drawer, one: ElementGeometry, kind: str, width: float) -> Pieces:
     """A rail along a_j, as long as the motion, and a solid on it."""
     (body, at), (rail_body, rail_at), along = one.place("i"), one.place("j"), one.vectors["a_j"]
     direction = to.motion.direction(along)
@@ -143,11 +143,11 @@ def _on_rail(to: Drawer, one: Placed, kind: str, width: float) -> Pieces:
     yield Mark("", kind, body, at, (width, width, 6.0 * to.unit), turned_to(axis))
 
 
-def _spring(to: Drawer, one: Placed) -> Pieces:
+def _spring(to: Drawer, one: ElementGeometry) -> Pieces:
     yield Span("", "spring", one.place("i"), one.place("j"), 2.2 * to.unit)
 
 
-def _wheel(to: Drawer, one: Placed) -> Pieces:
+def _wheel(to: Drawer, one: ElementGeometry) -> Pieces:
     """A thin disk about the y axis of the body, with spokes that show how it turns."""
     body, R = one.bodies["i"], one.numbers["radius"]
     y = (0.0, 1.0, 0.0)
@@ -158,7 +158,7 @@ def _wheel(to: Drawer, one: Placed) -> Pieces:
     yield ball("", body, (0.95 * R, 0.0, 0.0), 0.1 * R)
 
 
-def _declared_fields(to: Drawer, one: Placed) -> Pieces:
+def _declared_fields(to: Drawer, one: ElementGeometry) -> Pieces:
     """Points as balls, vectors as lines, a vector between points as a rod."""
     if one.has_ends:
         yield Span("", "rod", one.place("i"), one.place("j"), 0.5 * to.unit)
@@ -173,7 +173,7 @@ def _declared_fields(to: Drawer, one: Placed) -> Pieces:
 
 
 #: Symbol (``interface.types.SYMBOLS``) -> what draws it.
-DRAWINGS: dict[str, Callable[[Drawer, Placed], Pieces]] = {
+DRAWINGS: dict[str, Callable[[Drawer, ElementGeometry], Pieces]] = {
     "": _declared_fields,
     "ball": _ball,
     "block": _block,

@@ -24,7 +24,7 @@ import dap3d_core as dap
 from dap3d_core.plot import animate
 from dap3d_core.plot.film.animation import frame_times, usual_speed
 from dap3d_core.plot.film.frame import Stage
-from dap3d_core.plot.film.projection import camera_of, shown, with_margin
+from dap3d_core.plot.film.projection import camera_of, visible_rectangle, with_margin
 from dap3d_core.plot.film.shaded_solids import shapes_of
 from dap3d_core.plot.film.stick_figure import SHADES, pose_at, sticks_of
 from dap3d_core.result import ResultError
@@ -193,7 +193,7 @@ def test_all_of_the_motion_is_inside_at_one_scale(result, view, size):
     extent = sticks.extent(result, np.eye(3))
     camera = camera_of(view, extent)
     limits = with_margin(extent)
-    seen = shown(camera, limits, sticks.extent(result, camera.axes))
+    seen = visible_rectangle(camera, limits, sticks.extent(result, camera.axes))
     stage = Stage(sticks, camera, limits, seen, size, "")
     for t in result.t:
         flat = camera.project(sticks.positions(*pose_at(result, t)))

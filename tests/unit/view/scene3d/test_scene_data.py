@@ -10,7 +10,7 @@ from dap3d_core.view.scene3d.bodies import inertia_ellipsoid
 from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.colors import CYCLE, chains_of, colors
 from dap3d_core.view.scene3d.primitives import turned_to
-from dap3d_core.view.scene3d.sampled_motion import Extent, chosen
+from dap3d_core.view.scene3d.sampled_motion import Extent, instants_to_show
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_arrows_are_reactions_and_forces_of_the_result(four, page):
 @pytest.mark.parametrize("fps", [1.0, 30.0, 77.0, 1e6])
 def test_frames_are_the_nearest_reported_instants(fps):
     t = np.cumsum(np.random.default_rng(0).uniform(0.001, 0.02, 400))
-    places = chosen(t, 3, fps)
+    places = instants_to_show(t, 3, fps)
     assert places[0] == 0
     assert places[-1] == len(t) - 1
     assert np.all(np.diff(places) > 0)
@@ -51,11 +51,11 @@ def test_frames_are_the_nearest_reported_instants(fps):
 
 def test_without_fps_all_instants_are_there_as_far_as_they_fit():
     t = np.linspace(0.0, 1.0, 5001)
-    np.testing.assert_array_equal(chosen(t, 4, None), np.arange(5001))
-    thinned = chosen(t, 1000, None)
-    assert 500 < len(thinned) < 600
-    assert (thinned[0], thinned[-1]) == (0, 5000)
-    assert list(chosen(t[:1], 4, 10.0)) == [0]
+    np.testing.assert_array_equal(instants_to_show(t, 4, None), np.arange(5001))
+    at_instants = instants_to_show(t, 1000, None)
+    assert 500 < len(at_instants) < 600
+    assert (at_instants[0], at_instants[-1]) == (0, 5000)
+    assert list(instants_to_show(t[:1], 4, 10.0)) == [0]
 
 
 def test_bodies_without_shapes_are_links_between_their_points(page):

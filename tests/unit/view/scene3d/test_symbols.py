@@ -16,9 +16,9 @@ from dap3d_core.model import build_model
 from dap3d_core.model.rotations import to_global
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
-from dap3d_core.view.scene3d.elements import joints_of
+from dap3d_core.view.scene3d.elements import elements_of, joints_of
 from dap3d_core.view.scene3d.sampled_motion import Motion
-from dap3d_core.view.scene3d.scene_data import elements_of, geometry_of
+from dap3d_core.view.scene3d.scene_data import geometry_of
 from dap3d_core.view.scene3d.symbols import DRAWINGS, Drawer
 
 TYPES = [
