@@ -115,7 +115,7 @@ def test_what_no_graphics_can_show_is_told_and_left_out(tmp_path, kind, fields):
     scene = dap.Scene(name="far", path=tmp_path / "scene.toml")
     scene.add_shape(kind, "far", body="ground", **fields)
     scene.add_shape("sphere", "near", body="ground", radius=1.0)
-    found = shapes.drawn(scene, [], [])
+    found = shapes.scene_shapes(scene, [], [])
     assert [note.partition(":")[0] for note in found.notes] == ["shape far is not drawn"]
     assert [mark.owner for mark in found.marks] == ["near"]
     assert len(found.meshes) + len(found.lines) == 0
@@ -143,6 +143,6 @@ def test_all_meshes_of_a_page_together_are_bounded(tmp_path, monkeypatch):
     scene = dap.Scene(name="many", path=tmp_path / "scene.toml")
     for k in range(10):
         scene.add_shape("mesh", f"m{k}", body="ground", file="a.obj")
-    found = shapes.drawn(scene, [], [])
+    found = shapes.scene_shapes(scene, [], [])
     assert sum(len(mesh.triangles) for mesh in found.meshes) == 6
     assert len(found.notes) == 7

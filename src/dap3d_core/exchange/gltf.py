@@ -105,8 +105,7 @@ class _Document:
         """The node of a body: its first pose, and its motion."""
         r, p = scene.result.r[:, k], scene.result.p[:, k]
         p_dot = euler_rates(p, scene.result.w[:, k])
-        node = self._add("nodes", {"name": name, "translation": r[0].tolist(),
-                                   "rotation": _xyzw(p[:1])[0].tolist()})  # fmt: skip
+        node = self._add("nodes", {"name": name})
         self._move(node, "translation", r, scene.result.rd[:, k])
         self._move(node, "rotation", _xyzw(p), _xyzw(p_dot))
         return node
@@ -120,17 +119,17 @@ class _Document:
 
     def _span(self, one: Stretched) -> int:
         node = self._add("nodes", {"name": one.owner, "mesh": self._mesh(one)})
-        for path, values in (("translation", one.at), ("rotation", _xyzw(one.q)),
-                             ("scale", one.size)):  # fmt: skip
-            self.tree["nodes"][node][path] = values[0].tolist()
-            self._move(node, path, values)
+        self._move(node, "translation", one.at)
+        self._move(node, "rotation", _xyzw(one.q))
+        self._move(node, "scale", one.size)
         return node
 
     def _move(self, node: int, path: str, values: Floats, rates: Floats | None = None) -> None:
-        """The motion of a node: cubic where its rate is known, else linear between instants.
+        """First value and motion of a node: cubic where its rate is known, else linear.
 
         An instant that an event reports twice has a rate before it and one after it.
         """
+        self.tree["nodes"][node][path] = values[0].tolist()
         course, kind = values[self._last], "LINEAR"
         if rates is not None:
             course = np.stack([rates[self._first], course, rates[self._last]], axis=1)

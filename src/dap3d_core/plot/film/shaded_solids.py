@@ -84,18 +84,17 @@ def shapes_of(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Shap
             "dap3d export show them"
         )
         pieces = []
-    starts = np.cumsum([0, *(len(piece[1]) for piece in pieces)])
-    nothing = np.zeros((0, 3))
+    hues = {piece[0]: to_hex(_rgb(piece[3])) for piece in reversed(pieces)}
+    none = np.zeros((0, 3))
+    bodies, locals_, triangles, colors = zip((0, none, none, GROUND_COLOR), *pieces, strict=True)
+    counts = [len(local) for local in locals_]
+    starts = np.repeat(np.cumsum([0, *counts[:-1]]), [len(t) for t in triangles])
     return Shapes(
-        body=np.repeat([piece[0] for piece in pieces], np.diff(starts)).astype(np.int64),
-        local=np.concatenate([nothing, *(piece[1] for piece in pieces)]),
-        triangles=np.concatenate(
-            [nothing, *(piece[2] + start for piece, start in zip(pieces, starts, strict=False))]
-        ).astype(np.int64),
-        colors=np.concatenate(
-            [nothing, *(np.tile(_rgb(piece[3]), (len(piece[2]), 1)) for piece in pieces)]
-        ),
-        hues={piece[0]: to_hex(_rgb(piece[3])) for piece in reversed(pieces)},
+        body=np.repeat(bodies, counts).astype(np.int64),
+        local=np.concatenate(locals_),
+        triangles=np.concatenate(triangles).astype(np.int64) + starts[:, None],
+        colors=np.repeat([_rgb(color) for color in colors], [len(t) for t in triangles], axis=0),
+        hues=hues,
         notes=tuple(notes),
     )
 

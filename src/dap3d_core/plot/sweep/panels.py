@@ -54,49 +54,41 @@ class Lines(Panel):
     status: Status
 
     def paint(self, ax: Axes, size: tuple[float, float], legend: StatusLegend) -> None:
-        """Lines, their points marked."""
-        marked = len(self.x.values) <= MARKED
+        """The outputs, and marks below them of points without a value."""
+        x = self.x.values
         for k, output in enumerate(self.outputs):
-            style: dict[str, Any] = dict(color=PALETTE[k % len(PALETTE)], markersize=3.5)
-            marker = MARKERS[k % len(MARKERS)]
-            ax.plot(self.x.values, output.values, marker=marker if marked else "",
-                    linestyle=DASHES[k // len(PALETTE) % len(DASHES)], linewidth=1.4,
-                    label=shown_text(output.name), **style)  # fmt: skip
-            finite = np.concatenate([[False], np.isfinite(output.values), [False]])
-            alone = finite[1:-1] & ~finite[:-2] & ~finite[2:]
-            if not marked and alone.any():  # a value between two gaps makes no line
-                ax.plot(self.x.values[alone], output.values[alone], marker=marker, linestyle="",
-                        **style)  # fmt: skip
-        _mark_missing(ax, self, legend)
+            self._draw(ax, k, output)
+        missing = np.any([~np.isfinite(o.values) for o in self.outputs], axis=0)
+        _extend_down(ax, missing)
+        legend.mark(ax, self.status, missing & np.isfinite(x), x, None)
         _label_axes(ax, self.x, self.outputs, size)
+
+    def _draw(self, ax: Axes, k: int, output: Variable) -> None:
+        """A line, its points marked where they are few."""
+        x, few = self.x.values, len(self.x.values) <= MARKED
+        style: dict[str, Any] = dict(color=PALETTE[k % len(PALETTE)], markersize=3.5)
+        marker = MARKERS[k % len(MARKERS)]
+        ax.plot(x, output.values, marker=marker if few else "",
+                linestyle=DASHES[k // len(PALETTE) % len(DASHES)], linewidth=1.4,
+                label=shown_text(output.name), **style)  # fmt: skip
+        finite = np.concatenate([[False], np.isfinite(output.values), [False]])
+        alone = finite[1:-1] & ~finite[:-2] & ~finite[2:]
+        if not few and alone.any():  # a value between two gaps makes no line
+            ax.plot(x[alone], output.values[alone], marker=marker, linestyle="", **style)
 
 
 @attrs.frozen(eq=False)
-class Scatter(Panel):
+class Scatter(Lines):
     """Outputs of one unit over a number or an output, a dot for each point."""
 
-    x: Variable
-    outputs: list[Variable]
-    status: Status
-
-    def paint(self, ax: Axes, size: tuple[float, float], legend: StatusLegend) -> None:
+    def _draw(self, ax: Axes, k: int, output: Variable) -> None:
         """Dots; the more there are, the fainter each is."""
         count = len(self.x.values)
-        alpha = float(np.clip((300.0 / count) ** 0.5, 0.15, 0.85))
-        for k, output in enumerate(self.outputs):
-            ax.plot(self.x.values, output.values, marker=MARKERS[k % len(MARKERS)], linestyle="",
-                    markersize=3.5 if count < 500 else 2.5, markeredgewidth=0.0, alpha=alpha,
-                    color=PALETTE[k % len(PALETTE)], label=shown_text(output.name),
-                    rasterized=count > 2000)  # fmt: skip
-        _mark_missing(ax, self, legend)
-        _label_axes(ax, self.x, self.outputs, size)
-
-
-def _mark_missing(ax: Axes, panel: Lines | Scatter, legend: StatusLegend) -> None:
-    """Mark points without a value below the curves."""
-    missing = np.any([~np.isfinite(o.values) for o in panel.outputs], axis=0)
-    _extend_down(ax, missing)
-    legend.mark(ax, panel.status, missing & np.isfinite(panel.x.values), panel.x.values, None)
+        ax.plot(self.x.values, output.values, marker=MARKERS[k % len(MARKERS)], linestyle="",
+                markersize=3.5 if count < 500 else 2.5, markeredgewidth=0.0,
+                alpha=float(np.clip((300.0 / count) ** 0.5, 0.15, 0.85)),
+                color=PALETTE[k % len(PALETTE)], label=shown_text(output.name),
+                rasterized=count > 2000)  # fmt: skip
 
 
 def _extend_down(ax: Axes, missing: NDArray[np.bool_]) -> None:

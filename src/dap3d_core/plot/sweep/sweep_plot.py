@@ -73,8 +73,7 @@ class SweepPicture(Picture):
 
 def _share_x(above: Panel, below: Panel) -> bool:
     """True where the label of the x axis below the lower panel serves both."""
-    plain = Lines, Scatter
-    return isinstance(above, plain) and isinstance(below, plain) and above.x.name == below.x.name
+    return isinstance(above, Lines) and isinstance(below, Lines) and above.x.name == below.x.name
 
 
 def sweep_picture(
