@@ -21,7 +21,7 @@ import dap3d_core as dap
 from dap3d_core.study import Ensemble, PointStatus
 from dap3d_core.study.workers import dask_cluster
 from dap3d_core.study.workers.dask_cluster import ClusterError, connect, run_on
-from dap3d_core.study.workers.environment import differences, environment_of, with_whole_path
+from dap3d_core.study.workers.environment import differences, environment_of, with_absolute_path
 from dap3d_core.study.workers.threads import run_here
 
 pytestmark = [
@@ -369,9 +369,9 @@ def test_types_of_the_model_itself_need_its_folder(client, tmp_path, monkeypatch
         collected(run_here(Ensemble(study), POINTS, PLACES[:8], threads=1)),
         collected(run_on(client, study, POINTS, PLACES[:8], chunk=2)),
     )
-    here = environment_of(with_whole_path(study))
+    here = environment_of(with_absolute_path(study))
     (folder / "plugin.py").rename(folder / "gone.py")
-    (unseen,) = differences(here, environment_of(with_whole_path(study)))
+    (unseen,) = differences(here, environment_of(with_absolute_path(study)))
     assert unseen == (
         f"the force type 'push' stands in {folder / 'plugin.py'}, which it does not see; "
         f"let it see the folder {folder} under this very path"
@@ -455,12 +455,11 @@ def another_worker_of(address):
 
 def test_a_client_that_is_closed_meanwhile(client):
     """Nothing can be asked of it, nor be told to it; so is one that was closed before."""
-    from distributed import as_completed
 
     with connect(client.scheduler.address) as mine:
         found = run_on(mine, bob(), POINTS, np.arange(200), chunk=1)
         next(found)
-        watch, silent = dask_cluster._Watch(mine), as_completed(loop=mine.loop)
+        watch, silent = dask_cluster._ClusterMonitor(mine), distributed.as_completed(loop=mine.loop)
         mine.close()
         with pytest.raises(ClusterError, match=r"the scheduler at .* is gone"):
             collected(found)

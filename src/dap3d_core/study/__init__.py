@@ -1,20 +1,27 @@
-"""The study floor: many runs of one scene with other numbers."""
+"""Studies: many runs of one scene with other values of its parameters."""
 
+from dap3d_core.study.ensemble import Ensemble
 from dap3d_core.study.outputs import REDUCTIONS, Output, outputs_of
-from dap3d_core.study.parameters import Number, all_numbers, names_under, numbers_named, with_values
-from dap3d_core.study.study import Batch, Ensemble, PointStatus, Study
+from dap3d_core.study.parameters import (
+    SceneParameter,
+    all_parameters,
+    names_under,
+    parameters_named,
+    with_values,
+)
+from dap3d_core.study.study import Batch, PointStatus, Study
 
 __all__ = [
     "REDUCTIONS",
     "Batch",
     "Ensemble",
-    "Number",
     "Output",
     "PointStatus",
+    "SceneParameter",
     "Study",
-    "all_numbers",
+    "all_parameters",
     "names_under",
-    "numbers_named",
     "outputs_of",
+    "parameters_named",
     "with_values",
 ]

@@ -1,4 +1,4 @@
-"""The points of a study: what varies and how, as a grid of values or as samples."""
+"""Design of a study: what varies, and its points as a grid of values or as samples."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -14,30 +14,27 @@ from dap3d_core.scene.validate.coerce_values import LARGEST
 
 Floats = NDArray[np.float64]
 
-#: How samples may be drawn; a grid is drawn from nothing.
 DESIGNS = ("lhs", "random", "sobol", "halton")
 GRID = "grid"
-#: More points are a mistake of somebody.
-MOST_POINTS = 10**8
-#: More numbers than this vary in no study; Sobol' sequences are tabled up to 21201.
-MOST_VARIED = 1000
+#: Limits; Sobol' sequences are tabled for up to 21201 dimensions.
+MAX_POINTS, MAX_VARIED = 10**8, 1000
 #: Samples of (0, 1) stay so far from its ends, where the normal distribution is infinite.
-END = 2.0**-53
+MARGIN = 2.0**-53
 NO_NUMBER = f"is no finite number of at most {LARGEST:g} in size"
 FORMS = "1:5:9 (from:to:count), 1:100:5:log, 10,50,100 (a list)"
 SAMPLED = "1:5 (from:to), 1:100:log, 3~0.1 (mean~standard deviation), 10,50,100 (one of these)"
 
 
 @attrs.frozen(eq=False)
-class Varied:
-    """A number that varies, and how.
+class VariedParameter:
+    """How a parameter varies.
 
     Attributes:
-        name: of the number.
-        spec: what was asked for: text, or a list of numbers.
-        values: (count,) the values themselves, of a list or an axis of a grid; else None.
-        kind: how it is distributed where it is sampled: "list", "uniform", "log" or "normal".
-        first, second: the ends of its range; or mean and standard deviation.
+        name: dotted name of the parameter.
+        spec: as given: text, or a list of numbers.
+        values: (count,) of a list or an axis of a grid; else None.
+        kind: its distribution where it is sampled: "list", "uniform", "log" or "normal".
+        first, second: ends of its range; or mean and standard deviation.
     """
 
     name: str
@@ -47,50 +44,47 @@ class Varied:
     first: float = 0.0
     second: float = 0.0
 
-    def at(self, shares: Floats) -> Floats:
+    def quantiles(self, shares: Floats) -> Floats:
         """Values (n,) below which a share (n,) of the distribution lies."""
         if self.values is not None:
-            places = np.minimum((shares * len(self.values)).astype(int), len(self.values) - 1)
-            return np.asarray(self.values[places])
+            index = np.minimum((shares * len(self.values)).astype(int), len(self.values) - 1)
+            return np.asarray(self.values[index])
         if self.kind == "normal":
             from scipy.special import ndtri
 
-            inside = np.clip(shares, END, 1.0 - END)
+            inside = np.clip(shares, MARGIN, 1.0 - MARGIN)
             return np.asarray(self.first + self.second * ndtri(inside))
         return _between(self.first, self.second, shares, self.kind == "log")
 
 
 @attrs.frozen(eq=False)
 class Design:
-    """Which points a study has.
+    """The points of a study.
 
     Attributes:
         varied: what varies, in order.
         name: "grid", or one of ``DESIGNS``.
-        count: number of samples; None for a grid.
-        seed: of the samples; None for a grid.
+        count, seed: of the samples; None for a grid.
     """
 
-    varied: tuple[Varied, ...]
+    varied: tuple[VariedParameter, ...]
     name: str = GRID
     count: int | None = None
     seed: int | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Points along each axis of a grid; of samples, their number."""
-        if self.count is not None:
-            return (self.count,)
-        return tuple(len(axis) for axis in self.axes)
+        """Points along each axis of a grid; (count,) of samples."""
+        return tuple(map(len, self.axes)) if self.count is None else (self.count,)
 
     @property
     def dimensions(self) -> tuple[str, ...]:
-        """Names of the axes: those of the numbers; of samples, ``point``."""
+        """Names of the axes: those of the parameters; of samples, ``point``."""
         return tuple(v.name for v in self.varied) if self.count is None else ("point",)
 
     @property
     def axes(self) -> list[Floats]:
-        """The values of each number of a grid."""
+        """The values of each parameter of a grid."""
         return [v.values for v in self.varied if v.values is not None]
 
     @property
@@ -99,15 +93,15 @@ class Design:
         return math.prod(self.shape)
 
     def points(self) -> Floats:
-        """The values of the numbers at all points (N, numbers), the last number fastest."""
+        """The values at all points (N, parameters), the last parameter fastest."""
         if self.count is None:
             grid = np.meshgrid(*self.axes, indexing="ij")
             return np.stack([axis.ravel() for axis in grid], axis=1)
-        shares = self._shares(self.count)
-        return np.stack([v.at(shares[:, k]) for k, v in enumerate(self.varied)], axis=1)
+        shares = self._unit_cube(self.count)
+        return np.stack([v.quantiles(shares[:, k]) for k, v in enumerate(self.varied)], axis=1)
 
-    def _shares(self, count: int) -> Floats:
-        """Points (count, numbers) of the unit cube."""
+    def _unit_cube(self, count: int) -> Floats:
+        """Points (count, parameters) of the unit cube."""
         generator = np.random.default_rng(self.seed)
         dimension = len(self.varied)
         if self.name == "random":
@@ -119,7 +113,7 @@ class Design:
 
 
 def design_of(vary: Any, sample: int | None = None, design: str = "lhs", seed: int = 0) -> Design:
-    """The points that a script or a command line asks for.
+    """The design that a script or a command line describes.
 
     Args:
         vary: name -> how it varies: text in one of the forms below, a number, or a list or an
@@ -127,7 +121,7 @@ def design_of(vary: Any, sample: int | None = None, design: str = "lhs", seed: i
             ``1:100:5:log`` (evenly in the logarithm), ``10,50,100``. For samples: ``1:5``,
             ``1:100:log``, ``3~0.1`` (normal: mean~standard deviation), ``10,50,100`` (each of
             these as often).
-        sample: number of samples; None for a grid, which has all combinations.
+        sample: number of samples; None for a grid of all combinations.
         design: how samples are drawn: "lhs" (Latin hypercube), "random", "sobol", "halton".
         seed: of the generator they are drawn with.
 
@@ -136,40 +130,34 @@ def design_of(vary: Any, sample: int | None = None, design: str = "lhs", seed: i
     """
     mistakes = _sampling_mistakes(sample, design, seed)
     pairs = _pairs(vary, mistakes)
-    varied: list[Varied] = []
-    for name, spec in pairs:
-        found = _read(name, spec, sample is not None)
-        if isinstance(found, Mistake):
-            mistakes.append(found)
-        else:
-            varied.append(found)
-    if len(pairs) > MOST_VARIED:
-        what = f"{len(pairs)} numbers vary; at most {MOST_VARIED} do"
+    read = [_read(name, spec, sample is not None) for name, spec in pairs]
+    mistakes += [one for one in read if isinstance(one, Mistake)]
+    varied = tuple(one for one in read if not isinstance(one, Mistake))
+    if len(pairs) > MAX_VARIED:
+        what = f"{len(pairs)} numbers vary; at most {MAX_VARIED} do"
         mistakes.append(Mistake("vary", MISSING, what))
-    size = math.prod(len(v.values) for v in varied if v.values is not None)
-    if sample is None and size > MOST_POINTS:
-        lengths = " x ".join(f"{len(v.values):,}" for v in varied if v.values is not None)
-        what = f"the grid has {lengths} = {size:.3g} points; a study has at most {MOST_POINTS:g}"
+    lengths = [len(axis) for axis in Design(varied).axes]
+    if sample is None and math.prod(lengths) > MAX_POINTS:
+        product = f"{' x '.join(f'{n:,}' for n in lengths)} = {math.prod(lengths):.3g}"
+        what = f"the grid has {product} points; a study has at most {MAX_POINTS:g}"
         mistakes.append(Mistake("vary", MISSING, what, remedy="sample it: sample=1000, --sample"))
     if mistakes:
         raise SceneError(mistakes)
-    if sample is None:
-        return Design(tuple(varied))
-    return Design(tuple(varied), design, int(sample), int(seed))
+    return Design(varied) if sample is None else Design(varied, design, int(sample), int(seed))
 
 
 def _sampling_mistakes(sample: Any, design: Any, seed: Any) -> list[Mistake]:
-    found = []
-    if sample is not None and not (_is_whole(sample) and 1 <= sample <= MOST_POINTS):
-        what = f"the number of samples is a whole number from 1 to {MOST_POINTS:g}"
-        found.append(Mistake("sample", sample, what))
+    mistakes = []
+    if sample is not None and not (_is_whole(sample) and 1 <= sample <= MAX_POINTS):
+        what = f"the number of samples is a whole number from 1 to {MAX_POINTS:g}"
+        mistakes.append(Mistake("sample", sample, what))
     if design not in DESIGNS:
         what = f"samples are drawn by one of {', '.join(DESIGNS)}"
         remedy = "for a grid leave sample and design out" if design == GRID else ""
-        found.append(Mistake("design", design, what, nearest(design, DESIGNS), remedy))
+        mistakes.append(Mistake("design", design, what, nearest(design, DESIGNS), remedy))
     if not (_is_whole(seed) and 0 <= seed < 2**63):
-        found.append(Mistake("seed", seed, "the seed is a whole number from 0 to 2^63 - 1"))
-    return found
+        mistakes.append(Mistake("seed", seed, "the seed is a whole number from 0 to 2^63 - 1"))
+    return mistakes
 
 
 def _is_whole(value: Any) -> bool:
@@ -177,20 +165,18 @@ def _is_whole(value: Any) -> bool:
 
 
 def _pairs(vary: Any, mistakes: list[Mistake]) -> list[tuple[str, Any]]:
-    """Name and form of each number; what cannot be told apart is a mistake."""
-    if isinstance(vary, str):
-        vary = [vary]
+    """Name and form of each parameter."""
     pairs: list[tuple[str, Any]] = []
     if isinstance(vary, Mapping):
-        pairs = [(name, spec) for name, spec in vary.items()]
+        pairs = list(vary.items())
     elif isinstance(vary, Iterable):
-        for one in vary:
+        for one in [vary] if isinstance(vary, str) else vary:
             name, sign, spec = one.rpartition("=") if isinstance(one, str) else ("", "", "")
-            if not sign or not name:
+            if sign and name:
+                pairs.append((name.strip(), spec))
+            else:
                 what = 'what varies is NAME=FORM, such as "bodies.crank.mass=1:5:9"'
                 mistakes.append(Mistake("vary", one, what))
-            else:
-                pairs.append((name.strip(), spec))
     else:
         mistakes.append(Mistake("vary", vary, 'what varies is {"bodies.crank.mass": "1:5:9"}'))
         return pairs
@@ -203,21 +189,21 @@ def _pairs(vary: Any, mistakes: list[Mistake]) -> list[tuple[str, Any]]:
     return pairs
 
 
-def _read(name: Any, spec: Any, sampled: bool) -> Varied | Mistake:
-    """How one number varies, or what is wrong with it."""
+def _read(name: Any, spec: Any, sampled: bool) -> VariedParameter | Mistake:
+    """How one parameter varies, or what is wrong with it."""
     if not isinstance(spec, str):
-        return _listed(name, spec, spec)
+        return _list(name, spec, spec)
     if "~" in spec:
         return _normal(name, spec, sampled)
     if ":" in spec:
         return _range(name, spec, sampled)
     if not spec.strip():
         return Mistake(f"vary {name}", spec, f"no values; write {FORMS}")
-    return _listed(name, spec, [part.strip() for part in spec.split(",")])
+    return _list(name, spec, [part.strip() for part in spec.split(",")])
 
 
-def _listed(name: str, spec: Any, values: Any) -> Varied | Mistake:
-    """A list of values: each is a number, and none stands twice."""
+def _list(name: str, spec: Any, values: Any) -> VariedParameter | Mistake:
+    """A list of different numbers."""
     key = f"vary {name}"
     try:
         array = np.atleast_1d(np.asarray(values))
@@ -227,21 +213,21 @@ def _listed(name: str, spec: Any, values: Any) -> Varied | Mistake:
         return Mistake(key, spec, f"should be numbers in a list, or text: {FORMS}")
     if not len(array):
         return Mistake(key, spec, "no points: there is no value in the list")
-    if len(array) > MOST_POINTS:
-        return Mistake(key, MISSING, f"{len(array):.3g} values; at most {MOST_POINTS:g}")
-    found = np.empty(len(array))
+    if len(array) > MAX_POINTS:
+        return Mistake(key, MISSING, f"{len(array):.3g} values; at most {MAX_POINTS:g}")
+    numbers = np.empty(len(array))
     for k, part in enumerate(array.tolist()):
         number = _number(part)
         if number is None:
             return Mistake(key, part, f"{NO_NUMBER}; write {FORMS}")
-        found[k] = number
-    there, counts = np.unique(found, return_counts=True)
-    if len(there) < len(found):
-        return Mistake(key, spec, f"{there[counts > 1][0]:g} stands in the list twice")
-    return Varied(name, spec if isinstance(spec, str) else found.tolist(), found)
+        numbers[k] = number
+    unique, counts = np.unique(numbers, return_counts=True)
+    if len(unique) < len(numbers):
+        return Mistake(key, spec, f"{unique[counts > 1][0]:g} is in the list twice")
+    return VariedParameter(name, spec if isinstance(spec, str) else numbers.tolist(), numbers)
 
 
-def _range(name: str, spec: str, sampled: bool) -> Varied | Mistake:
+def _range(name: str, spec: str, sampled: bool) -> VariedParameter | Mistake:
     """``from:to:count``, ``from:to``, each perhaps with ``:log``."""
     key = f"vary {name}"
     parts = [part.strip() for part in spec.split(":")]
@@ -255,8 +241,8 @@ def _range(name: str, spec: str, sampled: bool) -> Varied | Mistake:
             return Mistake(key, spec, f"{part!r} {NO_NUMBER}")
     low, high = ends[0] or 0.0, ends[1] or 0.0
     if low == high:
-        what = "the range begins where it ends"
-        return Mistake(key, spec, what, remedy=f"a value that stays is {name}={low:g}")
+        remedy = f"a constant value is {name}={low:g}"
+        return Mistake(key, spec, "the range begins where it ends", remedy=remedy)
     if is_log and min(low, high) < 1.0 / LARGEST:
         what = f"a logarithm is of positive numbers; both ends should be {1.0 / LARGEST:g} or more"
         return Mistake(key, spec, what)
@@ -264,7 +250,7 @@ def _range(name: str, spec: str, sampled: bool) -> Varied | Mistake:
         remedy = f"leave the count out: {':'.join(parts[:2] + ['log'] * is_log)}"
         return Mistake(key, spec, "a range that is sampled has no count", remedy=remedy)
     if sampled:
-        return Varied(name, spec, None, "log" if is_log else "uniform", low, high)
+        return VariedParameter(name, spec, None, "log" if is_log else "uniform", low, high)
     if len(parts) == 2:
         tail = ":log" if is_log else ""
         remedy = f"add how many, {':'.join(parts)}:9{tail}, or sample: sample=N, --sample N"
@@ -273,26 +259,26 @@ def _range(name: str, spec: str, sampled: bool) -> Varied | Mistake:
 
 
 def _axis(
-    name: str, spec: str, ends: tuple[float, float], words: str, is_log: bool
-) -> Varied | Mistake:
-    """The values of an axis of a grid."""
+    name: str, spec: str, ends: tuple[float, float], text: str, is_log: bool
+) -> VariedParameter | Mistake:
+    """An axis of a grid."""
     key = f"vary {name}"
     try:
-        count = int(words) if words.isascii() else 0
+        count = int(text) if text.isascii() else 0
     except ValueError:
-        return Mistake(key, spec, f"the count {words!r} is no whole number")
+        return Mistake(key, spec, f"the count {text!r} is no whole number")
     if count < 1:
         return Mistake(key, spec, "no points: the count is at least 1")
     if count == 1:
         what = "one value does not reach from one end to the other"
-        return Mistake(key, spec, what, remedy=f"a value that stays is {name}={ends[0]:g}")
-    if count > MOST_POINTS:
-        return Mistake(key, spec, f"{count:.3g} points; a study has at most {MOST_POINTS:g}")
-    values = _between(*ends, np.linspace(0.0, 1.0, count), is_log)
-    values[-1] = ends[1]  # which rounding may miss
-    if not is_log:
-        values = np.linspace(*ends, count)
-    return Varied(name, spec, values)
+        return Mistake(key, spec, what, remedy=f"a constant value is {name}={ends[0]:g}")
+    if count > MAX_POINTS:
+        return Mistake(key, spec, f"{count:.3g} points; a study has at most {MAX_POINTS:g}")
+    values = np.linspace(*ends, count)
+    if is_log:
+        values = _between(*ends, np.linspace(0.0, 1.0, count), is_log)
+        values[-1] = ends[1]  # which rounding may miss
+    return VariedParameter(name, spec, values)
 
 
 def _between(low: float, high: float, shares: Floats, is_log: bool) -> Floats:
@@ -301,23 +287,22 @@ def _between(low: float, high: float, shares: Floats, is_log: bool) -> Floats:
     return np.asarray(low + (high - low) * shares)
 
 
-def _normal(name: str, spec: str, sampled: bool) -> Varied | Mistake:
+def _normal(name: str, spec: str, sampled: bool) -> VariedParameter | Mistake:
     """``mean~standard deviation``."""
     key = f"vary {name}"
-    parts = [part.strip() for part in spec.split("~")]
-    found = [_number(part) for part in parts]
-    if len(parts) != 2 or found[0] is None or found[1] is None:
+    numbers = [_number(part.strip()) for part in spec.split("~")]
+    if len(numbers) != 2 or numbers[0] is None or numbers[1] is None:
         return Mistake(key, spec, "should be two finite numbers, mean~standard deviation")
-    if found[1] <= 0.0:
+    if numbers[1] <= 0.0:
         return Mistake(key, spec, "a standard deviation is greater than 0")
     if not sampled:
         remedy = "say how many: sample=N, --sample N; or list values"
         return Mistake(key, spec, "a normal distribution is sampled", remedy=remedy)
-    return Varied(name, spec, None, "normal", found[0], found[1])
+    return VariedParameter(name, spec, None, "normal", numbers[0], numbers[1])
 
 
 def _number(value: Any) -> float | None:
-    """A finite number that a scene may hold; None for what is none."""
+    """A finite number that a scene may hold; None for anything else."""
     if isinstance(value, str) and "_" in value:  # which Python takes for a comma
         return None
     try:

@@ -1,17 +1,20 @@
-"""What is kept of each run of a study: a quantity, at the end, its extreme, its mean, or all."""
+"""Outputs of a study: what is computed from each run, from its result or its rows."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.model import Model
 from dap3d_core.registry.suggestions import nearest
-from dap3d_core.result import Result
+from dap3d_core.result import Quantity, Record, Result, ResultError, UnknownNameError, find
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.scene.errors import shown
-from dap3d_core.simulation import SimulationError
+from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.study.parameters import SceneParameter
 
 Floats = NDArray[np.float64]
 
@@ -22,7 +25,7 @@ def _mean(values: Floats, t: Floats) -> Any:
     return np.trapezoid(values, t, axis=-1) / span if span else values[..., -1]
 
 
-#: What is made of values (..., nt) of a quantity at the reported instants t (nt,).
+#: Of values (..., nt) of a quantity at the reported instants t (nt,).
 REDUCTIONS: dict[str, Callable[[Floats, Floats], Any]] = {
     "end": lambda values, t: values[..., -1],
     "min": lambda values, t: np.min(values, axis=-1),
@@ -31,19 +34,22 @@ REDUCTIONS: dict[str, Callable[[Floats, Floats], Any]] = {
     "series": lambda values, t: values,
 }
 
-#: Names that a study's data set gives to something else.
+#: Names of other variables in a study's data set.
 RESERVED = ("point", "time", "status", "note")
 FORM = "an output is text such as 'crank.r.z:max', or a function of the result"
+#: Parameters that change the reporting times.
+TIMING = (("simulation", "t_end"), ("simulation", "dt"))
+#: Quantities of the model that are computed with masses, and of joints, that are in the rows.
+OF_MASSES, IN_ROWS = ("kinetic energy", "total energy"), "Lagrange multipliers"
 
 
 @attrs.frozen
 class Output:
-    """One thing that is kept of each run.
+    """One value or series that is computed from each run.
 
     Attributes:
-        name: what it is called: as the user asks for it, ``crank.r.z:max``.
-        of: a quantity of one number by its name in results; or a function of the ``Result`` that
-            returns one number.
+        name: its label, by default the text that defines it, ``crank.r.z:max``.
+        of: name of a scalar quantity; or a function of the ``Result`` that returns one number.
         reduction: one of ``REDUCTIONS``; "" for a function.
     """
 
@@ -63,76 +69,198 @@ class Output:
             return np.empty(0) if self.reduction == "series" else np.nan
         return REDUCTIONS[self.reduction](result.quantity(self.of).values, result.t)
 
+    def components(self, names: Sequence[str]) -> "list[Output]":
+        """An output for each component of a vector: ``crank.r:max`` -> ``crank.r.x:max``, ..."""
+        if not names:
+            return [self]
+        head, colon, tail = self.name.rpartition(":")
+        head, colon, tail = (head, colon, tail) if colon else (self.name, "", "")
+        return [
+            attrs.evolve(self, name=f"{head}.{c}{colon}{tail}", of=f"{self.of}.{c}") for c in names
+        ]
+
     def _returned(self, function: Callable[[Result], Any], result: Result) -> float:
         try:
             value = function(result)
         except Exception as error:
-            words = f"the function of output {self.name!r} raises {type(error).__name__}: {error}"
-            raise SimulationError(words) from error
+            message = f"the function of output {self.name!r} raises {type(error).__name__}: {error}"
+            raise SimulationError(message) from error
         try:
             return float(value)
         except (TypeError, ValueError) as error:
-            words = f"the function of output {self.name!r} should return one number"
-            raise SimulationError(f"{words}, not {shown(value)}") from error
+            message = f"the function of output {self.name!r} should return one number"
+            raise SimulationError(f"{message}, not {shown(value)}") from error
 
 
-def outputs_of(asked: Any) -> tuple[Output, ...]:
-    """Outputs as a script asks for them.
+def outputs_of(given: Any) -> tuple[Output, ...]:
+    """Outputs as given by a script or a command line.
 
     Args:
-        asked: the name of a quantity, perhaps with a reduction behind a colon (one of
-            ``REDUCTIONS``, "end" where there is none); a function of the ``Result`` that returns
-            one number, called by its name; a list of these; or label -> one of these.
+        given: name of a quantity, with a reduction after a colon (one of ``REDUCTIONS``, by default
+            "end"); a function of the ``Result`` that returns one number, labelled by its name; a
+            list of these; or label -> one of these.
 
     Raises:
-        SceneError: none, one twice, an unknown reduction, a label that is no name; all mistakes.
+        SceneError: none, one twice, an unknown reduction, an invalid label; all mistakes.
     """
-    if isinstance(asked, str) or callable(asked):
-        asked = [asked]
-    pairs: list[tuple[Any, Any]]
-    if isinstance(asked, Mapping):
-        pairs = list(asked.items())
-    elif isinstance(asked, Iterable):
-        pairs = [(_own_name(one), one) for one in asked]
+    if isinstance(given, str) or callable(given):
+        given = [given]
+    if isinstance(given, Mapping):
+        pairs = list(given.items())
+    elif isinstance(given, Iterable):
+        pairs = [(getattr(of, "__name__", "") if callable(of) else of, of) for of in given]
     else:
-        raise SceneError([Mistake("outputs", asked, FORM)])
+        raise SceneError([Mistake("outputs", given, FORM)])
     if not pairs:
         raise SceneError([Mistake("outputs", MISSING, f"a study needs at least one; {FORM}")])
-    read = [_output(label, one) for label, one in pairs]
-    found = [one for one in read if isinstance(one, Output)]
+    read = [_output(label, of) for label, of in pairs]
+    outputs = [one for one in read if isinstance(one, Output)]
     mistakes = [one for one in read if isinstance(one, Mistake)]
-    names = [output.name for output in found]
+    names = [output.name for output in outputs]
     twice = dict.fromkeys(name for name in names if names.count(name) > 1)
     mistakes += [Mistake("outputs", name, "an output is named once only") for name in twice]
     if mistakes:
         raise SceneError(mistakes)
-    return tuple(found)
+    return tuple(outputs)
 
 
-def _own_name(one: Any) -> Any:
-    """What an output is called that has no label."""
-    return getattr(one, "__name__", "") if callable(one) else one
-
-
-def _output(label: Any, one: Any) -> Output | Mistake:
-    if not callable(one) and not isinstance(one, str):
-        return Mistake("outputs", one, FORM)
-    if callable(one) and (not isinstance(label, str) or not label or label == "<lambda>"):
+def _output(label: Any, of: Any) -> Output | Mistake:
+    if not callable(of) and not isinstance(of, str):
+        return Mistake("outputs", of, FORM)
+    if callable(of) and (not isinstance(label, str) or not label or label == "<lambda>"):
         what = "a function without a name of its own needs a label"
         return Mistake("outputs", MISSING, what, remedy='give {"label": function}')
     if not isinstance(label, str) or not label.strip() or not label.isprintable():
         return Mistake("outputs", label, "the label of an output is text of one line")
     if label in RESERVED:
-        return Mistake("outputs", label, "this is the name of a part of every study; take another")
-    if callable(one):
-        return Output(label, one, "")
-    quantity, colon, reduction = one.rpartition(":")
+        return Mistake("outputs", label, "this name is reserved in every study; take another")
+    if callable(of):
+        return Output(label, of, "")
+    quantity, colon, reduction = of.rpartition(":")
     if not colon or "." in reduction:  # names of bodies may hold a colon
-        quantity, reduction = one, "end"
+        quantity, reduction = of, "end"
     if reduction in REDUCTIONS and quantity:
         return Output(label, quantity, reduction)
     if not quantity:
-        return Mistake("outputs", one, FORM)
-    what = f"behind the colon stands one of {', '.join(REDUCTIONS)}"
+        return Mistake("outputs", of, FORM)
     near = nearest(reduction, REDUCTIONS)
-    return Mistake("outputs", one, what, f"{quantity}:{near}" if near else "")
+    what = f"the reduction after the colon is one of {', '.join(REDUCTIONS)}"
+    return Mistake("outputs", of, what, f"{quantity}:{near}" if near else "")
+
+
+class Reduction:
+    """Computes the outputs of a study from the rows that its runs report.
+
+    Attributes:
+        outputs: those requested, each vector in its components.
+        labels, units: of each output, by name.
+        of_rows: whether each output can be computed from the rows of many runs at once, by name.
+    """
+
+    def __init__(
+        self,
+        compiled: CompiledModel,
+        parameters: Sequence[SceneParameter],
+        outputs: Sequence[Output],
+    ) -> None:
+        """Look the outputs up.
+
+        Raises:
+            SceneError: an unknown quantity; or a series of a length that varies.
+        """
+        self._compiled = compiled
+        self._tables = {parameter.table for parameter in parameters}
+        self.labels: dict[str, str] = {}
+        self.units: dict[str, str] = {}
+        self.of_rows: dict[str, bool] = {}
+        self.outputs = self._look_up(outputs)
+        self._columns = self._find_columns()
+        timing = [parameter.name for parameter in parameters if parameter.path in TIMING]
+        series = [output.name for output in self.outputs if output.reduction == "series"]
+        if timing and series:
+            what = f"a series has the same length at each point, and {timing[0]} varies"
+            remedy = "use :end, :min, :max or :mean"
+            raise SceneError(Mistake("outputs", name, what, remedy=remedy) for name in series)
+
+    def reduce(self, rows: Floats, times: Floats) -> dict[str, Floats]:
+        """The outputs that are ``of_rows``, (k,) or (k, nt), of k runs' rows (k, nt, width)."""
+        k, nt, width = rows.shape
+        result, values_of = None, {}
+        for output in self.outputs:
+            if not self.of_rows[output.name]:
+                continue
+            if output.name in self._columns:
+                values = rows[:, :, self._columns[output.name]]
+            else:
+                result = result or self.result(self._compiled.model, rows.reshape(k * nt, width))
+                values = result.quantity(str(output.of)).values.reshape(k, nt)
+            values_of[output.name] = REDUCTIONS[output.reduction](values, times)
+        return values_of
+
+    @property
+    def is_of_single_copies(self) -> bool:
+        """True if no output needs what all copies of a pack share, which is NaN in their rows."""
+        if not all(self.of_rows.values()):
+            return False
+        layout = self._compiled.model.row_layout
+        rows = np.random.default_rng(0).random((1, 3, layout.size))
+        for name in ("work", "potential_energy", "residuals"):
+            rows[..., layout[name]] = np.nan
+        reduced = self.reduce(rows, np.arange(3.0))
+        return all(bool(np.all(np.isfinite(values))) for values in reduced.values())
+
+    def result(self, model: Model, rows: Floats, machine: Machine | None = None) -> Result:
+        """A result in memory, of rows of a model that a machine evaluates."""
+        record = Record(scene_text=self._compiled.scene_text)
+        return Result.of_run(model, rows, record, lambda: machine or self._compiled.machine)
+
+    def _look_up(self, outputs: Sequence[Output]) -> tuple[Output, ...]:
+        machine = self._compiled.machine
+        y = machine.integrated(machine.model.u0)
+        row = np.concatenate([[0.0], y, np.zeros(machine.report_size)])
+        probe = self.result(machine.model, row[None])
+        expanded: list[Output] = []
+        mistakes: list[Mistake] = []
+        for output in outputs:
+            components, label, unit, of_rows = [output], output.name, "", False
+            if not callable(output.of):
+                try:
+                    quantity = find(probe, output.of)
+                except (UnknownNameError, ResultError) as error:
+                    near = getattr(error, "nearest", "")
+                    what = str(error.args[0] if error.args else error)
+                    mistakes.append(Mistake("outputs", output.name, what, near))
+                    continue
+                components = output.components(quantity.components)
+                label, unit, of_rows = quantity.label, quantity.unit, self._is_of_rows(quantity)
+            expanded += components
+            for name in (component.name for component in components):
+                self.labels[name], self.units[name], self.of_rows[name] = label, unit, of_rows
+        if mistakes:
+            raise SceneError(mistakes)
+        return tuple(expanded)
+
+    def _find_columns(self) -> dict[str, int]:
+        """Output -> column of the rows: one that a quantity of random rows is equal to."""
+        machine = self._compiled.machine
+        width = 1 + len(machine.integrated(machine.model.u0)) + machine.report_size
+        rows = np.random.default_rng(0).random((3, width))
+        result = self.result(machine.model, rows)
+        columns = {}
+        for output in self.outputs:
+            if self.of_rows[output.name]:
+                values = result.quantity(str(output.of)).values
+                same = np.flatnonzero(np.all(rows == values[:, None], axis=0))
+                if len(same):
+                    columns[output.name] = int(same[0])
+        return columns
+
+    def _is_of_rows(self, quantity: Quantity) -> bool:
+        """True if a quantity is computed with nothing that varies from point to point."""
+        if quantity.owner == "joint" and quantity.kind != IN_ROWS:
+            return self._tables <= {"forces"}
+        if quantity.owner == "force":
+            return not self._tables
+        if quantity.owner == "point":
+            return "points" not in self._tables
+        return quantity.kind not in OF_MASSES or "bodies" not in self._tables

@@ -1,6 +1,6 @@
-"""Numbers of a scene by their dotted names: ``bodies.crank.mass``, ``points.A.sPp.x``.
+"""Parameters of a scene by their dotted names: ``bodies.crank.mass``, ``points.A.sPp.x``.
 
-A name is followed part by part, so that a scene may have any number of others.
+A name is resolved part by part, so that it takes no longer in a large scene.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -15,38 +15,38 @@ from dap3d_core.scene.scene import NAMED, Element
 from dap3d_core.scene.validate.settings import OPEN
 
 AXES = ("x", "y", "z")
-PARAMETERS = ("e0", "e1", "e2", "e3")
-#: Tables whose parts have numbers; shapes are only drawn, a vector2 has points alone.
+EULER_PARAMETERS = ("e0", "e1", "e2", "e3")
+#: Tables with parameters; shapes are only drawn, a vector2 has points alone.
 TABLES = (*(table for table in NAMED if table not in ("shapes", "vectors2")), "simulation")
-#: Kinds of fields that are numbers also where the scene leaves them to their type.
+#: Kinds of fields that are numeric also where the scene leaves them to their type.
 NUMERIC = ("number", "vec3", "matrix")
-#: What is used for a body that does not give it (scene/validate/bodies.py).
-USUAL: dict[str, Any] = {"mass": 1.0, "Jp": (1.0, 1.0, 1.0)}
-#: Units of what is no field of a type.
+#: Defaults of a body (scene/validate/bodies.py).
+BODY_DEFAULTS: dict[str, Any] = {"mass": 1.0, "Jp": (1.0, 1.0, 1.0)}
+#: Units of fields that do not belong to a type.
 UNITS = {"mass": "kg", "Jp": "kg m^2", "r": "m", "r_dot": "m/s", "w": "rad/s", "sPp": "m",
          "t_end": "s", "dt": "s", "step": "s", "Omega": "rad/s"}  # fmt: skip
-#: As many names are shown in a message.
-SHOWN = 6
+#: Largest number of names in a message.
+MAX_NAMES = 6
 FORM = "names are TABLE.NAME.FIELD, such as bodies.crank.mass, or simulation.FIELD"
 
 
 @attrs.frozen
-class Number:
+class SceneParameter:
     """One number of a scene.
 
     Attributes:
         name: dotted, as the user gives it.
         path: table, owner and field; ``simulation`` has no owner.
-        places: where in the field's value, from 0; empty for a single number.
-        value: what stands there now; None where the scene leaves it to the type.
-        unit: SI, "1" where it has none.
-        whole: whether it must be a whole number.
-        default: the whole field as it is used where the scene does not give it.
+        index: of the number in the field's value, from 0; empty for a scalar field.
+        value: in the scene; None where the scene leaves it to the type.
+        unit: SI, "1" for a number without dimension.
+        whole: True if it must be an integer.
+        default: value of the whole field where the scene does not give it.
     """
 
     name: str
     path: tuple[str, ...]
-    places: tuple[int, ...]
+    index: tuple[int, ...]
     value: float | None
     unit: str = "1"
     whole: bool = False
@@ -58,102 +58,99 @@ class Number:
         return self.path[0]
 
     @property
-    def twins(self) -> frozenset[tuple[Any, ...]]:
-        """Where it stands: of an inertia matrix an entry beside the diagonal stands twice."""
-        turned = self.places[::-1] if self.path[-1] == "Jp" else self.places
-        return frozenset({(self.path, self.places), (self.path, turned)})
+    def entries(self) -> frozenset[tuple[Any, ...]]:
+        """Path and index of its entries: an off-diagonal one of an inertia matrix has two."""
+        mirrored = self.index[::-1] if self.path[-1] == "Jp" else self.index
+        return frozenset({(self.path, self.index), (self.path, mirrored)})
 
-    def put(self, scene: Scene, value: float) -> None:
-        """Give the number another value, in a scene that is changed.
-
-        An inertia matrix stays symmetric: an entry beside its diagonal is changed with its twin.
-        """
+    def assign(self, scene: Scene, value: float) -> None:
+        """Change the value in a scene; an inertia matrix stays symmetric."""
         holder = _holder(scene, self.path)
         field = self.path[-1]
-        whole: Any = value
-        if self.places:
-            given = _given(holder, field)
-            whole = self.default if given is None else given
-            for _, places in self.twins:
-                whole = _replaced(whole, places, value)
-        if isinstance(holder, Element):
-            holder.fields[field] = whole
+        is_element = isinstance(holder, Element)
+        changed: Any = value
+        if self.index:
+            given = holder.fields.get(field) if is_element else getattr(holder, field)
+            changed = self.default if given is None else given
+            for _, index in self.entries:
+                changed = _replaced(changed, index, value)
+        if is_element:
+            holder.fields[field] = changed
         else:
-            setattr(holder, field, whole)
+            setattr(holder, field, changed)
 
 
-def with_values(scene: Scene, numbers: Sequence[Number], values: Sequence[float]) -> Scene:
-    """A copy of a scene in which numbers have other values; nothing is checked."""
+def with_values(
+    scene: Scene, parameters: Sequence[SceneParameter], values: Sequence[float]
+) -> Scene:
+    """A copy of a scene with other values of parameters, which are not checked."""
     changed = scene.copy()
-    for number, value in zip(numbers, values, strict=True):
-        number.put(changed, float(value))
+    for parameter, value in zip(parameters, values, strict=True):
+        parameter.assign(changed, float(value))
     return changed
 
 
-def numbers_named(checked: Checked, names: Sequence[str]) -> tuple[Number, ...]:
-    """Numbers of a scene by name.
+def parameters_named(checked: Checked, names: Sequence[str]) -> tuple[SceneParameter, ...]:
+    """Parameters of a scene by name.
 
     Args:
         checked: the scene.
-        names: ``TABLE.NAME.FIELD`` or ``simulation.FIELD``; a component follows behind a further
-            dot: x, y, z, for Euler parameters e0 to e3, or its place in the list, from 1.
+        names: ``TABLE.NAME.FIELD`` or ``simulation.FIELD``; a component follows after a further
+            dot: x, y, z, for Euler parameters e0 to e3, or its index in the list, from 1.
 
     Raises:
-        SceneError: a name is none of these, the nearest is shown; or it is given twice.
+        SceneError: unknown names, with the nearest; a parameter that is named twice.
     """
-    found: list[Number] = []
+    parameters: list[SceneParameter] = []
     mistakes: list[Mistake] = []
     for name in names:
-        number = _followed(checked, name)
-        if isinstance(number, Mistake):
-            mistakes.append(number)
+        parameter = _resolve(checked, name)
+        if isinstance(parameter, Mistake):
+            mistakes.append(parameter)
             continue
-        same = next((other for other in found if other.twins & number.twins), None)
+        same = next((other for other in parameters if other.entries & parameter.entries), None)
         if same is not None:
             alias = "" if same.name == name else f"this is {same.name} under another name; "
             mistakes.append(Mistake("vary", name, f"{alias}a number is varied only once"))
-        found.append(number)
+        parameters.append(parameter)
     if mistakes:
         raise SceneError(mistakes)
-    return tuple(found)
+    return tuple(parameters)
 
 
-def all_numbers(checked: Checked) -> Iterator[Number]:
-    """Every number of a scene that can be varied, those that it leaves to its types as well."""
+def all_parameters(checked: Checked) -> Iterator[SceneParameter]:
+    """Every parameter of a scene, those that it leaves to its types as well."""
     for table in TABLES:
-        for owner in _owners(checked.scene, table):
-            path = (table, owner) if owner else (table,)
-            for field in _fields(checked, path):
-                yield from _numbers_in(field)
+        for owner in ("",) if table == "simulation" else getattr(checked.scene, table):
+            for field in _fields(checked, (table, owner) if owner else (table,)):
+                yield from field.parameters()
 
 
 def names_under(checked: Checked, begin: str = "") -> list[str]:
-    """The names that go on from a beginning by one part; those that are no number end in a dot."""
+    """Names that extend a beginning by one part; those that are no parameter end in a dot."""
     *head, _ = begin.split(".")
+    table = head[0] if head else ""
+    owners = getattr(checked.scene, table) if table in TABLES and table != "simulation" else ()
+    depth = 1 if table == "simulation" else 2
     if not head:
-        found = [f"{t}." for t in TABLES if t == "simulation" or getattr(checked.scene, t)]
-    elif len(head) == 1 and head[0] in TABLES and head[0] != "simulation":
-        found = [f"{head[0]}.{owner}." for owner in getattr(checked.scene, head[0])]
+        names = [f"{t}." for t in TABLES if t == "simulation" or getattr(checked.scene, t)]
+    elif len(head) == 1 and owners:
+        names = [f"{table}.{owner}." for owner in owners]
+    elif table not in TABLES or (depth == 2 and (len(head) < 2 or head[1] not in owners)):
+        return []
     else:
-        of_table = 1 if head[0] == "simulation" else 2
-        path = tuple(head[:of_table])
-        if head[0] not in TABLES or (
-            of_table == 2 and head[1] not in getattr(checked.scene, head[0])
-        ):
-            return []
-        fields = list(_fields(checked, path))
-        parts = {n.name: field.name for field in fields for n in _numbers_in(field)}
-        if len(head) == of_table:
-            single = [name for name, field in parts.items() if name == field]
-            found = [f.name if f.name in single else f"{f.name}." for f in fields]
+        fields = list(_fields(checked, tuple(head[:depth])))
+        field_of = {p.name: field.name for field in fields for p in field.parameters()}
+        if len(head) == depth:
+            names = [f.name if f.name in field_of else f"{f.name}." for f in fields]
         else:
-            found = [name for name, field in parts.items() if name != field]
-    return [name for name in found if name.startswith(begin)]
+            names = [name for name, field in field_of.items() if name != field]
+    return [name for name in names if name.startswith(begin)]
 
 
 @attrs.frozen
 class _Field:
-    """A field with numbers: its path, its value (None: left to the type), what it is."""
+    """A numeric field: its path, and its value (None: left to the type)."""
 
     path: tuple[str, ...]
     value: Any
@@ -165,22 +162,55 @@ class _Field:
     def name(self) -> str:
         return ".".join(self.path)
 
-    def number(self, name: str, places: tuple[int, ...] = ()) -> Number | None:
-        """The number at a place; None where there is none."""
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """Letters of the components: x, y, z; none where it has none."""
         value = self.value
-        for k in places:
+        if type(value) is not tuple or any(type(part) is tuple for part in value):
+            return ()
+        if len(value) == 3:
+            return AXES
+        return EULER_PARAMETERS if self.path[-1] == "p" and len(value) == 4 else ()
+
+    def parameter(self, name: str, index: tuple[int, ...] = ()) -> SceneParameter | None:
+        """The parameter at an index; None where there is none."""
+        value = self.value
+        for k in index:
             if type(value) is not tuple or not 0 <= k < len(value):
                 return None
             value = value[k]
         if value is not None and type(value) not in (int, float):
             return None
         default = None if self.is_given else self.value
-        now = None if value is None else float(value)
-        return Number(name, self.path, places, now, self.unit, self.whole, default)
+        number = None if value is None else float(value)
+        return SceneParameter(name, self.path, index, number, self.unit, self.whole, default)
+
+    def parameters(self, index: tuple[int, ...] = ()) -> Iterator[SceneParameter]:
+        """All parameters of the field, named by letters where it has some."""
+        value = self.value
+        for k in index:
+            value = value[k]
+        if type(value) is tuple:
+            for k in range(len(value)):
+                yield from self.parameters((*index, k))
+            return
+        letters = self.letters
+        parts = [letters[index[0]]] if letters and index else [str(k + 1) for k in index]
+        parameter = self.parameter(".".join((self.name, *parts)), index)
+        if parameter is not None:
+            yield parameter
+
+    def index(self, parts: Sequence[str]) -> tuple[int, ...]:
+        """Index of a component from 0, by letter or by numbers from 1; -1 for an invalid one."""
+        letters = self.letters
+        if len(parts) == 1 and parts[0] in letters:
+            return (letters.index(parts[0]),)
+        digits = [p if p.isascii() and p.isdigit() and len(p) < 10 else "0" for p in parts]
+        return tuple(int(p) - 1 for p in digits)
 
 
-def _followed(checked: Checked, name: Any) -> Number | Mistake:
-    """The number of a name, found part by part, or what is wrong with it."""
+def _resolve(checked: Checked, name: Any) -> SceneParameter | Mistake:
+    """The parameter of a name, or what is wrong with the name."""
     if not isinstance(name, str):
         return Mistake("vary", name, "the name of a number is text such as 'bodies.crank.mass'")
     table, *rest = name.split(".")
@@ -196,16 +226,16 @@ def _followed(checked: Checked, name: Any) -> Number | Mistake:
         path = (table, rest.pop(0))
     fields = {field.path[-1]: field for field in _fields(checked, path)}
     if not rest:
-        shown = _listed([f.name for f in fields.values()])
-        return Mistake("vary", name, f"this is no single number; it has {shown}")
+        listed = _listed([f.name for f in fields.values()])
+        return Mistake("vary", name, f"this is no single number; it has {listed}")
     if rest[0] not in fields:
         what = f"{'.'.join(path)} has no number {rest[0]!r}"
         return _unknown(name, path, rest, fields, what)
     field = fields[rest.pop(0)]
-    number = field.number(name, _places(field, rest)) if all(rest) else None
-    if number is not None:
-        return number
-    parts = [n.name for n in _numbers_in(field)]
+    parameter = field.parameter(name, field.index(rest)) if all(rest) else None
+    if parameter is not None:
+        return parameter
+    parts = [p.name for p in field.parameters()]
     if not rest:
         return Mistake("vary", name, f"this is no single number; it has {_listed(parts)}")
     what = f"{field.name} has no number {'.'.join(rest)!r}; it has {_listed(parts)}"
@@ -214,58 +244,21 @@ def _followed(checked: Checked, name: Any) -> Number | Mistake:
     return Mistake("vary", name, what, nearest(name, parts))
 
 
-def _places(field: _Field, parts: Sequence[str]) -> tuple[int, ...]:
-    """Where a component stands, from 0; -1 for what is none."""
-    letters = _letters(field)
-    if len(parts) == 1 and parts[0] in letters:
-        return (letters.index(parts[0]),)
-    digits = [p if p.isascii() and p.isdigit() and len(p) < 10 else "0" for p in parts]
-    return tuple(int(p) - 1 for p in digits)
-
-
-def _letters(field: _Field) -> tuple[str, ...]:
-    """The letters of the components of a field: x, y, z; none where it has none."""
-    value = field.value
-    if type(value) is not tuple or any(type(part) is tuple for part in value):
-        return ()
-    if len(value) == 3:
-        return AXES
-    return PARAMETERS if field.path[-1] == "p" and len(value) == 4 else ()
-
-
-def _numbers_in(field: _Field, places: tuple[int, ...] = ()) -> Iterator[Number]:
-    """All numbers of a field, components by their letters where they have some."""
-    value = field.value
-    for k in places:
-        value = value[k]
-    if type(value) is tuple:
-        for k in range(len(value)):
-            yield from _numbers_in(field, (*places, k))
-        return
-    letters = _letters(field)
-    parts = [letters[places[0]]] if letters and places else [str(k + 1) for k in places]
-    number = field.number(".".join((field.name, *parts)), places)
-    if number is not None:
-        yield number
-
-
-def _owners(scene: Scene, table: str) -> Collection[str]:
-    return ("",) if table == "simulation" else getattr(scene, table)
-
-
 def _fields(checked: Checked, path: tuple[str, ...]) -> Iterator[_Field]:
-    """The fields with numbers of a part of a scene."""
+    """The numeric fields of an owner, or of the settings."""
     table = path[0]
     holder = _holder(checked.scene, (*path, ""))
     if isinstance(holder, Element):
-        yield from _element_fields(holder, path, _instance(checked, *path))
+        instances: list[Instance] = getattr(checked, table)
+        instance = next(instance for instance in instances if instance.name == path[1])
+        yield from _element_fields(holder, path, instance)
         return
     for attribute in attrs.fields(type(holder)):
         name = attribute.name
         value = getattr(holder, name)
         given = value is not None
         if not given and table == "bodies":
-            value = USUAL.get(name)
+            value = BODY_DEFAULTS.get(name)
         is_open = table == "simulation" and name in OPEN
         if _is_numeric(value) or (value is None and is_open):
             yield _Field((*path, name), value, UNITS.get(name, "1"), is_given=given)
@@ -284,48 +277,36 @@ def _element_fields(
             yield _Field((*path, name), value, spec.unit or "1", spec.whole, given)
 
 
-def _instance(checked: Checked, table: str, owner: str) -> Instance:
-    instances: list[Instance] = getattr(checked, table)
-    return next(instance for instance in instances if instance.name == owner)
-
-
 def _is_numeric(value: Any) -> bool:
-    """Whether a value is a number, or a list that begins with numbers."""
+    """True for a number, or a list that begins with numbers."""
     while type(value) is tuple and value:
         value = value[0]
     return type(value) in (int, float)
 
 
 def _holder(scene: Scene, path: tuple[str, ...]) -> Any:
-    """The part of a scene that has the field at the end of a path."""
-    if path[0] == "simulation":
-        return scene.simulation
-    return getattr(scene, path[0])[path[1]]
+    """The object of a scene that has the field at the end of a path."""
+    return scene.simulation if path[0] == "simulation" else getattr(scene, path[0])[path[1]]
 
 
-def _given(holder: Any, field: str) -> Any:
-    """What a scene gives for a field, or None."""
-    return holder.fields.get(field) if isinstance(holder, Element) else getattr(holder, field)
-
-
-def _replaced(value: Any, places: tuple[int, ...], number: float) -> Any:
-    """A nested tuple with another number at one place."""
-    k, *rest = places
+def _replaced(value: Any, index: tuple[int, ...], number: float) -> Any:
+    """A nested tuple with another number at an index."""
+    k, *rest = index
     part = _replaced(value[k], tuple(rest), number) if rest else number
     return (*value[:k], part, *value[k + 1 :])
 
 
 def _no_table(checked: Checked, name: str, table: str, rest: list[str]) -> Mistake:
-    """A name that begins with no table: a misspelt one, or that of a part of the scene."""
+    """The mistake of a name without a table, with the name that was probably meant."""
     homes = [t for t in TABLES if t != "simulation" and table in getattr(checked.scene, t)]
     near = ""
     if homes:
         near = f"{homes[0]}.{name}"
     elif not rest and table in attrs.fields_dict(Simulation):
         near = f"simulation.{name}"
-    elif found := nearest(table, TABLES):
-        near = ".".join((found, *rest))
-    if near and isinstance(_followed(checked, near), Mistake):
+    elif similar := nearest(table, TABLES):
+        near = ".".join((similar, *rest))
+    if near and isinstance(_resolve(checked, near), Mistake):
         near = ""
     what = "the scene has no number of this name"
     return Mistake("vary", name, what, near, "" if near else FORM)
@@ -334,16 +315,12 @@ def _no_table(checked: Checked, name: str, table: str, rest: list[str]) -> Mista
 def _unknown(
     name: str, path: tuple[str, ...], rest: list[str], known: Collection[str], what: str
 ) -> Mistake:
-    """A part of a name that is not there, with the nearest that is."""
+    """The mistake of an unknown part of a name, with the nearest known one."""
     near = nearest(rest[0], known)
     if near:
         return Mistake("vary", name, what, ".".join((*path, near, *rest[1:])))
-    shown = _listed(list(known)) if known else "nothing"
-    return Mistake("vary", name, f"{what}; it has {shown}")
+    return Mistake("vary", name, f"{what}; it has {_listed(list(known)) if known else 'nothing'}")
 
 
 def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")
-
-
-__all__ = ["Number", "all_numbers", "names_under", "numbers_named", "with_values"]
+    return ", ".join(names[:MAX_NAMES]) + (", ..." if len(names) > MAX_NAMES else "")

@@ -13,8 +13,7 @@ from dap3d_core.result import Result, ResultError, UnknownNameError, find
 from dap3d_core.result.file.schema import SWEEP
 from dap3d_core.scene import Mistake, SceneError, load, parse
 from dap3d_core.simulation import CompiledModel, SimulationError, simulate
-from dap3d_core.simulation.output.type_sources import digests_of
-from dap3d_core.study import REDUCTIONS, Number, PointStatus, numbers_named, with_values
+from dap3d_core.study import REDUCTIONS, PointStatus, SceneParameter, parameters_named, with_values
 from dap3d_core.study.sweep.subsample import at_places, evenly
 from dap3d_core.view.page_data import page_data
 from dap3d_core.view.scene3d.camera import stage
@@ -138,7 +137,7 @@ class SweepRuns:
             raise error if model is not None else SceneError(map(_own, error.mistakes)) from error
         _check_types(data, compiled)
         self._registry, self._between = compiled.checked.registry, between
-        self._numbers: tuple[Number, ...] = numbers_named(compiled.checked, names)
+        self._numbers: tuple[SceneParameter, ...] = parameters_named(compiled.checked, names)
 
     def result(self, values: Sequence[float]) -> tuple[Result | None, str]:
         """The result of a point, perhaps a part of it, and why it went no further."""

@@ -1,188 +1,201 @@
-"""The points of a study run many at once, as far as they can be; what is left is run by itself."""
+"""Runs points in compiled batches; points that cannot be batched are left open."""
 
 import contextlib
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import SceneError
-from dap3d_core.simulation import AssemblyError
+from dap3d_core.simulation import AssemblyError, CompiledModel
 from dap3d_core.simulation.failure.negative_reactions import Pulling
 from dap3d_core.simulation.initial.assemble import ROUNDING, Initial, correction_notes, distance
 from dap3d_core.simulation.initial_state import Start
 from dap3d_core.study.batch import driver, initial_state
-from dap3d_core.study.batch.compiled_batch import Found, Runs
-from dap3d_core.study.batch.packs import Packs, packs_for
-from dap3d_core.study.batch.parameter_map import NotCopiedError, Places
-from dap3d_core.study.batch.rebuild import Modelling
+from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch
+from dap3d_core.study.batch.packs import PackedBatch
+from dap3d_core.study.batch.parameter_map import NotCopiedError, ParameterMap
+from dap3d_core.study.batch.rebuild import ModelRebuilder
+from dap3d_core.study.outputs import Reduction
+from dap3d_core.study.parameters import SceneParameter
+from dap3d_core.study.study import Batch, PointStatus
 
-if TYPE_CHECKING:
-    from dap3d_core.study.study import Batch, Ensemble
-
-#: The status of a point whose run went to its end (``PointStatus``).
-DONE = 1
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-def together(ensemble: "Ensemble") -> "Together | None":
-    """What runs points of an ensemble for this thread; None where the scene as given cannot start.
+def batch_runner(
+    compiled: CompiledModel,
+    parameters: Sequence[SceneParameter],
+    reduction: Reduction,
+    times: Floats,
+    pack: int,
+) -> "BatchRunner | None":
+    """A batch runner for this thread; None where the scene as given cannot start.
 
-    Each point is then run by itself, which says what is wrong there.
+    Each point is then run individually, which reports what is wrong there.
     """
-    settings = ensemble.study.scene.simulation
-    compiled = ensemble.compiled
-    asked = bool(settings.correct), settings.hold, str(settings.correct_metric)
+    settings = compiled.scene.simulation
+    options = bool(settings.correct), settings.hold, str(settings.correct_metric)
     try:
-        start = compiled.start(*asked)
+        start = compiled.start(*options)
     except (AssemblyError, SceneError):
         return None
-    found = start.redundancy
-    if not found.is_plain:
+    redundancy = start.redundancy
+    if not redundancy.is_plain:
         return None
-    if found.rank.redundant and not compiled.machine.formulation.accepts_redundant:
+    if redundancy.rank.redundant and not compiled.machine.formulation.accepts_redundant:
         return None
-    return Together(ensemble, start)
+    return BatchRunner(compiled, start, parameters, reduction, times, pack)
 
 
-class Together:
-    """Runs points in one compiled call. For one thread."""
+class BatchRunner:
+    """Runs points of one scene in compiled batches. Not for two threads at once.
 
-    def __init__(self, ensemble: "Ensemble", start: Start) -> None:
-        """Args: whose points; the start of the scene as given."""
-        compiled, self._ensemble, self._start = ensemble.compiled, ensemble, start
-        machine = compiled.another_machine()
-        settings = compiled.scene.simulation
-        end = float(ensemble.times[-1])
-        self._modelling = Modelling(compiled, machine, ensemble.numbers, end)
-        self._runs = Runs(machine, settings, ensemble.times, compiled.pace(end).stops)
-        self._size = self._runs.size
-        self._pulling = Pulling(compiled.model)
-        self._places: Places | None = None
-        self._packs: Packs | None = None
-        with contextlib.suppress(NotCopiedError):
-            places = Places(compiled.checked, machine, ensemble.numbers)
-            if not places.moves_start or self._assembles_simply():
-                self._places = places
-                self._packs = packs_for(ensemble, machine)
+    Attributes:
+        parameter_map: puts values of parameters into the arrays of the model; None where each point
+            needs a model of its own.
+        packed: runs points in packs; None where they run one by one.
+    """
 
-    def run(self, values: Floats, batch: "Batch", part: slice, notes: list[str]) -> None:
-        """Run points (k, d): the outputs of those that go to their end into a part of a batch."""
-        places = np.arange(part.start, part.stop)
-        if self._places is not None:
-            which, found = self._run_copied(values)
-        else:
-            which, found = self._run_modelled(values, notes, part.start)
-        first = 2 + 19 * self._ensemble.compiled.model.body_count
-        good = found.done & (found.numbers[:, driver.LOOSE] == 0.0)
-        good &= ~self._pulling.among(found.rows[..., first:])  # these are run alone, and noted
-        which, rows = which[good], found.rows[good]
-        self._note(found, good, which, notes, part.start)
-        batch.status[places[which]] = DONE
-        self._keep(values, which, rows, batch, notes, part.start)
-
-    def _run_copied(self, values: Floats) -> tuple[Integers, Found]:
-        """Points whose numbers have their places: which were run, and what came of them."""
-        assert self._places is not None
-        table, fine = self._places.table(values)
-        which = np.flatnonzero(fine)
-        model, moves = self._ensemble.compiled.model, self._places.moves_start
-        if moves:
-            y0 = self._places.states(values[which], model.u0)
-        else:
-            y0 = np.repeat(self._runs.machine.integrated(self._start.u)[None], len(which), axis=0)
-        table, places = table[which], self._places.places
-        start = driver.CORRECTED if moves and model.row_count else driver.AS_IT_STANDS
-        found = self._run_in_packs(table, places, y0, start)
-        if self._places.moves:
-            found.done[self._places.are_undefined(table, found.y0)] = False
-        return which, found
-
-    def _run_in_packs(self, table: Floats, places: Integers, y0: Floats, start: int) -> Found:
-        """Runs of points whose numbers have their places; in packs, where that was asked for."""
-        if self._packs is None:
-            return self._runs.run(table, places, y0, start)
-        first = None
-        if start == driver.CORRECTED:
-            first = self._runs.run(table, places, y0, driver.ALONE)
-            y0 = np.where(first.done[:, None], first.y0, y0)
-        found = self._packs.run(table, places, y0)
-        if first is not None:
-            found = found._replace(given=first.given, numbers=first.numbers)
-            found.done[:] &= first.done
-        rest = np.flatnonzero(~found.done)
-        singly = self._runs.run(table[rest], places, found.given[rest], start)
-        for all_of_them, of_rest in zip(found, singly, strict=True):
-            all_of_them[rest] = of_rest
-        return found
-
-    def _run_modelled(self, values: Floats, notes: list[str], first: int) -> tuple[Integers, Found]:
-        """Points each of which has a model of its own."""
-        which, table, y0 = [], [], []
-        for k, point in enumerate(values):
-            ready = self._modelling.prepare(point)
-            if ready is not None:
-                which.append(k)
-                table.append(ready.numbers)
-                y0.append(ready.y0)
-                notes[first + k] = "; ".join(ready.notes)
-        places, size = self._modelling.places, self._ensemble.compiled.model.u0.size + 1
-        numbers = np.array(table).reshape(-1, len(places))
-        states = np.array(y0).reshape(-1, size)
-        return np.array(which, dtype=np.int64), self._runs.run(numbers, places, states)
-
-    def _keep(
+    def __init__(
         self,
-        values: Floats,
-        which: Integers,
-        rows: Floats,
-        batch: "Batch",
-        notes: list[str],
-        first: int,
+        compiled: CompiledModel,
+        start: Start,
+        parameters: Sequence[SceneParameter],
+        reduction: Reduction,
+        times: Floats,
+        pack: int,
     ) -> None:
-        """The outputs of runs, by their rows (k, nt, width)."""
-        reduction, times = self._ensemble.reduction, self._ensemble.times
-        for name, of_rows in reduction.reduce(rows, times).items():
-            batch.values[name][first + which] = of_rows
-        others = [o for o in reduction.outputs if not reduction.of_rows[o.name]]
-        if not others:
-            return
-        machine = self._runs.machine
-        for k, of_run in zip(which, rows, strict=True):
-            _, model = self._modelling.load(values[k])
-            result = reduction.result(model, of_run, lambda: machine)
-            why = self._ensemble.keep(first + int(k), result, others, batch)
-            notes[first + k] = why or notes[first + k]
+        """Args:
+        compiled, start: the scene as given, and its corrected initial state.
+        parameters, reduction, times, pack: of the ensemble.
+        """
+        self._compiled, self._start = compiled, start
+        self._reduction, self._times = reduction, times
+        machine = compiled.another_machine()
+        end = float(times[-1])
+        stops = compiled.pace(end).stops
+        self._rebuilder = ModelRebuilder(compiled, machine, parameters, end)
+        self._batch = CompiledBatch(machine, compiled.scene.simulation, times, stops)
+        self._pulling = Pulling(compiled.model)
+        self.parameter_map: ParameterMap | None = None
+        self.packed: PackedBatch | None = None
+        with contextlib.suppress(NotCopiedError):
+            parameter_map = ParameterMap(compiled.checked, machine, parameters)
+            if not parameter_map.moves_start or self._has_compiled_correction():
+                self.parameter_map = parameter_map
+                # Switches of one copy would interrupt all, friction is iterated for all.
+                shared = machine.formulation.accepts_redundant or bool(machine.switches)
+                shared = shared or bool(compiled.model.friction)
+                if pack > 1 and not shared and reduction.is_of_single_copies:
+                    self.packed = PackedBatch(compiled, machine, times, pack)
 
-    def _note(
-        self, found: Found, good: NDArray[np.bool_], which: Integers, notes: list[str], first: int
+    def run(self, values: Floats, batch: Batch, first: int) -> None:
+        """Run points (k, d), and store those that reach their end in a batch from ``first`` on."""
+        if self.parameter_map is not None:
+            which, rows = self._run_mapped(self.parameter_map, values)
+        else:
+            which, rows = self._run_rebuilt(values, batch.notes, first)
+        multipliers = 2 + 19 * self._compiled.model.body_count
+        good = rows.done & (rows.diagnostics[:, driver.FRICTION_FAILURES] == 0.0)
+        # those with joints that pull are run individually, and noted
+        good &= ~self._pulling.among(rows.rows[..., multipliers:])
+        which = which[good]
+        self._note_corrections(rows, np.flatnonzero(good), first + which, batch.notes)
+        batch.status[first + which] = PointStatus.DONE
+        self._reduce(values[which], first + which, rows.rows[good], batch)
+
+    def _run_mapped(
+        self, parameter_map: ParameterMap, values: Floats
+    ) -> tuple[Integers, BatchRows]:
+        """Run points by the parameter map: indices of those that were run, and their rows."""
+        table, valid = parameter_map.table(values)
+        which = np.flatnonzero(valid)
+        model, moves_start = self._compiled.model, parameter_map.moves_start
+        if moves_start:
+            y0 = parameter_map.states(values[which], model.u0)
+        else:
+            y0 = np.repeat(self._batch.machine.integrated(self._start.u)[None], len(which), axis=0)
+        table, places = table[which], parameter_map.places
+        start = driver.CORRECT if moves_start and model.row_count else driver.UNCORRECTED
+        rows = self._run_packed(table, places, y0, start)
+        if parameter_map.moves:
+            rows.done[parameter_map.are_undefined(table, rows.y0)] = False
+        return which, rows
+
+    def _run_packed(self, table: Floats, places: Integers, y0: Floats, start: int) -> BatchRows:
+        """Run points in packs where they are packed, and one by one what packs do not finish."""
+        if self.packed is None:
+            return self._batch.run(table, places, y0, start)
+        first = None
+        if start == driver.CORRECT:
+            first = self._batch.run(table, places, y0, driver.CORRECT_ONLY)
+            y0 = np.where(first.done[:, None], first.y0, y0)
+        rows = self.packed.run(table, places, y0)
+        if first is not None:
+            rows = rows._replace(given=first.given, diagnostics=first.diagnostics)
+            rows.done[:] &= first.done
+        rest = np.flatnonzero(~rows.done)
+        singly = self._batch.run(table[rest], places, rows.given[rest], start)
+        for of_all, of_rest in zip(rows, singly, strict=True):
+            of_all[rest] = of_rest
+        return rows
+
+    def _run_rebuilt(
+        self, values: Floats, notes: list[str], first: int
+    ) -> tuple[Integers, BatchRows]:
+        """Run points each of which has a model of its own."""
+        which, points = [], []
+        for k, values_of_point in enumerate(values):
+            point = self._rebuilder.prepare(values_of_point)
+            if point is not None:
+                which.append(k)
+                points.append(point)
+                notes[first + k] = "; ".join(point.notes)
+        places = self._rebuilder.places
+        table = np.array([point.table for point in points]).reshape(-1, len(places))
+        y0 = np.array([point.y0 for point in points])
+        y0 = y0.reshape(-1, self._compiled.model.u0.size + 1)
+        return np.array(which, dtype=np.int64), self._batch.run(table, places, y0)
+
+    def _reduce(self, values: Floats, index: Integers, rows: Floats, batch: Batch) -> None:
+        """Store the outputs of points with these rows (k, nt, width) in a batch."""
+        reduction = self._reduction
+        for name, of_rows in reduction.reduce(rows, self._times).items():
+            batch.values[name][index] = of_rows
+        others = [o for o in reduction.outputs if not reduction.of_rows[o.name]]
+        for k, point, of_run in zip(index, values, rows, strict=True) if others else ():
+            _, model = self._rebuilder.load(point)
+            result = reduction.result(model, of_run, self._batch.machine)
+            batch.store(int(k), result, others)
+
+    def _note_corrections(
+        self, rows: BatchRows, good: Integers, index: Integers, notes: list[str]
     ) -> None:
-        """Warn of starts that had to be corrected by more than rounding."""
-        scene, machine = self._ensemble.compiled.scene, self._runs.machine
-        n = machine.model.body_count
-        corrected = found.numbers[good, initial_state.C_BEFORE] > ROUNDING * self._size
-        those = np.flatnonzero(good)[corrected]
-        moved, turned = distance(found.given[those], found.y0[those], n)
-        for j, (k, place) in enumerate(zip(those, which[corrected], strict=True)):
-            numbers = found.numbers[k].tolist()
+        """Warn of starts that were corrected by more than rounding."""
+        machine = self._batch.machine
+        large = rows.diagnostics[good, initial_state.C_BEFORE] > ROUNDING * self._batch.size
+        good, index = good[large], index[large]
+        moved, turned = distance(rows.given[good], rows.y0[good], machine.model.body_count)
+        for j, k in enumerate(good):
+            numbers = rows.diagnostics[k].tolist()
             initial = Initial(
                 u=machine.model.u0,
                 violation=(numbers[initial_state.C_BEFORE], numbers[initial_state.V_BEFORE]),
                 residual=(numbers[initial_state.C_AFTER], numbers[initial_state.V_AFTER]),
-                passes=int(numbers[initial_state.NEWTON]),
+                passes=int(numbers[initial_state.PASSES]),
                 moved=float(moved[j]),
                 turned=float(turned[j]),
             )
-            words = correction_notes(initial, machine, scene)
-            notes[first + place] = "; ".join(w for w in words if not w.startswith(INFORMATION))
+            messages = correction_notes(initial, machine, self._compiled.scene)
+            notes[index[j]] = "; ".join(m for m in messages if not m.startswith(INFORMATION))
 
-    def _assembles_simply(self) -> bool:
-        """Whether compiled code can correct a start: independent rows, the usual metric."""
-        compiled = self._ensemble.compiled
-        settings, model = compiled.scene.simulation, compiled.model
+    def _has_compiled_correction(self) -> bool:
+        """True if compiled code can correct a start: independent rows, metric "unit"."""
+        settings, model = self._compiled.scene.simulation, self._compiled.model
         if not model.row_count or not settings.correct:
             return not model.row_count
-        usual = str(settings.correct_metric) == "unit" and not settings.hold
-        return usual and not compiled.machine.formulation.accepts_redundant
+        is_unit = str(settings.correct_metric) == "unit" and not settings.hold
+        return is_unit and not self._compiled.machine.formulation.accepts_redundant

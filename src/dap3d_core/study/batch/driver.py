@@ -1,9 +1,8 @@
-"""Many runs of one model in one compiled call: the points of a study.
+"""Runs many points of one model in one compiled call.
 
-The integrator is the one of a single run (integrators/runge_kutta/step.py), called by its address;
-here is only what stands around it: numbers put in their places, a start, rows taken. A point's
-numbers are the same bit for bit whichever points were run before it, and as ``simulate`` gives
-them.
+The integrator is that of a single run (integrators/runge_kutta/step.py), called by its address.
+Before it the loop sets numbers and the initial state, after it it stores rows. Results of a point
+are the same bit for bit whichever points ran before it, and as those of ``simulate``.
 """
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
@@ -45,23 +44,23 @@ from dap3d_core.integrators.stepping.output import project_state
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
 from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
 from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
-from dap3d_core.study.batch.initial_state import LEAST, OPEN, STARTING
+from dap3d_core.study.batch.initial_state import LEAST_PIVOT, OPEN, STARTING
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Places in ``at``: the point that is to be run, whether it has begun, how to start: as it stands,
-# corrected, or corrected and no more.
-POINT, BEGUN, ASSEMBLES, PLACES = range(4)
-AS_IT_STANDS, CORRECTED, ALONE = range(3)
-# Columns of ``found`` behind those of the start: status, rows, steps, right-hand sides, how often
-# friction did not settle.
-ENDED, ROWS, TAKEN, CALLS, LOOSE, COLUMNS = range(STARTING, STARTING + 6)
-#: Stands for a status where the start could not be assembled as it should.
+# Entries of ``at``: the current point, whether its run has begun, how to start.
+POINT, BEGUN, START, AT_SIZE = range(4)
+# Start from the state as given, from the corrected state, or correct it and do not run.
+UNCORRECTED, CORRECT, CORRECT_ONLY = range(3)
+# Columns of ``diagnostics`` after those of the start: status, rows, steps, right-hand sides, and
+# how often the iteration of friction did not converge.
+ENDED, ROWS, TAKEN, CALLS, FRICTION_FAILURES, COLUMNS = range(STARTING, STARTING + 6)
+#: Status of a point whose start could not be corrected here.
 NO_START = -1
-#: Rows that hang together so closely at the start that the run has to be looked at by itself: the
-#: least pivot as a part of its row, 1e4 times what a rank is judged by.
-CLOSE = 1e-10
+#: Least pivot as a fraction of its row, below which rows depend so closely on one another that the
+#: point has to be run individually: 1e4 times what a rank is judged by.
+MIN_PIVOT = 1e-10
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
@@ -70,26 +69,24 @@ class Points(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(("at", "places", "first_integer"), INTEGER_VECTOR),
-        **dict.fromkeys(
-            ("table", "y0", "metric", "stops", "rows", "found", "first_switches", "first_lengths"),
-            MATRIX,
-        ),
+        **dict.fromkeys(("table", "y0", "metric", "stops", "rows", "diagnostics"), MATRIX),
+        **dict.fromkeys(("first_switches", "first_lengths"), MATRIX),
     }
 
-    at: Integers  # (PLACES,)
-    places: Integers  # (w,) places in par, body and metric, one behind the other
-    table: Floats  # (k, w) their numbers
+    at: Integers  # (AT_SIZE,)
+    places: Integers  # (w,) indices in par, body and metric, concatenated
+    table: Floats  # (k, w) the numbers at these indices
     y0: Floats  # (k, n) states to start from
     metric: Floats  # of the model, where its numbers do not change from point to point
-    unit: Floats  # (7,) constants of the metric that displacements are measured by at the start
-    stops: Floats  # (s, 2) times that no step goes over, and whether something jumps there
-    starting: Floats  # (STARTING + rows,) what is told to and by the start (initial_state.py)
+    unit: Floats  # (7,) constants of the metric of displacements at the start
+    stops: Floats  # (s, 2) times that no step crosses, and whether something jumps there
+    starting: Floats  # (STARTING + rows,) arguments and results of the start (initial_state.py)
     first_real: Floats  # the work as it is before a run
     first_integer: Integers
     first_switches: Floats
     first_lengths: Floats
-    rows: Floats  # (k nt, width) what was reported
-    found: Floats  # (k, COLUMNS)
+    rows: Floats  # (k nt, width) reported rows
+    diagnostics: Floats  # (k, COLUMNS)
 
 
 @compiled_inside
@@ -100,8 +97,8 @@ def copy_into(target: Any, source: Any) -> None:
 
 
 @compiled_inside
-def put_numbers(points: Points, p: int, system: System) -> None:
-    """The numbers of point p into the arrays of the system."""
+def set_numbers(points: Points, p: int, system: System) -> None:
+    """Copy the numbers of point p into the arrays of the system."""
     places, par, body, metric = points.places, system.par, system.body, system.metric
     first_body = par.shape[0]
     first_metric = first_body + body.shape[0] * body.shape[1]
@@ -110,17 +107,16 @@ def put_numbers(points: Points, p: int, system: System) -> None:
         if place < first_body:
             par[place] = value
         elif place < first_metric:
-            body[(place - first_body) // body.shape[1], (place - first_body) % body.shape[1]] = (
-                value
-            )
+            k = place - first_body
+            body[k // body.shape[1], k % body.shape[1]] = value
         else:
             k = place - first_metric
             metric[k // metric.shape[1], k % metric.shape[1]] = value
 
 
 @compiled_inside
-def put_back(points: Points, p: int, work: Work) -> None:
-    """The work as it is before a run, with the state of point p."""
+def reset_work(points: Points, p: int, work: Work) -> None:
+    """Reset the work to that before a run, with the state of point p."""
     copy_into(work.real, points.first_real)
     copy_into(work.integer, points.first_integer)
     for k in range(work.switches.shape[0]):
@@ -141,29 +137,29 @@ def start(
     system: System,
     loops: Any,
 ) -> bool:
-    """Make ready for the run of point p; whether it can be run here."""
-    found, metric = points.found[p], system.metric
-    put_back(points, p, work)
-    put_numbers(points, p, system)
+    """Start the run of point p; returns False if it has to be run individually."""
+    diagnostics, metric = points.diagnostics[p], system.metric
+    reset_work(points, p, work)
+    set_numbers(points, p, system)
     t, y = work.real[T], work.state[Y]
-    if points.at[ASSEMBLES] != 0:
+    if points.at[START] != 0:
         for b in range(1, metric.shape[0]):
             copy_into(metric[b], points.unit)
         starting[1](t, y, points.starting, system, loops)
-        copy_into(found[:STARTING], points.starting[:STARTING])
+        copy_into(diagnostics[:STARTING], points.starting[:STARTING])
         for b in range(1, metric.shape[0]):
             copy_into(metric[b], points.metric[b])
-        put_numbers(points, p, system)
-        if found[OPEN] != 0.0 or not found[LEAST] > CLOSE:
+        set_numbers(points, p, system)
+        if diagnostics[OPEN] != 0.0 or not diagnostics[LEAST_PIVOT] > MIN_PIVOT:
             return False
         copy_into(points.y0[p], y)
-    starting[0](t, y, found, system, loops)
+    starting[0](t, y, diagnostics, system, loops)
     return True
 
 
 @compiled_inside
 def restart(work: Work) -> None:
-    """As ``Integration.restart``."""
+    """Restart the step control, as ``Integration.restart``."""
     real, integer = work.real, work.integer
     real[H], real[ERROR_OLD], real[CUT] = 0.0, 1e-4, np.inf
     integer[FRESH] = integer[LOOKED] = integer[LAST_REJECTED] = integer[CUTS] = 0
@@ -180,7 +176,7 @@ def next_stop(
     system: System,
     loops: Any,
 ) -> float:
-    """As ``Integration._next_stop``."""
+    """The next time that no step crosses, as ``Integration._next_stop``."""
     real, adaptive = work.real, work.real[STEP] == 0.0
     for k in range(stops.shape[0]):
         t = stops[k, 0]
@@ -216,22 +212,21 @@ def run_points(
     loops: Any,
     budget: int,
 ) -> None:
-    """Go on with the points until all are run or more than ``budget`` right-hand sides are spent.
+    """Run points until none is left or more than ``budget`` right-hand sides are spent.
 
-    What a run's end leaves stands in ``found``; where one was not FINISHED its rows count for
-    nothing.
+    Rows of a run that is not FINISHED, by its ``diagnostics``, are not valid.
     """
-    at, integer, found = points.at, work.integer, points.found
+    at, integer, diagnostics = points.at, work.integer, points.diagnostics
     drive, spent, nt = drives[0], 0, work.rows.shape[0]
-    while at[POINT] < found.shape[0] and spent <= budget:
+    while at[POINT] < diagnostics.shape[0] and spent <= budget:
         p = at[POINT]
         if at[BEGUN] == 0:
             if not start(points, p, work, starting, system, loops):
-                found[p, ENDED] = NO_START
+                diagnostics[p, ENDED] = NO_START
                 at[POINT] += 1
                 continue
-            if at[ASSEMBLES] == ALONE:
-                found[p, ENDED] = FINISHED
+            if at[START] == CORRECT_ONLY:
+                diagnostics[p, ENDED] = FINISHED
                 at[POINT] += 1
                 continue
             at[BEGUN] = 1
@@ -244,8 +239,10 @@ def run_points(
         if integer[STATUS] != RUNNING:
             for k in range(integer[ROW]):
                 copy_into(points.rows[p * nt + k], work.rows[k])
-            found[p, ENDED], found[p, ROWS] = integer[STATUS], integer[ROW]
-            found[p, TAKEN], found[p, CALLS] = integer[STEPS], integer[RHS]
-            found[p, LOOSE] = system.settings[UNSETTLED] + system.settings[DOUBTFUL]
+            diagnostics[p, ENDED], diagnostics[p, ROWS] = integer[STATUS], integer[ROW]
+            diagnostics[p, TAKEN], diagnostics[p, CALLS] = integer[STEPS], integer[RHS]
+            diagnostics[p, FRICTION_FAILURES] = (
+                system.settings[UNSETTLED] + system.settings[DOUBTFUL]
+            )
             at[POINT] += 1
             at[BEGUN] = 0

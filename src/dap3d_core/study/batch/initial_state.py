@@ -1,7 +1,8 @@
-"""The start of a run as compiled code, for many runs of one model (study/batch/driver.py).
+"""Compiled correction of initial states, for many runs of one model (study/batch/driver.py).
 
-What simulation/initial/assemble.py and ``Machine.start`` do for one run, with the same passes: the
-least change that brings a state onto its constraints, and what a run remembers of its start.
+Its passes are those of simulation/initial/assemble.py, which solves each by singular values, where
+this uses the block factorisation (equal to rounding), and which also takes redundant rows, held
+bodies and the mass metric. ``begin_...`` stores references of a start as ``Machine.start`` does.
 """
 
 # What a compiled function returns is Any to mypy.
@@ -46,14 +47,15 @@ from dap3d_core.simulation.initial.assemble import (
     TOLERANCE,
 )
 
-# Places in ``out`` of these functions. On entry: a length of the model; then largest residuals of
-# position and velocity before and after, Newton passes, and the least pivot as a part of its row.
-SIZE, C_BEFORE, V_BEFORE, C_AFTER, V_AFTER, NEWTON, LEAST, OPEN, STARTING = range(9)
+# Entries of ``out`` of these functions: a length of the model (given); largest residuals of
+# position and velocity before and after; Newton passes; the least pivot as a fraction of its row;
+# 1 where positions did not close. From STARTING on (given): 1 for rows without a position level.
+SIZE, C_BEFORE, V_BEFORE, C_AFTER, V_AFTER, PASSES, LEAST_PIVOT, OPEN, STARTING = range(9)
 
 
 @compiled_inside
 def measure_rows(system: System, squares: Floats) -> None:
-    """The squared length of each row of D^."""
+    """Squared length of each row of D^."""
     blocks, D = system.blocks, system.D
     for k in range(squares.shape[0]):
         squares[k] = 0.0
@@ -66,8 +68,8 @@ def measure_rows(system: System, squares: Floats) -> None:
 
 
 @compiled_inside
-def leave_out(system: System, rows: Floats) -> None:
-    """Make the rows of D^ that are marked with 1 zero."""
+def zero_rows(system: System, rows: Floats) -> None:
+    """Zero the rows of D^ that are marked with 1."""
     blocks, D = system.blocks, system.D
     for b in range(blocks.shape[0]):
         first, height, row = blocks[b, 0], blocks[b, 2], blocks[b, 3]
@@ -79,9 +81,9 @@ def leave_out(system: System, rows: Floats) -> None:
 
 @compiled_inside
 def factor_positions(system: System, without_position: Floats) -> None:
-    """Factors of the rows that have a position level; the unknowns of the others become zero."""
+    """Factorise the rows with a position level; the unknowns of the others become zero."""
     smallest = system.smallest
-    leave_out(system, without_position)
+    zero_rows(system, without_position)
     assemble(system.targets, system.contributions, system.D, system.K)
     measure_rows(system, smallest)
     for k in range(smallest.shape[0]):
@@ -90,8 +92,8 @@ def factor_positions(system: System, without_position: Floats) -> None:
 
 
 @compiled_inside
-def smallest_share(system: System) -> float:
-    """The least pivot of the factors in K as a part of the squared length of its row of D^."""
+def least_pivot_fraction(system: System) -> float:
+    """Least pivot of the factors in K as a fraction of the squared length of its row of D^."""
     squares = system.smallest
     measure_rows(system, squares)
     least, nodes, K = 1.0, system.nodes, system.K
@@ -99,42 +101,38 @@ def smallest_share(system: System) -> float:
         size, first, diagonal = nodes[k, 0], nodes[k, 1], nodes[k, 2]
         for i in range(size):
             inverse, whole = K[diagonal + i * (size + 1)], squares[first + i]
-            share = 1.0 / abs(inverse * whole) if inverse * whole != 0.0 else 0.0
-            least = min(least, share) if share == share else 0.0
+            fraction = 1.0 / abs(inverse * whole) if inverse * whole != 0.0 else 0.0
+            least = min(least, fraction) if fraction == fraction else 0.0
     return least
 
 
 @compiled_into
 def length_of(a: Floats) -> float:
-    """The length of a 3-vector."""
+    """Length of a 3-vector."""
     return np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
 @compiled_inside
-def shorten(system: System, longest_shift: float) -> float:
-    """Shorten a displacement in ``force``, of unit metric, so that no body moves too far.
-
-    Returns the part that is left.
-    """
+def limit_displacement(system: System, max_shift: float) -> None:
+    """Shorten a displacement in ``force``, of unit metric, so that no body moves too far."""
     force, shift, turn = system.force, 0.0, 0.0
     for b in range(1, force.shape[0] // 6):
         o = 6 * b
         shift = max(shift, length_of(force[o : o + 3]))
         turn = max(turn, length_of(force[o + 3 : o + 6]))
-    part = 1.0
-    if shift > longest_shift:
-        part = longest_shift / shift
-    if turn * part > MOST_TURN:
-        part = MOST_TURN / turn
-    if part < 1.0:
+    ratio = 1.0
+    if shift > max_shift:
+        ratio = max_shift / shift
+    if turn * ratio > MOST_TURN:
+        ratio = MOST_TURN / turn
+    if ratio < 1.0:
         for k in range(force.shape[0]):
-            force[k] *= part
-    return part
+            force[k] *= ratio
 
 
 @compiled_inside
 def place_with_spin(y: Floats, system: System) -> None:
-    """Place bodies that were turned; their angular velocities stay as they are in global axes."""
+    """Place bodies that were rotated; angular velocities stay the same in global axes."""
     body, first = system.body, velocity_offset(1, system.body.shape[0] - 1)
     for b in range(1, body.shape[0]):
         o = first + 6 * (b - 1) + 3
@@ -151,13 +149,9 @@ def place_with_spin(y: Floats, system: System) -> None:
 
 @compiled
 def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """Bring a state onto its constraints, in the metric that stands in the system: unit.
-
-    As ``correct_initial`` for independent rows. out: see above; OPEN is 1 where positions did not
-    close; from STARTING on, as an argument, 1 for each row that has no position level.
-    """
+    """Correct a state of independent rows, in the metric of the system, which is unit."""
     size, length, before = out[SIZE], system.settings[LENGTH], 1e300
-    out[OPEN], out[NEWTON] = 1.0, 0.0
+    out[OPEN], out[PASSES] = 1.0, 0.0
     place(t, y, system, loops)
     worst = residuals(t, system, loops)
     linearise(t, system, loops)
@@ -174,14 +168,14 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         linearise(t, system, loops)
         factor_positions(system, out[STARTING:])
         correct(system)
-        shorten(system, MOST_SHIFT * size / length)
+        limit_displacement(system, MOST_SHIFT * size / length)
         move(y, system.metric, system.force)
         place_with_spin(y, system)
-        out[NEWTON] += 1.0
+        out[PASSES] += 1.0
     out[C_AFTER] = worst
     linearise(t, system, loops)
     factorise(system, None)
-    out[LEAST] = smallest_share(system)
+    out[LEAST_PIVOT] = least_pivot_fraction(system)
     if velocity_residuals(system) > 0.0:
         correct(system)
         change_velocity(y, system.metric, system.force)
@@ -190,8 +184,8 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
 
 
 @compiled_into
-def remember(t: float, y: Floats, system: System, loops: Any) -> None:
-    """The bodies placed, functions' values at the start kept, turns counted from here."""
+def store_start(t: float, y: Floats, system: System, loops: Any) -> None:
+    """Place bodies, store functions' values at the start, count turns from here."""
     unused, F = system.settings[SCRATCH : SCRATCH + 1], system.F
     place(t, y, system, loops)
     for k in range(F.shape[0]):
@@ -202,7 +196,7 @@ def remember(t: float, y: Floats, system: System, loops: Any) -> None:
 
 @compiled_into
 def watch_pivots(t: float, system: System, loops: Any, part: float | None) -> None:
-    """As ``Machine.watch_pivots`` does, at the bodies as placed."""
+    """Store reference pivots at the bodies as placed, as ``Machine.watch_pivots``."""
     smallest, nodes, K = system.smallest, system.nodes, system.K
     for k in range(smallest.shape[0]):
         smallest[k] = 0.0
@@ -222,21 +216,21 @@ def watch_pivots(t: float, system: System, loops: Any, part: float | None) -> No
 
 @compiled
 def begin_free(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """What a run of a scene without joints remembers of its start; ``out`` is left as it is."""
-    remember(t, y, system, loops)
+    """Begin a run of a scene without joints; ``out`` is not used."""
+    store_start(t, y, system, loops)
 
 
 @compiled
 def begin_standard(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """The same with joints whose rows are independent."""
+    """Begin a run with joints of independent rows."""
     place(t, y, system, loops)
     watch_pivots(t, system, loops, None)
-    remember(t, y, system, loops)
+    store_start(t, y, system, loops)
 
 
 @compiled
 def begin_regularised(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """The same for the formulations with regularised factors."""
+    """Begin a run of the formulations with regularised factors."""
     place(t, y, system, loops)
     watch_pivots(t, system, loops, PART)
-    remember(t, y, system, loops)
+    store_start(t, y, system, loops)

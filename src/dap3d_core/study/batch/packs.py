@@ -1,58 +1,169 @@
-"""Points run several at a time, as one model of copies that share their steps (packed_model.py)."""
+"""Runs several points at a time, as one model of copies that share their steps.
 
-from typing import TYPE_CHECKING
+A small scene leaves much of a processor idle: loops over one body, sums over fourteen components.
+Loops over the bodies of many copies use its vector units (docs/concepts/studies.md has figures).
+Steps are as short as the worst copy needs.
+"""
 
+from typing import Any
+
+import attrs
 import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Machine
-from dap3d_core.study.batch.compiled_batch import Found, Runs
-from dap3d_core.study.batch.packed_model import Lanes, packed
-
-if TYPE_CHECKING:
-    from dap3d_core.study.study import Ensemble
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
+from dap3d_core.model import Group, Model
+from dap3d_core.model.state_layout import coordinates_of, velocities_of
+from dap3d_core.simulation import CompiledModel
+from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch
+from dap3d_core.study.batch.parameter_map import METRIC_WIDTH
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-class Packs:
-    """Runs points of one model, ``count`` at a time. For one thread."""
+class PackedBatch:
+    """Runs points of one model, ``count`` at a time. Not for two threads at once."""
 
-    def __init__(self, ensemble: "Ensemble", one: Machine, count: int) -> None:
-        """Args: whose points; a machine of the model; how many at a time."""
-        compiled, times = ensemble.compiled, ensemble.times
-        self._many = Machine(packed(compiled.model, count), compiled.method)
-        self._lanes = Lanes(one, self._many, count)
+    def __init__(self, compiled: CompiledModel, one: Machine, times: Floats, count: int) -> None:
+        """Args: the model, a machine of it, reporting times, points at a time."""
+        many = Machine(packed(compiled.model, count), compiled.method)
+        self._lanes = LaneLayout(one, many, count)
         stops = compiled.pace(float(times[-1])).stops
-        self._runs = Runs(self._many, compiled.scene.simulation, times, stops)
-        self._width = one.model.row_layout.size
+        self._batch = CompiledBatch(many, compiled.scene.simulation, times, stops)
+        self._shape = len(times), one.model.row_layout.size
         self.count = count
 
-    def run(self, table: Floats, places: Integers, y0: Floats) -> Found:
-        """As ``Runs.run``, from states as they stand; the points that fill no pack are not done."""
-        count, nt = self.count, len(self._runs.integration.work.times)
-        packs = len(table) // count
+    def run(self, table: Floats, places: Integers, y0: Floats) -> BatchRows:
+        """As ``CompiledBatch.run``, uncorrected; points that fill no pack are not done."""
+        count, total = self.count, len(table)
+        packs = total // count
         used = packs * count
         joined = table[:used].reshape(packs, count * table.shape[1])
         states = self._lanes.join(y0[:used].reshape(packs, count, y0.shape[1]))
-        found = self._runs.run(joined, self._lanes.places(places).ravel(), states)
-        rows = np.empty((len(table), nt, self._width))
-        rows[:used] = self._lanes.rows_of(found.rows).reshape(used, nt, self._width)
-        done = np.zeros(len(table), dtype=bool)
-        done[:used] = np.repeat(found.done, count)
-        numbers = np.zeros((len(table), found.numbers.shape[1]))
-        return Found(done, rows, y0, y0, numbers)
+        packed_rows = self._batch.run(joined, self._lanes.places(places).ravel(), states)
+        rows = np.empty((total, *self._shape))
+        rows[:used] = self._lanes.rows_of(packed_rows.rows).reshape(used, *self._shape)
+        done = np.zeros(total, dtype=bool)
+        done[:used] = np.repeat(packed_rows.done, count)
+        return BatchRows(done, rows, y0, y0, np.zeros((total, packed_rows.diagnostics.shape[1])))
 
 
-def packs_for(ensemble: "Ensemble", one: Machine) -> Packs | None:
-    """What runs the points of an ensemble in packs; None where they are not to be, or cannot.
+def packed(model: Model, count: int) -> Model:
+    """A model of ``count`` copies: their bodies, joints, forces, functions one after another."""
 
-    Switches of one copy would interrupt all, and friction is iterated for all; of what all share
-    (work, potential energy, residuals) nothing may be asked for.
-    """
-    count, model = ensemble.study.pack, ensemble.compiled.model
-    alone = one.formulation.accepts_redundant or bool(one.switches) or model.friction
-    if count < 2 or alone or not ensemble.reduction.is_of_single_copies:
-        return None
-    return Packs(ensemble, one, count)
+    def tiled(values: NDArray[Any]) -> NDArray[Any]:
+        return np.tile(values, (count, *(1,) * (values.ndim - 1)))
+
+    def names(values: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(f"{name} [{lane + 1}]" for lane in range(count) for name in values)
+
+    arrays = ("mass", "Jp", "r", "p", "v", "w", "joint_rows", "position_row")
+    changed: dict[str, Any] = {name: tiled(getattr(model, name)) for name in arrays}
+    for name in ("joints", "forces", "functions", "friction"):
+        changed[name] = tuple(_copies(group, model, count) for group in getattr(model, name))
+    return attrs.evolve(
+        model,
+        body_names=names(model.body_names),
+        joint_names=names(model.joint_names),
+        force_names=names(model.force_names),
+        function_names=names(model.function_names),
+        joint_start=np.concatenate([[0], np.cumsum(np.tile(model.joint_rows, count))]),
+        joint_slots=tuple(
+            tuple(b + lane * model.body_count if b else 0 for b in slots)
+            for lane in range(count)
+            for slots in model.joint_slots
+        ),
+        function_count=count * model.function_count,
+        point_names=(),
+        point_body=model.point_body[:0],
+        point_local=model.point_local[:0],
+        notes=(),
+        **changed,
+    )
+
+
+def _copies(group: Group, model: Model, count: int) -> Group:
+    """A group with the instances of all copies, those of one after another."""
+    kind, n, m = group.examined.type.kind, model.body_count, group.count
+    sizes = {
+        "joint": len(model.joint_names),
+        "force": len(model.force_names),
+        "function": model.function_count,
+    }
+    lanes = np.arange(count)[:, None]
+    joints = group.joints  # of friction
+    members = group.members + sizes[kind if joints is None else "force"] * lanes
+    shift = np.full(group.functions.shape[1], n)
+    shift[: len(group.examined.layout.functions)] = model.function_count
+    bodies, functions = group.bodies[None], group.functions[None]
+    return attrs.evolve(
+        group,
+        members=members.ravel(),
+        joints=None if joints is None else (joints + sizes["joint"] * lanes).ravel(),
+        bodies=np.concatenate(np.where(bodies > 0, bodies + n * lanes[..., None], 0)),
+        functions=np.concatenate(np.where(functions > 0, functions + shift * lanes[..., None], 0)),
+        numbers=np.tile(group.numbers, (count, 1)),
+        tables=tuple(
+            (k + lane * m, offset, rows)
+            for lane in range(count)
+            for k, offset, rows in group.tables
+        ),
+    )
+
+
+class LaneLayout:
+    """Indices of the numbers and of the state of each copy in a machine of many."""
+
+    def __init__(self, one: Machine, many: Machine, count: int) -> None:
+        """Args: a machine of the model, one of ``packed(model, count)``, number of copies."""
+        self.count = count
+        self._n = one.model.body_count
+        self._row, self._row_of_many = one.model.row_layout, many.model.row_layout
+        self._angles = [g.count * len(g.examined.layout.angles) for g in one.model.acting]
+        self._par = np.full((count, one.system.par.size), -1, dtype=np.int64)
+        for q, (_, group) in enumerate(one.what):
+            first, first_of_many = (int(m.system.groups[q, 1]) for m in (one, many))
+            size = group.numbers.size
+            lanes = size * np.arange(count)[:, None]
+            self._par[:, first : first + size] = first_of_many + np.arange(size) + lanes
+        self._sizes = (one.system.par.size, one.system.body.size)
+        self._first = (many.system.par.size, many.system.par.size + many.system.body.size)
+
+    def places(self, places: Integers) -> Integers:
+        """(count, w) indices in the machine of many of indices (w,) in that of one.
+
+        Both are in par, body and metric, concatenated.
+        """
+        par, body = self._sizes
+        lanes = np.arange(self.count)[:, None] * self._n
+        in_par = self._par[:, np.minimum(places, par - 1)] if par else -1
+        in_body = self._first[0] + places - par + lanes * BODY_WIDTH
+        in_metric = self._first[1] + places - par - body + lanes * METRIC_WIDTH
+        return np.where(places < par, in_par, np.where(places < par + body, in_body, in_metric))
+
+    def join(self, states: Floats) -> Floats:
+        """(k, 13 n count + 1) one integrated state of all, of (k, count, 13 n + 1)."""
+        k, parts = len(states), (coordinates_of(states), velocities_of(states))
+        work = np.zeros((k, 1))
+        return np.hstack([*(part.reshape(k, self.count * part.shape[-1]) for part in parts), work])
+
+    def rows_of(self, rows: Floats) -> Floats:
+        """(k, count, nt, width) rows of the single copies, of (k, nt, width of many).
+
+        Work, potential energy and residuals, which all share, are NaN.
+        """
+        k, nt, _ = rows.shape
+        count, one, many = self.count, self._row, self._row_of_many
+        out = np.full((k, count, nt, one.size), np.nan)
+        out[..., one["t"]] = rows[:, None, :, many["t"]]
+        for name in ("coordinates", "velocities", "v_dot", "Lam"):
+            part = rows[..., many[name]].reshape(k, nt, count, one.length(name))
+            out[..., one[name]] = part.transpose(0, 2, 1, 3)
+        source, target = many["angles"].start, one["angles"].start
+        for width in self._angles:
+            part = rows[:, :, source : source + width * count].reshape(k, nt, count, width)
+            out[..., target : target + width] = part.transpose(0, 2, 1, 3)
+            source, target = source + width * count, target + width
+        return out

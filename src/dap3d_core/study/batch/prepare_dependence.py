@@ -1,7 +1,7 @@
-"""What a type's ``prepare`` looks at: what it does not read cannot change what it returns.
+"""Finds what a type's ``prepare`` reads: nothing else can change what it returns.
 
-``prepare`` is run once on an element whose fields, and the bodies' poses, note who reads them. With
-other values of what was not read it takes the same way through its code and gives the same.
+``prepare`` is run once on an element whose fields, and the bodies' poses, record that they are
+read. With other values of what was not read it takes the same way through its code.
 """
 
 from collections.abc import Mapping
@@ -15,20 +15,17 @@ from dap3d_core.scene import Instance
 
 
 class Dependence(NamedTuple):
-    """What the constants of an element depend on.
+    """Dependence of the constants of an element.
 
     Attributes:
         fields: names of its own fields that are read.
         poses: (body index, "r", "p", "A" or "Jp") that are read.
-        constants: names of what is returned: these are no copies of fields.
+        constants: names of the constants, which are no copies of fields.
     """
 
     fields: frozenset[str]
     poses: frozenset[tuple[int, str]]
     constants: frozenset[str]
-
-
-NOTHING = Dependence(frozenset(), frozenset(), frozenset())
 
 
 def dependence_of(instance: Instance, poses: Mapping[int, BodyPose], body_count: int) -> Dependence:
@@ -40,47 +37,44 @@ def dependence_of(instance: Instance, poses: Mapping[int, BodyPose], body_count:
         body_count: for elements that act on each body.
     """
     type_: Any = instance.examined.type
-    if type_.prepare in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__()):
-        return NOTHING
-    slots = instance.examined.layout.slots
-    each = bool(getattr(type_, "each_body", False))
-    bodies = [(b,) for b in range(1, body_count + 1)] if each else [instance.bodies]
     fields: set[str] = set()
     read: set[tuple[int, str]] = set()
     constants: set[str] = set()
-    for of_element in bodies:
-        thing = _watched(instance, fields)
-        seen = {
-            slot: _WatchedPose(poses[body], body, read)
-            for slot, body in zip(slots, of_element, strict=True)
-        }
-        constants |= prepared(thing, seen).keys()
+    if type_.prepare not in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__()):
+        slots = instance.examined.layout.slots
+        each = bool(getattr(type_, "each_body", False))
+        for bodies in [(b,) for b in range(1, body_count + 1)] if each else [instance.bodies]:
+            recorded = {
+                slot: _RecordedPose(poses[body], body, read)
+                for slot, body in zip(slots, bodies, strict=True)
+            }
+            constants |= prepared(_recorded(instance, fields), recorded).keys()
     return Dependence(frozenset(fields), frozenset(read), frozenset(constants))
 
 
-def _watched(instance: Instance, read: set[str]) -> Any:
-    """The element as ``prepare`` gets it, of a class that notes which of its fields are read."""
+def _recorded(instance: Instance, read: set[str]) -> Any:
+    """The element as ``prepare`` gets it, of a class that records reads of its fields."""
     type_: Any = instance.examined.type
     specs = specs_of(type_)
     ends = ("P_i", "P_j") if any(s.kind == "vector2" for s in specs.values()) else ()
     names = frozenset((*specs, *ends))
+    initial = set(read)
 
-    class Watched(type_):  # type: ignore[misc]
+    class Recorded(type_):  # type: ignore[misc]
         def __getattribute__(self, name: str) -> Any:
             if name in names:
                 read.add(name)
             return super().__getattribute__(name)
 
-    values = {name: value for name, value in instance.values.items() if name in specs}
-    thing = Watched(**values)
+    element = Recorded(**{name: v for name, v in instance.values.items() if name in specs})
     for end in ends:
-        setattr(thing, end, instance.values[end])
-    read.clear()
-    return thing
+        setattr(element, end, instance.values[end])
+    read.intersection_update(initial)  # without what its construction has read
+    return element
 
 
-class _WatchedPose(BodyPose):
-    """A pose that notes what is read of it."""
+class _RecordedPose(BodyPose):
+    """A pose that records what is read of it."""
 
     def __init__(self, pose: BodyPose, body: int, read: set[tuple[int, str]]) -> None:
         super().__init__(pose.r, pose.p, pose.A, pose.Jp)

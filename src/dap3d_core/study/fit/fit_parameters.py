@@ -1,4 +1,4 @@
-"""Parameters of a fit: where they start, and the bounds that they keep."""
+"""Parameters of a fit: their starts and bounds."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,19 +7,18 @@ import attrs
 import numpy as np
 
 from dap3d_core.scene import Checked, Mistake, SceneError
-from dap3d_core.study.parameters import Number, numbers_named
+from dap3d_core.study.parameters import SceneParameter, parameters_named
 
-#: What a parameter may be given as.
 FORMS = "a start, (start, low, high), a Parameter, or None for the number of the scene"
 
 
 @attrs.frozen
 class Parameter:
-    """A number of a scene that is to be found.
+    """A number of a scene that is fitted.
 
     Attributes:
-        start: where the search begins; None: what stands in the scene.
-        low, high: it stays from ``low`` to ``high``.
+        start: where the search begins; None: the value in the scene.
+        low, high: its bounds.
         scale: a change of it that matters; by default the size of ``start``, and where that is 0
             a tenth of the span between the bounds, or 1.
     """
@@ -31,7 +30,7 @@ class Parameter:
 
     @property
     def size(self) -> float:
-        """The scale, given or found."""
+        """The scale, given or by default."""
         if self.scale is not None:
             return self.scale
         if self.start:
@@ -40,38 +39,34 @@ class Parameter:
         return span / 10.0 if np.isfinite(span) and span > 0.0 else 1.0
 
 
-def read_parameters(
-    checked: Checked, asked: Any
-) -> tuple[tuple[Number, ...], list[Parameter], list[Mistake]]:
-    """Parameters as ``fit`` takes them: numbers of the scene, what is known, what is wrong."""
-    if isinstance(asked, str):
-        asked = [asked]
+def read_parameters(checked: Checked, given: Any) -> tuple[dict[str, Parameter], list[Mistake]]:
+    """Parameters as ``fit`` takes them, by name, with their starts; and mistakes."""
+    if isinstance(given, str):
+        given = [given]
     try:
-        given: dict[Any, Any] = dict(asked) if isinstance(asked, Mapping) else dict.fromkeys(asked)
+        values: dict[Any, Any] = dict(given) if isinstance(given, Mapping) else dict.fromkeys(given)
     except TypeError:
         what = "parameters are {'forces.spring.k': (start, low, high)}, or names alone"
-        return (), [], [Mistake("parameters", asked, what)]
-    if not given:
-        return (), [], [Mistake("parameters", [], "a fit needs at least one parameter")]
+        return {}, [Mistake("parameters", given, what)]
+    if not values:
+        return {}, [Mistake("parameters", [], "a fit needs at least one parameter")]
     mistakes: list[Mistake] = []
-    numbers: tuple[Number, ...] = ()
+    known: tuple[SceneParameter, ...] = ()
     try:
-        numbers = numbers_named(checked, list(given))
+        known = parameters_named(checked, list(values))
     except SceneError as error:
         mistakes += [attrs.evolve(m, key="parameters") for m in error.mistakes]
-    starts = {number.name: number.value for number in numbers}
-    found = [_parameter(name, value, starts, mistakes) for name, value in given.items()]
-    for number in numbers:
-        if number.table == "simulation":
-            what = "this is a setting of the run, not a number of the mechanism"
-            mistakes.append(Mistake("parameters", number.name, what))
-    return numbers, found, mistakes
+    starts = {parameter.name: parameter.value for parameter in known}
+    parameters = {n: _parameter(n, value, starts, mistakes) for n, value in values.items()}
+    what = "this is a setting of the run, not a number of the mechanism"
+    mistakes += [Mistake("parameters", p.name, what) for p in known if p.table == "simulation"]
+    return parameters, mistakes
 
 
 def _parameter(
     name: Any, value: Any, starts: Mapping[Any, float | None], mistakes: list[Mistake]
 ) -> Parameter:
-    """One of them; checked, and with its start."""
+    """One checked parameter."""
     key = f"parameters.{name}"
     start, low, high, scale = value, None, None, None
     if isinstance(value, Parameter):
@@ -85,13 +80,12 @@ def _parameter(
     if any(not is_number(v) for v in (start, low, high, scale) if v is not None):
         mistakes.append(Mistake(key, value, f"should be numbers: {FORMS}"))
         return Parameter(1.0)
+    start = starts.get(name) if start is None else start
     if start is None:
-        start = starts.get(name)
-        if start is None and name in starts:
+        if name in starts:
             what = "the scene leaves this number open: it needs a start"
             mistakes.append(Mistake(key, None, what))
-        if start is None:
-            return Parameter(1.0)
+        return Parameter(1.0)
     if not np.isfinite(start):
         mistakes.append(Mistake(key, float(start), "a start is finite"))
     elif not low < high:
@@ -106,5 +100,5 @@ def _parameter(
 
 
 def is_number(value: Any) -> bool:
-    """Whether something is one number, and no truth value."""
+    """True for one number that is no truth value."""
     return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)

@@ -1,4 +1,4 @@
-"""What a fit found."""
+"""Result of a fit."""
 
 import attrs
 import numpy as np
@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 @attrs.frozen(eq=False, repr=False)
 class Fit:
-    """What ``fit`` found: values, how sure they are, and how well they explain the data.
+    """Fitted values, their confidence, and how well they explain the data.
 
     ``print`` shows it as a table, ``dap.plot`` draws it. Arrays over parameters are in the order
     of ``values``, those over times in the order of the data.
@@ -20,12 +20,11 @@ class Fit:
     Attributes:
         values: parameter -> its fitted value, in the unit of the scene.
         interval: parameter -> (low, high) of 95 % confidence: infinite where the data do not
-            determine it, NaN where it stands at a bound.
-        covariance: (d, d) of the values; inf and NaN as above.
-        correlation: (d, d) of the values, NaN where the covariance is.
+            determine it, NaN at a bound.
+        covariance, correlation: (d, d) of the values; inf and NaN as above.
         t: (nt,) times of the data, s.
         measured: output -> (nt,) the data, NaN where nothing was measured.
-        fitted: output -> (nt,) what the run at the optimum has there.
+        fitted: output -> (nt,) of the run at the optimum.
         residuals: output -> (nt,) measured minus fitted.
         sigma: output -> (nt,) standard deviations; empty where none were given.
         units: output -> SI unit.
@@ -37,8 +36,8 @@ class Fit:
         iterations, runs: evaluations of the derivatives; runs of the scene in all.
         status: "converged", or "stopped" where the iterations were used up.
         message: why the search ended.
-        notes: what is to be known: parameters that cannot be told apart, have no effect, stand at
-            a bound; errors of interpolation.
+        notes: parameters that cannot be told apart, have no effect, are at a bound; errors of
+            interpolation.
         scene: with the fitted values.
         result: the run of that scene.
     """

@@ -1,4 +1,4 @@
-"""Measured data: what they may be given as, checked, and as plain arrays."""
+"""Reads and checks measured data."""
 
 import csv
 import io
@@ -18,21 +18,20 @@ from dap3d_core.study.fit.fit_parameters import is_number
 
 Floats = NDArray[np.float64]
 
-#: What the column of the times may be called.
+#: Names of the column of times, and entries of a CSV file where nothing was measured.
 TIMES = ("t", "time")
-#: What stands in a CSV file where nothing was measured.
 EMPTY = ("", "nan", "na", "n/a", "null", "none")
 
 
 @attrs.frozen(eq=False)
-class Measured:
-    """Data that a fit compares runs with.
+class MeasuredData:
+    """Data that a fit compares with runs.
 
     Attributes:
-        t: (nt,) times, s, as they were given: in any order, also several times the same.
-        values: label -> (nt,) what was measured, SI; NaN where nothing was.
+        t: (nt,) times as given, s: in any order, also equal ones.
+        values: label -> (nt,) measured, SI; NaN where nothing was measured.
         quantities: label -> name of the quantity in results.
-        sigma: label -> (nt,) standard deviations; empty where they are not known.
+        sigma: label -> (nt,) standard deviations; empty where they are unknown.
     """
 
     t: Floats
@@ -42,25 +41,23 @@ class Measured:
 
     @property
     def count(self) -> int:
-        """How many numbers were measured."""
+        """Number of measured values."""
         return int(sum(np.isfinite(v).sum() for v in self.values.values()))
 
     def weighted(self, values: Mapping[str, Floats]) -> Floats:
-        """Values (..., nt) by label in one vector (..., count), over their standard deviations."""
+        """Values (..., nt) by label as one vector (..., count), over standard deviations."""
         parts = []
         for label, data in self.values.items():
-            there = np.isfinite(data)
-            sigma = self.sigma[label][there] if self.sigma else 1.0
-            parts.append(values[label][..., there] / sigma)
+            measured = np.isfinite(data)
+            sigma = self.sigma[label][measured] if self.sigma else 1.0
+            parts.append(values[label][..., measured] / sigma)
         return np.concatenate(parts, axis=-1)
 
 
 def read_measured(
     measured: Any, outputs: Any, sigma: Any
-) -> tuple[Measured | None, dict[str, str], list[Mistake]]:
-    """Measured data as ``fit`` takes them, None where something is wrong with them; label ->
-    quantity of the columns that are used; what is wrong.
-    """
+) -> tuple[MeasuredData | None, dict[str, str], list[Mistake]]:
+    """Measured data as ``fit`` takes them, None with mistakes; label -> quantity; the mistakes."""
     mistakes: list[Mistake] = []
     columns = _columns(measured, mistakes)
     if mistakes:
@@ -75,21 +72,21 @@ def read_measured(
     values = {label: _numbers(label, columns[label], mistakes) for label in chosen}
     if times is not None:
         _check_times(named[0], times, mistakes)
-        for label, found in values.items():
-            if found is not None and len(found) != len(times):
-                what = f"{len(found)} values for {len(times)} times"
+        for label, array in values.items():
+            if array is not None and len(array) != len(times):
+                what = f"{len(array)} values for {len(times)} times"
                 mistakes.append(Mistake(f"measured.{label}", MISSING, what))
     good = {label: v for label, v in values.items() if v is not None}
-    for label, found in good.items():
-        if np.isinf(found).any():
-            what = "not finite; NaN stands where nothing was measured"
-            mistakes.append(Mistake(f"measured.{label}", float(found[np.isinf(found)][0]), what))
+    for label, data in good.items():
+        if np.isinf(data).any():
+            what = "not finite; give NaN where nothing was measured"
+            mistakes.append(Mistake(f"measured.{label}", float(data[np.isinf(data)][0]), what))
     if not mistakes and not any(np.isfinite(v).any() for v in good.values()):
         mistakes.append(Mistake("measured", MISSING, "there is nothing that was measured"))
     deviations = {} if mistakes or sigma is None else _deviations(sigma, good, mistakes)
     if mistakes or times is None:
         return None, chosen, mistakes
-    return Measured(times, good, chosen, deviations), chosen, []
+    return MeasuredData(times, good, chosen, deviations), chosen, []
 
 
 def _check_times(name: str, times: Floats, mistakes: list[Mistake]) -> None:
@@ -104,7 +101,7 @@ def _check_times(name: str, times: Floats, mistakes: list[Mistake]) -> None:
 def _columns(measured: Any, mistakes: list[Mistake]) -> dict[str, Any]:
     """Name -> values of a CSV file, a mapping, a data frame or a data set."""
     if isinstance(measured, (str, os.PathLike)):
-        return _of_file(Path(measured), mistakes)
+        return _read_csv(Path(measured), mistakes)
     if hasattr(measured, "data_vars"):
         return {str(name): variable.values for name, variable in measured.variables.items()
                 if name in TIMES or name in measured.data_vars}  # fmt: skip
@@ -118,11 +115,11 @@ def _columns(measured: Any, mistakes: list[Mistake]) -> dict[str, Any]:
     return {}
 
 
-def _of_file(path: Path, mistakes: list[Mistake]) -> dict[str, Any]:
-    """The columns of a CSV file; units in brackets behind names, and # lines, are left out."""
+def _read_csv(path: Path, mistakes: list[Mistake]) -> dict[str, Any]:
+    """The columns of a CSV file, without units in brackets after names and # lines."""
     try:
-        text = io.StringIO(read_regular(path).decode("utf-8-sig"), newline="")
-        rows = [(k, row) for k, row in enumerate(csv.reader(text), start=1)
+        lines = io.StringIO(read_regular(path).decode("utf-8-sig"), newline="")
+        rows = [(k, row) for k, row in enumerate(csv.reader(lines), start=1)
                 if any(row) and not row[0].startswith("#")]  # fmt: skip
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
@@ -136,33 +133,33 @@ def _of_file(path: Path, mistakes: list[Mistake]) -> dict[str, Any]:
         what = "two columns have this name"
         mistakes.append(Mistake(f"measured.{name}", MISSING, what, file=str(path), line=rows[0][0]))
     columns: dict[str, Any] = {name: np.full(len(rows) - 1, np.nan) for name in names}
-    for place, (line, row) in enumerate(rows[1:]):
+    for k, (line, row) in enumerate(rows[1:]):
         if len(row) != len(names):
             what = f"{len(row)} columns, the header has {len(names)}"
             mistakes.append(Mistake("measured", MISSING, what, file=str(path), line=line))
             continue
-        for name, word in zip(names, row, strict=True):
+        for name, text in zip(names, row, strict=True):
             try:
-                columns[name][place] = np.nan if word.strip().lower() in EMPTY else float(word)
+                columns[name][k] = np.nan if text.strip().lower() in EMPTY else float(text)
             except ValueError:
-                mistakes.append(Mistake(f"measured.{name}", word, "should be a number",
+                mistakes.append(Mistake(f"measured.{name}", text, "should be a number",
                                         file=str(path), line=line))  # fmt: skip
     return columns
 
 
 def _chosen(columns: dict[str, Any], outputs: Any, mistakes: list[Mistake]) -> dict[str, str]:
-    """Label -> quantity of the columns that are to be used."""
-    asked: dict[str, Any] = {name: name for name in columns}
+    """Label -> quantity of the columns that are used."""
+    quantities: dict[str, Any] = {name: name for name in columns}
     if isinstance(outputs, Mapping):
-        asked = {str(column): name for column, name in outputs.items()}
+        quantities = {str(column): name for column, name in outputs.items()}
     elif isinstance(outputs, (str, list, tuple)):
-        asked = {str(n): n for n in ([outputs] if isinstance(outputs, str) else outputs)}
+        quantities = {str(n): n for n in ([outputs] if isinstance(outputs, str) else outputs)}
     elif outputs is not None:
         what = "outputs are names of columns, or column -> name of its quantity"
         mistakes.append(Mistake("outputs", outputs, what))
-    if not asked:
+    if not quantities:
         mistakes.append(Mistake("measured", MISSING, "there is no quantity besides the time"))
-    for column, quantity in asked.items():
+    for column, quantity in quantities.items():
         if column not in columns:
             near = nearest(column, columns)
             remedy = "" if near else f"there are {', '.join(columns)}"
@@ -171,7 +168,7 @@ def _chosen(columns: dict[str, Any], outputs: Any, mistakes: list[Mistake]) -> d
         if not isinstance(quantity, str):
             what = "the name of a quantity is text such as 'crank.r.z'"
             mistakes.append(Mistake(f"outputs.{column}", quantity, what))
-    return {c: name for c, name in asked.items() if c in columns and isinstance(name, str)}
+    return {c: name for c, name in quantities.items() if c in columns and isinstance(name, str)}
 
 
 def _numbers(name: str, values: Any, mistakes: list[Mistake]) -> Floats | None:

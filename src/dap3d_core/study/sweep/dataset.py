@@ -26,7 +26,8 @@ from dap3d_core.result.metadata import to_json
 from dap3d_core.result.open import check_signature, unreadable
 from dap3d_core.simulation.output.type_sources import digests_of
 from dap3d_core.study.design import Design
-from dap3d_core.study.study import Batch, Ensemble, PointStatus
+from dap3d_core.study.ensemble import Ensemble
+from dap3d_core.study.study import Batch, PointStatus
 
 if TYPE_CHECKING:
     import xarray
@@ -121,7 +122,7 @@ def layout_of(ensemble: Ensemble, design: Design, points: Floats) -> Layout:
             {"long_name": number.name, "units": number.unit},
             axis,
         )
-        for number, axis in zip(ensemble.numbers, values, strict=True)
+        for number, axis in zip(ensemble.parameters, values, strict=True)
     ]
     sizes = dict(zip(design.dimensions, design.shape, strict=True))
     if any(output.reduction == "series" for output in ensemble.outputs):

@@ -1,4 +1,4 @@
-"""Some of the points of a study, evenly chosen: where all are too many to be shown."""
+"""Even subsampling of the points of a study, where all are too many to be shown."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,32 +12,25 @@ if TYPE_CHECKING:
 
 Integers = NDArray[np.int64]
 
-#: Variables of up to so many bytes are read whole: from a file, single places take far longer.
+#: Variables of up to so many bytes are read whole: single values from a file take far longer.
 READ_WHOLE = 2**30
 
 
 def at_places(data: "xarray.Dataset", places: Mapping[str, Integers]) -> "xarray.Dataset":
-    """A data set at some places of its dimensions."""
+    """A data set at some indices along its dimensions."""
 
-    def chosen(array: "xarray.DataArray") -> "xarray.DataArray":
-        there = {axis: k for axis, k in places.items() if axis in array.dims}
-        return (array.compute() if array.nbytes <= READ_WHOLE else array).isel(there)
+    def subset(array: "xarray.DataArray") -> "xarray.DataArray":
+        index = {axis: k for axis, k in places.items() if axis in array.dims}
+        return (array.compute() if array.nbytes <= READ_WHOLE else array).isel(index)
 
-    return data.map(chosen, keep_attrs=True)
+    return data.map(subset, keep_attrs=True)
 
 
 def evenly(shape: Sequence[int], most: int) -> list[Integers]:
-    """Places along each axis of points whose combinations are so many at most.
+    """Indices along each axis with at most ``most`` combinations (1 or more), (k,) rising.
 
-    No axis keeps more places than the longest that is shortened; the first and the last place of
+    No axis keeps more indices than the longest that is shortened; the first and the last index of
     an axis are among them where it keeps two or more.
-
-    Args:
-        shape: points along each axis.
-        most: of all combinations, 1 or more.
-
-    Returns:
-        (k,) rising, for each axis.
     """
     low, high = 1, max(shape, default=1)
     while low < high:

@@ -1,35 +1,31 @@
-"""The door to a sweep: one scene, run at many combinations of its numbers."""
+"""Sweeps: one scene, run at many combinations of values of its parameters."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.result import ResultError
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
 from dap3d_core.simulation.output.free_space import check_room_of_points
 from dap3d_core.study.design import Design, design_of
-from dap3d_core.study.outputs import Output, outputs_of
-from dap3d_core.study.study import Ensemble, Study
+from dap3d_core.study.ensemble import Ensemble
+from dap3d_core.study.outputs import outputs_of
+from dap3d_core.study.study import Study
 from dap3d_core.study.sweep.dataset import InMemory, layout_of, open_sweep
 from dap3d_core.study.sweep.file import Growing
 from dap3d_core.study.sweep.schema import NOTE
-from dap3d_core.study.workers.threads import run_here
+from dap3d_core.study.workers.threads import RunPoints, run_here
 
 if TYPE_CHECKING:
     import xarray
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-
-#: Larger packs gain nothing, and a hard point would hold up more of the others.
+#: Larger packs gain nothing, and a hard point would delay more of the others.
 LARGEST_PACK = 1024
-#: How a name of a NetCDF variable does not begin, and what it does not hold.
-NO_NAME = "a name in a NetCDF file begins with a letter, a digit or _ and holds no slash"
+INVALID_NAME = "a name in a NetCDF file begins with a letter, a digit or _ and holds no slash"
 
 
 def sweep(
@@ -60,84 +56,77 @@ def sweep(
     progress: Callable[[int, int], None] | None = None,
     announce: Callable[[str], None] | None = None,
 ) -> "xarray.Dataset":
-    """Run a scene at many points, combinations of values of its numbers (docs/how-to/sweeps.md).
+    """Run a scene at many points, combinations of values of its parameters (docs/how-to/sweeps.md).
 
-    They are those of ``simulate`` of the changed scene; remarks in docs/concepts/studies.md.
+    Outputs are those of ``simulate`` of the changed scene; details in docs/concepts/studies.md.
 
     Args:
         scene: a Scene, or what ``load`` takes.
-        vary: name of a number (``bodies.crank.mass``) -> how it varies: a list or an array of
+        vary: name of a parameter (``bodies.crank.mass``) -> how it varies: a list or an array of
             numbers, "1:5:9" (from:to:count), "1:100:5:log"; for samples "1:5", "3~0.1" (normal).
         outputs: quantities ("crank.r.z:max"), functions of a ``Result``, or label -> one of these.
         sample, design, seed: number of samples (without: a grid), "lhs", "random", "sobol" or
             "halton", seed.
-        t_end, dt, method, integrator, rtol, atol, step, correct, project, correct_metric: as
-            ``simulate`` has them; so has it allow_code. announce: as ``compile``.
+        t_end, dt, method, integrator, rtol, atol, step, correct, project, correct_metric,
+            allow_code: as of ``simulate``. announce: as of ``compile``.
         threads, client: points at once, or a ``distributed.Client`` whose workers run them.
         pack: points that take their steps together, for speed: equal within the tolerances only.
-        output, force, resume: file to write; over another; go on with ``OUTPUT.part``.
+        output, force, resume: file to write; overwrite it; continue with ``OUTPUT.part``.
         progress: called as progress(done, total).
 
     Returns:
-        the outputs over the numbers, or over ``point``; NaN, ``status``, ``note`` where one failed.
+        the outputs over the parameters, or ``point``; NaN, ``status``, ``note`` where one failed.
 
     Raises:
-        SceneError, PluginError, SimulationError, ResultError: nothing can be run or kept. What ends
-            it later (Ctrl-C, an exception of ``progress``) has the points so far as ``.result``.
+        SceneError, PluginError, SimulationError, ResultError: nothing can be run or stored. What
+            ends it later (Ctrl-C, say) has the points so far as ``.result``.
     """
     settings = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol,
                     step=step, correct=correct, project=project,
                     correct_metric=correct_metric)  # fmt: skip
-    study, plan = _asked(scene, vary, outputs, (sample, design, seed), settings, allow_code, pack)
+    study, plan = _read(scene, vary, outputs, (sample, design, seed), settings, allow_code, pack)
     runner = _Runner(threads, client, progress, announce, force=force, resume=resume)
     return runner.run(study, plan, output)
 
 
-def _asked(
+def _read(
     scene: Any,
     vary: Any,
     outputs: Any,
     sampling: tuple[Any, ...],
-    settings: Any,
+    settings: dict[str, Any],
     allow_code: bool,
     pack: Any,
 ) -> tuple[Study, Design]:
-    """The study and its points, as far as they can be judged before the scene is compiled."""
-    mistakes = _pack_mistakes(pack)
-    chosen = scene.copy() if isinstance(scene, Scene) else load(scene)
+    """The study and its points, as far as they can be checked before the scene is compiled."""
+    mistakes: list[Mistake] = []
+    if not (isinstance(pack, int) and not isinstance(pack, bool) and 1 <= pack <= LARGEST_PACK):
+        what = f"the points of a pack are a whole number from 1 to {LARGEST_PACK}"
+        mistakes.append(Mistake("pack", pack, what))
+    changed = scene.copy() if isinstance(scene, Scene) else load(scene)
     given = {k: v for k, v in settings.items() if v is not None}
-    chosen.simulation = attrs.evolve(chosen.simulation, **given)
-    plan: Design | None = None
-    kept: tuple[Output, ...] = ()
+    changed.simulation = attrs.evolve(changed.simulation, **given)
     try:
-        check_simulation(chosen.simulation, chosen.bodies)
-    except SceneError as error:  # others are found again with the whole scene, with their lines
-        about = given.keys() | ({"step"} if "integrator" in given else set())
-        about = about | ({"dt"} if "t_end" in given else set())
-        mistakes += [m for m in error.mistakes if m.key in about]
+        check_simulation(changed.simulation, changed.bodies)
+    except SceneError as error:  # other mistakes come again with the whole scene, with their lines
+        keys = given.keys() | ({"step"} if "integrator" in given else set())
+        keys = keys | ({"dt"} if "t_end" in given else set())
+        mistakes += [m for m in error.mistakes if m.key in keys]
     try:
         plan = design_of(vary, *sampling)
     except SceneError as error:
         mistakes += error.mistakes
     try:
-        kept = outputs_of(outputs)
+        computed = outputs_of(outputs)
     except SceneError as error:
         mistakes += error.mistakes
-    if mistakes or plan is None:
+    if mistakes:
         raise SceneError(mistakes)
-    names = tuple(varied.name for varied in plan.varied)
-    return Study(chosen, names, kept, allow_code, pack), plan
-
-
-def _pack_mistakes(pack: Any) -> list[Mistake]:
-    if isinstance(pack, int) and not isinstance(pack, bool) and 1 <= pack <= LARGEST_PACK:
-        return []
-    what = f"the points of a pack are a whole number from 1 to {LARGEST_PACK}"
-    return [Mistake("pack", pack, what)]
+    return Study(changed, tuple(v.name for v in plan.varied), computed, allow_code, pack), plan
 
 
 def _ensemble(study: Study, announce: Callable[[str], None] | None) -> Ensemble:
-    """What runs the points; names and outputs that are wrong are told together."""
+    """The ensemble of a study; wrong names and wrong outputs are reported together."""
     try:
         return Ensemble(study, announce)
     except SceneError as error:
@@ -151,48 +140,45 @@ def _ensemble(study: Study, announce: Callable[[str], None] | None) -> Ensemble:
 
 
 def _check_names(ensemble: Ensemble, plan: Design, *, in_file: bool) -> None:
-    """Refuse outputs called like numbers, numbers that are not whole, and names no file takes."""
-    names = [number.name for number in ensemble.numbers]
-    kept = [output.name for output in ensemble.outputs]
-    mistakes = [
-        Mistake("outputs", name, "this is the name of a number that varies; take another label")
-        for name in kept
-        if name in names
-    ]
-    twice = dict.fromkeys(name for name in kept if kept.count(name) > 1)
+    """Refuse labels that are taken, fractions of integers, and names that no file takes."""
+    names = [parameter.name for parameter in ensemble.parameters]
+    labels = [output.name for output in ensemble.outputs]
+    what = "this is the name of a number that varies; take another label"
+    mistakes = [Mistake("outputs", name, what) for name in labels if name in names]
+    twice = dict.fromkeys(name for name in labels if labels.count(name) > 1)
     mistakes += [Mistake("outputs", name, "an output is named once only") for name in twice]
-    for number, varied in zip(ensemble.numbers, plan.varied, strict=True):
+    for parameter, varied in zip(ensemble.parameters, plan.varied, strict=True):
         values = varied.values
-        if number.whole and (values is None or not np.all(values == np.round(values))):
+        if parameter.whole and (values is None or not np.all(values == np.round(values))):
             what = "this is a whole number; list whole values"
-            mistakes.append(Mistake(f"vary {number.name}", varied.spec, what))
-    for key, given in (("vary", names), ("outputs", kept)) if in_file else ():
-        remedy = "rename it" if key == "vary" else 'give it a label: {"label": quantity}'
-        mistakes += [
-            Mistake(key, name, NO_NAME, remedy=remedy) for name in given if not _fits_file(name)
-        ]
+            mistakes.append(Mistake(f"vary {parameter.name}", varied.spec, what))
+    if in_file:
+        label = 'give it a label: {"label": quantity}'
+        for key, given, remedy in (("vary", names, "rename it"), ("outputs", labels, label)):
+            invalid = [name for name in given if not _fits_file(name)]
+            mistakes += [Mistake(key, name, INVALID_NAME, remedy=remedy) for name in invalid]
     if mistakes:
         raise SceneError(mistakes)
 
 
 def _fits_file(name: str) -> bool:
-    """Whether a NetCDF file takes the name of a variable."""
+    """True for a valid name of a NetCDF variable."""
     first = name[0]
     return "/" not in name and name == name.strip() and (first.isalnum() or first == "_")
 
 
-def _check_room(ensemble: Ensemble, plan: Design, output: str | os.PathLike[str] | None) -> None:
+def _check_space(ensemble: Ensemble, plan: Design, output: str | os.PathLike[str] | None) -> None:
     """Refuse what fits neither into memory nor on the disk."""
     series = [o for o in ensemble.outputs if o.reduction == "series"]
     width = 8 * (len(ensemble.outputs) + len(series) * (len(ensemble.times) - 1))
-    # beside the outputs: status and note; in memory the points, while they are drawn three times
+    # in addition status and note; in memory the points, three times while they are drawn
     width += 1 + (NOTE if output is not None else 8 + 3 * 8 * len(plan.varied))
     check_room_of_points(plan.size, width, output)
 
 
 @attrs.frozen(eq=False)
 class _Runner:
-    """Where points are run, and who is told; as ``sweep`` has them."""
+    """Runs points here or on a cluster; attributes as the arguments of ``sweep``."""
 
     threads: int | None
     client: Any
@@ -204,33 +190,33 @@ class _Runner:
     def run(
         self, study: Study, plan: Design, output: str | os.PathLike[str] | None
     ) -> "xarray.Dataset":
-        """Run the points of a study that are missing, and keep what comes of them."""
-        self._refuse(output)
+        """Run the points of a study that are missing, and store their outputs."""
+        self._check_options(output)
         ensemble = _ensemble(study, self.announce)
         _check_names(ensemble, plan, in_file=output is not None)
         if not self.force:
-            _check_room(ensemble, plan, output)
+            _check_space(ensemble, plan, output)
         if self.client is None:
-            ensemble.prepare(self.announce)
+            ensemble.prepare()
         points = plan.points()
         layout = layout_of(ensemble, plan, points)
-        kept: InMemory | Growing = InMemory(layout)
+        store: InMemory | Growing = InMemory(layout)
         if output is not None:
-            kept = Growing(layout, output, force=self.force, resume=self.resume)
+            store = Growing(layout, output, force=self.force, resume=self.resume)
         try:
-            self._go(ensemble, points, kept)
-            if isinstance(kept, Growing):
-                kept.finish()
+            self._run_points(ensemble, points, store)
+            if isinstance(store, Growing):
+                store.finish()
         except BaseException as error:
             with suppress(ResultError, AttributeError):
-                error.result = _so_far(kept)  # type: ignore[attr-defined]
+                error.result = _partial_result(store)  # type: ignore[attr-defined]
             raise
-        return kept.dataset() if isinstance(kept, InMemory) else open_sweep(kept.target)
+        return store.dataset() if isinstance(store, InMemory) else open_sweep(store.target)
 
-    def _refuse(self, output: str | os.PathLike[str] | None) -> None:
+    def _check_options(self, output: str | os.PathLike[str] | None) -> None:
         mistakes = []
         if self.resume and output is None:
-            what = "a sweep goes on from the part of its file"
+            what = "a sweep is resumed from the part of its file"
             mistakes.append(Mistake("resume", True, what, remedy="give output"))
         if self.client is not None and self.threads is not None:
             what = "threads are of this machine; the workers of a client have their own"
@@ -238,32 +224,33 @@ class _Runner:
         if mistakes:
             raise SceneError(mistakes)
 
-    def _go(self, ensemble: Ensemble, points: Floats, kept: InMemory | Growing) -> None:
-        todo, total = kept.todo, len(points)
+    def _run_points(self, ensemble: Ensemble, points: Any, store: InMemory | Growing) -> None:
+        todo, total = store.todo, len(points)
         done = total - len(todo)
-        self._tell(done, total)
-        with closing(self._found(ensemble, points, todo)) as found:
-            for places, batch in found:
-                kept.put(places, batch)
-                done += len(places)
-                self._tell(done, total)
+        self._report(done, total)
+        batches: Any = self._batches(ensemble, points, todo)
+        with closing(batches):
+            for index, batch in batches:
+                store.put(index, batch)
+                done += len(index)
+                self._report(done, total)
 
-    def _found(self, ensemble: Ensemble, points: Floats, places: Integers) -> Any:
-        """What comes of the points, here or on a cluster: an iterator of places and batches."""
+    def _batches(self, ensemble: Ensemble, points: Any, index: Any) -> Iterator[RunPoints]:
+        """Outputs of the points as they are computed, here or on a cluster."""
         if self.client is None:
-            return run_here(ensemble, points, places, self.threads)
+            return run_here(ensemble, points, index, self.threads)
         from dap3d_core.study.workers.dask_cluster import run_on
 
-        return run_on(self.client, ensemble.study, points, places)
+        return run_on(self.client, ensemble.study, points, index)
 
-    def _tell(self, done: int, total: int) -> None:
+    def _report(self, done: int, total: int) -> None:
         if self.progress is not None:
             self.progress(done, total)
 
 
-def _so_far(kept: InMemory | Growing) -> "xarray.Dataset":
-    """What a sweep that is ended has computed; its part stays."""
-    if isinstance(kept, InMemory):
-        return kept.dataset()
-    kept.leave()
-    return open_sweep(kept.part)
+def _partial_result(store: InMemory | Growing) -> "xarray.Dataset":
+    """The points that an interrupted sweep has computed; its part stays."""
+    if isinstance(store, InMemory):
+        return store.dataset()
+    store.leave()
+    return open_sweep(store.part)

@@ -1,4 +1,4 @@
-"""The points of a study on a cluster, by dask: tasks of some points each."""
+"""Runs the points of a study on a cluster by dask: tasks of some points each."""
 
 import asyncio
 import hashlib
@@ -13,41 +13,37 @@ from threading import Lock
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.result import current_versions
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.simulation import SimulationError
-from dap3d_core.study.study import Batch, Ensemble, Study
+from dap3d_core.study.ensemble import Ensemble
+from dap3d_core.study.study import Batch, Study
 from dap3d_core.study.workers.environment import (
     Environment,
     bare_environment,
     differences,
     environment_of,
-    other_versions,
-    with_whole_path,
+    version_differences,
+    with_absolute_path,
 )
-from dap3d_core.study.workers.threads import Portions
+from dap3d_core.study.workers.threads import ChunkSize, Floats, Integers, RunPoints
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Found = tuple[Integers, Batch]
-
-#: Seconds that a task is to take: its transport, some milliseconds, is then no matter.
-SECONDS = 1.0
-#: Seconds to wait for a scheduler that does not answer, for a first worker, and for another one
-#: where all are gone.
+#: Seconds that a task should take: much longer than its transport of some milliseconds.
+TASK_SECONDS = 1.0
+#: Seconds to wait for the answer of a scheduler, for a first worker, and for another one where all
+#: are lost.
 ANSWER, ARRIVAL, ABSENCE = 10.0, 10.0, 60.0
-#: Seconds from one look at the cluster to the next.
-LOOK = 2.0
-#: Studies whose compiled models a worker keeps.
-KEPT = 4
-#: Workers that a message names.
-NAMED = 10
+#: Seconds between requests for the number of workers.
+POLL_SECONDS = 2.0
+#: Number of studies whose compiled models a worker keeps.
+MAX_ENSEMBLES = 4
+#: Largest number of workers in a message.
+MAX_NAMES = 10
 
 
 class ClusterError(SimulationError):
-    """A study cannot be run on a cluster; says what to do."""
+    """A study cannot be run on a cluster; the message gives the remedy."""
 
 
 def connect(address: str, timeout: float = ANSWER) -> Any:
@@ -57,14 +53,14 @@ def connect(address: str, timeout: float = ANSWER) -> Any:
         ClusterError: dask is not installed, or nobody answers within ``timeout`` s.
     """
     distributed = _distributed()
-    # A scheduler that goes away is told by an error, not by a traceback in a log as well.
+    # A lost scheduler raises an error, and needs no traceback in a log in addition.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL + 1)
     try:
-        with ThreadPoolExecutor(1) as beside:  # this thread may have an event loop of its own
-            beside.submit(asyncio.run, _greet(address, timeout)).result()
+        with ThreadPoolExecutor(1) as thread:  # the current one may have an event loop of its own
+            thread.submit(asyncio.run, _greet(address, timeout)).result()
         return distributed.Client(address, timeout=timeout, set_as_default=False)
     except (OSError, ValueError, TypeError, ImportError, RuntimeError) as error:
-        reason = str(error) or f"nothing was said within {timeout:g} s"
+        reason = str(error) or f"no answer within {timeout:g} s"
         raise ClusterError(
             f"no dask scheduler answers at {address} ({reason.splitlines()[0]}); start one with "
             "`dask scheduler`, which prints its address, such as tcp://node7:8786"
@@ -72,9 +68,10 @@ def connect(address: str, timeout: float = ANSWER) -> Any:
 
 
 async def _greet(address: str, timeout: float) -> None:
-    """Exchange greetings with a scheduler; a client would wait for ever for one that is silent.
+    """Exchange greetings with a scheduler.
 
-    A client that could not be made also leaves a traceback when it is collected.
+    A client would wait for ever for a silent one, and a client that could not be made leaves a
+    traceback when it is collected.
     """
     distributed = _distributed()
     options = distributed.Security().get_connection_args("client")
@@ -86,51 +83,52 @@ def run_on(
     client: Any,
     study: Study,
     points: Floats,
-    places: Integers,
+    index: Integers,
     chunk: int | None = None,
     retries: int = 2,
-) -> Iterator[Found]:
-    """Run points on the workers of a cluster and give what came of them as it comes.
+) -> Iterator[RunPoints]:
+    """Run points on the workers of a cluster and yield their outputs as they are computed.
 
-    Numbers are those of ``run_here`` where versions are the same. What a worker had that was lost
-    is run again by another one; no point is given twice. Whoever stops asking, or is interrupted,
-    cancels the tasks: none begins, those that run end by themselves.
+    Values are those of ``run_here`` where versions are the same. Tasks of a lost worker are run
+    again by another one; no point is yielded twice. Closing or interrupting the iterator cancels
+    the tasks: none begins, those that run end.
 
     Args:
         client: a ``distributed.Client``.
-        study: what is done at each point.
-        points: (N, numbers) the values of the numbers at all points.
-        places: which of them to run.
+        study: the work at each point.
+        points: (N, parameters) values of the parameters at all points.
+        index: (k,) of the points to run.
         chunk: points of a task; by default as many as take about a second.
-        retries: how often a task that raised an exception is tried again.
+        retries: of a task that raised an exception.
 
     Raises:
         SceneError: ``client`` is no client, ``chunk`` no number of points.
         ClusterError: the cluster has no workers, or some of them lack what the study needs or have
             other versions: each is named with the remedy, and no point is run.
     """
-    _refuse(client, chunk)
-    study, places = with_whole_path(study), np.asarray(places, dtype=np.int64)
+    _check_arguments(client, chunk)
+    study = with_absolute_path(study)
     here = environment_of(study)
     if here["fault"]:
         raise ClusterError(here["fault"])
     payload = _pickled(study, here)
     check_workers(client, here, payload)
-    return _run(client, payload, np.asarray(points, dtype=float), places, chunk, retries)
+    points, index = np.asarray(points, dtype=float), np.asarray(index, dtype=np.int64)
+    return _run(client, payload, points, index, chunk, retries)
 
 
 def check_workers(client: Any, here: Environment, payload: bytes) -> None:
-    """Ask all workers, before any point is run, whether they have what the study needs.
+    """Check, before any point is run, that all workers have what the study needs.
 
     Args:
         client: of their scheduler.
-        here: what this process has.
+        here: environment of this process.
         payload: pickled: the study, ``here``.
 
     Raises:
         ClusterError: there are no workers, or some cannot run the study; names them.
     """
-    with _asking(client):
+    with _requests(client):
         try:
             client.wait_for_workers(1, timeout=ARRIVAL)
         except TimeoutError as error:
@@ -141,36 +139,37 @@ def check_workers(client: Any, here: Environment, payload: bytes) -> None:
             ) from error
         answers = client.run(environment_there, current_versions(), payload, on_error="return")
     faults = {worker: _faults(here, answer) for worker, answer in sorted(answers.items())}
-    unfit = [f"{worker}: {'; '.join(found)}" for worker, found in faults.items() if found]
+    unfit = [f"{worker}: {'; '.join(of_worker)}" for worker, of_worker in faults.items()
+             if of_worker]  # fmt: skip
     if unfit:
-        more = [f"... and {len(unfit) - NAMED} more"] if len(unfit) > NAMED else []
+        more = [f"... and {len(unfit) - MAX_NAMES} more"] if len(unfit) > MAX_NAMES else []
         title = f"{len(unfit)} of {len(answers)} workers cannot run this study:"
-        raise ClusterError("\n".join([title, *unfit[:NAMED], *more]))
+        raise ClusterError("\n".join([title, *unfit[:MAX_NAMES], *more]))
 
 
 def environment_there(versions: dict[str, str], payload: bytes) -> Environment:
-    """What this process, a worker, has of what a study needs.
+    """The environment of this process, a worker.
 
     Args:
-        versions: of who asks; where Python or dap3d differ, nothing is unpickled.
-        payload: pickled: the study, what is there where it comes from.
+        versions: of the client; where Python or dap3d differ, nothing is unpickled.
+        payload: pickled: the study, the environment of the client.
     """
-    found = bare_environment()
-    if not other_versions(versions, found["versions"]):
+    environment = bare_environment()
+    if not version_differences(versions, environment["versions"]):
         import cloudpickle
 
         try:
             return environment_of(cloudpickle.loads(payload)[0])
-        except Exception as error:  # of a module that is not there: whatever it raises
-            found["fault"] = (
+        except Exception as error:  # of a missing module: whatever it raises
+            environment["fault"] = (
                 f"it cannot load the study ({type(error).__name__}: {error}); functions among the "
-                "outputs must stand in the script, or in a module that can be imported there"
+                "outputs must be defined in the script, or in a module that can be imported there"
             )
-    return found
+    return environment
 
 
 def _faults(here: Environment, answer: Any) -> list[str]:
-    """What keeps a worker from running the study, by its answer."""
+    """Reasons, of the answer of a worker, why it cannot run the study."""
     if isinstance(answer, BaseException):
         version = here["versions"]["dap3d"]
         return [
@@ -184,55 +183,50 @@ def _run(
     client: Any,
     payload: bytes,
     points: Floats,
-    places: Integers,
+    index: Integers,
     chunk: int | None,
     retries: int,
-) -> Iterator[Found]:
+) -> Iterator[RunPoints]:
     name = f"dap3d-{uuid.uuid4().hex[:12]}"
     digest = hashlib.sha256(payload).hexdigest()
-    # A task whose result is the study, and not data that is scattered: dask makes it again where
-    # the worker that had it is lost. Each worker gets it once.
-    with _asking(client):
-        study = client.submit(_as_it_is, payload, key=f"{name}-study", pure=False)
+    # A task that returns the study, and no scattered data: dask makes it again where the worker
+    # that had it is lost. Each worker gets it once.
+    with _requests(client):
+        study = client.submit(_identity, payload, key=f"{name}-study", pure=False)
     done = _distributed().as_completed(loop=client.loop, with_results=True, raise_errors=False)
-    portions, watch = Portions(SECONDS, 1), _Watch(client)
+    chunks, monitor = ChunkSize(TASK_SECONDS, 1), _ClusterMonitor(client)
     waiting: dict[Any, Integers] = {}
     try:
-        while waiting or len(places):
-            portions.workers = watch.cores
-            while len(places) and len(waiting) < 2 * portions.workers:
-                size = chunk or portions.next(len(places))
-                part, places = places[:size], places[size:]
-                with _asking(client):
+        while waiting or len(index):
+            chunks.workers = monitor.cores
+            while len(index) and len(waiting) < 2 * chunks.workers:
+                size = chunk or chunks.next(len(index))
+                part, index = index[:size], index[size:]
+                task = run_points, study, digest, points[part]
+                with _requests(client):
                     future = client.submit(
-                        run_points,
-                        study,
-                        digest,
-                        points[part],
-                        key=f"{name}-{part[0]}",
-                        retries=retries,
-                        pure=False,
+                        *task, key=f"{name}-{part[0]}", retries=retries, pure=False
                     )
                 waiting[future] = part
                 done.add(future)
-            watch.wait(done)
-            future, found = next(done)
+            monitor.wait(done)
+            future, outcome = next(done)
             part = waiting.pop(future)
             # Not by the state of the future: a worker may be lost after its result was fetched.
-            if not (isinstance(found, tuple) and isinstance(found[0], Batch)):
-                _raise(client, found, part)
-            batch, seconds = found
-            portions.note(len(part), seconds)
-            del future, found  # or the cluster would keep it
+            if not (isinstance(outcome, tuple) and isinstance(outcome[0], Batch)):
+                _raise(client, outcome, part)
+            batch, seconds = outcome
+            chunks.update(len(part), seconds)
+            del future, outcome  # or the cluster would keep the result
             yield part, batch
     finally:
         if client.status == "running":
-            with suppress(ClusterError), _asking(client):
+            with suppress(ClusterError), _requests(client):
                 client.cancel([*waiting, study])
 
 
-class _Watch:
-    """Looks at a cluster from time to time.
+class _ClusterMonitor:
+    """Polls a cluster.
 
     Attributes:
         cores: threads of all workers, from 1.
@@ -241,7 +235,7 @@ class _Watch:
     def __init__(self, client: Any) -> None:
         self.client, self.cores = client, 1
         self._seen = self._next = time.monotonic()
-        self._look()
+        self._poll()
 
     def wait(self, done: Any) -> None:
         """Wait until a task has ended.
@@ -250,20 +244,20 @@ class _Watch:
             ClusterError: there have been no workers for some time, or the scheduler is gone.
         """
         while not done.has_ready():
-            if self.client.status != "running":  # then dask may never speak of a task again
+            if self.client.status != "running":  # then dask may never report a task again
                 raise _gone(self.client)
-            self._look()
+            self._poll()
             time.sleep(0.01)
-        self._look()
+        self._poll()
 
-    def _look(self) -> None:
+    def _poll(self) -> None:
         now = time.monotonic()
         if now < self._next or self.client.status != "running":
             return
-        self._next = now + LOOK
+        self._next = now + POLL_SECONDS
         try:
             cores = sum(self.client.nthreads().values())
-        except OSError as error:  # most likely the client sees soon that nobody is there
+        except OSError as error:  # the client most likely notices soon that nobody is there
             if now - self._seen > ABSENCE:
                 raise _gone(self.client) from error
             return
@@ -278,73 +272,69 @@ class _Watch:
 
 
 def run_points(payload: bytes, digest: str, points: Floats) -> tuple[Batch, float]:
-    """What a task is: run points, on a worker.
-
-    Returns:
-        What came of them, and how many seconds they took.
-    """
+    """The task of a worker: run points. Returns their outputs and the seconds they took."""
     ensemble = _ensemble(payload, digest)
     begun = time.perf_counter()
     batch = ensemble.run(points)
     return batch, time.perf_counter() - begun
 
 
-#: Of a worker's process: the compiled studies by their digest, the last one used at the end.
+#: Compiled studies of a worker's process by their digest, the last one used at the end.
 _ensembles: OrderedDict[str, Ensemble] = OrderedDict()
-_one_at_a_time = Lock()
+_lock = Lock()
 
 
 def _ensemble(payload: bytes, digest: str) -> Ensemble:
     """The compiled study, compiled once in a process."""
-    with _one_at_a_time:
+    with _lock:
         if digest not in _ensembles:
             import cloudpickle
 
-            study, elsewhere = cloudpickle.loads(payload)
-            # a worker that came after all had been asked
-            if faults := differences(elsewhere, environment_of(study)):
+            study, there = cloudpickle.loads(payload)
+            # a worker that came after all had been checked
+            if faults := differences(there, environment_of(study)):
                 address = _distributed().get_worker().address
                 raise ClusterError(f"{address} cannot run this study: {'; '.join(faults)}")
             _ensembles[digest] = Ensemble(study)
-            while len(_ensembles) > KEPT:
+            while len(_ensembles) > MAX_ENSEMBLES:
                 _ensembles.popitem(last=False)
         _ensembles.move_to_end(digest)
         return _ensembles[digest]
 
 
-def _as_it_is(payload: bytes) -> bytes:
+def _identity(payload: bytes) -> bytes:
     return payload
 
 
-def _raise(client: Any, found: Any, part: Integers) -> NoReturn:
-    """Say why a task has no result."""
-    error = found[1] if isinstance(found, tuple) else found
+def _raise(client: Any, outcome: Any, part: Integers) -> NoReturn:
+    """Raise the error of a task that has no result."""
+    error = outcome[1] if isinstance(outcome, tuple) else outcome
     if isinstance(error, _distributed().KilledWorker):
         raise ClusterError(
-            f"a task of {len(part)} points, from place {part[0]} on, has ended each worker that "
+            f"a task of {len(part)} points, from index {part[0]} on, has ended each worker that "
             f"ran it, the last one {error.last_worker.address}: its log says why (often there was "
             "not enough memory)"
         ) from error
-    if not isinstance(found, tuple):  # cancelled
+    if not isinstance(outcome, tuple):  # cancelled
         if client.status != "running":
             raise _gone(client) from error
         raise ClusterError(
             f"the scheduler at {_address(client)} has dropped the tasks: somebody has cancelled "
             "them"
         ) from error
-    raise error.with_traceback(found[2])
+    raise error.with_traceback(outcome[2])
 
 
 @contextmanager
-def _asking(client: Any) -> Iterator[None]:
-    """Something asked of the scheduler, or told to it.
+def _requests(client: Any) -> Iterator[None]:
+    """Requests to the scheduler.
 
     Raises:
-        ClusterError: it is not there any more.
+        ClusterError: it is gone.
     """
     try:
         yield
-    except Exception as error:  # of a client that has closed meanwhile: a kind of its own
+    except Exception as error:  # of a client that has closed meanwhile: a type of its own
         if isinstance(error, OSError) or client.status != "running":
             raise _gone(client) from error
         raise
@@ -354,7 +344,7 @@ def _gone(client: Any) -> ClusterError:
     return ClusterError(f"the scheduler at {_address(client)} is gone")
 
 
-def _refuse(client: Any, chunk: Any) -> None:
+def _check_arguments(client: Any, chunk: Any) -> None:
     mistakes = []
     distributed = _distributed()
     if not isinstance(client, distributed.Client) or client.asynchronous:
@@ -368,7 +358,7 @@ def _refuse(client: Any, chunk: Any) -> None:
 
 
 def _pickled(study: Study, here: Environment) -> bytes:
-    """The study and what it needs; functions of the script by value."""
+    """The study and its environment; functions of the script by value."""
     import cloudpickle
 
     try:

@@ -1,4 +1,4 @@
-"""Whether another process has what a study needs: dap3d, its plugins, the model's own types."""
+"""Compares environments of processes: versions of dap3d, its plugins, the model's own types."""
 
 import os
 from typing import Any
@@ -22,63 +22,62 @@ Environment = dict[str, Any]
 
 
 def environment_of(study: Study) -> Environment:
-    """What this process has of what a study needs."""
-    found = bare_environment()
+    """The environment of this process, for a study."""
+    environment = bare_environment()
     registry = load_registry()
     digests: dict[str, str] = {}
     try:
         checked = check(study.scene, registry, allow_code=study.allow_code)
         registry, digests = checked.registry, digests_of(checked)
     except (SceneError, PluginError) as error:
-        found["fault"] = str(error)
-    found["types"] = {
-        f"{kind} {word}": _origin(registry, kind, word, digests)
-        for kind in GROUPS
-        for word in _words(study, kind)
-        if any(not s.blocked for s in registry.sources.get((kind, word), ()))
-    }
-    return found
+        environment["fault"] = str(error)
+    types = environment["types"] = {}
+    for kind in GROUPS:
+        elements = getattr(study.scene, f"{kind}s").values()
+        for keyword in sorted({e.type for e in elements if isinstance(e.type, str)}):
+            if any(not s.blocked for s in registry.sources.get((kind, keyword), ())):
+                types[f"{kind} {keyword}"] = _origin(registry, kind, keyword, digests)
+    return environment
 
 
 def bare_environment() -> Environment:
-    """What can be said without a study."""
+    """The environment as far as it is known without a study."""
     sources = driver_digest("study")
     return {"versions": current_versions(), "sources": sources, "types": None, "fault": ""}
 
 
 def differences(here: Environment, there: Environment) -> list[str]:
-    """What keeps another process from running the study as this one does, each with a remedy."""
-    other = other_versions(here["versions"], there["versions"])
-    if other:
+    """Reasons why another process cannot run the study as this one does, each with a remedy."""
+    if other := version_differences(here["versions"], there["versions"]):
         return other
     if there["types"] is None:
         return [there["fault"]]
-    found = [
-        words
-        for name, wanted in here["types"].items()
-        if (words := _difference(name, wanted, there["types"].get(name)))
-    ]
-    if not found and here["sources"] != there["sources"]:
-        found = [f"its dap3d {there['versions']['dap3d']} has other sources; install the same"]
-    return found or ([there["fault"]] if there["fault"] else [])
+    compared = (
+        _type_difference(name, expected, there["types"].get(name))
+        for name, expected in here["types"].items()
+    )
+    of_types = [message for message in compared if message]
+    if not of_types and here["sources"] != there["sources"]:
+        of_types = [f"its dap3d {there['versions']['dap3d']} has other sources; install the same"]
+    return of_types or ([there["fault"]] if there["fault"] else [])
 
 
-def other_versions(here: dict[str, str], there: dict[str, str]) -> list[str]:
-    """What keeps processes of such versions apart, each with the remedy."""
-    found = []
+def version_differences(here: dict[str, str], there: dict[str, str]) -> list[str]:
+    """Differences of versions that keep processes apart, each with the remedy."""
+    messages = []
     if here["python"].split(".")[:2] != there["python"].split(".")[:2]:
-        found.append(f"it has Python {there['python']}, here is {here['python']}; take the same")
+        messages.append(f"it has Python {there['python']}, here is {here['python']}; take the same")
     if here["dap3d"] != there["dap3d"]:
         version = here["dap3d"]
-        found.append(
+        messages.append(
             f"it has dap3d {there['dap3d']}, here is {version}; "
             f'pip install "dap3d[cluster]=={version}" there'
         )
-    return found
+    return messages
 
 
-def with_whole_path(study: Study) -> Study:
-    """The study with the path of its scene from the root: other processes stand elsewhere."""
+def with_absolute_path(study: Study) -> Study:
+    """The study with the absolute path of its scene: other processes have other folders."""
     path = study.scene.path
     if path is None or path.is_absolute():
         return study
@@ -87,41 +86,35 @@ def with_whole_path(study: Study) -> Study:
     return attrs.evolve(study, scene=scene)
 
 
-def _words(study: Study, kind: str) -> list[str]:
-    """The keywords of a kind that the scene names."""
-    elements = getattr(study.scene, f"{kind}s").values()
-    return sorted({e.type for e in elements if isinstance(e.type, str)})
-
-
-def _origin(registry: Registry, kind: str, word: str, digests: dict[str, str]) -> dict[str, str]:
-    source = next(s for s in registry.sources[kind, word] if not s.blocked)
+def _origin(registry: Registry, kind: str, keyword: str, digests: dict[str, str]) -> dict[str, str]:
+    source = next(s for s in registry.sources[kind, keyword] if not s.blocked)
     return {
         "package": source.distribution,
         "version": source.version,
         "module": source.module,
-        "digest": digests.get(f"{kind} {word}", ""),
+        "digest": digests.get(f"{kind} {keyword}", ""),
     }
 
 
-def _difference(name: str, wanted: dict[str, str], got: dict[str, str] | None) -> str:
-    """What is wrong with one type in another process; "" where nothing is."""
-    kind, _, word = name.partition(" ")
-    package, version = wanted["package"], wanted["version"]
-    if not got:
+def _type_difference(name: str, here: dict[str, str], there: dict[str, str] | None) -> str:
+    """The fault of one type in another process; "" where there is none."""
+    kind, _, keyword = name.partition(" ")
+    package, version = here["package"], here["version"]
+    if not there:
         if not package:
             return (
-                f"the {kind} type {word!r} stands in {wanted['module']}, which it does not see; "
-                f"let it see the folder {os.path.dirname(wanted['module'])} under this very path"
+                f"the {kind} type {keyword!r} is in {here['module']}, which it does not see; "
+                f"let it see the folder {os.path.dirname(here['module'])} under this very path"
             )
         return (
-            f"it lacks the {kind} type {word!r} of {package} {version}; "
+            f"it lacks the {kind} type {keyword!r} of {package} {version}; "
             f"pip install {package}=={version} there"
         )
-    if (got["package"], got["version"]) != (package, version):
+    if (there["package"], there["version"]) != (package, version):
         return (
-            f"its {kind} type {word!r} is of {got['package'] or got['module']} {got['version']}, "
-            f"here of {package or wanted['module']} {version}; install the same"
+            f"its {kind} type {keyword!r} is of {there['package'] or there['module']} "
+            f"{there['version']}, here of {package or here['module']} {version}; install the same"
         )
-    if got["digest"] and got["digest"] != wanted["digest"]:
-        return f"the file of its {kind} type {word!r} is not the one here; install the same"
+    if there["digest"] and there["digest"] != here["digest"]:
+        return f"the file of its {kind} type {keyword!r} is not the one here; install the same"
     return ""

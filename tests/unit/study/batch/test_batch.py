@@ -9,9 +9,9 @@ from unit.test_checkpoint import driven, stone, wheel
 import dap3d_core as dap
 from dap3d_core.scene import SceneError
 from dap3d_core.study import Ensemble, PointStatus, Study, outputs_of, with_values
-from dap3d_core.study.batch.parameter_map import Places
+from dap3d_core.study.batch.parameter_map import ParameterMap, poses_of
 from dap3d_core.study.batch.prepare_dependence import dependence_of
-from dap3d_core.study.batch.rebuild import Modelling
+from dap3d_core.study.batch.rebuild import ModelRebuilder
 
 DONE, STOPPED, FAILED = PointStatus.DONE, PointStatus.STOPPED, PointStatus.FAILED
 
@@ -25,19 +25,19 @@ def ensemble(scene, names, outputs, **settings):
     return Ensemble(Study(scene, tuple(names), outputs_of(outputs)))
 
 
-def way(of):
-    """How an ensemble runs its points: "copied", "modelled", or "alone"."""
+def path_of(of):
+    """How an ensemble runs its points: "copied", "rebuilt", or "alone"."""
     runner = of._runner()
     if runner is None:
         return "alone"
-    return "modelled" if runner._places is None else "copied"
+    return "rebuilt" if runner.parameter_map is None else "copied"
 
 
 def singly(of, points):
     """The outputs of points by ``simulate``, of the scene with these numbers."""
     found = {output.name: [] for output in of.outputs}
     for point in points:
-        result = dap.simulate(with_values(of.study.scene, of.numbers, point))
+        result = dap.simulate(with_values(of.study.scene, of.parameters, point))
         for output in of.outputs:
             found[output.name].append(output.value(result))
     return {name: np.array(values) for name, values in found.items()}
@@ -86,13 +86,13 @@ CASES = {
     "breaks of a function": (
         driven, "bodies.crank.mass", (1.0, 2.0), "crank.w.z:series", {"t_end": 1.0}, "copied"),
     "function with breaks": (
-        driven, "functions.turn.f_end", (1.0, 2.0), "crank.w.z:max", {"t_end": 1.0}, "modelled"),
+        driven, "functions.turn.f_end", (1.0, 2.0), "crank.w.z:max", {"t_end": 1.0}, "rebuilt"),
     "mass, by which starts are corrected": (
-        skew, "bodies.bob.mass", (1.0, 3.0), "bob.r.x", {"correct_metric": "mass"}, "modelled"),
+        skew, "bodies.bob.mass", (1.0, 3.0), "bob.r.x", {"correct_metric": "mass"}, "rebuilt"),
     "redundant joints": (
         falling_linkage, "bodies.left.mass", (1.0, 2.0), "left.w.z:min", {"t_end": 0.1}, "copied"),
     "not corrected": (
-        pendulum, "points.A.sPp.y", (1.0, 1.0 + 1e-9), "bob.r.x", {"correct": False}, "modelled"),
+        pendulum, "points.A.sPp.y", (1.0, 1.0 + 1e-9), "bob.r.x", {"correct": False}, "rebuilt"),
     "other steps": (
         pendulum, "bodies.bob.mass", (1.0, 2.0), "bob.r:series",
         {"integrator": "rk4", "step": 0.01}, "copied"),
@@ -111,7 +111,7 @@ def test_points_are_single_runs_bit_for_bit(case):
     of = ensemble(make(), [name], [output], **{"dt": 0.05, **settings})
     points = np.array(values)[:, None]
     batch = of.run(points)
-    assert way(of) == expected
+    assert path_of(of) == expected
     assert batch.status.tolist() == [DONE, DONE]
     for output_name, single in singly(of, points).items():
         assert np.array_equal(batch.values[output_name], single)
@@ -139,7 +139,7 @@ def test_starts_are_corrected_as_those_of_single_runs(name):
     of = ensemble(pendulum(), [name], ["bob.r:series", "bob.w"], dt=0.1, t_end=0.5)
     points = np.array([[0.3], [0.9], [1.1]])
     batch = of.run(points)
-    assert way(of) == "copied"
+    assert path_of(of) == "copied"
     assert batch.status.tolist() == [DONE] * 3
     for output, single in singly(of, points).items():
         np.testing.assert_allclose(batch.values[output], single, rtol=0.0, atol=1e-13 * 10.0)
@@ -150,10 +150,10 @@ def test_starts_are_corrected_as_those_of_single_runs(name):
 @long_in_plain_python
 def test_a_driver_without_position_level_is_left_out_of_the_correction_of_positions():
     of = ensemble("fourbar3", ["points.P2.sPp.z"], ["crank.r:series"])
-    nominal = of.numbers[0].value
+    nominal = of.parameters[0].value
     points = np.array([[nominal], [1.01 * nominal + 0.01]])
     batch = of.run(points)
-    assert way(of) == "copied"
+    assert path_of(of) == "copied"
     single = singly(of, points)
     for output in of.outputs:
         found = batch.values[output.name]
@@ -189,7 +189,7 @@ def test_a_direction_that_a_point_leaves_undefined_is_refused(points, status):
     scene.bodies["stone"].r = (0.0, 0.0, 1.0)
     of = ensemble(scene, ["bodies.stone.r.z"], ["stone.r.z"], t_end=0.01, dt=0.01)
     batch = of.run(points)
-    assert way(of) == "copied"
+    assert path_of(of) == "copied"
     assert batch.status.tolist() == status
     if status == [FAILED]:
         assert "coincide at the start" in batch.notes[0]
@@ -201,7 +201,7 @@ def test_a_scene_that_cannot_start_as_given_has_points_that_can():
     scene.bodies["stone"].r = (0.0, 0.0, 0.0)
     of = ensemble(scene, ["bodies.stone.r.z"], ["stone.r.z"], t_end=0.01, dt=0.01)
     batch = of.run([[0.0], [2.0]])
-    assert way(of) == "alone"
+    assert path_of(of) == "alone"
     assert batch.status.tolist() == [FAILED, DONE]
 
 
@@ -212,7 +212,7 @@ def test_numbers_that_are_copied_need_no_check_and_no_model(monkeypatch):
     def refuse(*args):
         raise AssertionError("a model was made")
 
-    monkeypatch.setattr(Modelling, "load", refuse)
+    monkeypatch.setattr(ModelRebuilder, "load", refuse)
     monkeypatch.setattr(Ensemble, "result", refuse)
     assert of.run([[1.5], [2.0]]).status.tolist() == [DONE, DONE]
 
@@ -222,7 +222,7 @@ def test_a_number_that_prepare_reads_is_not_copied():
     compiled = dap.compile("fourbar3")
     poses = dict.fromkeys(range(4))
     joint = next(j for j in compiled.checked.joints if j.name == "J1")
-    found = dependence_of(joint, _poses(compiled.checked), len(poses) - 1)
+    found = dependence_of(joint, poses_of(compiled.checked), len(poses) - 1)
     assert found.fields == {"a_j"}
     assert found.constants == {"n_j", "m_j"}
     assert not found.poses
@@ -232,23 +232,17 @@ def test_poses_that_prepare_reads_are_told():
     """``fix`` keeps the relative pose that the bodies are given in."""
     compiled = dap.compile("fourbar4")
     joint = next(j for j in compiled.checked.joints if j.examined.type.keyword == "fix")
-    found = dependence_of(joint, _poses(compiled.checked), len(compiled.checked.body_names))
+    found = dependence_of(joint, poses_of(compiled.checked), len(compiled.checked.body_names))
     assert {part for _, part in found.poses} == {"r", "p"}
-
-
-def _poses(checked):
-    from dap3d_core.study.batch.parameter_map import _poses
-
-    return _poses(checked)
 
 
 def test_masses_beyond_what_a_scene_may_have_are_left_to_its_check():
     of = ensemble(pendulum(), ["bodies.bob.Jp.x", "bodies.bob.mass"], ["bob.r.y"])
-    places = Places(of.compiled.checked, of.compiled.machine, of.numbers)
+    parameter_map = ParameterMap(of.compiled.checked, of.compiled.machine, of.parameters)
     values = np.array(
         [[0.1, 1.0], [0.1, 0.0], [0.5, 1.0], [-0.1, 1.0], [0.1, np.inf], [0.1, 1e-300]]
     )
-    assert places.table(values)[1].tolist() == [True, False, False, False, False, False]
+    assert parameter_map.table(values)[1].tolist() == [True, False, False, False, False, False]
 
 
 def test_runs_that_are_asked_for_their_end_report_their_end():
@@ -272,7 +266,7 @@ def test_the_period_of_a_spring_follows_its_stiffness():
     k, mass = np.meshgrid(np.linspace(1.0, 9.0, 5), np.linspace(1.0, 4.0, 4))
     points = np.column_stack([k.ravel(), mass.ravel()])
     found = of.run(points).values["m.r.x"]
-    assert way(of) == "copied"
+    assert path_of(of) == "copied"
     np.testing.assert_allclose(found, np.cos(np.sqrt(points[:, 0] / points[:, 1])), atol=1e-7)
 
 

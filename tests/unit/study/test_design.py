@@ -87,9 +87,9 @@ def test_a_latin_hypercube_takes_each_of_a_list_as_often():
 def test_a_share_at_the_end_is_finite():
     """Sobol' sequences reach 0, where the normal distribution does not end."""
     (varied,) = design_of({"a": "0~1"}, 2).varied
-    assert np.isfinite(varied.at(np.array([0.0, 1.0]))).all()
+    assert np.isfinite(varied.quantiles(np.array([0.0, 1.0]))).all()
     (listed,) = design_of({"a": "1,2"}, 2).varied
-    assert listed.at(np.array([0.0, 1.0])).tolist() == [1.0, 2.0]
+    assert listed.quantiles(np.array([0.0, 1.0])).tolist() == [1.0, 2.0]
 
 
 # ---------------------------------------------------------------------------- mistakes
@@ -121,8 +121,8 @@ def test_a_share_at_the_end_is_finite():
         ({"a": True}, {}, "should be numbers in a list"),
         ({"a": {"b": 1}}, {}, "should be numbers in a list"),
         ({"a": 1j}, {}, "should be numbers in a list"),
-        ({"a": "10,10"}, {}, "10 stands in the list twice"),
-        ({"a": [0.0, -0.0]}, {}, "0 stands in the list twice"),
+        ({"a": "10,10"}, {}, "10 is in the list twice"),
+        ({"a": [0.0, -0.0]}, {}, "0 is in the list twice"),
         ({"a": "1:2:3:4"}, {}, "should be one of 1:5:9"),
         ({"a": "1:2:log:3"}, {}, "should be one of"),
         ({"a": "1:5"}, {}, "add how many, 1:5:9, or sample"),

@@ -10,10 +10,10 @@ from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
 from dap3d_core.study import (
     Output,
-    all_numbers,
+    all_parameters,
     names_under,
-    numbers_named,
     outputs_of,
+    parameters_named,
     with_values,
 )
 
@@ -59,10 +59,10 @@ def checked(scene):
 
 
 def test_numbers_are_found_with_what_stands_there(checked):
-    found = numbers_named(checked, [name for name in HERE if name != "bodies.rod.r.1"])
+    found = parameters_named(checked, [name for name in HERE if name != "bodies.rod.r.1"])
     assert {n.name: n.value for n in found} == {k: v for k, v in HERE.items()
                                                 if k != "bodies.rod.r.1"}  # fmt: skip
-    assert numbers_named(checked, ["bodies.rod.r.1"])[0].places == (0,)
+    assert parameters_named(checked, ["bodies.rod.r.1"])[0].index == (0,)
     units = {n.name: n.unit for n in found}
     assert units["bodies.rod.mass"] == "kg"
     assert units["forces.spring.k"] == "N/m"
@@ -71,10 +71,10 @@ def test_numbers_are_found_with_what_stands_there(checked):
 
 def test_every_number_is_found_by_its_name(checked):
     """Those that a list gives are those that are found one by one."""
-    numbers = list(all_numbers(checked))
+    numbers = list(all_parameters(checked))
     assert len({n.name for n in numbers}) == len(numbers) > 50
     for number in numbers:
-        assert numbers_named(checked, [number.name]) == (number,)
+        assert parameters_named(checked, [number.name]) == (number,)
     assert not any("shapes" in n.name for n in numbers)
 
 
@@ -87,10 +87,10 @@ def twin(name):
 
 def test_every_number_is_put_where_it_is_read(scene, checked):
     """Its own value changes, an inertia matrix stays symmetric, nothing else does."""
-    numbers = {n.name: n for n in all_numbers(checked)}
+    numbers = {n.name: n for n in all_parameters(checked)}
     for name, number in numbers.items():
         changed = with_values(scene, [number], [0.375])
-        found = {n.name: n.value for n in all_numbers(attrs.evolve(checked, scene=changed))}
+        found = {n.name: n.value for n in all_parameters(attrs.evolve(checked, scene=changed))}
         assert found.pop(name) == 0.375
         assert found.pop(twin(name), 0.375) == 0.375
         assert found == {n: v.value for n, v in numbers.items() if n in found}
@@ -100,7 +100,7 @@ def test_every_number_is_put_where_it_is_read(scene, checked):
 
 def test_two_components_of_what_the_scene_leaves_open(scene, checked):
     """The second is put beside the first, not beside the default."""
-    numbers = numbers_named(checked, ["forces.g.wgt.x", "forces.g.wgt.y"])
+    numbers = parameters_named(checked, ["forces.g.wgt.x", "forces.g.wgt.y"])
     changed = with_values(scene, numbers, [0.25, 0.5])
     assert changed.forces["g"].fields["wgt"] == (0.25, 0.5, -1.0)
 
@@ -135,14 +135,14 @@ def test_two_components_of_what_the_scene_leaves_open(scene, checked):
 )
 def test_what_is_no_number(checked, name, words):
     with pytest.raises(dap.SceneError) as refused:
-        numbers_named(checked, [name])
+        parameters_named(checked, [name])
     assert words in str(refused.value)
 
 
 def test_all_mistakes_at_once_and_no_number_twice(checked):
     names = ["bodies.rod.r.x", "bodies.rod.r.1", "none", "bodies.rod.r.x", "bodies.rod.Jp.1.2"]
     with pytest.raises(dap.SceneError) as refused:
-        numbers_named(checked, [*names, "bodies.rod.Jp.2.1"])
+        parameters_named(checked, [*names, "bodies.rod.Jp.2.1"])
     said = [m.what for m in refused.value.mistakes]
     assert said == [
         "this is bodies.rod.r.x under another name; a number is varied only once",
@@ -162,7 +162,7 @@ def test_names_do_not_take_longer_in_large_scenes():
     spent = []
     for _ in range(5):
         begun = time.process_time()
-        numbers_named(checked, ["bodies.b9999.mass", "bodies.b5.r.x", "simulation.rtol"])
+        parameters_named(checked, ["bodies.b9999.mass", "bodies.b5.r.x", "simulation.rtol"])
         spent.append(time.process_time() - begun)
     assert min(spent) < 0.01
 
@@ -178,7 +178,7 @@ def test_names_go_on_part_by_part(checked):
             todo += parts
         else:
             reached.append(name)
-    assert sorted(reached) == sorted(n.name for n in all_numbers(checked))
+    assert sorted(reached) == sorted(n.name for n in all_parameters(checked))
     assert names_under(checked, "bodies.rod.r") == ["bodies.rod.r.", "bodies.rod.r_dot."]
     assert names_under(checked, "bodies.none.") == names_under(checked, "none.") == []
 
@@ -207,14 +207,14 @@ def test_outputs_as_a_script_asks_for_them():
         (3, "an output is text"),
         ([3], "an output is text"),
         ("rod.r.z:maximum", "did you mean 'rod.r.z:max'"),
-        ("rod.r.z:", "behind the colon stands one of end, min, max, mean, series"),
+        ("rod.r.z:", "the reduction after the colon is one of end, min, max, mean, series"),
         (":max", "an output is text"),
         (["rod.r.z", "rod.r.z"], "named once only"),
         ([lambda result: 0.0], "needs a label"),
         ({"": "rod.r.z"}, "text of one line"),
         ({"a\nb": "rod.r.z"}, "text of one line"),
         ({3: "rod.r.z"}, "text of one line"),
-        ({"status": "rod.r.z"}, "a part of every study"),
+        ({"status": "rod.r.z"}, "reserved in every study"),
     ],
 )
 def test_what_is_no_output(asked, words):

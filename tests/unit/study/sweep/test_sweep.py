@@ -510,7 +510,7 @@ def test_whole_numbers_stay_whole(monkeypatch):
 
     def with_whole(study, announce=None):
         ensemble = plain(study, announce)
-        ensemble.numbers = tuple(attrs.evolve(n, whole=True) for n in ensemble.numbers)
+        ensemble.parameters = tuple(attrs.evolve(p, whole=True) for p in ensemble.parameters)
         return ensemble
 
     monkeypatch.setattr(sweep, "Ensemble", with_whole)

@@ -198,7 +198,7 @@ def test_bounds_are_kept_and_told():
     assert fit.values["forces.spring.k"] == 39.0
     assert np.isnan(fit.interval["forces.spring.k"]).all()
     assert "at its bound" in str(fit)
-    assert any("forces.spring.k stands at its upper bound, 39" in note for note in fit.notes)
+    assert any("forces.spring.k is at its upper bound, 39" in note for note in fit.notes)
     assert np.isfinite(fit.interval["forces.spring.c"]).all()
     # nor does a run leave the bounds for the derivatives: here the truth is a bound itself
     undamped = dap.fit(oscillator(), asked | {"forces.spring.k": 39.0},

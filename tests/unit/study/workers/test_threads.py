@@ -15,7 +15,7 @@ import dap3d_core as dap
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.study import Batch, Ensemble, PointStatus
 from dap3d_core.study.workers import threads as local
-from dap3d_core.study.workers.threads import PATIENCE, Portions, run_here
+from dap3d_core.study.workers.threads import PATIENCE, ChunkSize, run_here
 
 POINTS_COUNT = 24 if jit_is_on() else 4
 
@@ -66,7 +66,7 @@ class Slow:
         if (points[:, 0] >= self.fails_at).any():
             raise ValueError("a function of the user")
         status = np.full(len(points), PointStatus.DONE, dtype=np.int8)
-        return Batch(status, ("",) * len(points), {"mass": points[:, 0]})
+        return Batch(status, [""] * len(points), {"mass": points[:, 0]})
 
 
 @pytest.mark.parametrize(("threads", "count"), [(1, 30), (8, 1)])
@@ -92,12 +92,12 @@ def test_portions_follow_the_clock():
 
 def test_portions_shrink_where_points_take_longer():
     """A portion of 1000 quick points is followed by one long one."""
-    portions = Portions(0.2, 1)
+    portions = ChunkSize(0.2, 1)
     for size in (1, 16, 256):
         assert portions.next(10**6) <= size
-        portions.note(size, size * 1e-4)
+        portions.update(size, size * 1e-4)
     assert portions.next(10**6) == pytest.approx(2000, rel=0.01)
-    portions.note(2000, 2000.0)
+    portions.update(2000, 2000.0)
     assert portions.next(10**6) == 1
     assert portions.next(0) >= 0
 

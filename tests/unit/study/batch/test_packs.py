@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from support.plain import long_in_plain_python
+from unit.study.batch.test_batch import ensemble, pendulum
 from unit.test_checkpoint import driven, stone, wheel
-from unit.test_study_ensemble import ensemble, pendulum
 
 import dap3d_core as dap
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.study import Ensemble, PointStatus
-from dap3d_core.study.batch.packed_model import Lanes, packed
+from dap3d_core.study.batch.packs import LaneLayout, packed
 
 
 def in_packs(of, count):
@@ -49,7 +49,7 @@ def test_packs_give_what_single_runs_give(case):
     points = low + fractions * (high - low)
     single, together = of.run(points), in_packs(of, 3)
     batch = together.run(points)
-    assert together._runner()._packs is not None
+    assert together._runner().packed is not None
     assert batch.status.tolist() == [PointStatus.DONE] * 7
     assert batch.notes == single.notes
     differ = False
@@ -84,7 +84,7 @@ def test_a_pack_that_fails_is_run_point_by_point():
 def test_what_copies_would_share_is_not_run_in_packs(make, name, output):
     of = in_packs(ensemble(make(), [name], [output], t_end=0.01, dt=0.01), 2)
     of.run([[0.2]])
-    assert of._runner()._packs is None
+    assert of._runner().packed is None
 
 
 def test_copies_have_the_rates_of_the_single_model():
@@ -92,7 +92,7 @@ def test_copies_have_the_rates_of_the_single_model():
     compiled = dap.compile(pendulum())
     one, count = compiled.another_machine(), 3
     many = Machine(packed(compiled.model, count), compiled.method)
-    lanes = Lanes(one, many, count)
+    lanes = LaneLayout(one, many, count)
     rng = np.random.default_rng(2)
     states = np.array([one.integrated(compiled.model.u0) for _ in range(count)])
     states[:, 7:13] += 0.1 * rng.random((count, 6))

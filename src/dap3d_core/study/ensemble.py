@@ -1,0 +1,136 @@
+"""Runs the points of a study."""
+
+import threading
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dap3d_core.integrators import EXPLICIT, INTEGRATORS
+from dap3d_core.result import INFORMATION, Result
+from dap3d_core.scene import Scene, SceneError
+from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
+from dap3d_core.study.outputs import Reduction
+from dap3d_core.study.parameters import SceneParameter, parameters_named, with_values
+from dap3d_core.study.study import Batch, PointStatus, Study
+
+if TYPE_CHECKING:
+    from dap3d_core.study.batch.batch import BatchRunner
+
+#: Largest number of values in the rows of one compiled call: 64 MB.
+MAX_ROW_VALUES = 8_000_000
+
+
+class Ensemble:
+    """The compiled model of a study, which runs its points; threads may share it.
+
+    Points run in compiled batches (study/batch), which release the lock of the interpreter. A point
+    that cannot be run so, or does not reach its end there, is run by ``simulate``, which reports
+    why. Both give the same values, bit for bit, whichever points are run together.
+
+    Attributes:
+        asked, study: the study as requested, and as executed: where only values at the end are
+            needed, runs report their end alone.
+        compiled: the model of the scene as given.
+        parameters: those that vary.
+        outputs: those of the study, each vector in its components.
+        labels, units: of each output, by name.
+        times: (nt,) reporting times.
+    """
+
+    def __init__(self, study: Study, announce: Callable[[str], None] | None = None) -> None:
+        """Compile what the points share.
+
+        Raises:
+            SceneError: an unknown name, an unknown output, or mistakes of the scene.
+        """
+        self.asked, self.study = study, _with_end_alone(study)
+        scene = self.study.scene
+        self.compiled = CompiledModel(scene, allow_code=study.allow_code, announce=announce)
+        self.parameters: tuple[SceneParameter, ...] = parameters_named(
+            self.compiled.checked, study.names
+        )
+        settings = scene.simulation
+        self.times = report_times(settings.t_end, settings.dt)
+        self.reduction = Reduction(self.compiled, self.parameters, study.outputs)
+        self.outputs = self.reduction.outputs
+        self.labels, self.units = self.reduction.labels, self.reduction.units
+        self._of_thread = threading.local()
+        self._takes_batches = INTEGRATORS.get(settings.integrator, EXPLICIT).one_step and not any(
+            parameter.table == "simulation" for parameter in self.parameters
+        )
+
+    def prepare(self) -> None:
+        """Compile the code of batches in advance: threads would wait for one another."""
+        self._runner()
+
+    def run(self, points: ArrayLike) -> Batch:
+        """Run points (k, parameters): the values of the parameters at each."""
+        values = np.asarray(points, dtype=float).reshape(-1, len(self.parameters))
+        batch = Batch.empty(self.outputs, len(values), len(self.times))
+        runner = self._runner()
+        if runner is not None:
+            most = max(1, MAX_ROW_VALUES // (self._row_width() * len(self.times)))
+            for first in range(0, len(values), most):
+                runner.run(values[first : first + most], batch, first)
+        for k in np.flatnonzero(batch.status == PointStatus.OPEN):
+            self._run_one(int(k), values[k], batch)
+        return batch
+
+    def result(self, point: Sequence[float]) -> Result:
+        """The whole result of one point, as ``simulate`` gives it; errors as of that."""
+        return self._result(self.asked.scene, point)
+
+    def _result(self, scene: Scene, point: Sequence[float]) -> Result:
+        changed = with_values(scene, self.parameters, point)
+        return simulate(CompiledModel(changed, registry=self.compiled.checked.registry))
+
+    def _runner(self) -> "BatchRunner | None":
+        """The batch runner of this thread; None where points have to be run individually."""
+        if not hasattr(self._of_thread, "runner"):
+            self._of_thread.runner = None
+            if self._takes_batches:
+                from dap3d_core.study.batch.batch import batch_runner
+
+                self._of_thread.runner = batch_runner(
+                    self.compiled, self.parameters, self.reduction, self.times, self.study.pack
+                )
+        runner: BatchRunner | None = self._of_thread.runner
+        return runner
+
+    def _row_width(self) -> int:
+        return 2 + 20 * self.compiled.model.body_count + self.compiled.model.row_count + 4
+
+    def _run_one(self, k: int, point: NDArray[np.float64], batch: Batch) -> None:
+        """Run one point by ``simulate`` and store its status, note and outputs."""
+        result: Result | None
+        try:
+            result = self._result(self.study.scene, point.tolist())
+            status, note = PointStatus.DONE, self._note(result)
+        except (SceneError, SimulationError) as error:
+            result = getattr(error, "result", None)
+            status = PointStatus.FAILED if result is None else PointStatus.STOPPED
+            note = " ".join(str(error).split())
+        batch.status[k], batch.notes[k] = status, note
+        if result is not None:
+            batch.store(k, result, self.outputs)
+
+    def _note(self, result: Result) -> str:
+        """The warnings of a run that the scene as given does not have."""
+        known = {*self.compiled.notes, f"method {self.compiled.method}: {self.compiled.reason}"}
+        own = [n for n in result.notes if not n.startswith((INFORMATION, "method "))]
+        return "; ".join(note for note in own if note not in known)
+
+
+def _with_end_alone(study: Study) -> Study:
+    """The study, with runs that report only their end where all outputs are values at the end."""
+    settings = study.scene.simulation
+    if any(output.reduction != "end" for output in study.outputs) or "simulation.dt" in study.names:
+        return study
+    if not INTEGRATORS.get(settings.integrator, EXPLICIT).adaptive or not settings.t_end:
+        return study
+    scene = study.scene.copy()
+    scene.simulation.dt = None if "simulation.t_end" in study.names else settings.t_end
+    return attrs.evolve(study, scene=scene)
