@@ -140,7 +140,7 @@ def test_functions_of_the_script_are_sent(client, tmp_path, monkeypatch):
     elsewhere = bob({"lowest": importlib.import_module("mine").lowest})
     with pytest.raises(ClusterError, match="2 of 2 workers") as error:
         run_on(client, elsewhere, POINTS, PLACES)
-    assert "functions among the outputs must stand in the script" in str(error.value)
+    assert "functions among the outputs must be defined in the script" in str(error.value)
 
 
 def test_a_function_that_raises_fails_its_points(client):
@@ -225,7 +225,7 @@ def test_points_that_kill_their_workers_are_named():
     def deadly(result):
         os.kill(os.getpid(), signal.SIGKILL)
 
-    words = "a task of 1 points, from place 4 on, has ended each worker that ran it"
+    words = "a task of 1 points, from index 4 on, has ended each worker that ran it"
     with two_workers() as client, pytest.raises(ClusterError, match=words):
         collected(run_on(client, bob({"none": deadly}), POINTS, np.array([4])))
 
@@ -373,7 +373,7 @@ def test_types_of_the_model_itself_need_its_folder(client, tmp_path, monkeypatch
     (folder / "plugin.py").rename(folder / "gone.py")
     (unseen,) = differences(here, environment_of(with_absolute_path(study)))
     assert unseen == (
-        f"the force type 'push' stands in {folder / 'plugin.py'}, which it does not see; "
+        f"the force type 'push' is in {folder / 'plugin.py'}, which it does not see; "
         f"let it see the folder {folder} under this very path"
     )
 
@@ -393,7 +393,7 @@ def test_a_port_that_accepts_and_says_nothing_is_not_waited_for():
     """A firewall, or another service: a client of dask would wait for ever."""
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
-        words = rf"answers at {address} \(nothing was said within 1 s\)"
+        words = rf"answers at {address} \(no answer within 1 s\)"
         with pytest.raises(ClusterError, match=words):
             connect(address, timeout=1.0)
 
@@ -408,7 +408,7 @@ def test_an_address_without_a_port_leaves_no_half_made_client():
 
 def test_workers_and_schedulers_that_are_gone(tmp_path, monkeypatch):
     """No workers at the start, none any more, and a scheduler that dies: each is one sentence."""
-    for name, seconds in (("ARRIVAL", 0.5), ("ABSENCE", 0.5), ("LOOK", 0.1)):
+    for name, seconds in (("ARRIVAL", 0.5), ("ABSENCE", 0.5), ("POLL_SECONDS", 0.1)):
         monkeypatch.setattr(dask_cluster, name, seconds)
     file = tmp_path / "scheduler.json"
     command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--no-dashboard"]
@@ -431,7 +431,7 @@ def test_workers_and_schedulers_that_are_gone(tmp_path, monkeypatch):
                 client.wait_for_workers(1, timeout=60)
                 found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
                 next(found)
-                monkeypatch.setattr(dask_cluster, "LOOK", 0.0)  # it is asked when it dies
+                monkeypatch.setattr(dask_cluster, "POLL_SECONDS", 0.0)  # it is asked when it dies
                 process.kill()
                 with pytest.raises(ClusterError, match=f"the scheduler at {address} is gone"):
                     collected(found)

@@ -94,9 +94,7 @@ class Ensemble:
             if self._takes_batches:
                 from dap3d_core.study.batch.batch import batch_runner
 
-                self._of_thread.runner = batch_runner(
-                    self.compiled, self.parameters, self.reduction, self.times, self.study.pack
-                )
+                self._of_thread.runner = batch_runner(self.reduction, self.times, self.study.pack)
         runner: BatchRunner | None = self._of_thread.runner
         return runner
 

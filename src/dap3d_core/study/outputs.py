@@ -154,6 +154,7 @@ class Reduction:
     Attributes:
         outputs: those requested, each vector in its components.
         labels, units: of each output, by name.
+        compiled, parameters: the model of the scene as given, and what varies.
         of_rows: whether each output can be computed from the rows of many runs at once, by name.
     """
 
@@ -168,7 +169,7 @@ class Reduction:
         Raises:
             SceneError: an unknown quantity; or a series of a length that varies.
         """
-        self._compiled = compiled
+        self.compiled, self.parameters = compiled, parameters
         self._tables = {parameter.table for parameter in parameters}
         self.labels: dict[str, str] = {}
         self.units: dict[str, str] = {}
@@ -192,7 +193,7 @@ class Reduction:
             if output.name in self._columns:
                 values = rows[:, :, self._columns[output.name]]
             else:
-                result = result or self.result(self._compiled.model, rows.reshape(k * nt, width))
+                result = result or self.result(self.compiled.model, rows.reshape(k * nt, width))
                 values = result.quantity(str(output.of)).values.reshape(k, nt)
             values_of[output.name] = REDUCTIONS[output.reduction](values, times)
         return values_of
@@ -202,7 +203,7 @@ class Reduction:
         """True if no output needs what all copies of a pack share, which is NaN in their rows."""
         if not all(self.of_rows.values()):
             return False
-        layout = self._compiled.model.row_layout
+        layout = self.compiled.model.row_layout
         rows = np.random.default_rng(0).random((1, 3, layout.size))
         for name in ("work", "potential_energy", "residuals"):
             rows[..., layout[name]] = np.nan
@@ -211,11 +212,11 @@ class Reduction:
 
     def result(self, model: Model, rows: Floats, machine: Machine | None = None) -> Result:
         """A result in memory, of rows of a model that a machine evaluates."""
-        record = Record(scene_text=self._compiled.scene_text)
-        return Result.of_run(model, rows, record, lambda: machine or self._compiled.machine)
+        record = Record(scene_text=self.compiled.scene_text)
+        return Result.of_run(model, rows, record, lambda: machine or self.compiled.machine)
 
     def _look_up(self, outputs: Sequence[Output]) -> tuple[Output, ...]:
-        machine = self._compiled.machine
+        machine = self.compiled.machine
         y = machine.integrated(machine.model.u0)
         row = np.concatenate([[0.0], y, np.zeros(machine.report_size)])
         probe = self.result(machine.model, row[None])
@@ -242,7 +243,7 @@ class Reduction:
 
     def _find_columns(self) -> dict[str, int]:
         """Output -> column of the rows: one that a quantity of random rows is equal to."""
-        machine = self._compiled.machine
+        machine = self.compiled.machine
         width = 1 + len(machine.integrated(machine.model.u0)) + machine.report_size
         rows = np.random.default_rng(0).random((3, width))
         result = self.result(machine.model, rows)

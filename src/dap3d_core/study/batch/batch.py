@@ -1,14 +1,13 @@
 """Runs points in compiled batches; points that cannot be batched are left open."""
 
 import contextlib
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import SceneError
-from dap3d_core.simulation import AssemblyError, CompiledModel
+from dap3d_core.simulation import AssemblyError
 from dap3d_core.simulation.failure.negative_reactions import Pulling
 from dap3d_core.simulation.initial.assemble import ROUNDING, Initial, correction_notes, distance
 from dap3d_core.simulation.initial_state import Start
@@ -18,36 +17,28 @@ from dap3d_core.study.batch.packs import PackedBatch
 from dap3d_core.study.batch.parameter_map import NotCopiedError, ParameterMap
 from dap3d_core.study.batch.rebuild import ModelRebuilder
 from dap3d_core.study.outputs import Reduction
-from dap3d_core.study.parameters import SceneParameter
 from dap3d_core.study.study import Batch, PointStatus
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-def batch_runner(
-    compiled: CompiledModel,
-    parameters: Sequence[SceneParameter],
-    reduction: Reduction,
-    times: Floats,
-    pack: int,
-) -> "BatchRunner | None":
+def batch_runner(reduction: Reduction, times: Floats, pack: int) -> "BatchRunner | None":
     """A batch runner for this thread; None where the scene as given cannot start.
 
     Each point is then run individually, which reports what is wrong there.
     """
+    compiled = reduction.compiled
     settings = compiled.scene.simulation
-    options = bool(settings.correct), settings.hold, str(settings.correct_metric)
     try:
-        start = compiled.start(*options)
+        start = compiled.start(bool(settings.correct), settings.hold, str(settings.correct_metric))
     except (AssemblyError, SceneError):
         return None
     redundancy = start.redundancy
-    if not redundancy.is_plain:
+    takes_rows = not redundancy.rank.redundant or compiled.machine.formulation.accepts_redundant
+    if not redundancy.is_plain or not takes_rows:
         return None
-    if redundancy.rank.redundant and not compiled.machine.formulation.accepts_redundant:
-        return None
-    return BatchRunner(compiled, start, parameters, reduction, times, pack)
+    return BatchRunner(start, reduction, times, pack)
 
 
 class BatchRunner:
@@ -59,21 +50,11 @@ class BatchRunner:
         packed: runs points in packs; None where they run one by one.
     """
 
-    def __init__(
-        self,
-        compiled: CompiledModel,
-        start: Start,
-        parameters: Sequence[SceneParameter],
-        reduction: Reduction,
-        times: Floats,
-        pack: int,
-    ) -> None:
-        """Args:
-        compiled, start: the scene as given, and its corrected initial state.
-        parameters, reduction, times, pack: of the ensemble.
-        """
-        self._compiled, self._start = compiled, start
-        self._reduction, self._times = reduction, times
+    def __init__(self, start: Start, reduction: Reduction, times: Floats, pack: int) -> None:
+        """Args: the start of the scene as given; reduction, times and pack of the ensemble."""
+        self._start, self._reduction, self._times = start, reduction, times
+        compiled = self._compiled = reduction.compiled
+        parameters = reduction.parameters
         machine = compiled.another_machine()
         end = float(times[-1])
         stops = compiled.pace(end).stops

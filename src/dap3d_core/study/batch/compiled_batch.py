@@ -57,11 +57,7 @@ class CompiledBatch:
     """
 
     def __init__(
-        self,
-        machine: Machine,
-        settings: Simulation,
-        times: Floats,
-        stops: list[tuple[float, bool]],
+        self, machine: Machine, settings: Simulation, times: Floats, stops: list[tuple[float, bool]]
     ) -> None:
         """Args:
         machine: evaluates the model; its numbers change.

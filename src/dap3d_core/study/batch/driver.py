@@ -130,12 +130,7 @@ def reset_work(points: Points, p: int, work: Work) -> None:
 
 @compiled_inside
 def start(
-    points: Points,
-    p: int,
-    work: Work,
-    starting: Sequence[Function],
-    system: System,
-    loops: Any,
+    points: Points, p: int, work: Work, starting: Sequence[Function], system: System, loops: Any
 ) -> bool:
     """Start the run of point p; returns False if it has to be run individually."""
     diagnostics, metric = points.diagnostics[p], system.metric
@@ -169,12 +164,7 @@ def restart(work: Work) -> None:
 
 @compiled_inside
 def next_stop(
-    stops: Floats,
-    work: Work,
-    functions: Any,
-    drive: Function,
-    system: System,
-    loops: Any,
+    stops: Floats, work: Work, functions: Any, drive: Function, system: System, loops: Any
 ) -> float:
     """The next time that no step crosses, as ``Integration._next_stop``."""
     real, adaptive = work.real, work.real[STEP] == 0.0

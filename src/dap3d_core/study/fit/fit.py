@@ -9,15 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.registry import load_registry
-from dap3d_core.scene import (
-    MISSING,
-    Mistake,
-    Scene,
-    SceneError,
-    check,
-    check_simulation,
-    load,
-)
+from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, check, check_simulation, load
 from dap3d_core.simulation import SimulationError
 from dap3d_core.study.ensemble import Ensemble
 from dap3d_core.study.fit.fit_parameters import Parameter, read_parameters

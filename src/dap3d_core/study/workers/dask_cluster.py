@@ -180,12 +180,7 @@ def _faults(here: Environment, answer: Any) -> list[str]:
 
 
 def _run(
-    client: Any,
-    payload: bytes,
-    points: Floats,
-    index: Integers,
-    chunk: int | None,
-    retries: int,
+    client: Any, payload: bytes, points: Floats, index: Integers, chunk: int | None, retries: int
 ) -> Iterator[RunPoints]:
     name = f"dap3d-{uuid.uuid4().hex[:12]}"
     digest = hashlib.sha256(payload).hexdigest()
