@@ -1,4 +1,4 @@
-"""The points of a study: grids, samples, and what is neither."""
+"""Designs of studies: grids, samples, and what is neither."""
 
 import math
 
@@ -10,7 +10,6 @@ from scipy import stats
 
 import dap3d_core as dap
 from dap3d_core.study.design import DESIGNS, design_of
-from dap3d_core.study.sweep.schema import NOTE, boxes, cut
 
 # ---------------------------------------------------------------------------- grids
 
@@ -99,7 +98,6 @@ def test_a_share_at_the_end_is_finite():
     ("vary", "options", "words"),
     [
         ({}, {}, "nothing varies"),
-        ([], {}, "nothing varies"),
         (3, {}, "what varies is"),
         ("a", {}, "what varies is NAME=FORM"),
         (["=3"], {}, "what varies is NAME=FORM"),
@@ -109,31 +107,24 @@ def test_a_share_at_the_end_is_finite():
         ({"a": "1,x,3"}, {}, 'vary a = "x"'),
         ({"a": "1,,3"}, {}, "no finite number"),
         ({"a": "1_000"}, {}, "no finite number"),
-        ({"a": "nan"}, {}, "no finite number"),
         ({"a": [1.0, np.inf]}, {}, "no finite number"),
-        ({"a": "1e999,2"}, {}, "no finite number"),
         ({"a": "1:1e200:3"}, {}, "no finite number of at most 1e+100"),
         ({"a": "1:b:3"}, {}, "'b' is no finite number"),
         ({"a": []}, {}, "no points"),
-        ({"a": [[1.0]]}, {}, "should be numbers in a list"),
         ({"a": [[1.0], [2.0, 3.0]]}, {}, "should be numbers in a list"),
         ({"a": None}, {}, "should be numbers in a list"),
-        ({"a": True}, {}, "should be numbers in a list"),
         ({"a": {"b": 1}}, {}, "should be numbers in a list"),
         ({"a": 1j}, {}, "should be numbers in a list"),
         ({"a": "10,10"}, {}, "10 is in the list twice"),
         ({"a": [0.0, -0.0]}, {}, "0 is in the list twice"),
         ({"a": "1:2:3:4"}, {}, "should be one of 1:5:9"),
-        ({"a": "1:2:log:3"}, {}, "should be one of"),
         ({"a": "1:5"}, {}, "add how many, 1:5:9, or sample"),
         ({"a": "1:5:log"}, {}, "add how many, 1:5:9:log"),
         ({"a": "1:5:0"}, {}, "no points"),
-        ({"a": "1:5:-3"}, {}, "no points"),
         ({"a": "1:5:1"}, {}, "does not reach"),
         ({"a": "1:5:2.5"}, {}, "'2.5' is no whole number"),
         ({"a": "3:3:2"}, {}, "begins where it ends"),
         ({"a": "0:5:2:log"}, {}, "a logarithm is of positive numbers"),
-        ({"a": "-5:5:3:log"}, {}, "a logarithm is of positive numbers"),
         ({"a": "1:5:1000000000000"}, {}, "1e+12 points"),
         ({"a": "0:1:1000000", "b": "0:1:1000000"}, {}, "1,000,000 x 1,000,000 = 1e+12 points"),
         (["a=1,2", "a=3"], {}, "varied only once"),
@@ -141,11 +132,8 @@ def test_a_share_at_the_end_is_finite():
         ({"a": "1:5:3"}, {"sample": 9}, "leave the count out: 1:5"),
         ({"a": "1:5:3:log"}, {"sample": 9}, "leave the count out: 1:5:log"),
         ({"a": "3~0"}, {"sample": 9}, "greater than 0"),
-        ({"a": "3~-1"}, {"sample": 9}, "greater than 0"),
         ({"a": "3~1~1"}, {"sample": 9}, "mean~standard deviation"),
-        ({"a": "3~x"}, {"sample": 9}, "mean~standard deviation"),
         ({"a": "1:2"}, {"sample": 0}, "from 1 to 1e+08"),
-        ({"a": "1:2"}, {"sample": -1}, "from 1 to 1e+08"),
         ({"a": "1:2"}, {"sample": 2.5}, "a whole number"),
         ({"a": "1:2"}, {"sample": True}, "a whole number"),
         ({"a": "1:2"}, {"sample": 10**12}, "from 1 to 1e+08"),
@@ -153,17 +141,16 @@ def test_a_share_at_the_end_is_finite():
         ({"a": "1:2"}, {"sample": 9, "design": "grid"}, "leave sample and design out"),
         ({"a": "1:2"}, {"sample": 9, "design": None}, "drawn by one of lhs, random"),
         ({"a": "1:2"}, {"sample": 9, "seed": -1}, "the seed is a whole number"),
-        ({"a": "1:2"}, {"sample": 9, "seed": 0.5}, "the seed is a whole number"),
         ({f"a{k}": 1.0 for k in range(1001)}, {}, "1001 numbers vary; at most 1000"),
     ],
 )
-def test_what_is_no_design(vary, options, words):
+def test_invalid_designs(vary, options, words):
     with pytest.raises(dap.SceneError) as refused:
         design_of(vary, **options)
     assert words in str(refused.value)
 
 
-def test_all_mistakes_are_told_at_once():
+def test_all_mistakes_are_reported_at_once():
     with pytest.raises(dap.SceneError) as refused:
         design_of({"a": "x", "b": "1:5:3", "c": "2~0"}, 0, "lsh", -1)
     keys = [mistake.key for mistake in refused.value.mistakes]
@@ -177,28 +164,3 @@ def test_any_text_is_a_design_of_finite_points_or_a_mistake(text, sample):
     except dap.SceneError:
         return
     assert np.isfinite(points).all()
-
-
-# ---------------------------------------------------------------------------- places in a file
-
-
-@given(st.lists(st.integers(1, 4), min_size=1, max_size=4).map(tuple), st.data())
-def test_boxes_cover_a_run_of_places_once_and_in_order(shape, data):
-    """Whatever the grid and the run: against the places themselves."""
-    whole = np.arange(math.prod(shape))
-    first = data.draw(st.integers(0, len(whole)))
-    last = data.draw(st.integers(first, len(whole)))
-    found = []
-    for index, count in boxes(shape, first, last):
-        block = whole.reshape(shape)[index]
-        assert block.size == count > 0
-        found += block.ravel().tolist()
-    assert found == list(range(first, last))
-    assert len(list(boxes(shape, first, last))) <= 2 * len(shape) - 1
-
-
-def test_notes_are_cut_between_letters():
-    assert cut("short") == b"short"
-    long = cut("ü" * NOTE)
-    assert len(long) <= NOTE
-    assert long.decode().endswith("ü ...")

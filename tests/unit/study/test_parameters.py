@@ -1,6 +1,4 @@
-"""Numbers of a scene by their names, and what is kept of a run."""
-
-import time
+"""Parameters of a scene by their names."""
 
 import attrs
 import pytest
@@ -9,10 +7,8 @@ import dap3d_core as dap
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
 from dap3d_core.study import (
-    Output,
     all_parameters,
     names_under,
-    outputs_of,
     parameters_named,
     with_values,
 )
@@ -133,7 +129,7 @@ def test_two_components_of_what_the_scene_leaves_open(scene, checked):
         (("bodies", "rod"), "the name of a number is text"),
     ],
 )
-def test_what_is_no_number(checked, name, words):
+def test_invalid_names(checked, name, words):
     with pytest.raises(dap.SceneError) as refused:
         parameters_named(checked, [name])
     assert words in str(refused.value)
@@ -152,21 +148,6 @@ def test_all_mistakes_at_once_and_no_number_twice(checked):
     ]
 
 
-def test_names_do_not_take_longer_in_large_scenes():
-    """Of 1e4 bodies three names take less than a hundredth of listing all numbers, or of 1 s, at
-    the best of five times: now and then a collection of garbage comes between."""
-    scene = dap.Scene(name="many")
-    for k in range(10_000):
-        scene.add_body(f"b{k}", mass=1.0, Jp=(1.0, 1.0, 1.0))
-    checked = check(scene, load_registry())
-    spent = []
-    for _ in range(5):
-        begun = time.process_time()
-        parameters_named(checked, ["bodies.b9999.mass", "bodies.b5.r.x", "simulation.rtol"])
-        spent.append(time.process_time() - begun)
-    assert min(spent) < 0.01
-
-
 def test_names_go_on_part_by_part(checked):
     """What the tab key offers: all of it exists, and all numbers are reached."""
     todo, reached = names_under(checked), []
@@ -181,65 +162,3 @@ def test_names_go_on_part_by_part(checked):
     assert sorted(reached) == sorted(n.name for n in all_parameters(checked))
     assert names_under(checked, "bodies.rod.r") == ["bodies.rod.r.", "bodies.rod.r_dot."]
     assert names_under(checked, "bodies.none.") == names_under(checked, "none.") == []
-
-
-# ---------------------------------------------------------------------------- outputs
-
-
-def last_height(result):
-    return result.r[-1, 0, 2]
-
-
-def test_outputs_as_a_script_asks_for_them():
-    assert outputs_of("rod.r.z") == (Output("rod.r.z", "rod.r.z", "end"),)
-    assert outputs_of("rod.r.z:max") == (Output("rod.r.z:max", "rod.r.z", "max"),)
-    assert outputs_of(last_height) == (Output("last_height", last_height, ""),)
-    found = outputs_of({"peak": "rod.r.z:max", "own": last_height})
-    assert found == (Output("peak", "rod.r.z", "max"), Output("own", last_height, ""))
-    assert outputs_of(["a:b.r.z"]) == (Output("a:b.r.z", "a:b.r.z", "end"),)
-
-
-@pytest.mark.parametrize(
-    ("asked", "words"),
-    [
-        ([], "at least one"),
-        ({}, "at least one"),
-        (3, "an output is text"),
-        ([3], "an output is text"),
-        ("rod.r.z:maximum", "did you mean 'rod.r.z:max'"),
-        ("rod.r.z:", "the reduction after the colon is one of end, min, max, mean, series"),
-        (":max", "an output is text"),
-        (["rod.r.z", "rod.r.z"], "named once only"),
-        ([lambda result: 0.0], "needs a label"),
-        ({"": "rod.r.z"}, "text of one line"),
-        ({"a\nb": "rod.r.z"}, "text of one line"),
-        ({3: "rod.r.z"}, "text of one line"),
-        ({"status": "rod.r.z"}, "reserved in every study"),
-    ],
-)
-def test_what_is_no_output(asked, words):
-    with pytest.raises(dap.SceneError) as refused:
-        outputs_of(asked)
-    assert words in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("function", "words"),
-    [
-        (lambda result: 1 / 0, "'own' raises ZeroDivisionError: division by zero"),
-        (lambda result: "much", "'own' should return one number, not \"much\""),
-        (lambda result: None, "should return one number, not None"),
-        (lambda result: result.r, "should return one number"),
-    ],
-)
-def test_a_function_that_returns_no_number_is_named(function, words):
-    result = dap.simulate(falling(), t_end=0.1)
-    (output,) = outputs_of({"own": function})
-    with pytest.raises(dap.SimulationError, match=words):
-        output.value(result)
-
-
-def falling():
-    scene = dap.Scene(name="fall")
-    scene.add_body("stone", mass=1.0, Jp=(1.0, 1.0, 1.0))
-    return scene

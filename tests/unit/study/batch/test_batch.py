@@ -7,7 +7,6 @@ from support.plain import long_in_plain_python
 from unit.test_checkpoint import driven, stone, wheel
 
 import dap3d_core as dap
-from dap3d_core.scene import SceneError
 from dap3d_core.study import Ensemble, PointStatus, Study, outputs_of, with_values
 from dap3d_core.study.batch.parameter_map import ParameterMap, poses_of
 from dap3d_core.study.batch.prepare_dependence import dependence_of
@@ -249,25 +248,6 @@ def test_runs_that_are_asked_for_their_end_report_their_end():
     of = ensemble(pendulum(), ["bodies.bob.mass"], ["bob.r.y"])
     assert of.times.tolist() == [0.0, 0.5]
     assert len(ensemble(pendulum(), ["bodies.bob.mass"], ["bob.r.y:max"]).times) == 6
-
-
-def test_a_series_of_varying_length_is_refused():
-    with pytest.raises(SceneError, match="a series has the same length at each point"):
-        ensemble(pendulum(), ["simulation.t_end"], ["bob.r.y:series"])
-
-
-@long_in_plain_python
-def test_the_period_of_a_spring_follows_its_stiffness():
-    """x = cos(sqrt(k / m) t) of a mass on a spring of no length, to ten times rtol."""
-    scene = dap.Scene()
-    scene.add_body("m", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(1.0, 0.0, 0.0))
-    scene.add_force("ptp", "s", P_i="m.O", P_j="ground.O", k=1.0, l0=0.0)
-    of = ensemble(scene, ["forces.s.k", "bodies.m.mass"], ["m.r.x"], t_end=1.0, dt=1.0)
-    k, mass = np.meshgrid(np.linspace(1.0, 9.0, 5), np.linspace(1.0, 4.0, 4))
-    points = np.column_stack([k.ravel(), mass.ravel()])
-    found = of.run(points).values["m.r.x"]
-    assert path_of(of) == "copied"
-    np.testing.assert_allclose(found, np.cos(np.sqrt(points[:, 0] / points[:, 1])), atol=1e-7)
 
 
 def test_a_function_of_the_user_that_raises_fails_its_point():

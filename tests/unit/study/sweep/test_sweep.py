@@ -137,40 +137,6 @@ def test_samples_lie_along_points():
     assert (found.attrs["design"], found.attrs["seed"]) == ("lhs", 3)
 
 
-def test_vectors_inertia_matrices_and_settings_vary(one_by_one):
-    """A component of what the scene leaves open, an entry that stands twice, a tolerance."""
-    scene = dap.Scene(name="top")
-    inertia = ((0.5, 0.0, 0.0), (0.0, 0.6, 0.0), (0.0, 0.0, 0.7))
-    scene.add_body("top", mass=1.0, Jp=inertia, w=(1.0, 2.0, 3.0))
-    scene.add_force("weight", "g")
-    vary = {"bodies.top.Jp.1.2": [0.05], "forces.g.wgt.x": [0.5], "simulation.rtol": [1e-6]}
-    found = dap.sweep(scene, vary, outputs=["top.w", "top.r.x"], t_end=0.2)
-    scene.bodies["top"].Jp = ((0.5, 0.05, 0.0), (0.05, 0.6, 0.0), (0.0, 0.0, 0.7))
-    scene.forces["g"].fields["wgt"] = (0.5, 0.0, -1.0)
-    result = dap.simulate(scene, t_end=0.2, rtol=1e-6)
-    w = [found[f"top.w.{axis}"].item() for axis in "xyz"]
-    assert w == result.w[-1, 0].tolist()
-    assert found["top.r.x"].item() == result.r[-1, 0, 0]
-
-
-def test_points_that_go_wrong_do_not_end_the_others():
-    """A mass that is refused, one with which the block runs away; both are named."""
-    masses = [1.0, -1.0, 1e-99, 2.0]
-    found = dap.sweep(
-        spring(), {"bodies.block.mass": masses}, outputs=["block.r.x", "block.r.x:series"], **TIMES
-    )
-    assert found["status"].values.tolist()[:2] == [1, 3]
-    assert found["status"].values.tolist()[2:] == [2, 1]
-    notes = found["note"].values
-    assert notes[0] == notes[3] == ""
-    assert "greater than 0" in notes[1]
-    assert "block" in notes[2]
-    x = found["block.r.x"].values
-    assert x[[0, 3]] == pytest.approx(at(0.5, np.array([1.0, 2.0]), 4.0), abs=1e-7)
-    assert np.isnan(x[1])
-    assert np.isnan(found["block.r.x:series"][1]).all()
-
-
 def test_a_scene_is_left_as_it_is():
     scene = spring()
     text = scene.to_toml()

@@ -15,7 +15,7 @@ import dap3d_core as dap
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.study import Batch, Ensemble, PointStatus
 from dap3d_core.study.workers import threads as local
-from dap3d_core.study.workers.threads import PATIENCE, ChunkSize, run_here
+from dap3d_core.study.workers.threads import ChunkSize, run_here
 
 POINTS_COUNT = 24 if jit_is_on() else 4
 
@@ -77,29 +77,18 @@ def test_one_thread_or_one_point_makes_no_thread(threads, count):
     assert {name for name, _ in slow.seen} == {threading.current_thread().name}
 
 
-def test_portions_follow_the_clock():
-    """Points of 4 ms: some 50 at once (0.2 s) in the middle, few at the end; each once."""
-    slow = Slow(0.004)
-    count = 400
-    points, places = np.zeros((count, 2)), np.arange(count)
-    assert len(collected(run_here(slow, points, places, threads=2))) == count
-    sizes = [size for _, size in slow.seen]
-    assert sum(sizes) == count
-    assert sizes[:2] == [1, 1]
-    assert 10 <= max(sizes) <= 55
-    assert sizes[-1] < 10
-
-
-def test_portions_shrink_where_points_take_longer():
-    """A portion of 1000 quick points is followed by one long one."""
-    portions = ChunkSize(0.2, 1)
+def test_chunks_follow_the_time_of_earlier_ones():
+    """A chunk of 1000 quick points is followed by one long one; the last ones are small."""
+    chunks = ChunkSize(0.2, 1)
     for size in (1, 16, 256):
-        assert portions.next(10**6) <= size
-        portions.update(size, size * 1e-4)
-    assert portions.next(10**6) == pytest.approx(2000, rel=0.01)
-    portions.update(2000, 2000.0)
-    assert portions.next(10**6) == 1
-    assert portions.next(0) >= 0
+        assert chunks.next(10**6) <= size
+        chunks.update(size, size * 1e-4)
+    assert chunks.next(10**6) == pytest.approx(2000, rel=0.01)
+    chunks.workers = 2
+    assert 100 <= chunks.next(1000) <= 250
+    chunks.update(2000, 2000.0)
+    assert chunks.next(10**6) == 1
+    assert chunks.next(0) >= 0
 
 
 def test_an_exception_comes_out_once_and_ends_the_others():
@@ -119,31 +108,28 @@ def test_an_exception_comes_out_once_and_ends_the_others():
 
 
 @pytest.mark.parametrize("how", ["close", "Ctrl-C"])
-def test_who_ends_early_does_not_wait_for_the_rest(how):
-    """500 points of 10 ms would take 2.5 s."""
+def test_an_early_end_leaves_the_rest(how):
     slow = Slow(0.01)
     found = run_here(slow, np.zeros((500, 2)), np.arange(500), threads=2)
     next(found)
-    begun = time.monotonic()
     if how == "close":
         found.close()
     else:
         with pytest.raises(KeyboardInterrupt):
             found.throw(KeyboardInterrupt)
-    assert time.monotonic() - begun < PATIENCE
+    assert sum(size for _, size in slow.seen) < 250
     assert not ours()
 
 
-def test_a_long_point_is_not_waited_for_for_ever(monkeypatch):
-    """It is left to its thread, which begins no other one and is no hindrance to the end."""
-    monkeypatch.setattr(local, "PATIENCE", 0.1)
-    slow = Slow(1.0)
+def test_an_early_end_does_not_wait_for_a_long_point(monkeypatch):
+    """Its thread runs it to its end, begins no other one and does not keep the process alive."""
+    monkeypatch.setattr(local, "PATIENCE", 0.01)
+    slow = Slow(0.5)
     found = run_here(slow, POINTS[:20], np.arange(20), threads=2)
     next(found)
-    begun = time.monotonic()
     found.close()
-    assert time.monotonic() - begun < 0.8
     left, run = ours(), len(slow.seen)
+    assert left
     assert all(thread.daemon for thread in left)
     for thread in left:
         thread.join(5.0)
