@@ -6,13 +6,11 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.model.groups import Floats
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.scene.validate.coerce_values import LARGEST
-
-Floats = NDArray[np.float64]
 
 DESIGNS = ("lhs", "random", "sobol", "halton")
 GRID = "grid"

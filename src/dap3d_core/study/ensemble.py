@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dap3d_core.integrators import EXPLICIT, INTEGRATORS
+from dap3d_core.model.groups import Floats
 from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
@@ -101,7 +102,7 @@ class Ensemble:
     def _row_width(self) -> int:
         return 2 + 20 * self.compiled.model.body_count + self.compiled.model.row_count + 4
 
-    def _run_one(self, k: int, point: NDArray[np.float64], batch: Batch) -> None:
+    def _run_one(self, k: int, point: Floats, batch: Batch) -> None:
         """Run one point by ``simulate`` and store its status, note and outputs."""
         result: Result | None
         try:

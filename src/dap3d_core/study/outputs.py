@@ -5,18 +5,16 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model import Model
+from dap3d_core.model.groups import Floats
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result import Quantity, Record, Result, ResultError, UnknownNameError, find
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.scene.errors import shown
 from dap3d_core.simulation import CompiledModel, SimulationError
 from dap3d_core.study.parameters import SceneParameter
-
-Floats = NDArray[np.float64]
 
 
 def _mean(values: Floats, t: Floats) -> Any:

@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.model.groups import Floats
 from dap3d_core.result import Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation import SimulationError
@@ -54,7 +55,7 @@ class Batch:
 
     status: NDArray[np.int8]
     notes: list[str]
-    values: dict[str, NDArray[np.float64]]
+    values: dict[str, Floats]
 
     @classmethod
     def empty(cls, outputs: Sequence[Output], count: int, nt: int) -> "Batch":

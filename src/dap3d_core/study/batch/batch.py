@@ -3,8 +3,8 @@
 import contextlib
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import SceneError
 from dap3d_core.simulation import AssemblyError
@@ -18,9 +18,6 @@ from dap3d_core.study.batch.parameter_map import NotCopiedError, ParameterMap
 from dap3d_core.study.batch.rebuild import ModelRebuilder
 from dap3d_core.study.outputs import Reduction
 from dap3d_core.study.study import Batch, PointStatus
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 def batch_runner(reduction: Reduction, times: Floats, pack: int) -> "BatchRunner | None":

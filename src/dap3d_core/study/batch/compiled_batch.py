@@ -14,13 +14,11 @@ from dap3d_core.integrators.runge_kutta.step import advance
 from dap3d_core.integrators.stepping.integration_state import Status, Work
 from dap3d_core.kernels.runtime.cache import table_of
 from dap3d_core.kernels.runtime.function_lists import INTEGER, LOOP_LIST, procedure_signature
+from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.scene import Simulation
 from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.settings import fits, integration_options
 from dap3d_core.study.batch import driver, initial_state
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Right-hand sides after which a compiled call returns, so that Ctrl-C is answered.
 CALL = 200_000

@@ -13,7 +13,6 @@ from typing import Any, ClassVar
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import DOUBTFUL, UNSETTLED, System
 from dap3d_core.integrators.stepping.integration_state import (
@@ -44,10 +43,8 @@ from dap3d_core.integrators.stepping.output import project_state
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
 from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
 from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.study.batch.initial_state import LEAST_PIVOT, OPEN, STARTING
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 # Entries of ``at``: the current point, whether its run has begun, how to start.
 POINT, BEGUN, START, AT_SIZE = range(4)

@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.model import Group, Model
+from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.state_layout import coordinates_of, velocities_of
 from dap3d_core.simulation import CompiledModel
 from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch
 from dap3d_core.study.batch.parameter_map import METRIC_WIDTH
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class PackedBatch:

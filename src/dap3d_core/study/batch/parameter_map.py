@@ -21,6 +21,7 @@ from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.types import Function
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
 from dap3d_core.model import Group
+from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.state_layout import from_integrated, join, split, to_integrated
 from dap3d_core.scene import Checked, Instance
 from dap3d_core.scene.validate.bodies import SMALLEST_INERTIA, ZERO_INERTIA
@@ -30,8 +31,6 @@ from dap3d_core.simulation.initial.undefined_directions import are_undefined
 from dap3d_core.study.batch.prepare_dependence import Dependence, dependence_of
 from dap3d_core.study.parameters import SceneParameter
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 #: Columns of the metric, and those that hold constants of a body: 1/sqrt(m), then U by rows.

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model import Model, ModelError, build_model
+from dap3d_core.model.groups import Floats
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Checked, SceneError, check
 from dap3d_core.simulation import AssemblyError, CompiledModel
@@ -16,8 +16,6 @@ from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.initial.undefined_directions import undefined_directions
 from dap3d_core.simulation.initial_state import find_start, start_notes
 from dap3d_core.study.parameters import SceneParameter, with_values
-
-Floats = NDArray[np.float64]
 
 
 class RebuiltPoint(NamedTuple):

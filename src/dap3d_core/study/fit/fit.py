@@ -6,8 +6,8 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.model.groups import Floats
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, check, check_simulation, load
 from dap3d_core.simulation import SimulationError
@@ -28,7 +28,6 @@ from dap3d_core.study.outputs import Output
 from dap3d_core.study.parameters import with_values
 from dap3d_core.study.study import Study
 
-Floats = NDArray[np.float64]
 Announce = Callable[[str], None]
 #: Called as progress(iteration, cost) with each new derivative.
 Progress = Callable[[int, float], None]
@@ -177,10 +176,11 @@ def _output_mistakes(
     except SceneError as error:
         return [attrs.evolve(m, key="measured" if m.key == "outputs" else m.key)
                 for m in error.mistakes]  # fmt: skip
-    vectors = {o.name: o.of for o in outputs} | dict.fromkeys(o.name for o in ensemble.outputs)
+    expanded = {output.name for output in ensemble.outputs}
     what = "a column is one number: name a component of this vector"
-    mistakes = [Mistake("measured", name, what, f"{vectors[name]}.x")
-                for name in sorted(vectors) if vectors[name] is not None]  # fmt: skip
+    mistakes = [
+        Mistake("measured", o.name, what, f"{o.of}.x") for o in outputs if o.name not in expanded
+    ]
     units = sorted(set(ensemble.units.values()))
     if not mistakes and len(units) > 1 and not has_sigma:
         what = f"outputs in {', '.join(units)} are weighed by their standard deviations"
@@ -197,11 +197,8 @@ def _predictor(task: _Task, threads: int | None, announce: Announce | None) -> P
     """
     t, last = task.data.t, task.study.scene.simulation.t_end or 0.0
     common = common_step(np.append(t, last))
-    dt = (
-        task.dt
-        or (common / -(-MIN_STEPS // round(last / common)) if common else last / MIN_STEPS)
-        or None
-    )
+    step = common / -(-MIN_STEPS // round(last / common)) if common else last / MIN_STEPS
+    dt = task.dt or step or None
     while True:
         scene = task.study.scene.copy()
         scene.simulation = attrs.evolve(scene.simulation, dt=dt)

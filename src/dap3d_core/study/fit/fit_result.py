@@ -2,12 +2,10 @@
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.model.groups import Floats
 from dap3d_core.result import Result
 from dap3d_core.scene import Scene
-
-Floats = NDArray[np.float64]
 
 
 @attrs.frozen(eq=False, repr=False)

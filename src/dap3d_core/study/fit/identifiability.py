@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from dap3d_core.model.groups import Floats
 
 #: A direction is lost if its singular value of the scaled Jacobian, over the largest, is below the
 #: first, or below the second times the error of a central difference at the tolerance.

@@ -4,9 +4,8 @@ from math import gcd
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from dap3d_core.model.groups import Floats, Integers
 
 #: Largest number of reported instants of a run, so that the measured times are among them.
 MAX_INSTANTS = 5000
@@ -58,7 +57,7 @@ class SeriesInterpolator:
 
     grid: Floats
     t: Floats
-    index: NDArray[np.int64] | None
+    index: Integers | None
 
     @classmethod
     def of(cls, grid: Floats, t: Floats) -> "SeriesInterpolator":

@@ -4,16 +4,14 @@ from collections.abc import Sequence
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.simulation import SimulationError
 from dap3d_core.study.ensemble import Ensemble
 from dap3d_core.study.fit.fit_parameters import Parameter
 from dap3d_core.study.fit.interpolation import SeriesInterpolator
 from dap3d_core.study.fit.measured_data import MeasuredData
 from dap3d_core.study.workers.threads import run_here
-
-Floats = NDArray[np.float64]
 
 Stencil = tuple[tuple[float, ...], tuple[float, ...]]
 
@@ -131,7 +129,7 @@ class Differences:
         return jacobian
 
     def _fill(
-        self, jacobian: Floats, which: NDArray[np.int64], x: Floats, base: Floats, steps: Floats,
+        self, jacobian: Floats, which: Integers, x: Floats, base: Floats, steps: Floats,
         stencil: Stencil,
     ) -> None:  # fmt: skip
         """Fill columns of these parameters, as far as runs within the bounds succeed."""

@@ -9,14 +9,12 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.model.groups import Floats
 from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import MISSING, Mistake
 from dap3d_core.study.fit.fit_parameters import is_number
-
-Floats = NDArray[np.float64]
 
 #: Names of the column of times, and entries of a CSV file where nothing was measured.
 TIMES = ("t", "time")

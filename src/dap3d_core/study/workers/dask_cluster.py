@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.result import current_versions
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.simulation import SimulationError
@@ -27,7 +28,7 @@ from dap3d_core.study.workers.environment import (
     version_differences,
     with_absolute_path,
 )
-from dap3d_core.study.workers.threads import ChunkSize, Floats, Integers, RunPoints
+from dap3d_core.study.workers.threads import ChunkSize, RunPoints
 
 #: Seconds that a task should take: much longer than its transport of some milliseconds.
 TASK_SECONDS = 1.0

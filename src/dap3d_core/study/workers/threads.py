@@ -9,15 +9,13 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.simulation import SimulationError
 from dap3d_core.study.ensemble import Ensemble
 from dap3d_core.study.study import Batch
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 #: Indices of points, and their outputs.
 RunPoints = tuple[Integers, Batch]
 
