@@ -37,7 +37,7 @@ from dap3d_core.formulations.common.constraints import (
 from dap3d_core.formulations.evaluator import REDUNDANT
 from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
 from dap3d_core.kernels.runtime.loop_support import A, W
-from dap3d_core.linear.ldlt.factor import POOR, assemble, factor
+from dap3d_core.linear.ldlt.factor import POOR, assemble, factor, weigh_rows
 from dap3d_core.linear.rank.rank import PIVOT_TOLERANCE
 from dap3d_core.simulation.initial.assemble import (
     FIT,
@@ -51,20 +51,6 @@ from dap3d_core.simulation.initial.assemble import (
 # position and velocity before and after; Newton passes; the least pivot as a fraction of its row;
 # 1 where positions did not close. From STARTING on (given): 1 for rows without a position level.
 SIZE, C_BEFORE, V_BEFORE, C_AFTER, V_AFTER, PASSES, LEAST_PIVOT, OPEN, STARTING = range(9)
-
-
-@compiled_inside
-def measure_rows(system: System, squares: Floats) -> None:
-    """Squared length of each row of D^."""
-    blocks, D = system.blocks, system.D
-    for k in range(squares.shape[0]):
-        squares[k] = 0.0
-    for b in range(blocks.shape[0]):
-        first, height, row = blocks[b, 0], blocks[b, 2], blocks[b, 3]
-        for i in range(height):
-            for c in range(6):
-                value = D[first + 6 * i + c]
-                squares[row + i] += value * value
 
 
 @compiled_inside
@@ -85,9 +71,7 @@ def factor_positions(system: System, without_position: Floats) -> None:
     smallest = system.smallest
     zero_rows(system, without_position)
     assemble(system.targets, system.contributions, system.D, system.K)
-    measure_rows(system, smallest)
-    for k in range(smallest.shape[0]):
-        smallest[k] *= PIVOT_TOLERANCE
+    weigh_rows(system.blocks, system.D, PIVOT_TOLERANCE, smallest)
     factor(system.nodes, system.columns, system.updates, system.K, smallest, True)
 
 
@@ -95,7 +79,7 @@ def factor_positions(system: System, without_position: Floats) -> None:
 def least_pivot_fraction(system: System) -> float:
     """Least pivot of the factors in K as a fraction of the squared length of its row of D^."""
     squares = system.smallest
-    measure_rows(system, squares)
+    weigh_rows(system.blocks, system.D, 1.0, squares)
     least, nodes, K = 1.0, system.nodes, system.K
     for k in range(nodes.shape[0] - 1):
         size, first, diagonal = nodes[k, 0], nodes[k, 1], nodes[k, 2]

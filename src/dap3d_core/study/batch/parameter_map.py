@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.arrays import set_metric
 from dap3d_core.formulations.evaluator import Machine
-from dap3d_core.interface.body_pose import BodyPose, pose
-from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
+from dap3d_core.interface.body_pose import BodyPose
+from dap3d_core.interface.examine.examine import pose
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.types import Function
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
@@ -105,9 +105,10 @@ class ParameterMap:
         bodies = {p.path[1] for p in parameters if p.path[0] == "bodies"
                   and p.path[2] in ("mass", "Jp")}  # fmt: skip
         self._bodies = np.array(sorted(checked.body_index[b] - 1 for b in bodies), dtype=np.int64)
-        counters = _turn_counters(machine)
-        self._counters = len(counters)
         system, n = machine.system, 1 + self._bodies[:, None]
+        par = np.arange(system.par.size)  # turns are counted from zero at the start of each run
+        counters = np.concatenate([par[:0], *(par[places] for places in machine.turn_places())])
+        self._counters = len(counters)
         body = system.par.size + n * BODY_WIDTH
         metric = system.par.size + system.body.size + n * METRIC_WIDTH
         assert JP == MASS + 1
@@ -322,15 +323,3 @@ def _point_fields(checked: Checked, instance: Instance, point: str) -> Iterator[
                 given = getattr(declared, end) if declared else element.fields.get(end)
                 if given == point:
                     yield end
-
-
-def _turn_counters(machine: Machine) -> Integers:
-    """Indices in par of the revolution counters of angles: zero at the start of each run."""
-    indices: list[Any] = [np.zeros(0, dtype=np.int64)]
-    for q, (kind, group) in enumerate(machine.what):
-        if kind == "angle":
-            first, width = int(machine.system.groups[q, 1]), group.examined.layout.par_width
-            instances = first + width * np.arange(group.count)
-            for offset in group.examined.layout.angles.values():
-                indices += [instances + offset + k for k in range(ANGLE_WIDTH)]
-    return np.concatenate(indices)
