@@ -84,4 +84,4 @@ def test_a_grid_in_memory_needs_no_samples_no_cluster_and_no_packs_of_its_own():
     heavy = {"distributed", "scipy.stats", "scipy.optimize", "matplotlib"}
     assert not found & heavy
     ours = {name.rpartition(".")[2] for name in found if name.startswith("dap3d_core.study.")}
-    assert not ours & {"cluster", "environment", "fitting", "determined", "measured"}
+    assert not ours & {"dask_cluster", "environment", "fit", "identifiability", "measured_data"}

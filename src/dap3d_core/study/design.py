@@ -25,7 +25,7 @@ SAMPLED = "1:5 (from:to), 1:100:log, 3~0.1 (mean~standard deviation), 10,50,100 
 
 @attrs.frozen(eq=False)
 class VariedParameter:
-    """How a parameter varies.
+    """A parameter, and the values or the distribution that it takes.
 
     Attributes:
         name: dotted name of the parameter.
@@ -188,7 +188,7 @@ def _pairs(vary: Any, mistakes: list[Mistake]) -> list[tuple[str, Any]]:
 
 
 def _read(name: Any, spec: Any, sampled: bool) -> VariedParameter | Mistake:
-    """How one parameter varies, or what is wrong with it."""
+    """One varied parameter, or its mistake."""
     if not isinstance(spec, str):
         return _list(name, spec, spec)
     if "~" in spec:

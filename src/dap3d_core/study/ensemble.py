@@ -32,7 +32,7 @@ class Ensemble:
     why. Both give the same values, bit for bit, whichever points are run together.
 
     Attributes:
-        asked, study: the study as requested, and as executed: where only values at the end are
+        requested, study: the study as requested, and as executed: where only values at the end are
             needed, runs report their end alone.
         compiled: the model of the scene as given.
         parameters: those that vary.
@@ -47,7 +47,7 @@ class Ensemble:
         Raises:
             SceneError: an unknown name, an unknown output, or mistakes of the scene.
         """
-        self.asked, self.study = study, _with_end_alone(study)
+        self.requested, self.study = study, _with_end_alone(study)
         scene = self.study.scene
         self.compiled = CompiledModel(scene, allow_code=study.allow_code, announce=announce)
         self.parameters: tuple[SceneParameter, ...] = parameters_named(
@@ -82,7 +82,7 @@ class Ensemble:
 
     def result(self, point: Sequence[float]) -> Result:
         """The whole result of one point, as ``simulate`` gives it; errors as of that."""
-        return self._result(self.asked.scene, point)
+        return self._result(self.requested.scene, point)
 
     def _result(self, scene: Scene, point: Sequence[float]) -> Result:
         changed = with_values(scene, self.parameters, point)

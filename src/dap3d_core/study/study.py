@@ -15,7 +15,7 @@ from dap3d_core.study.outputs import Output
 
 
 class PointStatus(IntEnum):
-    """How the run at a point of a study ended."""
+    """Outcome of the run at a point of a study."""
 
     OPEN = 0  # not run so far
     DONE = 1

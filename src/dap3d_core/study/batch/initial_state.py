@@ -142,8 +142,8 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
     out[C_BEFORE], out[V_BEFORE] = worst, velocity_residuals(system)
     for passes in range(MOST_PASSES + 1):
         worst = residuals(t, system, loops)
-        stands = worst > 0.5 * before and worst <= FIT * min(length, size)
-        if worst <= TOLERANCE * length or stands:
+        stalls = worst > 0.5 * before and worst <= FIT * min(length, size)
+        if worst <= TOLERANCE * length or stalls:
             out[OPEN] = 0.0
             break
         before = worst

@@ -29,7 +29,7 @@ class Dependence(NamedTuple):
 
 
 def dependence_of(instance: Instance, poses: Mapping[int, BodyPose], body_count: int) -> Dependence:
-    """What ``prepare`` reads of an element; nothing where its type has none.
+    """Fields and poses that ``prepare`` reads for an element; none where its type has none.
 
     Args:
         instance: a checked element.

@@ -77,7 +77,7 @@ def fit(
     """Find the values of parameters of a scene with which its run explains measured data best.
 
     The sum of the squares of (measured - predicted) / sigma is minimised within the bounds, by a
-    trust region; derivatives are central differences whose runs are one batch.
+    trust region; derivatives are central differences, all runs of which are one batch.
 
     Args:
         scene: a Scene, or what ``load`` takes.
@@ -374,7 +374,7 @@ def _notes(
     if not degrees and not task.data.sigma:
         yield "there are as many measured numbers as parameters: no interval is known"
     if search.predict.interpolator.index is None:
-        error = "whose error is not known" if np.isinf(spline_error) else (
+        error = "with an unknown error" if np.isinf(spline_error) else (
             f"with an error of up to {spline_error:.1g} of the size of an output")  # fmt: skip
         remedy = "; a smaller dt, or none, would be better" if spline_error > LARGE_ERROR else ""
         yield f"a spline of degree 5 interpolates between reported instants, {error}{remedy}"

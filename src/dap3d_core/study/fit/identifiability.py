@@ -26,7 +26,7 @@ NORMAL_95 = 1.959963984540054
 
 @attrs.frozen(eq=False)
 class Identifiability:
-    """What the data determine of the parameters at the optimum.
+    """Parameters and combinations of them that the data determine at the optimum.
 
     Attributes:
         covariance: (d, d) with a standard deviation of 1 for the weighted data; rows of parameters

@@ -66,7 +66,7 @@ class Predictor:
 
 @attrs.frozen(eq=False)
 class Differences:
-    """Derivatives of predictions by differences, whose runs are one batch.
+    """Derivatives of predictions by differences, all runs of which are one batch.
 
     Attributes:
         predict: runs points.

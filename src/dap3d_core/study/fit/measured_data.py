@@ -176,18 +176,18 @@ def _numbers(name: str, values: Any, mistakes: list[Mistake]) -> Floats | None:
         array = np.asarray(values)
         if array.dtype.kind not in "fiuO":
             raise ValueError
-        found = np.asarray(array, dtype=np.float64)
+        numbers = np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError):
         listed = () if isinstance(values, str) or not np.iterable(values) else values
         shown = next((v for v in listed if not is_number(v)), values)
         mistakes.append(Mistake(key, shown, "should be numbers, one for each time"))
         return None
-    if found.ndim != 1:
-        what = f"should be one number for each time, and has the shape {found.shape}"
-        remedy = "name its components, such as crank.r.z" if found.ndim == 2 else ""
+    if numbers.ndim != 1:
+        what = f"should be one number for each time, and has the shape {numbers.shape}"
+        remedy = "name its components, such as crank.r.z" if numbers.ndim == 2 else ""
         mistakes.append(Mistake(key, MISSING, what, remedy=remedy))
         return None
-    return found
+    return numbers
 
 
 def _deviations(
@@ -200,7 +200,7 @@ def _deviations(
             what = "this is none of the measured quantities"
             near = nearest(label, values)
             mistakes.append(Mistake(f"sigma.{label}", MISSING, what, near))
-    found = {}
+    deviations = {}
     for label, data in values.items():
         key = f"sigma.{label}" if isinstance(sigma, Mapping) else "sigma"
         if label not in given:
@@ -216,5 +216,5 @@ def _deviations(
         bad = array[np.isfinite(data) & ~((array > 0.0) & np.isfinite(array))]
         if len(bad):
             mistakes.append(Mistake(key, float(bad[0]), "a standard deviation is above 0"))
-        found[label] = array
-    return found
+        deviations[label] = array
+    return deviations

@@ -151,7 +151,7 @@ def _attributes(ensemble: Ensemble, design: Design) -> dict[str, Any]:
     found: dict[str, Any] = {
         SWEEP: np.int32(FORMAT),
         "model": str(scene.name).replace("\0", ""),
-        "scene": ensemble.asked.scene.to_toml(),
+        "scene": ensemble.requested.scene.to_toml(),
         "varied": to_json(varied),
         "outputs": to_json(outputs),
         "design": design.name,

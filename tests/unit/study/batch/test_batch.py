@@ -159,7 +159,7 @@ def test_a_driver_without_position_level_is_left_out_of_the_correction_of_positi
         np.testing.assert_allclose(found, single[output.name], rtol=0.0, atol=1e-11)
 
 
-def test_failing_points_are_told_and_the_others_go_on():
+def test_failing_points_are_noted_and_the_others_run():
     of = ensemble(pendulum(), ["bodies.bob.mass"], ["bob.r.y"], t_end=0.02, dt=0.01)
     batch = of.run([[1.0], [-1.0], [np.nan], [2.0]])
     assert batch.status.tolist() == [DONE, FAILED, FAILED, DONE]
@@ -227,7 +227,7 @@ def test_a_number_that_prepare_reads_is_not_copied():
     assert not found.poses
 
 
-def test_poses_that_prepare_reads_are_told():
+def test_poses_that_prepare_reads():
     """``fix`` keeps the relative pose that the bodies are given in."""
     compiled = dap.compile("fourbar4")
     joint = next(j for j in compiled.checked.joints if j.examined.type.keyword == "fix")
@@ -244,7 +244,7 @@ def test_masses_beyond_what_a_scene_may_have_are_left_to_its_check():
     assert parameter_map.table(values)[1].tolist() == [True, False, False, False, False, False]
 
 
-def test_runs_that_are_asked_for_their_end_report_their_end():
+def test_runs_report_only_their_end_where_nothing_else_is_needed():
     of = ensemble(pendulum(), ["bodies.bob.mass"], ["bob.r.y"])
     assert of.times.tolist() == [0.0, 0.5]
     assert len(ensemble(pendulum(), ["bodies.bob.mass"], ["bob.r.y:max"]).times) == 6

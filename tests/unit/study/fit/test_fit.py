@@ -50,8 +50,8 @@ def test_bodies2_gives_back_stiffness_and_damping():
     data = {"t": true.t} | {
         name: true.quantity(name).values + 2e-3 * rng.standard_normal(len(true.t)) for name in names
     }
-    asked = {"forces.spring1.k": (80.0, 10.0, 300.0), "forces.spring2.c": 1.0}
-    fit = dap.fit(scene, asked, data)
+    given = {"forces.spring1.k": (80.0, 10.0, 300.0), "forces.spring2.c": 1.0}
+    fit = dap.fit(scene, given, data)
     assert fit.status == "converged"
     for name, truth in (("forces.spring1.k", 100.0), ("forces.spring2.c", 2.0)):
         low, high = fit.interval[name]
@@ -144,11 +144,11 @@ def test_free_fall_is_linear_least_squares(sigma):
 
 @compiled
 def test_stiffness_and_mass_of_an_oscillator_cannot_be_told_apart():
-    """Its motion depends on k/m alone: that is told, and right; neither has an interval."""
+    """Its motion depends on k/m alone: a note says so; neither has an interval."""
     t = np.linspace(0.0, 10.0, 101)
     noise = 1e-3 * np.random.default_rng(1).standard_normal(len(t))
-    asked = {"forces.spring.k": 41.0, "bodies.mass.mass": 1.9}
-    fit = dap.fit(oscillator(), asked, {"t": t, "mass.r.x": swing(t) + noise})
+    given = {"forces.spring.k": 41.0, "bodies.mass.mass": 1.9}
+    fit = dap.fit(oscillator(), given, {"t": t, "mass.r.x": swing(t) + noise})
     assert any(
         "forces.spring.k and bodies.mass.mass cannot be told apart by these data: only "
         "forces.spring.k / bodies.mass.mass is determined" in note
@@ -175,33 +175,33 @@ def test_what_is_determined_keeps_its_interval_beside_what_is_not():
     t = np.linspace(0.0, 5.0, 51)
     noise = 1e-3 * np.random.default_rng(2).standard_normal(len(t))
     data = {"t": t, "mass.r.x": swing(t) + noise}
-    asked = ["forces.spring.l0", "forces.spring.k", "bodies.mass.mass", "bodies.mass.Jp.2"]
-    fit = dap.fit(oscillator(), asked, data)
-    fewer = dap.fit(oscillator(), asked[:2], data)
+    given = ["forces.spring.l0", "forces.spring.k", "bodies.mass.mass", "bodies.mass.Jp.2"]
+    fit = dap.fit(oscillator(), given, data)
+    fewer = dap.fit(oscillator(), given[:2], data)
     assert fit.interval["forces.spring.l0"] == pytest.approx(
         fewer.interval["forces.spring.l0"], rel=1e-6
     )
     assert "bodies.mass.Jp.2 has no effect on these data" in fit.notes
     assert fit.values["bodies.mass.Jp.2"] == 0.1
-    for name in asked[1:]:
+    for name in given[1:]:
         assert fit.interval[name] == (-np.inf, np.inf)
     assert np.isnan(fit.correlation[0, 1])
 
 
 @compiled
-def test_bounds_are_kept_and_told():
+def test_bounds_are_kept_and_noted():
     """The truth lies beyond a bound: the fit stands there and says so, others have intervals."""
     t = np.linspace(0.0, 2.0, 41)
     data = {"t": t, "mass.r.x": swing(t, c=C)}
-    asked = {"forces.spring.k": (35.0, 20.0, 39.0), "forces.spring.c": (0.0, 0.0, 5.0)}
-    fit = dap.fit(oscillator(), asked, data)
+    given = {"forces.spring.k": (35.0, 20.0, 39.0), "forces.spring.c": (0.0, 0.0, 5.0)}
+    fit = dap.fit(oscillator(), given, data)
     assert fit.values["forces.spring.k"] == 39.0
     assert np.isnan(fit.interval["forces.spring.k"]).all()
     assert "at its bound" in str(fit)
     assert any("forces.spring.k is at its upper bound, 39" in note for note in fit.notes)
     assert np.isfinite(fit.interval["forces.spring.c"]).all()
     # nor does a run leave the bounds for the derivatives: here the truth is a bound itself
-    undamped = dap.fit(oscillator(), asked | {"forces.spring.k": 39.0},
+    undamped = dap.fit(oscillator(), given | {"forces.spring.k": 39.0},
                        {"t": t, "mass.r.x": swing(t)})  # fmt: skip
     assert undamped.values["forces.spring.k"] == pytest.approx(K, rel=1e-7)
     assert 0.0 <= undamped.values["forces.spring.c"] < 1e-7
@@ -293,11 +293,11 @@ def mistakes_of(*arguments, **settings):
     return str(caught.value)
 
 
-def test_all_that_is_wrong_is_told_at_once():
+def test_all_mistakes_are_reported_at_once():
     """Names with the nearest, data, bounds, settings: one error."""
     data = {"t": [0.0, -1.0], "mass.r.q": [0.0, 1.0], "mass.r": ["a", "b"], "mass.r.y": [1.0]}
-    asked = {"bodies.mass.mas": 1.0, "forces.spring.k": (50.0, 0.0, 40.0)}
-    text = mistakes_of(oscillator(), asked, data, rtol=-1.0)
+    given = {"bodies.mass.mas": 1.0, "forces.spring.k": (50.0, 0.0, 40.0)}
+    text = mistakes_of(oscillator(), given, data, rtol=-1.0)
     for part in (
         "bodies.mass.mas",
         "did you mean 'bodies.mass.mass'?",
@@ -315,7 +315,7 @@ T = [0.0, 1.0]
 
 
 @pytest.mark.parametrize(
-    ("asked", "data", "settings", "words"),
+    ("given", "data", "settings", "words"),
     [
         ({}, {"t": T, "mass.r.x": T}, {}, "at least one parameter"),
         (3, {"t": T, "mass.r.x": T}, {}, "parameters are"),
@@ -347,11 +347,11 @@ T = [0.0, 1.0]
          "2 measured numbers cannot determine 3 parameters"),
     ],
 )  # fmt: skip
-def test_what_is_refused(asked, data, settings, words):
-    assert words in mistakes_of(oscillator(), asked, data, **settings)
+def test_what_is_refused(given, data, settings, words):
+    assert words in mistakes_of(oscillator(), given, data, **settings)
 
 
-def test_a_damaged_file_is_told_with_its_lines(tmp_path):
+def test_mistakes_of_a_file_have_their_lines(tmp_path):
     path = tmp_path / "data.csv"
     path.write_text("t,mass.r.x\n0,1\n1,one\n2\n")
     text = mistakes_of(oscillator(), ["forces.spring.k"], path)
@@ -363,7 +363,7 @@ def test_a_damaged_file_is_told_with_its_lines(tmp_path):
 
 @compiled
 def test_a_fit_is_drawn(tmp_path):
-    """Two panels for each output; a file without a display; an unknown output is told."""
+    """Two panels for each output; a file without a display; an unknown output is an error."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -97,7 +97,7 @@ def test_numbers_are_those_of_the_closed_form(swept):
 
 
 def test_the_data_set_says_what_it_is(swept):
-    """Dimensions in the order asked for, units, what status means, all that makes it again."""
+    """Dimensions in the given order, units, what status means, all that makes it again."""
     assert swept["block.r.x"].dims == ("bodies.block.mass", "forces.spring.k")
     assert swept["block.r.x:series"].dims == ("bodies.block.mass", "forces.spring.k", "time")
     assert swept["bodies.block.mass"].attrs["units"] == "kg"
@@ -148,7 +148,7 @@ def test_a_scene_is_left_as_it_is():
 
 
 def test_a_file_holds_the_same(swept, tmp_path):
-    """What is returned, what is read, and what xarray reads by itself."""
+    """The same data as returned, what is read, and what xarray reads by itself."""
     path = tmp_path / "a.nc"
     found = dap.sweep(spring(), VARY, outputs=OUTPUTS, output=path, **TIMES)
     assert found.identical(swept)
@@ -202,7 +202,7 @@ def test_what_is_no_sweep(tmp_path, begin):
         dap.open_sweep(tmp_path / "a.nc")
 
 
-def test_results_and_sweeps_are_told_apart(tmp_path):
+def test_results_and_sweeps_are_distinguished(tmp_path):
     dap.simulate(spring(), t_end=0.1, output=tmp_path / "run.nc")
     dap.sweep(spring(), {"forces.spring.k": [1.0]}, outputs="block.r.x", t_end=0.1,
               output=tmp_path / "sweep.nc")  # fmt: skip
@@ -223,7 +223,7 @@ def test_results_and_sweeps_are_told_apart(tmp_path):
         dap.open_sweep(tmp_path / "bare.nc")
 
 
-def test_a_large_file_is_read_when_it_is_asked_for(swept, tmp_path, monkeypatch):
+def test_a_large_file_is_read_lazily(swept, tmp_path, monkeypatch):
     """Lazily, with the same numbers; so are its extremes, block by block."""
     path = tmp_path / "a.nc"
     dap.sweep(spring(), VARY, outputs=OUTPUTS, output=path, **TIMES)
@@ -318,11 +318,11 @@ def test_a_sweep_that_is_ended_before_its_first_point_leaves_nothing(tmp_path, o
 
 @pytest.fixture
 def part(tmp_path, one_by_one):
-    """Path of a sweep of samples that was ended after two points, and how it was asked for."""
-    asked = dict(outputs=["block.r.x"], sample=3, output=tmp_path / "a.nc", **TIMES)
+    """Path of a sweep of samples that was ended after two points, and its arguments."""
+    arguments = dict(outputs=["block.r.x"], sample=3, output=tmp_path / "a.nc", **TIMES)
     with pytest.raises(Enough):
-        dap.sweep(spring(), {"forces.spring.k": "4:16"}, progress=stop_after(2), **asked)
-    return asked
+        dap.sweep(spring(), {"forces.spring.k": "4:16"}, progress=stop_after(2), **arguments)
+    return arguments
 
 
 @pytest.mark.parametrize(
@@ -337,11 +337,11 @@ def part(tmp_path, one_by_one):
     ],
 )
 def test_another_sweep_does_not_go_on(part, changes, words):
-    asked = {"vary": {"forces.spring.k": "4:16"}} | part | changes
-    file = asked["output"].with_name("a.nc.part")
+    arguments = {"vary": {"forces.spring.k": "4:16"}} | part | changes
+    file = arguments["output"].with_name("a.nc.part")
     before = file.read_bytes()
     with pytest.raises(ResultError, match=f"is of another sweep: it has {words}"):
-        dap.sweep(spring(), resume=True, **asked)
+        dap.sweep(spring(), resume=True, **arguments)
     assert file.read_bytes() == before
 
 
@@ -387,10 +387,10 @@ def test_a_part_is_not_lost_by_beginning_anew(part, one_by_one):
     for content in (b"mine", b""):
         file.write_bytes(content)
         for options, verb in (({"force": True}, "overwrite"), ({"resume": True}, "resume")):
-            asked = part | options | {"output": part["output"].with_name("a.nc")}
-            asked["output"].unlink(missing_ok=True)
+            arguments = part | options | {"output": part["output"].with_name("a.nc")}
+            arguments["output"].unlink(missing_ok=True)
             with pytest.raises(ResultError, match=f"cannot {verb}: .*move it away"):
-                dap.sweep(spring(), vary, **asked)
+                dap.sweep(spring(), vary, **arguments)
             assert file.read_bytes() == content
 
 
@@ -447,10 +447,10 @@ def test_there_must_be_something_to_go_on_with(tmp_path):
         ({"rtol": 0.0, "integrator": "cvode"}, ["integrator", "rtol"], "should be one of"),
     ],
 )  # fmt: skip
-def test_mistakes_are_told_together(changes, keys, words):
-    asked = {"vary": {"bodies.block.mass": [1.0]}, "outputs": "block.r.x"} | TIMES | changes
+def test_mistakes_are_reported_together(changes, keys, words):
+    arguments = {"vary": {"bodies.block.mass": [1.0]}, "outputs": "block.r.x"} | TIMES | changes
     with pytest.raises(dap.SceneError) as refused:
-        dap.sweep(spring(), **asked)
+        dap.sweep(spring(), **arguments)
     assert [m.key for m in refused.value.mistakes] == keys
     assert words in str(refused.value)
 

@@ -42,7 +42,7 @@ def test_numbers_depend_neither_on_threads_nor_on_portions(ensemble):
     assert not ours()
 
 
-def test_only_the_places_asked_for_are_run(ensemble):
+def test_only_the_given_points_are_run(ensemble):
     """In any order; none at all gives nothing."""
     points, places = POINTS[:9], np.array([7, 2, 5])
     found = collected(run_here(ensemble, points, places, threads=2))
@@ -138,7 +138,7 @@ def test_an_early_end_does_not_wait_for_a_long_point(monkeypatch):
 
 
 def test_the_environment_limits_threads(monkeypatch):
-    """DAP3D_THREADS, for those asked for, too; what it cannot say is refused."""
+    """DAP3D_THREADS, also of requested threads; invalid values are refused."""
     monkeypatch.setenv("DAP3D_THREADS", "1")
     slow = Slow()
     collected(run_here(slow, POINTS[:8], np.arange(8), threads=4))
