@@ -253,15 +253,14 @@ def _fields(checked: Checked, path: tuple[str, ...]) -> Iterator[_Field]:
         instance = next(instance for instance in instances if instance.name == path[1])
         yield from _element_fields(holder, path, instance)
         return
-    for attribute in attrs.fields(type(holder)):
-        name = attribute.name
+    for name in attrs.fields_dict(type(holder)):
         value = getattr(holder, name)
-        given = value is not None
-        if not given and table == "bodies":
+        is_given = value is not None
+        if not is_given and table == "bodies":
             value = BODY_DEFAULTS.get(name)
-        is_open = table == "simulation" and name in OPEN
-        if _is_numeric(value) or (value is None and is_open):
-            yield _Field((*path, name), value, UNITS.get(name, "1"), is_given=given)
+        is_open = value is None and table == "simulation" and name in OPEN
+        if _is_numeric(value) or is_open:
+            yield _Field((*path, name), value, UNITS.get(name, "1"), is_given=is_given)
 
 
 def _element_fields(
@@ -269,12 +268,12 @@ def _element_fields(
 ) -> Iterator[_Field]:
     for name, spec in specs_of(instance.examined.type).items():
         value = element.fields.get(name)
-        given = value is not None
-        if not given and spec.kind in NUMERIC and spec.given:
+        is_given = value is not None
+        if not is_given and spec.kind in NUMERIC and spec.given:
             value = instance.values.get(name)
         is_open = value is None and spec.kind == "number" and spec.given
         if _is_numeric(value) or is_open:
-            yield _Field((*path, name), value, spec.unit or "1", spec.whole, given)
+            yield _Field((*path, name), value, spec.unit or "1", spec.whole, is_given)
 
 
 def _is_numeric(value: Any) -> bool:

@@ -139,9 +139,15 @@ def check_workers(client: Any, here: Environment, payload: bytes) -> None:
                 f"`dask worker {address}`"
             ) from error
         answers = client.run(environment_there, current_versions(), payload, on_error="return")
-    faults = {worker: _faults(here, answer) for worker, answer in sorted(answers.items())}
-    unfit = [f"{worker}: {'; '.join(of_worker)}" for worker, of_worker in faults.items()
-             if of_worker]  # fmt: skip
+    version = here["versions"]["dap3d"]
+    remedy = f'pip install "dap3d[cluster]=={version}" in its environment'
+    unfit = []
+    for worker, answer in sorted(answers.items()):
+        faults = [f"dap3d {version} cannot be used there ({answer}); {remedy}"]
+        if not isinstance(answer, BaseException):
+            faults = differences(here, answer)
+        if faults:
+            unfit.append(f"{worker}: {'; '.join(faults)}")
     if unfit:
         more = [f"... and {len(unfit) - MAX_NAMES} more"] if len(unfit) > MAX_NAMES else []
         title = f"{len(unfit)} of {len(answers)} workers cannot run this study:"
@@ -167,17 +173,6 @@ def environment_there(versions: dict[str, str], payload: bytes) -> Environment:
                 "outputs must be defined in the script, or in a module that can be imported there"
             )
     return environment
-
-
-def _faults(here: Environment, answer: Any) -> list[str]:
-    """Reasons, of the answer of a worker, why it cannot run the study."""
-    if isinstance(answer, BaseException):
-        version = here["versions"]["dap3d"]
-        return [
-            f'dap3d {version} cannot be used there ({answer}); pip install "dap3d[cluster]'
-            f'=={version}" in its environment'
-        ]
-    return differences(here, answer)
 
 
 def _run(
