@@ -55,7 +55,7 @@ def _study(scene, names, output):
 
 def points_of(study, count):
     """(count, 2) points near the scene's own numbers."""
-    numbers = Ensemble(study).numbers
+    numbers = Ensemble(study).parameters
     middle = np.array([number.value for number in numbers])
     return middle + np.random.default_rng(0).uniform(0.0, 0.2, (count, len(middle)))
 
