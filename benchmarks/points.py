@@ -89,10 +89,10 @@ def _overhead(scene, name, points, output):
     of = Ensemble(Study(scene, (name,), outputs_of([output])))
     many = np.tile(points, (5, 1))
     of.run(many[:3])
-    runs = of._runner()._runs
+    runs = of._runner().compiled_batch
     integration, work = runs.integration, runs.integration.work
     fresh = [array.copy() for array in integration.state_arrays()]
-    numbers = runs.first["first_real"], runs.first["first_integer"]
+    numbers = runs.constants["first_real"], runs.constants["first_integer"]
     least = {}
     for _ in range(ROUNDS):
         _keep(least, "point", _seconds(lambda: of.run(many)) / len(many))

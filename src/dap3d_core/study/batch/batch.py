@@ -44,7 +44,8 @@ class BatchRunner:
     Attributes:
         parameter_map: puts values of parameters into the arrays of the model; None where each point
             needs a model of its own.
-        packed: runs points in packs; None where they run one by one.
+        compiled_batch: runs points one by one.
+        packed: runs them in packs; None where they are not packed.
     """
 
     def __init__(self, start: Start, reduction: Reduction, times: Floats, pack: int) -> None:
@@ -56,7 +57,7 @@ class BatchRunner:
         end = float(times[-1])
         stops = compiled.pace(end).stops
         self._rebuilder = ModelRebuilder(compiled, machine, parameters, end)
-        self._batch = CompiledBatch(machine, compiled.scene.simulation, times, stops)
+        self.compiled_batch = CompiledBatch(machine, compiled.scene.simulation, times, stops)
         self._pulling = Pulling(compiled.model)
         self.parameter_map: ParameterMap | None = None
         self.packed: PackedBatch | None = None
@@ -95,7 +96,9 @@ class BatchRunner:
         if moves_start:
             y0 = parameter_map.states(values[which], model.u0)
         else:
-            y0 = np.repeat(self._batch.machine.integrated(self._start.u)[None], len(which), axis=0)
+            y0 = np.repeat(
+                self.compiled_batch.machine.integrated(self._start.u)[None], len(which), axis=0
+            )
         table, places = table[which], parameter_map.places
         start = driver.CORRECT if moves_start and model.row_count else driver.UNCORRECTED
         rows = self._run_packed(table, places, y0, start)
@@ -106,17 +109,17 @@ class BatchRunner:
     def _run_packed(self, table: Floats, places: Integers, y0: Floats, start: int) -> BatchRows:
         """Run points in packs where they are packed, and one by one what packs do not finish."""
         if self.packed is None:
-            return self._batch.run(table, places, y0, start)
+            return self.compiled_batch.run(table, places, y0, start)
         first = None
         if start == driver.CORRECT:
-            first = self._batch.run(table, places, y0, driver.CORRECT_ONLY)
+            first = self.compiled_batch.run(table, places, y0, driver.CORRECT_ONLY)
             y0 = np.where(first.done[:, None], first.y0, y0)
         rows = self.packed.run(table, places, y0)
         if first is not None:
             rows = rows._replace(given=first.given, diagnostics=first.diagnostics)
             rows.done[:] &= first.done
         rest = np.flatnonzero(~rows.done)
-        singly = self._batch.run(table[rest], places, rows.given[rest], start)
+        singly = self.compiled_batch.run(table[rest], places, rows.given[rest], start)
         for of_all, of_rest in zip(rows, singly, strict=True):
             of_all[rest] = of_rest
         return rows
@@ -136,7 +139,7 @@ class BatchRunner:
         table = np.array([point.table for point in points]).reshape(-1, len(places))
         y0 = np.array([point.y0 for point in points])
         y0 = y0.reshape(-1, self._compiled.model.u0.size + 1)
-        return np.array(which, dtype=np.int64), self._batch.run(table, places, y0)
+        return np.array(which, dtype=np.int64), self.compiled_batch.run(table, places, y0)
 
     def _reduce(self, values: Floats, index: Integers, rows: Floats, batch: Batch) -> None:
         """Store the outputs of points with these rows (k, nt, width) in a batch."""
@@ -146,15 +149,15 @@ class BatchRunner:
         others = [o for o in reduction.outputs if not reduction.of_rows[o.name]]
         for k, point, of_run in zip(index, values, rows, strict=True) if others else ():
             _, model = self._rebuilder.load(point)
-            result = reduction.result(model, of_run, self._batch.machine)
+            result = reduction.result(model, of_run, self.compiled_batch.machine)
             batch.store(int(k), result, others)
 
     def _note_corrections(
         self, rows: BatchRows, good: Integers, index: Integers, notes: list[str]
     ) -> None:
         """Warn of starts that were corrected by more than rounding."""
-        machine = self._batch.machine
-        large = rows.diagnostics[good, initial_state.C_BEFORE] > ROUNDING * self._batch.size
+        machine = self.compiled_batch.machine
+        large = rows.diagnostics[good, initial_state.C_BEFORE] > ROUNDING * self.compiled_batch.size
         good, index = good[large], index[large]
         moved, turned = distance(rows.given[good], rows.y0[good], machine.model.body_count)
         for j, k in enumerate(good):

@@ -52,6 +52,8 @@ class CompiledBatch:
         machine: evaluates the model.
         integration: of the runs.
         size: a length of the model, m.
+        constants: arguments of ``Points`` that all points share.
+        last_start: (n,) the state that the last run started from.
     """
 
     def __init__(
@@ -65,7 +67,7 @@ class CompiledBatch:
         stops: times that no step crosses, and whether something jumps there.
         """
         self.machine, self.size = machine, model_size(machine)
-        y0 = machine.integrated(machine.model.u0)
+        y0 = self.last_start = machine.integrated(machine.model.u0)
         may_turn_stiff = settings.integrator == "auto" and fits(IMPLICIT, machine.formulation)
         self.integration = INTEGRATORS.get(str(settings.integrator), EXPLICIT).make(
             machine,
@@ -81,7 +83,7 @@ class CompiledBatch:
         starting[initial_state.SIZE] = self.size
         without_position = np.flatnonzero(~machine.model.position_row)
         starting[initial_state.STARTING + machine.system.row[without_position]] = 1.0
-        self._constants: dict[str, Any] = {
+        self.constants: dict[str, Any] = {
             "metric": machine.system.metric.copy(),
             "unit": unit,
             "stops": np.array(stops, dtype=float).reshape(-1, 2),
@@ -115,7 +117,7 @@ class CompiledBatch:
             y0=np.array(y0, dtype=float),
             rows=np.empty((count * nt, width)),
             diagnostics=diagnostics,
-            **self._constants,
+            **self.constants,
         )
         problem = (self.machine.functions, _drives(), self._begin)
         system, loops = self.machine.system, self.machine.loops
@@ -124,6 +126,8 @@ class CompiledBatch:
                 driver.run_points(points, work, *problem, system, loops, CALL)
             if points.at[driver.POINT] == count:
                 break
+        if count:
+            self.last_start = points.y0[-1]
         rows = points.rows.reshape(count, nt, width)
         done = diagnostics[:, driver.ENDED] == Status.FINISHED
         return BatchRows(done, rows, y0, points.y0, diagnostics)
