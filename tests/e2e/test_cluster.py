@@ -455,11 +455,12 @@ def another_worker_of(address):
 
 def test_a_client_that_is_closed_meanwhile(client):
     """Nothing can be asked of it, nor be told to it; so is one that was closed before."""
+    from distributed import as_completed
 
     with connect(client.scheduler.address) as mine:
         found = run_on(mine, bob(), POINTS, np.arange(200), chunk=1)
         next(found)
-        watch, silent = dask_cluster._ClusterMonitor(mine), distributed.as_completed(loop=mine.loop)
+        watch, silent = dask_cluster._ClusterMonitor(mine), as_completed(loop=mine.loop)
         mine.close()
         with pytest.raises(ClusterError, match=r"the scheduler at .* is gone"):
             collected(found)

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.arrays import set_metric
 from dap3d_core.formulations.evaluator import Machine
-from dap3d_core.interface.body_pose import BodyPose
-from dap3d_core.interface.examine.examine import pose
+from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.types import Function
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
