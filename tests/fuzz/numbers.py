@@ -20,7 +20,7 @@ from support.ended import EndedError
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
-from dap3d_core.result.file.checksum import write_seal
+from dap3d_core.result.file.checksum import write_checksums
 from dap3d_core.simulation import SimulationError
 from dap3d_core.simulation.checkpoint.file import Checkpoint, read_checkpoint, write_checkpoint
 from fuzz.acceptable import examine_result, strict
@@ -187,7 +187,7 @@ def make(change, place):
         else:
             variable = dataset.variables[what]
             variable[...] = _changed(np.asarray(variable[...]), where, value)
-    write_seal(path, path.stat().st_size, is_whole=True)
+    write_checksums(path, path.stat().st_size, is_whole=True)
     return path
 
 

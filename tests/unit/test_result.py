@@ -14,7 +14,7 @@ from dap3d_core.model import build_model
 from dap3d_core.model.rotations import to_global
 from dap3d_core.model.state_layout import join, to_integrated
 from dap3d_core.registry import load_registry
-from dap3d_core.result import Result, ResultError, Statistics, UnknownNameError
+from dap3d_core.result import Record, Result, ResultError, Statistics, UnknownNameError
 from dap3d_core.scene import Scene, check, load
 
 CONTROLLED = dict(rtol=1e-8, atol=1e-10, step=None, project=True, correct=True, conservative=True)
@@ -46,13 +46,8 @@ def result_of(scene, rows, model=None, method="standard", **more):
     """A result whose machine is made when something asks for it."""
     model = model or model_of(scene)
     given = dict(settings=CONTROLLED, integrator="dop853", method=method) | more
-    return Result(
-        model=model,
-        machine_of=lambda: Machine(model, method),
-        scene_text=scene.to_toml(),
-        rows=rows,
-        **given,
-    )
+    record = Record(scene_text=scene.to_toml(), **given)
+    return Result.of_run(model, rows, record, lambda: Machine(model, method))
 
 
 MASS, ARM, RATE, PIVOT = 3.0, 0.4, 2.5, np.array([0.3, -0.2, 0.5])
@@ -319,7 +314,7 @@ def test_the_machine_is_made_once_and_only_when_needed():
 def test_what_the_run_says_of_itself():
     stats = Statistics(steps=7, rejected=1, rhs=90, projections=8, wall_time_s=0.5)
     result, _, _ = circling(
-        status="interrupted", notes=["one", "two"], stats=stats, versions={"dap3d": "9"}
+        status="interrupted", notes=["one", "two"], stats=stats, known_versions={"dap3d": "9"}
     )
     assert result.status == "interrupted"
     assert result.notes == ["one", "two"]

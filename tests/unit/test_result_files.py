@@ -18,6 +18,7 @@ from unit.test_result import CONTROLLED, circling, circling_scene, drifting, mod
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model.state_layout import split
 from dap3d_core.result import (
+    Record,
     Result,
     ResultError,
     ResultWriter,
@@ -32,7 +33,7 @@ ABOUT = dict(
     status="interrupted",
     notes=["Newton's note: Δ|C| = 1e-9", 'a "second"'],
     stats=Statistics(steps=3, rejected=1, rhs=40, projections=4, wall_time_s=0.25),
-    versions={"dap3d": "0.1", "numpy": "2", "llvmlite": "0", "python": "3"},
+    known_versions={"dap3d": "0.1", "numpy": "2", "llvmlite": "0", "python": "3"},
 )
 
 
@@ -70,10 +71,8 @@ def noisy(model, nt=9, seed=3):
 def test_round_trip_is_bit_for_bit(tmp_path, name):
     scene = load(name)
     model = model_of(scene)
-    result = Result(
-        model=model, machine_of=lambda: None, rows=noisy(model), scene_text=scene.to_toml(),
-        settings=CONTROLLED, **ABOUT,
-    )  # fmt: skip
+    record = Record(scene_text=scene.to_toml(), settings=CONTROLLED, **ABOUT)
+    result = Result.of_run(model, noisy(model), record, lambda: None)
     result.save(tmp_path / "run.nc")
     found = open_result(tmp_path / "run.nc")
     assert same_bits(found, result)
@@ -115,9 +114,8 @@ def test_another_model_than_was_run_is_refused(tmp_path):
 @pytest.mark.parametrize("nt", [0, 1])
 def test_results_of_no_or_one_instant(tmp_path, nt):
     model = model_of(circling_scene())
-    result = Result(
-        model=model, machine_of=lambda: None, rows=noisy(model, 2)[:nt], scene_text="[scene]\n"
-    )
+    rows = noisy(model, 2)[:nt]
+    result = Result.of_run(model, rows, Record(scene_text="[scene]\n"), lambda: None)
     result.save(tmp_path / "run.nc")
     assert same_bits(open_result(tmp_path / "run.nc"), result)
 
@@ -128,9 +126,8 @@ def test_text_of_a_large_scene_and_odd_names(tmp_path):
     scene.description = "ä€😀" * 60_000
     scene.add_body("Kurbel ä 手", mass=1.0, Jp=[1, 1, 1], r=[9, 9, 9])
     model = model_of(scene)
-    result = Result(
-        model=model, machine_of=lambda: None, rows=noisy(model), scene_text=scene.to_toml()
-    )
+    record = Record(scene_text=scene.to_toml())
+    result = Result.of_run(model, noisy(model), record, lambda: None)
     result.save(tmp_path / "räder.nc")
     found = open_result(tmp_path / "räder.nc")
     assert found.scene_text == result.scene_text
@@ -355,7 +352,7 @@ def test_a_file_that_lacks_something_is_damaged(tmp_path, change):
 
 def test_width_of_rows_is_that_of_the_integrator():
     model = model_of(load("fourbar3"))
-    result = Result(model=model, machine_of=lambda: None, rows=noisy(model), scene_text="")
+    result = Result.of_run(model, noisy(model), Record(scene_text=""), lambda: None)
     size = Machine(model, "standard").report_size
     assert row_width(result.subject) == 1 + 13 * model.body_count + 1 + size
     assert split(result.u)[0].shape == result.r.shape

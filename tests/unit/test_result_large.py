@@ -13,7 +13,7 @@ from unit.test_result_files import same_bits
 import dap3d_core as dap
 from dap3d_core.result import arrays as arrays_module
 from dap3d_core.result.arrays import Arrays
-from dap3d_core.result.file.lazy_arrays import FileArrays
+from dap3d_core.result.file.lazy_arrays import LazyArrays
 
 KEEPING = import_module("dap3d_core.simulation.output.recorder")
 READING = import_module("dap3d_core.result.open")
@@ -37,7 +37,7 @@ def both(tmp_path, monkeypatch, small_limits):
     whole = dap.simulate(problems.four_bar(), **SHORT)
     large = dap.simulate(problems.four_bar(), output=tmp_path / "run.nc", **SHORT)
     assert isinstance(whole.arrays, Arrays)
-    assert isinstance(large.arrays, FileArrays)
+    assert isinstance(large.arrays, LazyArrays)
     return whole, large
 
 
@@ -47,7 +47,7 @@ def test_a_large_result_is_the_same(both, tmp_path):
     assert same_bits(large, whole)
     assert large.ledger == whole.ledger
     again = dap.open(tmp_path / "run.nc")
-    assert isinstance(again.arrays, FileArrays)
+    assert isinstance(again.arrays, LazyArrays)
     assert same_bits(again, whole)
     assert same_bits(pickle.loads(pickle.dumps(again)), whole)
     assert again.reaction("A0")["i"].force.tobytes() == whole.reaction("A0")["i"].force.tobytes()

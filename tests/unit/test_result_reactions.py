@@ -162,7 +162,7 @@ def test_turns_are_counted_again_from_the_start():
         np.testing.assert_allclose(found.energy, angle**2, rtol=1e-12, atol=1e-12)
         assert found.length is None
         assert found.on["i"].moment_at_point is None
-        result._applied.clear()
+        result._forces.clear()
 
 
 def test_friction_in_a_joint_has_no_quantities():

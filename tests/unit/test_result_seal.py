@@ -1,6 +1,7 @@
 """A result file that is not as it was written is refused before any library reads it."""
 
 import shutil
+from contextlib import closing
 
 import netCDF4
 import numpy as np
@@ -12,7 +13,7 @@ from unit.test_result_writer import grown
 
 from dap3d_core.result import ResultError, open_result
 from dap3d_core.result.file import checksum
-from dap3d_core.result.file.checksum import check_seal
+from dap3d_core.result.file.checksum import check_checksums
 
 SIZE = 40
 REFUSED = r"cannot read .*: it is (damaged|cut off).*; take another copy of it, or run again$"
@@ -30,7 +31,7 @@ def good(tmp_path_factory):
 def part(tmp_path):
     """A file that grew, as a killed run leaves it."""
     result, _, _ = circling(nt=50)
-    with grown(tmp_path / "run.nc", result, most=400) as writer:
+    with closing(grown(tmp_path / "run.nc", result, most=400)) as writer:
         writer.append(result.arrays)
     return writer.part
 
@@ -109,11 +110,11 @@ def test_a_growing_file_is_read_at_any_moment(tmp_path):
     """Nor does closing it change what was sealed."""
     result, _, _ = circling(nt=200)
     path = tmp_path / "run.nc.part"
-    with grown(tmp_path / "run.nc", result) as writer:
-        check_seal(path)
+    with closing(grown(tmp_path / "run.nc", result)) as writer:
+        check_checksums(path)
         for first in range(0, 200, 50):
             writer.append(result.arrays.part(slice(first, first + 50)))
-            check_seal(path)
+            check_checksums(path)
             shutil.copy(path, tmp_path / "copy.nc")
             assert len(open_result(tmp_path / "copy.nc").t) == first + 50
     assert same_bits(open_result(path), result)

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from support.plain import in_another_process
 from unit.test_result import circling, model_of
 from unit.test_result_files import noisy, run, same_bits
 
-from dap3d_core.result import Result, ResultError, ResultWriter, open_result
+from dap3d_core.result import Record, Result, ResultError, ResultWriter, open_result
 from dap3d_core.result.arrays import COLUMNS, arrays_of
 from dap3d_core.result.file.schema import write_rows
 from dap3d_core.scene import load
@@ -29,8 +30,8 @@ def grown(path, result, *, most=None, force=False):
 def test_a_file_grown_in_pieces_is_that_of_the_whole(tmp_path, pieces, name):
     model = model_of(load(name))
     rows = noisy(model)
-    whole = Result(model=model, machine_of=lambda: None, rows=rows, scene_text="[scene]\n")
-    with grown(tmp_path / "run.nc", whole, most=12) as writer:
+    whole = Result.of_run(model, rows, Record(scene_text="[scene]\n"), lambda: None)
+    with closing(grown(tmp_path / "run.nc", whole, most=12)) as writer:
         first = 0
         for count in pieces:
             writer.append(arrays_of(rows[first : first + count], whole.subject))
@@ -45,7 +46,7 @@ def test_a_writer_left_with_an_error_leaves_what_it_had(tmp_path):
     writer = grown(tmp_path / "run.nc", result)
 
     def interrupted():
-        with writer:
+        with closing(writer):
             writer.append(result.arrays.part(slice(7)))
             raise KeyboardInterrupt
 
@@ -63,7 +64,7 @@ def test_a_writer_left_with_an_error_leaves_what_it_had(tmp_path):
 
 def test_a_writer_that_had_nothing_yet_leaves_no_instant(tmp_path):
     result, _, _ = circling()
-    grown(tmp_path / "run.nc", result).leave()
+    grown(tmp_path / "run.nc", result).close()
     found = open_result(tmp_path / "run.nc.part")
     assert (len(found.t), found.status) == (0, "interrupted")
     assert "nothing was reported" in found.notes[-1]
@@ -72,7 +73,7 @@ def test_a_writer_that_had_nothing_yet_leaves_no_instant(tmp_path):
 def test_an_unfinished_file_is_not_overwritten_by_the_next_run(tmp_path):
     result, _, _ = circling()
     for _ in range(2):
-        with grown(tmp_path / "run.nc", result) as writer:
+        with closing(grown(tmp_path / "run.nc", result)) as writer:
             writer.append(result.arrays)
     assert sorted(os.listdir(tmp_path)) == ["run.nc.part", "run.nc.part2"]
 
@@ -98,7 +99,7 @@ def test_adding_rows_changes_nothing_but_their_places(tmp_path):
     """So that a writer may be killed at any moment: what describes the file is never touched."""
     result, _, _ = circling(nt=200)
     path = tmp_path / "run.nc.part"
-    with grown(tmp_path / "run.nc", result) as writer:
+    with closing(grown(tmp_path / "run.nc", result)) as writer:
         writer.append(result.arrays.part(slice(1)))
         before = np.fromfile(path, dtype=np.uint8)
         writer.append(result.arrays.part(slice(1, 150)))
@@ -149,7 +150,7 @@ def test_a_killed_run_leaves_a_readable_file(tmp_path):
 def test_rows_that_did_not_reach_the_file_whole_are_left_out(tmp_path):
     """As after a kill between two variables: the time of the last instants is not there yet."""
     result, _, _ = circling()
-    with grown(tmp_path / "run.nc", result) as writer:
+    with closing(grown(tmp_path / "run.nc", result)) as writer:
         writer.append(result.arrays.part(slice(20)))
         write_rows(writer._dataset, result.arrays.part(slice(20, None)), 20)
     found = open_result(tmp_path / "run.nc.part")

@@ -1,29 +1,41 @@
-"""The arrays that a result stores; all others are computed from them."""
+"""Stored arrays of a result; all other quantities are computed from them."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.state_layout import Layout, from_integrated, row_layout, state_layout
 from dap3d_core.result.model_summary import Subject
 
+#: Components of a vector, and of Euler parameters.
+AXES = ("x", "y", "z")
+EULER = ("e0", "e1", "e2", "e3")
+#: Numbers in a block.
+BLOCK = 2**18
+#: Results of more bytes are not read as a whole, and long runs hold no more in memory.
+LARGE = 2**26
+
 
 class Column(NamedTuple):
-    """One stored array: its name, its dimension besides time ("" for none), unit and meaning."""
+    """A stored array: name, dimension besides time ("" for none), unit and meaning.
+
+    The unit is "SI" where it differs from entry to entry; the meaning lists the units.
+    """
 
     name: str
     dimension: str
     unit: str
     meaning: str
 
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """All dimensions, time first."""
+        return ("time", self.dimension) if self.dimension else ("time",)
 
-#: Numbers in a block.
-BLOCK = 2**18
 
-#: "SI" stands where the unit differs from entry to entry; the meaning says how.
 COLUMNS = (
     Column("t", "", "s", "time"),
     Column(
@@ -46,11 +58,14 @@ COLUMNS = (
     Column("acceleration_residual", "", "SI", "largest |D v_dot - gamma| of the constraint rows"),
     Column("angles", "angle", "rad", "angles of forces and joints that count whole turns"),
 )
+#: Present only where a run estimated its error (post/global_error.py).
+U_ERROR = Column(
+    "u_error", "state", "SI", "estimated global error of the state u, entry by entry; no bound"
+)
 
 
-@attrs.frozen(eq=False)
-class Arrays:
-    """What was reported, for n bodies and m constraint rows at nt instants; read-only.
+class StoredArrays(ABC):
+    """Arrays of n bodies and m constraint rows at nt instants, in memory or in a file; read-only.
 
     Attributes:
         t: (nt,) s.
@@ -60,9 +75,10 @@ class Arrays:
         work: (nt,) J, done on the system by forces and drivers.
         potential_energy: (nt,) J.
         position_residual, velocity_residual, acceleration_residual: (nt,) largest magnitude.
-        angles: (nt, k) of k angles whose turns are counted, rad, as ``Model.angles_of`` has them.
-        u_error: (nt, 13 n) estimated error of u (post/global_error.py); None where none was asked
-        for.
+        angles: (nt, k) of k angles whose turns are counted, rad, as in ``Model.angles_of``.
+        u_error: (nt, 13 n) estimated error of u; None where the run made no estimate.
+        width: numbers of u, v_dot, Lam and angles at an instant.
+        has_error: True if there is an estimate of the error of u.
     """
 
     t: Floats
@@ -75,74 +91,76 @@ class Arrays:
     velocity_residual: Floats
     acceleration_residual: Floats
     angles: Floats
-    u_error: Floats | None = None
+    u_error: Floats | None
+    width: int
+    has_error: bool
 
-    def __attrs_post_init__(self) -> None:
-        for column in COLUMNS:
-            getattr(self, column.name).flags.writeable = False
-        if self.u_error is not None:
-            self.u_error.flags.writeable = False
+    @abstractmethod
+    def __len__(self) -> int: ...
+
+    @abstractmethod
+    def part(self, rows: slice) -> "Arrays":
+        """Arrays of some of the instants; views where the arrays are in memory."""
+
+    @abstractmethod
+    def at(self, indices: Integers) -> "Arrays":
+        """Arrays at single instants, (k,) rising indices, without the estimate of the error."""
+
+    def blocks(self) -> "Iterator[Arrays]":
+        """Consecutive parts of about BLOCK numbers each."""
+        step = max(1, BLOCK // (len(COLUMNS) + self.width))
+        return (self.part(slice(first, first + step)) for first in range(0, len(self), step))
+
+    def columns(self) -> Iterator[Floats]:
+        """The arrays of ``COLUMNS``, in their order."""
+        return (getattr(self, column.name) for column in COLUMNS)
+
+    def with_error(self, u_error: Floats) -> "Arrays":
+        """The same arrays, in memory, with an estimate of the error of u."""
+        return Arrays(self.columns(), u_error)
+
+
+class Arrays(StoredArrays):
+    """Stored arrays in memory: ``columns`` in the order of ``COLUMNS``, and ``u_error``."""
+
+    def __init__(self, columns: Iterable[Floats], u_error: Floats | None = None) -> None:
+        for column, array in zip(COLUMNS, columns, strict=True):
+            array.flags.writeable = False
+            setattr(self, column.name, array)
+        self.u_error, self.has_error = u_error, u_error is not None
+        if u_error is not None:
+            u_error.flags.writeable = False
+        self.width = sum(a.shape[1] for a in (self.u, self.v_dot, self.Lam, self.angles))
 
     def __len__(self) -> int:
         return len(self.t)
 
-    @property
-    def has_error(self) -> bool:
-        """Whether there is an estimate of the error of u."""
-        return self.u_error is not None
-
     def part(self, rows: slice) -> "Arrays":
-        """The same for some of the instants; of arrays in memory these are views."""
+        """Views of some of the instants."""
         error = None if self.u_error is None else self.u_error[rows]
-        return arrays_from((getattr(self, column.name)[rows] for column in COLUMNS), error)
+        return Arrays((array[rows] for array in self.columns()), error)
 
-    def at(self, places: Integers) -> "Arrays":
-        """The same at some instants alone, (k,) places."""
-        return arrays_from(getattr(self, column.name)[places] for column in COLUMNS)
-
-    def blocks(self) -> "Iterator[Arrays]":
-        """Parts of some hundred thousand numbers each, in order: all of it in little memory."""
-        width = len(COLUMNS) + self.width
-        for rows in block_rows(len(self), width):
-            yield self.part(rows)
-
-    @property
-    def width(self) -> int:
-        """Numbers of u, v_dot, Lam and angles at an instant."""
-        return sum(a.shape[1] for a in (self.u, self.v_dot, self.Lam, self.angles))
-
-    def with_error(self, u_error: Floats) -> "Arrays":
-        """The same with an estimate of the error of u."""
-        return arrays_from((getattr(self, column.name) for column in COLUMNS), u_error)
-
-
-def arrays_from(columns: Iterable[Floats], u_error: Floats | None = None) -> Arrays:
-    """Arrays from those of ``COLUMNS``, in their order."""
-    names = (column.name for column in COLUMNS)
-    return Arrays(**dict(zip(names, columns, strict=True)), u_error=u_error)
+    def at(self, indices: Integers) -> "Arrays":
+        """Copies of single instants."""
+        return Arrays(array[indices] for array in self.columns())
 
 
 def joined(parts: Sequence[Arrays]) -> Arrays:
-    """Parts that follow on one another, as one."""
-    columns = ([getattr(part, column.name) for part in parts] for column in COLUMNS)
-    return arrays_from(np.concatenate(column) for column in columns)
-
-
-def block_rows(count: int, width: int) -> Iterator[slice]:
-    """Slices of ``count`` rows of ``width`` numbers, each of BLOCK numbers or one row."""
-    step = max(1, BLOCK // max(1, width))
-    return (slice(first, min(first + step, count)) for first in range(0, count, step))
+    """Consecutive parts as one."""
+    columns = zip(*(part.columns() for part in parts), strict=True)
+    return Arrays(np.concatenate(column) for column in columns)
 
 
 def column_sizes(subject: Subject) -> dict[str, int]:
     """Length of each dimension that a column may have besides time."""
-    n, row = subject.body_count, _layout(subject)
+    row = _layout(subject)
     sizes = {"velocity": "v_dot", "row": "Lam", "angle": "angles"}
-    return {"state": state_layout(n).size} | {k: row.length(name) for k, name in sizes.items()}
+    state = state_layout(subject.body_count).size
+    return {"state": state} | {k: row.length(name) for k, name in sizes.items()}
 
 
 def row_width(subject: Subject) -> int:
-    """Numbers in a row as the integrator delivers it."""
+    """Numbers in a row of integrator output."""
     return _layout(subject).size
 
 
@@ -161,12 +179,12 @@ def _states(y: Floats) -> Floats:
 
 
 def arrays_of(rows: Floats, subject: Subject) -> Arrays:
-    """Take apart rows as the integrator delivers them.
+    """Splits rows of integrator output into arrays.
 
     Args:
         rows: (nt, row_width): t; the integrated state (angular velocity in body axes, work last);
             v_dot; lambda; angles; potential energy; largest residuals of the three levels.
-        subject: whose rows they are.
+        subject: the model of the rows.
 
     Raises:
         ValueError: the rows have another width.
@@ -179,4 +197,4 @@ def arrays_of(rows: Floats, subject: Subject) -> Arrays:
     t, *_, work, v_dot, Lam, angles, energy, residuals = (rows[:, layout[n]] for n in layout.names)
     u = _states(rows[:, layout["coordinates"].start : layout["work"].stop])
     columns = (t[:, 0], u, v_dot, Lam, work[:, 0], energy[:, 0], *residuals.T, angles)
-    return arrays_from(np.array(column) for column in columns)
+    return Arrays(np.array(column) for column in columns)

@@ -1,4 +1,4 @@
-"""What a run left behind, in memory: stored arrays, and all that is computed from them."""
+"""Results in memory: stored arrays, and all that is computed from them."""
 
 import os
 from collections.abc import Callable, Iterable, Mapping
@@ -9,138 +9,114 @@ import attrs
 
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats
-from dap3d_core.result.arrays import COLUMNS, Arrays, arrays_of
+from dap3d_core.model.rotations import read_only
+from dap3d_core.result.arrays import Arrays, StoredArrays, arrays_of
 from dap3d_core.result.errors import ResultError, unknown
 from dap3d_core.result.event_record import Occurrence
-from dap3d_core.result.file.lazy_arrays import FileArrays
 from dap3d_core.result.metadata import Record, Statistics
 from dap3d_core.result.model_summary import Subject, subject_of
-from dap3d_core.result.post.force_output import Applied, applied
+from dap3d_core.result.post.force_output import ForceOutput, force_output
 from dap3d_core.result.post.global_error import ErrorEstimate, estimate_of
 from dap3d_core.result.post.ledger import Entry, ledger_of
 from dap3d_core.result.post.point_motion import Energy, kinetic_energy
 from dap3d_core.result.post.reactions import Reaction, jacobians, reactions
+from dap3d_core.result.quantities.catalogue import MOTION
 from dap3d_core.result.quantities.lookup import find
-from dap3d_core.result.quantities.motion_arrays import Kinematics
 
 if TYPE_CHECKING:
     import xarray
 
     from dap3d_core.formulations.evaluator import Machine
 
-#: A model, and how to get a machine that evaluates it.
+#: A model, and a function that returns an evaluator of it.
 Origin = tuple[Model, "Callable[[], Machine]"]
 #: Makes an origin from the text of a scene.
 Rebuild = Callable[[str], Origin]
 
 
 class Values(NamedTuple):
-    """Values (nt,) or (nt, components) of a quantity, what it is in words, its SI unit."""
+    """Values (nt,) or (nt, components) of a quantity, its label, its SI unit."""
 
     values: Floats
     label: str
     unit: str
 
 
-class Result(Kinematics):
-    """What a run left behind: n bodies, m constraint rows, nP points at nt instants.
+def _motion(array: str) -> cached_property[Floats]:
+    """The attribute for an array of the catalogue."""
+    motion = next(m for m in MOTION if m.array == array)
+
+    def values(result: "Result") -> Floats:
+        return read_only(motion.values(result, slice(None)))
+
+    count = "n" if motion.owner == "body" else "nP"
+    values.__doc__ = f"(nt, {count}, {len(motion.components)}) {motion.meaning}, {motion.unit}."
+    return cached_property(values)
+
+
+class Result:
+    """Result of a run: n bodies, m constraint rows, nP points at nt instants.
 
     Stored are t, u, v_dot, Lam, work and the potential energy; the other arrays of the manual's
-    post-processor (spec 10) are computed when they are first asked for. Arrays that are stored are
-    read-only. SI units; global axes except where a name ends in p (body axes).
+    post-processor (spec 10) are computed on first use. Stored arrays are read-only. SI units;
+    global axes except for names that end in p (body axes). Animation points are the last points.
 
     Attributes:
         subject: names and constants of bodies, joints and points.
-        arrays: what is stored.
-        record: what the run says of itself.
+        arrays: the stored arrays.
+        record: metadata of the run.
     """
 
+    subject: Subject
+    arrays: StoredArrays
     record: Record
 
+    r = _motion("r")
+    p = _motion("p")
+    rd = _motion("rd")
+    w = _motion("w")
+    wp = _motion("wp")
+    rdd = _motion("rdd")
+    wd = _motion("wd")
+    wpd = _motion("wpd")
+    rP = _motion("rP")
+    rPd = _motion("rPd")
+    rPdd = _motion("rPdd")
+
     def __init__(
-        self,
-        *,
-        model: Model,
-        machine_of: "Callable[[], Machine]",
-        rows: Floats,
-        scene_text: str,
-        stats: Statistics | None = None,
-        status: str = "done",
-        method: str = "",
-        integrator: str = "",
-        notes: Iterable[str] = (),
-        settings: Mapping[str, Any] | None = None,
-        versions: Mapping[str, str] | None = None,
+        self, subject: Subject, arrays: StoredArrays, record: Record, origin: Callable[[], Origin]
     ) -> None:
-        """The result of a run.
-
-        Args:
-            model: what was run.
-            machine_of: gives a machine for the Jacobian and reactions: the calling thread's.
-            rows: (nt, 1 + 13 n + 1 + 6 n + m + 4) as the integrator delivers them: t; coordinates,
-                velocities with the angular one in body axes, work; v_dot (global axes); lambda;
-                potential energy; largest |C|, |D v - nu|, |D v_dot - gamma|.
-            scene_text, stats, status, method, integrator, notes, settings, versions: as ``Record``
-                has them; versions by default those that are installed.
-
-        Raises:
-            ValueError: the rows have another width, or the status is none.
+        """Args:
+        subject, arrays, record: the parts of the result.
+        origin: returns the model and access to an evaluator when they are needed.
         """
-        subject = subject_of(model)
-        record = Record(
-            scene_text=scene_text,
-            status=status,
-            method=method,
-            integrator=integrator,
-            notes=notes,
-            settings=settings or {},
-            stats=stats or Statistics(),
-            known_versions=versions,
-        )
-        self._fill(subject, arrays_of(rows, subject), record, lambda: (model, machine_of))
+        self.subject, self.arrays, self.record = subject, arrays, record
+        self._make_origin = origin
+        self._reactions: dict[str, dict[str, Reaction]] = {}
+        self._forces: dict[str, ForceOutput] = {}
 
     @classmethod
     def of_run(
         cls, model: Model, rows: Floats, record: Record, machine_of: "Callable[[], Machine]"
     ) -> Self:
-        """The result of a run whose record is at hand; arguments as for the class itself."""
-        subject = subject_of(model)
-        return cls.of_parts(subject, arrays_of(rows, subject), record, lambda: (model, machine_of))
-
-    @classmethod
-    def of_parts(
-        cls,
-        subject: Subject,
-        arrays: Arrays | FileArrays,
-        record: Record,
-        origin: Callable[[], Origin],
-    ) -> Self:
-        """A result put together from its parts, as one from a file is.
+        """The result of a run.
 
         Args:
-            subject, arrays, record: the parts.
-            origin: gives the model and a way to a machine when one is needed.
-        """
-        result = cls.__new__(cls)
-        result._fill(subject, arrays, record, origin)
-        return result
+            model: the model that was run.
+            rows: (nt, row_width) integrator output (arrays.py).
+            record: metadata of the run.
+            machine_of: returns the evaluator of the calling thread, for the Jacobian and reactions.
 
-    def _fill(
-        self,
-        subject: Subject,
-        arrays: Arrays | FileArrays,
-        record: Record,
-        origin: Callable[[], Origin],
-    ) -> None:
-        self.subject, self.arrays, self.record = subject, arrays, record
-        self._make_origin = origin
-        self._reactions: dict[str, dict[str, Reaction]] = {}
-        self._applied: dict[str, Applied] = {}
+        Raises:
+            ValueError: the rows have another width.
+        """
+        subject = subject_of(model)
+        return cls(subject, arrays_of(rows, subject), record, lambda: (model, machine_of))
 
     def __reduce__(self) -> Any:
-        """For other processes: everything but the model and the machine."""
-        arrays = tuple(getattr(self.arrays, column.name) for column in COLUMNS)
-        return _received, (self.subject, (*arrays, self.arrays.u_error), self.record)
+        """For other processes: everything but the model and the evaluator."""
+        arrays = tuple(self.arrays.columns()), self.arrays.u_error
+        return _received, (self.subject, arrays, self.record)
 
     def __repr__(self) -> str:
         times = f", t = {self.t[0]:g} ... {self.t[-1]:g} s" if len(self.t) else ""
@@ -149,11 +125,26 @@ class Result(Kinematics):
             f"{self.subject.row_count} rows, {len(self.t)} instants{times}>"
         )
 
-    # ------------------------------------------------------------------ what is stored
+    # ------------------------------------------------------------------ stored
+
+    @property
+    def t(self) -> Floats:
+        """(nt,) reported instants, s. T of the manual."""
+        return self.arrays.t
+
+    @property
+    def u(self) -> Floats:
+        """(nt, 13 n) states: r, p, then r_dot, omega of each body; uT of the manual."""
+        return self.arrays.u
+
+    @property
+    def v_dot(self) -> Floats:
+        """(nt, 6 n) accelerations: r_ddot (m/s^2), omega_dot (rad/s^2) of each body."""
+        return self.arrays.v_dot
 
     @property
     def Lam(self) -> Floats:
-        """(nt, m) Lagrange multipliers: D^T Lam is what the joints exert."""
+        """(nt, m) Lagrange multipliers: D^T Lam are the reactions of the joints."""
         return self.arrays.Lam
 
     @property
@@ -165,7 +156,7 @@ class Result(Kinematics):
     def error(self) -> ErrorEstimate | None:
         """Estimated global error of the state: ``.r``, ``.p``, ``.rd``, ``.w``, ``.u``; no bound.
 
-        None unless asked for (``simulate(..., estimate_error=True)``) and found.
+        None unless requested (``simulate(..., estimate_error=True)``) and available.
         """
         return estimate_of(self.t, self.u, self.arrays.u_error, self.record.length)
 
@@ -186,27 +177,27 @@ class Result(Kinematics):
 
     @property
     def notes(self) -> list[str]:
-        """What the run chose, changed or noticed, in order."""
+        """Choices, changes and warnings of the run, in order."""
         return list(self.record.notes)
 
     @property
     def events(self) -> tuple[Occurrence, ...]:
-        """What happened at instants that were located, in order: switches, events of a script."""
+        """Located switches and events, in order."""
         return self.record.events
 
     @property
     def stats(self) -> Statistics:
-        """What the run cost: steps, rejected, rhs, projections, wall_time_s, compile_time_s."""
+        """Cost of the run: steps, rejected, rhs, projections, wall_time_s, compile_time_s."""
         return self.record.stats
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings as they were used."""
+        """The settings of the run."""
         return dict(self.record.settings)
 
     @property
     def versions(self) -> dict[str, str]:
-        """Versions of dap3d, numpy, llvmlite and python that made it."""
+        """Versions of dap3d, numpy, llvmlite and python in the run."""
         return dict(self.record.versions)
 
     @property
@@ -218,7 +209,7 @@ class Result(Kinematics):
 
     @property
     def model(self) -> Model:
-        """The model; of a result from a file it is made from the scene when first asked for.
+        """The model; for a result from a file it is made from the scene on first use.
 
         Raises:
             ResultError: the file was opened without a way to do so, or gives another model.
@@ -231,7 +222,7 @@ class Result(Kinematics):
 
     @property
     def machine(self) -> "Machine":
-        """What evaluates the model for the thread that asks.
+        """The evaluator of the model for the calling thread.
 
         Raises:
             ResultError: as ``model``.
@@ -249,10 +240,9 @@ class Result(Kinematics):
         return jacobians(self.machine, self.t, self.u)
 
     def reaction(self, joint: str) -> Mapping[str, Reaction]:
-        """What a joint exerts on each of its bodies: D^T lambda (spec 2).
+        """Reaction of a joint on each of its bodies, ground included: D^T lambda (spec 2).
 
-        Ground has its reaction too, from the joint's own block for it, its moment about the
-        origin. Friction that a force element adds to a joint is not part of it.
+        Friction that a force element adds to a joint is not part of it.
 
         Args:
             joint: name of the joint.
@@ -261,52 +251,50 @@ class Result(Kinematics):
             By slot ("i", "j", "k"): ``.force`` (nt, 3) N, ``.moment`` (nt, 3) N m about the body's
             mass centre, global axes; ``.force_body``, ``.moment_body`` the same in body axes;
             ``.moment_at_point`` about the joint's own point, global axes; ``.body`` its name.
+            The moment on ground is about the origin.
 
         Raises:
             UnknownNameError: there is no such joint; names the nearest.
             ResultError: as ``model``.
         """
-        place = self.subject.joint_index.get(joint)
-        if place is None:
+        if joint not in self.subject.joint_index:
             raise unknown("joint", joint, self.subject.joint_names)
-        if joint not in self._reactions:
-            self._find_reactions([place])
+        self._compute_reactions([joint])
         return dict(self._reactions[joint])
 
     def reactions(self) -> dict[str, Mapping[str, Reaction]]:
-        """The reactions of all joints by name, found in one pass; else as ``reaction``."""
-        names = self.subject.joint_names
-        self._find_reactions([k for k, name in enumerate(names) if name not in self._reactions])
-        return {name: dict(self._reactions[name]) for name in names}
+        """Reactions of all joints by name, computed in one pass; otherwise as ``reaction``."""
+        self._compute_reactions(self.subject.joint_names)
+        return {name: dict(self._reactions[name]) for name in self.subject.joint_names}
 
-    def _find_reactions(self, joints: list[int]) -> None:
-        if joints:
-            angles = self._angles()
-            found = reactions(self.machine, self.t, self.u, self.Lam, joints, angles)
-            names = self.subject.joint_names
-            self._reactions |= {names[joint]: one for joint, one in found.items()}
+    def _compute_reactions(self, names: Iterable[str]) -> None:
+        index = self.subject.joint_index
+        missing = {index[name]: name for name in names if name not in self._reactions}
+        if missing:
+            machine, angles = self.machine, self._angles()
+            by_joint = reactions(machine, self.t, self.u, self.Lam, missing, angles)
+            self._reactions |= {missing[joint]: actions for joint, actions in by_joint.items()}
 
     # ------------------------------------------------------------------ forces
 
     @cached_property
     def force_names(self) -> tuple[str, ...]:
-        """Names of the force elements, as they stand in the scene."""
+        """Names of the force elements, in the order of the scene."""
         return self.record.force_names
 
-    def force(self, name: str) -> Applied:
-        """What a force element did, its kernels evaluated again at the reported states (spec 6).
+    def force(self, name: str) -> ForceOutput:
+        """Output of a force element, evaluated at the reported states (spec 6).
 
         Args:
-            name: of an element that acts on bodies of its own (not ``weight``).
+            name: of an element that acts on given bodies (not ``weight``).
 
         Returns:
-            ``.on["i"]`` what it exerts on the body of that slot, as ``reaction`` has it;
-            ``.length``, ``.length_rate``, ``.tension`` and ``.energy``, (nt,) each, where its type
-            has them, else None.
+            ``.on["i"]`` force and moment on the body of that slot, as in ``reaction``; ``.length``,
+            ``.length_rate``, ``.tension`` and ``.energy``, (nt,) each, None if its type has none.
 
         Raises:
             UnknownNameError: there is no such force; names the nearest.
-            ResultError: as ``model``; or an event changed its numbers on the way.
+            ResultError: as ``model``; or an event changed its parameters during the run.
         """
         if name not in self.force_names:
             raise unknown("force", name, self.force_names)
@@ -315,15 +303,15 @@ class Result(Kinematics):
                 f"an event changed numbers of force {name!r} in the course of the run: it cannot "
                 "be evaluated again with those of the scene"
             )
-        if name not in self._applied:
-            place = self.model.force_names.index(name)
-            self._applied[name] = applied(
-                self.machine, self.t, self.u, self.v_dot, name, place, self._angles()
+        if name not in self._forces:
+            index = self.model.force_names.index(name)
+            self._forces[name] = force_output(
+                self.machine, self.t, self.u, self.v_dot, name, index, self._angles()
             )
-        return self._applied[name]
+        return self._forces[name]
 
     def _angles(self) -> Floats | None:
-        """(nt, k) the angles whose turns are counted; None where an older file has none of them."""
+        """(nt, k) angles with counted turns; None if an older file lacks them."""
         if self.subject.angle_count == self.model.angle_count:
             return self.arrays.angles
         note = (
@@ -335,7 +323,7 @@ class Result(Kinematics):
             self.record = attrs.evolve(self.record, notes=(*self.record.notes, note))
         return None
 
-    # ------------------------------------------------------------------ the whole
+    # ------------------------------------------------------------------ system
 
     @cached_property
     def energy(self) -> Energy:
@@ -344,38 +332,38 @@ class Result(Kinematics):
 
     @cached_property
     def ledger(self) -> dict[str, Entry]:
-        """What should be conserved or zero, and how far it is (post/ledger.py): entries by name."""
+        """Errors of conserved and vanishing quantities (post/ledger.py): entries by name."""
         return ledger_of(self.subject, self.arrays, self.record)
 
     def quantity(self, name: str) -> Values:
         """A quantity by name, such as ``crank.r.z``, ``P3.v``, ``J1.force.norm``, ``energy.total``.
 
         Args:
-            name: as quantities/lookup.py lists them.
+            name: as listed in quantities/lookup.py.
 
         Returns:
-            (values, label, unit): (nt,) or (nt, components); what it is in words; SI unit.
+            (values, label, unit): (nt,) or (nt, components); a description; SI unit.
 
         Raises:
             UnknownNameError: there is no such quantity; names the nearest.
             ResultError: reactions and forces of a result from a file, as ``model``.
         """
-        found = find(self, name)
-        return Values(found.values, found.label, found.unit)
+        quantity = find(self, name)
+        return Values(quantity.values, quantity.label, quantity.unit)
 
     def save(self, path: str | os.PathLike[str], force: bool = False) -> None:
-        """Write a NetCDF-4 file, whole or not at all; ``open_result`` reads it.
+        """Writes a NetCDF-4 file, whole or not at all; ``open_result`` reads it.
 
         Args:
             path: the file.
-            force: whether an existing file is overwritten.
+            force: True to overwrite an existing file.
 
         Raises:
             ResultError: the file cannot be written, or exists and ``force`` is off.
         """
         from dap3d_core.result.file.write import save
 
-        save(self, path, force)
+        save(self.subject, self.record, self.arrays, path, force)
 
     def to_xarray(self) -> "xarray.Dataset":
         """All arrays with named dimensions and units, as an xarray.Dataset."""
@@ -384,9 +372,9 @@ class Result(Kinematics):
         return dataset_of(self)
 
 
-def _received(subject: Subject, arrays: tuple[Any, ...], record: Record) -> Result:
+def _received(subject: Subject, arrays: tuple[Any, Any], record: Record) -> Result:
     """A result from another process."""
-    return Result.of_parts(subject, Arrays(*arrays), record, _no_origin)
+    return Result(subject, Arrays(*arrays), record, _no_origin)
 
 
 def _no_origin() -> Origin:

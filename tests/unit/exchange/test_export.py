@@ -183,7 +183,7 @@ def test_an_instant_that_is_reported_twice_has_a_rate_before_and_after(result, t
     arrays = result.arrays.at(np.array([0, 1, 1, 2]))
     u = arrays.u.copy()
     u[2, 14:17] *= -1.0  # the velocity of the first body
-    struck = dap.Result.of_parts(
+    struck = dap.Result(
         result.subject, attrs.evolve(arrays, u=u), result.record, lambda: result._origin
     )
     made = dap.export(struck, tmp_path / "a.glb")

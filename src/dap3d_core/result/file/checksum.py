@@ -1,8 +1,7 @@
-"""A seal behind the end of a result file: checksums, compared before a library reads it.
+"""Checksums at the end of a file, compared before a library reads it.
 
-HDF5 reads damaged files as it can: it may crash on them, or never end. Bytes behind the end that
-its own header names it passes over, so that other programs read a sealed file as any other; one
-that changes the file cuts them off.
+HDF5 may crash or never end on damaged files. It ignores bytes behind the end that its own header
+states, so that other programs read such a file as any other; one that changes it cuts them off.
 """
 
 import struct
@@ -11,29 +10,30 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from dap3d_core.result.errors import ResultError
-from dap3d_core.result.file.atomic_write import beginning, cannot
+from dap3d_core.result.file.atomic_write import beginning, cannot, check_utf8
 
-#: Of files with more bytes the rows are not compared, only what describes them.
+#: Of files with more bytes only the description is compared, not the rows.
 WHOLE = 2**30
 
-#: HDF5's header in the form that the NetCDF library writes: its size, and where it names the end of
-#: the file. It has a checksum of its own, and changes when a growing file is closed.
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+#: HDF5's header in the form that the NetCDF library writes: its size, and the bytes that state the
+#: end of the file. It has a checksum of its own, and changes when a growing file is closed.
 _HEADER, _END = 48, slice(28, 36)
 _FORMS = (2, 3)
 _PIECE = 2**20
 
 
-class Seal(NamedTuple):
-    """What a seal says.
+class ChecksumTrailer(NamedTuple):
+    """The last bytes of a file.
 
     Attributes:
-        magic: the word by which it is known.
-        is_whole: whether ``whole`` is known; it is not while the file grows.
-        head: checksum of what describes the file, from HDF5's header to the rows.
-        rows: where the rows begin, bytes.
-        size: of the file without the seal, bytes.
+        magic: keyword of the trailer.
+        is_whole: 1 if ``whole`` is known; 0 while the file grows.
+        head: checksum of the description of the file, from HDF5's header to the rows.
+        rows: offset of the rows, bytes.
+        size: of the file without the trailer, bytes.
         whole: checksum of all of it.
-        own: checksum of the seal up to here.
+        own: checksum of the trailer up to here.
     """
 
     magic: bytes
@@ -49,13 +49,30 @@ _MAGIC = b"dap3dsum"
 _LAYOUT = struct.Struct("<8sIIQQII")
 
 
-def write_seal(file: Path, rows: int, *, is_whole: bool) -> None:
-    """Seal a file.
+def check_signature(file: Path, kind: str = "result") -> None:
+    """Refuses a file without the signature of HDF5.
 
     Args:
-        file: one that is complete, or one that grows and whose rows have their places.
-        rows: where they begin, bytes: of a file beyond ``WHOLE`` what lies before is compared.
-        is_whole: whether it is complete.
+        file: its path.
+        kind: what was expected, for the error.
+
+    Raises:
+        ResultError: there is no such file, it cannot be read, or is of another format.
+    """
+    check_utf8("read", file)
+    begin = beginning(file, len(_SIGNATURE))
+    if begin != _SIGNATURE:
+        fault = "it is not a NetCDF-4 file" if begin else "the file is empty"
+        raise ResultError(f"cannot read {file}: {fault}, so no {kind} of dap3d")
+
+
+def write_checksums(file: Path, rows: int, *, is_whole: bool) -> None:
+    """Appends the trailer to a file.
+
+    Args:
+        file: complete, or growing with all its rows allocated.
+        rows: their offset, bytes: of a file beyond ``WHOLE`` what lies before is compared.
+        is_whole: True if it is complete.
 
     Raises:
         OSError: the system refuses.
@@ -65,13 +82,13 @@ def write_seal(file: Path, rows: int, *, is_whole: bool) -> None:
         rows = min(rows, size)
         head = _checksum(stream, _HEADER, rows)
         whole = _checksum(stream, 0, size) if is_whole else 0
-        said = _LAYOUT.pack(_MAGIC, is_whole, head, rows, size, whole, 0)[:-4]
+        trailer = _LAYOUT.pack(_MAGIC, is_whole, head, rows, size, whole, 0)[:-4]
         stream.seek(size)
-        stream.write(said + struct.pack("<I", zlib.crc32(said)))
+        stream.write(trailer + struct.pack("<I", zlib.crc32(trailer)))
 
 
-def check_seal(file: Path) -> None:
-    """Whether a file is as it was sealed. One without a seal, of an older program, passes.
+def check_checksums(file: Path) -> None:
+    """Refuses a file that differs from its checksums. Older files without a trailer pass.
 
     Args:
         file: has the signature of HDF5.
@@ -86,45 +103,45 @@ def check_seal(file: Path) -> None:
             stream.seek(max(0, size - _LAYOUT.size))
             end = stream.read()
             if end.startswith(_MAGIC):
-                fault = _broken(stream, end, size - len(end))
+                fault = _mismatch(stream, end, size - len(end))
             else:
-                fault = _unsealed(begin, size)
+                fault = _wrong_size(begin, size)
     except OSError as error:
         raise cannot("read", file, error) from error
     if fault:
         raise ResultError(f"cannot read {file}: {fault}; take another copy of it, or run again")
 
 
-def _broken(stream: BinaryIO, end: bytes, size: int) -> str:
-    """What is wrong with a sealed file, in words."""
-    seal = Seal._make(_LAYOUT.unpack(end))
-    same = zlib.crc32(end[:-4]) == seal.own and seal.size == size
-    if same and seal.is_whole and size <= WHOLE:
-        same = _checksum(stream, 0, size) == seal.whole
+def _mismatch(stream: BinaryIO, end: bytes, size: int) -> str:
+    """The fault of a file with a trailer, or ""."""
+    trailer = ChecksumTrailer._make(_LAYOUT.unpack(end))
+    same = zlib.crc32(end[:-4]) == trailer.own and trailer.size == size
+    if same and trailer.is_whole and size <= WHOLE:
+        same = _checksum(stream, 0, size) == trailer.whole
     elif same:
-        same = _checksum(stream, _HEADER, seal.rows) == seal.head
+        same = _checksum(stream, _HEADER, trailer.rows) == trailer.head
     return "" if same else "it is damaged: its checksum is not the one it was written with"
 
 
-def _unsealed(begin: bytes, size: int) -> str:
-    """What is wrong with the size of a file that ends without a seal, in words."""
+def _wrong_size(begin: bytes, size: int) -> str:
+    """The fault of a file without a trailer, or ""."""
     if len(begin) < _HEADER:
         return f"it is cut off: only {size} bytes are there"
     if begin[8] not in _FORMS:
-        return ""  # another program wrote it, or HDF5 will say that its header is damaged
-    named = int.from_bytes(begin[_END], "little")
-    if size == named:
+        return ""  # another program wrote it, or HDF5 reports a damaged header
+    stated = int.from_bytes(begin[_END], "little")
+    if size == stated:
         return ""
-    if size < named + _LAYOUT.size:
-        return f"it is cut off, or damaged: {size} of {named + _LAYOUT.size} bytes are there"
-    return f"it is damaged: the {size - named} bytes behind its end are not those that dap3d writes"
+    if size < stated + _LAYOUT.size:
+        return f"it is cut off, or damaged: {size} of {stated + _LAYOUT.size} bytes are there"
+    return f"it is damaged: the {size - stated} bytes behind its end are not those of dap3d"
 
 
 def _checksum(stream: BinaryIO, first: int, last: int) -> int:
-    """The checksum (CRC-32) of some bytes of a file, as many as there are of them."""
+    """CRC-32 of bytes ``first`` to ``last`` of a file, as far as they exist."""
     stream.seek(first)
-    found, left = 0, last - first
+    value, left = 0, last - first
     while left > 0 and (piece := stream.read(min(left, _PIECE))):
-        found = zlib.crc32(piece, found)
+        value = zlib.crc32(piece, value)
         left -= len(piece)
-    return found
+    return value

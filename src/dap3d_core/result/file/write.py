@@ -1,15 +1,14 @@
-"""Writing results to NetCDF-4 files: whole, or growing with the run."""
+"""Writing of NetCDF-4 files: results as a whole, and files that grow with a run or a sweep."""
 
 import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import Any
 
 import attrs
 
-from dap3d_core.result.arrays import Arrays
+from dap3d_core.result.arrays import Arrays, StoredArrays
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.atomic_write import (
     check_target,
@@ -19,160 +18,186 @@ from dap3d_core.result.file.atomic_write import (
     synchronise,
     whole_file,
 )
-from dap3d_core.result.file.checksum import write_seal
-from dap3d_core.result.file.library import NETCDF, guarded
-from dap3d_core.result.file.schema import define, take_places, write_rows, write_times
+from dap3d_core.result.file.checksum import write_checksums
+from dap3d_core.result.file.library import NETCDF, created, guarded, opened
+from dap3d_core.result.file.schema import allocate_rows, define, write_rows, write_times
 from dap3d_core.result.metadata import RUNNING, Record
-
-if TYPE_CHECKING:
-    from dap3d_core.result.model_summary import Subject
-    from dap3d_core.result.result import Result
+from dap3d_core.result.model_summary import Subject
 
 
-def save(result: "Result", path: str | os.PathLike[str], force: bool = False) -> None:
-    """Write a result to a file, whole or not at all, block by block.
+def save(
+    subject: Subject,
+    record: Record,
+    arrays: StoredArrays,
+    path: str | os.PathLike[str],
+    force: bool = False,
+) -> None:
+    """Writes a result to a file, whole or not at all, block by block.
 
     Raises:
         ResultError: the file cannot be written, or exists and ``force`` is off.
     """
     check_utf8("write", path)
-    arrays = result.arrays
-    # killed now it leaves nothing that is called a part and is none
-    with whole_file(path, force) as part, NETCDF:
-        dataset = guarded(Path(path), lambda: _opened(part))
+    target = Path(path)
+    with whole_file(path, force) as part:
+        with created(part, target) as dataset:
 
-        def write() -> int:
-            nt = len(arrays)
-            rows = define(dataset, result.subject, result.record, nt, with_error=arrays.has_error)
-            first = 0
-            for block in arrays.blocks():
-                write_rows(dataset, block, first)
-                write_times(dataset, block, first)
-                first += len(block)
-            return rows
+            def write() -> int:
+                rows = define(dataset, subject, record, len(arrays), with_error=arrays.has_error)
+                first = 0
+                for block in arrays.blocks():
+                    write_rows(dataset, block, first)
+                    write_times(dataset, block, first)
+                    first += len(block)
+                return rows
 
-        try:
-            rows = guarded(Path(path), write)
-        finally:
-            guarded(Path(path), dataset.close)
-        guarded(Path(path), lambda: write_seal(part, rows, is_whole=True))
+            rows = guarded(target, write)
+        guarded(target, lambda: write_checksums(part, rows, is_whole=True))
 
 
-class ResultWriter:
-    """A result file that grows with the run: a killed run leaves what it had reported.
+class GrowingFile:
+    """A NetCDF-4 file ``NAME.part`` that grows with a computation, readable at any moment.
 
-    Its places are fixed from the start (layout.take_places), so that it is whole at any moment. As
-    a context manager it closes the file at the end of the block.
+    All numbers have fixed locations from the start, and a mark (time, status) is written after the
+    values that it stands for: a killed process leaves what it had written.
 
     Attributes:
-        path: the result file that is wanted in the end, which ``save`` makes.
-        part: the file that grows, ``NAME.part`` in the same folder.
+        target: the requested file.
+        part: the file that grows, in the same folder.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], force: bool) -> None:
+        check_utf8("write", path)
+        self.target = check_target(path, force)
+        self.part = self.target.with_name(f"{self.target.name}.part")
+
+    def _create(
+        self,
+        definition: Callable[[Any], Any],
+        completion: Callable[[Path, Any], None] = lambda new, value: None,
+    ) -> Path:
+        """Creates the file under a temporary name and names it ``NAME.part`` or the next free.
+
+        Killed meanwhile it leaves no half-defined part.
+
+        Args:
+            definition: defines the data set.
+            completion: receives the path of the closed file, and what ``definition`` returned.
+        """
+        new = reserve(self.target)
+        try:
+            with created(new, self.target) as dataset:
+                value = guarded(self.target, lambda: definition(dataset))
+            completion(new, value)
+            return named_part(new, self.target)
+        except BaseException:
+            new.unlink(missing_ok=True)
+            raise
+
+    def _append(
+        self, dataset: Any, values: Callable[[], None], marks: Callable[[], None], *, durable: bool
+    ) -> None:
+        """Writes values, then their marks, and hands both to the system, or to the disk."""
+
+        def flush() -> None:
+            dataset.sync()
+            if durable:
+                synchronise(self.part)
+
+        guarded(self.part, values, flush, marks, flush)
+
+
+class ResultWriter(GrowingFile):
+    """A result file that grows with the run.
+
+    ``save`` writes the final file anew: its times may be fewer, its attributes longer, and a
+    process killed while those of the part are changed would lose all rows.
+
+    Attributes:
         count: rows written so far.
     """
 
     def __init__(
         self,
         path: str | os.PathLike[str],
-        subject: "Subject",
+        subject: Subject,
         record: Record,
         most: int,
         *,
         force: bool = False,
     ) -> None:
-        """Make the file and write all but the rows.
+        """Creates the file and writes all but the rows.
 
         Args:
-            path: the file that is wanted in the end.
-            subject: whose rows will come.
-            record: what is known of the run as it starts; its status is not used.
-            most: how many rows will come at most.
-            force: whether ``path`` may exist.
+            path: the requested file.
+            subject: model of the rows.
+            record: metadata at the start of the run; its status is ignored.
+            most: largest number of rows.
+            force: True if ``path`` may exist.
 
         Raises:
             ResultError: the file cannot be written, or exists and ``force`` is off.
         """
-        self.path = check_target(path, force)
-        self.part = reserve(self.path)  # killed now it leaves nothing that is half a part
+        super().__init__(path, force)
         self.count = 0
         self._dataset: Any = None
         started = attrs.evolve(record, status=RUNNING)
-        try:
-            with NETCDF:
-                self._dataset = guarded(self.path, lambda: _opened(self.part))
-                rows = self._do(lambda: define(self._dataset, subject, started, most))
-                self.leave()  # what describes the file lies before the rows and is not shared
-                self._dataset = guarded(self.path, lambda: _opened(self.part, "r+"))
-                self._do(lambda: take_places(self._dataset), self._sync)
-                if most:
-                    guarded(self.path, lambda: write_seal(self.part, rows, is_whole=False))
-            self.part = named_part(self.part, self.path)
-        except BaseException:
-            self.discard()
-            raise
 
-    def append(self, arrays: Arrays) -> None:
-        """Write what was reported, and hand it to the system.
+        def allocate(new: Path, rows: int) -> None:
+            # opened again, so that the description of the file shares no block with the rows
+            self._dataset = guarded(self.target, lambda: opened(new, "r+"))
+            guarded(self.target, lambda: allocate_rows(self._dataset), self._dataset.sync)
+            if most:
+                guarded(self.target, lambda: write_checksums(new, rows, is_whole=False))
 
-        Raises:
-            ResultError: it cannot be written. The writer is then closed: the part holds what
-                came before, and takes no later rows, which would leave a gap.
-        """
         with NETCDF:
             try:
-                self._do(
+                self.part = self._create(lambda d: define(d, subject, started, most), allocate)
+            except BaseException:
+                with suppress(ResultError):
+                    self.close()
+                raise
+
+    def append(self, arrays: Arrays) -> None:
+        """Writes rows, and hands them to the system.
+
+        Raises:
+            ResultError: they cannot be written. The writer is then closed: the part holds the
+                earlier rows, and accepts no later ones, which would leave a gap.
+        """
+        if self._dataset is None:
+            raise ResultError(f"cannot write {self.target}: the writer is closed")
+        with NETCDF:
+            try:
+                self._append(
+                    self._dataset,
                     lambda: write_rows(self._dataset, arrays, self.count),
-                    self._sync,
                     lambda: write_times(self._dataset, arrays, self.count),
-                    self._sync,
+                    durable=False,
                 )
             except ResultError:
                 with suppress(ResultError):
-                    self.leave()
+                    self.close()
                 raise
         self.count += len(arrays)
 
     def to_disk(self) -> None:
-        """Wait until all rows are on the disk, so that they outlast a loss of power.
+        """Waits until all rows are on the disk, so that they outlast a loss of power.
 
         Raises:
             ResultError: the system refuses.
         """
         guarded(self.part, lambda: synchronise(self.part))
 
-    def leave(self) -> None:
-        """Close the part as it is."""
+    def close(self) -> None:
+        """Closes the part."""
         with NETCDF:
             dataset, self._dataset = self._dataset, None
             if dataset is not None:
                 guarded(self.part, dataset.close)
 
     def discard(self) -> None:
-        """Close the part and remove it."""
+        """Closes the part and removes it."""
         with suppress(ResultError):
-            self.leave()
+            self.close()
         self.part.unlink(missing_ok=True)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.leave()
-
-    def _sync(self) -> None:
-        self._dataset.sync()
-
-    def _do(self, *actions: Callable[[], object]) -> Any:
-        if self._dataset is None:
-            raise ResultError(f"cannot write {self.path}: the writer is closed")
-        return guarded(self.part, *actions)
-
-
-def _opened(path: Path, mode: Literal["w", "r+"] = "w") -> Any:
-    import netCDF4
-
-    return netCDF4.Dataset(os.path.abspath(path), mode, format="NETCDF4")

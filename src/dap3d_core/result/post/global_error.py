@@ -1,8 +1,8 @@
-"""The estimate of a result's global error: how far a second, finer run of the same scene is away.
+"""Estimate of a result's global error: its difference from a second, finer run of the scene.
 
 A run at tolerances ten times tighter (or half the step) has an error several times smaller, so the
-difference of the two is the error of the coarser one, but for that smaller part. It is an estimate
-and no bound: where both runs go the same wrong way, in a model or past an event, it shows nothing.
+difference of the two is the error of the coarser one, up to that smaller part. It is an estimate,
+not a bound: it does not see an error that both runs have, in a model or past an event.
 """
 
 import attrs
@@ -10,21 +10,15 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.state_layout import split
-from dap3d_core.result.arrays import Column
 
-#: The optional array of a result, as ``COLUMNS`` has the others.
-U_ERROR = Column(
-    "u_error", "state", "SI", "estimated global error of the state u, entry by entry; no bound"
-)
 #: The parts of a state by their symbols, with their units.
 PARTS = {"r": "m", "p": "1", "rd": "m/s", "w": "rad/s"}
-#: A state means nothing any more where its error is beyond this part of its size.
+#: A state is meaningless where its error exceeds this fraction of its size.
 MEANINGLESS = 1e-3
-#: Errors grow exponentially, and not with a power of time, where that line fits them better, over
-#: this many instants and this many powers of ten at least.
+#: Least number of instants, and of powers of ten, for exponential growth.
 FEWEST, DECADES = 10, 3.0
-#: Sizes below this part of the scene's are taken for that: of its length, of 1, and of the speeds
-#: that move a body by its length, or turn it by 1 rad, in the whole run.
+#: Least sizes, as a fraction of the scene's: of its length, of 1, and of the speeds that cover
+#: those in the whole run.
 SMALLEST_PART = 1e-3
 
 
@@ -36,7 +30,7 @@ class ErrorEstimate:
         t: (nt,) reported instants, s.
         u: (nt, 13 n) errors of the state, none negative, in its order and units.
         size: the largest magnitude over bodies and instants of r (m), p, rd (m/s), w (rad/s).
-        length: m, that tolerances of the scene speak of.
+        length: m, that tolerances of the scene refer to.
     """
 
     t: Floats
@@ -71,28 +65,27 @@ class ErrorEstimate:
 
     @property
     def meaningless_from(self) -> float | None:
-        """The first instant, s, at which an error is beyond 1e-3 of the size of what it belongs to.
+        """First instant, s, at which an error exceeds 1e-3 of the size of its quantity, else None.
 
-        Sizes below 1e-3 of the scene's (``least_sizes``) count as that. None where no error is.
+        Sizes are at least 1e-3 of the scene's (``least_sizes``).
         """
-        lost = self.relative > MEANINGLESS
-        return float(self.t[np.argmax(lost)]) if lost.any() else None
+        beyond = self.relative > MEANINGLESS
+        return float(self.t[np.argmax(beyond)]) if beyond.any() else None
 
     @property
     def relative(self) -> Floats:
-        """(nt,) the largest error at each instant, as a part of the size of what it belongs to."""
+        """(nt,) largest error at each instant, relative to the size of its quantity."""
         least = least_sizes(self.t, self.length)
         parts = [norms / max(self.size[name], least[name]) for name, norms in self._norms().items()]
-        found: Floats = np.max(parts, axis=0, initial=0.0)
-        return found
+        return np.asarray(np.max(parts, axis=0, initial=0.0))
 
     @property
     def tenfold(self) -> float | None:
-        """The time, s, in which the error grows tenfold, where it grows exponentially, else None.
+        """Time, s, in which the error grows tenfold if it grows exponentially, else None.
 
-        The slope of its logarithm over the instants before ``meaningless_from``; beyond, an error
-        is as large as the motion and grows no more. None as well where log(t) fits it better than
-        t: the errors of a motion that is no chaos grow with a power of time.
+        From the slope of its logarithm over the instants before ``meaningless_from``; beyond, an
+        error is as large as the motion and stops growing. None also if log(t) fits it better than
+        t: without chaos errors grow with a power of time.
         """
         relative, end = self.relative, self.meaningless_from
         chosen = (self.t > self.t[0]) & (relative > 0.0)
@@ -101,8 +94,8 @@ class ErrorEstimate:
         if np.count_nonzero(chosen) < FEWEST:
             return None
         elapsed, digits = self.t[chosen] - self.t[0], np.log10(relative[chosen])
-        slope, missed = _line(elapsed, digits)
-        if slope * elapsed[-1] < DECADES or missed >= _line(np.log10(elapsed), digits)[1]:
+        slope, residual = _line(elapsed, digits)
+        if slope * elapsed[-1] < DECADES or residual >= _line(np.log10(elapsed), digits)[1]:
             return None
         return 1.0 / slope
 
@@ -115,7 +108,7 @@ class ErrorEstimate:
 
 
 def _line(x: Floats, y: Floats) -> tuple[float, float]:
-    """Slope of the straight line through points, and the sum of squares that it misses."""
+    """Slope of the regression line through points, and its sum of squared residuals."""
     dx, dy = x - x.mean(), y - y.mean()
     slope = float(dx @ dy / (dx @ dx))
     return slope, float(np.sum((dy - slope * dx) ** 2))
@@ -136,9 +129,9 @@ def sizes_of(u: Floats) -> dict[str, float]:
 
 
 def least_sizes(t: Floats, length: float) -> dict[str, float]:
-    """By symbol r, p, rd, w: below which a magnitude in a run over instants t is as good as zero.
+    """By symbol r, p, rd, w: sizes in a run over instants t below which a magnitude counts as zero.
 
-    A part of the scene's length, m, of a unit vector, and of the speeds that make those in the run.
+    Fractions of the length, m, of a unit vector, and of the speeds that cover those in the run.
     """
     duration = float(t[-1] - t[0]) if len(t) else 0.0
     rate = 1.0 / duration if duration > 0.0 else np.inf
@@ -149,12 +142,12 @@ def least_sizes(t: Floats, length: float) -> dict[str, float]:
 def estimate_of(
     t: Floats, u: Floats, u_error: Floats | None, length: float
 ) -> ErrorEstimate | None:
-    """The estimate of a result's arrays; None where none was asked for."""
+    """The estimate of a result's arrays; None if there is none."""
     return None if u_error is None else ErrorEstimate(t, u_error, sizes_of(u), length)
 
 
 def difference(u: Floats, other: Floats) -> Floats:
-    """State u less another one of the same bodies, Euler parameters with the sign that is nearer.
+    """State u minus another one of the same bodies, Euler parameters with the closer sign.
 
     Args:
         u, other: (nt, 13 n) each.
@@ -162,18 +155,18 @@ def difference(u: Floats, other: Floats) -> Floats:
     Returns:
         (nt, 13 n), a new array.
     """
-    found = u - other
+    apart = u - other
     p, q = split(u)[1], split(other)[1]
     opposite = np.einsum("tbe,tbe->tb", p, q) < 0.0
-    split(found)[1][opposite] = (p + q)[opposite]
-    return found
+    split(apart)[1][opposite] = (p + q)[opposite]
+    return apart
 
 
 def estimated_error(u: Floats, finer: Floats, step_count: int) -> Floats:
-    """|u - finer| at each instant and its neighbours, the larger; at least what rounding comes to.
+    """Largest |u - finer| of each instant and its neighbours, at least the rounding error.
 
-    The difference changes its sign now and then, which says nothing of the error there. A rounding
-    error of each step, random in sign, adds up to the root of their number.
+    Neighbours, because the difference passes through zero where the error does not vanish. Rounding
+    errors of steps, random in sign, add up to the root of the number of steps.
 
     Args:
         u: (nt, 13 n) states of a run.

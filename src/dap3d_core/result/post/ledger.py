@@ -10,11 +10,11 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.result.arrays import Arrays
-from dap3d_core.result.file.lazy_arrays import FileArrays
+from dap3d_core.model.state_layout import split, velocities_of
+from dap3d_core.result.arrays import Arrays, StoredArrays
 from dap3d_core.result.metadata import Record
 from dap3d_core.result.model_summary import Subject
-from dap3d_core.result.post.ledger_series import Course, course_of
+from dap3d_core.result.post.point_motion import kinetic_energy, momentum
 
 #: How many steps' worth of error a run may gather.
 LOOSE = 1e3
@@ -58,12 +58,83 @@ def _entry(value: float, limit: float | None, unit: str, text: str) -> Entry:
     return Entry(value, limit, None if limit is None else bool(value <= limit), unit, text)
 
 
+@attrs.frozen(eq=False, kw_only=True)
+class LedgerSeries:
+    """Time series that the ledger is computed from, at nt instants.
+
+    Attributes:
+        t, work, potential_energy, position_residual, velocity_residual, acceleration_residual:
+            (nt,) as in ``Arrays``.
+        kinetic: (nt,) kinetic energy, J.
+        speed, spin: (nt,) sums over the bodies of m |r_dot|, kg m/s, and of |J| |omega|, kg m^2/s.
+        off_unit: (nt,) largest deviation of Euler parameters from unit length.
+        reaction: (nt,) sum of the magnitudes of all multipliers, SI.
+        far, orbit: (nt,) sums of m |r|, kg m, and of m |r| |r_dot|, kg m^2/s.
+        linear, angular: (nt, 3) momenta, kg m/s, kg m^2/s about the origin.
+        sizes: largest magnitude of a coordinate, a velocity and an acceleration, those of angles
+            times the length that tolerances refer to (m, m/s, m/s^2).
+
+    ``far``, ``orbit``, ``linear`` and ``angular`` only of an isolated system, else (0,).
+    """
+
+    t: Floats
+    work: Floats
+    potential_energy: Floats
+    position_residual: Floats
+    velocity_residual: Floats
+    acceleration_residual: Floats
+    kinetic: Floats
+    speed: Floats
+    spin: Floats
+    off_unit: Floats
+    reaction: Floats
+    far: Floats = attrs.Factory(lambda: np.zeros(0))
+    orbit: Floats = attrs.Factory(lambda: np.zeros(0))
+    linear: Floats = attrs.Factory(lambda: np.zeros(0))
+    angular: Floats = attrs.Factory(lambda: np.zeros(0))
+    sizes: list[float]
+
+    @classmethod
+    def of(cls, subject: Subject, arrays: StoredArrays, length: float) -> "LedgerSeries":
+        """The series of a run, computed block by block in little memory."""
+        blocks, sizes = [], np.zeros(3)
+        for block in arrays.blocks():
+            blocks.append(_series(subject, block))
+            arms = np.tile(np.repeat([1.0, length], 3), subject.body_count)
+            sized = (split(block.u)[0], arms * velocities_of(block.u), arms * block.v_dot)
+            sizes = np.maximum(sizes, [_largest(a) for a in sized])
+        series = {name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]}
+        return cls(**series, sizes=sizes.tolist())
+
+
+def _series(subject: Subject, block: Arrays) -> dict[str, Floats]:
+    """Series of a block of instants by name."""
+    r, p, rd, w = split(block.u)
+    fast = np.linalg.norm(rd, axis=2)
+    inertia = np.linalg.norm(subject.Jp, ord=2, axis=(1, 2))
+    off = np.abs(np.linalg.norm(p, axis=2) - 1.0)
+    residuals = ("position_residual", "velocity_residual", "acceleration_residual")
+    series = {name: getattr(block, name) for name in ("t", "work", "potential_energy", *residuals)}
+    series |= {
+        "kinetic": kinetic_energy(subject, block.u),
+        "speed": fast @ subject.mass,
+        "spin": np.linalg.norm(w, axis=2) @ inertia,
+        "off_unit": off.max(axis=1, initial=0.0),
+        "reaction": np.abs(block.Lam).sum(axis=1),
+    }
+    if subject.is_isolated:
+        far = np.linalg.norm(r, axis=2)
+        series |= {"far": far @ subject.mass, "orbit": (far * fast) @ subject.mass}
+        series |= dict(zip(("linear", "angular"), momentum(subject, block.u), strict=True))
+    return series
+
+
 #: Work of dampers and drivers below this part of all work is taken for an error of integration,
 #: where the elements of the scene do no such work.
 CONSERVATIVE = 1e-3
 
 
-def ledger_of(subject: Subject, arrays: Arrays | FileArrays, record: Record) -> dict[str, Entry]:
+def ledger_of(subject: Subject, arrays: StoredArrays, record: Record) -> dict[str, Entry]:
     """All entries of a run, by name; none for a run without reported instants.
 
     Names: energy; total energy (where potentials alone do work); momentum (where nothing
@@ -71,7 +142,7 @@ def ledger_of(subject: Subject, arrays: Arrays | FileArrays, record: Record) -> 
     """
     if not len(arrays):
         return {}
-    course = course_of(subject, arrays, record.length)
+    course = LedgerSeries.of(subject, arrays, record.length)
     entries = {"energy": _energy(subject, course, record)}
     if subject.has_potential and _is_conservative(subject, course, record):
         entries["total energy"] = _total_energy(subject, course, record)
@@ -96,7 +167,7 @@ def _floors(record: Record) -> dict[str, float]:
     return {name: atol / control[0] for name, atol in control[1].items()}
 
 
-def _energy_scale(subject: Subject, course: Course, record: Record) -> float:
+def _energy_scale(subject: Subject, course: LedgerSeries, record: Record) -> float:
     """What an imbalance of energy is compared with, J: the largest kinetic energy or work.
 
     Below a speed of atol / rtol error control is absolute: an error atol of the speed v is one of
@@ -123,7 +194,7 @@ def _inertia(subject: Subject) -> float:
     return float(np.linalg.norm(subject.Jp, ord=2, axis=(1, 2)).sum())
 
 
-def _energy(subject: Subject, course: Course, record: Record) -> Entry:
+def _energy(subject: Subject, course: LedgerSeries, record: Record) -> Entry:
     """Kinetic energy against the work done by forces and drivers, dampers included."""
     kinetic, work = course.kinetic, course.work
     worst, when = _worst((kinetic - kinetic[0]) - (work - work[0]), course.t)
@@ -135,7 +206,7 @@ def _energy(subject: Subject, course: Course, record: Record) -> Entry:
     return _entry(worst / scale, _relative_limit(record), "1", text)
 
 
-def _is_conservative(subject: Subject, course: Course, record: Record) -> bool:
+def _is_conservative(subject: Subject, course: LedgerSeries, record: Record) -> bool:
     """Whether potentials account for all work: by what the elements are, and as measured.
 
     As measured, because a damper may act only where bodies touch.
@@ -146,7 +217,7 @@ def _is_conservative(subject: Subject, course: Course, record: Record) -> bool:
     return little and bool(record.settings.get("conservative"))
 
 
-def _total_energy(subject: Subject, course: Course, record: Record) -> Entry:
+def _total_energy(subject: Subject, course: LedgerSeries, record: Record) -> Entry:
     """Change of kinetic and potential energy together: zero where potentials alone do work."""
     total = course.kinetic + course.potential_energy
     worst, when = _worst(total - total[0], course.t)
@@ -158,7 +229,7 @@ def _total_energy(subject: Subject, course: Course, record: Record) -> Entry:
     return _entry(worst / scale, _relative_limit(record), "1", text)
 
 
-def _momentum(subject: Subject, course: Course, record: Record) -> Entry:
+def _momentum(subject: Subject, course: LedgerSeries, record: Record) -> Entry:
     """Drift of linear and angular momentum, relative to the momenta of the bodies added up."""
     floors = _floors(record)
     far = floors["v"] * course.far + floors["r"] * course.speed
@@ -177,7 +248,7 @@ def _momentum(subject: Subject, course: Course, record: Record) -> Entry:
     return _entry(float(np.max(drifts)), _relative_limit(record), "1", text)
 
 
-def _constraints(subject: Subject, course: Course, record: Record) -> dict[str, Entry]:
+def _constraints(subject: Subject, course: LedgerSeries, record: Record) -> dict[str, Entry]:
     """Largest residuals of the constraints at the three levels.
 
     Position and velocity: with projection as far as a projection may leave them, else what errors
@@ -231,7 +302,7 @@ def _state_limit(record: Record, size: float, quantity: str) -> float:
     return FIXED * size if control is None else LOOSE * (control[0] * size + control[1][quantity])
 
 
-def _quaternion(course: Course, record: Record) -> Entry:
+def _quaternion(course: LedgerSeries, record: Record) -> Entry:
     """Euler parameters are normalised by projection; without it their length drifts."""
     worst, when = _worst(course.off_unit, course.t)
     limit = UNIT_LENGTH if record.projected else _state_limit(record, 1.0, "p")

@@ -15,16 +15,8 @@ def accelerations(v_dot: Floats) -> tuple[Floats, Floats]:
     return a[..., :3], a[..., 3:]
 
 
-def point_motion(
-    subject: Subject, u: Floats, v_dot: Floats, points: Integers, level: int
-) -> Floats:
-    """Position, velocity or acceleration of points of a subject, (nt, k, 3), global axes.
-
-    Args:
-        subject: whose points.
-        u, v_dot, level: as ``motion_of`` has them.
-        points: (k,) places of the points.
-    """
+def point_motion(subject: Subject, u: Floats, v_dot: Floats, points: slice, level: int) -> Floats:
+    """``motion_of`` points of a model, (nt, k, 3)."""
     return motion_of(subject.point_body[points], subject.point_local[points], u, v_dot, level)
 
 
@@ -35,13 +27,13 @@ def motion_of(body: Integers, local: Floats, u: Floats, v_dot: Floats, level: in
 
     Args:
         body: (k,) body of each point, 0 for ground.
-        local: (k, 3) place of each in the axes of its body, m.
+        local: (k, 3) coordinates of each in the axes of its body, m.
         u: (nt, 13 n) states.
         v_dot: (nt, 6 n) accelerations.
         level: 0 position (m), 1 velocity (m/s), 2 acceleration (m/s^2).
 
     Returns:
-        (nt, k, 3). Points of the ground stand still.
+        (nt, k, 3).
     """
     out = np.zeros((len(u), len(body), 3))
     moving = body > 0
@@ -55,8 +47,8 @@ def motion_of(body: Integers, local: Floats, u: Floats, v_dot: Floats, level: in
         out[:, moving] = rd[:, b] + np.cross(w[:, b], s)
     else:
         rdd, wd = accelerations(v_dot)
-        turning = np.cross(w[:, b], np.cross(w[:, b], s))
-        out[:, moving] = rdd[:, b] + np.cross(wd[:, b], s) + turning
+        centripetal = np.cross(w[:, b], np.cross(w[:, b], s))
+        out[:, moving] = rdd[:, b] + np.cross(wd[:, b], s) + centripetal
     return out
 
 
@@ -74,7 +66,7 @@ class Energy:
 
     @property
     def total(self) -> Floats:
-        """(nt,) kinetic and potential energy together, J."""
+        """(nt,) sum of kinetic and potential energy, J."""
         return self.kinetic + self.potential
 
 
@@ -82,9 +74,9 @@ def kinetic_energy(subject: Subject, u: Floats) -> Floats:
     """(nt,) kinetic energy, J: sum of m |r_dot|^2 / 2 and omega' . J' omega' / 2."""
     _, p, rd, w = split(u)
     wp = to_body(p, w)
-    sliding = np.einsum("b,tbc,tbc->t", subject.mass, rd, rd)
-    turning = np.einsum("tbc,bcd,tbd->t", wp, subject.Jp, wp)
-    return np.asarray(0.5 * (sliding + turning))
+    translation = np.einsum("b,tbc,tbc->t", subject.mass, rd, rd)
+    rotation = np.einsum("tbc,bcd,tbd->t", wp, subject.Jp, wp)
+    return np.asarray(0.5 * (translation + rotation))
 
 
 def momentum(subject: Subject, u: Floats) -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""What joints do to bodies, and the Jacobian: evaluated again at reported states (spec 2, 10)."""
+"""Reactions of joints and the Jacobian, evaluated at reported states (spec 2, 10)."""
 
 from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING, Any
@@ -22,15 +22,15 @@ DENSE_ROWS = 1000
 
 @attrs.frozen(eq=False)
 class Reaction:
-    """What a joint, or a force element, exerts on one of its bodies at nt instants.
+    """Force and moment of a joint, or a force element, on one of its bodies at nt instants.
 
     Attributes:
         body: name of the body.
         force: (nt, 3) N, global axes.
         moment: (nt, 3) N m about the body's mass centre, global axes; for ground about the origin.
         p: (nt, 4) Euler parameters of the body.
-        local: (3,) m, the element's own point on this body (``P_i`` for slot i), body axes; None
-            where its type has none.
+        local: (3,) m, the element's point on this body (``P_i`` for slot i), body axes; None if
+            its type has none.
     """
 
     body: str
@@ -51,9 +51,9 @@ class Reaction:
 
     @property
     def moment_at_point(self) -> Floats | None:
-        """(nt, 3) N m, the moment about the element's own point on this body, global axes.
+        """(nt, 3) N m, moment about the element's point on this body, global axes: n - s x f.
 
-        n - s x f with the arm s of the point; None where the type has no such point.
+        None if the type has no such point.
         """
         if self.local is None:
             return None
@@ -61,7 +61,7 @@ class Reaction:
 
 
 def rows_at(machine: "Machine", t: Floats, u: Floats) -> Iterator["Rows"]:
-    """The constraint rows at each instant, one after the other."""
+    """Yields the constraint rows at each instant."""
     for time, state in zip(t, u, strict=True):
         yield machine.rows(time, state)
 
@@ -95,35 +95,35 @@ def reactions(
     joints: Collection[int],
     angles: Floats | None = None,
 ) -> dict[int, dict[str, Reaction]]:
-    """What joints exert on each of their bodies: D_slot^T lambda (spec 2).
+    """Reactions of joints on each of their bodies: D_slot^T lambda (spec 2).
 
     Args:
         machine: evaluates the model.
         t: (nt,) s.
         u: (nt, 13 n) states.
         Lam: (nt, m) multipliers, m rows in the order of the model.
-        joints: places of the joints in the model.
-        angles: (nt, k) angles as ``Arrays`` has them; None where they are not known.
+        joints: indices of the joints in the model.
+        angles: (nt, k) angles as in ``Arrays``; None if unknown.
 
     Returns:
         For each joint a reaction for each slot, by its letter.
     """
-    loops = _own_loops(machine, np.array(list(joints), dtype=np.int64))
-    found = [np.empty((len(t), *loop.shape)) for loop in loops]
-    for k, time in placed(machine, t, u):
-        for loop, out in zip(loops, found, strict=True):
+    loops = _joint_loops(machine, np.array(list(joints), dtype=np.int64))
+    wrenches = [np.empty((len(t), *loop.shape)) for loop in loops]
+    for k, time in place_at(machine, t, u):
+        for loop, out in zip(loops, wrenches, strict=True):
             if angles is not None:
                 loop.angles.set(angles[k])
             out[k] = loop.wrenches(time, Lam[k])
     return {
-        int(joint): actions_of(machine.model, u, loop.group, place, out[:, n])
-        for loop, out in zip(loops, found, strict=True)
-        for n, (joint, place) in enumerate(zip(loop.joints, loop.places, strict=True))
+        int(joint): actions_of(machine.model, u, loop.group, index, out[:, n])
+        for loop, out in zip(loops, wrenches, strict=True)
+        for n, (joint, index) in enumerate(zip(loop.joints, loop.indices, strict=True))
     }
 
 
-def placed(machine: "Machine", t: Floats, u: Floats) -> Iterator[tuple[int, float]]:
-    """Put the bodies and functions of a machine to each instant in turn: its place, the time."""
+def place_at(machine: "Machine", t: Floats, u: Floats) -> Iterator[tuple[int, float]]:
+    """Sets bodies and functions of a machine to each instant in turn; yields its index and time."""
     from dap3d_core.assembly.arrays import VALUE
     from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 
@@ -136,79 +136,78 @@ def placed(machine: "Machine", t: Floats, u: Floats) -> Iterator[tuple[int, floa
 
 
 def actions_of(
-    model: Model, u: Floats, group: Group, place: int, wrenches: Floats
+    model: Model, u: Floats, group: Group, index: int, wrenches: Floats
 ) -> dict[str, Reaction]:
-    """Wrenches (nt, slots, 6) of an instance of a group, at its place there, by slot."""
+    """Wrenches (nt, slots, 6) of an instance of a group, by slot."""
     layout, p = group.examined.layout, split(u)[1]
-    names, found = ("ground", *model.body_names), {}
-    for n, (slot, body) in enumerate(zip(layout.slots, group.bodies[place], strict=True)):
+    names, actions = ("ground", *model.body_names), {}
+    for n, (slot, body) in enumerate(zip(layout.slots, group.bodies[index], strict=True)):
         at, shape = layout.numbers.get(f"P_{slot}", (0, ()))
-        local = read_only(group.numbers[place, at : at + 3]) if shape == (3,) else None
-        turned = p[:, body - 1] if body else np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(u), 4))
+        local = read_only(group.numbers[index, at : at + 3]) if shape == (3,) else None
+        pose = p[:, body - 1] if body else np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(u), 4))
         force, moment = read_only(wrenches[:, n, :3]), read_only(wrenches[:, n, 3:])
-        found[slot] = Reaction(names[body], force, moment, turned, local)
-    return found
+        actions[slot] = Reaction(names[body], force, moment, pose, local)
+    return actions
 
 
 class Angles:
-    """The angles of instances of a group among numbers of their own: they are set, not counted."""
+    """Angles with counted turns among parameters of instances of a group."""
 
-    def __init__(self, model: Model, group: Group, places: Integers, numbers: Floats) -> None:
-        """Args: whose; their (k, par_width) numbers, which setting changes."""
-        self._numbers, self._columns = numbers, model.angles_of(group, places)
+    def __init__(self, model: Model, group: Group, indices: Integers, numbers: Floats) -> None:
+        """Args: model, group, instances; their (k, par_width) parameters, which ``set`` changes."""
+        self._numbers, self._columns = numbers, model.angles_of(group, indices)
         self._at = list(group.examined.layout.angles.values())
 
     def set(self, angles: Floats) -> None:
-        """Let them be as reported at an instant, (all angles of the model,)."""
+        """Sets the angles from those of all the model at an instant."""
         for column, at in zip(self._columns.T, self._at, strict=True):
             self._numbers[:, at : at + ANGLE_WIDTH] = 0.0
             self._numbers[:, at] = angles[column]
 
 
-def _own_loops(machine: "Machine", joints: Integers) -> list["_OwnLoop"]:
-    """Loops over some joints, each with arrays of its own, by type."""
+def _joint_loops(machine: "Machine", joints: Integers) -> list["_JointLoop"]:
+    """Loops over some joints, one for each type."""
     loops = []
     for q, (kind, group) in enumerate(machine.what):
         if kind == "acceleration":
-            places = np.flatnonzero(np.isin(group.members, joints))
-            if len(places):
-                loops.append(_OwnLoop(machine, q, group, places))
+            indices = np.flatnonzero(np.isin(group.members, joints))
+            if len(indices):
+                loops.append(_JointLoop(machine, q, group, indices))
     return loops
 
 
-class _OwnLoop:
-    """The loop of a type over some of its joints, into arrays of its own.
+class _JointLoop:
+    """The loop of a type over some of its joints, with separate output arrays.
 
-    So that ground has its blocks, too: in the driver they share a place that nothing reads.
-    interface/codegen/loop_source.py says how an instance's integers are laid out: row and blocks
-    stand last.
+    Ground then has blocks, too: in the driver they share a location that nothing reads. Row and
+    blocks are the last integers of an instance (interface/codegen/loop_source.py).
     """
 
-    def __init__(self, machine: "Machine", q: int, group: Group, places: Integers) -> None:
+    def __init__(self, machine: "Machine", q: int, group: Group, indices: Integers) -> None:
         from dap3d_core.interface.codegen.loop_source import stride
 
-        s, model, count = machine.system, machine.model, len(places)
-        self.machine, self.q, self.group, self.places = machine, q, group, places
-        self.joints = group.members[places]
+        s, model, count = machine.system, machine.model, len(indices)
+        self.machine, self.q, self.group, self.indices = machine, q, group, indices
+        self.joints = group.members[indices]
         slots, rows = len(group.examined.layout.slots), int(model.joint_rows[self.joints[0]])
         self.shape = count, slots, 6
         self._rows = model.joint_start[self.joints][:, None] + np.arange(rows)
         width, numbers = stride(group.examined), group.examined.layout.par_width
         i0, p0, _ = s.groups[q]
-        idx = s.idx[i0 : i0 + group.count * width].reshape(-1, width)[places]
+        idx = s.idx[i0 : i0 + group.count * width].reshape(-1, width)[indices]
         idx[:, -slots - 1] = rows * np.arange(count)
         idx[:, -slots:] = 6 * rows * np.arange(count * slots).reshape(count, slots)
         self._idx = idx.ravel()
         par = s.par[p0 : p0 + group.count * numbers].reshape(group.count, numbers)
-        self._par = np.concatenate([s.par, par[places].ravel()])  # tables keep their places
+        self._par = np.concatenate([s.par, par[indices].ravel()])  # tables stay where they are
         own = self._par[len(s.par) :].reshape(count, numbers)
-        self.angles = Angles(model, group, places, own)
+        self.angles = Angles(model, group, indices, own)
         self._group = np.array([0, len(s.par), count])
         self._D = np.zeros((count, slots, rows, 6))
         self._gamma, self._nu = np.zeros(count * rows), np.zeros(count * rows)
 
     def wrenches(self, time: float, Lam: Floats) -> Floats:
-        """(joints, slots, 6) D^T lambda where the bodies stand, with multipliers Lam (m,)."""
+        """(joints, slots, 6) D^T lambda at the current poses, with multipliers Lam (m,)."""
         from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop
 
         s, D = self.machine.system, self._D.reshape(-1)

@@ -1,33 +1,57 @@
-"""What quantities there are: of a body, a point, a joint, a force, and of the whole."""
+"""Catalogue of quantities: name, components, unit, meaning and function of each.
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+Attributes of ``Result``, data sets, tables, and names for plots are made from it. Stored arrays are
+listed in arrays.py, constants of the model in file/schema.py.
+"""
 
-import numpy as np
+from collections.abc import Callable, Mapping
+from typing import NamedTuple, Protocol
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.rotations import to_body
 from dap3d_core.model.state_layout import split
+from dap3d_core.result.arrays import AXES, COLUMNS, EULER, StoredArrays
 from dap3d_core.result.errors import UnknownNameError
-from dap3d_core.result.post.point_motion import accelerations, point_motion
+from dap3d_core.result.metadata import Record
+from dap3d_core.result.model_summary import Subject
+from dap3d_core.result.post.force_output import ForceOutput
+from dap3d_core.result.post.point_motion import Energy, accelerations, point_motion
+from dap3d_core.result.post.reactions import Reaction
 
-if TYPE_CHECKING:
-    from dap3d_core.result.post.reactions import Reaction
-    from dap3d_core.result.result import Result
-
-AXES = ("x", "y", "z")
-EULER = ("e0", "e1", "e2", "e3")
+#: Slots of bodies that a joint or a force may have.
 SLOTS = ("i", "j", "k")
 
 
-class Owner(NamedTuple):
-    """Whose quantity it is.
+class QuantitySource(Protocol):
+    """The part of a ``Result`` that quantities are computed from."""
+
+    subject: Subject
+    arrays: StoredArrays
+    record: Record
+
+    @property
+    def energy(self) -> Energy:
+        """Energies of the system."""
+
+    @property
+    def force_names(self) -> tuple[str, ...]:
+        """Names of the force elements."""
+
+    def reaction(self, joint: str, /) -> Mapping[str, Reaction]:
+        """Reactions of a joint by slot."""
+
+    def force(self, name: str, /) -> ForceOutput:
+        """Output of a force element."""
+
+
+class QuantityOwner(NamedTuple):
+    """The body, point, joint or force that a quantity belongs to.
 
     Attributes:
         kind: "body", "point", "joint" or "force".
         name: its name.
-        place: its place among those of its kind.
-        slot: of a joint or a force the body slot that is meant, "" for the first.
+        place: its index among those of its kind.
+        slot: body slot of a joint or a force, "" for the first.
     """
 
     kind: str
@@ -36,114 +60,151 @@ class Owner(NamedTuple):
     slot: str = ""
 
     @property
-    def shown(self) -> str:
-        """The name, with the slot where one is meant."""
+    def label(self) -> str:
+        """The name, with the slot if there is one."""
         return f"{self.name}.{self.slot}" if self.slot else self.name
 
 
-class Kind(NamedTuple):
-    """One kind of quantity.
+class QuantityType(NamedTuple):
+    """A type of quantity.
 
     Attributes:
-        words: what it is.
+        label: what it is, such as "velocity".
         unit: SI unit, "1" for none, "SI" where it depends on the row.
-        components: names of the columns; empty for a number or for rows.
+        components: names of the columns; empty for a scalar or for rows.
         values: (nt,) or (nt, components) of an owner.
-        rate: the quantity that is its derivative in time, "" where none is.
+        rate: the quantity that is its time derivative, "" for none.
     """
 
-    words: str
+    label: str
     unit: str
     components: tuple[str, ...]
-    values: "Callable[[Result, Owner], Floats]"
+    values: Callable[[QuantitySource, QuantityOwner], Floats]
     rate: str = ""
 
 
-def _body_axes(result: "Result", vectors: Floats, body: int) -> Floats:
-    p = split(result.u)[1]
-    return to_body(p[:, body], vectors[:, body])
+class MotionArray(NamedTuple):
+    """Motion of all bodies or points: an attribute of a result, and a quantity of each owner.
+
+    Attributes:
+        array: name of the attribute.
+        quantity: name of the quantity of an owner.
+        label, unit, components, rate: of that quantity.
+        meaning: of the attribute.
+        values: (nt, k, components) of k bodies or points.
+        owner: "body" or "point".
+    """
+
+    array: str
+    quantity: str
+    label: str
+    meaning: str
+    unit: str
+    values: Callable[[QuantitySource, slice], Floats]
+    rate: str = ""
+    components: tuple[str, ...] = AXES
+    owner: str = "body"
+
+    @property
+    def dimensions(self) -> tuple[str, str]:
+        """Dimensions besides time."""
+        return self.owner, "axis" if self.components is AXES else "euler"
+
+    def quantity_type(self) -> QuantityType:
+        """The quantity of one body or point."""
+
+        def values(source: QuantitySource, owner: QuantityOwner) -> Floats:
+            return self.values(source, slice(owner.place, owner.place + 1))[:, 0]
+
+        return QuantityType(self.label, self.unit, self.components, values, self.rate)
 
 
-def _point(level: int) -> "Callable[[Result, Owner], Floats]":
-    def values(result: "Result", owner: Owner) -> Floats:
-        places = np.array([owner.place])
-        return point_motion(result.subject, result.u, result.v_dot, places, level)[:, 0]
+def _state(part: int) -> Callable[[QuantitySource, slice], Floats]:
+    return lambda source, bodies: split(source.arrays.u)[part][:, bodies]
+
+
+def _acceleration(part: int) -> Callable[[QuantitySource, slice], Floats]:
+    return lambda source, bodies: accelerations(source.arrays.v_dot)[part][:, bodies]
+
+
+def _in_body_axes(
+    vectors: Callable[[QuantitySource, slice], Floats],
+) -> Callable[[QuantitySource, slice], Floats]:
+    return lambda source, bodies: to_body(_state(1)(source, bodies), vectors(source, bodies))
+
+
+def _points(level: int) -> Callable[[QuantitySource, slice], Floats]:
+    def values(source: QuantitySource, points: slice) -> Floats:
+        return point_motion(source.subject, source.arrays.u, source.arrays.v_dot, points, level)
 
     return values
 
 
-def _action(part: str) -> "Callable[[Result, Owner], Floats]":
-    """What a joint or a force exerts on the body of a slot."""
+#: Arrays of the manual's post-processor (spec 10).
+MOTION = (
+    MotionArray("r", "r", "position", "position of the mass centre", "m", _state(0), "rd"),
+    MotionArray("p", "p", "Euler parameters", "Euler parameters, body to global", "1", _state(1),
+                components=EULER),
+    MotionArray("rd", "rd", "velocity", "velocity of the mass centre", "m/s", _state(2), "rdd"),
+    MotionArray("w", "w", "angular velocity", "angular velocity, global axes", "rad/s", _state(3),
+                "wd"),
+    MotionArray("wp", "wp", "angular velocity in body axes", "angular velocity, body axes",
+                "rad/s", _in_body_axes(_state(3)), "wpd"),
+    MotionArray("rdd", "rdd", "acceleration", "acceleration of the mass centre", "m/s^2",
+                _acceleration(0)),
+    MotionArray("wd", "wd", "angular acceleration", "angular acceleration, global axes",
+                "rad/s^2", _acceleration(1)),
+    MotionArray("wpd", "wpd", "angular acceleration in body axes",
+                "angular acceleration, body axes", "rad/s^2", _in_body_axes(_acceleration(1))),
+    MotionArray("rP", "r", "position", "position of the point", "m", _points(0), "v",
+                owner="point"),
+    MotionArray("rPd", "v", "velocity", "velocity of the point", "m/s", _points(1), "a",
+                owner="point"),
+    MotionArray("rPdd", "a", "acceleration", "acceleration of the point", "m/s^2", _points(2),
+                owner="point"),
+)  # fmt: skip
+#: Quantities of points by the names of their arrays, for points that share a body's name.
+POINT_ARRAYS = {m.array: m.quantity for m in MOTION if m.owner == "point"}
 
-    def values(result: "Result", owner: Owner) -> Floats:
-        found = getattr(_on(result, owner), part)
-        if found is None:
-            words = f"the type of the {owner.kind} {owner.name!r} has no point on that body"
-            raise UnknownNameError(f"there is no {owner.shown}.{part}: {words}")
-        return found  # type: ignore[no-any-return]
+
+def _action(part: str) -> Callable[[QuantitySource, QuantityOwner], Floats]:
+    """Part of the ``Reaction`` of a joint or a force on the body of a slot."""
+
+    def values(source: QuantitySource, owner: QuantityOwner) -> Floats:
+        is_joint = owner.kind == "joint"
+        actions = source.reaction(owner.name) if is_joint else source.force(owner.name).on
+        slot = owner.slot or next(iter(actions))
+        if slot not in actions:
+            raise UnknownNameError(
+                f"the {owner.kind} {owner.name!r} has the slots {', '.join(actions)}, not {slot!r}"
+            )
+        action: Floats | None = getattr(actions[slot], part)
+        if action is None:
+            reason = f"the type of the {owner.kind} {owner.name!r} has no point on that body"
+            raise UnknownNameError(f"there is no {owner.label}.{part}: {reason}")
+        return action
 
     return values
 
 
-def _on(result: "Result", owner: Owner) -> "Reaction":
-    joint = owner.kind == "joint"
-    actions = result.reaction(owner.name) if joint else result.force(owner.name).on
-    slot = owner.slot or next(iter(actions))
-    if slot not in actions:
-        raise UnknownNameError(
-            f"the {owner.kind} {owner.name!r} has the slots {', '.join(actions)}, not {slot!r}"
-        )
-    return actions[slot]
+def _force_output(part: str) -> Callable[[QuantitySource, QuantityOwner], Floats]:
+    """Part of the ``ForceOutput`` of a force element."""
 
-
-def _of_element(part: str) -> "Callable[[Result, Owner], Floats]":
-    """What a force element as a whole has, where its type has it."""
-
-    def values(result: "Result", owner: Owner) -> Floats:
-        found = getattr(result.force(owner.name), part)
-        if found is None:
+    def values(source: QuantitySource, owner: QuantityOwner) -> Floats:
+        output: Floats | None = getattr(source.force(owner.name), part)
+        if output is None:
             raise UnknownNameError(f"the type of the force {owner.name!r} has no {part}")
-        return found  # type: ignore[no-any-return]
+        return output
 
     return values
 
 
-def _multipliers(result: "Result", owner: Owner) -> Floats:
-    start = result.subject.joint_start
-    return result.Lam[:, start[owner.place] : start[owner.place + 1]]
+def _multipliers(source: QuantitySource, owner: QuantityOwner) -> Floats:
+    start = source.subject.joint_start
+    return source.arrays.Lam[:, start[owner.place] : start[owner.place + 1]]
 
 
-BODY = {
-    "r": Kind("position", "m", AXES, lambda s, o: s.r[:, o.place], "rd"),
-    "p": Kind("Euler parameters", "1", EULER, lambda s, o: s.p[:, o.place]),
-    "rd": Kind("velocity", "m/s", AXES, lambda s, o: s.rd[:, o.place], "rdd"),
-    "w": Kind("angular velocity", "rad/s", AXES, lambda s, o: s.w[:, o.place], "wd"),
-    "wp": Kind(
-        "angular velocity in body axes",
-        "rad/s",
-        AXES,
-        lambda s, o: _body_axes(s, s.w, o.place),
-        "wpd",
-    ),
-    "rdd": Kind("acceleration", "m/s^2", AXES, lambda s, o: accelerations(s.v_dot)[0][:, o.place]),
-    "wd": Kind(
-        "angular acceleration", "rad/s^2", AXES, lambda s, o: accelerations(s.v_dot)[1][:, o.place]
-    ),
-    "wpd": Kind(
-        "angular acceleration in body axes",
-        "rad/s^2",
-        AXES,
-        lambda s, o: _body_axes(s, accelerations(s.v_dot)[1], o.place),
-    ),
-}
-POINT = {
-    "r": Kind("position", "m", AXES, _point(0), "v"),
-    "v": Kind("velocity", "m/s", AXES, _point(1), "a"),
-    "a": Kind("acceleration", "m/s^2", AXES, _point(2)),
-}
-#: What the arrays of points are called (spec 10): the point is meant where a body has its name.
-POINT_ARRAYS = {"rP": "r", "rPd": "v", "rPdd": "a"}
-#: Of each body slot: the part of a Reaction, what it is, its unit.
+#: Parts of a ``Reaction``: label and unit.
 ACTIONS = {
     "force": ("force", "N"),
     "moment": ("moment", "N m"),
@@ -151,36 +212,50 @@ ACTIONS = {
     "moment_body": ("moment in body axes", "N m"),
     "moment_at_point": ("moment about its point", "N m"),
 }
-JOINT = {
-    part: Kind(f"reaction {words}", unit, AXES, _action(part))
-    for part, (words, unit) in ACTIONS.items()
-} | {"lambda": Kind("Lagrange multipliers", "SI", (), _multipliers)}
-FORCE = {
-    part: Kind(words, unit, AXES, _action(part)) for part, (words, unit) in ACTIONS.items()
-} | {
-    "length": Kind("length", "m", (), _of_element("length"), "length_rate"),
-    "length_rate": Kind("rate of the length", "m/s", (), _of_element("length_rate")),
-    "tension": Kind("tension", "N", (), _of_element("tension")),
-    "energy": Kind("potential energy", "J", (), _of_element("energy")),
+#: Quantities by kind of their owner and by name.
+QUANTITIES: dict[str, dict[str, QuantityType]] = {
+    **{
+        kind: {m.quantity: m.quantity_type() for m in MOTION if m.owner == kind}
+        for kind in ("body", "point")
+    },
+    "joint": {
+        **{n: QuantityType(f"reaction {a}", u, AXES, _action(n)) for n, (a, u) in ACTIONS.items()},
+        "lambda": QuantityType("Lagrange multipliers", "SI", (), _multipliers),
+    },
+    "force": {
+        **{n: QuantityType(label, u, AXES, _action(n)) for n, (label, u) in ACTIONS.items()},
+        "length": QuantityType("length", "m", (), _force_output("length"), "length_rate"),
+        "length_rate": QuantityType("rate of the length", "m/s", (), _force_output("length_rate")),
+        "tension": QuantityType("tension", "N", (), _force_output("tension")),
+        "energy": QuantityType("potential energy", "J", (), _force_output("energy")),
+    },
 }
-KINDS = {"body": BODY, "point": POINT, "joint": JOINT, "force": FORCE}
 
-#: Quantities of the whole: what it is, its unit, its values.
-WHOLE: "dict[str, tuple[str, str, Callable[[Result], Floats]]]" = {
-    "t": ("time", "s", lambda s: s.t),
-    "energy.kinetic": ("kinetic energy", "J", lambda s: s.energy.kinetic),
-    "energy.potential": ("potential energy", "J", lambda s: s.energy.potential),
-    "energy.total": ("total energy", "J", lambda s: s.energy.total),
-    "work": ("work of forces and drivers", "J", lambda s: s.work),
-    "constraint.position": ("constraint residual", "SI", lambda s: s.arrays.position_residual),
-    "constraint.velocity": (
-        "velocity constraint residual",
-        "SI",
-        lambda s: s.arrays.velocity_residual,
-    ),
-    "constraint.acceleration": (
-        "acceleration constraint residual",
-        "SI",
-        lambda s: s.arrays.acceleration_residual,
-    ),
+
+class SystemQuantity(NamedTuple):
+    """A quantity (nt,) of the whole system: label, unit, function."""
+
+    label: str
+    unit: str
+    values: Callable[[QuantitySource], Floats]
+
+
+def _energy(part: str) -> SystemQuantity:
+    return SystemQuantity(f"{part} energy", "J", lambda source: getattr(source.energy, part))
+
+
+def _stored(label: str, column: str) -> SystemQuantity:
+    unit = next(c.unit for c in COLUMNS if c.name == column)
+    return SystemQuantity(label, unit, lambda source: getattr(source.arrays, column))
+
+
+SYSTEM = {
+    "t": _stored("time", "t"),
+    "energy.kinetic": _energy("kinetic"),
+    "energy.potential": _energy("potential"),
+    "energy.total": _energy("total"),
+    "work": _stored("work of forces and drivers", "work"),
+    "constraint.position": _stored("constraint residual", "position_residual"),
+    "constraint.velocity": _stored("velocity constraint residual", "velocity_residual"),
+    "constraint.acceleration": _stored("acceleration constraint residual", "acceleration_residual"),
 }

@@ -4,33 +4,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dap3d_core.result.arrays import COLUMNS
-from dap3d_core.result.file.schema import CONSTANTS, NAMES, attributes
-from dap3d_core.result.post.global_error import U_ERROR
-from dap3d_core.result.quantities.catalogue import AXES, EULER
+from dap3d_core.result.arrays import AXES, COLUMNS, EULER, U_ERROR
+from dap3d_core.result.file.schema import CONSTANTS, NAMES, about, attributes
+from dap3d_core.result.quantities.catalogue import MOTION, SYSTEM, QuantitySource
 
 if TYPE_CHECKING:
     import xarray
 
-    from dap3d_core.result.result import Result
 
-#: name: (dimensions besides time, unit, meaning) of what is computed from the stored arrays.
-_COMPUTED = {
-    "r": (("body", "axis"), "m", "position of the mass centre"),
-    "p": (("body", "euler"), "1", "Euler parameters, body to global"),
-    "rd": (("body", "axis"), "m/s", "velocity of the mass centre"),
-    "w": (("body", "axis"), "rad/s", "angular velocity, global axes"),
-    "wp": (("body", "axis"), "rad/s", "angular velocity, body axes"),
-    "rdd": (("body", "axis"), "m/s^2", "acceleration of the mass centre"),
-    "wd": (("body", "axis"), "rad/s^2", "angular acceleration, global axes"),
-    "wpd": (("body", "axis"), "rad/s^2", "angular acceleration, body axes"),
-    "rP": (("point", "axis"), "m", "position of the point"),
-    "rPd": (("point", "axis"), "m/s", "velocity of the point"),
-    "rPdd": (("point", "axis"), "m/s^2", "acceleration of the point"),
-}
-
-
-def dataset_of(result: "Result") -> "xarray.Dataset":
+def dataset_of(result: QuantitySource) -> "xarray.Dataset":
     """A result as an xarray.Dataset.
 
     Returns:
@@ -40,23 +22,27 @@ def dataset_of(result: "Result") -> "xarray.Dataset":
     """
     import xarray
 
-    subject = result.subject
+    subject, arrays = result.subject, result.arrays
     variables: dict[str, Any] = {}
-    optional = (U_ERROR,) if result.arrays.has_error else ()
-    for column in (*COLUMNS[1:], *optional):
-        dimensions = ("time", column.dimension) if column.dimension else ("time",)
-        about = {"units": column.unit, "long_name": column.meaning}
-        variables[column.name] = (dimensions, getattr(result.arrays, column.name), about)
-    for name, (dimensions, unit, meaning) in _COMPUTED.items():
-        about = {"units": unit, "long_name": meaning}
-        variables[name] = (("time", *dimensions), getattr(result, name), about)
+    for column in (*COLUMNS[1:], U_ERROR) if arrays.has_error else COLUMNS[1:]:
+        values = getattr(arrays, column.name)
+        variables[column.name] = (column.dimensions, values, about(column.unit, column.meaning))
+    for motion in MOTION:
+        dimensions = ("time", *motion.dimensions)
+        values = getattr(result, motion.array)
+        variables[motion.array] = (dimensions, values, about(motion.unit, motion.meaning))
     for name in ("kinetic", "total"):
-        about = {"units": "J", "long_name": f"{name} energy"}
-        variables[f"{name}_energy"] = (("time",), getattr(result.energy, name), about)
+        energy = SYSTEM[f"energy.{name}"]
+        values = energy.values(result)
+        variables[f"{name}_energy"] = (("time",), values, about(energy.unit, energy.label))
     for constant in CONSTANTS:
-        about = {"units": constant.unit, "long_name": constant.meaning}
-        variables[constant.name] = (constant.dimensions, getattr(subject, constant.name), about)
-    owners = np.repeat(np.array(subject.joint_names, dtype=str), subject.joint_rows)
+        values = getattr(subject, constant.name)
+        variables[constant.name] = (
+            constant.dimensions,
+            values,
+            about(constant.unit, constant.meaning),
+        )
+    joint_of_row = np.repeat(np.array(subject.joint_names, dtype=str), subject.joint_rows)
     labels = {
         "body": subject.body_names,
         "point": subject.point_names,
@@ -65,11 +51,10 @@ def dataset_of(result: "Result") -> "xarray.Dataset":
         "euler": EULER,
     }
     coordinates = {
-        name: (name, np.array(names, dtype=str), {"units": "1", "long_name": NAMES[name]})
+        name: (name, np.array(names, dtype=str), about("1", NAMES[name]))
         for name, names in labels.items()
     } | {
-        "time": ("time", result.t, {"units": "s", "long_name": "time"}),
-        "row_joint": ("row", owners, {"units": "1", "long_name": "joint of the constraint row"}),
+        "time": ("time", arrays.t, about("s", "time")),
+        "row_joint": ("row", joint_of_row, about("1", "joint of the constraint row")),
     }
-    about_all = attributes(subject, result.record)
-    return xarray.Dataset(variables, coordinates, about_all)
+    return xarray.Dataset(variables, coordinates, attributes(subject, result.record))

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.result import Record, Result, ResultError, ResultWriter, check_target
-from dap3d_core.result.arrays import Arrays, arrays_of, joined
+from dap3d_core.result.arrays import LARGE, Arrays, StoredArrays, arrays_of, joined
 from dap3d_core.result.file.atomic_write import check_utf8
-from dap3d_core.result.file.lazy_arrays import LARGE, FileArrays
 from dap3d_core.result.model_summary import subject_of
 from dap3d_core.result.open import arrays_in
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -123,8 +122,8 @@ class Keeper:
             return None
         compiled = self._compiled
         if self._writer is not None:
-            self._writer.leave()
-        result = Result.of_parts(
+            self._writer.close()
+        result = Result(
             self._subject,
             self._arrays(),
             attrs.evolve(record, run=self.run),
@@ -143,7 +142,7 @@ class Keeper:
             self._writer.discard()
         return result
 
-    def _arrays(self) -> Arrays | FileArrays:
+    def _arrays(self) -> StoredArrays:
         if self._parts:
             return joined(self._parts)
         assert self._writer is not None

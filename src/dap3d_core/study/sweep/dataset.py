@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.result import ResultError, current_versions
-from dap3d_core.result.file.checksum import check_seal
-from dap3d_core.result.file.lazy_arrays import LARGE
-from dap3d_core.result.file.library import NETCDF
+from dap3d_core.result.arrays import LARGE
+from dap3d_core.result.file.checksum import check_checksums, check_signature
+from dap3d_core.result.file.library import NETCDF, unreadable
 from dap3d_core.result.file.schema import SWEEP
 from dap3d_core.result.file.validate import check_claims
 from dap3d_core.result.metadata import to_json
-from dap3d_core.result.open import check_signature, unreadable
 from dap3d_core.simulation.output.type_sources import digests_of
 from dap3d_core.study.design import Design
 from dap3d_core.study.ensemble import Ensemble
@@ -239,9 +238,7 @@ def _opened(file: Path) -> "xarray.Dataset":
     """What a file holds."""
     import xarray
 
-    from dap3d_core.study.sweep.display import Sweep
-
-    check_seal(file)
+    check_checksums(file)
     with NETCDF:
         _check(file)
         try:
@@ -273,7 +270,7 @@ def is_sweep(path: str | os.PathLike[str]) -> bool:
 def _attributes_of(file: Path) -> list[str]:
     import netCDF4
 
-    check_seal(file)
+    check_checksums(file)
     try:
         with NETCDF, netCDF4.Dataset(os.path.abspath(file), "r") as dataset:
             return list(dataset.ncattrs())

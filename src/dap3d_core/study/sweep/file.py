@@ -1,36 +1,35 @@
-"""A sweep's file that grows with it: whoever kills the sweep leaves the points that were run."""
+"""Incrementally written sweep file: completed points survive if the process is killed."""
 
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.result import ResultError, check_target
-from dap3d_core.result.file.atomic_write import (
-    cannot,
-    check_utf8,
-    named_part,
-    put_in_place,
-    reserve,
-    synchronise,
+from dap3d_core.result import ResultError
+from dap3d_core.result.file.atomic_write import cannot, put_in_place
+from dap3d_core.result.file.checksum import (
+    WHOLE,
+    check_checksums,
+    check_signature,
+    write_checksums,
 )
-from dap3d_core.result.file.checksum import WHOLE, check_seal, write_seal
-from dap3d_core.result.file.library import NETCDF, guarded
-from dap3d_core.result.open import check_signature, unreadable
+from dap3d_core.result.file.library import NETCDF, guarded, opened, reading
+from dap3d_core.result.file.write import GrowingFile
 from dap3d_core.study.study import Batch, PointStatus
 from dap3d_core.study.sweep.dataset import Layout, check_format
-from dap3d_core.study.sweep.file_claim import Claim
-from dap3d_core.study.sweep.schema import NOTE, boxes, cut, define
+from dap3d_core.study.sweep.schema import boxes, define, note_letters
 
 Integers = NDArray[np.int64]
 
 #: Seconds, and bytes of values, after which points are written.
 EVERY, MOST_WAITING = 2.0, 2**26
-#: Seconds to wait, at the end, for a reader who has locked the file.
+#: Seconds to wait, at the end, for a reader that has locked the file.
 PATIENCE = 10.0
-#: Attributes by which a part is known to be of the same sweep, and what each is.
+#: Attributes that identify the sweep of a part, and the difference that each shows.
 IDENTITY = {
     "scene": "another scene or other settings",
     "varied": "other numbers that vary, or other values",
@@ -43,60 +42,50 @@ IDENTITY = {
 }
 
 
-class Growing:
-    """The points of a sweep in ``NAME.part``, which gets its name when all are run.
+class Growing(GrowingFile):
+    """The points of a sweep in ``NAME.part``, which gets its name when all are complete.
 
-    The place of every number is fixed from the start, and a point's status is written once its
-    values are on the disk: the file is whole at any moment. It is open only while it is written,
-    for the library lets nobody read a file that another process has open for writing.
+    The status of a point is written once its values are on the disk. The file is open only while
+    it is written: the library does not read a file that another process has open for writing.
 
     Attributes:
         layout: of the data set.
-        target: the file that is wanted in the end.
-        part: the file that grows, in the same folder.
     """
 
     def __init__(
         self, layout: Layout, output: str | os.PathLike[str], *, force: bool, resume: bool
     ) -> None:
-        """Make the part, or go on with that of a sweep that was ended.
+        """Creates the part, or continues that of an interrupted sweep.
 
         Args:
             layout: of the data set.
-            output: the file that is wanted in the end.
-            force: whether ``output``, or a part of another sweep, may be overwritten.
-            resume: whether to go on with the part that is there.
+            output: the requested file.
+            force: True to overwrite ``output``, or a part of another sweep.
+            resume: True to continue the part.
 
         Raises:
             ResultError: the file cannot be written, or another sweep is writing it; there is a part
                 and ``resume`` is off; or it is on, and there is none, or one of another sweep.
         """
+        super().__init__(output, force)
         self.layout, self._force = layout, force
-        check_utf8("write", output)
-        self.target = check_target(output, force)
-        self.part = self.target.with_name(f"{self.target.name}.part")
         self._waiting: list[tuple[Integers, Batch]] = []
         self._is_empty = not resume
         self._written = time.monotonic()
-        self._claim = Claim(self.target)
-        try:
-            with NETCDF:
-                if resume:
-                    self._status = self._again()
-                else:
-                    self._new()
-                    self._status = np.zeros(layout.count, dtype=np.int8)
-        except BaseException:
-            self._claim.release()
-            raise
+        with NETCDF:
+            if resume:
+                self._status = self._stored_status()
+            else:
+                self._begin()
+                self._status = np.zeros(layout.count, dtype=np.int8)
 
     @property
     def todo(self) -> Integers:
-        """The points that are still to be run."""
+        """Indices of the points that are still to be run."""
         return np.flatnonzero(self._status == PointStatus.OPEN)
 
     def put(self, places: Integers, batch: Batch) -> None:
-        """Keep what came of some points; now and then everything is written.
+        """Stores results of some points; now and then everything is written.
 
         Raises:
             ResultError: it cannot be written.
@@ -110,19 +99,19 @@ class Growing:
             self._write(0.0)
 
     def finish(self) -> None:
-        """Write what is left and give the file its name.
+        """Writes what is left and gives the file its name.
 
         Raises:
             ResultError: it cannot be written; or another has the name by now and ``force`` is off.
         """
-        self._write(PATIENCE)
-        # numbers stand between descriptions here, so the beginning is what a large one is known by
-        guarded(self.part, lambda: write_seal(self.part, WHOLE, is_whole=True))
+        self.leave()
+        # numbers lie between descriptions here: of a large file the first bytes are compared
+        guarded(self.part, lambda: write_checksums(self.part, WHOLE, is_whole=True))
         put_in_place(self.part, self.target, self._force)
         self._claim.release()
 
     def leave(self) -> None:
-        """Write what is left; the part stays where it holds a point.
+        """Writes what is left; the part remains if it holds a point.
 
         Raises:
             ResultError: it cannot be written.
@@ -135,10 +124,10 @@ class Growing:
             self._claim.release()
 
     def _write(self, patience: float) -> None:
-        """Write what was kept, and wait until it is on the disk.
+        """Writes all stored results to the disk.
 
         Args:
-            patience: seconds to wait for a reader; with 0 it is put off.
+            patience: seconds to wait for a reader; with 0 writing is postponed.
 
         Raises:
             ResultError: it cannot be written.
@@ -148,84 +137,64 @@ class Growing:
             return
         places = np.concatenate([places for places, _ in self._waiting])
         order = np.argsort(places)
+        places = places[order]
         batches = [batch for _, batch in self._waiting]
-        with NETCDF:
-            dataset = self._open(patience)
+        names = [output.name for output in self.layout.outputs]
+        values = {n: np.concatenate([b.values[n] for b in batches])[order] for n in names}
+        status = np.concatenate([batch.status for batch in batches])[order]
+        notes = np.array([note for b in batches for note in b.notes], dtype=object)[order]
+        noted = notes != ""
+        with NETCDF, self._opened(patience) as dataset:
             if dataset is None:
                 return
-            try:
-                guarded(
-                    self.part,
-                    lambda: self._write_values(dataset, places[order], batches, order),
-                    lambda: self._to_disk(dataset),
-                    lambda: self._write_status(dataset, places[order], batches, order),
-                    lambda: self._to_disk(dataset),
-                )
-            finally:
-                guarded(self.part, dataset.close)
+
+            def write_values() -> None:
+                for name in names:
+                    self._write_at(dataset.variables[name], places, values[name])
+                if noted.any():
+                    letters = note_letters(notes[noted])
+                    self._write_at(dataset.variables["note"], places[noted], letters)
+
+            def write_status() -> None:
+                self._write_at(dataset.variables["status"], places, status)
+
+            self._append(dataset, write_values, write_status, durable=True)
         self._waiting.clear()
 
-    def _open(self, patience: float) -> Any:
-        """The part, open for writing; None where a reader has it."""
-        import netCDF4
-
+    @contextmanager
+    def _opened(self, patience: float) -> Iterator[Any]:
+        """The part, open for writing; None if a reader has locked it."""
         until = time.monotonic() + patience
         while True:
             try:
-                dataset = netCDF4.Dataset(os.path.abspath(self.part), "r+")
+                dataset = opened(self.part, "r+")
+                break
             except (OSError, RuntimeError) as error:
                 if not patience:
-                    return None
+                    yield None
+                    return
                 if time.monotonic() > until:
                     raise cannot("write", self.part, error) from error
                 time.sleep(0.05)
-            else:
-                dataset.set_auto_maskandscale(False)
-                dataset.set_auto_chartostring(False)
-                return dataset
-
-    def _write_values(
-        self, dataset: Any, places: Integers, batches: list[Batch], order: NDArray[np.intp]
-    ) -> None:
-        variables = dataset.variables
-        for output in self.layout.outputs:
-            values = np.concatenate([batch.values[output.name] for batch in batches])[order]
-            self._write_at(variables[output.name], places, values)
-        notes = np.array([note for batch in batches for note in batch.notes], dtype=object)[order]
-        told = notes != ""
-        if told.any():
-            letters = np.zeros((int(told.sum()), NOTE), dtype="S1")
-            for row, note in zip(letters, notes[told], strict=True):
-                words = cut(str(note))
-                row[: len(words)] = np.frombuffer(words, dtype="S1")
-            self._write_at(variables["note"], places[told], letters)
-
-    def _write_status(
-        self, dataset: Any, places: Integers, batches: list[Batch], order: NDArray[np.intp]
-    ) -> None:
-        status = np.concatenate([batch.status for batch in batches])[order]
-        self._write_at(dataset.variables["status"], places, status)
+        dataset.set_auto_chartostring(False)
+        try:
+            yield dataset
+        finally:
+            guarded(self.part, dataset.close)
 
     def _write_at(self, variable: Any, places: Integers, values: NDArray[Any]) -> None:
-        """Write values of points (k, ...) whose places rise."""
-        shape = self.layout.shape
+        """Writes values of points (k, ...) with rising indices."""
         breaks = np.flatnonzero(np.diff(places) != 1) + 1
         for run in np.split(np.arange(len(places)), breaks):
             first, done = int(places[run[0]]), int(run[0])
-            for index, count in boxes(shape, first, first + len(run)):
-                block = values[done : done + count]
+            for index, count in boxes(self.layout.shape, first, first + len(run)):
                 lengths = [part.stop - part.start for part in index]
+                block = values[done : done + count]
                 variable[index] = block.reshape(*lengths, *values.shape[1:])
                 done += count
 
-    def _to_disk(self, dataset: Any) -> None:
-        dataset.sync()
-        synchronise(self.part)
-
-    def _new(self) -> None:
-        """A new part; one of another sweep makes way where that is wanted."""
-        import netCDF4
-
+    def _begin(self) -> None:
+        """Creates the part; with ``force`` it replaces one of another sweep."""
         if os.path.lexists(self.part):
             if not self._force:
                 raise ResultError(
@@ -234,79 +203,54 @@ class Growing:
                 )
             self._check_part("cannot overwrite")
             self.part.unlink()
-        new = reserve(self.target)  # killed now it leaves nothing that is half a part
-        try:
-            dataset = guarded(
-                self.target, lambda: netCDF4.Dataset(os.path.abspath(new), "w", format="NETCDF4")
+        part = self._create(lambda dataset: define(dataset, self.layout))
+        if part != self.part:  # another process was quicker
+            part.unlink()
+            raise ResultError(
+                f"cannot write {self.target}: another sweep has just begun {self.part.name}"
             )
-            try:
-                guarded(self.target, lambda: define(dataset, self.layout))
-            finally:
-                guarded(self.target, dataset.close)
-            part = named_part(new, self.target)
-            if part != self.part:  # another process was quicker
-                part.unlink()
-                raise ResultError(
-                    f"cannot write {self.target}: another sweep has just begun {self.part.name}"
-                )
-        except BaseException:
-            new.unlink(missing_ok=True)
-            raise
 
-    def _again(self) -> NDArray[np.int8]:
-        """The status of all points in the part that is there, when it is of the same sweep."""
-        import netCDF4
-
+    def _stored_status(self) -> NDArray[np.int8]:
+        """Status of all points in the part, which has to be of the same sweep."""
         if not os.path.lexists(self.part):
             raise ResultError(
                 f"cannot resume: there is no {self.part}; without resume the sweep begins anew"
             )
         self._check_part("cannot resume")
-        try:
-            with netCDF4.Dataset(os.path.abspath(self.part), "r") as dataset:
-                dataset.set_auto_maskandscale(False)
-                self._check_same(dataset)
-                return np.array(dataset.variables["status"][...], np.int8).ravel()
-        except ResultError:
-            raise
-        except Exception as error:  # whatever a damaged file makes of it
-            raise unreadable(self.part, error) from error
+        with reading(self.part), opened(self.part) as dataset:
+            difference = self._difference(dataset)
+            if difference:
+                raise ResultError(
+                    f"cannot resume: {self.part} is of another sweep: it has {difference}; ask for "
+                    "the same, or begin anew with force"
+                )
+            return np.array(dataset.variables["status"][...], np.int8).ravel()
 
     def _check_part(self, verb: str) -> None:
-        """Refuse a part that is no sweep's."""
-        import netCDF4
-
+        """Refuses a part that is not of a sweep."""
         try:
             check_signature(self.part, "sweep")
-            check_seal(self.part)
-            with netCDF4.Dataset(os.path.abspath(self.part), "r") as dataset:
+            check_checksums(self.part)
+            with reading(self.part), opened(self.part) as dataset:
                 check_format(self.part, dataset)
-        except Exception as error:  # whatever a damaged file makes of it
-            if not isinstance(error, ResultError):
-                error = unreadable(self.part, error)
+        except ResultError as error:
             raise ResultError(f"{verb}: {error}; move it away, or name another file") from error
 
-    def _check_same(self, dataset: Any) -> None:
-        """Refuse a part of another sweep; says in what it differs."""
+    def _difference(self, dataset: Any) -> str:
+        """The difference between the sweep of a part and this one, "" if they are equal."""
         there, here = dataset.ncattrs(), self.layout.attributes
-        for name, what in IDENTITY.items():
-            found = dataset.getncattr(name) if name in there else None
-            if found != here.get(name):
-                raise self._another(what)
+        for name, difference in IDENTITY.items():
+            if (dataset.getncattr(name) if name in there else None) != here.get(name):
+                return difference
         for coordinate in self.layout.coordinates:
             variable = dataset.variables.get(coordinate.name)
             fits = variable is not None and variable.shape == coordinate.values.shape
             if not fits or not np.array_equal(variable[...], coordinate.values):
-                raise self._another(f"other values of {coordinate.name}")
+                return f"other values of {coordinate.name}"
         for output in self.layout.outputs:
             variable = dataset.variables.get(output.name)
             if variable is None or variable.shape != self.layout.shape_of(output):
-                raise self._another(IDENTITY["outputs"])
+                return IDENTITY["outputs"]
         if dataset.variables["status"].shape != self.layout.shape:
-            raise self._another("another number of points")
-
-    def _another(self, what: str) -> ResultError:
-        return ResultError(
-            f"cannot resume: {self.part} is of another sweep: it has {what}; ask for the same, or "
-            "begin anew with force"
-        )
+            return "another number of points"
+        return ""

@@ -1,24 +1,24 @@
-"""How a sweep lies in its file: definitions, and where points of a grid have their places."""
+"""Layout of a sweep in its file: definitions, and locations of the points of a grid."""
 
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dap3d_core.result.file.schema import write_attributes
 from dap3d_core.study.study import PointStatus
 from dap3d_core.study.sweep.dataset import ABOUT_NOTE, ABOUT_STATUS, Layout
 
-#: Bytes of a note in the file: it has its place from the start.
+#: Bytes of a note in the file, allocated from the start.
 NOTE = 200
 
 
 def boxes(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[Any, int]]:
-    """Places ``first`` to ``last`` of a grid in C order as blocks: an index and how many it has.
+    """Splits points ``first`` to ``last`` (exclusive) of a grid in C order into blocks.
 
-    Args:
-        shape: of the grid.
-        first, last: places in the order of memory; the last one is left out.
+    Yields:
+        Index of a block, and its number of points.
     """
     if first >= last:
         return
@@ -44,40 +44,43 @@ def _rows(shape: tuple[int, ...], row: int, first: int, last: int) -> Iterator[t
         yield (slice(row, row + 1), *index), count
 
 
-def cut(note: str) -> bytes:
-    """A note in UTF-8, cut to its place."""
-    words = note.encode("utf-8", "replace")
-    if len(words) <= NOTE:
-        return words
-    return words[: NOTE - 4].decode("utf-8", "ignore").encode() + b" ..."
+def note_letters(notes: NDArray[Any]) -> NDArray[np.bytes_]:
+    """(k, NOTE) bytes of notes in UTF-8, shortened where they are longer."""
+    letters = np.zeros((len(notes), NOTE), dtype="S1")
+    for row, note in zip(letters, notes, strict=True):
+        text = str(note).encode("utf-8", "replace")
+        if len(text) > NOTE:
+            text = text[: NOTE - 4].decode("utf-8", "ignore").encode() + b" ..."
+        row[: len(text)] = np.frombuffer(text, dtype="S1")
+    return letters
 
 
 def define(dataset: Any, layout: Layout) -> None:
-    """Define everything in a new file, each variable in one piece, and write what is known.
+    """Defines a new file, each variable contiguous, and writes what is known.
 
-    What no run has given is NaN; the notes that are not there take no room on a disk.
+    Outputs are NaN at first; absent notes take no space on a disk.
     """
     for name, length in layout.sizes.items():
         dataset.createDimension(name, length)
     dataset.createDimension("note_length", NOTE)
     for coordinate in layout.coordinates:
         variable = _variable(dataset, coordinate.name, "f8", coordinate.dimensions, False)
-        _describe(variable, coordinate.about)
+        write_attributes(variable, coordinate.about)
         variable[...] = coordinate.values
     names = [c.name for c in layout.coordinates if c.name not in layout.sizes]
     last = (-1,) * len(layout.dimensions)
     for output in layout.outputs:
         variable = _variable(dataset, output.name, "f8", output.dimensions, np.nan)
-        _describe(variable, output.about)
+        write_attributes(variable, output.about)
         if names and not any(" " in name for name in names):
             variable.setncattr_string("coordinates", " ".join(names))
-        variable[(*last, -1)[: len(output.dimensions)]] = np.nan  # takes its place in the file
+        variable[(*last, -1)[: len(output.dimensions)]] = np.nan  # allocates it
     status = _variable(dataset, "status", "i1", layout.dimensions, False)
-    _describe(status, ABOUT_STATUS)
+    write_attributes(status, ABOUT_STATUS)
     status[last] = PointStatus.OPEN
     note = _variable(dataset, "note", "S1", (*layout.dimensions, "note_length"), False)
     note.set_auto_chartostring(False)
-    _describe(note, ABOUT_NOTE)
+    write_attributes(note, ABOUT_NOTE)
     note.setncattr("_Encoding", "utf-8")
     note[(*last, -1)] = b""
     write_attributes(dataset, layout.attributes)
@@ -85,11 +88,3 @@ def define(dataset: Any, layout: Layout) -> None:
 
 def _variable(dataset: Any, name: str, kind: str, dimensions: tuple[str, ...], fill: Any) -> Any:
     return dataset.createVariable(name, kind, dimensions, fill_value=fill, contiguous=True)
-
-
-def _describe(variable: Any, about: dict[str, Any]) -> None:
-    for name, value in about.items():
-        if isinstance(value, str):
-            variable.setncattr_string(name, value)
-        else:
-            variable.setncattr(name, value)

@@ -48,7 +48,7 @@ def at_instants(result: Result, index: Integers) -> Result:
     """A result reduced to some of its instants, with the model of the whole."""
     if len(index) == len(result.t):
         return result
-    return Result.of_parts(
+    return Result(
         result.subject,
         result.arrays.at(index),
         result.record,
