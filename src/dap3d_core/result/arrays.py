@@ -1,9 +1,9 @@
 """Stored arrays of a result; all other quantities are computed from them."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
@@ -64,8 +64,9 @@ U_ERROR = Column(
 )
 
 
-class StoredArrays(ABC):
-    """Arrays of n bodies and m constraint rows at nt instants, in memory or in a file; read-only.
+@attrs.define(eq=False, slots=False)
+class Arrays:
+    """Arrays of n bodies and m constraint rows at nt instants; read-only.
 
     Attributes:
         t: (nt,) s.
@@ -77,8 +78,6 @@ class StoredArrays(ABC):
         position_residual, velocity_residual, acceleration_residual: (nt,) largest magnitude.
         angles: (nt, k) of k angles whose turns are counted, rad, as in ``Model.angles_of``.
         u_error: (nt, 13 n) estimated error of u; None where the run made no estimate.
-        width: numbers of u, v_dot, Lam and angles at an instant.
-        has_error: True if there is an estimate of the error of u.
     """
 
     t: Floats
@@ -91,64 +90,54 @@ class StoredArrays(ABC):
     velocity_residual: Floats
     acceleration_residual: Floats
     angles: Floats
-    u_error: Floats | None
-    width: int
-    has_error: bool
+    u_error: Floats | None = None
 
-    @abstractmethod
-    def __len__(self) -> int: ...
+    def __attrs_post_init__(self) -> None:
+        for array in self.columns():
+            array.flags.writeable = False
+        if self.u_error is not None:
+            self.u_error.flags.writeable = False
 
-    @abstractmethod
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def has_error(self) -> bool:
+        """True if there is an estimate of the error of u."""
+        return self.u_error is not None
+
+    @property
+    def width(self) -> int:
+        """Numbers of u, v_dot, Lam and angles at an instant."""
+        return sum(a.shape[1] for a in (self.u, self.v_dot, self.Lam, self.angles))
+
+    def columns(self) -> Iterator[Floats]:
+        """The arrays of ``COLUMNS``, in their order."""
+        return (getattr(self, column.name) for column in COLUMNS)
+
     def part(self, rows: slice) -> "Arrays":
         """Arrays of some of the instants; views where the arrays are in memory."""
+        error = None if self.u_error is None else self.u_error[rows]
+        return Arrays(*(array[rows] for array in self.columns()), error)
 
-    @abstractmethod
     def at(self, indices: Integers) -> "Arrays":
         """Arrays at single instants, (k,) rising indices, without the estimate of the error."""
+        return Arrays(*(array[indices] for array in self.columns()))
 
     def blocks(self) -> "Iterator[Arrays]":
         """Consecutive parts of about BLOCK numbers each."""
         step = max(1, BLOCK // (len(COLUMNS) + self.width))
         return (self.part(slice(first, first + step)) for first in range(0, len(self), step))
 
-    def columns(self) -> Iterator[Floats]:
-        """The arrays of ``COLUMNS``, in their order."""
-        return (getattr(self, column.name) for column in COLUMNS)
-
     def with_error(self, u_error: Floats) -> "Arrays":
         """The same arrays, in memory, with an estimate of the error of u."""
-        return Arrays(self.columns(), u_error)
-
-
-class Arrays(StoredArrays):
-    """Stored arrays in memory: ``columns`` in the order of ``COLUMNS``, and ``u_error``."""
-
-    def __init__(self, columns: Iterable[Floats], u_error: Floats | None = None) -> None:
-        for column, array in zip(COLUMNS, columns, strict=True):
-            array.flags.writeable = False
-            setattr(self, column.name, array)
-        self.u_error, self.has_error = u_error, u_error is not None
-        if u_error is not None:
-            u_error.flags.writeable = False
-        self.width = sum(a.shape[1] for a in (self.u, self.v_dot, self.Lam, self.angles))
-
-    def __len__(self) -> int:
-        return len(self.t)
-
-    def part(self, rows: slice) -> "Arrays":
-        """Views of some of the instants."""
-        error = None if self.u_error is None else self.u_error[rows]
-        return Arrays((array[rows] for array in self.columns()), error)
-
-    def at(self, indices: Integers) -> "Arrays":
-        """Copies of single instants."""
-        return Arrays(array[indices] for array in self.columns())
+        return Arrays(*self.columns(), u_error)
 
 
 def joined(parts: Sequence[Arrays]) -> Arrays:
     """Consecutive parts as one."""
     columns = zip(*(part.columns() for part in parts), strict=True)
-    return Arrays(np.concatenate(column) for column in columns)
+    return Arrays(*map(np.concatenate, columns))
 
 
 def column_sizes(subject: Subject) -> dict[str, int]:
@@ -197,4 +186,4 @@ def arrays_of(rows: Floats, subject: Subject) -> Arrays:
     t, *_, work, v_dot, Lam, angles, energy, residuals = (rows[:, layout[n]] for n in layout.names)
     u = _states(rows[:, layout["coordinates"].start : layout["work"].stop])
     columns = (t[:, 0], u, v_dot, Lam, work[:, 0], energy[:, 0], *residuals.T, angles)
-    return Arrays(np.array(column) for column in columns)
+    return Arrays(*map(np.array, columns))

@@ -1,15 +1,15 @@
-"""What goes wrong with results: files that cannot be written or read, names that are not there."""
+"""Errors of results: files that cannot be written or read, unknown names."""
 
 from collections.abc import Collection
 
 from dap3d_core.registry.suggestions import nearest
 
-#: Up to so many names are listed in a message.
+#: Largest number of names listed in a message.
 LISTED = 12
 
 
 class ResultError(OSError):
-    """A result cannot be written, read, or made complete; one sentence says why and what helps."""
+    """A result cannot be written, read, or completed; the message gives reason and remedy."""
 
 
 class UnknownNameError(KeyError):
@@ -19,8 +19,8 @@ class UnknownNameError(KeyError):
         nearest: the most similar name that it has, or "".
     """
 
-    def __init__(self, words: str, near: str = "") -> None:
-        super().__init__(words)
+    def __init__(self, message: str, near: str = "") -> None:
+        super().__init__(message)
         self.nearest = near
 
     def __str__(self) -> str:
@@ -28,10 +28,10 @@ class UnknownNameError(KeyError):
 
 
 def unknown(what: str, name: str, known: Collection[str]) -> UnknownNameError:
-    """The error for a name that is not among the known ones: lists them where they are few."""
-    words = f"there is no {what} {name!r}"
+    """The error for a name that is not known; lists the known ones if they are few."""
+    message = f"there is no {what} {name!r}"
     if not known:
-        words += f": the scene has no {what}"
+        message += f": the scene has no {what}"
     elif len(known) <= LISTED:
-        words += f" ({what}s: {', '.join(known)})"
-    return UnknownNameError(words, nearest(name, known))
+        message += f" ({what}s: {', '.join(known)})"
+    return UnknownNameError(message, nearest(name, known))

@@ -1,12 +1,12 @@
-"""What happened at an instant of a run: a switch changed its sign, an event of the user's came."""
+"""Records of switches and user events at located instants of a run."""
 
 from collections.abc import Mapping
 from typing import Any
 
 import attrs
 
-#: What an occurrence may be: a switch changed its sign, and the integration started anew; a switch
-#: ended the run; an event stopped it, was noted, or changed numbers of a force.
+#: A switch that restarted the integration, or ended the run; an event that stopped it, was
+#: recorded, or changed parameters of a force.
 KINDS = ("switch", "end", "stop", "record", "change")
 
 
@@ -16,15 +16,15 @@ def _state(u: Any) -> tuple[float, ...] | None:
 
 @attrs.frozen(kw_only=True)
 class Occurrence:
-    """An instant that was located.
+    """A switch or an event at a located instant.
 
     Attributes:
         name: of the event; of a switch ``force NAME`` or ``joint NAME``.
         t: s.
-        direction: +1 where the number that was watched rose through its level, -1 where it fell.
+        direction: +1 if its function rose through its level, -1 if it fell.
         kind: one of ``KINDS``.
         u: (13 n) the state, of events; None for switches.
-        changes: force -> field -> new value, where numbers were changed.
+        changes: force -> field -> new value of changed parameters.
     """
 
     name: str

@@ -1,8 +1,8 @@
-"""What a run says of itself: where it came from, how it went, what it cost."""
+"""Metadata of a run: scene, settings, status, cost."""
 
 import json
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -13,20 +13,20 @@ from dap3d_core.result.event_record import Occurrence
 from dap3d_core.scene import SceneError, tables_of
 from dap3d_core.scene.scene import FIXED_STEP
 
-#: How a run can have ended.
+#: Final statuses of a run.
 STATUSES = ("done", "interrupted", "stopped")
-#: How a note begins that changes nothing of what was asked for: no warning to ``--strict``.
+#: Prefix of a note that is no warning to ``--strict``.
 INFORMATION = "for information: "
-#: Stands in a file that is still being written, or whose writer was killed.
+#: Status in a file that is being written, or was left by a killed writer.
 RUNNING = "running"
 
 
 @attrs.frozen(kw_only=True)
 class Statistics:
-    """What a run cost.
+    """Cost of a run.
 
     Attributes:
-        steps, rejected: integration steps taken, and tried but thrown away.
+        steps, rejected: integration steps taken, and rejected.
         rhs: evaluations of the right-hand side.
         projections: projections on the constraints.
         wall_time_s, compile_time_s: time of the run without compilation, and of compilation, s.
@@ -52,55 +52,46 @@ def _installed() -> dict[str, str]:
 
 
 def current_versions() -> dict[str, str]:
-    """Versions of what the numbers depend on: dap3d, numpy, llvmlite, python."""
+    """Installed versions of dap3d, numpy, llvmlite, python."""
     return dict(_installed())
 
 
-def _words(words: Iterable[str]) -> tuple[str, ...]:
-    return tuple(words)
-
-
-def _occurrences(found: Iterable[Occurrence]) -> tuple[Occurrence, ...]:
-    return tuple(found)
-
-
 def _plain(value: Any) -> Any:
-    """Settings as a file gives them back: lists for tuples, Python's numbers for numpy's."""
+    """Settings as read from a file: lists for tuples, Python's numbers for numpy's."""
     return json.loads(to_json(value))
 
 
 def to_json(value: Any) -> str:
-    """Text of settings, notes or statistics; numpy's numbers and arrays become Python's."""
+    """JSON of settings, notes or statistics; numpy's numbers and arrays become Python's."""
     return json.dumps(value, default=lambda v: v.tolist() if hasattr(v, "tolist") else str(v))
 
 
 @attrs.frozen(kw_only=True)
 class Record:
-    """Everything about a run that is not an array.
+    """Metadata of a run: all but its arrays.
 
     Attributes:
         scene_text: the scene that was run, as the text of a scene file.
         status: "done"; "interrupted" by the user; "stopped" early, by an event or a failure.
         method, integrator: formulation and method of integration that were used.
-        notes: what the run chose, changed or noticed, in order.
-        settings: rtol, atol, step, project, correct and the like, as they were used.
-        stats: what it cost.
-        events: what happened at instants that were located, in their order.
-        run: by which a checkpoint knows the rows that belong to it; "" where there is none.
-        types: where the types of the scene come from (simulation/output/type_sources.py): "joint
-        rev" ->
-            ``digest``, ``distribution``, ``version``; None where it was not recorded.
-        known_versions: of dap3d, numpy, llvmlite, python; None for those that are installed.
+        notes: choices, changes and warnings, in order.
+        settings: rtol, atol, step, project, correct and others, as used.
+        stats: its cost.
+        events: located switches and events, in order.
+        run: identity that a checkpoint and its rows share, "" if there is none.
+        types: sources of the types (simulation/output/type_sources.py): "joint rev" -> ``digest``,
+            ``distribution``, ``version``; None if not recorded.
+        known_versions: of dap3d, numpy, llvmlite, python; None for those installed.
     """
 
     scene_text: str
     status: str = attrs.field(default="done", validator=attrs.validators.in_((*STATUSES, RUNNING)))
     method: str = ""
     integrator: str = ""
-    notes: tuple[str, ...] = attrs.field(default=(), converter=_words)
+    notes: tuple[str, ...] = attrs.field(default=(), converter=tuple[str, ...])
     settings: dict[str, Any] = attrs.field(factory=dict, converter=_plain)
     stats: Statistics = attrs.Factory(Statistics)
-    events: tuple[Occurrence, ...] = attrs.field(default=(), converter=_occurrences)
+    events: tuple[Occurrence, ...] = attrs.field(default=(), converter=tuple[Occurrence, ...])
     run: str = attrs.field(default="", eq=False)
     types: Mapping[str, Mapping[str, str]] | None = None
     known_versions: Mapping[str, str] | None = attrs.field(
@@ -109,13 +100,13 @@ class Record:
 
     @property
     def versions(self) -> dict[str, str]:
-        """Versions of dap3d, numpy, llvmlite and python that made the numbers."""
+        """Versions of dap3d, numpy, llvmlite and python in the run."""
         known = self.known_versions
         return current_versions() if known is None else dict(known)
 
     @property
     def title(self) -> str:
-        """Name of the scene, "" where it has none."""
+        """Name of the scene, "" if it has none."""
         head = self.scene_text.partition("\n[")[0]  # the header is the first table
         try:
             name = tables_of(head)["scene"]["name"]
@@ -141,10 +132,10 @@ class Record:
 
     @property
     def length(self) -> float:
-        """The length, m, that tolerances speak of (Model.length)."""
+        """The length, m, that tolerances refer to (Model.length)."""
         return float(self.settings.get("length", 1.0))
 
     @property
     def projected(self) -> bool:
-        """Whether states were projected on the constraints."""
+        """True if states were projected on the constraints."""
         return bool(self.settings.get("project", False))

@@ -1,4 +1,4 @@
-"""What the numbers of a result belong to: bodies, joints and points, and their constants."""
+"""Summary of a model: names and constants of bodies, joints and points."""
 
 from functools import cached_property
 
@@ -11,7 +11,7 @@ from dap3d_core.model.groups import Floats, Integers
 
 @attrs.frozen(eq=False)
 class Subject:
-    """The part of a model that a result needs and a file keeps.
+    """The part of a model that a result and its file hold.
 
     Attributes:
         body_names, joint_names, point_names: in file order; ground is not among the bodies,
@@ -21,10 +21,10 @@ class Subject:
         joint_rows: (joints,) constraint rows of each joint.
         point_body: (points,) body of each point: 1 to n, 0 for ground.
         point_local: (points, 3) coordinates on that body, m.
-        has_potential: whether every force has a potential (which a damper part still may not).
-        is_isolated: whether nothing outside acts on the bodies, so that momentum is conserved:
-            no force, and no joint with ground or with a single body.
-        angle_count: number of angles of forces and joints whose turns are counted.
+        has_potential: True if every force has a potential (which a damper in it may not).
+        is_isolated: True if momentum is conserved: no force, and no joint with ground or with a
+            single body.
+        angle_count: number of angles of forces and joints with counted turns.
     """
 
     body_names: tuple[str, ...]
@@ -56,22 +56,26 @@ class Subject:
 
     @cached_property
     def body_index(self) -> dict[str, int]:
-        """Name of a body -> its place, from 0."""
-        return {name: k for k, name in enumerate(self.body_names)}
+        """Name of a body -> its index."""
+        return _index(self.body_names)
 
     @cached_property
     def point_index(self) -> dict[str, int]:
-        """Name of a point -> its place, from 0."""
-        return {name: k for k, name in enumerate(self.point_names)}
+        """Name of a point -> its index."""
+        return _index(self.point_names)
 
     @cached_property
     def joint_index(self) -> dict[str, int]:
-        """Name of a joint -> its place, from 0."""
-        return {name: k for k, name in enumerate(self.joint_names)}
+        """Name of a joint -> its index."""
+        return _index(self.joint_names)
+
+
+def _index(names: tuple[str, ...]) -> dict[str, int]:
+    return {name: k for k, name in enumerate(names)}
 
 
 def is_subject_of(subject: Subject, model: Model) -> bool:
-    """Whether the arrays of a subject have the places of a model's bodies and rows."""
+    """True if arrays of a subject have the layout of a model's bodies and rows."""
     return (
         tuple(model.body_names) == tuple(subject.body_names)
         and tuple(model.joint_names) == tuple(subject.joint_names)
@@ -80,7 +84,7 @@ def is_subject_of(subject: Subject, model: Model) -> bool:
 
 
 def subject_of(model: Model) -> Subject:
-    """The subject of a model."""
+    """The summary of a model."""
     return Subject(
         body_names=model.body_names,
         mass=model.mass,

@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.result.arrays import LARGE, Arrays, StoredArrays
+from dap3d_core.result.arrays import LARGE, Arrays
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.checksum import check_checksums, check_signature
 from dap3d_core.result.file.lazy_arrays import LazyArrays
@@ -52,7 +52,7 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
         except BaseException:
             dataset.close()
             raise
-        if isinstance(arrays, Arrays):
+        if not isinstance(arrays, LazyArrays):
             dataset.close()
     return Result(subject, arrays, record, _origin(file, subject, record, rebuild))
 
@@ -84,7 +84,7 @@ def _check_format(file: Path, dataset: Any) -> None:
         )
 
 
-def _read(dataset: Any) -> tuple[Subject, Record, StoredArrays]:
+def _read(dataset: Any) -> tuple[Subject, Record, Arrays]:
     older = {"events": "[]", "run": "", "types": "null"}  # absent in files of older programs
     values = older | {name: dataset.getncattr(name) for name in dataset.ncattrs()}
     for name in _JSON:

@@ -10,7 +10,7 @@ import attrs
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.rotations import read_only
-from dap3d_core.result.arrays import Arrays, StoredArrays, arrays_of
+from dap3d_core.result.arrays import Arrays, arrays_of
 from dap3d_core.result.errors import ResultError, unknown
 from dap3d_core.result.event_record import Occurrence
 from dap3d_core.result.metadata import Record, Statistics
@@ -68,7 +68,7 @@ class Result:
     """
 
     subject: Subject
-    arrays: StoredArrays
+    arrays: Arrays
     record: Record
 
     r = _motion("r")
@@ -84,7 +84,7 @@ class Result:
     rPdd = _motion("rPdd")
 
     def __init__(
-        self, subject: Subject, arrays: StoredArrays, record: Record, origin: Callable[[], Origin]
+        self, subject: Subject, arrays: Arrays, record: Record, origin: Callable[[], Origin]
     ) -> None:
         """Args:
         subject, arrays, record: the parts of the result.
@@ -115,7 +115,7 @@ class Result:
 
     def __reduce__(self) -> Any:
         """For other processes: everything but the model and the evaluator."""
-        arrays = tuple(self.arrays.columns()), self.arrays.u_error
+        arrays = (*self.arrays.columns(), self.arrays.u_error)
         return _received, (self.subject, arrays, self.record)
 
     def __repr__(self) -> str:
@@ -372,7 +372,7 @@ class Result:
         return dataset_of(self)
 
 
-def _received(subject: Subject, arrays: tuple[Any, Any], record: Record) -> Result:
+def _received(subject: Subject, arrays: tuple[Any, ...], record: Record) -> Result:
     """A result from another process."""
     return Result(subject, Arrays(*arrays), record, _no_origin)
 

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and never over another without being asked to."""
+"""Files that are written whole or not at all, and replace another only on request."""
 
 import errno
 import os
@@ -12,19 +12,19 @@ from pathlib import Path
 from dap3d_core.registry.regular_files import kind_of, read_regular
 from dap3d_core.result.errors import ResultError
 
-#: A disk with less room, bytes, is full: a block of a file no longer fits.
+#: A disk with less free space, bytes, counts as full: a block of a file no longer fits.
 _NO_ROOM = 2**16
-#: So many unfinished files may lie beside one another.
+#: Largest number of unfinished files with one name.
 _MOST_PARTS = 1000
 
 
 def cannot(verb: str, path: Path, error: BaseException) -> ResultError:
-    """The error for a file that the system or a library refuses, in a sentence."""
+    """The error for a file that the system or a library refuses."""
     reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
     from_library = "HDF error" in reason
     if getattr(error, "errno", None) in (errno.EACCES, errno.EPERM):
         reason = "no permission"
-        from_library = os.access(path.parent, os.W_OK)  # so it calls whatever goes wrong
+        from_library = os.access(path.parent, os.W_OK)  # its word for all failures
     if verb == "write" and from_library and _is_full(path.parent):
         reason = os.strerror(errno.ENOSPC)
     elif "HDF error" in reason:
@@ -33,7 +33,7 @@ def cannot(verb: str, path: Path, error: BaseException) -> ResultError:
 
 
 def _is_full(folder: Path) -> bool:
-    """Whether the disk of a folder has next to no room left."""
+    """True if the disk of a folder is full."""
     try:
         return shutil.disk_usage(folder).free < _NO_ROOM
     except OSError:
@@ -41,7 +41,7 @@ def _is_full(folder: Path) -> bool:
 
 
 def beginning(file: Path, count: int) -> bytes:
-    """The first bytes of a file, as many as there are of them.
+    """Up to ``count`` first bytes of a file.
 
     Raises:
         ResultError: there is no such file, it is no regular file, or the system refuses.
@@ -57,26 +57,30 @@ def beginning(file: Path, count: int) -> bytes:
 
 
 def check_target(path: str | os.PathLike[str], force: bool = False) -> Path:
-    """The path of a file that may be written; a link is followed to the file that it stands for.
+    """The path of a file that may be written; a link is followed and remains.
 
     Raises:
         ResultError: its folder does not exist, it is no file, or it exists and ``force`` is off.
     """
     target = Path(path)
     try:
-        if target.is_symlink():
-            return _link_target(target, force)
-        mode = _mode_of(target)  # asked once: another process may make it meanwhile
-        if mode and stat.S_ISREG(mode):
-            fault = "" if force else "the file exists; force overwrites it"
-        elif mode and stat.S_ISDIR(mode):
+        mode = _mode_of(target)  # once: another process may create it meanwhile
+        is_link = target.is_symlink()
+        file = Path(os.path.realpath(target)) if is_link else target
+        if mode and stat.S_ISDIR(mode):
             fault = "it is a folder; name a file in it"
-        elif mode:
+        elif mode and not stat.S_ISREG(mode):
             fault = f"it is no regular file but {kind_of(mode)}"
-        elif not target.parent.is_dir():
-            fault = f"there is no folder {target.parent}"
+        elif mode and is_link and not (file.exists() and file.samefile(target)):
+            fault = "the file that it stands for has no name"  # as /dev/stdout may
+        elif not mode and is_link and not force:
+            fault = "it is a link that leads nowhere; force makes the file that it names"
+        elif is_link:
+            return check_target(file, force)
+        elif mode:
+            fault = "" if force else "the file exists; force overwrites it"
         else:
-            fault = ""
+            fault = "" if target.parent.is_dir() else f"there is no folder {target.parent}"
     except ResultError:
         raise
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
@@ -87,11 +91,7 @@ def check_target(path: str | os.PathLike[str], force: bool = False) -> Path:
 
 
 def check_utf8(verb: str, path: str | os.PathLike[str]) -> None:
-    """Refuse a NetCDF file whose path is not UTF-8, such as Latin-1: the library opens none.
-
-    Args:
-        verb: "read" or "write".
-        path: the file.
+    """Refuses to "read" or "write" a NetCDF file if its path is not UTF-8, such as Latin-1.
 
     Raises:
         ResultError: its name, or that of a folder above it, is not UTF-8.
@@ -105,26 +105,8 @@ def check_utf8(verb: str, path: str | os.PathLike[str]) -> None:
         ) from error
 
 
-def _link_target(link: Path, force: bool) -> Path:
-    """The file that a link stands for, as ``check_target`` has it: the link itself stays.
-
-    A link of the system, such as /dev/stdout, may stand for an open file that has no name.
-    """
-    target = Path(os.path.realpath(link))
-    mode = _mode_of(link)
-    if mode and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
-        fault = f"it is no regular file but {kind_of(mode)}"
-    elif mode and not (target.exists() and target.samefile(link)):
-        fault = "the file that it stands for has no name"
-    elif not mode and not force:
-        fault = "it is a link that leads nowhere; force makes the file that it names"
-    else:
-        return check_target(target, force)
-    raise ResultError(f"cannot write {link}: {fault}")
-
-
 def _mode_of(path: Path) -> int:
-    """What there is at a path, as ``stat`` has it; 0 where there is nothing."""
+    """Mode of the file at a path as in ``stat``; 0 if there is none."""
     try:
         return path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
@@ -132,10 +114,9 @@ def _mode_of(path: Path) -> int:
 
 
 def reserve(target: Path) -> Path:
-    """Create an empty temporary file next to the target, ``NAME.new-`` and a random suffix.
+    """Creates an empty temporary file next to the target, ``NAME.new-`` and a random suffix.
 
-    No other process ever uses its name, so that whoever made it may remove that name at any time,
-    even after the file has got another one.
+    No other process ever uses its name: its creator may remove it at any time.
 
     Raises:
         ResultError: the folder cannot be written to.
@@ -148,9 +129,7 @@ def reserve(target: Path) -> Path:
 
 
 def named_part(file: Path, target: Path) -> Path:
-    """Rename a temporary file, which may be open, to ``NAME.part`` or the first such name free.
-
-    The part of another run, or of one that was killed, stays as it is.
+    """Renames a temporary file, which may be open, to ``NAME.part`` or the next free name.
 
     Raises:
         ResultError: the system refuses.
@@ -174,18 +153,13 @@ def _claim(target: Path, suffixes: Iterable[str], take: Callable[[Path], None]) 
 
 
 def synchronise(path: Path) -> None:
-    """Wait until a file's content is on the disk; OSError where the system refuses."""
+    """Waits until a file's content is on the disk; OSError if the system refuses."""
     with path.open("rb+") as file:
         os.fsync(file.fileno())
 
 
 def put_in_place(part: Path, target: Path, force: bool = True) -> None:
-    """Give a finished file its name, once its content is on the disk.
-
-    Args:
-        part: the finished file.
-        target: its name.
-        force: whether another file of that name is replaced.
+    """Gives a finished file its name, once its content is on the disk; ``force`` replaces another.
 
     Raises:
         ResultError: the system refuses; another file has the name and ``force`` is off.
@@ -207,7 +181,7 @@ def put_in_place(part: Path, target: Path, force: bool = True) -> None:
 
 
 def _name_if_free(part: Path, target: Path) -> None:
-    """Give a file a name that no other has; of two processes that try, one succeeds."""
+    """Gives a file a name that no other has; of two processes that try, one succeeds."""
     try:
         os.link(part, target)
     except FileExistsError:
@@ -222,14 +196,14 @@ def _name_if_free(part: Path, target: Path) -> None:
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str], force: bool = False) -> Iterator[Path]:
-    """A file to write into, which gets its name at the end; left with an error, it vanishes.
+    """A file to write into, which gets its name at the end; after an error it is removed.
 
     Args:
-        path: what it is called in the end.
-        force: whether an existing file is overwritten.
+        path: the final name.
+        force: True to overwrite an existing file.
 
     Raises:
-        ResultError: the path cannot be written to; also for an OSError of what writes.
+        ResultError: the path cannot be written to; also in place of an OSError of the writer.
     """
     target = check_target(path, force)
     part = reserve(target)

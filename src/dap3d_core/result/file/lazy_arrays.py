@@ -5,15 +5,15 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.result.arrays import COLUMNS, U_ERROR, Arrays, StoredArrays, column_sizes, joined
+from dap3d_core.result.arrays import COLUMNS, U_ERROR, Arrays, column_sizes, joined
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.library import NETCDF
 from dap3d_core.result.file.validate import check_numbers
 from dap3d_core.result.model_summary import Subject
 
 
-class LazyArrays(StoredArrays):
-    """Stored arrays in a file; ``blocks``, ``part`` and ``at`` read without caching.
+class LazyArrays(Arrays):
+    """Arrays in a file, read on first use; ``blocks``, ``part`` and ``at`` read without caching.
 
     The file stays open: another file that takes its name meanwhile changes nothing here.
     """
@@ -22,16 +22,15 @@ class LazyArrays(StoredArrays):
         """Args: an open netCDF4.Dataset, its model, and the number of complete instants."""
         self._dataset, self._count = dataset, count
         self._sizes = {"": None, **column_sizes(subject)}
-        self.has_error = U_ERROR.name in dataset.variables
-        self.width = sum(size for size in self._sizes.values() if size)
-        self._columns = {c.name: c for c in ((*COLUMNS, U_ERROR) if self.has_error else COLUMNS)}
+        optional = (U_ERROR,) if U_ERROR.name in dataset.variables else ()
+        self._columns = {c.name: c for c in (*COLUMNS, *optional)}
 
     def __len__(self) -> int:
         return self._count
 
     def __getattr__(self, name: str) -> Any:
         """Reads a column on its first use."""
-        if name == U_ERROR.name and name not in self._columns:
+        if name == U_ERROR.name and not self.has_error:
             return None
         if name.startswith("_") or name not in self._columns:
             raise AttributeError(name)
@@ -39,11 +38,21 @@ class LazyArrays(StoredArrays):
         setattr(self, name, values)
         return values
 
+    @property
+    def has_error(self) -> bool:
+        """As in ``Arrays``, without reading it."""
+        return U_ERROR.name in self._columns
+
+    @property
+    def width(self) -> int:
+        """As in ``Arrays``, without reading them."""
+        return sum(size for size in self._sizes.values() if size)
+
     def part(self, rows: slice) -> Arrays:
         """Some of the instants, read from the file."""
         first, last, step = rows.indices(self._count)
         error = self._read(U_ERROR.name, slice(first, last)) if self.has_error else None
-        whole = Arrays((self._read(c.name, slice(first, last)) for c in COLUMNS), error)
+        whole = Arrays(*(self._read(c.name, slice(first, last)) for c in COLUMNS), error)
         return whole if step == 1 else whole.part(slice(None, None, step))
 
     def at(self, indices: Integers) -> Arrays:

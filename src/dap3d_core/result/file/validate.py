@@ -1,4 +1,4 @@
-"""What a result file may claim: asked before memory is taken for it, and before it is believed."""
+"""Checks of the content of a result file, before memory is allocated and before it is used."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -12,37 +12,31 @@ from dap3d_core.result.errors import ResultError
 from dap3d_core.result.event_record import KINDS
 from dap3d_core.result.model_summary import Subject
 
-#: Arrays of so many bytes are read whatever the size of the file; beyond, a file holds at least one
-#: byte for so many. dap3d writes numbers as they are; other programs may press them together.
+#: Arrays up to so many bytes are read whatever the size of the file; larger ones only up to a ratio
+#: of their size to that of the file. dap3d does not compress; other programs may.
 ALWAYS, MOST_PRESSED = 64 * 2**20, 64
-#: Rows of a joint.
+#: Largest number of rows of a joint.
 MOST_ROWS = 1000
 
-#: Larger numbers leave no run: it is stopped before.
+#: Largest number in a result: runs are stopped before.
 MOST = 1e100
 
-#: What an entry must fulfil, and what it is in words.
+#: Test of an entry, and its description.
 Form = tuple[Callable[[Any], bool], str]
 
 
 def check_claims(file: Path, dataset: Any) -> None:
-    """Refuse a file that says it holds far more numbers than fit into it.
-
-    A few bytes can claim 1e12 entries: what was never written reads as a filling value.
-
-    Args:
-        file: where it lies.
-        dataset: the open netCDF4.Dataset.
+    """Refuses a file that claims far more numbers than fit into it; unwritten ones need no space.
 
     Raises:
-        ResultError: it claims too much; says how much.
+        ResultError: it claims too much.
     """
     shapes = [variable.shape for variable in dataset.variables.values()]
     check_shapes(file, shapes, file.stat().st_size)
 
 
 def check_shapes(file: Path, shapes: Iterable[tuple[int, ...]], byte_count: int) -> None:
-    """The same for arrays of these shapes, of 8 bytes a number, and a size of the file in bytes."""
+    """The same for shapes of arrays, with 8 bytes a number, and a size of the file in bytes."""
     claimed = 8 * sum(math.prod(shape) for shape in shapes)
     if claimed > max(ALWAYS, MOST_PRESSED * byte_count):
         raise ResultError(
@@ -52,29 +46,26 @@ def check_shapes(file: Path, shapes: Iterable[tuple[int, ...]], byte_count: int)
 
 
 def check_attributes(found: Mapping[str, Any]) -> None:
-    """Whether what a file says of its run has the form in which dap3d writes it.
-
-    Args:
-        found: the global attributes, JSON already read.
+    """Checks the form of a file's global attributes, with JSON decoded.
 
     Raises:
-        ValueError: names the first that has not.
+        ValueError: names the first that is invalid.
     """
     check_forms(found, FORMS)
 
 
 def check_forms(found: Mapping[str, Any], forms: Mapping[str, Form]) -> None:
-    """ValueError for the first entry that is not of its form."""
+    """Raises ValueError for the first entry that is not of its form."""
     for name, (fits, what) in forms.items():
         if not fits(found.get(name)):
             raise ValueError(f"{name} should be {what}")
 
 
 def check_numbers(file: str | Path, name: str, values: NDArray[np.float64]) -> None:
-    """Whether an array of a file holds what a run may have left; times increase.
+    """Refuses an array of a file with numbers beyond those of a run, or times that do not increase.
 
     Raises:
-        ResultError: it does not.
+        ResultError: the array is damaged.
     """
     good = not values.size or (values.min() >= -MOST and values.max() <= MOST)
     if not good or (name == "t" and not (values[1:] > values[:-1]).all()):
@@ -83,10 +74,10 @@ def check_numbers(file: str | Path, name: str, values: NDArray[np.float64]) -> N
 
 
 def check_subject(subject: Subject) -> None:
-    """Whether names are texts of a line, and indices and counts lie within what there is.
+    """Checks that names are single lines, and that constants and indices are in range.
 
     Raises:
-        ValueError: names what does not.
+        ValueError: describes the first that is not.
     """
     for kind in ("body", "joint", "point"):
         for name in getattr(subject, f"{kind}_names"):
@@ -104,17 +95,17 @@ def check_subject(subject: Subject) -> None:
 
 
 def is_number(value: Any) -> bool:
-    """Whether this is a finite number of a size that a run may meet."""
+    """True for a finite number of ordinary size."""
     return type(value) in (int, float) and abs(value) < 1e300
 
 
 def are_texts(value: Any) -> bool:
-    """Whether this is a list of texts."""
+    """True for a list of texts."""
     return isinstance(value, list) and all(isinstance(v, str) for v in value)
 
 
 def _is_plain(value: Any, depth: int = 3) -> bool:
-    """A setting: a number, a word, a truth value, nothing, or a short nest of them."""
+    """True for a number, text, truth value or None, or a shallow nest of them."""
     if isinstance(value, (list, dict)):
         parts = value.values() if isinstance(value, dict) else value
         return depth > 0 and all(_is_plain(v, depth - 1) for v in parts)
@@ -133,7 +124,7 @@ def _are_settings(value: Any) -> bool:
 
 
 def _is_tolerance(value: Any) -> bool:
-    """One number, one for each quantity, or none."""
+    """True for one number, one for each quantity, or none."""
     return value is None or is_number(value) or (_are_numbers(value) and set(value) == set("rpvw"))
 
 
@@ -142,7 +133,7 @@ def _are_numbers(value: Any) -> bool:
 
 
 def are_events(value: Any) -> bool:
-    """Whether these are events as a result and a checkpoint hold them."""
+    """True for events of a result or a checkpoint."""
     return isinstance(value, list) and all(isinstance(v, dict) and _is_event(v) for v in value)
 
 
@@ -166,11 +157,11 @@ def _are_sources(value: Any) -> bool:
 
 
 def is_table_of_texts(value: Any) -> bool:
-    """Whether this is a table whose values are texts."""
+    """True for a table of texts."""
     return isinstance(value, dict) and all(isinstance(v, str) for v in value.values())
 
 
-#: Of the attributes of a result.
+#: Forms of the attributes of a result.
 FORMS: dict[str, Form] = {
     "types": (_are_sources, "a table of tables of texts"),
     "notes": (are_texts, "a list of texts"),

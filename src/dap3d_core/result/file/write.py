@@ -8,7 +8,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.result.arrays import Arrays, StoredArrays
+from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.atomic_write import (
     check_target,
@@ -28,7 +28,7 @@ from dap3d_core.result.model_summary import Subject
 def save(
     subject: Subject,
     record: Record,
-    arrays: StoredArrays,
+    arrays: Arrays,
     path: str | os.PathLike[str],
     force: bool = False,
 ) -> None:

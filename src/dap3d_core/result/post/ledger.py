@@ -11,7 +11,7 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.state_layout import split, velocities_of
-from dap3d_core.result.arrays import Arrays, StoredArrays
+from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.metadata import Record
 from dap3d_core.result.model_summary import Subject
 from dap3d_core.result.post.point_motion import kinetic_energy, momentum
@@ -95,7 +95,7 @@ class LedgerSeries:
     sizes: list[float]
 
     @classmethod
-    def of(cls, subject: Subject, arrays: StoredArrays, length: float) -> "LedgerSeries":
+    def of(cls, subject: Subject, arrays: Arrays, length: float) -> "LedgerSeries":
         """The series of a run, computed block by block in little memory."""
         blocks, sizes = [], np.zeros(3)
         for block in arrays.blocks():
@@ -134,7 +134,7 @@ def _series(subject: Subject, block: Arrays) -> dict[str, Floats]:
 CONSERVATIVE = 1e-3
 
 
-def ledger_of(subject: Subject, arrays: StoredArrays, record: Record) -> dict[str, Entry]:
+def ledger_of(subject: Subject, arrays: Arrays, record: Record) -> dict[str, Entry]:
     """All entries of a run, by name; none for a run without reported instants.
 
     Names: energy; total energy (where potentials alone do work); momentum (where nothing

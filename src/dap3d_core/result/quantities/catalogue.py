@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.rotations import to_body
 from dap3d_core.model.state_layout import split
-from dap3d_core.result.arrays import AXES, COLUMNS, EULER, StoredArrays
+from dap3d_core.result.arrays import AXES, COLUMNS, EULER, Arrays
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.metadata import Record
 from dap3d_core.result.model_summary import Subject
@@ -26,7 +26,7 @@ class QuantitySource(Protocol):
     """The part of a ``Result`` that quantities are computed from."""
 
     subject: Subject
-    arrays: StoredArrays
+    arrays: Arrays
     record: Record
 
     @property

@@ -149,10 +149,10 @@ def write_netcdf(
 def _add_jacobian(file: Any, result: "Result") -> None:
     meaning = "constraint Jacobian D, D v = nu"
     sparse = result.subject.row_count > DENSE_ROWS
-    for name, count in (("row", result.subject.row_count),
-                        ("velocity", 6 * result.subject.body_count)):  # fmt: skip
+    sizes = {"row": result.subject.row_count, "velocity": 6 * result.subject.body_count}
+    for name, size in sizes.items():
         if name not in file.dimensions:
-            file.createDimension(name, count)
+            file.createDimension(name, size)
     variable = None
     for k, rows in enumerate(rows_at(result.machine, result.t, result.u)):
         if variable is None and sparse:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.result import Record, Result, ResultError, ResultWriter, check_target
-from dap3d_core.result.arrays import LARGE, Arrays, StoredArrays, arrays_of, joined
+from dap3d_core.result.arrays import LARGE, Arrays, arrays_of, joined
 from dap3d_core.result.file.atomic_write import check_utf8
 from dap3d_core.result.model_summary import subject_of
 from dap3d_core.result.open import arrays_in
@@ -142,7 +142,7 @@ class Keeper:
             self._writer.discard()
         return result
 
-    def _arrays(self) -> StoredArrays:
+    def _arrays(self) -> Arrays:
         if self._parts:
             return joined(self._parts)
         assert self._writer is not None
