@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.model.rotations import read_only
 from dap3d_core.model.state_layout import Layout, from_integrated, row_layout, state_layout
 from dap3d_core.result.model_summary import Subject
 
@@ -94,9 +95,9 @@ class Arrays:
 
     def __attrs_post_init__(self) -> None:
         for array in self.columns():
-            array.flags.writeable = False
+            read_only(array)
         if self.u_error is not None:
-            self.u_error.flags.writeable = False
+            read_only(self.u_error)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -117,8 +118,8 @@ class Arrays:
 
     def part(self, rows: slice) -> "Arrays":
         """Arrays of some of the instants; views where the arrays are in memory."""
-        error = None if self.u_error is None else self.u_error[rows]
-        return Arrays(*(array[rows] for array in self.columns()), error)
+        part = Arrays(*(array[rows] for array in self.columns()))
+        return part if self.u_error is None else part.with_error(self.u_error[rows])
 
     def at(self, indices: Integers) -> "Arrays":
         """Arrays at single instants, (k,) rising indices, without the estimate of the error."""
@@ -131,7 +132,9 @@ class Arrays:
 
     def with_error(self, u_error: Floats) -> "Arrays":
         """The same arrays, in memory, with an estimate of the error of u."""
-        return Arrays(*self.columns(), u_error)
+        arrays = Arrays(*self.columns())
+        arrays.u_error = read_only(u_error)
+        return arrays
 
 
 def joined(parts: Sequence[Arrays]) -> Arrays:

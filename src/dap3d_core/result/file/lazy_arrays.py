@@ -51,8 +51,9 @@ class LazyArrays(Arrays):
     def part(self, rows: slice) -> Arrays:
         """Some of the instants, read from the file."""
         first, last, step = rows.indices(self._count)
-        error = self._read(U_ERROR.name, slice(first, last)) if self.has_error else None
-        whole = Arrays(*(self._read(c.name, slice(first, last)) for c in COLUMNS), error)
+        whole = Arrays(*(self._read(c.name, slice(first, last)) for c in COLUMNS))
+        if self.has_error:
+            whole = whole.with_error(self._read(U_ERROR.name, slice(first, last)))
         return whole if step == 1 else whole.part(slice(None, None, step))
 
     def at(self, indices: Integers) -> Arrays:
