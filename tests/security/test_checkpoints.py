@@ -11,7 +11,7 @@ import pytest
 from fuzz.numbers import PATIENCE, RUNS, check_change, folder, make
 from fuzz.results import in_child
 from support.ended import EndedError, ended_at, leave, shorten_chunks
-from unit.test_result_files import same_bits
+from support.results import same_bits
 
 import dap3d_core as dap
 from dap3d_core.cli import main

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import mechanisms, problems
 from support.ended import EndedError, ended_at, leave, shorten_chunks
-from unit.test_result_files import same_bits
+from support.results import same_bits
 
 import dap3d_core as dap
 from dap3d_core.kernels.runtime.cache import jit_is_on

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from PIL import Image
-from unit.test_result import (
+from support.results import (
     ARM,
     PIVOT,
     RATE,

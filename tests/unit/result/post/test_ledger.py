@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from unit.test_result import (
+from support.results import (
     CONTROLLED,
     about_z,
     circling,

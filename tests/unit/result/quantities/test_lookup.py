@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from unit.test_result import ARM, MASS, RATE, circling, model_of, result_of
+from support.results import ARM, MASS, RATE, circling, model_of, result_of
 
 from dap3d_core.result import UnknownNameError, find
-from dap3d_core.scene import Scene
+from dap3d_core.scene import AnimationPoint, Scene
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_points(result):
 def test_animation_points_have_a_dot_in_their_names():
     scene = Scene(name="drawn")
     scene.add_body("b", mass=1.0, Jp=[1, 1, 1])
-    scene.animation.points.append(type_of_point(scene)(body="b", sPp=[1.0, 2.0, 3.0]))
+    scene.animation.points.append(AnimationPoint(body="b", sPp=[1.0, 2.0, 3.0]))
     model = model_of(scene)
     rows = np.zeros((1, 1 + 14 + 6 + 4))
     rows[0, 4] = 1.0  # e0
@@ -53,12 +53,6 @@ def test_animation_points_have_a_dot_in_their_names():
     np.testing.assert_array_equal(result.quantity("animation.1.r.y").values, [2])
     with pytest.raises(UnknownNameError, match=r"did you mean 'animation\.1\.r'"):
         result.quantity("animation.2.r")
-
-
-def type_of_point(scene):
-    from dap3d_core.scene import AnimationPoint
-
-    return AnimationPoint
 
 
 def test_reactions_are_those_on_the_first_body(result):
@@ -100,6 +94,8 @@ def test_a_name_that_a_body_and_a_point_share_means_the_body_where_it_can():
     result = result_of(scene, rows, model_of(scene), "unconstrained")
     np.testing.assert_array_equal(result.quantity("b.r").values, [[0, 0, 0]])
     assert result.quantity("b.v").label == "velocity of b"  # only the point has v
+    np.testing.assert_array_equal(result.quantity("b.rP").values, [[1, 0, 0]])
+    np.testing.assert_array_equal(result.quantity("b.rPdd.norm").values, [0])
 
 
 @pytest.mark.parametrize(

@@ -1,19 +1,22 @@
-"""A result survives its file bit for bit, and no file is lost, half written or misread."""
+"""A result survives its file bit for bit, and no file is misread."""
 
 import os
-import signal
-import subprocess
-import sys
-import textwrap
 import tomllib
-from concurrent.futures import ThreadPoolExecutor
 
 import attrs
 import netCDF4
 import numpy as np
 import pytest
 import xarray
-from unit.test_result import CONTROLLED, circling, circling_scene, drifting, model_of
+from support.results import (
+    CONTROLLED,
+    circling,
+    circling_scene,
+    drifting,
+    model_of,
+    noisy,
+    same_bits,
+)
 
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model.state_layout import split
@@ -21,11 +24,10 @@ from dap3d_core.result import (
     Record,
     Result,
     ResultError,
-    ResultWriter,
     Statistics,
     open_result,
 )
-from dap3d_core.result.arrays import COLUMNS, row_width
+from dap3d_core.result.arrays import row_width
 from dap3d_core.scene import load
 from dap3d_core.scene.files.read_toml import scene_of
 
@@ -37,34 +39,12 @@ ABOUT = dict(
 )
 
 
-def same_bits(left, right):
-    for column in COLUMNS:
-        a, b = (getattr(side.arrays, column.name) for side in (left, right))
-        assert a.shape == b.shape
-        assert a.dtype == b.dtype
-        assert a.tobytes() == b.tobytes(), column.name
-    return True
-
-
 def rebuild(text):
     model = model_of(scene_of(tomllib.loads(text)))
     return model, lambda: Machine(model, "standard")
 
 
 # ---------------------------------------------------------------------------- round trip
-
-
-def noisy(model, nt=9, seed=3):
-    """Rows of random bits, as large as a run may leave; Euler parameters and times are plain."""
-    rng = np.random.default_rng(seed)
-    n = model.body_count
-    width = 1 + 13 * n + 1 + 6 * n + model.row_count + 4
-    rows = rng.normal(size=(nt, width)) * 10.0 ** rng.integers(-200, 99, size=(nt, width))
-    rows[:, 0] = np.cumsum(rng.random(nt))
-    rows[:, 1 : 1 + 13 * n] = rng.normal(size=(nt, 13 * n))
-    rows[0, -1] = -0.0
-    rows[1, -1] = 5e-324
-    return rows
 
 
 @pytest.mark.parametrize("name", ["pen1", "bodies2", "fourbar3"])
@@ -188,107 +168,6 @@ def test_to_xarray_has_every_array_with_units():
     assert drifting().to_xarray().sizes["row"] == 0
 
 
-# ---------------------------------------------------------------------------- writing safely
-
-
-def test_an_existing_file_is_kept_unless_forced(tmp_path):
-    path = tmp_path / "run.nc"
-    path.write_text("precious")
-    result, _, _ = circling()
-    with pytest.raises(ResultError, match=r"cannot write .*run\.nc: the file exists; force"):
-        result.save(path)
-    with pytest.raises(ResultError, match="the file exists"):
-        ResultWriter(path, result.subject, result.record, len(result.t))
-    assert path.read_text() == "precious"
-    assert os.listdir(tmp_path) == ["run.nc"]
-    result.save(path, force=True)
-    assert same_bits(open_result(path), result)
-
-
-def test_places_that_cannot_be_written_are_refused_in_a_sentence(tmp_path):
-    result, _, _ = circling()
-    (tmp_path / "file").touch()
-    for path, words in {
-        tmp_path / "nowhere" / "run.nc": "there is no folder .*nowhere",
-        tmp_path / "file" / "run.nc": "there is no folder|Not a directory",
-        tmp_path: "it is a folder",
-        "/dev/null": "it is no regular file",
-        "a\0b": "null byte",
-    }.items():
-        with pytest.raises(ResultError, match=words):
-            result.save(path, force=True)
-    assert issubclass(ResultError, OSError)
-
-
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write all")
-def test_a_folder_without_permission(tmp_path):
-    result, _, _ = circling()
-    tmp_path.chmod(0o500)
-    try:
-        with pytest.raises(ResultError, match="no permission"):
-            result.save(tmp_path / "run.nc")
-    finally:
-        tmp_path.chmod(0o700)
-
-
-def test_a_write_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
-    path = tmp_path / "run.nc"
-    result, _, _ = circling()
-    result.save(path)
-    before = path.read_bytes()
-
-    def fail(*_):
-        raise RuntimeError("NetCDF: HDF error")
-
-    monkeypatch.setattr("dap3d_core.result.file.write.write_rows", fail)
-    with pytest.raises(ResultError, match=r"run\.nc: .*is the disk full"):
-        result.save(path, force=True)
-    assert path.read_bytes() == before
-    assert os.listdir(tmp_path) == ["run.nc"]
-
-
-@pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="no limits of file size here")
-def test_a_full_disk(tmp_path):
-    """The system refuses to write more than 50 kB to a file."""
-    code = f"""
-        import resource, signal, sys
-        sys.path.insert(0, {os.path.dirname(os.path.dirname(__file__))!r})
-        from unit.test_result import circling
-        from dap3d_core.result import ResultError
-        result = circling(nt=5000)[0]
-        sys.dont_write_bytecode = True  # it would be cut off, and kept
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, resource.RLIM_INFINITY))
-        try:
-            result.save("run.nc")
-        except ResultError as error:
-            print(error)
-    """
-    out = run(code, tmp_path)
-    assert "cannot write run.nc" in out
-    assert os.listdir(tmp_path) == []
-
-
-def run(code, folder):
-    found = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], cwd=folder, capture_output=True, text=True,
-        check=True,
-    )  # fmt: skip
-    return found.stdout
-
-
-def test_threads_may_write_and_read_at_once(tmp_path):
-    """The NetCDF library is not made for threads: one at a time uses it."""
-    result, _, _ = circling(nt=300)
-
-    def there_and_back(k):
-        result.save(tmp_path / f"{k}.nc")
-        return same_bits(open_result(tmp_path / f"{k}.nc"), result)
-
-    with ThreadPoolExecutor(8) as pool:
-        assert all(pool.map(there_and_back, range(40)))
-
-
 # ---------------------------------------------------------------------------- reading safely
 
 
@@ -307,18 +186,6 @@ def test_files_that_are_no_results(tmp_path):
     }.items():
         with pytest.raises(ResultError, match=words):
             open_result(tmp_path / name)
-
-
-@pytest.mark.parametrize("kept", [8, 100, 3000, 0.5, 0.9, -1])
-def test_a_file_cut_off_anywhere_is_refused(tmp_path, kept):
-    circling(nt=200)[0].save(tmp_path / "run.nc")
-    data = (tmp_path / "run.nc").read_bytes()
-    size = int(kept * len(data)) if isinstance(kept, float) else kept
-    (tmp_path / "cut.nc").write_bytes(data[:size])
-    with pytest.raises(
-        ResultError, match=r"cannot read .*cut\.nc: it is cut off.* bytes are there"
-    ):
-        open_result(tmp_path / "cut.nc")
 
 
 def changed(path, change):

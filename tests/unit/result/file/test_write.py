@@ -1,28 +1,25 @@
-"""A file that grows with the run is that of the whole, and whatever happens keeps what it had."""
+"""Result files are written whole or not at all; one that grows with a run keeps what it had."""
 
 import os
 import signal
 import subprocess
 import sys
 import textwrap
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 
 import numpy as np
 import pytest
 from support.plain import in_another_process
-from unit.test_result import circling, model_of
-from unit.test_result_files import noisy, run, same_bits
+from support.process import REPOSITORY, run
+from support.results import circling, grown, model_of, noisy, same_bits
 
 from dap3d_core.result import Record, Result, ResultError, ResultWriter, open_result
 from dap3d_core.result.arrays import COLUMNS, arrays_of
 from dap3d_core.result.file.schema import write_rows
 from dap3d_core.scene import load
 
-
-def grown(path, result, *, most=None, force=False):
-    """A writer for as many rows as a result has."""
-    most = len(result.t) if most is None else most
-    return ResultWriter(path, result.subject, result.record, most, force=force)
+TESTS = str(REPOSITORY / "tests")
 
 
 @pytest.mark.parametrize("pieces", [(1,) * 9, (4, 5), (9,), (0, 8, 1)])
@@ -124,9 +121,8 @@ def test_a_killed_run_leaves_a_readable_file(tmp_path):
     """The writer is killed without a chance to close; a fresh process reads all it had reported."""
     code = f"""
         import os, signal, sys
-        sys.path.insert(0, {os.path.dirname(os.path.dirname(__file__))!r})
-        from unit.test_result import circling
-        from unit.test_result_writer import grown
+        sys.path.insert(0, {TESTS!r})
+        from support.results import circling, grown
         result = circling(nt=300)[0]
         writer = grown("run.nc", result)
         for first in range(0, 270, 27):
@@ -144,7 +140,10 @@ def test_a_killed_run_leaves_a_readable_file(tmp_path):
         found = open_result("run.nc.part")
         print(len(found.t), found.status, found.r.shape, found.record.title)
     """
-    assert run(code, tmp_path).split("\n")[0] == "270 interrupted (270, 1, 3) circling"
+    assert (
+        run(textwrap.dedent(code), cwd=tmp_path).split("\n")[0]
+        == "270 interrupted (270, 1, 3) circling"
+    )
 
 
 def test_rows_that_did_not_reach_the_file_whole_are_left_out(tmp_path):
@@ -167,3 +166,96 @@ def test_a_writer_that_cannot_begin_leaves_nothing(tmp_path, monkeypatch):
     with pytest.raises(ResultError, match="is the disk full"):
         grown(tmp_path / "run.nc", result)
     assert os.listdir(tmp_path) == []
+
+
+# ---------------------------------------------------------------------------- writing safely
+
+
+def test_an_existing_file_is_kept_unless_forced(tmp_path):
+    path = tmp_path / "run.nc"
+    path.write_text("precious")
+    result, _, _ = circling()
+    with pytest.raises(ResultError, match=r"cannot write .*run\.nc: the file exists; force"):
+        result.save(path)
+    with pytest.raises(ResultError, match="the file exists"):
+        ResultWriter(path, result.subject, result.record, len(result.t))
+    assert path.read_text() == "precious"
+    assert os.listdir(tmp_path) == ["run.nc"]
+    result.save(path, force=True)
+    assert same_bits(open_result(path), result)
+
+
+def test_places_that_cannot_be_written_are_refused_in_a_sentence(tmp_path):
+    result, _, _ = circling()
+    (tmp_path / "file").touch()
+    for path, words in {
+        tmp_path / "nowhere" / "run.nc": "there is no folder .*nowhere",
+        tmp_path / "file" / "run.nc": "there is no folder|Not a directory",
+        tmp_path: "it is a folder",
+        "/dev/null": "it is no regular file",
+        "a\0b": "null byte",
+    }.items():
+        with pytest.raises(ResultError, match=words):
+            result.save(path, force=True)
+    assert issubclass(ResultError, OSError)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write all")
+def test_a_folder_without_permission(tmp_path):
+    result, _, _ = circling()
+    tmp_path.chmod(0o500)
+    try:
+        with pytest.raises(ResultError, match="no permission"):
+            result.save(tmp_path / "run.nc")
+    finally:
+        tmp_path.chmod(0o700)
+
+
+def test_a_write_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
+    path = tmp_path / "run.nc"
+    result, _, _ = circling()
+    result.save(path)
+    before = path.read_bytes()
+
+    def fail(*_):
+        raise RuntimeError("NetCDF: HDF error")
+
+    monkeypatch.setattr("dap3d_core.result.file.write.write_rows", fail)
+    with pytest.raises(ResultError, match=r"run\.nc: .*is the disk full"):
+        result.save(path, force=True)
+    assert path.read_bytes() == before
+    assert os.listdir(tmp_path) == ["run.nc"]
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="no limits of file size here")
+def test_a_full_disk(tmp_path):
+    """The system refuses to write more than 50 kB to a file."""
+    code = f"""
+        import resource, signal, sys
+        sys.path.insert(0, {TESTS!r})
+        from support.results import circling
+        from dap3d_core.result import ResultError
+        result = circling(nt=5000)[0]
+        sys.dont_write_bytecode = True  # it would be cut off, and kept
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, resource.RLIM_INFINITY))
+        try:
+            result.save("run.nc")
+        except ResultError as error:
+            print(error)
+    """
+    out = run(textwrap.dedent(code), cwd=tmp_path)
+    assert "cannot write run.nc" in out
+    assert os.listdir(tmp_path) == []
+
+
+def test_threads_may_write_and_read_at_once(tmp_path):
+    """The NetCDF library is not made for threads: one at a time uses it."""
+    result, _, _ = circling(nt=300)
+
+    def there_and_back(k):
+        result.save(tmp_path / f"{k}.nc")
+        return same_bits(open_result(tmp_path / f"{k}.nc"), result)
+
+    with ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(there_and_back, range(40)))

@@ -7,9 +7,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray
-from unit.test_result import circling
-from unit.test_result_files import same_bits
-from unit.test_result_writer import grown
+from support.results import circling, grown, same_bits
 
 from dap3d_core.result import ResultError, open_result
 from dap3d_core.result.file import checksum

@@ -8,98 +8,25 @@ import sys
 import numpy as np
 import pytest
 from support.plain import in_another_process
+from support.results import (
+    ARM,
+    MASS,
+    PIVOT,
+    RATE,
+    about_z,
+    circling,
+    circling_scene,
+    drifting,
+    model_of,
+    result_of,
+    rows_of,
+)
 
 from dap3d_core.formulations.evaluator import Machine
-from dap3d_core.model import build_model
 from dap3d_core.model.rotations import to_global
 from dap3d_core.model.state_layout import join, to_integrated
-from dap3d_core.registry import load_registry
-from dap3d_core.result import Record, Result, ResultError, Statistics, UnknownNameError
-from dap3d_core.scene import Scene, check, load
-
-CONTROLLED = dict(rtol=1e-8, atol=1e-10, step=None, project=True, correct=True, conservative=True)
-
-
-def model_of(scene):
-    return build_model(check(scene, load_registry()))
-
-
-def about_z(angle):
-    """Euler parameters (nt, 1, 4) of a rotation about z."""
-    half = np.asarray(angle, dtype=float)[:, None] / 2
-    zero = np.zeros_like(half)
-    return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
-
-
-def rows_of(
-    model, t, u, v_dot, Lam, work=0.0, potential=0.0, residuals=(0.0, 0.0, 0.0), angles=None
-):
-    """Rows as the integrator delivers them."""
-    angles = np.zeros((len(t), model.angle_count)) if angles is None else angles
-    last = np.tile([0.0, *residuals], (len(t), 1))
-    last[:, 0] = potential
-    y = to_integrated(u, work)
-    return np.hstack([t[:, None], y, v_dot, Lam, angles, last])
-
-
-def result_of(scene, rows, model=None, method="standard", **more):
-    """A result whose machine is made when something asks for it."""
-    model = model or model_of(scene)
-    given = dict(settings=CONTROLLED, integrator="dop853", method=method) | more
-    record = Record(scene_text=scene.to_toml(), **given)
-    return Result.of_run(model, rows, record, lambda: Machine(model, method))
-
-
-MASS, ARM, RATE, PIVOT = 3.0, 0.4, 2.5, np.array([0.3, -0.2, 0.5])
-X = np.array([1.0, 0.0, 0.0])
-
-
-def circling_scene():
-    """A bob on a ball joint away from the origin, without gravity; P is beyond its mass centre."""
-    scene = Scene(name="circling")
-    scene.add_body("bob", mass=MASS, Jp=[0.2, 0.3, 0.4], r=PIVOT + ARM * X, w=[0, 0, RATE],
-                   r_dot=[0, RATE * ARM, 0])  # fmt: skip
-    scene.add_point("Q", body="ground", sPp=PIVOT)
-    scene.add_point("H", body="bob", sPp=[-ARM, 0, 0])
-    scene.add_point("P", body="bob", sPp=[0.1, 0, 0])
-    scene.add_joint("sph", "J1", P_i="H", P_j="Q")
-    return scene
-
-
-def circling(nt=21, **more):
-    """Its motion: uniform rotation about z through the pivot. The joint holds m RATE^2 ARM."""
-    scene = circling_scene()
-    model = model_of(scene)
-    t = np.linspace(0.0, 1.7, nt)
-    out = np.stack([np.cos(RATE * t), np.sin(RATE * t), 0 * t], axis=1)  # from the pivot outwards
-    ahead = np.stack([-out[:, 1], out[:, 0], 0 * t], axis=1)
-    w = np.broadcast_to([0.0, 0.0, RATE], (nt, 1, 3))
-    u = join((PIVOT + ARM * out)[:, None], about_z(RATE * t), (RATE * ARM * ahead)[:, None], w)
-    v_dot = np.hstack([-(RATE**2) * ARM * out, np.zeros((nt, 3))])
-    Lam = MASS * RATE**2 * ARM * out  # 'sph' exerts -lambda on body i (spec 2)
-    rows = rows_of(model, t, u, v_dot, Lam)
-    return result_of(scene, rows, model, **more), out, ahead
-
-
-def drifting(nt=11, joint=False, **more):
-    """Two free bodies, each with constant velocity and a spin about a principal axis."""
-    scene = Scene(name="drifting")
-    scene.add_body("a", mass=2.0, Jp=[1.0, 2.0, 3.0], r=[1, 0, 0])
-    scene.add_body("b", mass=5.0, Jp=[0.1, 0.2, 0.3], r=[0, -2, 1])
-    if joint:
-        scene.add_joint("sph", "J", P_i="a.O", P_j="b.O")
-    model = model_of(scene)
-    t = np.linspace(0.0, 3.0, nt)
-    velocity = np.array([[0.5, -0.2, 0.1], [-1.0, 0.3, 0.7]])
-    rates = np.array([0.8, -1.3])
-    r = np.array([[1.0, 0, 0], [0, -2, 1]]) + t[:, None, None] * velocity
-    p = np.concatenate([about_z(rate * t) for rate in rates], axis=1)
-    w = np.zeros((nt, 2, 3))
-    w[..., 2] = rates
-    u = join(r, p, np.broadcast_to(velocity, r.shape), w)
-    rows = rows_of(model, t, u, np.zeros((nt, 12)), np.zeros((nt, model.row_count)))
-    return result_of(scene, rows, model, "standard" if joint else "unconstrained", **more)
-
+from dap3d_core.result import ResultError, Statistics, UnknownNameError
+from dap3d_core.scene import Scene, load
 
 # ---------------------------------------------------------------------------- motion
 
@@ -243,22 +170,6 @@ def thrown(request):
     y = to_integrated(u)
     result = result_of(scene, np.hstack([t[:, None], y, report]), model)
     return result, machine
-
-
-def test_every_joint_acts_on_its_bodies_as_they_act_on_it(thrown):
-    """Forces of a joint cancel, and their moments about the origin, ground taken into account."""
-    result, _ = thrown
-    place = result.subject.body_index
-    for name in result.subject.joint_names:
-        total, moment, size = 0.0, 0.0, 0.0
-        for one in result.reaction(name).values():
-            r = result.r[:, place[one.body]] if one.body in place else np.zeros((3, 3))
-            total = total + one.force
-            moment = moment + one.moment + np.cross(r, one.force)
-            size = max(size, np.abs(one.force).max(), np.abs(one.moment).max())
-        assert size > 0
-        np.testing.assert_allclose(total, 0, atol=1e-12 * size, err_msg=name)
-        np.testing.assert_allclose(moment, 0, atol=1e-11 * size, err_msg=name)
 
 
 def test_reactions_are_what_the_jacobian_transposed_gives(thrown):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from support.motions import Motion
+from support.results import ARM, MASS, PIVOT, RATE, about_z, circling, model_of, result_of, rows_of
 from support.scenes import scene_for
-from unit.test_result import ARM, MASS, PIVOT, RATE, about_z, circling, model_of, result_of, rows_of
 
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model.rotations import rotation
@@ -228,18 +228,6 @@ def test_reactions_by_slot_as_quantities():
         result.quantity("J1.k.force")
     with pytest.raises(UnknownNameError, match="force_body, moment_body, moment_at_point, not"):
         result.quantity("J1.j.lambda")
-
-
-def test_a_point_that_shares_its_name_with_a_body_is_reached_by_the_names_of_the_arrays():
-    scene = Scene(name="twins")
-    scene.add_body("b", mass=1.0, Jp=[1, 1, 1])
-    scene.add_point("b", body="b", sPp=[1.0, 0.0, 0.0])
-    rows = np.zeros((1, 25))
-    rows[0, 4] = 1.0
-    result = result_of(scene, rows, model_of(scene), "unconstrained")
-    np.testing.assert_array_equal(result.quantity("b.r").values, [[0, 0, 0]])
-    np.testing.assert_array_equal(result.quantity("b.rP").values, [[1, 0, 0]])
-    np.testing.assert_array_equal(result.quantity("b.rPdd.norm").values, [0])
 
 
 def test_forces_of_a_result_without_its_model():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import problems
 from support.process import run
-from unit.test_result_files import same_bits
+from support.results import same_bits
 
 import dap3d_core as dap
 from dap3d_core.result import arrays as arrays_module

@@ -1,0 +1,122 @@
+"""Results of closed-form motions, without a run, and comparison of results."""
+
+import numpy as np
+
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.model import build_model
+from dap3d_core.model.state_layout import join, to_integrated
+from dap3d_core.registry import load_registry
+from dap3d_core.result import Record, Result, ResultWriter
+from dap3d_core.result.arrays import COLUMNS
+from dap3d_core.scene import Scene, check
+
+CONTROLLED = dict(rtol=1e-8, atol=1e-10, step=None, project=True, correct=True, conservative=True)
+
+
+def model_of(scene):
+    return build_model(check(scene, load_registry()))
+
+
+def about_z(angle):
+    """Euler parameters (nt, 1, 4) of a rotation about z."""
+    half = np.asarray(angle, dtype=float)[:, None] / 2
+    zero = np.zeros_like(half)
+    return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
+
+
+def rows_of(
+    model, t, u, v_dot, Lam, work=0.0, potential=0.0, residuals=(0.0, 0.0, 0.0), angles=None
+):
+    """Rows as the integrator delivers them."""
+    angles = np.zeros((len(t), model.angle_count)) if angles is None else angles
+    last = np.tile([0.0, *residuals], (len(t), 1))
+    last[:, 0] = potential
+    y = to_integrated(u, work)
+    return np.hstack([t[:, None], y, v_dot, Lam, angles, last])
+
+
+def result_of(scene, rows, model=None, method="standard", **more):
+    """A result whose machine is made when something asks for it."""
+    model = model or model_of(scene)
+    given = dict(settings=CONTROLLED, integrator="dop853", method=method) | more
+    record = Record(scene_text=scene.to_toml(), **given)
+    return Result.of_run(model, rows, record, lambda: Machine(model, method))
+
+
+MASS, ARM, RATE, PIVOT = 3.0, 0.4, 2.5, np.array([0.3, -0.2, 0.5])
+X = np.array([1.0, 0.0, 0.0])
+
+
+def circling_scene():
+    """A bob on a ball joint away from the origin, without gravity; P is beyond its mass centre."""
+    scene = Scene(name="circling")
+    scene.add_body("bob", mass=MASS, Jp=[0.2, 0.3, 0.4], r=PIVOT + ARM * X, w=[0, 0, RATE],
+                   r_dot=[0, RATE * ARM, 0])  # fmt: skip
+    scene.add_point("Q", body="ground", sPp=PIVOT)
+    scene.add_point("H", body="bob", sPp=[-ARM, 0, 0])
+    scene.add_point("P", body="bob", sPp=[0.1, 0, 0])
+    scene.add_joint("sph", "J1", P_i="H", P_j="Q")
+    return scene
+
+
+def circling(nt=21, **more):
+    """Its motion: uniform rotation about z through the pivot. The joint holds m RATE^2 ARM."""
+    scene = circling_scene()
+    model = model_of(scene)
+    t = np.linspace(0.0, 1.7, nt)
+    out = np.stack([np.cos(RATE * t), np.sin(RATE * t), 0 * t], axis=1)  # from the pivot outwards
+    ahead = np.stack([-out[:, 1], out[:, 0], 0 * t], axis=1)
+    w = np.broadcast_to([0.0, 0.0, RATE], (nt, 1, 3))
+    u = join((PIVOT + ARM * out)[:, None], about_z(RATE * t), (RATE * ARM * ahead)[:, None], w)
+    v_dot = np.hstack([-(RATE**2) * ARM * out, np.zeros((nt, 3))])
+    Lam = MASS * RATE**2 * ARM * out  # 'sph' exerts -lambda on body i (spec 2)
+    rows = rows_of(model, t, u, v_dot, Lam)
+    return result_of(scene, rows, model, **more), out, ahead
+
+
+def drifting(nt=11, joint=False, **more):
+    """Two free bodies, each with constant velocity and a spin about a principal axis."""
+    scene = Scene(name="drifting")
+    scene.add_body("a", mass=2.0, Jp=[1.0, 2.0, 3.0], r=[1, 0, 0])
+    scene.add_body("b", mass=5.0, Jp=[0.1, 0.2, 0.3], r=[0, -2, 1])
+    if joint:
+        scene.add_joint("sph", "J", P_i="a.O", P_j="b.O")
+    model = model_of(scene)
+    t = np.linspace(0.0, 3.0, nt)
+    velocity = np.array([[0.5, -0.2, 0.1], [-1.0, 0.3, 0.7]])
+    rates = np.array([0.8, -1.3])
+    r = np.array([[1.0, 0, 0], [0, -2, 1]]) + t[:, None, None] * velocity
+    p = np.concatenate([about_z(rate * t) for rate in rates], axis=1)
+    w = np.zeros((nt, 2, 3))
+    w[..., 2] = rates
+    u = join(r, p, np.broadcast_to(velocity, r.shape), w)
+    rows = rows_of(model, t, u, np.zeros((nt, 12)), np.zeros((nt, model.row_count)))
+    return result_of(scene, rows, model, "standard" if joint else "unconstrained", **more)
+
+
+def same_bits(left, right):
+    for column in COLUMNS:
+        a, b = (getattr(side.arrays, column.name) for side in (left, right))
+        assert a.shape == b.shape
+        assert a.dtype == b.dtype
+        assert a.tobytes() == b.tobytes(), column.name
+    return True
+
+
+def noisy(model, nt=9, seed=3):
+    """Rows of random bits, as large as a run may leave; Euler parameters and times are plain."""
+    rng = np.random.default_rng(seed)
+    n = model.body_count
+    width = 1 + 13 * n + 1 + 6 * n + model.row_count + 4
+    rows = rng.normal(size=(nt, width)) * 10.0 ** rng.integers(-200, 99, size=(nt, width))
+    rows[:, 0] = np.cumsum(rng.random(nt))
+    rows[:, 1 : 1 + 13 * n] = rng.normal(size=(nt, 13 * n))
+    rows[0, -1] = -0.0
+    rows[1, -1] = 5e-324
+    return rows
+
+
+def grown(path, result, *, most=None, force=False):
+    """A writer for as many rows as a result has."""
+    most = len(result.t) if most is None else most
+    return ResultWriter(path, result.subject, result.record, most, force=force)
