@@ -20,13 +20,7 @@ from support.results import (
 
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.model.state_layout import split
-from dap3d_core.result import (
-    Record,
-    Result,
-    ResultError,
-    Statistics,
-    open_result,
-)
+from dap3d_core.result import Record, Result, ResultError, Statistics, open_result
 from dap3d_core.result.arrays import row_width
 from dap3d_core.scene import load
 from dap3d_core.scene.files.read_toml import scene_of

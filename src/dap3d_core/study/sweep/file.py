@@ -11,12 +11,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.result import ResultError
 from dap3d_core.result.file.atomic_write import cannot, put_in_place
-from dap3d_core.result.file.checksum import (
-    WHOLE,
-    check_checksums,
-    check_signature,
-    write_checksums,
-)
+from dap3d_core.result.file.checksum import WHOLE, check_checksums, check_signature, write_checksums
 from dap3d_core.result.file.library import NETCDF, guarded, opened, reading
 from dap3d_core.result.file.write import GrowingFile
 from dap3d_core.study.study import Batch, PointStatus
