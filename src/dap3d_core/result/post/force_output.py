@@ -10,7 +10,7 @@ from dap3d_core.interface.fields import specs_of
 from dap3d_core.model.groups import Floats, Group
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.post.point_motion import motion_of
-from dap3d_core.result.post.reactions import Angles, Reaction, actions_of, place_at
+from dap3d_core.result.post.reactions import InstanceParameters, Reaction, actions_of, place_at
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Machine
@@ -68,7 +68,7 @@ def force_output(
         if angles is None:
             loops.call("angle", time, force)
         else:
-            loops.angles.set(angles[k])
+            loops.parameters.set_angles(angles[k])
         force[:] = energy[:] = 0.0
         loops.call("wrench", time, force)
         loops.call("energy", time, energy)
@@ -119,15 +119,12 @@ class _ForceLoops:
         s = machine.system
         self._machine = machine
         self._loops = {kind: q for q, (kind, g) in enumerate(machine.what) if g is group}
-        self._groups, width = s.groups.copy(), group.examined.layout.par_width
-        first = s.groups[self._loops["wrench"], 1] + index * width
-        numbers = s.par[first : first + width].copy()
-        self._par = np.concatenate([s.par, numbers])  # tables stay where they are
-        own = self._par[len(s.par) :].reshape(1, width)
-        self.angles = Angles(machine.model, group, np.array([index]), own)
-        self.angles.set(np.zeros(machine.model.angle_count))
+        q = self._loops["wrench"]
+        self.parameters = InstanceParameters(machine, q, group, np.array([index]))
+        self.parameters.set_angles(np.zeros(machine.model.angle_count))
+        self._groups, start = s.groups.copy(), self.parameters.start
         for q in self._loops.values():
-            self._groups[q] = s.groups[q, 0] + index * stride(group.examined), len(s.par), 1
+            self._groups[q] = s.groups[q, 0] + index * stride(group.examined), start, 1
 
     def has(self, kind: str) -> bool:
         """True if there is a loop of a kind."""
@@ -139,6 +136,6 @@ class _ForceLoops:
 
         if self.has(kind):
             s = self._machine.system
-            arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=self._par)
+            arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=self.parameters.par)
             q, loops = self._loops[kind], self._machine.loops
             call_loop(loops, q, time, arrays, self._groups[q], out, out, out)

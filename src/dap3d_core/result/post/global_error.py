@@ -41,27 +41,27 @@ class ErrorEstimate:
     @property
     def r(self) -> Floats:
         """(nt, n, 3) error of the positions of the mass centres, m."""
-        return self._part(0)
+        return split(self.u)[0]
 
     @property
     def p(self) -> Floats:
         """(nt, n, 4) error of the Euler parameters; p and -p are one orientation."""
-        return self._part(1)
+        return split(self.u)[1]
 
     @property
     def rd(self) -> Floats:
         """(nt, n, 3) error of the velocities, m/s."""
-        return self._part(2)
+        return split(self.u)[2]
 
     @property
     def w(self) -> Floats:
         """(nt, n, 3) error of the angular velocities, rad/s, global axes."""
-        return self._part(3)
+        return split(self.u)[3]
 
     @property
     def largest(self) -> dict[str, float]:
         """By symbol, the largest error of a body's vector at any instant."""
-        return {name: float(np.max(norms, initial=0.0)) for name, norms in self._norms().items()}
+        return sizes_of(self.u)
 
     @property
     def meaningless_from(self) -> float | None:
@@ -76,7 +76,10 @@ class ErrorEstimate:
     def relative(self) -> Floats:
         """(nt,) largest error at each instant, relative to the size of its quantity."""
         least = least_sizes(self.t, self.length)
-        parts = [norms / max(self.size[name], least[name]) for name, norms in self._norms().items()]
+        parts = [
+            norms / max(self.size[name], least[name])
+            for name, norms in largest_norms(self.u).items()
+        ]
         return np.asarray(np.max(parts, axis=0, initial=0.0))
 
     @property
@@ -98,13 +101,6 @@ class ErrorEstimate:
         if slope * elapsed[-1] < DECADES or residual >= _line(np.log10(elapsed), digits)[1]:
             return None
         return 1.0 / slope
-
-    def _part(self, place: int) -> Floats:
-        return split(self.u)[place]
-
-    def _norms(self) -> dict[str, Floats]:
-        """By symbol, (nt,) the largest error of a body's vector."""
-        return largest_norms(self.u)
 
 
 def _line(x: Floats, y: Floats) -> tuple[float, float]:

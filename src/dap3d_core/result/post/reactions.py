@@ -113,7 +113,7 @@ def reactions(
     for k, time in place_at(machine, t, u):
         for loop, out in zip(loops, wrenches, strict=True):
             if angles is not None:
-                loop.angles.set(angles[k])
+                loop.parameters.set_angles(angles[k])
             out[k] = loop.wrenches(time, Lam[k])
     return {
         int(joint): actions_of(machine.model, u, loop.group, index, out[:, n])
@@ -150,30 +150,39 @@ def actions_of(
     return actions
 
 
-class Angles:
-    """Angles with counted turns among parameters of instances of a group."""
+class InstanceParameters:
+    """Copy of the parameters of instances of a group, whose angles are set instead of counted.
 
-    def __init__(self, model: Model, group: Group, indices: Integers, numbers: Floats) -> None:
-        """Args: model, group, instances; their (k, par_width) parameters, which ``set`` changes."""
-        self._numbers, self._columns = numbers, model.angles_of(group, indices)
-        self._at = list(group.examined.layout.angles.values())
+    Attributes:
+        par: parameters of the model, followed by the copy: tables stay where they are.
+        start: first number of the copy.
+    """
 
-    def set(self, angles: Floats) -> None:
+    def __init__(self, machine: "Machine", q: int, group: Group, indices: Integers) -> None:
+        """Args: evaluator, its loop, the loop's group, (k,) indices of the instances."""
+        s, layout = machine.system, group.examined.layout
+        shape, first = (group.count, layout.par_width), s.groups[q, 1]
+        of_group = s.par[first : first + group.count * layout.par_width].reshape(shape)
+        self.par, self.start = np.concatenate([s.par, of_group[indices].ravel()]), len(s.par)
+        self._copy = self.par[self.start :].reshape(len(indices), layout.par_width)
+        self._columns = machine.model.angles_of(group, indices)
+        self._offsets = list(layout.angles.values())
+
+    def set_angles(self, angles: Floats) -> None:
         """Sets the angles from those of all the model at an instant."""
-        for column, at in zip(self._columns.T, self._at, strict=True):
-            self._numbers[:, at : at + ANGLE_WIDTH] = 0.0
-            self._numbers[:, at] = angles[column]
+        for column, offset in zip(self._columns.T, self._offsets, strict=True):
+            self._copy[:, offset : offset + ANGLE_WIDTH] = 0.0
+            self._copy[:, offset] = angles[column]
 
 
 def _joint_loops(machine: "Machine", joints: Integers) -> list["_JointLoop"]:
     """Loops over some joints, one for each type."""
-    loops = []
-    for q, (kind, group) in enumerate(machine.what):
-        if kind == "acceleration":
-            indices = np.flatnonzero(np.isin(group.members, joints))
-            if len(indices):
-                loops.append(_JointLoop(machine, q, group, indices))
-    return loops
+    members = [
+        (q, group, np.flatnonzero(np.isin(group.members, joints)))
+        for q, (kind, group) in enumerate(machine.what)
+        if kind == "acceleration"
+    ]
+    return [_JointLoop(machine, q, group, indices) for q, group, indices in members if len(indices)]
 
 
 class _JointLoop:
@@ -192,17 +201,13 @@ class _JointLoop:
         slots, rows = len(group.examined.layout.slots), int(model.joint_rows[self.joints[0]])
         self.shape = count, slots, 6
         self._rows = model.joint_start[self.joints][:, None] + np.arange(rows)
-        width, numbers = stride(group.examined), group.examined.layout.par_width
-        i0, p0, _ = s.groups[q]
+        width, i0 = stride(group.examined), s.groups[q, 0]
         idx = s.idx[i0 : i0 + group.count * width].reshape(-1, width)[indices]
         idx[:, -slots - 1] = rows * np.arange(count)
         idx[:, -slots:] = 6 * rows * np.arange(count * slots).reshape(count, slots)
         self._idx = idx.ravel()
-        par = s.par[p0 : p0 + group.count * numbers].reshape(group.count, numbers)
-        self._par = np.concatenate([s.par, par[indices].ravel()])  # tables stay where they are
-        own = self._par[len(s.par) :].reshape(count, numbers)
-        self.angles = Angles(model, group, indices, own)
-        self._group = np.array([0, len(s.par), count])
+        self.parameters = InstanceParameters(machine, q, group, indices)
+        self._group = np.array([0, self.parameters.start, count])
         self._D = np.zeros((count, slots, rows, 6))
         self._gamma, self._nu = np.zeros(count * rows), np.zeros(count * rows)
 
@@ -211,6 +216,6 @@ class _JointLoop:
         from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop
 
         s, D = self.machine.system, self._D.reshape(-1)
-        arrays = LoopArrays(body=s.body, F=s.F, idx=self._idx, par=self._par)
+        arrays = LoopArrays(body=s.body, F=s.F, idx=self._idx, par=self.parameters.par)
         call_loop(self.machine.loops, self.q, time, arrays, self._group, D, self._gamma, self._nu)
         return np.asarray(np.einsum("msrv,mr->msv", self._D, Lam[self._rows]))

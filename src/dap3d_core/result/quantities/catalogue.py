@@ -65,6 +65,11 @@ class QuantityOwner(NamedTuple):
         return f"{self.name}.{self.slot}" if self.slot else self.name
 
 
+#: Values (nt,) or (nt, components) of an owner; (nt, k, components) of k bodies or points.
+QuantityFunction = Callable[[QuantitySource, QuantityOwner], Floats]
+MotionFunction = Callable[[QuantitySource, slice], Floats]
+
+
 class QuantityType(NamedTuple):
     """A type of quantity.
 
@@ -79,7 +84,7 @@ class QuantityType(NamedTuple):
     label: str
     unit: str
     components: tuple[str, ...]
-    values: Callable[[QuantitySource, QuantityOwner], Floats]
+    values: QuantityFunction
     rate: str = ""
 
 
@@ -100,7 +105,7 @@ class MotionArray(NamedTuple):
     label: str
     meaning: str
     unit: str
-    values: Callable[[QuantitySource, slice], Floats]
+    values: MotionFunction
     rate: str = ""
     components: tuple[str, ...] = AXES
     owner: str = "body"
@@ -119,25 +124,22 @@ class MotionArray(NamedTuple):
         return QuantityType(self.label, self.unit, self.components, values, self.rate)
 
 
-def _state(part: int) -> Callable[[QuantitySource, slice], Floats]:
+def _state(part: int) -> MotionFunction:
     return lambda source, bodies: split(source.arrays.u)[part][:, bodies]
 
 
-def _acceleration(part: int) -> Callable[[QuantitySource, slice], Floats]:
+def _acceleration(part: int) -> MotionFunction:
     return lambda source, bodies: accelerations(source.arrays.v_dot)[part][:, bodies]
 
 
-def _in_body_axes(
-    vectors: Callable[[QuantitySource, slice], Floats],
-) -> Callable[[QuantitySource, slice], Floats]:
+def _in_body_axes(vectors: MotionFunction) -> MotionFunction:
     return lambda source, bodies: to_body(_state(1)(source, bodies), vectors(source, bodies))
 
 
-def _points(level: int) -> Callable[[QuantitySource, slice], Floats]:
-    def values(source: QuantitySource, points: slice) -> Floats:
-        return point_motion(source.subject, source.arrays.u, source.arrays.v_dot, points, level)
-
-    return values
+def _points(level: int) -> MotionFunction:
+    return lambda source, points: point_motion(
+        source.subject, source.arrays.u, source.arrays.v_dot, points, level
+    )
 
 
 #: Arrays of the manual's post-processor (spec 10).
@@ -167,7 +169,7 @@ MOTION = (
 POINT_ARRAYS = {m.array: m.quantity for m in MOTION if m.owner == "point"}
 
 
-def _action(part: str) -> Callable[[QuantitySource, QuantityOwner], Floats]:
+def _action(part: str) -> QuantityFunction:
     """Part of the ``Reaction`` of a joint or a force on the body of a slot."""
 
     def values(source: QuantitySource, owner: QuantityOwner) -> Floats:
@@ -187,7 +189,7 @@ def _action(part: str) -> Callable[[QuantitySource, QuantityOwner], Floats]:
     return values
 
 
-def _force_output(part: str) -> Callable[[QuantitySource, QuantityOwner], Floats]:
+def _force_output(part: str) -> QuantityFunction:
     """Part of the ``ForceOutput`` of a force element."""
 
     def values(source: QuantitySource, owner: QuantityOwner) -> Floats:
