@@ -11,7 +11,7 @@ import attrs
 
 from dap3d_core.result.event_record import Occurrence
 from dap3d_core.scene import SceneError, tables_of
-from dap3d_core.scene.scene import FIXED_STEP
+from dap3d_core.scene.validate.settings import FIXED_STEP
 
 #: Final statuses of a run.
 STATUSES = ("done", "interrupted", "stopped")
