@@ -16,6 +16,7 @@ from dap3d_core.result.file.library import NETCDF, guarded, opened, reading
 from dap3d_core.result.file.write import GrowingFile
 from dap3d_core.study.study import Batch, PointStatus
 from dap3d_core.study.sweep.dataset import Layout, check_format
+from dap3d_core.study.sweep.file_claim import Claim
 from dap3d_core.study.sweep.schema import boxes, define, note_letters
 
 Integers = NDArray[np.int64]
@@ -67,12 +68,17 @@ class Growing(GrowingFile):
         self._waiting: list[tuple[Integers, Batch]] = []
         self._is_empty = not resume
         self._written = time.monotonic()
-        with NETCDF:
-            if resume:
-                self._status = self._stored_status()
-            else:
-                self._begin()
-                self._status = np.zeros(layout.count, dtype=np.int8)
+        self._claim = Claim(self.target)
+        try:
+            with NETCDF:
+                if resume:
+                    self._status = self._stored_status()
+                else:
+                    self._begin()
+                    self._status = np.zeros(layout.count, dtype=np.int8)
+        except BaseException:
+            self._claim.release()
+            raise
 
     @property
     def todo(self) -> Integers:
@@ -99,7 +105,7 @@ class Growing(GrowingFile):
         Raises:
             ResultError: it cannot be written; or another has the name by now and ``force`` is off.
         """
-        self.leave()
+        self._write(PATIENCE)
         # numbers lie between descriptions here: of a large file the first bytes are compared
         guarded(self.part, lambda: write_checksums(self.part, WHOLE, is_whole=True))
         put_in_place(self.part, self.target, self._force)
