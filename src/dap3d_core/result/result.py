@@ -86,9 +86,11 @@ class Result:
     def __init__(
         self, subject: Subject, arrays: Arrays, record: Record, origin: Callable[[], Origin]
     ) -> None:
-        """Args:
-        subject, arrays, record: the parts of the result.
-        origin: returns the model and access to an evaluator when they are needed.
+        """Composes a result of its parts.
+
+        Args:
+            subject, arrays, record: the parts.
+            origin: returns the model and access to an evaluator when they are needed.
         """
         self.subject, self.arrays, self.record = subject, arrays, record
         self._make_origin = origin
