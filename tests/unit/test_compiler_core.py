@@ -44,8 +44,8 @@ RUNS = [
 MORE = """
 from support.problems import everything
 from unit.test_checkpoint import wheel
-from unit.test_study_ensemble import ensemble, pendulum
-from unit.test_study_packs import CASES, in_packs
+from unit.study.batch.test_batch import ensemble, pendulum
+from unit.study.batch.test_packs import CASES, in_packs
 
 def pack(make, vary, output, t_end=0.02, **settings):
     study = ensemble(make(), vary, [output], t_end=t_end, dt=0.01, **settings)

@@ -30,7 +30,6 @@ from dap3d_core.report.settings_ladder import (
 from dap3d_core.report.timing import Announce, Bench, Progress
 from dap3d_core.result import Result
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
-from dap3d_core.scene.validate.settings import FIXED_STEP
 from dap3d_core.simulation import report_times
 
 #: Time limit of all timings of one rung, s: longer runs are repeated less.
@@ -125,10 +124,11 @@ def _prepared(
     changes = {name: value for name, value in requested.items() if value is not None}
     changes |= {"step": None, "integrator": ADAPTIVE[0], "method": "auto"}
     settings = attrs.evolve(scene.simulation, **changes)
-    tried = [settings]
-    tried += [attrs.evolve(settings, method=name) for name in methods or ()]
-    tried += [
-        attrs.evolve(settings, integrator=name, step=1.0 if name in FIXED_STEP else None)
+    fixed_step = {name for name, one in INTEGRATORS.items() if not one.adaptive}
+    variants: list[dict[str, Any]] = [{}]
+    variants += [{"method": name} for name in methods or ()]
+    variants += [
+        {"integrator": name, "step": 1.0 if name in fixed_step else None}
         for name in integrators or ()
     ]
     variants += [{"rtol": rtol} for rtol in tolerances or ()]

@@ -1,8 +1,8 @@
-"""Metadata of a run: scene, settings, status, cost."""
+"""What a run says of itself: where it came from, how it went, what it cost."""
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -11,22 +11,22 @@ import attrs
 
 from dap3d_core.result.event_record import Occurrence
 from dap3d_core.scene import SceneError, tables_of
-from dap3d_core.scene.validate.settings import FIXED_STEP
+from dap3d_core.scene.scene import FIXED_STEP
 
-#: Final statuses of a run.
+#: How a run can have ended.
 STATUSES = ("done", "interrupted", "stopped")
-#: Prefix of a note that is no warning to ``--strict``.
+#: How a note begins that changes nothing of what was asked for: no warning to ``--strict``.
 INFORMATION = "for information: "
-#: Status in a file that is being written, or was left by a killed writer.
+#: Stands in a file that is still being written, or whose writer was killed.
 RUNNING = "running"
 
 
 @attrs.frozen(kw_only=True)
 class Statistics:
-    """Cost of a run.
+    """What a run cost.
 
     Attributes:
-        steps, rejected: integration steps taken, and rejected.
+        steps, rejected: integration steps taken, and tried but thrown away.
         rhs: evaluations of the right-hand side.
         projections: projections on the constraints.
         wall_time_s, compile_time_s: time of the run without compilation, and of compilation, s.
@@ -52,46 +52,55 @@ def _installed() -> dict[str, str]:
 
 
 def current_versions() -> dict[str, str]:
-    """Installed versions of dap3d, numpy, llvmlite, python."""
+    """Versions of what the numbers depend on: dap3d, numpy, llvmlite, python."""
     return dict(_installed())
 
 
+def _words(words: Iterable[str]) -> tuple[str, ...]:
+    return tuple(words)
+
+
+def _occurrences(found: Iterable[Occurrence]) -> tuple[Occurrence, ...]:
+    return tuple(found)
+
+
 def _plain(value: Any) -> Any:
-    """Settings as read from a file: lists for tuples, Python's numbers for numpy's."""
+    """Settings as a file gives them back: lists for tuples, Python's numbers for numpy's."""
     return json.loads(to_json(value))
 
 
 def to_json(value: Any) -> str:
-    """JSON of settings, notes or statistics; numpy's numbers and arrays become Python's."""
+    """Text of settings, notes or statistics; numpy's numbers and arrays become Python's."""
     return json.dumps(value, default=lambda v: v.tolist() if hasattr(v, "tolist") else str(v))
 
 
 @attrs.frozen(kw_only=True)
 class Record:
-    """Metadata of a run: all but its arrays.
+    """Everything about a run that is not an array.
 
     Attributes:
         scene_text: the scene that was run, as the text of a scene file.
         status: "done"; "interrupted" by the user; "stopped" early, by an event or a failure.
         method, integrator: formulation and method of integration that were used.
-        notes: choices, changes and warnings, in order.
-        settings: rtol, atol, step, project, correct and others, as used.
-        stats: its cost.
-        events: located switches and events, in order.
-        run: identity that a checkpoint and its rows share, "" if there is none.
-        types: sources of the types (simulation/output/type_sources.py): "joint rev" -> ``digest``,
-            ``distribution``, ``version``; None if not recorded.
-        known_versions: of dap3d, numpy, llvmlite, python; None for those installed.
+        notes: what the run chose, changed or noticed, in order.
+        settings: rtol, atol, step, project, correct and the like, as they were used.
+        stats: what it cost.
+        events: what happened at instants that were located, in their order.
+        run: by which a checkpoint knows the rows that belong to it; "" where there is none.
+        types: where the types of the scene come from (simulation/output/type_sources.py): "joint
+        rev" ->
+            ``digest``, ``distribution``, ``version``; None where it was not recorded.
+        known_versions: of dap3d, numpy, llvmlite, python; None for those that are installed.
     """
 
     scene_text: str
     status: str = attrs.field(default="done", validator=attrs.validators.in_((*STATUSES, RUNNING)))
     method: str = ""
     integrator: str = ""
-    notes: tuple[str, ...] = attrs.field(default=(), converter=tuple[str, ...])
+    notes: tuple[str, ...] = attrs.field(default=(), converter=_words)
     settings: dict[str, Any] = attrs.field(factory=dict, converter=_plain)
     stats: Statistics = attrs.Factory(Statistics)
-    events: tuple[Occurrence, ...] = attrs.field(default=(), converter=tuple[Occurrence, ...])
+    events: tuple[Occurrence, ...] = attrs.field(default=(), converter=_occurrences)
     run: str = attrs.field(default="", eq=False)
     types: Mapping[str, Mapping[str, str]] | None = None
     known_versions: Mapping[str, str] | None = attrs.field(
@@ -100,13 +109,13 @@ class Record:
 
     @property
     def versions(self) -> dict[str, str]:
-        """Versions of dap3d, numpy, llvmlite and python in the run."""
+        """Versions of dap3d, numpy, llvmlite and python that made the numbers."""
         known = self.known_versions
         return current_versions() if known is None else dict(known)
 
     @property
     def title(self) -> str:
-        """Name of the scene, "" if it has none."""
+        """Name of the scene, "" where it has none."""
         head = self.scene_text.partition("\n[")[0]  # the header is the first table
         try:
             name = tables_of(head)["scene"]["name"]
@@ -132,10 +141,10 @@ class Record:
 
     @property
     def length(self) -> float:
-        """The length, m, that tolerances refer to (Model.length)."""
+        """The length, m, that tolerances speak of (Model.length)."""
         return float(self.settings.get("length", 1.0))
 
     @property
     def projected(self) -> bool:
-        """True if states were projected on the constraints."""
+        """Whether states were projected on the constraints."""
         return bool(self.settings.get("project", False))

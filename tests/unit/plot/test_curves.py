@@ -9,7 +9,6 @@ import matplotlib.image
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from support.plain import in_another_process
 from support.results import circling, drifting, model_of, result_of
 
 import dap3d_core as dap
@@ -185,46 +184,6 @@ def test_it_can_be_read_at_60_mm(result, names):
         assert ax.get_window_extent().width > 0.45 * small.bbox.width
 
 
-def test_without_a_display_there_is_no_window(result):
-    with pytest.raises(ResultError, match=r"cannot open a window.*-o writes a file"):
-        show_plot(result, "bob.r")
-
-
-@pytest.mark.slow
-@in_another_process
-def test_a_window_shows_the_figure(tmp_path):
-    """With a way to show windows that only says what it would show."""
-    (tmp_path / "says.py").write_text(
-        "from matplotlib.backends.backend_agg import FigureCanvasAgg as FigureCanvas\n"
-        "from matplotlib.backend_bases import FigureManagerBase as FigureManager\n"
-        "def show(*args, **options):\n"
-        "    from matplotlib import pyplot\n"
-        "    print(pyplot.gcf().axes[0].get_ylabel())\n"
-    )
-    tests = Path(__file__).parents[1]
-    code = (
-        "import sys; sys.path[:0] = sys.argv[1:]\n"
-        "from support.results import circling\n"
-        "from dap3d_core.plot import show_plot\n"
-        "show_plot(circling()[0], 'bob.r.x')\n"
-    )
-    out = subprocess.run(
-        [sys.executable, "-c", code, str(tests), str(tmp_path)], capture_output=True, text=True,
-        env=os.environ | {"MPLBACKEND": "module://says"}, check=True,
-    )  # fmt: skip
-    assert out.stdout.strip() == "position of bob, x [m]"
-
-
-def test_on_axes_that_are_given(result):
-    from matplotlib import pyplot
-
-    _, given = pyplot.subplots()
-    assert plot(result, "bob.r.x", "bob.r.y", ax=given) is given
-    assert len(given.get_lines()) == 2
-    with pytest.raises(ValueError, match=r"one unit.*m, J"):
-        plot(result, "bob.r.x", "work", ax=given)
-
-
 def test_one_instant_is_drawn_as_markers():
     single = circling(nt=1)[0]
     for line in plot(single, "bob.rdd").get_lines():
@@ -274,27 +233,3 @@ def test_names_are_shown_as_they_are(tmp_path, name):
         f"{name}.r.{axis}" for axis in "xyz"
     ]
     save_plot(result, f"{name}.r", tmp_path / "a.png")
-
-
-@pytest.mark.slow
-@in_another_process
-def test_saving_needs_no_window_and_the_module_can_be_called(tmp_path):
-    """pyplot, which opens windows, stays out; dap3d_core.plot(...) works with the module loaded."""
-    code = """if True:
-        import sys
-        sys.path.insert(0, sys.argv[1])
-        from support.results import circling
-        import dap3d_core
-        import dap3d_core.plot
-        dap3d_core.plot.save_plot(circling()[0], "work", "a.png")
-        assert "matplotlib.pyplot" not in sys.modules
-        import matplotlib
-        matplotlib.use("Agg")
-        print(dap3d_core.plot(circling()[0], "work").get_ylabel())
-    """
-    tests = Path(__file__).parents[1]
-    out = subprocess.run(
-        [sys.executable, "-c", code, str(tests)], cwd=tmp_path, capture_output=True, text=True,
-        check=True,
-    )  # fmt: skip
-    assert out.stdout.strip() == "work of forces and drivers [J]"

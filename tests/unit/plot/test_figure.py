@@ -10,7 +10,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from support.plain import in_another_process
-from unit.test_result import circling
+from support.results import circling
 
 import dap3d_core as dap
 from dap3d_core.plot import FORMATS, animate, plot, save_plot, show_plot
@@ -52,7 +52,7 @@ def test_a_window_shows_the_figure(tmp_path):
     tests = Path(__file__).parents[2]
     code = (
         "import sys; sys.path[:0] = sys.argv[1:]\n"
-        "from unit.test_result import circling\n"
+        "from support.results import circling\n"
         "from dap3d_core.plot import show_plot\n"
         "show_plot(circling()[0], 'bob.r.x')\n"
     )
@@ -128,7 +128,7 @@ def test_saving_needs_no_window_and_the_module_can_be_called(tmp_path):
     code = """if True:
         import sys
         sys.path.insert(0, sys.argv[1])
-        from unit.test_result import circling
+        from support.results import circling
         import dap3d_core
         import dap3d_core.plot
         dap3d_core.plot.save_plot(circling()[0], "work", "a.png")

@@ -3,7 +3,7 @@
 import json
 from typing import TYPE_CHECKING, Any
 
-from dap3d_core.cli.console.console import Terminal, seconds
+from dap3d_core.cli.console.console import Terminal, scene_name, seconds
 from dap3d_core.result.arrays import LARGE
 
 if TYPE_CHECKING:

@@ -278,7 +278,7 @@ def _constraints(subject: Subject, course: LedgerSeries, record: Record) -> dict
     return found
 
 
-def _rounding_of_accelerations(subject: Subject, course: Course, length: float) -> float:
+def _rounding_of_accelerations(subject: Subject, course: LedgerSeries, length: float) -> float:
     """What rounding of the reactions leaves of D v_dot - gamma, m/s^2.
 
     The factors L D L^T of the matrix K of the equations of motion give a solution x of an equation

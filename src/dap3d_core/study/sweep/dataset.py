@@ -238,6 +238,8 @@ def _opened(file: Path) -> "xarray.Dataset":
     """What a file holds."""
     import xarray
 
+    from dap3d_core.study.sweep.display import Sweep
+
     check_checksums(file)
     with NETCDF:
         _check(file)

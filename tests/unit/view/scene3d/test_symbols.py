@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from support.own_types import registry_of
+from support.results import model_of, result_of, rows_of
 from support.scenes import scene_for
-from unit.test_result import model_of, result_of, rows_of
 
 import dap3d_core as dap
 from dap3d_core.interface import Body, Force, Joint, Point, Vector, body, point, vector
