@@ -3,7 +3,7 @@
 import netCDF4
 import pytest
 from unit.result.file.test_checksum import REFUSED, SIZE, changed_files, no_library, written
-from unit.test_sweep import spring
+from unit.study.sweep.test_sweep import spring
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
