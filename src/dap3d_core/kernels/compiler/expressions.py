@@ -108,6 +108,8 @@ class Expressions(Operations):
         elif isinstance(type_, Array) and name == "size":
             return Value(INT, (self.count_of(value.words[1:]),))
         elif isinstance(type_, Struct):
+            if name in value.type.scalars:
+                return self.read_from(*self._scalar(node, value, name))
             return self._member(node, value, name)
         elif type_ in (FLOAT, COMPLEX) and name in ("real", "imag"):
             words = (*value.words, bits(0.0))
@@ -129,8 +131,8 @@ class Expressions(Operations):
                 break
             first += len(type_.words)
         else:
-            self.refuse(node, f"{value.type.name} has no member {name}",
-                        f"it has {', '.join(m for m, _ in value.type.members)}")  # fmt: skip
+            names = ", ".join([*dict(value.type.members), *value.type.scalars])
+            self.refuse(node, f"{value.type.name} has no member {name}", f"it has {names}")
         words = []
         for k, word in enumerate(type_.words):
             at = self.new(f"getelementptr inbounds i64, ptr {value.word}, i64 {first + k}")
@@ -170,8 +172,22 @@ class Expressions(Operations):
         step = f"getelementptr inbounds {item.words[0]}, ptr {address}, i64"
         return [address, *(self.new(f"{step} {k}") for k in more)]
 
-    def element(self, node: ast.Subscript) -> tuple[list[str], Any]:
-        """Addresses of the words, and type, of the item that an index selects."""
+    def _scalar(self, node: ast.Attribute, struct: Value, name: str) -> tuple[list[str], Any]:
+        member, k = struct.type.scalars[name]
+        array = self._member(node, struct, member)
+        return self.slots_at(self.item(array, str(k)), array.type.item), array.type.item
+
+    def number_at(self, node: ast.expr) -> tuple[list[str], Any]:
+        """Addresses of the words, and type, of a number that is to be changed."""
+        if isinstance(node, ast.Attribute):
+            struct = self.value(node.value)
+            if node.attr not in getattr(struct.type, "scalars", ()):
+                self.refuse(node, f"{node.attr} of a {name_of(struct.type)} is given a value",
+                            "only arrays and scalars of structs change")  # fmt: skip
+            return self._scalar(node, struct, node.attr)
+        if not isinstance(node, ast.Subscript):
+            self.refuse(node, "a value is given to what is no name and no number",
+                        "only names, arrays and scalars of structs change")  # fmt: skip
         array, places = self.value(node.value), _parts(node.slice)
         if not isinstance(array.type, Array):
             self.refuse(node, f"a {name_of(array.type)} is written into", "only arrays change")

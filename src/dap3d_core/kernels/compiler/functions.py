@@ -229,9 +229,6 @@ class FunctionCompiler(Expressions):
     def _assign(self, target: ast.expr, value: Value) -> None:
         if isinstance(target, ast.Name):
             self.store(target, target.id, value)
-        elif isinstance(target, ast.Subscript):
-            slots, item = self.element(target)
-            self.write_to(slots, self.cast(target, value, item))
         elif isinstance(target, (ast.Tuple, ast.List)):
             if not isinstance(value.type, Tuple) or len(value.type.items) != len(target.elts):
                 self.refuse(target, f"takes {len(target.elts)} values apart that are not there",
@@ -239,8 +236,8 @@ class FunctionCompiler(Expressions):
             for part, item in zip(target.elts, items_of(value), strict=True):
                 self._assign(part, item)
         else:
-            self.refuse(target, "a value is given to what is no name and no item",
-                        "only arrays and names change")  # fmt: skip
+            slots, item = self.number_at(target)
+            self.write_to(slots, self.cast(target, value, item))
 
     def _AugAssign(self, node: ast.AugAssign) -> None:
         if isinstance(node.target, ast.Name):
@@ -249,9 +246,7 @@ class FunctionCompiler(Expressions):
             self.store(node, node.target.id,
                        self.operation(node, node.op, before, self.value(node.value)))  # fmt: skip
             return
-        if not isinstance(node.target, ast.Subscript):
-            self.refuse(node, "changes what is no name and no item", "only arrays change")
-        slots, item = self.element(node.target)
+        slots, item = self.number_at(node.target)
         before = self.read_from(slots, item)
         after = self.operation(node, node.op, before, self.value(node.value))
         self.write_to(slots, self.cast(node, after, item))

@@ -1,7 +1,7 @@
 """Types of compiled code, and the machine words that represent their values."""
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,10 +56,14 @@ class Numbers(_ByAddress):
 
 @dataclass(frozen=True, eq=False)
 class Struct(_ByAddress):
-    """A struct of arrays and further structs (kernels/runtime/array_struct.py)."""
+    """A struct of arrays and further structs (kernels/runtime/array_struct.py).
+
+    ``scalars`` gives array and index of each number that has a name of its own.
+    """
 
     name: str
     members: tuple[tuple[str, Any], ...]
+    scalars: dict[str, tuple[str, int]] = field(default_factory=dict)
 
     def begins_with(self, other: Any) -> bool:
         """Whether this struct extends the other: its first members are those of the other."""

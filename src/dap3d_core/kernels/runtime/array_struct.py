@@ -7,13 +7,17 @@ as the call, because Python holds it. Measurements: docs/decisions/0001.
 
 A class of arrays that extends another one begins with its members: compiled code takes it for that
 one as well, as in C.
+
+A number that has a name of its own is a ``Scalar``, an item of one of the arrays: reading it loads
+that item, assigning to it stores there, in Python and in compiled code.
 """
 
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, TypeVar, overload
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from dap3d_core.kernels.compiler.types import COMPLEX, DTYPES, FLOAT, INT, Array, Struct
 from dap3d_core.kernels.compiler.units import address_of
@@ -22,17 +26,48 @@ from dap3d_core.kernels.compiler.words import word
 VECTOR, MATRIX, TENSOR = Array(FLOAT, 1), Array(FLOAT, 2), Array(FLOAT, 3)
 INTEGERS, INTEGER_MATRIX = Array(INT, 1), Array(INT, 2)
 COMPLEX_VECTOR = Array(COMPLEX, 1)
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Number = TypeVar("Number", float, int)
 
 
-@attrs.frozen(eq=False, kw_only=True, slots=False)
+class Scalar(Generic[Number]):
+    """A number of a class of arrays by name: the next item of the member ``array``."""
+
+    index: int
+
+    def __init__(self, array: str) -> None:
+        self.array = array
+
+    def __set_name__(self, owner: "type[Arrays]", name: str) -> None:
+        self.index = len(owner.indices(self.array))
+        owner.scalars = {**owner.scalars, name: self}
+
+    @overload
+    def __get__(self, struct: None, owner: Any) -> "Scalar[Number]": ...
+
+    @overload
+    def __get__(self, struct: "Arrays", owner: Any) -> Number: ...
+
+    def __get__(self, struct: Any, owner: Any) -> Any:
+        return self if struct is None else getattr(struct, self.array)[self.index]
+
+    def __set__(self, struct: "Arrays", value: Number) -> None:
+        getattr(struct, self.array)[self.index] = value
+
+
+@attrs.define(eq=False, kw_only=True, slots=False)
 class Arrays:
     """Base of classes whose members are C-contiguous arrays, or further such classes.
 
     ``types`` gives the type of each member that is not a vector of float64. A member that is a
-    class of arrays may be None where nothing reads it.
+    class of arrays may be None where nothing reads it. Subclasses are frozen, but for those with
+    scalars: their arrays are bound once.
     """
 
     types: ClassVar[dict[str, Any]] = {}
+    #: By name; those of base classes first.
+    scalars: ClassVar[dict[str, Scalar[Any]]] = {}
     _table: Any = attrs.field(init=False, repr=False)
     #: Where the table is.
     address: int = attrs.field(init=False, repr=False)
@@ -53,6 +88,12 @@ class Arrays:
         object.__setattr__(self, "_table", table)
         object.__setattr__(self, "address", address_of(table))
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        is_unbound = name not in self.__dict__ and hasattr(attrs.fields(type(self)), name)
+        if name not in type(self).scalars and not is_unbound:
+            raise AttributeError(f"{name} is no scalar: only scalars and items of arrays change")
+        object.__setattr__(self, name, value)
+
     def __iter__(self) -> Iterator[Any]:
         """The members, in order."""
         return (getattr(self, name) for name, _ in self.type_of().members)
@@ -72,8 +113,16 @@ class Arrays:
         found: Struct | None = cls.__dict__.get("_type")
         if found is None:
             members = [(f.name, cls.types.get(f.name, VECTOR)) for f in attrs.fields(cls) if f.init]
-            found = cls._type = Struct(cls.__name__, tuple(members))  # type: ignore[attr-defined]
+            scalars = {name: (s.array, s.index) for name, s in cls.scalars.items()}
+            found = cls._type = Struct(  # type: ignore[attr-defined]
+                cls.__name__, tuple(members), scalars
+            )
         return found
+
+    @classmethod
+    def indices(cls, array: str) -> dict[str, int]:
+        """Index of each scalar of a member, by name."""
+        return {name: s.index for name, s in cls.scalars.items() if s.array == array}
 
 
 @word("pointer")
