@@ -5,7 +5,7 @@ import time
 
 import scenes
 
-from dap3d_core.integrators import TABLEAUS, Integration, Status
+from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
 from dap3d_core.simulation import CompiledModel
 
 CALLS, REPEATS = 1000, 15
@@ -17,7 +17,7 @@ def call():
     y0 = machine.integrated(machine.model.u0)
 
     def make():
-        return Integration(
+        return RungeKutta(
             TABLEAUS["dop853"], machine.functions, machine.system, machine.loops, y0, [0.0, 1e-3],
             report_size=machine.report_size, length_count=machine.length_count, buffer_rows=2,
         )  # fmt: skip

@@ -5,7 +5,7 @@ import time
 
 import scenes
 
-from dap3d_core.integrators import TABLEAUS, Integration, Status
+from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
 from dap3d_core.simulation import CompiledModel
 
 #: Chains of so many bodies fall for a second; each run is repeated so often.
@@ -17,7 +17,7 @@ def seconds(machine, u, method, rtol, *, project):
     machine.watch_pivots(0.0, u)
     machine.start(0.0, u)
     y0 = machine.integrated(u)
-    run = Integration(
+    run = RungeKutta(
         TABLEAUS[method], machine.functions, machine.system, machine.loops, y0, [0.0, 1.0],
         rtol=rtol, atol=rtol / 100.0, project_on=project, error_size=len(y0) - 1,
         report_size=machine.report_size, length_count=machine.length_count,

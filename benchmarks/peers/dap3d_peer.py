@@ -9,7 +9,7 @@ from levels import WHOLE
 from mechanisms import GROUND, rotation_of
 
 import dap3d_core as dap
-from dap3d_core.integrators import TABLEAUS, Integration, Status, make_adams
+from dap3d_core.integrators import TABLEAUS, RungeKutta, Status, make_adams
 from dap3d_core.simulation import CompiledModel
 
 VERSION = importlib.metadata.version("dap3d")
@@ -75,7 +75,7 @@ class Model:
         if method == "adams":
             integration = make_adams(*self.problem, **options)
         else:
-            integration = Integration(TABLEAUS[method], *self.problem, **options)
+            integration = RungeKutta(TABLEAUS[method], *self.problem, **options)
         if integration.advance(10**12) is not Status.FINISHED:
             raise RuntimeError(f"the run stopped: {integration.status.name}")
         return integration

@@ -15,9 +15,9 @@ from support.results import same_bits
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.integrators.adams.formulas import EQUAL, FAILURES, ORDER_LAST, ORDER_NOW
-from dap3d_core.integrators.radau.state import ITERATIONS
-from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.adams.formulas import AdamsState
+from dap3d_core.integrators.radau.state import RadauState
+from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.simulation import CheckpointError
 from dap3d_core.simulation.checkpoint.file import Checkpoint, read_checkpoint, write_checkpoint
 
@@ -27,37 +27,47 @@ def crafted(run, what, where, value):
     return check_change(json.dumps(["checkpoint", run, what, where, value]).encode())
 
 
-#: Places of ``integer`` that only count, and so hold any count.
-COUNTS = {at.STEPS, at.REJECTED, at.RHS, at.PROJECTIONS, at.REPORTS, at.POOR, at.CUTS,
-          at.STIFF_STEPS, at.CALM_STEPS, at.STALLS}  # fmt: skip
+INTEGERS = RadauState.indices("integer") | AdamsState.indices("integer")
+#: Integers that only count, and so hold any count.
+COUNTS = {
+    "step_count", "rejected_count", "rhs_count", "projection_count", "report_count",
+    "near_singular_landings", "cut_attempts", "stiff_steps", "nonstiff_steps", "stalled_steps",
+    "equal_steps", "failure_count",
+    "iteration_count", "last_iterations", "jacobian_count", "factorisation_count",
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("place", [at.STAGES, at.ERROR_SIZE, at.NEXT, at.ROW, at.LATE_STAGE])
-def test_an_index_out_of_its_array_is_refused(place):
+@pytest.mark.parametrize(
+    "name", ["stage_count", "error_size", "next_report", "row_count", "stiffness_stage"]
+)
+def test_an_index_out_of_its_array_is_refused(name):
     """They crashed, or let the file write where it liked."""
-    assert crafted("pen1", "0.integer", place, 10**7) == "checkpoint refused"
+    assert crafted("pen1", "0.integer", INTEGERS[name], 10**7) == "checkpoint refused"
 
 
 def test_the_command_refuses_it_as_any_damaged_file(tmp_path, capsys):
-    path = make(["checkpoint", "pen1", "0.integer", at.ROW, 48], tmp_path)
+    path = make(["checkpoint", "pen1", "0.integer", INTEGERS["row_count"], 48], tmp_path)
     assert main(["resume", str(path)]) == 2
     words = "".join(capsys.readouterr().err.split())  # a long path is broken over lines
-    expected = f"cannot resume from {path}: integer[{at.ROW}] is 48, which no run can have"
+    expected = f"cannot resume from {path}: row_count is 48, which no run can have"
     assert "".join(expected.split()) in words
 
 
 def test_an_order_that_adams_methods_do_not_have_is_refused():
-    for place in (ORDER_NOW, ORDER_LAST):
-        assert crafted("adams", "0.integer", place, 14) == "checkpoint refused"
+    for name in ("next_order", "last_order"):
+        assert crafted("adams", "0.integer", INTEGERS[name], 14) == "checkpoint refused"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("run", ["pen1", "adams", "radau"])
-def test_every_place_that_holds_no_count_is_limited(run):
+@pytest.mark.parametrize(
+    ("run", "state"), [("pen1", IntegrationState), ("adams", AdamsState), ("radau", RadauState)]
+)
+def test_every_integer_that_is_no_count_is_limited(run, state):
+    indices = state.indices("integer")
     size = read_checkpoint(folder() / run / "run.nc.checkpoint").arrays["0.integer"].size
-    own = {"pen1": set(), "adams": {EQUAL, FAILURES}, "radau": set(range(ITERATIONS, size))}
-    for place in range(size):
-        if place not in COUNTS | own[run]:
+    assert list(indices.values()) == list(range(size))
+    for name, place in indices.items():
+        if name not in COUNTS:
             assert crafted(run, "0.integer", place, 10**7) == "checkpoint refused", place
         assert crafted(run, "0.integer", place, -(10**7)) == "checkpoint refused", place
 
@@ -132,7 +142,7 @@ def test_numbers_that_a_run_does_not_change_are_those_of_its_scene(tmp_path, mon
     arrays["system.par"] = np.full_like(arrays["system.par"], 1e9)
     arrays["system.settings"] = np.zeros_like(arrays["system.settings"])
     arrays["0.real"] = arrays["0.real"].copy()
-    arrays["0.real"][at.RTOL] = 0.0
+    arrays["0.real"][IntegrationState.indices("real")["rtol"]] = 0.0
     write_checkpoint(found, Checkpoint(before.header, arrays))
     assert same_bits(dap.resume(found), whole)
 

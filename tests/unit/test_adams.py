@@ -42,7 +42,7 @@ def test_order_conditions_on_unequal_steps(k):
     for degree in (k - 1, k):
         rate = np.polynomial.Polynomial(rng.uniform(-1.0, 1.0, degree + 1))
         run = start(kepler, [0.25], [0.0, 1.0])
-        work = run._work
+        work = run.work
         divided = rate(-ages)
         for j in range(k + 1):
             work.differences[j, 0] = divided[0] * np.prod(ages[1 : j + 1])
@@ -114,7 +114,7 @@ def test_reports_do_not_steer_the_steps(tol):
     often = start(toys.oscillator, [0.0, 1.0], times, **options)
     equal = 0
     while alone.advance(0) is Status.RUNNING:
-        equal = max(equal, alone.work.integer[adams.EQUAL])
+        equal = max(equal, alone.work.equal_steps)
     assert equal > adams.HIGHEST + 1
     rows = finish(often)
     assert often.statistics[:2] == alone.statistics[:2]

@@ -9,8 +9,7 @@ from support.ended import leave, shorten_chunks
 from support.results import same_bits
 
 import dap3d_core as dap
-from dap3d_core.integrators.radau.state import H_FACTORED, TANGENT_NEEDED
-from dap3d_core.integrators.stepping.integration_state import H
+from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.simulation.checkpoint.file import read_checkpoint
 
@@ -57,8 +56,9 @@ def test_a_tangent_that_is_kept_for_the_next_step(make, t, has_factors, tmp_path
     whole = dap.simulate(make(), **settings)
     checkpoint = leave(make(), tmp_path, t, **settings)
     arrays = read_checkpoint(checkpoint).arrays
-    assert arrays["0.integer"][TANGENT_NEEDED] == 0
-    assert (arrays["0.own"][H_FACTORED] == arrays["0.real"][H]) == has_factors
+    state = {name: arrays[f"0.{s.array}"][s.index] for name, s in RadauState.scalars.items()}
+    assert state["tangent_needed"] == 0
+    assert (state["factored_step"] == state["h"]) == has_factors
     assert same_bits(dap.resume(checkpoint), whole)
 
 

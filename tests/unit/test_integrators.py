@@ -20,7 +20,8 @@ from unit.test_integrators_problems import (
 )
 
 from dap3d_core.integrators import TABLEAUS
-from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA, GROUP, GROUPS, TERMS, combinations
+from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA, combinations
+from dap3d_core.integrators.stepping.vector_ops import GROUP, GROUPS, TERMS
 
 # ------------------------------------------------------------------ coefficients
 

@@ -5,7 +5,7 @@ import pytest
 from support import redundant
 
 import dap3d_core as dap
-from dap3d_core.integrators import TABLEAUS, Integration, Status
+from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
 from dap3d_core.integrators.stepping.singular_poses import NOW, RATE, aim, is_near, look_back
 
 
@@ -49,8 +49,8 @@ def test_lengths_count_from_the_far_side_after_a_crossing():
 
 def test_the_middle_of_the_widest_gap():
     """By hand from the tableaux: 1/3 to 3/5, 3/10 to 4/5."""
-    assert TABLEAUS["dop853"].calm == pytest.approx((1 / 3 + 3 / 5) / 2)
-    assert TABLEAUS["dopri5"].calm == pytest.approx((3 / 10 + 4 / 5) / 2)
+    assert TABLEAUS["dop853"].widest_gap_abscissa == pytest.approx((1 / 3 + 3 / 5) / 2)
+    assert TABLEAUS["dopri5"].widest_gap_abscissa == pytest.approx((3 / 10 + 4 / 5) / 2)
 
 
 def test_a_run_across_is_the_same_however_it_is_cut():
@@ -63,7 +63,7 @@ def test_a_run_across_is_the_same_however_it_is_cut():
 
     def integration():
         machine.watch_pivots(0.0, u)
-        return Integration(
+        return RungeKutta(
             TABLEAUS["dop853"], machine.functions, machine.system, machine.loops, y0, [0.0, 1.0],
             project_on=True, error_size=len(y0) - 1, report_size=machine.report_size,
             length_count=machine.length_count,

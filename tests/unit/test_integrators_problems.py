@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dap3d_core.assembly.arrays import System, step_functions
-from dap3d_core.integrators import TABLEAUS, Integration, Status
+from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
 from dap3d_core.kernels.compiler.types import DTYPES, Array
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.runtime.function_lists import loop_list
@@ -103,7 +103,7 @@ def start(name, rhs, y0, times, project=no_constraint, report=plain_report, **op
     """An integration of a toy; its calls are counted in ``.calls``."""
     functions, calls = first_class(rhs, project, report), np.zeros(3)
     system = counting(calls)
-    run = Integration(TABLEAUS[name], functions, system, loop_list([]), y0, times, **options)
+    run = RungeKutta(TABLEAUS[name], functions, system, loop_list([]), y0, times, **options)
     run.calls = calls
     return run
 

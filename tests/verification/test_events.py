@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from support.contact import contact_registry
 
 import dap3d_core as dap
-from dap3d_core.integrators import TABLEAUS, Integration, Status
+from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
 from dap3d_core.integrators.stepping.integration_state import LOGGED
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-14}
@@ -89,7 +89,7 @@ def test_a_run_is_the_same_however_it_is_cut(registry, integrator):
         u0 = machine.model.u0
         machine.start(0.0, u0)
         y0 = machine.integrated(u0)
-        integration = Integration(
+        integration = RungeKutta(
             TABLEAUS[integrator], machine.functions, machine.system, machine.loops, y0,
             np.linspace(0.0, 2.0, 21), project_on=True, error_size=len(y0) - 1,
             report_size=machine.report_size, ends=machine.ending,

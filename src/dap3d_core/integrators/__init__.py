@@ -8,20 +8,21 @@ import attrs
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.integrators.runge_kutta.dop853 import DOP853
 from dap3d_core.integrators.runge_kutta.dopri5 import DOPRI5
-from dap3d_core.integrators.runge_kutta.integration import Integration, Statistics
+from dap3d_core.integrators.runge_kutta.integration import RungeKutta
 from dap3d_core.integrators.runge_kutta.rk4 import RK4
-from dap3d_core.integrators.runge_kutta.tableau import Method
+from dap3d_core.integrators.runge_kutta.tableau import Tableau
+from dap3d_core.integrators.stepping.integration import Integration, Statistics
 from dap3d_core.integrators.stepping.integration_state import Status
 
 #: The explicit Runge-Kutta methods by name.
-TABLEAUS: dict[str, Method] = {method.name: method for method in (DOP853, DOPRI5, RK4)}
+TABLEAUS: dict[str, Tableau] = {method.name: method for method in (DOP853, DOPRI5, RK4)}
 
 
 def _explicit(name: str) -> Callable[..., Integration]:
     def make(machine: Machine, y0: Any, times: Any, **options: Any) -> Integration:
         functions, system, loops = machine.functions, machine.system, machine.loops
         options |= _placed_steps(machine)
-        return Integration(TABLEAUS[name], functions, system, loops, y0, times, **options)
+        return RungeKutta(TABLEAUS[name], functions, system, loops, y0, times, **options)
 
     return make
 
@@ -89,7 +90,8 @@ __all__ = [
     "TABLEAUS",
     "Integration",
     "Integrator",
-    "Method",
+    "RungeKutta",
     "Statistics",
     "Status",
+    "Tableau",
 ]

@@ -50,7 +50,7 @@ def hand_over(run: "Run") -> bool:
     if present.status in (Status.STIFF, Status.RUNNING):
         run.until = np.inf
         if present.status is Status.RUNNING:
-            present.work.integer[at.STATUS] = Status.FINISHED
+            present.work.status = Status.FINISHED
     else:
         left = _left(run)
         has_just_begun = len(run.runs) > 1 and run.runs[0].t >= present.t
@@ -94,7 +94,7 @@ def _aim_across(run: "Run", left: float) -> None:
     present = run.runs[-1]
     span = float(run.times[-1])
     present.work.lengths[:] = lengths_at(run.machine, present.t, present.y, span)
-    present.work.real[at.H] = left / present.work.real[at.CALM]
+    present.work.h = left / present.work.widest_gap_abscissa
 
 
 @AS_COMPILED
@@ -133,9 +133,9 @@ def time_left(lengths: Floats, span: float) -> float:
 
 
 def _lengths(machine: Machine, t: float, y: Floats) -> Floats:
-    found = np.zeros(at.LENGTHS - at.OUTCOME + machine.length_count)
+    found = np.zeros(at.MEASURES - at.PROJECTED + machine.length_count)
     machine.functions[PROJECT](t, y.copy(), found, machine.system, machine.loops)
-    lengths: Floats = found[at.LENGTHS - at.OUTCOME :]
+    lengths: Floats = found[at.MEASURES - at.PROJECTED :]
     return lengths
 
 

@@ -27,14 +27,15 @@ def implicit_rest(
 
 def take_over(integration: Integration, before: Integration) -> None:
     """Let an integration of the same run go on from where another one stands."""
-    real, integer = integration.work.real, integration.work.integer
-    integration.work.state[at.Y] = before.work.state[at.Y]
-    real[at.T], integer[at.NEXT] = before.t, before.work.integer[at.NEXT]
-    real[at.STIFF_AT], integer[at.STATUS] = np.inf, Status.RUNNING
-    real[[at.ACROSS, at.FAILED_RATE]] = 0.0
-    integer[[at.POOR, at.STIFF_STEPS, at.CALM_STEPS, at.STALLS]] = 0
+    work = integration.work
+    work.state[at.Y] = before.work.state[at.Y]
+    work.t, work.next_report = before.t, before.work.next_report
+    work.t_stiff, work.status = np.inf, Status.RUNNING
+    work.error_across_singularity = work.failed_error_rate = 0.0
+    work.near_singular_landings = work.stalled_steps = 0
+    work.stiff_steps = work.nonstiff_steps = 0
     if not integration.implicit:
-        integration.work.lengths[:] = np.nan
+        work.lengths[:] = np.nan
     integration.restart()
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import DOUBTFUL, UNSETTLED
 from dap3d_core.integrators import Status
-from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED, NEXT
+from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED
 from dap3d_core.integrators.stepping.restore import check_alike, restored
 from dap3d_core.interface import PluginError
 from dap3d_core.kernels.runtime.cache import driver_digest
@@ -331,6 +331,6 @@ def check_position(run: Run, rows: int) -> None:
     """
     model, last = run.machine.model, run.runs[-1]
     state_of(from_integrated(last.y[None])[0], model.body_names)
-    reported = last.work.integer[NEXT]
+    reported = last.work.next_report
     if rows - reported not in (0, 1):  # an event that ends a run reports its own instant
         raise ValueError(f"{rows} rows are reported of the {reported} that its instants need")

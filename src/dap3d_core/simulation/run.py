@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS, Integration, Status
-from dap3d_core.integrators.runge_kutta.integration import Statistics as Counts
-from dap3d_core.integrators.stepping.integration_state import LONGEST
-from dap3d_core.integrators.stepping.singular_start import begin_singular
+from dap3d_core.integrators import Statistics as Counts
+from dap3d_core.integrators.stepping.singular_poses import begin_singular
 from dap3d_core.result import INFORMATION, Occurrence, Record, Result, ResultError, Statistics
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -259,7 +258,7 @@ class Run:
         integration.stops = self.compiled.pace(float(self.times[-1])).stops
         if self.limits is not None:
             integration.stops = halved(integration.stops)
-            integration.work.real[LONGEST] = self.limits.longest
+            integration.work.longest_step = self.limits.longest
         before = time.perf_counter()
         integration.compile()
         spent = time.perf_counter() - before

@@ -8,48 +8,27 @@ orders are those of Shampine, Gordon, Computer Solution of Ordinary Differential
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from collections.abc import Container
+from collections.abc import Container, Mapping
 from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 
-from dap3d_core.integrators.runge_kutta.tableau import Floats, Integers
 from dap3d_core.integrators.stepping.integration_state import (
     ABSOLUTE,
-    ERROR_SIZE,
-    FRESH,
-    INTEGERS,
     MOST_COUNTED,
     NOISE,
-    RTOL,
     SCRATCH,
     TRIAL,
+    IntegrationState,
     Y,
 )
-from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
+from dap3d_core.kernels.runtime.array_struct import MATRIX, Floats, Scalar
 from dap3d_core.kernels.runtime.cache import compiled_inside
 
 HIGHEST = 12
 #: Rows of differences: up to one more than the order, from zero; one more for a right-hand side.
 ROWS = HIGHEST + 3
-#: Places in ``integer`` behind those of every method: order; order of the last step; how many of
-#: the last steps were equal, the coming one included; whether the run is still starting; failures
-#: of the coming step in a row.
-ORDER_NOW, ORDER_LAST, EQUAL, STARTING, FAILURES, ADAMS_INTEGERS = range(INTEGERS, INTEGERS + 6)
-
-
-def allowed_adams_integers(found: Integers) -> dict[int, Container[int]]:
-    """What these places may hold between two chunks of a run, as ``work.allowed_integers``."""
-    return {
-        ORDER_NOW: range(1 if found[FRESH] else 0, HIGHEST + 1),
-        ORDER_LAST: range(HIGHEST + 1),
-        STARTING: (0, 1),
-        **dict.fromkeys((EQUAL, FAILURES), range(MOST_COUNTED)),
-    }
-
-
 #: Rows of ``table``. x_n - x_(n-j) for j = 1, ...; the same of the coming step; beta, g, sigma of
 #: HNW (III.5.9, 5.10) and Shampine, Gordon; scratch; |gamma*_j|, error constants at equal steps;
 #: g of an interpolation. Its row is its own: among equal steps the next step uses g once more.
@@ -67,38 +46,34 @@ def _error_constants() -> Floats:
     return np.abs(constants)
 
 
-@attrs.frozen(eq=False, kw_only=True, slots=False)
-class AdamsWork(Arrays):
-    """All that ``advance_adams`` reads and writes; n components."""
+@attrs.define(eq=False, kw_only=True, slots=False)
+class AdamsState(IntegrationState):
+    """What ``advance_adams`` reads and writes; n components."""
 
     types: ClassVar[dict[str, Any]] = {
-        "integer": INTEGER_VECTOR,
-        **dict.fromkeys(
-            (
-                "state",
-                "rows",
-                "differences",
-                "scaled",
-                "table",
-                "switches",
-                "crossings",
-                "tolerance",
-            ),
-            MATRIX,
-        ),
+        **IntegrationState.types,
+        **dict.fromkeys(("differences", "scaled", "table"), MATRIX),
     }
 
-    real: Floats  # as in ``Work``
-    integer: Integers  # (ADAMS_INTEGERS,)
-    times: Floats
-    state: Floats
-    rows: Floats
+    next_order = Scalar[int]("integer")
+    last_order = Scalar[int]("integer")
+    equal_steps = Scalar[int]("integer")  # in a row, the coming one included
+    is_starting = Scalar[int]("integer")
+    failure_count = Scalar[int]("integer")  # of the coming step, in a row
+
     differences: Floats  # (ROWS, n) Phi_j at t, HNW (III.5.8)
     scaled: Floats  # (ROWS, n) Phi*_j = beta_j Phi_j; in the last row the rates at the prediction
     table: Floats  # (TABLE_ROWS, ROWS + HIGHEST)
-    switches: Floats  # as in ``Work``
-    crossings: Floats
-    tolerance: Floats
+
+
+def allowed_adams_integers(found: Mapping[str, int]) -> dict[str, Container[int]]:
+    """Values of these integers between two chunks of a run, as ``allowed_integers`` has them."""
+    return {
+        "next_order": range(1 if found["first_stage_valid"] else 0, HIGHEST + 1),
+        "last_order": range(HIGHEST + 1),
+        "is_starting": (0, 1),
+        **dict.fromkeys(("equal_steps", "failure_count"), range(MOST_COUNTED)),
+    }
 
 
 def make_table() -> Floats:
@@ -109,16 +84,16 @@ def make_table() -> Floats:
 
 
 @compiled_inside
-def coefficients(work: AdamsWork, h: float, k: int) -> None:
+def coefficients(work: AdamsState, h: float, k: int) -> None:
     """beta, g and sigma of a step h; among equal steps they stay what they were."""
-    table, integer = work.table, work.integer
+    table = work.table
     psi, following, beta, sigma = table[PSI], table[PSI_NEXT], table[BETA_ROW], table[SIGMA]
     if abs(h - psi[1]) > EQUAL_TO * h:
-        integer[EQUAL] = 0
-    elif integer[EQUAL] > HIGHEST + 1:
+        work.equal_steps = 0
+    elif work.equal_steps > HIGHEST + 1:
         return
     highest = k
-    if integer[EQUAL] == HIGHEST + 1:  # from here on they are those of equal steps, of all orders
+    if work.equal_steps == HIGHEST + 1:  # from here on they are those of equal steps, of all orders
         highest = HIGHEST
         for j in range(1, highest + 2):
             psi[j] = j * h
@@ -148,7 +123,7 @@ def weights(table: Floats, h: float, order: int) -> None:
 
 
 @compiled_inside
-def predict(work: AdamsWork, h: float, k: int) -> None:
+def predict(work: AdamsState, h: float, k: int) -> None:
     """Phi*_j; the prediction into TRIAL, the sum of Phi*_0 to Phi*_(k-1) into SCRATCH."""
     table, star, f, y = work.table, work.scaled, work.differences, work.state[Y]
     trial, total = work.state[TRIAL], work.state[SCRATCH]
@@ -175,14 +150,14 @@ def predict(work: AdamsWork, h: float, k: int) -> None:
 
 
 @compiled_inside
-def differences_at(work: AdamsWork, k: int, h: float) -> tuple[float, float, float]:
+def differences_at(work: AdamsState, k: int, h: float) -> tuple[float, float, float]:
     """Scaled sizes of Phi_k, Phi_(k-1), Phi_(k-2) at the prediction; NaN where a number is none.
 
     What of them is rounding (stepping/rounding.py) is not counted.
     """
-    real, size, star = work.real, work.integer[ERROR_SIZE], work.scaled
+    size, star = work.error_size, work.scaled
     y, trial, change = work.state[Y], work.state[TRIAL], work.state[SCRATCH]
-    rtol, tolerance, last, before = real[RTOL], work.tolerance, k - 1, max(k - 2, 0)
+    rtol, tolerance, last, before = work.rtol, work.tolerance, k - 1, max(k - 2, 0)
     zero, one, two = 0.0, 0.0, 0.0
     for i in range(size):
         a, b = abs(y[i]), abs(trial[i])
@@ -217,12 +192,12 @@ def compare_orders(
 
 
 @compiled_inside
-def interpolate(work: AdamsWork, back: float, out: Floats) -> None:
+def interpolate(work: AdamsState, back: float, out: Floats) -> None:
     """The solution at t + back, -h <= back <= 0: the integral of the polynomial through the rates.
 
     Shampine, Gordon, chapter 5 (their code INTRP); the order is one more than that of the step.
     """
-    table, differences, last = work.table, work.differences, work.integer[ORDER_LAST] + 1
+    table, differences, last = work.table, work.differences, work.last_order + 1
     line, g, psi, y = table[LINE], table[WITHIN], table[PSI], work.state[Y]
     for q in range(last):
         line[q] = 1.0 / (q + 1.0)

@@ -18,24 +18,18 @@ from typing import Any
 
 from dap3d_core.integrators.adams.formulas import (
     CONSTANT,
-    EQUAL,
-    FAILURES,
     G_ROW,
     HIGHEST,
-    ORDER_LAST,
-    ORDER_NOW,
     PSI,
     PSI_NEXT,
     ROWS,
-    STARTING,
-    AdamsWork,
+    AdamsState,
     coefficients,
     compare_orders,
     differences_at,
     interpolate,
     predict,
 )
-from dap3d_core.integrators.runge_kutta.tableau import Floats
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
     next_length,
@@ -43,29 +37,14 @@ from dap3d_core.integrators.stepping.event_location import (
     settle,
 )
 from dap3d_core.integrators.stepping.integration_state import (
-    ERROR_SIZE,
-    FRESH,
-    LIMIT,
-    LONGEST,
-    NEXT,
     NOT_FINITE,
     OTHER,
-    OUTCOME,
-    REJECTED,
-    RHS,
-    RTOL,
+    PROJECTED,
     RUNNING,
     SCRATCH,
-    STATUS,
     STEP_FLOOR,
-    STEPS,
-    SWITCHES,
-    T_STOP,
     TRIAL,
-    WATCHED,
     Function,
-    H,
-    T,
     Y,
 )
 from dap3d_core.integrators.stepping.output import may_step, project_state
@@ -78,6 +57,7 @@ from dap3d_core.integrators.stepping.step_control import (
     step_floor,
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_beyond, scaled_largest
+from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
 
 #: The step is doubled, kept, or multiplied by a factor in between these.
@@ -88,66 +68,62 @@ PLANNED, PATIENCE = 0.5, 3
 
 @compiled
 def advance_adams(
-    work: AdamsWork, functions: Sequence[Function], system: Any, loops: Any, budget: int
+    work: AdamsState, functions: Sequence[Function], system: Any, loops: Any, budget: int
 ) -> None:
     """Go on as ``runge_kutta.advance`` does; functions and budget as there."""
     rhs, project, report = functions[0], functions[1], functions[2]
-    real, integer = work.real, work.integer
-    watch = functions[4] if integer[SWITCHES] != 0 else rhs
-    limit = integer[RHS] + budget
+    watch = functions[4] if work.switch_count != 0 else rhs
+    limit = work.rhs_count + budget
     while may_step(work, state_at, limit, project, report, system, loops):
-        steps, rejected, h = integer[STEPS], integer[REJECTED], real[H]
+        steps, rejected, h = work.step_count, work.rejected_count, work.h
         step(work, rhs, project, watch, system, loops)
         watch_rounding(work, work.differences[0], h, rejected, rhs, system, loops)
-        if integer[WATCHED] != 0 and integer[STEPS] > steps:
-            functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
+        if work.calls_accepted != 0 and work.step_count > steps:
+            functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
 
 
 @compiled_inside
-def state_at(work: AdamsWork, t: float, y: Floats) -> None:
+def state_at(work: AdamsState, t: float, y: Floats) -> None:
     """The state at an instant of the last step, by the polynomial of the method."""
-    interpolate(work, t - work.real[T], y)
+    interpolate(work, t - work.t, y)
 
 
 @compiled_inside
-def begin(work: AdamsWork, rhs: Function, system: Any, loops: Any) -> None:
+def begin(work: AdamsState, rhs: Function, system: Any, loops: Any) -> None:
     """The rates at the start, the first step, order 1."""
-    real, integer, times, f = work.real, work.integer, work.times, work.differences
+    f = work.differences
     y = work.state[Y]
-    integer[RHS] += 1
-    rhs(real[T], y, f[0], system, loops)
-    integer[FRESH] = 1
+    work.rhs_count += 1
+    rhs(work.t, y, f[0], system, loops)
+    work.first_stage_valid = 1
     if not all_finite(f[0]):
-        real[T_STOP], integer[STATUS] = real[T], NOT_FINITE
+        work.t_stop, work.status = work.t, NOT_FINITE
         return
-    if real[H] == 0.0:
-        scratch = work.state[SCRATCH]
-        real[H] = first_step(
-            real, integer, times, y, f, scratch, work.tolerance, rhs, system, loops
-        )
+    if work.h == 0.0:
+        work.h = first_step(work, f, rhs, system, loops)
     for i in range(y.size):
         f[1, i] = 0.0
     for j in range(ROWS):
-        work.table[PSI, j] = j * real[H]
-    integer[ORDER_NOW], integer[STARTING], integer[EQUAL] = 1, 1, 0
+        work.table[PSI, j] = j * work.h
+    work.next_order, work.is_starting, work.equal_steps = 1, 1, 0
 
 
 @compiled_inside
 def step(
-    work: AdamsWork, rhs: Function, project: Function, watch: Function, system: Any, loops: Any
+    work: AdamsState, rhs: Function, project: Function, watch: Function, system: Any, loops: Any
 ) -> None:
     """Try one step: accept it, reject it, or stop the run."""
-    real, integer, times = work.real, work.integer, work.times
-    if integer[FRESH] == 0:
+    times = work.times
+    if work.first_stage_valid == 0:
         begin(work, rhs, system, loops)
-        if integer[STATUS] != RUNNING:
+        if work.status != RUNNING:
             return
-    t, t_end, k = real[T], times[-1], integer[ORDER_NOW]
-    h = min(real[H], real[LONGEST])
+    t, t_end, k = work.t, times[-1], work.next_order
+    h = min(work.h, work.longest_step)
     end = t_end if t + STRETCH * h >= t_end else t + h
-    t1 = min(end, real[LIMIT])
+    t1 = min(end, work.t_limit)
     h = t1 - t
-    if integer[SWITCHES] != 0:
+    if work.switch_count != 0:
         h = min(h, next_length(work, end, work.differences[0], project, watch, system, loops))
         if h == 0.0:
             return
@@ -155,68 +131,68 @@ def step(
     coefficients(work, h, k)
     predict(work, h, k)
     trial, table = work.state[TRIAL], work.table
-    if integer[SWITCHES] != 0 and sample(work, t1, trial, watch, system, loops):
+    if work.switch_count != 0 and sample(work, t1, trial, watch, system, loops):
         return
     rates, change = work.scaled[ROWS - 1], work.state[SCRATCH]
-    integer[RHS] += 1
+    work.rhs_count += 1
     rhs(t1, trial, rates, system, loops)
     for i in range(trial.size):
         change[i] = rates[i] - change[i]  # Phi_k at t1
     sizes = differences_at(work, k, h)
     error = h * abs(table[G_ROW, k - 1] - table[G_ROW, k]) * sizes[0]
     here, below, lower = compare_orders(table, h, k, sizes)
-    if 1.0 < error <= LARGEST and h * SLOWEST < step_floor(real, times):
-        doubt, size, f0 = EPSILON * max(abs(t), abs(t1)), integer[ERROR_SIZE], work.differences[0]
+    if 1.0 < error <= LARGEST and h * SLOWEST < step_floor(work):
+        doubt, size, f0 = EPSILON * max(abs(t), abs(t1)), work.error_size, work.differences[0]
         found = scaled_beyond(
-            change, work.state[Y], trial, f0, rates, doubt, size, real[RTOL], work.tolerance
+            change, work.state[Y], trial, f0, rates, doubt, size, work.rtol, work.tolerance
         )
         error = min(error, error * (found / sizes[0]))
     if error <= 1.0:
         g = h * table[G_ROW, k]
         for i in range(trial.size):
             trial[i] += g * change[i]
-        failure = project_state(real, integer, t1, trial, project, system, loops)
+        failure = project_state(work, t1, trial, project, system, loops)
         if failure == RUNNING:
             if find_rates(work, t1, rhs, watch, system, loops):
                 accept(work, t1, k, here, below, lower)
         else:
             fail(work, t1, h, 1, 0.1, failure)
     elif error <= LARGEST:
-        note_failure(real, integer, error, h, integer[FAILURES] != 0)
-        integer[FAILURES] += 1
+        note_failure(work, error, h, work.failure_count != 0)
+        work.failure_count += 1
         factor = SLOWEST
-        if integer[FAILURES] > PATIENCE:
+        if work.failure_count > PATIENCE:
             factor = max(0.1, min(SLOWEST, math.sqrt(PLANNED / here)))
         order = k - 1 if lower else k
-        fail(work, t1, h, 1 if integer[FAILURES] >= PATIENCE else order, factor, STEP_FLOOR)
+        fail(work, t1, h, 1 if work.failure_count >= PATIENCE else order, factor, STEP_FLOOR)
     else:
         fail(work, t1, h, 1, 0.1, NOT_FINITE)
 
 
 @compiled_inside
 def find_rates(
-    work: AdamsWork, t1: float, rhs: Function, watch: Function, system: Any, loops: Any
+    work: AdamsState, t1: float, rhs: Function, watch: Function, system: Any, loops: Any
 ) -> bool:
     """The rates at the trial state; False where they are not finite, or it lies across a switch."""
-    real, integer, rates = work.real, work.integer, work.scaled[ROWS - 1]
-    trial, total, watched = work.state[TRIAL], work.state[SCRATCH], integer[SWITCHES] != 0
+    rates = work.scaled[ROWS - 1]
+    trial, total, watched = work.state[TRIAL], work.state[SCRATCH], work.switch_count != 0
     for i in range(trial.size):
         total[i] = rates[i] - total[i]  # the sum of Phi*_j again
-    if watched or t1 < work.times[-1] or work.times[work.integer[NEXT]] < t1:
-        integer[RHS] += 1
+    if watched or t1 < work.times[-1] or work.times[work.next_report] < t1:
+        work.rhs_count += 1
         rhs(t1, trial, rates, system, loops)
         if not all_finite(rates):
-            real[T_STOP], integer[STATUS] = t1, NOT_FINITE
+            work.t_stop, work.status = t1, NOT_FINITE
             return False
     return not (watched and end_is_across(work, t1, rates, watch, system, loops))
 
 
 @compiled_inside
-def accept(work: AdamsWork, t1: float, k: int, here: float, below: float, lower: bool) -> None:
+def accept(work: AdamsState, t1: float, k: int, here: float, below: float, lower: bool) -> None:
     """Make the trial state the state; its differences; order and length of what comes."""
-    real, integer, star, f = work.real, work.integer, work.scaled, work.differences
+    star, f = work.scaled, work.differences
     y, trial, total, rates = work.state[Y], work.state[TRIAL], work.state[SCRATCH], star[ROWS - 1]
-    h = t1 - real[T]
+    h = t1 - work.t
     for i in range(y.size):
         y[i] = trial[i]
         difference = rates[i] - total[i]
@@ -227,53 +203,52 @@ def accept(work: AdamsWork, t1: float, k: int, here: float, below: float, lower:
     for j in range(1, k + 2):
         work.table[PSI, j] = work.table[PSI_NEXT, j]
     work.table[PSI, 0] = 0.0
-    real[T] = t1
-    integer[STEPS] += 1
-    integer[EQUAL] += 1
-    integer[FAILURES], integer[ORDER_LAST] = 0, k
+    work.t = t1
+    work.step_count += 1
+    work.equal_steps += 1
+    work.failure_count, work.last_order = 0, k
     plan(work, h, k, here, below, lower)
     settle(work, h, h, t1)
 
 
 @compiled_inside
-def plan(work: AdamsWork, h: float, k: int, here: float, below: float, lower: bool) -> None:
+def plan(work: AdamsState, h: float, k: int, here: float, below: float, lower: bool) -> None:
     """Order and length of the next step (Shampine, Gordon, chapter 7; their code STEP, block 4)."""
-    real, integer, f = work.real, work.integer, work.differences
+    f = work.differences
     if lower or k == HIGHEST:
-        integer[STARTING] = 0
+        work.is_starting = 0
     order, error = k, here
-    if integer[STARTING] != 0:
+    if work.is_starting != 0:
         order, error = k + 1, 0.0
     elif lower:
         order, error = k - 1, below
-    elif integer[EQUAL] > k:
+    elif work.equal_steps > k:
         y = work.state[Y]
         highest = work.state[OTHER]
         for i in range(y.size):
             highest[i] = h * f[k + 1, i]
-        size = integer[ERROR_SIZE]
+        size = work.error_size
         above = work.table[CONSTANT, k + 1] * scaled_largest(
-            highest, y, y, size, real[RTOL], work.tolerance, h
+            highest, y, y, size, work.rtol, work.tolerance, h
         )
         if k > 1 and below <= min(here, above):
             order, error = k - 1, below
         elif k < HIGHEST and above < (here if k > 1 else 0.5 * here):
             order, error = k + 1, above
-    integer[ORDER_NOW] = order
+    work.next_order = order
     factor = 2.0
     if error * 2.0 ** (order + 1) > PLANNED:
         factor = 1.0
         if error > PLANNED:
             factor = max(SLOWEST, min(STEADY, (PLANNED / error) ** (1.0 / (order + 1))))
-    real[H] = max(h * factor, step_floor(real, work.times))
+    work.h = max(h * factor, step_floor(work))
 
 
 @compiled_inside
-def fail(work: AdamsWork, t1: float, h: float, order: int, factor: float, cause: int) -> None:
+def fail(work: AdamsState, t1: float, h: float, order: int, factor: float, cause: int) -> None:
     """Try a shorter step again, of another order perhaps; at the floor, stop for ``cause``."""
-    real, integer = work.real, work.integer
-    integer[REJECTED] += 1
-    integer[STARTING], integer[EQUAL], integer[ORDER_NOW] = 0, 0, order
-    real[H] = h * factor
-    if real[H] < step_floor(real, work.times):
-        real[T_STOP], integer[STATUS] = t1, cause
+    work.rejected_count += 1
+    work.is_starting, work.equal_steps, work.next_order = 0, 0, order
+    work.h = h * factor
+    if work.h < step_floor(work):
+        work.t_stop, work.status = t1, cause

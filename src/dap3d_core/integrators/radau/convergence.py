@@ -6,13 +6,9 @@
 import math
 
 from dap3d_core.integrators.radau.state import (
-    OF_MULTIPLIERS,
-    OF_STATES,
-    PART,
-    TANGENT_HERE,
-    RadauWork,
+    RadauState,
 )
-from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, RTOL, Y
+from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, Y
 from dap3d_core.integrators.stepping.step_control import EPSILON, LARGEST
 from dap3d_core.kernels.runtime.cache import compiled_inside
 from dap3d_core.model.state_layout import COORDINATES, STATE, VELOCITIES
@@ -29,9 +25,9 @@ STALLED, MOST_ROUNDINGS = 10.0, 1e6
 
 
 @compiled_inside
-def newton_limit(work: RadauWork) -> float:
+def newton_limit(work: RadauState) -> float:
     """Norm of a change at which the iteration ends (HW IV.8), not below what rounding allows."""
-    y, rtol = work.state[Y], work.real[RTOL]
+    y, rtol = work.state[Y], work.rtol
     n = (y.shape[0] - 1) // STATE
     limit = min(0.03, math.sqrt(rtol))
     first = 0
@@ -54,7 +50,7 @@ def converges(theta: float, change: float, limit: float, left: int) -> bool:
 
 
 @compiled_inside
-def is_stalled(states: float, multipliers: float, limit: float, work: RadauWork) -> bool:
+def is_stalled(states: float, multipliers: float, limit: float, work: RadauState) -> bool:
     """Whether an iteration that does not converge has come to rounding, as far as the tangent goes.
 
     Multipliers are known to their own last digits: under large forces, and near a singular pose,
@@ -62,19 +58,18 @@ def is_stalled(states: float, multipliers: float, limit: float, work: RadauWork)
     last two changes were less than MOST_ROUNDINGS and STALLED times the limit, which still is a
     third of what a step may be off by (implicit.estimate_tolerances).
     """
-    own = work.own
-    least = min(STALLED * limit, MOST_ROUNDINGS * EPSILON / work.real[RTOL])
+    least = min(STALLED * limit, MOST_ROUNDINGS * EPSILON / work.rtol)
     return (
-        work.integer[TANGENT_HERE] != 0
-        and max(states, own[OF_STATES]) <= least
-        and own[OF_MULTIPLIERS] > SETTLING * multipliers
+        work.tangent_is_current != 0
+        and max(states, work.state_change) <= least
+        and work.multiplier_change > SETTLING * multipliers
     )
 
 
 @compiled_inside
-def is_settling(multipliers: float, work: RadauWork) -> bool:
+def is_settling(multipliers: float, work: RadauState) -> bool:
     """Whether multipliers that have no part in the norm still converge, as they do before states.
 
     Behind a singular pose they change by much where the motion hardly does.
     """
-    return work.own[PART] != 0.0 and work.own[OF_MULTIPLIERS] < SETTLING * multipliers
+    return work.regularisation != 0.0 and work.multiplier_change < SETTLING * multipliers

@@ -19,15 +19,13 @@ from dap3d_core.formulations.common.constraints import PART, correct, factorise,
 from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import Matrix
 from dap3d_core.integrators.radau.state import (
-    ACCEPTED,
-    H_ACCEPTED,
     OLD,
     OLD_SLOPE,
     SLOPE,
     TRIAL_SLOPE,
-    RadauWork,
+    RadauState,
 )
-from dap3d_core.integrators.stepping.integration_state import H_DENSE, T_DENSE, TRIAL, T, Y
+from dap3d_core.integrators.stepping.integration_state import TRIAL, Y
 from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
 from dap3d_core.linear.ldlt.saddle_point import add_product
 
@@ -40,7 +38,7 @@ NEGLIGIBLE = 1e-4
 def find_slope(
     t: float,
     h: float,
-    work: RadauWork,
+    work: RadauState,
     system: System,
     loops: Any,
     tangent: Tangent,
@@ -91,12 +89,12 @@ def scale_slopes(inverse: Floats, stages: Floats, h: float, metric: Floats, forc
 
 
 @compiled_inside
-def prepare_dense(h: float, work: RadauWork) -> None:
+def prepare_dense(h: float, work: RadauState) -> None:
     """Terms of dense output from t to the trial state, for combination.interpolate."""
-    real, state, terms, stages, c = work.real, work.state, work.terms, work.Z, work.method.c
-    real[T_DENSE], real[H_DENSE] = real[T], h
-    q = work.own[H_ACCEPTED] / h
-    first = work.integer[ACCEPTED] == 0 or q < NEGLIGIBLE
+    state, terms, stages, c = work.state, work.terms, work.Z, work.method.c
+    work.t_dense, work.h_dense = work.t, h
+    q = work.accepted_step / h
+    first = work.has_last_step == 0 or q < NEGLIGIBLE
     for k in range(state.shape[1]):
         y, rise = state[Y, k], state[TRIAL, k] - state[Y, k]
         terms[0, k], terms[1, k] = y, rise

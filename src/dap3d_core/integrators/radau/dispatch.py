@@ -16,12 +16,12 @@ from dap3d_core.integrators.radau.newton import (
     find_stages,
     find_tangent,
 )
-from dap3d_core.integrators.radau.state import RadauWork
+from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.kernels.runtime.cache import table_of
 from dap3d_core.kernels.runtime.function_lists import LOOP_LIST, number_signature
 
 PART = number_signature(
-    RadauWork.type_of(), System.type_of(), LOOP_LIST, Tangent.type_of(), Matrix.type_of()
+    RadauState.type_of(), System.type_of(), LOOP_LIST, Tangent.type_of(), Matrix.type_of()
 )
 
 

@@ -39,29 +39,10 @@ from dap3d_core.integrators.radau.convergence import (
     newton_limit,
 )
 from dap3d_core.integrators.radau.state import (
-    ACCEPTED,
-    FACCON,
-    FACTORISATIONS,
-    H_ACCEPTED,
-    H_FACTORED,
-    ITERATIONS,
-    JACOBIANS,
-    LAST_ITERATIONS,
-    OF_MULTIPLIERS,
-    OF_STATES,
-    PART,
-    TANGENT_HERE,
-    TANGENT_NEEDED,
-    THETA,
-    RadauWork,
+    RadauState,
 )
 from dap3d_core.integrators.stepping.integration_state import (
-    ERROR_SIZE,
-    LAST_REJECTED,
-    RHS,
-    RTOL,
     SCRATCH,
-    STEP,
     TRIAL,
     Y,
 )
@@ -85,7 +66,7 @@ LARGEST = 1.7976931348623157e308
 def find_tangent(
     t: float,
     h: float,
-    work: RadauWork,
+    work: RadauState,
     system: System,
     loops: Any,
     tangent: Tangent,
@@ -100,15 +81,15 @@ def find_tangent(
     argument = work.state[SCRATCH]
     for k in range(argument.shape[0]):
         argument[k] = work.state[Y, k] + work.Z[2, k]
-    at = t + h if work.integer[ACCEPTED] != 0 else t
+    at = t + h if work.has_last_step != 0 else t
     place(at, argument, system, loops)
     linearise(at, system, loops)
-    keep_state(system, matrix, work.own[PART])
+    keep_state(system, matrix, work.regularisation)
     for k in range(system.x.shape[0]):
         system.x[k] = -work.multipliers[2, 1, k]
-    work.integer[JACOBIANS] += 1
-    work.integer[TANGENT_NEEDED], work.integer[TANGENT_HERE] = 0, 1
-    work.own[H_FACTORED] = 0.0
+    work.jacobian_count += 1
+    work.tangent_needed, work.tangent_is_current = 0, 1
+    work.factored_step = 0.0
     return 0.0 if differentiate(at, system.x, system, loops, tangent) else math.nan
 
 
@@ -122,7 +103,7 @@ def pole(poles: Floats, h: float) -> Any:
 def factorise_both(
     t: float,
     h: float,
-    work: RadauWork,
+    work: RadauState,
     system: System,
     loops: Any,
     tangent: Tangent,
@@ -130,8 +111,8 @@ def factorise_both(
 ) -> float:
     """Factors of the real and the complex system of a step h; 0, or UNFOUND if one is singular."""
     poles = work.method.poles
-    work.integer[FACTORISATIONS] += 1
-    work.own[H_FACTORED] = h
+    work.factorisation_count += 1
+    work.factored_step = h
     fill_matrix(poles[0] / h, work.K, system.blocks, matrix, tangent)
     fill_matrix(pole(poles, h), work.Kc, system.blocks, matrix, tangent)
     nodes, columns, updates = matrix.nodes, matrix.columns, matrix.updates
@@ -142,19 +123,19 @@ def factorise_both(
 
 
 @compiled_inside
-def predict(h: float, work: RadauWork) -> None:
+def predict(h: float, work: RadauState) -> None:
     """Starting values of the stages: the polynomials of the last step, prolonged (HW IV.8).
 
     mu is no smooth function: it has the same values at the stages of each step, but for h^3.
     """
     c, stages, old, now = work.method.c, work.Z, work.Z_old, work.multipliers
-    if work.integer[ACCEPTED] == 0:
+    if work.has_last_step == 0:
         for i in range(3):
             zero(stages[i])
             for k in range(now.shape[2]):
                 now[i, 0, k], now[i, 1, k] = 0.0, work.last_multipliers[2, 1, k]
         return
-    ratio, last = h / work.own[H_ACCEPTED], work.last_multipliers
+    ratio, last = h / work.accepted_step, work.last_multipliers
     for i in range(3):
         u = 1.0 + c[i] * ratio
         v0 = (u - c[1]) * (u - 1.0) / ((c[0] - c[1]) * (c[0] - 1.0))
@@ -171,7 +152,7 @@ def predict(h: float, work: RadauWork) -> None:
 
 
 @compiled_inside
-def solve_first(h: float, work: RadauWork, system: System, matrix: Matrix) -> None:
+def solve_first(h: float, work: RadauState, system: System, matrix: Matrix) -> None:
     """R[0], G[0] from the residual of one equation with the real matrix to the change."""
     x, along, s = work.x[0], work.along[0], work.method.poles[0] / h
     scale_residual(work.R[0], work.G[0], system.blocks, system.metric, matrix, work.frames[0],
@@ -202,7 +183,7 @@ def unite(T: Floats, real: Floats, pair: Any, x: Floats) -> None:
 
 
 @compiled_inside
-def solve_stages(h: float, work: RadauWork, system: System, matrix: Matrix) -> None:
+def solve_stages(h: float, work: RadauState, system: System, matrix: Matrix) -> None:
     """R, G from the residuals of the three stages to the changes."""
     x, along, poles = work.x, work.along, work.method.poles
     s, sc = poles[0] / h, pole(poles, h)
@@ -226,7 +207,7 @@ def solve_stages(h: float, work: RadauWork, system: System, matrix: Matrix) -> N
 
 @compiled_inside
 def evaluate_stages(
-    t: float, h: float, work: RadauWork, system: System, loops: Any, matrix: Matrix
+    t: float, h: float, work: RadauState, system: System, loops: Any, matrix: Matrix
 ) -> None:
     """Residuals of the three stages: F - A^-1 Z / h into R, those of the rows into G."""
     y, argument, c = work.state[Y], work.state[SCRATCH], work.method.c
@@ -241,13 +222,13 @@ def evaluate_stages(
         for k in range(y.shape[0]):
             rate = a0 * stages[0, k] + a1 * stages[1, k] + a2 * stages[2, k]
             work.R[i, k] = work.F[i, k] - rate
-    work.integer[RHS] += 3
+    work.rhs_count += 3
 
 
 @compiled_inside
-def size_of_multipliers(h: float, change: Floats, work: RadauWork, system: System) -> float:
+def size_of_multipliers(h: float, change: Floats, work: RadauState, system: System) -> float:
     """Norm of multipliers (2, R): as changes of y, h M^-1 D^T times them (HW VII.4: index 2)."""
-    real, y, out = work.real, work.state[Y], work.state[SCRATCH]
+    y, out = work.state[Y], work.state[SCRATCH]
     force, n = system.force, system.metric.shape[0] - 1
     zero(out)
     zero(force)
@@ -256,42 +237,40 @@ def size_of_multipliers(h: float, change: Floats, work: RadauWork, system: Syste
     zero(force)
     add_transposed(system.blocks, system.D, change[1], h, force)
     add_velocity(system.metric, force, out[velocity_offset(1, n) :])
-    return scaled_largest(out, y, y, work.integer[ERROR_SIZE], real[RTOL], work.tolerance, h)
+    return scaled_largest(out, y, y, work.error_size, work.rtol, work.tolerance, h)
 
 
 @compiled_inside
-def change_stages(h: float, work: RadauWork, system: System) -> float:
+def change_stages(h: float, work: RadauState, system: System) -> float:
     """Add the changes in R and G to the stages; returns their norm.
 
     Multipliers do not count where rows are regularised: those that depend on others have a part of
     rounding over what regularises them, new in each iteration, that moves nothing.
     """
-    real, own, y = work.real, work.own, work.state[Y]
-    own[OF_STATES] = own[OF_MULTIPLIERS] = 0.0
+    y = work.state[Y]
+    work.state_change = work.multiplier_change = 0.0
     for i in range(3):
-        size = scaled_largest(
-            work.R[i], y, y, work.integer[ERROR_SIZE], real[RTOL], work.tolerance, h
-        )
+        size = scaled_largest(work.R[i], y, y, work.error_size, work.rtol, work.tolerance, h)
         other = size_of_multipliers(h, work.G[i], work, system)
-        if not size <= own[OF_STATES]:
-            own[OF_STATES] = size
-        if not other <= own[OF_MULTIPLIERS]:
-            own[OF_MULTIPLIERS] = other
+        if not size <= work.state_change:
+            work.state_change = size
+        if not other <= work.multiplier_change:
+            work.multiplier_change = other
         for k in range(y.shape[0]):
             work.Z[i, k] += work.R[i, k]
         for r in range(2):
             for k in range(work.G.shape[2]):
                 work.multipliers[i, r, k] += work.G[i, r, k]
-    if own[PART] != 0.0 or own[OF_MULTIPLIERS] <= own[OF_STATES]:
-        return own[OF_STATES]
-    return own[OF_MULTIPLIERS]
+    if work.regularisation != 0.0 or work.multiplier_change <= work.state_change:
+        return work.state_change
+    return work.multiplier_change
 
 
 @compiled
 def find_stages(
     t: float,
     h: float,
-    work: RadauWork,
+    work: RadauState,
     system: System,
     loops: Any,
     tangent: Tangent,
@@ -303,18 +282,17 @@ def find_stages(
         0 where they are found; else the factor on the step that is to be tried; NaN where a number
         is not finite.
     """
-    own, integer = work.own, work.integer
     limit = newton_limit(work)
-    own[FACCON] = max(own[FACCON], ROUNDING) ** 0.8
+    work.convergence_factor = max(work.convergence_factor, ROUNDING) ** 0.8
     before = ratio_before = states = multipliers = 1.0
-    fixed = work.real[STEP] != 0.0
+    fixed = work.fixed_step != 0.0
     most = MOST_FIXED if fixed else MOST
     for done in range(1, most + 1):
         evaluate_stages(t, h, work, system, loops, matrix)
         solve_stages(h, work, system, matrix)
         change = change_stages(h, work, system)
-        integer[ITERATIONS] += 1
-        integer[LAST_ITERATIONS] = done
+        work.iteration_count += 1
+        work.last_iterations = done
         if not change <= LARGEST:
             return math.nan
         if change == 0.0:  # rounding alone, which tells nothing of the rate of convergence
@@ -326,22 +304,23 @@ def find_stages(
             slow = not converges(theta, change, limit, most - 1 - done)
             if slow and is_stalled(states, multipliers, limit, work):
                 return 0.0
-            own[THETA] = theta
+            work.convergence_rate = theta
             patient = fixed or (slow and is_settling(multipliers, work))
             if theta >= SLOWEST:
                 if change <= limit:
                     return 0.0
                 if done > PATIENCE or not patient:
                     return UNFOUND
-                own[THETA] = SLOWEST
-            own[FACCON] = own[THETA] / (1.0 - own[THETA])
-            left = own[FACCON] * change * own[THETA] ** (most - 1 - done) / limit
+                work.convergence_rate = SLOWEST
+            theta = work.convergence_rate
+            work.convergence_factor = theta / (1.0 - theta)
+            left = work.convergence_factor * change * theta ** (most - 1 - done) / limit
             if done < most and left >= 1.0 and not patient:
                 excess = max(1e-4, min(20.0, left))
                 return 0.8 * excess ** (-1.0 / (3.0 + most - done))
         before = max(change, ROUNDING)
-        states, multipliers = own[OF_STATES], own[OF_MULTIPLIERS]
-        if own[FACCON] * change <= limit:
+        states, multipliers = work.state_change, work.multiplier_change
+        if work.convergence_factor * change <= limit:
             return 0.0
     return UNFOUND
 
@@ -350,7 +329,7 @@ def find_stages(
 def estimate_error(
     t: float,
     h: float,
-    work: RadauWork,
+    work: RadauState,
     system: System,
     loops: Any,
     tangent: Tangent,
@@ -362,8 +341,8 @@ def estimate_error(
     are those at the end of the last step: an error of theirs acts along D^T, which the matrix takes
     away only as far as its own D is that of the state.
     """
-    again = work.integer[ACCEPTED] == 0 or work.integer[LAST_REJECTED] != 0
-    real, y, argument, e = work.real, work.state[Y], work.state[SCRATCH], work.method.e
+    again = work.has_last_step == 0 or work.last_rejected != 0
+    y, argument, e = work.state[Y], work.state[SCRATCH], work.method.e
     multipliers, error = work.last_multipliers[2], 0.0
     zero(multipliers[0])
     for attempt in range(2 if again else 1):
@@ -372,15 +351,15 @@ def estimate_error(
         evaluate_stage(t, argument, multipliers, matrix.held, work.R[0], work.G[0], system,
                        loops)  # fmt: skip
         keep_frames(system.body, work.frames[0])
-        work.integer[RHS] += 1
+        work.rhs_count += 1
         for k in range(y.shape[0]):
             total = e[0] * work.Z[0, k] + e[1] * work.Z[1, k] + e[2] * work.Z[2, k]
             work.R[0, k] += total / h
         for r in range(2):
             zero(work.G[0, r])
         solve_first(h, work, system, matrix)
-        error = scaled_largest(work.R[0], y, work.state[TRIAL], work.integer[ERROR_SIZE],
-                               real[RTOL], work.tolerance, h)  # fmt: skip
+        error = scaled_largest(work.R[0], y, work.state[TRIAL], work.error_size,
+                               work.rtol, work.tolerance, h)  # fmt: skip
         if not error >= 1.0:
             return error
     return error

@@ -19,28 +19,12 @@ from dap3d_core.integrators.radau.convergence import newton_limit
 from dap3d_core.integrators.radau.dense_output import prepare_dense
 from dap3d_core.integrators.radau.newton import MOST, SAME_STEP, predict
 from dap3d_core.integrators.radau.state import (
-    ACCEPTED,
-    ERROR_ACCEPTED,
-    H_ACCEPTED,
-    H_FACTORED,
-    LAST_ITERATIONS,
-    OF_STATES,
     OLD,
     OLD_SLOPE,
     SLOPE,
-    TANGENT_HERE,
-    TANGENT_NEEDED,
-    THETA,
     TRIAL_SLOPE,
-    RadauWork,
+    RadauState,
 )
-from dap3d_core.integrators.runge_kutta.step import (
-    ACROSS_A_SWITCH,
-    ELSEWHERE,
-    RETREAT,
-    is_poor,
-)
-from dap3d_core.integrators.runge_kutta.tableau import Integers
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
     next_length,
@@ -48,39 +32,25 @@ from dap3d_core.integrators.stepping.event_location import (
     settle,
 )
 from dap3d_core.integrators.stepping.integration_state import (
-    DENSE,
-    FRESH,
-    GAP_STEP,
-    LAST_REJECTED,
-    LIMIT,
-    NEXT,
     NOT_FINITE,
-    OUTCOME,
-    POOR,
-    REJECTED,
-    RHS,
-    ROUNDED,
+    PROJECTED,
     RUNNING,
     SCRATCH,
-    STATUS,
-    STEP,
     STEP_FLOOR,
-    STEPS,
-    SWITCHES,
-    T_STOP,
     TRIAL,
-    WATCHED,
     Function,
-    H,
-    T,
     Y,
 )
 from dap3d_core.integrators.stepping.output import dense_state, may_step, project_state
 from dap3d_core.integrators.stepping.rounding import note_failure, watch_rounding
 from dap3d_core.integrators.stepping.step_control import (
+    ACROSS_A_SWITCH,
+    ELSEWHERE,
     LARGEST,
+    RETREAT,
     end_of_step,
     first_step,
+    is_poor,
     reject,
     step_floor,
 )
@@ -103,7 +73,7 @@ BEST_RATE, RATE_EXPONENT = 0.3, 1.0 / 6.0
 
 @compiled
 def advance(
-    work: RadauWork,
+    work: RadauState,
     functions: Sequence[Function],
     parts: Sequence[Any],
     system: System,
@@ -114,50 +84,46 @@ def advance(
 ) -> None:
     """Go on until more than ``budget`` stages are evaluated, the rows are full, or the run ends."""
     rhs, project, report = functions[0], functions[1], functions[2]
-    real, integer = work.real, work.integer
-    watch = functions[4] if integer[SWITCHES] != 0 else rhs
-    limit = integer[RHS] + budget
+    watch = functions[4] if work.switch_count != 0 else rhs
+    limit = work.rhs_count + budget
     while may_step(work, dense_state, limit, project, report, system, loops):
-        steps, rejected, h = integer[STEPS], integer[REJECTED], real[H]
-        if integer[FRESH] == 0:
+        steps, rejected, h = work.step_count, work.rejected_count, work.h
+        if work.first_stage_valid == 0:
             start(work, rhs, project, system, loops)
         else:
             step(work, parts, project, watch, system, loops, tangent, matrix)
-            if integer[ROUNDED] != 0:  # a step that rounding failed
+            if work.rounding_state != 0:  # a step that rounding failed
                 watch_rounding(work, work.state[SLOPE], h, rejected, rhs, system, loops)
-        if integer[WATCHED] != 0 and integer[STEPS] > steps:
-            functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
+        if work.calls_accepted != 0 and work.step_count > steps:
+            functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
 
 
 @compiled_inside
-def start(work: RadauWork, rhs: Function, project: Function, system: System, loops: Any) -> None:
+def start(work: RadauState, rhs: Function, project: Function, system: System, loops: Any) -> None:
     """Where a motion starts: on the constraints, with multipliers that belong to the state."""
-    real, integer, y = work.real, work.integer, work.state[Y]
-    failure = project_state(real, integer, real[T], y, project, system, loops)
+    y = work.state[Y]
+    failure = project_state(work, work.t, y, project, system, loops)
     if failure == RUNNING:
-        integer[RHS] += 1
-        rhs(real[T], y, work.k[0], system, loops)
+        work.rhs_count += 1
+        rhs(work.t, y, work.k[0], system, loops)
         if not all_finite(work.k[0]):
             failure = NOT_FINITE
     if failure != RUNNING:
-        real[T_STOP], integer[STATUS] = real[T], failure
+        work.t_stop, work.status = work.t, failure
         return
     for k in range(system.x.shape[0]):
         work.last_multipliers[2, 1, k] = -system.x[k]
     for k in range(y.shape[0]):
         work.state[SLOPE, k] = work.k[0, k]
-    integer[FRESH] = integer[TANGENT_NEEDED] = 1
-    integer[ACCEPTED] = 0
-    if real[STEP] == 0.0 and real[H] == 0.0:
-        real[H] = first_step(
-            real, integer, work.times, y, work.k, work.state[SCRATCH], work.tolerance, rhs, system,
-            loops,
-        )  # fmt: skip
+    work.first_stage_valid = work.tangent_needed = 1
+    work.has_last_step = 0
+    if work.fixed_step == 0.0 and work.h == 0.0:
+        work.h = first_step(work, work.k, rhs, system, loops)  # fmt: skip
 
 
 @compiled_inside
 def step(
-    work: RadauWork,
+    work: RadauState,
     parts: Sequence[Any],
     project: Function,
     watch: Function,
@@ -168,24 +134,24 @@ def step(
 ) -> None:
     """Try one step: accept it, reject it, or stop the run."""
     estimate_error, find_slope = parts[3], parts[4]
-    real, integer, times, state = work.real, work.integer, work.times, work.state
-    adaptive, t = real[STEP] == 0.0, real[T]
-    end = t1 = end_of_step(real, integer, times)
+    state = work.state
+    adaptive, t = work.fixed_step == 0.0, work.t
+    end = t1 = end_of_step(work)
     longest = h = t1 - t
-    if integer[SWITCHES] != 0 or real[LIMIT] < t1:
+    if work.switch_count != 0 or work.t_limit < t1:
         h = next_length(work, t1, state[SLOPE], project, watch, system, loops)
         if h == 0.0:
             return
         t1 = t1 if h == longest else t + h
     predict(h, work)
     shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
-    if shorter > 0.0 and work.own[THETA] < HOPELESS:  # once more, with the tangent at the end
-        integer[TANGENT_NEEDED] = 1
+    if shorter > 0.0 and work.convergence_rate < HOPELESS:  # once more, with the tangent at the end
+        work.tangent_needed = 1
         shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
     if shorter != 0.0:
         refuse(work, t1, h, shorter)
         return
-    if integer[SWITCHES] != 0 and stage_is_across(work, t, h, watch, system, loops):
+    if work.switch_count != 0 and stage_is_across(work, t, h, watch, system, loops):
         return
     for k in range(state.shape[1]):
         state[TRIAL, k] = state[Y, k] + work.Z[2, k]
@@ -197,29 +163,29 @@ def step(
             failure = finish(work, t1, h, watch, system, loops)
         if failure == ACROSS_A_SWITCH:
             return
-        if failure == RUNNING and adaptive and is_poor(real, integer, times, t1):
-            integer[POOR] += 1
-            reject(real, integer, times, t1, h * ELSEWHERE, STEP_FLOOR)
+        if failure == RUNNING and adaptive and is_poor(work, t1):
+            work.near_singular_landings += 1
+            reject(work, t1, h * ELSEWHERE, STEP_FLOOR)
         elif failure == RUNNING:
-            integer[POOR] = 0
+            work.near_singular_landings = 0
             accept(work, t1, h, error)
             settle(work, h, longest, end)
         else:
-            reject(real, integer, times, t1, h * RETREAT, failure)
+            reject(work, t1, h * RETREAT, failure)
     elif error <= LARGEST:
-        note_failure(real, integer, error, h, integer[LAST_REJECTED] != 0)
-        factor = max(SHRINKAGE, safety(integer) / error**0.25)
-        reject(real, integer, times, t1, h * factor, STEP_FLOOR)
-        if integer[ACCEPTED] == 0:
-            real[H] = min(real[H], 0.1 * h)
-        integer[TANGENT_NEEDED] = max(integer[TANGENT_NEEDED], 1 - integer[TANGENT_HERE])
+        note_failure(work, error, h, work.last_rejected != 0)
+        factor = max(SHRINKAGE, safety(work) / error**0.25)
+        reject(work, t1, h * factor, STEP_FLOOR)
+        if work.has_last_step == 0:
+            work.h = min(work.h, 0.1 * h)
+        work.tangent_needed = max(work.tangent_needed, 1 - work.tangent_is_current)
     else:
-        reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)
+        reject(work, t1, h * RETREAT, NOT_FINITE)
 
 
 @compiled_inside
 def stage_is_across(
-    work: RadauWork, t: float, h: float, watch: Function, system: System, loops: Any
+    work: RadauState, t: float, h: float, watch: Function, system: System, loops: Any
 ) -> bool:
     """Whether an inner stage lies beyond a switch; then the step is cut."""
     x = work.state[SCRATCH]
@@ -235,7 +201,7 @@ def stage_is_across(
 def iterate(
     t: float,
     h: float,
-    work: RadauWork,
+    work: RadauState,
     parts: Sequence[Any],
     system: System,
     loops: Any,
@@ -245,9 +211,9 @@ def iterate(
     """Find the stages from where they stand, with a new tangent if asked for; as find_stages."""
     find_tangent, factorise_both, find_stages = parts[0], parts[1], parts[2]
     wrong = 0.0
-    if work.integer[TANGENT_NEEDED] != 0:
+    if work.tangent_needed != 0:
         wrong = find_tangent(t, h, work, system, loops, tangent, matrix)
-    if wrong == 0.0 and not abs(h - work.own[H_FACTORED]) <= SAME_STEP * h:
+    if wrong == 0.0 and not abs(h - work.factored_step) <= SAME_STEP * h:
         wrong = factorise_both(t, h, work, system, loops, tangent, matrix)
     if wrong == 0.0:
         wrong = find_stages(t, h, work, system, loops, tangent, matrix)
@@ -255,59 +221,58 @@ def iterate(
 
 
 @compiled_inside
-def refuse(work: RadauWork, t1: float, h: float, shorter: float) -> None:
+def refuse(work: RadauState, t1: float, h: float, shorter: float) -> None:
     """Shorten a step whose stages were not found; a fixed one is tried with a new tangent first."""
-    real, integer = work.real, work.integer
-    stale = integer[TANGENT_HERE] == 0
-    integer[TANGENT_NEEDED] = 1
+    stale = work.tangent_is_current == 0
+    work.tangent_needed = 1
     if not shorter > 0.0:  # NaN
-        reject(real, integer, work.times, t1, h * RETREAT, NOT_FINITE)
-    elif real[STEP] == 0.0 or not stale:
-        if work.own[OF_STATES] > newton_limit(work):
-            note_failure(real, integer, work.own[OF_STATES], h, integer[LAST_REJECTED] != 0)
-        reject(real, integer, work.times, t1, h * shorter, STEP_FLOOR)
+        reject(work, t1, h * RETREAT, NOT_FINITE)
+    elif work.fixed_step == 0.0 or not stale:
+        if work.state_change > newton_limit(work):
+            note_failure(work, work.state_change, h, work.last_rejected != 0)
+        reject(work, t1, h * shorter, STEP_FLOOR)
 
 
 @compiled_inside
-def safety(integer: Integers) -> float:
+def safety(work: RadauState) -> float:
     """Safety factor of the next step: smaller where the iteration took long (HW IV.8)."""
     most = 2.0 * MOST
-    return min(SAFETY, SAFETY * (1.0 + most) / (integer[LAST_ITERATIONS] + most))
+    return min(SAFETY, SAFETY * (1.0 + most) / (work.last_iterations + most))
 
 
 @compiled_inside
 def land(
-    work: RadauWork, t1: float, h: float, project: Function, system: System, loops: Any
+    work: RadauState, t1: float, h: float, project: Function, system: System, loops: Any
 ) -> int:
     """The work done, and the trial state projected; why that failed, or RUNNING."""
-    real, integer, n = work.real, work.integer, work.state.shape[1]
+    n = work.state.shape[1]
     A = work.method.A
     for i in range(3):  # the work is a quadrature
         work.Z[i, n - 1] = h * (A[i, 0] * work.F[0, n - 1] + A[i, 1] * work.F[1, n - 1]
                                 + A[i, 2] * work.F[2, n - 1])  # fmt: skip
     work.state[TRIAL, n - 1] = work.state[Y, n - 1] + work.Z[2, n - 1]
-    return project_state(real, integer, t1, work.state[TRIAL], project, system, loops)
+    return project_state(work, t1, work.state[TRIAL], project, system, loops)
 
 
 @compiled_inside
 def finish(
-    work: RadauWork, t1: float, h: float, watch: Function, system: System, loops: Any
+    work: RadauState, t1: float, h: float, watch: Function, system: System, loops: Any
 ) -> int:
     """Prepare dense output where a reporting time lies in the step; RUNNING, or why not."""
-    integer, slope = work.integer, work.state[TRIAL_SLOPE]
+    slope = work.state[TRIAL_SLOPE]
     if not all_finite(slope):
         return NOT_FINITE
-    if integer[SWITCHES] != 0 and end_is_across(work, t1, slope, watch, system, loops):
+    if work.switch_count != 0 and end_is_across(work, t1, slope, watch, system, loops):
         return ACROSS_A_SWITCH
-    if integer[DENSE] != 0 and work.times[integer[NEXT]] < t1:
+    if work.has_dense_output != 0 and work.times[work.next_report] < t1:
         prepare_dense(h, work)
     return RUNNING
 
 
 @compiled_inside
-def accept(work: RadauWork, t1: float, h: float, error: float) -> None:
+def accept(work: RadauState, t1: float, h: float, error: float) -> None:
     """Make the trial state the state; choose the next step (Gustafsson's control, HW IV.8)."""
-    real, own, integer, state = work.real, work.own, work.integer, work.state
+    state = work.state
     for k in range(state.shape[1]):
         state[OLD, k], state[Y, k] = state[Y, k], state[TRIAL, k]
         state[OLD_SLOPE, k], state[SLOPE, k] = state[SLOPE, k], state[TRIAL_SLOPE, k]
@@ -317,34 +282,33 @@ def accept(work: RadauWork, t1: float, h: float, error: float) -> None:
         for r in range(2):
             for k in range(work.multipliers.shape[2]):
                 work.last_multipliers[i, r, k] = work.multipliers[i, r, k]
-    integer[STEPS] += 1
-    integer[TANGENT_HERE] = 0
-    good = own[THETA] <= GOOD_TANGENT
-    if real[STEP] != 0.0:
-        integer[GAP_STEP] += 1
+    work.step_count += 1
+    work.tangent_is_current = 0
+    good = work.convergence_rate <= GOOD_TANGENT
+    if work.fixed_step != 0.0:
+        work.segment_step += 1
     else:
         choose_next(work, h, error, good)
     if not good:
-        integer[TANGENT_NEEDED] = 1
-    real[T], own[H_ACCEPTED] = t1, h
-    integer[ACCEPTED], integer[LAST_REJECTED] = 1, 0
+        work.tangent_needed = 1
+    work.t, work.accepted_step = t1, h
+    work.has_last_step, work.last_rejected = 1, 0
 
 
 @compiled_inside
-def choose_next(work: RadauWork, h: float, error: float, good: bool) -> None:
+def choose_next(work: RadauState, h: float, error: float, good: bool) -> None:
     """The next step, after an accepted one."""
-    real, own, integer = work.real, work.own, work.integer
-    divisor = error**0.25 / safety(integer)
-    if integer[ACCEPTED] != 0:
-        trend = (error * error / own[ERROR_ACCEPTED]) ** 0.25
-        divisor = max(divisor, own[H_ACCEPTED] / h * trend / SAFETY)
-    if integer[LAST_ITERATIONS] > 1:
-        divisor = max(divisor, (own[THETA] / BEST_RATE) ** RATE_EXPONENT)
+    divisor = error**0.25 / safety(work)
+    if work.has_last_step != 0:
+        trend = (error * error / work.accepted_error) ** 0.25
+        divisor = max(divisor, work.accepted_step / h * trend / SAFETY)
+    if work.last_iterations > 1:
+        divisor = max(divisor, (work.convergence_rate / BEST_RATE) ** RATE_EXPONENT)
     factor = 1.0 / min(1.0 / SHRINKAGE, max(1.0 / GROWTH, divisor))
-    if integer[LAST_REJECTED] != 0:
+    if work.last_rejected != 0:
         factor = min(factor, 1.0)
-    own[ERROR_ACCEPTED] = max(error, 0.01)
+    work.accepted_error = max(error, 0.01)
     if not (good and 1.0 <= factor <= SAME_FACTORS):
-        real[H] = max(h * factor, step_floor(real, work.times))
+        work.h = max(h * factor, step_floor(work))
     else:
-        real[H] = h
+        work.h = h

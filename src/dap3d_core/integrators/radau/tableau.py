@@ -10,8 +10,7 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from dap3d_core.integrators.runge_kutta.tableau import Floats
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
+from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays, Floats
 
 STAGES = 3
 #: Order of the method, and of its error estimate plus one.

@@ -10,7 +10,7 @@ Prince, Dormand, J. Comp. Appl. Math. 7 (1981) 67. Coefficients not written are 
 
 from collections.abc import Mapping
 
-from dap3d_core.integrators.runge_kutta.tableau import Method, lower_triangle
+from dap3d_core.integrators.runge_kutta.tableau import Tableau, lower_triangle
 
 _STAGES, _ALL = 12, 16
 
@@ -233,7 +233,7 @@ _D = (
 
 _E3 = {stage: b - _B3.get(stage, 0.0) for stage, b in _A[_STAGES - 1].items()}
 
-DOP853 = Method(
+DOP853 = Tableau(
     name="dop853",
     order=8,
     stages=_STAGES,

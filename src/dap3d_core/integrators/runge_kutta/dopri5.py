@@ -8,9 +8,9 @@ Ordinary Differential Equations I, table II.5.2, dense output of II.6 with the c
 code DOPRI5, controller of II.4 with the stabilisation of volume II, IV.2 (beta = 0.04).
 """
 
-from dap3d_core.integrators.runge_kutta.tableau import Method, lower_triangle
+from dap3d_core.integrators.runge_kutta.tableau import Tableau, lower_triangle
 
-DOPRI5 = Method(
+DOPRI5 = Tableau(
     name="dopri5",
     order=5,
     stages=6,

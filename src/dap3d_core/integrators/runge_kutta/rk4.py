@@ -7,9 +7,9 @@ Sources: Kutta, Zeitschrift fuer Mathematik und Physik 46 (1901) 435; Hairer, No
 Solving Ordinary Differential Equations I, table II.1.2.
 """
 
-from dap3d_core.integrators.runge_kutta.tableau import Method, lower_triangle
+from dap3d_core.integrators.runge_kutta.tableau import Tableau, lower_triangle
 
-RK4 = Method(
+RK4 = Tableau(
     name="rk4",
     order=4,
     stages=4,

@@ -12,9 +12,9 @@ It knows a vector y and first-class functions ``f(t, y, out, system, loops)``:
     accepted (only where something is watched) takes note of an accepted state
     watch    (only where there are switches) gives their values (stepping/event_location.py)
 
-Everything that decides what comes next lies in the arrays of ``Work``: however a run is cut into
-calls of ``advance``, its numbers are the same bit for bit. Source: Hairer, Norsett, Wanner, Solving
-Ordinary Differential Equations I (HNW), II.4 to II.6.
+Everything that decides what comes next is in the arrays of ``RungeKuttaState``: however a run is
+cut into calls of ``advance``, its numbers are the same bit for bit. Source: Hairer, Norsett,
+Wanner, Solving Ordinary Differential Equations I (HNW), II.4 to II.6.
 """
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
@@ -23,7 +23,9 @@ Ordinary Differential Equations I (HNW), II.4 to II.6.
 from collections.abc import Sequence
 from typing import Any
 
-from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA, Floats, Integers
+from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
+from dap3d_core.integrators.runge_kutta.stiffness import watch_stiffness
+from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
     next_length,
@@ -31,46 +33,18 @@ from dap3d_core.integrators.stepping.event_location import (
     settle,
 )
 from dap3d_core.integrators.stepping.integration_state import (
-    ACROSS,
-    CALM,
-    DENSE,
-    ERROR_SIZE,
-    ERROR_USES_RESULT,
-    ERRORS,
-    FRESH,
-    H_DENSE,
-    LAST_REJECTED,
-    LENGTHS,
-    LIMIT,
-    NEXT,
+    MEASURES,
     NOT_FINITE,
     OTHER,
-    OUTCOME,
-    POOR,
-    PROJECT_ON,
-    REJECTED,
-    RHS,
-    RTOL,
+    PROJECTED,
     RUNNING,
     SCRATCH,
-    STAGES,
-    STATUS,
-    STEP,
     STEP_FLOOR,
-    STEPS,
-    SWITCHES,
-    T_DENSE,
-    T_STOP,
     TRIAL,
-    WATCHED,
     Function,
-    H,
-    T,
-    Work,
     Y,
 )
 from dap3d_core.integrators.stepping.output import (
-    POOR_PLACE,
     dense_state,
     may_step,
     project_state,
@@ -84,27 +58,24 @@ from dap3d_core.integrators.stepping.singular_poses import (
     singular_ahead,
 )
 from dap3d_core.integrators.stepping.step_control import (
+    ACROSS_A_SWITCH,
+    ELSEWHERE,
     LARGEST,
+    RETREAT,
     accept,
     beyond_rounding,
     end_of_step,
     error_norm,
     first_step,
+    is_poor,
     joined,
     reject,
     shrinkage,
     step_floor,
 )
-from dap3d_core.integrators.stepping.stiffness import watch_stiffness
 from dap3d_core.integrators.stepping.vector_ops import all_finite, combine, copy, scaled_largest
+from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
-
-#: Factor on a step that met a number that is not finite, or whose end could not be projected.
-RETREAT = 0.1
-#: What ``land`` says, besides a status: the step was cut.
-ACROSS_A_SWITCH = -1
-#: Factor on a step that should end elsewhere, and how often in a row that is tried.
-ELSEWHERE, ATTEMPTS = 0.6, 4
 
 #: Near a singular state nothing is known better than to this part of the largest component.
 BLURRED = 1e-11
@@ -117,102 +88,108 @@ ROUNDED = 100.0
 
 @compiled
 def advance(
-    work: Work, functions: Sequence[Function], system: Any, loops: Any, budget: int
+    work: RungeKuttaState, functions: Sequence[Function], system: Any, loops: Any, budget: int
 ) -> None:
     """Go on until more than ``budget`` calls of rhs are spent, the rows are full, or the run ends.
 
     At least one step is tried in each call, whatever the budget.
     """
     rhs, project, report = functions[0], functions[1], functions[2]
-    real, integer = work.real, work.integer
-    watch = functions[4] if integer[SWITCHES] != 0 else rhs
-    limit = integer[RHS] + budget
+    watch = functions[4] if work.switch_count != 0 else rhs
+    limit = work.rhs_count + budget
     while may_step(work, dense_state, limit, project, report, system, loops):
-        steps, rejected = integer[STEPS], integer[REJECTED]
-        h = real[H]
+        steps, rejected = work.step_count, work.rejected_count
+        h = work.h
         step(work, rhs, project, watch, system, loops)
         watch_rounding(work, work.k[0], h, rejected, rhs, system, loops)
-        if integer[WATCHED] != 0 and integer[STEPS] > steps:
-            functions[3](real[T], work.state[Y], real[OUTCOME:], system, loops)
+        if work.calls_accepted != 0 and work.step_count > steps:
+            functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
 
 
 @compiled_inside
 def step(
-    work: Work, rhs: Function, project: Function, watch: Function, system: Any, loops: Any
+    work: RungeKuttaState,
+    rhs: Function,
+    project: Function,
+    watch: Function,
+    system: Any,
+    loops: Any,
 ) -> None:
     """Try one step: accept it, reject it, or stop the run."""
-    real, integer, times, k, y = work.real, work.integer, work.times, work.k, work.state[Y]
-    if integer[FRESH] == 0:
-        integer[RHS] += 1
-        rhs(real[T], y, k[0], system, loops)
-        integer[FRESH] = 1
-        if not all_finite(k[0]):
-            real[T_STOP], integer[STATUS] = real[T], NOT_FINITE
-            return
-    adaptive = real[STEP] == 0.0
-    if adaptive and real[H] == 0.0:
-        real[H] = first_step(real, integer, times, y, k, work.state[SCRATCH], work.tolerance, rhs,
-                             system, loops)  # fmt: skip
-    end = t1 = end_of_step(real, integer, times)
-    longest = t1 - real[T]
-    h = aim(work.lengths, real[CALM], longest) if adaptive else longest
-    if integer[SWITCHES] != 0 or real[LIMIT] < t1:
-        h = min(h, next_length(work, t1, k[0], project, watch, system, loops))
+    if work.first_stage_valid == 0 and not find_first_stage(work, rhs, system, loops):
+        return
+    adaptive = work.fixed_step == 0.0
+    if adaptive and work.h == 0.0:
+        work.h = first_step(work, work.k, rhs, system, loops)
+    end = t1 = end_of_step(work)
+    longest = t1 - work.t
+    h = aim(work.lengths, work.widest_gap_abscissa, longest) if adaptive else longest
+    if work.switch_count != 0 or work.t_limit < t1:
+        h = min(h, next_length(work, t1, work.k[0], project, watch, system, loops))
         if h == 0.0:
             return
     if h < longest:
-        t1 = real[T] + h
-    near = integer[PROJECT_ON] != 0 and is_near(work.lengths, longest)
+        t1 = work.t + h
+    near = work.projects != 0 and is_near(work.lengths, longest)
     if not take_stages(work, t1, h, near, rhs, project, watch, system, loops):
         return
     error = 0.0
     if adaptive and near:
         error = kept_error(work, t1, h, project, system, loops)
     elif adaptive:
-        error = error_norm(real, integer, work.state, k, work.table, work.tolerance, h)
+        error = error_norm(work, h)
     if 1.0 < error <= LARGEST:
         error = judged(work, near, h, error)
     if error <= 1.0:
         failure = land(work, t1, near, rhs, project, watch, system, loops)
         if failure == ACROSS_A_SWITCH:
             return
-        if failure == RUNNING and adaptive and not near and is_poor(real, integer, times, t1):
-            integer[POOR] += 1
-            look_ahead(work.lengths, real[LENGTHS:], h)
-            shorter = h if aim(work.lengths, real[CALM], h) < h else h * ELSEWHERE
-            reject(real, integer, times, t1, shorter, STEP_FLOOR)
+        if failure == RUNNING and adaptive and not near and is_poor(work, t1):
+            work.near_singular_landings += 1
+            look_ahead(work.lengths, work.real[MEASURES:], h)
+            shorter = h if aim(work.lengths, work.widest_gap_abscissa, h) < h else h * ELSEWHERE
+            reject(work, t1, shorter, STEP_FLOOR)
         elif failure == RUNNING:
-            integer[POOR] = 0
+            work.near_singular_landings = 0
             if singular_ahead(work.lengths, h) < h:
-                real[ACROSS] = 0.0
-            look_back(work.lengths, real[LENGTHS:], h)
-            accept(real, integer, times, work.state, k, t1, error)
+                work.error_across_singularity = 0.0
+            look_back(work.lengths, work.real[MEASURES:], h)
+            accept(work, t1, error)
             settle(work, h, longest, end)
         else:
-            reject(real, integer, times, t1, h * RETREAT, failure)
+            reject(work, t1, h * RETREAT, failure)
     elif error <= LARGEST:
-        note_failure(real, integer, error, h, integer[LAST_REJECTED] != 0)
-        reject(real, integer, times, t1, h * shrinkage(real, error), STEP_FLOOR)
+        note_failure(work, error, h, work.last_rejected != 0)
+        reject(work, t1, h * shrinkage(work, error), STEP_FLOOR)
     else:
-        reject(real, integer, times, t1, h * RETREAT, NOT_FINITE)
+        reject(work, t1, h * RETREAT, NOT_FINITE)
 
 
 @compiled_inside
-def judged(work: Work, near: bool, h: float, error: float) -> float:
+def find_first_stage(work: RungeKuttaState, rhs: Function, system: Any, loops: Any) -> bool:
+    """Evaluate f at the state; False where it is not finite, which ends the run."""
+    work.rhs_count += 1
+    rhs(work.t, work.state[Y], work.k[0], system, loops)
+    work.first_stage_valid = 1
+    if all_finite(work.k[0]):
+        return True
+    work.t_stop, work.status = work.t, NOT_FINITE
+    return False
+
+
+@compiled_inside
+def judged(work: RungeKuttaState, near: bool, h: float, error: float) -> float:
     """The error of a step that is too large, but for what a shorter step could not do better."""
-    real, integer = work.real, work.integer
     if near:
-        return 1.0 if is_rounding(real, work.lengths, h, error) else error
-    if h * shrinkage(real, error) < step_floor(real, work.times):
-        return min(
-            error, beyond_rounding(real, integer, work.state, work.k, work.table, work.tolerance, h)
-        )
+        return 1.0 if is_rounding(work, h, error) else error
+    if h * shrinkage(work, error) < step_floor(work):
+        return min(error, beyond_rounding(work, h))
     return error
 
 
 @compiled_inside
 def take_stages(
-    work: Work,
+    work: RungeKuttaState,
     t1: float,
     h: float,
     near: bool,
@@ -226,96 +203,85 @@ def take_stages(
 
     False where one of them lies beyond a switch.
     """
-    real, integer, k, table = work.real, work.integer, work.k, work.table
-    stages, watched = integer[STAGES], integer[SWITCHES] != 0
-    last = stages if integer[ERROR_USES_RESULT] != 0 else stages - 1
+    k, table = work.k, work.table
+    stages, watched = work.stage_count, work.switch_count != 0
+    last = stages if work.error_uses_last_stage != 0 else stages - 1
     for i in range(1, stages + 1):
         x = work.state[TRIAL] if i == stages else work.state[SCRATCH]
         combine(x, 1.0, work.state[Y], h, table, i, k)
         if i <= last:
             c = table[i, ABSCISSA]
-            t = t1 if c == 1.0 else real[T] + c * h
+            t = t1 if c == 1.0 else work.t + c * h
             if near:
                 on_constraints(work, t, x, project, system, loops)
                 x = work.state[SCRATCH]
             if watched and sample(work, t, x, watch, system, loops):
                 return False
-            integer[RHS] += 1
+            work.rhs_count += 1
             rhs(t, x, k[i], system, loops)
     return True
 
 
 @compiled_inside
 def on_constraints(
-    work: Work, t: float, x: Floats, project: Function, system: Any, loops: Any
+    work: RungeKuttaState, t: float, x: Floats, project: Function, system: Any, loops: Any
 ) -> None:
     """The state x of a stage, projected, into the scratch row (x may be that row)."""
     argument = work.state[SCRATCH]
     copy(argument, x)
-    project_state(work.real, work.integer, t, argument, project, system, loops)
+    project_state(work, t, argument, project, system, loops)
 
 
 @compiled_inside
 def kept_error(
-    work: Work, t1: float, h: float, project: Function, system: Any, loops: Any
+    work: RungeKuttaState, t1: float, h: float, project: Function, system: Any, loops: Any
 ) -> float:
     """The error of a step as ``error_norm`` has it, but of the projected result.
 
     Near a singular state errors are large in a direction that projection takes away, up to rounding
     over the square of the distance: below BLURRED nothing is asked for.
     """
-    real, integer, table, k = work.real, work.integer, work.table, work.k
+    table, k = work.table, work.k
     y, trial, result, other = (work.state[Y], work.state[TRIAL], work.state[SCRATCH],
                                work.state[OTHER])  # fmt: skip
     on_constraints(work, t1, trial, project, system, loops)
     jump = 0.0
-    for i in range(integer[ERROR_SIZE]):
+    for i in range(work.error_size):
         ratio = abs(result[i] - trial[i]) / (JUMP * (1.0 + max(abs(y[i]), abs(result[i]))))
         if not ratio <= jump:
             jump = ratio
     if not jump <= 1.0:
         return jump
     least, main = 0.0, 0.0
-    for i in range(integer[ERROR_SIZE]):
+    for i in range(work.error_size):
         least = max(least, BLURRED * abs(y[i]))
-    for e in range(integer[ERRORS]):
+    for e in range(work.estimate_count):
         combine(other, 1.0, trial, -h, table, k.shape[0] + e, k)
-        project_state(real, integer, t1, other, project, system, loops)
+        project_state(work, t1, other, project, system, loops)
         for i in range(other.size):
             other[i] -= result[i]
         size = scaled_largest(
-            other, y, result, integer[ERROR_SIZE], real[RTOL], work.tolerance, h, least
+            other, y, result, work.error_size, work.rtol, work.tolerance, h, least
         )
         main = size if e == 0 else joined(main, size)
     return main
 
 
 @compiled_inside
-def is_rounding(real: Floats, lengths: Floats, h: float, error: float) -> bool:
+def is_rounding(work: RungeKuttaState, h: float, error: float) -> bool:
     """Whether the error of a step across a singular state is rounding: a shorter one had no less.
 
     It is mostly in the direction that projection takes away from there on.
     """
-    if not (singular_ahead(lengths, h) < h and error < ROUNDED):
+    if not (singular_ahead(work.lengths, h) < h and error < ROUNDED):
         return False
-    before, real[ACROSS] = real[ACROSS], error
+    before, work.error_across_singularity = work.error_across_singularity, error
     return before > 0.0 and error > 0.25 * before
 
 
 @compiled_inside
-def is_poor(real: Floats, integer: Integers, times: Floats, t1: float) -> bool:
-    """Whether a step should end elsewhere: project found the state close to a singular one.
-
-    From there every next step would be inaccurate, while from some way before it one can step
-    across. A run that stays close to a singular state is not held up: after a few attempts the
-    landing is taken.
-    """
-    return real[OUTCOME + 1] == POOR_PLACE and integer[POOR] < ATTEMPTS and t1 < times[-1]
-
-
-@compiled_inside
 def land(
-    work: Work,
+    work: RungeKuttaState,
     t1: float,
     near: bool,
     rhs: Function,
@@ -330,14 +296,14 @@ def land(
     f is evaluated before the projection, which then has less to do. Where that moves the state by
     no more than the step's error may be, the next step starts with the value all the same.
     """
-    real, integer, times, k = work.real, work.integer, work.times, work.k
-    y, trial, result = work.state[Y], work.state[TRIAL], integer[STAGES]
-    known, watched = integer[ERROR_USES_RESULT] != 0, integer[SWITCHES] != 0
-    here, controlled = known and not near, real[STEP] == 0.0 and not near
-    if integer[DENSE] != 0 and times[integer[NEXT]] < t1:
-        t, argument, table = real[T], work.state[SCRATCH], work.table
+    times, k = work.times, work.k
+    y, trial, result = work.state[Y], work.state[TRIAL], work.stage_count
+    known, watched = work.error_uses_last_stage != 0, work.switch_count != 0
+    here, controlled = known and not near, work.fixed_step == 0.0 and not near
+    if work.has_dense_output != 0 and times[work.next_report] < t1:
+        t, argument, table = work.t, work.state[SCRATCH], work.table
         if not known:
-            integer[RHS] += 1
+            work.rhs_count += 1
             rhs(t1, trial, k[result], system, loops)
             known = True
         for i in range(result + 1, k.shape[0]):
@@ -348,62 +314,55 @@ def land(
             if watched and sample(work, at, argument, watch, system, loops):
                 return ACROSS_A_SWITCH
             rhs(at, argument, k[i], system, loops)
-        integer[RHS] += k.shape[0] - 1 - result
+        work.rhs_count += k.shape[0] - 1 - result
         here = here and k.shape[0] == result + 1
-        prepare_dense(real, integer, work.state, k, work.terms, table, t1)
+        prepare_dense(work, t1)
     if controlled and not known and t1 < times[-1]:
-        integer[RHS] += 1
+        work.rhs_count += 1
         rhs(t1, trial, k[result], system, loops)
         known = here = True
     if controlled and known:
-        watch_stiffness(work, t1 - real[T])
+        watch_stiffness(work, t1 - work.t)
     copy(work.state[OTHER], trial)
-    failure = project_state(real, integer, t1, trial, project, system, loops, here)
+    failure = project_state(work, t1, trial, project, system, loops, here)
     if failure != RUNNING:
         return failure
-    if known and real[OUTCOME] != 0.0:
+    if known and work.projection_moved != 0.0:
         known = controlled and is_within_error(work)
     if not known and (watched or t1 < times[-1]):
-        integer[RHS] += 1
+        work.rhs_count += 1
         rhs(t1, trial, k[result], system, loops)
         known = True
     if known and not all_finite(k[result]):
         return NOT_FINITE
     if watched and end_is_across(work, t1, k[result], watch, system, loops):
         return ACROSS_A_SWITCH
-    integer[FRESH] = 1 if known else 0
+    work.first_stage_valid = 1 if known else 0
     return RUNNING
 
 
 @compiled_inside
-def is_within_error(work: Work) -> bool:
+def is_within_error(work: RungeKuttaState) -> bool:
     """Whether the trial state is as near to the other one as the error of a step may be."""
-    real, y, trial, other = work.real, work.state[Y], work.state[TRIAL], work.state[OTHER]
+    y, trial, other = work.state[Y], work.state[TRIAL], work.state[OTHER]
     for i in range(other.size):
         other[i] -= trial[i]
-    size = work.integer[ERROR_SIZE]
-    return scaled_largest(other, y, trial, size, real[RTOL], work.tolerance, 0.0) <= 1.0
+    size = work.error_size
+    return scaled_largest(other, y, trial, size, work.rtol, work.tolerance, 0.0) <= 1.0
 
 
 @compiled_inside
-def prepare_dense(
-    real: Floats,
-    integer: Integers,
-    state: Floats,
-    k: Floats,
-    terms: Floats,
-    table: Floats,
-    t1: float,
-) -> None:
+def prepare_dense(work: RungeKuttaState, t1: float) -> None:
     """Terms of the dense output from t to t1, HNW II.6, from all stages."""
-    h, result = t1 - real[T], integer[STAGES]
+    state, k, terms = work.state, work.k, work.terms
+    h, result = t1 - work.t, work.stage_count
     for i in range(state.shape[1]):
         rise = state[TRIAL, i] - state[Y, i]
         terms[0, i] = state[Y, i]
         terms[1, i] = rise
         terms[2, i] = h * k[0, i] - rise
         terms[3, i] = rise - h * k[result, i] - terms[2, i]
-    first = k.shape[0] + integer[ERRORS]
+    first = k.shape[0] + work.estimate_count
     for row in range(4, terms.shape[0]):
-        combine(terms[row], 0.0, state[Y], h, table, first + row - 4, k)
-    real[T_DENSE], real[H_DENSE] = real[T], h
+        combine(terms[row], 0.0, state[Y], h, work.table, first + row - 4, k)
+    work.t_dense, work.h_dense = work.t, h

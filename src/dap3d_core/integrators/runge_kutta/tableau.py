@@ -5,13 +5,10 @@ from functools import cache
 
 import numpy as np
 from attrs import field, frozen
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-
-#: Terms of a linear combination of stages that are added in one pass over the components.
-GROUP = 4
+from dap3d_core.integrators.stepping.vector_ops import GROUP, GROUPS, TERMS
+from dap3d_core.kernels.runtime.array_struct import Floats
 
 
 def _read_only(rows: ArrayLike) -> Floats:
@@ -29,7 +26,7 @@ def lower_triangle(*rows: Sequence[float]) -> Floats:
 
 
 @frozen(eq=False)
-class Method:
+class Tableau:
     """An explicit Runge-Kutta method as data; one algorithm (step.py) serves them all.
 
     With s stages, row s of the tableau holds the weights b of the result and ``k[s]`` is f at the
@@ -71,30 +68,29 @@ class Method:
         return len(self.d) > 0
 
     @property
-    def calm(self) -> float:
+    def widest_gap_abscissa(self) -> float:
         """The middle of the widest gap between the abscissae of the stages: nothing is sampled."""
         c = np.unique(self.c[: self.stages])
         widest = int(np.argmax(np.diff(c)))
         return float(0.5 * (c[widest] + c[widest + 1]))
 
     @property
-    def late_stage(self) -> int:
+    def stiffness_stage(self) -> int:
         """The last stage before the result that stands at the end of the step; 0: none."""
         return max(i for i in range(self.stages) if i == 0 or self.c[i] == 1.0)
 
     @property
-    def error_uses_result(self) -> bool:
+    def error_uses_last_stage(self) -> bool:
         """Whether the error estimate needs f at the result of the step."""
         return self.adaptive and bool(np.any(self.e[:, self.stages] != 0.0))
 
 
-#: Columns of a row of ``combinations``: abscissa of the stage, number of groups, then for each
-#: group its weights and the stages they belong to.
-ABSCISSA, GROUPS, TERMS = 0, 1, 2
+#: First column of a row of ``combinations``, before those of vector_ops.py: abscissa of the stage.
+ABSCISSA = 0
 
 
 @cache
-def combinations(method: Method) -> Floats:
+def combinations(method: Tableau) -> Floats:
     """The method's coefficients as the compiled core reads them: without the zeros, in one table.
 
     One row for each row of a, then of e, then of d. A row's terms are filled up to whole groups of

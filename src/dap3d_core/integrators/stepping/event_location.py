@@ -23,46 +23,24 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import ENDS, UNSEEN
-from dap3d_core.integrators.runge_kutta.tableau import Floats
 from dap3d_core.integrators.stepping.integration_state import (
     BAND,
     BEND,
     CHATTERED,
     COUNT,
-    CULPRIT,
-    CUT,
-    CUTS,
     DOES,
-    ENDING,
-    ERROR_OLD,
     FOUND,
     FOUND_RATE,
-    FRESH,
-    GAP_STEP,
-    LAST_REJECTED,
-    LIMIT,
-    LOOKED,
-    NEXT,
     RATE,
-    REJECTED,
     RUNNING,
     SAMPLE,
-    SAMPLED,
     SIDE,
     SINCE,
-    STALLS,
-    STATUS,
-    STEP,
-    STEPS,
     SWITCHED,
-    SWITCHES,
-    T_STOP,
     TRIAL,
     VALUE,
     Function,
-    H,
-    T,
-    Work,
+    IntegrationState,
     Y,
 )
 from dap3d_core.integrators.stepping.output import project_state
@@ -77,6 +55,7 @@ from dap3d_core.integrators.stepping.switch_values import (
     span,
     usual_step,
 )
+from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import compiled_inside
 
 #: A crossing this part of a usual step away is reached by an Euler step: its error is of the order
@@ -95,27 +74,26 @@ CHATTER, CHATTER_SPAN = 100, 1e-6
 
 @compiled_inside
 def next_length(
-    work: Work, end: float, slope: Floats, project: Function, watch: Function, system: Any,
-    loops: Any,
+    work: IntegrationState, end: float, slope: Floats, project: Function, watch: Function,
+    system: Any, loops: Any,
 ) -> float:  # fmt: skip
     """Length of the next step, which may go to time ``end``; 0 where it has been done here.
 
     slope: dy/dt at the state.
     """
-    real, integer = work.real, work.integer
-    longest = min(end, real[LIMIT]) - real[T]
+    longest = min(end, work.t_limit) - work.t
     h = longest
-    if integer[SWITCHES] != 0:
-        if integer[LOOKED] == 0:
+    if work.switch_count != 0:
+        if work.switch_rates_valid == 0:
             look(work, slope, watch, system, loops)
-            if integer[ENDING] != 0:
+            if work.end_status != 0:
                 return 0.0
         h = reach(work, h)
     short = max(SHORT * usual_step(work), 4.0 * FLOOR * span(work))
-    short *= 2.0 ** min(integer[STALLS], MOST_STALLS)
-    if h > short or h == end - real[T]:
+    short *= 2.0 ** min(work.stalled_steps, MOST_STALLS)
+    if h > short or h == end - work.t:
         return h
-    h = min(min(longest, 2.0 * short), work.times[integer[NEXT]] - real[T])
+    h = min(min(longest, 2.0 * short), work.times[work.next_report] - work.t)
     creep(work, h, end, slope, project, watch, system, loops)
     return 0.0
 
@@ -134,10 +112,10 @@ def time_to_zero(value: float, rate: float, bend: float) -> float:
 
 
 @compiled_inside
-def reach(work: Work, h: float) -> float:
+def reach(work: IntegrationState, h: float) -> float:
     """How far a step of length h may go: it ends shortly before the next crossing."""
     s, longest = work.switches, h
-    h = min(h, work.real[CUT])
+    h = min(h, work.step_limit_at_switch)
     for k in range(s.shape[1]):
         side = s[SIDE, k]
         if side == 0.0:
@@ -153,12 +131,14 @@ def reach(work: Work, h: float) -> float:
 
 
 @compiled_inside
-def sample(work: Work, t: float, x: Floats, watch: Function, system: Any, loops: Any) -> bool:
+def sample(
+    work: IntegrationState, t: float, x: Floats, watch: Function, system: Any, loops: Any
+) -> bool:
     """Whether a state within a step lies across; then the step is cut.
 
     Not of what is UNSEEN: where a function takes another form it is smooth: a step may mix both.
     """
-    if work.integer[SAMPLED] == 0:
+    if work.sampled_switch_count == 0:
         return False
     evaluate(work, t, x, SAMPLE, watch, system, loops)
     s = work.switches
@@ -167,14 +147,14 @@ def sample(work: Work, t: float, x: Floats, watch: Function, system: Any, loops:
             s[SAMPLE, k] = s[SIDE, k]
     if not leaves(s, SAMPLE):
         return False
-    shorten(work, SAMPLE, t - work.real[T])
+    shorten(work, SAMPLE, t - work.t)
     return True
 
 
 @compiled_inside
-def shorten(work: Work, row: int, h: float) -> None:
+def shorten(work: IntegrationState, row: int, h: float) -> None:
     """Cut the next attempt to before the crossing that a sample at h told of."""
-    s, integer = work.switches, work.integer
+    s = work.switches
     left = h
     for k in range(s.shape[1]):
         side, value, found = s[SIDE, k], s[VALUE, k], s[row, k]
@@ -182,27 +162,27 @@ def shorten(work: Work, row: int, h: float) -> None:
             rate = s[RATE, k]
             bend = 2.0 * (found - value - rate * h) / (h * h)
             left = min(left, time_to_zero(side * value, side * rate, side * bend))
-    integer[CUTS] += 1
-    integer[REJECTED] += 1
+    work.cut_attempts += 1
+    work.rejected_count += 1
     # samples are as good as the stages they belong to: trusted less from attempt to attempt
-    work.real[CUT] = left * max(0.25, 1.0 - 0.01 * 4.0 ** integer[CUTS])
+    work.step_limit_at_switch = left * max(0.25, 1.0 - 0.01 * 4.0**work.cut_attempts)
 
 
 @compiled_inside
 def end_is_across(
-    work: Work, t1: float, slope: Floats, watch: Function, system: Any, loops: Any
+    work: IntegrationState, t1: float, slope: Floats, watch: Function, system: Any, loops: Any
 ) -> bool:
     """Whether the trial state, whose dy/dt is ``slope``, lies across, or the motion went there.
 
     Then the step is cut.
     """
-    s, trial, h = work.switches, work.state[TRIAL], t1 - work.real[T]
+    s, trial, h = work.switches, work.state[TRIAL], t1 - work.t
     evaluate(work, t1, trial, FOUND, watch, system, loops)
     if leaves(s, FOUND):
         shorten(work, FOUND, h)
         return True
     find_rates(work, t1, trial, slope, FOUND, FOUND_RATE, watch, system, loops)
-    if work.integer[CUTS] >= SUSPICIONS:
+    if work.cut_attempts >= SUSPICIONS:
         return False
     part = 1.0
     for k in range(s.shape[1]):
@@ -211,9 +191,9 @@ def end_is_across(
                                 h * side * s[FOUND_RATE, k]))  # fmt: skip
     if part == 1.0:
         return False
-    work.integer[CUTS] += 1
-    work.integer[REJECTED] += 1
-    work.real[CUT] = part * h
+    work.cut_attempts += 1
+    work.rejected_count += 1
+    work.step_limit_at_switch = part * h
     return True
 
 
@@ -237,42 +217,42 @@ def lowest(a: float, b: float, c: float, d: float) -> float:
 
 
 @compiled_inside
-def settle(work: Work, h: float, longest: float, end: float) -> None:
+def settle(work: IntegrationState, h: float, longest: float, end: float) -> None:
     """After a step was accepted: what its end told of switches; if cut, the motion's own step.
 
     h: its length; longest, end: the length it might have had, and where it would have ended.
     """
-    real, integer, s = work.real, work.integer, work.switches
+    s = work.switches
     if h < longest:
-        real[H] = max(real[H], longest)
-    if real[STEP] != 0.0 and real[T] < end:
-        integer[GAP_STEP] -= 1
-    if integer[SWITCHES] == 0:
+        work.h = max(work.h, longest)
+    if work.fixed_step != 0.0 and work.t < end:
+        work.segment_step -= 1
+    if work.switch_count == 0:
         return
     stalled = 0
     for k in range(s.shape[1]):
-        stands = (integer[CUTS] > 0) & (s[FOUND, k] == s[VALUE, k])
+        stands = (work.cut_attempts > 0) & (s[FOUND, k] == s[VALUE, k])
         stalled |= stands & (s[SIDE, k] * s[RATE, k] < 0.0)
         s[BEND, k] = (s[FOUND_RATE, k] - s[RATE, k]) / h
         s[VALUE, k], s[RATE, k] = s[FOUND, k], s[FOUND_RATE, k]
         if s[SIDE, k] == 0.0:
             s[SIDE, k] = np.sign(s[FOUND, k])
             s[VALUE, k] += s[SIDE, k] * s[BAND, k]
-    real[CUT], integer[CUTS] = np.inf, 0
-    integer[STALLS] = integer[STALLS] + 1 if stalled else 0
+    work.step_limit_at_switch, work.cut_attempts = np.inf, 0
+    work.stalled_steps = work.stalled_steps + 1 if stalled else 0
 
 
 @compiled_inside
 def creep(
-    work: Work, h: float, end: float, slope: Floats, project: Function, watch: Function,
+    work: IntegrationState, h: float, end: float, slope: Floats, project: Function, watch: Function,
     system: Any, loops: Any,
 ) -> None:  # fmt: skip
     """An Euler step of length h, or to the crossing in it: the integration starts anew there."""
-    real, integer, s = work.real, work.integer, work.switches
-    t = real[T]
+    s = work.switches
+    t = work.t
     low, high, least = 0.0, h, 1e-3 * EPSILON * span(work)
     failure = go_on(work, high, slope, project, watch, system, loops)
-    crossed = integer[SWITCHES] != 0 and is_across(s, FOUND)
+    crossed = work.switch_count != 0 and is_across(s, FOUND)
     if crossed:
         middle = 0.5 * high
         while failure == RUNNING and t + low < t + middle < t + high and high - low > least:
@@ -285,21 +265,21 @@ def creep(
         if failure == RUNNING:
             failure = go_on(work, high, slope, project, watch, system, loops)
         take_notice(work, t + high)
-        if failure == RUNNING and integer[ENDING] == SWITCHED:
+        if failure == RUNNING and work.end_status == SWITCHED:
             high = low
             failure = go_on(work, high, slope, project, watch, system, loops)
     if failure != RUNNING:
-        real[T_STOP], integer[STATUS] = t + high, failure
+        work.t_stop, work.status = t + high, failure
         return
-    real[T] = t + high
+    work.t = t + high
     for i in range(slope.shape[0]):
         work.state[Y, i] = work.state[TRIAL, i]
-    integer[STEPS] += 1
-    if real[STEP] != 0.0 and real[T] >= end:
-        integer[GAP_STEP] += 1
-    integer[FRESH] = integer[LOOKED] = integer[CUTS] = 0
-    real[CUT] = np.inf
-    integer[STALLS] = 0 if crossed or integer[STALLS] == 0 else integer[STALLS] + 1
+    work.step_count += 1
+    if work.fixed_step != 0.0 and work.t >= end:
+        work.segment_step += 1
+    work.first_stage_valid = work.switch_rates_valid = work.cut_attempts = 0
+    work.step_limit_at_switch = np.inf
+    work.stalled_steps = 0 if crossed or work.stalled_steps == 0 else work.stalled_steps + 1
     for k in range(s.shape[1]):
         if s[VALUE, k] == 0.0 and s[FOUND, k] == 0.0:
             s[SIDE, k] = 0.0  # it stays zero: it has no side until it leaves
@@ -309,39 +289,39 @@ def creep(
 
 @compiled_inside
 def go_on(
-    work: Work, h: float, slope: Floats, project: Function, watch: Function, system: Any,
-    loops: Any,
+    work: IntegrationState, h: float, slope: Floats, project: Function, watch: Function,
+    system: Any, loops: Any,
 ) -> int:  # fmt: skip
     """The state after a very short time h, on its constraints, as trial state; its switches."""
-    t, y, trial = work.real[T] + h, work.state[Y], work.state[TRIAL]
+    t, y, trial = work.t + h, work.state[Y], work.state[TRIAL]
     for i in range(y.shape[0]):
         trial[i] = y[i] + h * slope[i]
-    failure = project_state(work.real, work.integer, t, trial, project, system, loops)
-    if failure == RUNNING and work.integer[SWITCHES] != 0:
+    failure = project_state(work, t, trial, project, system, loops)
+    if failure == RUNNING and work.switch_count != 0:
         evaluate(work, t, trial, FOUND, watch, system, loops)
     return failure
 
 
 @compiled_inside
-def take_notice(work: Work, t: float) -> None:
+def take_notice(work: IntegrationState, t: float) -> None:
     """Which switches changed their sign at t, and what follows: end, chatter, or another side."""
-    integer, s = work.integer, work.switches
+    s = work.switches
     for k in range(s.shape[1]):
         if not s[FOUND, k] * s[SIDE, k] < 0.0:
             continue
         s[SIDE, k] = -s[SIDE, k]
         log(work, k, t)
         if s[DOES, k] == ENDS and s[SIDE, k] < 0.0:
-            integer[ENDING], integer[CULPRIT] = SWITCHED, k
+            work.end_status, work.terminal_switch = SWITCHED, k
         if s[COUNT, k] == 0.0 or t - s[SINCE, k] > CHATTER_SPAN * (work.times[-1] - work.times[0]):
             s[SINCE, k], s[COUNT, k] = t, 0.0
         s[COUNT, k] += 1.0
-        if s[COUNT, k] > CHATTER and integer[ENDING] == 0:
-            integer[ENDING], integer[CULPRIT] = CHATTERED, k
+        if s[COUNT, k] > CHATTER and work.end_status == 0:
+            work.end_status, work.terminal_switch = CHATTERED, k
 
 
 @compiled_inside
-def forget(work: Work) -> None:
+def forget(work: IntegrationState) -> None:
     """Let the control of the step start anew: what follows is another motion."""
-    work.real[H], work.real[ERROR_OLD] = 0.0, 1e-4
-    work.integer[FRESH] = work.integer[LOOKED] = work.integer[LAST_REJECTED] = 0
+    work.h, work.last_error = 0.0, 1e-4
+    work.first_stage_valid = work.switch_rates_valid = work.last_rejected = 0

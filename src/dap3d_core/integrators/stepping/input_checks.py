@@ -1,10 +1,12 @@
 """What an integration may be asked for: states, times, tolerances and steps that make sense."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dap3d_core.integrators.runge_kutta.tableau import Floats, Method
 from dap3d_core.integrators.stepping.step_control import FLOOR
+from dap3d_core.kernels.runtime.array_struct import Floats
 
 
 def check_state_and_times(y: Floats, times: Floats) -> None:
@@ -26,7 +28,7 @@ def check_sizes(error_size: int, size: int, buffer_rows: int) -> None:
 
 
 def check_control(
-    method: Method,
+    integrator: Any,
     rtol: float,
     atol: ArrayLike,
     times: Floats,
@@ -41,9 +43,9 @@ def check_control(
             raise ValueError(
                 f"{name} is {value}; it must be finite and above {least:.1e}, the rounding of time"
             )
-    if step is None and not method.adaptive:
+    if step is None and not integrator.adaptive:
         raise ValueError(
-            f"{method.name} does not choose its step: give step, or take an adaptive method"
+            f"{integrator.name} does not choose its step: give step, or take an adaptive method"
         )
     least_atol, most_atol = float(np.min(atol)), float(np.max(atol))
     good = 0.0 <= rtol < np.inf and 0.0 <= least_atol <= most_atol < np.inf

@@ -1,4 +1,4 @@
-"""The state of an integration: arrays that the compiled core reads and writes, and their places."""
+"""The state of an integration: arrays that compiled code reads and writes, and their scalars."""
 
 import math
 from collections.abc import Callable, Container
@@ -7,26 +7,31 @@ from typing import Any, ClassVar
 
 import attrs
 
-from dap3d_core.integrators.runge_kutta.tableau import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
+from dap3d_core.kernels.runtime.array_struct import (
+    MATRIX,
+    Arrays,
+    Floats,
+    Integers,
+    Scalar,
+)
 
 #: ``f(t, y, out, system, loops)``: rhs, project, report, accepted or watch (runge_kutta/step.py).
 Function = Callable[..., None]
 
 
 class Status(IntEnum):
-    """Where an integration stands."""
+    """State of progress of an integration."""
 
     RUNNING = 0
     FINISHED = 1
-    STEP_FLOOR = 2  # the error asks for a step that time cannot resolve
+    STEP_FLOOR = 2  # the error requires a step that time cannot resolve
     NOT_FINITE = 3  # dy/dt, y or a reported quantity: beyond 1e100, or not a number
     PROJECTION_FAILED = 4
     SWITCHED = 5  # a switch of the model that ends the run became negative
-    CHATTERED = 6  # a switch changed its sign again and again while time hardly went on
-    ENDED = 7  # an event of the user's asked for it
-    STIFF = 8  # the scene has become stiff, and the integration was to leave it then
+    CHATTERED = 6  # a switch changed its sign again and again while time hardly advanced
+    ENDED = 7  # a user event requested it
+    STIFF = 8  # the scene has become stiff, and the integration was to stop then
 
 
 # The same as plain integers, for compiled code.
@@ -35,38 +40,6 @@ STEP_FLOOR, NOT_FINITE = int(Status.STEP_FLOOR), int(Status.NOT_FINITE)
 PROJECTION_FAILED, SWITCHED = int(Status.PROJECTION_FAILED), int(Status.SWITCHED)
 CHATTERED, STIFF = int(Status.CHATTERED), int(Status.STIFF)
 
-# Places in ``real``. Settings; a STEP of 0 lets the error choose it. CALM, SAFETY: see Method.
-RTOL, STEP, EXPONENT, BETA, FACTOR_MIN, FACTOR_MAX, CALM, SAFETY = range(8)
-# What changes: time, next step, error of the last accepted step, start and length of the step that
-# the dense output belongs to, start of the present run of equal steps, time of what stopped
-# the run, error of the last step that was to go across a singular state; the instant that the next
-# step may not go beyond, its greatest length since one met the other side of a switch; when the
-# scene was found stiff; the largest magnitude of the last component, which is the work done, at an
-# accepted state; error per length of the last step that failed; the longest step that error control
-# may take; and what project gives: four numbers, then lengths.
-(
-    T, H, ERROR_OLD, T_DENSE, H_DENSE, GAP_START, T_STOP, ACROSS, LIMIT, CUT, STIFF_AT, MOST_WORK,
-    FAILED_RATE, LONGEST, OUTCOME
-) = range(8, 23)  # fmt: skip
-LENGTHS = OUTCOME + 4
-#: Places in ``real`` and ``integer`` that never change in the course of a run.
-REAL_SETTINGS = (*range(T), LONGEST)
-# Places in ``integer``. Settings.
-STAGES, ORDER, ERROR_SIZE, ERRORS, ERROR_USES_RESULT, DENSE, PROJECT_ON, WATCHED = range(8)
-# What changes. POOR: landings in a row that project called poor. FRESH: k[0] is f(t, y).
-# GAP_STEP of GAP_STEPS: in the present run of equal steps.
-STATUS, NEXT, ROW, FRESH, LAST_REJECTED, GAP_STEP, GAP_STEPS = range(8, 15)
-STEPS, REJECTED, RHS, PROJECTIONS, REPORTS, POOR = range(15, 21)
-# Number of switches. LOOKED: their values and rates at t are known; steps in a row that were cut
-# because they met the other side; the status with which the run ends here, and the switch that is
-# to blame; how often a switch has changed its sign.
-SWITCHES, LOOKED, CUTS, ENDING, CULPRIT, CROSSINGS = range(21, 27)
-# LATE_STAGE: see Method; whether the run ends where the scene becomes stiff; steps that looked so,
-# and those in a row that did not since (stiffness.py). STALLS: steps in a row towards a crossing,
-# so short that the switch did not change by a bit. ROUNDED: whether rounding makes a part of the
-# errors is to be looked at (1), or is so (2). SAMPLED: switches that stages have to keep to.
-LATE_STAGE, LEAVE, STIFF_STEPS, CALM_STEPS, STALLS, ROUNDED, SAMPLED, INTEGERS = range(27, 35)
-INTEGER_SETTINGS = (*range(STATUS), SWITCHES, LATE_STAGE, LEAVE, SAMPLED)
 # Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch.
 Y, TRIAL, SCRATCH, OTHER, STATES = range(5)
 # Rows of ``tolerance``: absolute tolerance; change of dy/dt by the rounding of y (rounding.py).
@@ -82,73 +55,162 @@ VALUE, SIDE, RATE, BEND, FOUND, FOUND_RATE, SAMPLE, DOES, BAND, SINCE, COUNT, SW
 LOGGED = 1000
 
 
-@attrs.frozen(eq=False, kw_only=True, slots=False)
-class Work(Arrays):
-    """All that ``advance`` reads and writes; n components, S stages (method.Method)."""
+def _real() -> Scalar[float]:
+    return Scalar("real")
+
+
+def _integer() -> Scalar[int]:
+    return Scalar("integer")
+
+
+@attrs.define(eq=False, kw_only=True, slots=False)
+class IntegrationState(Arrays):
+    """What every integrator reads and writes; n components.
+
+    Numbers are in ``real`` and ``integer`` in this order, in checkpoints as well. Those of the
+    step-size controller are explained at ``Tableau``.
+    """
 
     types: ClassVar[dict[str, Any]] = {
         "integer": INTEGER_VECTOR,
-        **dict.fromkeys(("state", "k", "terms", "rows", "table", "lengths", "switches",
-                         "crossings", "tolerance"), MATRIX),
-    }  # fmt: skip
+        **dict.fromkeys(("state", "rows", "switches", "crossings", "tolerance"), MATRIX),
+    }
 
-    real: Floats  # (LENGTHS + m,) m lengths that project gives
-    integer: Integers  # (INTEGERS,)
+    # settings
+    rtol = _real()
+    fixed_step = _real()  # 0: error control
+    exponent = _real()
+    beta = _real()
+    factor_min = _real()
+    factor_max = _real()
+    widest_gap_abscissa = _real()
+    safety = _real()
+    # what changes
+    t = _real()
+    h = _real()  # next step; 0: unknown
+    last_error = _real()  # of the last accepted step
+    t_dense = _real()  # start and length of the step that dense output belongs to
+    h_dense = _real()
+    segment_start = _real()  # of the present segment of equal steps
+    t_stop = _real()  # of what stopped the run
+    error_across_singularity = _real()  # of the last step that was to cross a singular state
+    t_limit = _real()  # no step goes beyond
+    step_limit_at_switch = _real()  # since a step met the other side of a switch
+    t_stiff = _real()  # when the scene became stiff
+    largest_work = _real()  # magnitude of the last component at an accepted state
+    failed_error_rate = _real()  # error per length of the last step that failed
+    longest_step = _real()  # a setting
+    # output of project, followed by the singularity measures
+    projection_moved = _real()
+    projection_outcome = _real()
+    position_residual = _real()
+    velocity_residual = _real()
+
+    # settings
+    stage_count = _integer()
+    order = _integer()
+    error_size = _integer()  # leading components that steer the step
+    estimate_count = _integer()
+    error_uses_last_stage = _integer()
+    has_dense_output = _integer()
+    projects = _integer()
+    calls_accepted = _integer()
+    # what changes
+    status = _integer()
+    next_report = _integer()  # index in times
+    row_count = _integer()  # rows that wait to be taken
+    first_stage_valid = _integer()  # k[0] is f(t, y)
+    last_rejected = _integer()
+    segment_step = _integer()  # of segment_step_count equal steps
+    segment_step_count = _integer()
+    step_count = _integer()
+    rejected_count = _integer()
+    rhs_count = _integer()
+    projection_count = _integer()
+    report_count = _integer()
+    near_singular_landings = _integer()  # in a row
+    switch_count = _integer()  # a setting
+    switch_rates_valid = _integer()  # values and rates of switches are those at t
+    cut_attempts = _integer()  # in a row, which met the other side of a switch
+    end_status = _integer()  # with which the run ends here
+    terminal_switch = _integer()  # the one that ended it
+    crossing_count = _integer()
+    stiffness_stage = _integer()  # a setting
+    stops_when_stiff = _integer()  # a setting
+    stiff_steps = _integer()  # and those in a row since that were not (stiffness.py)
+    nonstiff_steps = _integer()
+    stalled_steps = _integer()  # in a row, too short to change a switch by a bit
+    rounding_state = _integer()  # of errors: 1 to be measured, 2 dominant (rounding.py)
+    sampled_switch_count = _integer()  # a setting: switches that stages must not cross
+
+    real: Floats  # (MEASURES + m,) scalars; m singularity measures that project gives
+    integer: Integers  # scalars
     times: Floats  # (nt,) reporting times, increasing, t0 first and t_end last
     state: Floats  # (STATES, n)
-    k: Floats  # (S, n) stages; k[0] is f(t, y)
-    terms: Floats  # (4 + rows of d, n) of the dense output over the last step
     rows: Floats  # (capacity, 1 + n + report_size) rows t, y, report that wait to be taken
-    table: Floats  # method.combinations
-    lengths: Floats  # (2, m) at t, and their rates over the last step (singular_poses.py)
     switches: Floats  # (SWITCH_ROWS, q) of q switches of the model (event_location.py)
     crossings: Floats  # (LOGGED, 3) where they changed their sign; no row without switches
     tolerance: Floats  # (TOLERANCES, n)
 
 
+#: Indices in ``real``: of the first number that project gives, and of the singularity measures.
+PROJECTED = IntegrationState.indices("real")["projection_moved"]
+MEASURES = len(IntegrationState.indices("real"))
+#: Scalars that never change in the course of a run.
+REAL_SETTINGS = ("rtol", "fixed_step", "exponent", "beta", "factor_min", "factor_max",
+                 "widest_gap_abscissa", "safety", "longest_step")  # fmt: skip
+INTEGER_SETTINGS = ("stage_count", "order", "error_size", "estimate_count",
+                    "error_uses_last_stage", "has_dense_output", "projects", "calls_accepted",
+                    "switch_count", "stiffness_stage", "stops_when_stiff",
+                    "sampled_switch_count")  # fmt: skip
 #: Nothing is counted beyond: a count, and twice that, are exact in double precision.
 MOST_COUNTED = 2**52
 
 
-def allowed_integers(work: Any, found: Integers) -> dict[int, Container[int]]:
-    """What each place of ``integer`` that is no setting may hold between two chunks of a run.
+def allowed_integers(work: Any, found: Any) -> dict[str, Container[int]]:
+    """Values of each integer that is no setting between two chunks of a run.
 
     Args:
         work: of the same run, with its settings.
-        found: (INTEGERS,) what is to be compared: some places limit others.
+        found: the integers to be compared, by name: some limit others.
     """
-    instants, switches, real = work.times.size, work.switches.shape[1], work.real
-    running, steps = found[STATUS] == RUNNING, int(found[GAP_STEPS])
+    instants, switches = work.times.size, work.switches.shape[1]
+    running = found["status"] == RUNNING
     by_switch = {SWITCHED, CHATTERED} if switches else set()
-    by_method = {STIFF} if work.integer[LEAVE] else set()
-    fixed = real[STEP] != 0.0
-    most_steps = math.ceil((work.times[-1] - work.times[0]) / real[STEP]) + 1 if fixed else 0
+    by_method = {STIFF} if work.stops_when_stiff else set()
+    most_steps = 0
+    if work.fixed_step != 0.0:
+        most_steps = math.ceil((work.times[-1] - work.times[0]) / work.fixed_step) + 1
     return {
-        STATUS: {*range(SWITCHED), Status.ENDED, *by_switch, *by_method},
-        NEXT: range(instants if running else instants + 1),
-        ROW: (0,),
-        **dict.fromkeys((FRESH, LAST_REJECTED, LOOKED), (0, 1)),
-        ROUNDED: (0, 1, 2),
-        GAP_STEPS: range(most_steps + 1),
-        GAP_STEP: range(steps + 1),
-        ENDING: {0, Status.ENDED, *by_switch},
-        CULPRIT: range(max(1, switches)),
+        "status": {*range(SWITCHED), Status.ENDED, *by_switch, *by_method},
+        "next_report": range(instants if running else instants + 1),
+        "row_count": (0,),
+        **dict.fromkeys(("first_stage_valid", "last_rejected", "switch_rates_valid"), (0, 1)),
+        "rounding_state": (0, 1, 2),
+        "segment_step_count": range(most_steps + 1),
+        "segment_step": range(found["segment_step_count"] + 1),
+        "end_status": {0, Status.ENDED, *by_switch},
+        "terminal_switch": range(max(1, switches)),
         **dict.fromkeys(
-            (STEPS, REJECTED, RHS, PROJECTIONS, REPORTS, POOR, CUTS, CROSSINGS, STIFF_STEPS,
-             CALM_STEPS, STALLS), range(MOST_COUNTED)
+            ("step_count", "rejected_count", "rhs_count", "projection_count", "report_count",
+             "near_singular_landings", "cut_attempts", "crossing_count", "stiff_steps",
+             "nonstiff_steps", "stalled_steps"), range(MOST_COUNTED)
         ),
     }  # fmt: skip
 
 
-def allowed_reals(work: Any) -> dict[int, tuple[float, float]]:
-    """Least and greatest value of each such place of ``real`` but those that ``project`` gives."""
-    # a step may go on just behind the last instant (Integration.stops)
+def allowed_reals(work: Any) -> dict[str, tuple[float, float]]:
+    """Least and greatest value of each such number in ``real``, without those of ``project``."""
+    # a step may start just behind the last instant (Integration.tstops)
     first, last = float(work.times[0]), math.nextafter(float(work.times[-1]), math.inf)
     largest = 1.7976931348623157e308
     return {
-        T: (first, last),
-        **dict.fromkeys((T_DENSE, GAP_START, T_STOP), (0.0, last)),
-        **dict.fromkeys((H, H_DENSE, ERROR_OLD, ACROSS), (0.0, largest)),
-        LIMIT: (math.inf, math.inf),
-        **dict.fromkeys((CUT, STIFF_AT, MOST_WORK, FAILED_RATE), (0.0, math.inf)),
+        "t": (first, last),
+        **dict.fromkeys(("t_dense", "segment_start", "t_stop"), (0.0, last)),
+        **dict.fromkeys(("h", "h_dense", "last_error", "error_across_singularity"), (0.0, largest)),
+        "t_limit": (math.inf, math.inf),
+        **dict.fromkeys(
+            ("step_limit_at_switch", "t_stiff", "largest_work", "failed_error_rate"),
+            (0.0, math.inf),
+        ),
     }

@@ -6,37 +6,19 @@
 from collections.abc import Callable
 from typing import Any
 
-from dap3d_core.integrators.runge_kutta.tableau import Floats, Integers
 from dap3d_core.integrators.stepping.integration_state import (
-    ENDING,
     FINISHED,
-    H_DENSE,
-    LEAVE,
-    LIMIT,
-    MOST_WORK,
-    NEXT,
     NOT_FINITE,
-    OUTCOME,
-    PROJECT_ON,
+    PROJECTED,
     PROJECTION_FAILED,
-    PROJECTIONS,
-    REPORTS,
-    RHS,
-    ROW,
-    RTOL,
     RUNNING,
-    STATUS,
     STIFF,
-    STIFF_AT,
-    T_DENSE,
-    T_STOP,
     TRIAL,
     Function,
-    T,
-    Work,
     Y,
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite, interpolate
+from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import compiled_inside, compiled_into
 
 #: What project says in out[1]: it failed; the state is good, but too close to a singular one.
@@ -45,8 +27,7 @@ FAILED, POOR_PLACE = 1.0, 2.0
 
 @compiled_inside
 def project_state(
-    real: Floats,
-    integer: Integers,
+    work: Any,
     t: float,
     y: Floats,
     project: Function,
@@ -58,14 +39,14 @@ def project_state(
 
     here: whether rhs was the last function called, at this very t and y.
     """
-    real[OUTCOME] = 0.0
+    work.projection_moved = 0.0
     if not all_finite(y):
         return NOT_FINITE
-    if integer[PROJECT_ON] == 0:
+    if work.projects == 0:
         return RUNNING
-    outcome = real[OUTCOME:]
+    outcome = work.real[PROJECTED:]
     outcome[0], outcome[1] = 1.0 if here else 0.0, 0.0
-    integer[PROJECTIONS] += 1
+    work.projection_count += 1
     project(t, y, outcome, system, loops)
     if outcome[1] == FAILED or not all_finite(y):
         return PROJECTION_FAILED
@@ -73,9 +54,9 @@ def project_state(
 
 
 @compiled_inside
-def dense_state(work: Work, t: float, y: Floats) -> None:
+def dense_state(work: Any, t: float, y: Floats) -> None:
     """The state at an instant of the last step, by the terms of its dense output."""
-    interpolate(y, work.terms, (t - work.real[T_DENSE]) / work.real[H_DENSE])
+    interpolate(y, work.terms, (t - work.t_dense) / work.h_dense)
 
 
 @compiled_into
@@ -93,20 +74,20 @@ def may_step(
     state_at: as for ``report_reached``. limit: right-hand sides after which this call of the
     integration is left.
     """
-    real, integer, times = work.real, work.integer, work.times
-    while integer[STATUS] == RUNNING:
-        if times[integer[NEXT]] <= real[T]:
+    times = work.times
+    while work.status == RUNNING:
+        if times[work.next_report] <= work.t:
             if not report_reached(work, state_at, project, report, system, loops):
                 return False
-        elif integer[ENDING] != 0:
+        elif work.end_status != 0:
             if not report_end(work, report, system, loops):
                 return False
-        elif integer[LEAVE] != 0 and real[STIFF_AT] < real[T]:
-            integer[STATUS] = STIFF
+        elif work.stops_when_stiff != 0 and work.t_stiff < work.t:
+            work.status = STIFF
         else:
             work_done = abs(work.state[Y, work.state.shape[1] - 1])
-            real[MOST_WORK] = max(real[MOST_WORK], work_done)
-            return integer[RHS] <= limit and real[T] < real[LIMIT]
+            work.largest_work = max(work.largest_work, work_done)
+            return work.rhs_count <= limit and work.t < work.t_limit
     return False
 
 
@@ -125,55 +106,55 @@ def report_reached(
 
     state_at: fills in the state at an instant within the last step.
     """
-    real, integer, times = work.real, work.integer, work.times
-    while integer[NEXT] < times.size and times[integer[NEXT]] <= real[T]:
-        if integer[ROW] == work.rows.shape[0]:
+    times = work.times
+    while work.next_report < times.size and times[work.next_report] <= work.t:
+        if work.row_count == work.rows.shape[0]:
             return False
-        t, y = times[integer[NEXT]], work.state[Y]
-        if t < real[T]:
+        t, y = times[work.next_report], work.state[Y]
+        if t < work.t:
             y = work.state[TRIAL]
             state_at(work, t, y)
-            failure = project_state(real, integer, t, y, project, system, loops)
-            closed = real[OUTCOME + 2] <= real[RTOL] and real[OUTCOME + 3] <= real[RTOL]
+            failure = project_state(work, t, y, project, system, loops)
+            closed = work.position_residual <= work.rtol and work.velocity_residual <= work.rtol
             if failure == PROJECTION_FAILED and closed:  # too close to a singular one for more
                 failure = RUNNING
             if failure != RUNNING:
-                real[T_STOP], integer[STATUS] = t, failure
+                work.t_stop, work.status = t, failure
                 return True
         if not write_row(work, t, y, report, system, loops):
             return True
-        integer[NEXT] += 1
-    if integer[NEXT] == times.size:
-        integer[STATUS] = FINISHED
+        work.next_report += 1
+    if work.next_report == times.size:
+        work.status = FINISHED
     return True
 
 
 @compiled_inside
 def report_end(work: Any, report: Function, system: Any, loops: Any) -> bool:
     """End the run where it stands, with a row for this state; False where the rows are full."""
-    real, integer, times = work.real, work.integer, work.times
-    t, last = real[T], integer[NEXT] - 1
+    times = work.times
+    t, last = work.t, work.next_report - 1
     if last < 0 or times[last] < t:
-        if integer[ROW] == work.rows.shape[0]:
+        if work.row_count == work.rows.shape[0]:
             return False
         if not write_row(work, t, work.state[Y], report, system, loops):
             return True
-    real[T_STOP], integer[STATUS] = t, integer[ENDING]
+    work.t_stop, work.status = t, work.end_status
     return True
 
 
 @compiled_inside
 def write_row(work: Any, t: float, y: Floats, report: Function, system: Any, loops: Any) -> bool:
     """One row; False, with the status, where it is not finite."""
-    real, integer, n = work.real, work.integer, y.shape[0]
-    row = work.rows[integer[ROW]]
+    n = y.shape[0]
+    row = work.rows[work.row_count]
     row[0] = t
     for i in range(n):
         row[1 + i] = y[i]
-    integer[REPORTS] += 1
+    work.report_count += 1
     report(t, y, row[1 + n :], system, loops)
     if not all_finite(row):
-        real[T_STOP], integer[STATUS] = t, NOT_FINITE
+        work.t_stop, work.status = t, NOT_FINITE
         return False
-    integer[ROW] += 1
+    work.row_count += 1
     return True

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.integrators.runge_kutta.tableau import Floats, Integers
 from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.kernels.runtime.array_struct import Floats, Integers
 
 
 class Restorable:
@@ -37,10 +37,10 @@ class Restorable:
             ValueError: they are of another model, or hold what no run can have; says which.
         """
         new = {name: self.restored(name, a, found.get(name)) for name, a in self.all_arrays()}
-        integer, real = new["integer"], new["real"]
-        check_integers(integer, self.allowed_integers(integer))
-        check_reals(real, at.allowed_reals(self.work))
-        check_crossings(new["crossings"], int(integer[at.CROSSINGS]), self.work)
+        integers, reals = self.scalars(new, "integer"), self.scalars(new, "real")
+        check_integers(integers, self.allowed_integers(integers))
+        check_reals(reals, at.allowed_reals(self.work))
+        check_crossings(new["crossings"], integers["crossing_count"], self.work)
         if not np.isfinite(new["state"][at.Y]).all():
             raise ValueError("its state is not finite")
         noise = new["tolerance"][at.NOISE]
@@ -53,16 +53,25 @@ class Restorable:
     def restored(self, name: str, array: Any, found: Any) -> Any:
         """What an array becomes, given that of a file; ValueError where it is of another model."""
         own = {
-            "real": at.REAL_SETTINGS,
-            "integer": at.INTEGER_SETTINGS,
+            "real": self.indices("real", at.REAL_SETTINGS),
+            "integer": self.indices("integer", at.INTEGER_SETTINGS),
             "switches": (at.DOES, at.BAND),
             "table": range(len(array)),
             "tolerance": (at.ABSOLUTE,),
         }
         return restored(name, array, found, own.get(name, ()))
 
-    def allowed_integers(self, found: Integers) -> dict[int, Container[int]]:
-        """As ``work.allowed_integers``."""
+    def indices(self, array: str, names: Iterable[str]) -> list[int]:
+        """Indices of scalars in an array of the state."""
+        indices = type(self.work).indices(array)
+        return [indices[name] for name in names]
+
+    def scalars(self, arrays: Mapping[str, Any], array: str) -> dict[str, Any]:
+        """The scalars in one of some arrays of a state, by name."""
+        return {name: arrays[array][k].item() for name, k in type(self.work).indices(array).items()}
+
+    def allowed_integers(self, found: Mapping[str, int]) -> dict[str, Container[int]]:
+        """As ``integration_state.allowed_integers``."""
         return at.allowed_integers(self.work, found)
 
 
@@ -86,24 +95,24 @@ def restored(name: str, array: Any, found: Any, own: Iterable[Any] = ()) -> Any:
     return new
 
 
-def check_integers(found: Integers, allowed: Mapping[int, Container[int]]) -> None:
-    """ValueError for the first of the places of ``integer`` that holds what it cannot."""
-    for place, values in allowed.items():
-        if int(found[place]) not in values:
-            raise ValueError(f"integer[{place}] is {found[place]}, which no run can have there")
+def check_integers(found: Mapping[str, int], allowed: Mapping[str, Container[int]]) -> None:
+    """ValueError for the first of the integers of a state that holds what it cannot."""
+    for name, values in allowed.items():
+        if found[name] not in values:
+            raise ValueError(f"{name} is {found[name]}, which no run can have there")
 
 
-def check_reals(found: Floats, allowed: Mapping[int, tuple[float, float]]) -> None:
-    """ValueError for the first of the places of ``real`` that holds what it cannot."""
-    for place, (least, most) in allowed.items():
-        if not least <= found[place] <= most:
-            raise ValueError(f"real[{place}] is {found[place]:g}, which no run can have there")
+def check_reals(found: Mapping[str, float], allowed: Mapping[str, tuple[float, float]]) -> None:
+    """ValueError for the first of the numbers of a state that holds what it cannot."""
+    for name, (least, most) in allowed.items():
+        if not least <= found[name] <= most:
+            raise ValueError(f"{name} is {found[name]:g}, which no run can have there")
 
 
 def check_crossings(crossings: Floats, count: int, work: Any) -> None:
     """ValueError for sign changes of switches that there are not, or outside of the run."""
     t, which, side = crossings[: min(count, at.LOGGED)].T
-    switches, (first, last) = work.switches.shape[1], at.allowed_reals(work)[at.T]
+    switches, (first, last) = work.switches.shape[1], at.allowed_reals(work)["t"]
     good = (first <= t) & (t <= last) & np.isin(which, np.arange(switches)) & np.isin(side, (-1, 1))
     if not good.all() or (count and not switches):
         raise ValueError("crossings: no such sign change of a switch can be")

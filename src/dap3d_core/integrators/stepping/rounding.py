@@ -15,28 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dap3d_core.integrators.runge_kutta.tableau import Floats, Integers
 from dap3d_core.integrators.stepping.integration_state import (
     ABSOLUTE,
-    ERROR_SIZE,
-    FAILED_RATE,
-    FRESH,
     NOISE,
     OTHER,
-    REJECTED,
-    RHS,
-    ROUNDED,
-    RTOL,
     RUNNING,
     SCRATCH,
-    STATUS,
-    STEP,
-    STEPS,
     TOLERANCES,
     Function,
-    T,
     Y,
 )
+from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import compiled_inside, compiled_into
 
 #: Least scale of an error: at atol = 0 a component that is exactly zero is not divided by zero.
@@ -70,33 +59,38 @@ def watch_rounding(
 
     f: dy/dt at the state. rejected: how many steps had failed before that one.
     """
-    real, integer = work.real, work.integer
-    due = integer[STEPS] % PROBE == 0 and real[STEP] == 0.0 and integer[REJECTED] == rejected
-    if not (integer[ROUNDED] != 0 or (due and integer[STEPS] != 0)):
+    due = (
+        work.step_count % PROBE == 0 and work.fixed_step == 0.0 and work.rejected_count == rejected
+    )
+    if not (work.rounding_state != 0 or (due and work.step_count != 0)):
         return
-    if integer[STATUS] != RUNNING or integer[FRESH] == 0:
+    if work.status != RUNNING or work.first_stage_valid == 0:
         return
-    if integer[ROUNDED] == 2 and integer[REJECTED] == rejected and integer[STEPS] % EVERY != 0:
+    if (
+        work.rounding_state == 2
+        and work.rejected_count == rejected
+        and work.step_count % EVERY != 0
+    ):
         return
     tolerance, argument, out = work.tolerance, work.state[SCRATCH], work.state[OTHER]
-    integer[RHS] += SAMPLES + 1
-    measure_noise(real[T], work.state[Y], f, h, tolerance, argument, out, rhs, system, loops)
-    integer[ROUNDED] = 0
-    for i in range(integer[ERROR_SIZE]):
-        scale = tolerance[ABSOLUTE, i] + real[RTOL] * abs(work.state[Y, i])
+    work.rhs_count += SAMPLES + 1
+    measure_noise(work.t, work.state[Y], f, h, tolerance, argument, out, rhs, system, loops)
+    work.rounding_state = 0
+    for i in range(work.error_size):
+        scale = tolerance[ABSOLUTE, i] + work.rtol * abs(work.state[Y, i])
         if h * tolerance[NOISE, i] > COUNTS * scale:
-            integer[ROUNDED] = 2
-    if integer[ROUNDED] == 0:
+            work.rounding_state = 2
+    if work.rounding_state == 0:
         for i in range(argument.size):
             tolerance[NOISE, i] = 0.0
 
 
 @compiled_inside
-def note_failure(real: Floats, integer: Integers, error: float, h: float, again: bool) -> None:
+def note_failure(work: Any, error: float, h: float, again: bool) -> None:
     """Have an eye on a step of length h that failed; again: the one before it had failed, too."""
-    before, real[FAILED_RATE] = real[FAILED_RATE], error / h
+    before, work.failed_error_rate = work.failed_error_rate, error / h
     if again and error / h > SAME * before:
-        integer[ROUNDED] = max(integer[ROUNDED], 1)
+        work.rounding_state = max(work.rounding_state, 1)
 
 
 @compiled_inside

@@ -11,9 +11,11 @@ evaluated on the constraints, where nothing but rounding is left of that error
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+from typing import Any
+
 import numpy as np
 
-from dap3d_core.integrators.runge_kutta.tableau import Floats
+from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import compiled_inside
 
 #: Rows of ``lengths``: as they are at t, and their rates over the last step.
@@ -74,3 +76,14 @@ def look_ahead(lengths: Floats, found: Floats, h: float) -> None:
     """Take rates from the end of a step that is not taken, because it is close to singular."""
     for k in range(lengths.shape[1]):
         lengths[RATE, k] = (found[k] - lengths[NOW, k]) / h
+
+
+def begin_singular(work: Any, slope: Floats, first_step: float) -> None:
+    """Give an integration the rates (n,) at its start, which are not those of its functions there.
+
+    The first step is one of those near a singular state, with its stages on the constraints, and
+    as long as may be: close to the state rates are known the worse.
+    """
+    work.k[0], work.h = slope, first_step
+    work.first_stage_valid = 1
+    work.lengths[NOW], work.lengths[RATE] = 0.0, np.finfo(float).tiny

@@ -8,28 +8,21 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import ENDS, UNSEEN
-from dap3d_core.integrators.runge_kutta.tableau import Floats
 from dap3d_core.integrators.stepping.integration_state import (
     BAND,
     BEND,
-    CROSSINGS,
-    CULPRIT,
     DOES,
-    ENDING,
     LOGGED,
-    LOOKED,
     OTHER,
     RATE,
     SIDE,
-    STEP,
     SWITCHED,
     VALUE,
     Function,
-    H,
-    T,
-    Work,
+    IntegrationState,
     Y,
 )
+from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import compiled_inside
 
 #: Part of a usual step over which rates are found by differences, and the least part of the time.
@@ -38,7 +31,7 @@ DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-8
 
 @compiled_inside
 def evaluate(
-    work: Work, t: float, x: Floats, row: int, watch: Function, system: Any, loops: Any
+    work: IntegrationState, t: float, x: Floats, row: int, watch: Function, system: Any, loops: Any
 ) -> None:
     """The switches at a state, into a row.
 
@@ -52,26 +45,26 @@ def evaluate(
 
 
 @compiled_inside
-def look(work: Work, slope: Floats, watch: Function, system: Any, loops: Any) -> None:
+def look(work: IntegrationState, slope: Floats, watch: Function, system: Any, loops: Any) -> None:
     """Values, sides and rates at the state; the run ends where it should have ended before."""
-    real, integer, s = work.real, work.integer, work.switches
+    s = work.switches
     y = work.state[Y]
-    evaluate(work, real[T], y, VALUE, watch, system, loops)
+    evaluate(work, work.t, y, VALUE, watch, system, loops)
     for k in range(s.shape[1]):
         if s[SIDE, k] == 0.0:
             s[SIDE, k] = np.sign(s[VALUE, k])
             s[VALUE, k] += s[SIDE, k] * s[BAND, k]
         s[BEND, k] = 0.0
         if s[DOES, k] == ENDS and s[SIDE, k] < 0.0:
-            integer[ENDING], integer[CULPRIT] = SWITCHED, k
-            log(work, k, real[T])
-    find_rates(work, real[T], y, slope, VALUE, RATE, watch, system, loops)
-    integer[LOOKED] = 1
+            work.end_status, work.terminal_switch = SWITCHED, k
+            log(work, k, work.t)
+    find_rates(work, work.t, y, slope, VALUE, RATE, watch, system, loops)
+    work.switch_rates_valid = 1
 
 
 @compiled_inside
 def find_rates(
-    work: Work, t: float, y: Floats, slope: Floats, row: int, out: int, watch: Function,
+    work: IntegrationState, t: float, y: Floats, slope: Floats, row: int, out: int, watch: Function,
     system: Any, loops: Any,
 ) -> None:  # fmt: skip
     """Rates of the switches along the slope, by a difference, from their values in a row."""
@@ -106,24 +99,24 @@ def leaves(s: Floats, row: int) -> bool:
 
 
 @compiled_inside
-def log(work: Work, k: int, t: float) -> None:
+def log(work: IntegrationState, k: int, t: float) -> None:
     """Note that a switch changed its sign, where somebody wants to know."""
     if work.switches[DOES, k] == UNSEEN:
         return
-    count = work.integer[CROSSINGS]
+    count = work.crossing_count
     if count < LOGGED:
         row = work.crossings[count]
         row[0], row[1], row[2] = t, k, work.switches[SIDE, k]
-    work.integer[CROSSINGS] = count + 1
+    work.crossing_count = count + 1
 
 
 @compiled_inside
-def span(work: Work) -> float:
+def span(work: IntegrationState) -> float:
     """The time, s, whose rounding bounds what can be told apart."""
-    return max(abs(work.real[T]), work.times[-1] - work.times[0])
+    return max(abs(work.t), work.times[-1] - work.times[0])
 
 
 @compiled_inside
-def usual_step(work: Work) -> float:
+def usual_step(work: IntegrationState) -> float:
     """The step that the motion asks for."""
-    return work.real[STEP] if work.real[STEP] != 0.0 else work.real[H]
+    return work.fixed_step if work.fixed_step != 0.0 else work.h

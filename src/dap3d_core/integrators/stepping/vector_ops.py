@@ -1,13 +1,18 @@
 """The arithmetic of a step: sums over stages, the norm of the error, interpolation.
 
 Loops run over the components innermost, four stages at a time, so that a sum of many stages reads
-and writes its result a few times only; the terms come from ``method.combinations``.
+and writes its result a few times only; the terms come from ``tableau.combinations``.
 """
 
-from dap3d_core.integrators.runge_kutta.tableau import GROUP, GROUPS, TERMS, Floats
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE
+from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import compiled_inside
 
+#: Terms of a linear combination of stages that are added in one pass over the components.
+GROUP = 4
+#: Columns of a row of such terms: number of groups; then for each group its weights and the stages
+#: that they belong to.
+GROUPS, TERMS = 1, 2
 #: Larger numbers leave double precision in products such as m v^2: they end a run before an energy
 #: of it becomes infinite. What a scene may give has the same bound (validate/coerce_values.py).
 _LARGEST = 1e100

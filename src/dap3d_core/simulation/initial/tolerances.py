@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.integrators import Integration
-from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE, ROUNDED, RTOL, H, Y
+from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE, Y
 from dap3d_core.model.state_layout import split
 from dap3d_core.scene import Simulation
 from dap3d_core.scene.validate.settings import QUANTITIES, USUAL_ATOL
@@ -98,11 +98,11 @@ def motion_notes(low: Floats, high: Floats, settings: Simulation) -> list[str]:
 def rounding_notes(runs: Sequence[Integration], names: Sequence[str]) -> list[str]:
     """That rounding, and not the tolerances, limits the accuracy of some bodies, in words."""
     work = runs[-1].work
-    if not work.integer[ROUNDED] > 1:
+    if not work.rounding_state > 1:
         return []
     n = len(names)
-    noise = work.real[H] * work.tolerance[NOISE, :-1]
-    above = noise > work.tolerance[ABSOLUTE, :-1] + work.real[RTOL] * np.abs(work.state[Y, :-1])
+    noise = work.h * work.tolerance[NOISE, :-1]
+    above = noise > work.tolerance[ABSOLUTE, :-1] + work.rtol * np.abs(work.state[Y, :-1])
     worst = [bool(np.any(np.concatenate([part[k] for part in split(above)]))) for k in range(n)]
     bodies = [name for name, is_worst in zip(names, worst, strict=True) if is_worst]
     if not bodies:

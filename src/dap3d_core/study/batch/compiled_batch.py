@@ -10,8 +10,9 @@ from dap3d_core.assembly.arrays import STEPS, System, step_functions
 from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Machine
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS
+from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.step import advance
-from dap3d_core.integrators.stepping.integration_state import Status, Work
+from dap3d_core.integrators.stepping.integration_state import Status
 from dap3d_core.kernels.runtime.cache import table_of
 from dap3d_core.kernels.runtime.function_lists import INTEGER, LOOP_LIST, procedure_signature
 from dap3d_core.model.groups import Floats, Integers
@@ -25,7 +26,7 @@ CALL = 200_000
 #: Constants of the metric in which displacements are measured in m (Model.length) and rad.
 UNIT_METRIC = np.array([1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
 
-_DRIVE = procedure_signature(Work.type_of(), STEPS, System.type_of(), LOOP_LIST, INTEGER)
+_DRIVE = procedure_signature(RungeKuttaState.type_of(), STEPS, System.type_of(), LOOP_LIST, INTEGER)
 
 
 class BatchRows(NamedTuple):

@@ -15,28 +15,13 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import DOUBTFUL, UNSETTLED, System
+from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.stepping.integration_state import (
-    CUT,
-    CUTS,
-    ERROR_OLD,
     FINISHED,
-    FRESH,
-    LAST_REJECTED,
-    LIMIT,
-    LOOKED,
     NOISE,
-    PROJECT_ON,
-    RHS,
-    ROW,
     RUNNING,
     SIDE,
-    STATUS,
-    STEP,
-    STEPS,
     Function,
-    H,
-    T,
-    Work,
     Y,
 )
 from dap3d_core.integrators.stepping.output import project_state
@@ -112,8 +97,8 @@ def set_numbers(points: Points, p: int, system: System) -> None:
 
 
 @compiled_inside
-def reset_work(points: Points, p: int, work: Work) -> None:
-    """Reset the work to that before a run, with the state of point p."""
+def put_back(points: Points, p: int, work: RungeKuttaState) -> None:
+    """The work as it is before a run, with the state of point p."""
     copy_into(work.real, points.first_real)
     copy_into(work.integer, points.first_integer)
     for k in range(work.switches.shape[0]):
@@ -127,14 +112,19 @@ def reset_work(points: Points, p: int, work: Work) -> None:
 
 @compiled_inside
 def start(
-    points: Points, p: int, work: Work, starting: Sequence[Function], system: System, loops: Any
+    points: Points,
+    p: int,
+    work: RungeKuttaState,
+    starting: Sequence[Function],
+    system: System,
+    loops: Any,
 ) -> bool:
-    """Start the run of point p; returns False if it has to be run individually."""
-    diagnostics, metric = points.diagnostics[p], system.metric
-    reset_work(points, p, work)
-    set_numbers(points, p, system)
-    t, y = work.real[T], work.state[Y]
-    if points.at[START] != 0:
+    """Make ready for the run of point p; whether it can be run here."""
+    found, metric = points.found[p], system.metric
+    put_back(points, p, work)
+    put_numbers(points, p, system)
+    t, y = work.t, work.state[Y]
+    if points.at[ASSEMBLES] != 0:
         for b in range(1, metric.shape[0]):
             copy_into(metric[b], points.unit)
         starting[1](t, y, points.starting, system, loops)
@@ -150,40 +140,44 @@ def start(
 
 
 @compiled_inside
-def restart(work: Work) -> None:
-    """Restart the step control, as ``Integration.restart``."""
-    real, integer = work.real, work.integer
-    real[H], real[ERROR_OLD], real[CUT] = 0.0, 1e-4, np.inf
-    integer[FRESH] = integer[LOOKED] = integer[LAST_REJECTED] = integer[CUTS] = 0
+def restart(work: RungeKuttaState) -> None:
+    """As ``Integration.restart``."""
+    work.h, work.last_error, work.step_limit_at_switch = 0.0, 1e-4, np.inf
+    work.first_stage_valid = work.switch_rates_valid = work.last_rejected = work.cut_attempts = 0
     for q in range(work.switches.shape[1]):
         work.switches[SIDE, q] = 0.0
 
 
 @compiled_inside
 def next_stop(
-    stops: Floats, work: Work, functions: Any, drive: Function, system: System, loops: Any
+    stops: Floats,
+    work: RungeKuttaState,
+    functions: Any,
+    drive: Function,
+    system: System,
+    loops: Any,
 ) -> float:
-    """The next time that no step crosses, as ``Integration._next_stop``."""
-    real, adaptive = work.real, work.real[STEP] == 0.0
+    """As ``Integration._next_stop``."""
+    adaptive = work.fixed_step == 0.0
     for k in range(stops.shape[0]):
         t = stops[k, 0]
-        if t < real[T]:
+        if t < work.t:
             continue
         before = np.nextafter(t, -np.inf) if stops[k, 1] != 0.0 and adaptive else t
-        if real[T] < before:
+        if work.t < before:
             return before
         if before < t:
-            real[T] = real[LIMIT] = t
+            work.t = work.t_limit = t
             drive(work, functions, system, loops, 0)
-            if work.integer[STATUS] != RUNNING:
+            if work.status != RUNNING:
                 return t
-            real[T] = np.nextafter(t, np.inf)
+            work.t = np.nextafter(t, np.inf)
             restart(work)
-            if work.integer[PROJECT_ON] != 0:
-                work.integer[STATUS] = project_state(
-                    real, work.integer, real[T], work.state[Y], functions[1], system, loops
+            if work.projects != 0:
+                work.status = project_state(
+                    work, work.t, work.state[Y], functions[1], system, loops
                 )
-                if work.integer[STATUS] != RUNNING:
+                if work.status != RUNNING:
                     return t
     return np.inf
 
@@ -191,7 +185,7 @@ def next_stop(
 @compiled
 def run_points(
     points: Points,
-    work: Work,
+    work: RungeKuttaState,
     functions: Any,
     drives: Any,
     starting: Any,
@@ -203,7 +197,7 @@ def run_points(
 
     Rows of a run that is not FINISHED, by its ``diagnostics``, are not valid.
     """
-    at, integer, diagnostics = points.at, work.integer, points.diagnostics
+    at, found = points.at, points.found
     drive, spent, nt = drives[0], 0, work.rows.shape[0]
     while at[POINT] < diagnostics.shape[0] and spent <= budget:
         p = at[POINT]
@@ -217,19 +211,17 @@ def run_points(
                 at[POINT] += 1
                 continue
             at[BEGUN] = 1
-        calls = integer[RHS]
+        calls = work.rhs_count
         if points.stops.shape[0] != 0:
-            work.real[LIMIT] = next_stop(points.stops, work, functions, drive, system, loops)
+            work.t_limit = next_stop(points.stops, work, functions, drive, system, loops)
         drive(work, functions, system, loops, budget - spent)
-        work.real[LIMIT] = np.inf
-        spent += integer[RHS] - calls
-        if integer[STATUS] != RUNNING:
-            for k in range(integer[ROW]):
+        work.t_limit = np.inf
+        spent += work.rhs_count - calls
+        if work.status != RUNNING:
+            for k in range(work.row_count):
                 copy_into(points.rows[p * nt + k], work.rows[k])
-            diagnostics[p, ENDED], diagnostics[p, ROWS] = integer[STATUS], integer[ROW]
-            diagnostics[p, TAKEN], diagnostics[p, CALLS] = integer[STEPS], integer[RHS]
-            diagnostics[p, FRICTION_FAILURES] = (
-                system.settings[UNSETTLED] + system.settings[DOUBTFUL]
-            )
+            found[p, ENDED], found[p, ROWS] = work.status, work.row_count
+            found[p, TAKEN], found[p, CALLS] = work.step_count, work.rhs_count
+            found[p, LOOSE] = system.settings[UNSETTLED] + system.settings[DOUBTFUL]
             at[POINT] += 1
             at[BEGUN] = 0

@@ -12,18 +12,10 @@ positions, so that the two are always nearly parallel, but it grows as often as 
 which the component grows clears the scene.
 """
 
+from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.stepping.integration_state import (
-    CALM_STEPS,
-    ERROR_SIZE,
-    LATE_STAGE,
     OTHER,
-    STAGES,
-    STEPS,
-    STIFF_AT,
-    STIFF_STEPS,
     TRIAL,
-    T,
-    Work,
     Y,
 )
 from dap3d_core.integrators.stepping.vector_ops import combine
@@ -38,35 +30,34 @@ LEAST, PARALLEL = 0.5, 0.96
 
 
 @compiled_inside
-def watch_stiffness(work: Work, h: float) -> None:
+def watch_stiffness(work: RungeKuttaState, h: float) -> None:
     """Note in STIFF_AT when the scene has become stiff; f at the trial state stands in ``k``.
 
     The trial state is that of the method, not yet projected.
     """
-    real, integer = work.real, work.integer
-    late = integer[LATE_STAGE]
-    if late == 0 or real[STIFF_AT] < real[T]:
+    late = work.stiffness_stage
+    if late == 0 or work.t_stiff < work.t:
         return
-    if integer[STIFF_STEPS] == 0 and integer[STEPS] % EVERY != 0:
+    if work.stiff_steps == 0 and work.step_count % EVERY != 0:
         return
     other, trial = work.state[OTHER], work.state[TRIAL]
     combine(other, 1.0, work.state[Y], h, work.table, late, work.k)
     upper = lower = along = 0.0
-    for i in range(integer[ERROR_SIZE]):
-        change = h * (work.k[integer[STAGES], i] - work.k[late, i])
+    for i in range(work.error_size):
+        change = h * (work.k[work.stage_count, i] - work.k[late, i])
         apart = trial[i] - other[i]
         upper += change * change
         lower += apart * apart
         along += change * apart
     marked = along * along > PARALLEL * upper * lower and upper > LEAST * LEAST * lower
     if marked and along > 0.0:
-        integer[STIFF_STEPS] = integer[CALM_STEPS] = 0
+        work.stiff_steps = work.nonstiff_steps = 0
     elif marked:
-        integer[STIFF_STEPS] += 1
-        integer[CALM_STEPS] = 0
-        if integer[STIFF_STEPS] >= STIFF:
-            real[STIFF_AT] = real[T]
-    elif integer[STIFF_STEPS] > 0:
-        integer[CALM_STEPS] += 1
-        if integer[CALM_STEPS] >= CLEARED:
-            integer[STIFF_STEPS] = integer[CALM_STEPS] = 0
+        work.stiff_steps += 1
+        work.nonstiff_steps = 0
+        if work.stiff_steps >= STIFF:
+            work.t_stiff = work.t
+    elif work.stiff_steps > 0:
+        work.nonstiff_steps += 1
+        if work.nonstiff_steps >= CLEARED:
+            work.stiff_steps = work.nonstiff_steps = 0

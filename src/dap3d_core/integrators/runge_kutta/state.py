@@ -1,0 +1,23 @@
+"""The state of an integration by an explicit Runge-Kutta method."""
+
+from typing import Any, ClassVar
+
+import attrs
+
+from dap3d_core.integrators.stepping.integration_state import IntegrationState
+from dap3d_core.kernels.runtime.array_struct import MATRIX, Floats
+
+
+@attrs.define(eq=False, kw_only=True, slots=False)
+class RungeKuttaState(IntegrationState):
+    """What ``advance`` reads and writes; n components, S stages (tableau.Tableau)."""
+
+    types: ClassVar[dict[str, Any]] = {
+        **IntegrationState.types,
+        **dict.fromkeys(("k", "terms", "table", "lengths"), MATRIX),
+    }
+
+    k: Floats  # (S, n) stages; k[0] is f(t, y)
+    terms: Floats  # (4 + rows of d, n) of the dense output over the last step
+    table: Floats  # tableau.combinations
+    lengths: Floats  # (2, m) singularity measures at t, their rates over the last step

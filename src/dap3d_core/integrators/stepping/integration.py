@@ -1,0 +1,346 @@
+"""An integration seen from Python: set up, advanced in chunks, drained of its rows, restored."""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dap3d_core.assembly.arrays import UNSEEN
+from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.stepping.input_checks import (
+    check_control,
+    check_sizes,
+    check_state_and_times,
+)
+from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState, Status
+from dap3d_core.integrators.stepping.output import FAILED
+from dap3d_core.integrators.stepping.restore import Restorable
+from dap3d_core.integrators.stepping.rounding import tolerance_of
+from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.runtime.cache import jit_is_on
+
+
+class Statistics(NamedTuple):
+    """What an integration has done so far."""
+
+    steps: int  # accepted
+    rejected: int  # tried and thrown away
+    rhs: int  # calls of rhs alone
+    projections: int  # calls of project
+    reports: int  # calls of report
+
+
+class Integration(Restorable):
+    """An initial value problem on its way: ``advance`` it until its status is no longer RUNNING.
+
+    Parameters
+    ----------
+    functions
+        ``[rhs, project, report]``: a typed list of first-class functions of the signature
+        ``void(t, y, out, system, loops)`` (step.py says what each does); a plain list where
+        compilation is off. ``project`` is called only with ``project_on``.
+    system, loops
+        Handed on to the functions: a tuple of arrays, and a typed list of first-class functions.
+    y0
+        (n,) state at ``times[0]``, used as it is: it is not projected.
+    times
+        (nt,) increasing reporting times; the first is t0, the last t_end.
+    rtol, atol
+        Tolerances: the error of a step is measured by ``atol + rtol max(|y0|, |y1|)``; atol is one
+        number, or one for each component.
+    step
+        Fixed step, without error control: equal steps, none longer. A method with dense output
+        takes them from t0 to t_end, one without (rk4, which needs ``step``) from reporting time to
+        reporting time; adams takes none.
+    first_step
+        First step that error control tries; by default it is chosen as in HNW I, II.4.
+    project_on
+        Whether accepted steps and interpolated states are projected.
+    error_size
+        Number of leading components that steer the step; all by default.
+    report_size
+        Number of values that ``report`` gives.
+    buffer_rows
+        Number of rows that wait at most to be taken by ``rows``.
+    length_count
+        Number of lengths that ``project`` gives, which vanish at singular states
+        (stepping/singular_poses.py).
+    watched
+        Whether the fourth function is called with each accepted state.
+    ends
+        (2, q) for each switch that the fifth function gives, what it does: the run ENDS where it
+        becomes negative; the integration BEGINS anew where it changes its sign
+        (stepping/event_location.py), which is noted down, or UNSEEN. And how far beyond zero it may
+        be until that is so.
+
+    Raises
+    ------
+    ValueError
+        For times, sizes, tolerances or steps that make no sense.
+    """
+
+    #: Name in messages; whether it chooses its steps by their error.
+    name: str
+    adaptive: bool = True
+    #: Class of ``work``, and rows of its ``state``.
+    state_class: type[IntegrationState]
+    state_rows = at.STATES
+    #: Trailing components that never steer the step.
+    unscaled_size = 0
+    #: Times in ascending order that no step goes over, and whether the right-hand side may jump
+    #: there, so that the integration starts anew.
+    stops: Sequence[tuple[float, bool]] = ()
+    #: Whether its formulas are implicit.
+    implicit = False
+
+    def __init__(
+        self,
+        functions: Sequence[Function],
+        system: Any,
+        loops: Any,
+        y0: ArrayLike,
+        times: ArrayLike,
+        *,
+        rtol: float = 1e-8,
+        atol: ArrayLike = 1e-10,
+        step: float | None = None,
+        first_step: float | None = None,
+        project_on: bool = False,
+        error_size: int | None = None,
+        report_size: int = 0,
+        buffer_rows: int = 256,
+        length_count: int = 0,
+        watched: bool = False,
+        ends: ArrayLike = (),
+    ) -> None:
+        self._arguments = (functions, system, loops)
+        y = np.array(y0, dtype=np.float64)
+        instants = np.array(times, dtype=np.float64)
+        check_state_and_times(y, instants)
+        check_control(self, rtol, atol, instants, step=step, first_step=first_step)
+        size = y.size - self.unscaled_size
+        error_size = size if error_size is None else error_size
+        check_sizes(error_size, size, buffer_rows)
+        rtol, atol = self.error_tolerances(rtol, atol)
+        switches = np.asarray(ends, dtype=np.float64).reshape(2, -1)
+        count = switches.shape[1]
+        #: All the state there is, as arrays: copied and put back, the run goes on from there.
+        self.work: Any = self.state_class(
+            real=np.zeros(at.MEASURES + length_count),
+            integer=np.zeros(len(self.state_class.indices("integer")), dtype=np.int64),
+            times=instants,
+            state=np.zeros((self.state_rows, y.size)),
+            rows=np.empty((buffer_rows, 1 + y.size + report_size)),
+            switches=np.zeros((at.SWITCH_ROWS, count)),
+            crossings=np.zeros((at.LOGGED if count else 0, 3)),
+            tolerance=tolerance_of(y.size, atol),
+            **self.own_arrays(y.size, length_count),
+        )
+        work = self.work
+        work.state[at.Y] = y
+        work.switches[[at.DOES, at.BAND]] = switches
+        work.switch_count = count
+        work.sampled_switch_count = int(np.count_nonzero(switches[0] != UNSEEN))
+        work.t, work.h, work.fixed_step = instants[0], first_step or 0.0, step or 0.0
+        work.rtol, work.error_size = rtol, error_size
+        work.projects, work.calls_accepted = project_on, watched
+        work.t_limit = work.step_limit_at_switch = work.longest_step = np.inf
+
+    def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:
+        """Further arrays of ``work``, for ``size`` components."""
+        raise NotImplementedError
+
+    def error_tolerances(self, rtol: float, atol: ArrayLike) -> tuple[float, Any]:
+        """Tolerances that the error estimate of a step is compared with."""
+        return rtol, atol
+
+    def compile(self) -> None:
+        """Compile what ``advance`` needs, or load it, without doing a step."""
+        status = int(self.work.status)
+        self.work.status = Status.FINISHED
+        self._advance(0)
+        self.work.status = status
+
+    def _advance(self, budget: int) -> None:
+        """Call the compiled loop of the integrator."""
+        raise NotImplementedError
+
+    def advance(self, budget: int) -> Status:
+        """Go on until more than ``budget`` calls of rhs are spent, the buffer is full, or the end.
+
+        How a run is cut into chunks changes no bit of its result. Take the ``rows`` after each.
+
+        Raises
+        ------
+        RuntimeError
+            If the buffer is full on entry, so that nothing can be done.
+        """
+        if self.rows_are_full and self.status is Status.RUNNING:
+            raise RuntimeError("the row buffer is full: take rows() before advancing")
+        asked = self.work.t_limit
+        if self.stops:
+            self.work.t_limit = min(asked, self._next_stop())
+        self._go(budget)
+        self.work.t_limit = asked
+        return self.status
+
+    def _go(self, budget: int) -> None:
+        if jit_is_on():
+            self._advance(budget)
+        else:
+            with np.errstate(all="ignore"):  # as in compiled code, which tests what matters
+                self._advance(budget)
+
+    def _next_stop(self) -> float:
+        """The time that the next step may not go over.
+
+        Where the right-hand side may jump steps end just before and go on just behind, so that none
+        has samples of both sides; the state stays, which is right to the rounding of time, but for
+        what the constraints make of it there. Fixed steps end on their grid, and on what jumps.
+        """
+        work, is_adaptive = self.work, self.work.fixed_step == 0.0
+        for t, jumps in self.stops[bisect_left(self.stops, (self.t, False)) :]:
+            before = float(np.nextafter(t, -np.inf)) if jumps and is_adaptive else t
+            if self.t < before:
+                return before
+            if before < t:
+                work.t = work.t_limit = t
+                self._go(0)  # no step: what is asked for at t is reported
+                if self.rows_are_full or self.status is not Status.RUNNING:
+                    return t
+                work.t = np.nextafter(t, np.inf)
+                self.restart()
+                if not self._project():
+                    return t
+        return np.inf
+
+    def _project(self) -> bool:
+        """Bring the state onto its constraints where they have moved, if that is on.
+
+        Whether the run goes on.
+        """
+        functions, system, loops = self._arguments
+        work = self.work
+        if work.projects == 0:
+            return True
+        work.projection_moved = work.projection_outcome = 0.0
+        work.projection_count += 1
+        with np.errstate(all="ignore"):  # as compiled code does
+            functions[1](self.t, work.state[at.Y], work.real[at.PROJECTED :], system, loops)
+        if work.projection_outcome == FAILED:
+            work.t_stop, work.status = self.t, Status.PROJECTION_FAILED
+        return bool(work.projection_outcome != FAILED)
+
+    def advance_to(self, limit: float) -> Status:
+        """Try one step, or what stands in its place, that ends at time ``limit`` at the latest."""
+        self.work.t_limit = limit
+        status = self.advance(0)
+        self.work.t_limit = np.inf
+        return status
+
+    def state_arrays(self) -> list[Any]:
+        """All arrays that a step changes, but for rows that wait: copied and put back, as before.
+
+        What ``functions`` keep in ``system`` is not among them.
+        """
+        same = ("times", "rows", "table", "crossings")
+        names = [name for name, _ in self.work.type_of().members if name not in same]
+        arrays = [getattr(self.work, name) for name in names]
+        return [array for array in arrays if isinstance(array, np.ndarray)]
+
+    def restart(self) -> None:
+        """Let the next step start anew: what the functions compute has changed."""
+        work = self.work
+        work.h = 0.0
+        work.last_error, work.step_limit_at_switch = 1e-4, np.inf
+        work.first_stage_valid = work.switch_rates_valid = 0
+        work.last_rejected = work.cut_attempts = 0
+        work.switches[at.SIDE] = 0.0
+
+    def end(self) -> None:
+        """End the run where it stands: the next ``advance`` reports this state, and stops."""
+        self.work.end_status = Status.ENDED
+
+    def rows(self) -> Floats:
+        """Take the waiting rows out of the buffer: (k, 1 + n + report_size), each t, y, report."""
+        taken: Floats = self.work.rows[: self.work.row_count].copy()
+        self.work.row_count = 0
+        return taken
+
+    @property
+    def status(self) -> Status:
+        """Where the integration stands."""
+        return Status(int(self.work.status))
+
+    @property
+    def t(self) -> float:
+        """Time reached by accepted steps."""
+        return float(self.work.t)
+
+    @property
+    def y(self) -> Floats:
+        """(n,) state at ``t``, a copy."""
+        y: Floats = self.work.state[at.Y].copy()
+        return y
+
+    @property
+    def t_stop(self) -> float | None:
+        """Time of what stopped the run short: end of the step that failed, or a reporting time."""
+        if self.status in (Status.RUNNING, Status.FINISHED):
+            return None
+        return float(self.work.t_stop)
+
+    @property
+    def slope(self) -> Floats | None:
+        """(n,) dy/dt at ``t``, a copy; None where it is not known."""
+        if self.work.first_stage_valid == 0:
+            return None
+        slope: Floats = self.work.k[0].copy()
+        return slope
+
+    @property
+    def most_work(self) -> float:
+        """The largest magnitude of the last component at an accepted state."""
+        return float(self.work.largest_work)
+
+    @property
+    def stiff_at(self) -> float | None:
+        """Time since which the scene is stiff for this method, if noticed (stiffness.py)."""
+        found = float(self.work.t_stiff)
+        return found if 0.0 < found < np.inf else None
+
+    @property
+    def rows_are_full(self) -> bool:
+        """Whether ``rows`` must be taken before it can go on."""
+        return int(self.work.row_count) == len(self.work.rows)
+
+    @property
+    def culprit(self) -> int:
+        """Which switch ended the run, where one did."""
+        return int(self.work.terminal_switch)
+
+    @property
+    def chatter(self) -> tuple[float, int]:
+        """Since when, s, the changes of the culprit are counted, and how many there were."""
+        since, count = self.work.switches[[at.SINCE, at.COUNT], self.culprit]
+        return float(since), int(count)
+
+    @property
+    def crossings(self) -> Floats:
+        """(k, 3) time, which switch, to which side (+1 or -1): the first ``LOGGED`` of them."""
+        found: Floats = self.work.crossings[: self.crossing_count].copy()
+        return found
+
+    @property
+    def crossing_count(self) -> int:
+        """How often a switch has changed its sign."""
+        return int(self.work.crossing_count)
+
+    @property
+    def statistics(self) -> Statistics:
+        """What has been done so far."""
+        w = self.work
+        counts = w.step_count, w.rejected_count, w.rhs_count, w.projection_count, w.report_count
+        return Statistics(*map(int, counts))
