@@ -26,7 +26,7 @@ def start(rhs, y0, times, project=toys.no_constraint, report=toys.plain_report, 
 
 @compiled
 def predicted(work, h, k):
-    adams.coefficients(work, h, k)
+    adams.update_coefficients(work, h, k)
     adams.predict(work, h, k)
 
 

@@ -1,50 +1,61 @@
 """Where steps end for the sake of a singular state ahead, and that a run may be cut there."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from support import redundant
 
 import dap3d_core as dap
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
-from dap3d_core.integrators.stepping.singular_poses import NOW, RATE, aim, is_near, look_back
+from dap3d_core.integrators.stepping.integration_state import MEASURES
+from dap3d_core.integrators.stepping.singular_poses import (
+    NOW,
+    RATE,
+    is_near_singularity,
+    limit_step_at_singularity,
+    update_measures,
+)
 
 
-def lengths_of(*pairs):
-    """(2, m) from (length, rate) of each row."""
-    return np.array(pairs, dtype=float).T.copy()
+def state_of(*pairs, gap=0.5):
+    """State with (measure, rate) of each node, and the middle of the widest gap."""
+    lengths = np.array(pairs, dtype=float).T.copy()
+    return SimpleNamespace(lengths=lengths, widest_gap_abscissa=gap)
 
 
-@pytest.mark.parametrize("calm", [0.25, 7 / 15, 0.55])
+@pytest.mark.parametrize("gap", [0.25, 7 / 15, 0.55])
 @pytest.mark.parametrize("left", np.linspace(0.02, 2.5, 40))
-def test_the_step_across_has_the_singular_state_in_its_gap(calm, left):
+def test_the_step_across_has_the_singular_state_in_its_gap(gap, left):
     """From any distance: no step is longer than allowed or ends close to the singular state, and
-    the one across has it at ``calm``, exactly. 2.5 steps away it is crossed by the fifth."""
+    the one across has it at ``gap``, exactly. 2.5 steps away it is crossed by the fifth."""
     h = 1.0
     for _ in range(5):
-        step = aim(lengths_of((2.0 * left, -2.0), (1.0, 0.1)), calm, h)
+        step = limit_step_at_singularity(state_of((2.0 * left, -2.0), (1.0, 0.1), gap=gap), h)
         assert 0.0 < step <= h
         if step > left:
-            assert left / step == pytest.approx(calm, rel=1e-12)
+            assert left / step == pytest.approx(gap, rel=1e-12)
             return
         left -= step
-        assert left >= 0.9 * calm * h
+        assert left >= 0.9 * gap * h
     raise AssertionError(f"never across: {left} left")
 
 
 def test_nothing_ahead_leaves_the_step_alone():
     """Rates that are zero, positive or unknown, and a state far away."""
     for pair in ((1.0, 0.0), (1.0, 3.0), (np.nan, np.nan), (1.0, -0.1)):
-        assert aim(lengths_of(pair), 0.5, 1.0) == 1.0
-        assert not is_near(lengths_of(pair), 0.1)
+        assert limit_step_at_singularity(state_of(pair), 1.0) == 1.0
+        assert not is_near_singularity(state_of(pair), 0.1)
 
 
 def test_lengths_count_from_the_far_side_after_a_crossing():
     """They are square roots and turn round at zero: -0.2 -> 0.3 is a rate of 0.5, and of the row
     that did not cross -0.1."""
-    lengths = lengths_of((0.2, -0.5), (1.0, -0.1))
-    look_back(lengths, np.array([0.3, 0.9]), 1.0)
-    assert lengths[NOW] == pytest.approx([0.3, 0.9])
-    assert lengths[RATE] == pytest.approx([0.5, -0.1])
+    state = state_of((0.2, -0.5), (1.0, -0.1))
+    state.real = np.array([*np.zeros(MEASURES), 0.3, 0.9])
+    update_measures(state, 1.0)
+    assert state.lengths[NOW] == pytest.approx([0.3, 0.9])
+    assert state.lengths[RATE] == pytest.approx([0.5, -0.1])
 
 
 def test_the_middle_of_the_widest_gap():

@@ -84,7 +84,7 @@ def make_table() -> Floats:
 
 
 @compiled_inside
-def coefficients(work: AdamsState, h: float, k: int) -> None:
+def update_coefficients(work: AdamsState, h: float, k: int) -> None:
     """beta, g and sigma of a step h; among equal steps they stay what they were."""
     table = work.table
     psi, following, beta, sigma = table[PSI], table[PSI_NEXT], table[BETA_ROW], table[SIGMA]
@@ -150,7 +150,7 @@ def predict(work: AdamsState, h: float, k: int) -> None:
 
 
 @compiled_inside
-def differences_at(work: AdamsState, k: int, h: float) -> tuple[float, float, float]:
+def difference_norms(work: AdamsState, k: int, h: float) -> tuple[float, float, float]:
     """Scaled sizes of Phi_k, Phi_(k-1), Phi_(k-2) at the prediction; NaN where a number is none.
 
     What of them is rounding (stepping/rounding.py) is not counted.

@@ -24,17 +24,17 @@ from dap3d_core.integrators.adams.formulas import (
     PSI_NEXT,
     ROWS,
     AdamsState,
-    coefficients,
     compare_orders,
-    differences_at,
+    difference_norms,
     interpolate,
     predict,
+    update_coefficients,
 )
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
+    is_sample_across,
     next_length,
-    sample,
-    settle,
+    update_switches_after_step,
 )
 from dap3d_core.integrators.stepping.integration_state import (
     NOT_FINITE,
@@ -48,7 +48,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Y,
 )
 from dap3d_core.integrators.stepping.output import may_step, project_state
-from dap3d_core.integrators.stepping.rounding import note_failure, watch_rounding
+from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.step_control import (
     EPSILON,
     LARGEST,
@@ -77,7 +77,7 @@ def advance_adams(
     while may_step(work, state_at, limit, project, report, system, loops):
         steps, rejected, h = work.step_count, work.rejected_count, work.h
         step(work, rhs, project, watch, system, loops)
-        watch_rounding(work, work.differences[0], h, rejected, rhs, system, loops)
+        update_rounding(work, work.differences[0], h, rejected, rhs, system, loops)
         if work.calls_accepted != 0 and work.step_count > steps:
             functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
 
@@ -128,17 +128,17 @@ def step(
         if h == 0.0:
             return
         t1 = t1 if h == t1 - t else t + h
-    coefficients(work, h, k)
+    update_coefficients(work, h, k)
     predict(work, h, k)
     trial, table = work.state[TRIAL], work.table
-    if work.switch_count != 0 and sample(work, t1, trial, watch, system, loops):
+    if work.switch_count != 0 and is_sample_across(work, t1, trial, watch, system, loops):
         return
     rates, change = work.scaled[ROWS - 1], work.state[SCRATCH]
     work.rhs_count += 1
     rhs(t1, trial, rates, system, loops)
     for i in range(trial.size):
         change[i] = rates[i] - change[i]  # Phi_k at t1
-    sizes = differences_at(work, k, h)
+    sizes = difference_norms(work, k, h)
     error = h * abs(table[G_ROW, k - 1] - table[G_ROW, k]) * sizes[0]
     here, below, lower = compare_orders(table, h, k, sizes)
     if 1.0 < error <= LARGEST and h * SLOWEST < step_floor(work):
@@ -153,24 +153,24 @@ def step(
             trial[i] += g * change[i]
         failure = project_state(work, t1, trial, project, system, loops)
         if failure == RUNNING:
-            if find_rates(work, t1, rhs, watch, system, loops):
+            if complete_step(work, t1, rhs, watch, system, loops):
                 accept(work, t1, k, here, below, lower)
         else:
-            fail(work, t1, h, 1, 0.1, failure)
+            reject(work, t1, h, 1, 0.1, failure)
     elif error <= LARGEST:
-        note_failure(work, error, h, work.failure_count != 0)
+        record_failure(work, error, h, work.failure_count != 0)
         work.failure_count += 1
         factor = SLOWEST
         if work.failure_count > PATIENCE:
             factor = max(0.1, min(SLOWEST, math.sqrt(PLANNED / here)))
         order = k - 1 if lower else k
-        fail(work, t1, h, 1 if work.failure_count >= PATIENCE else order, factor, STEP_FLOOR)
+        reject(work, t1, h, 1 if work.failure_count >= PATIENCE else order, factor, STEP_FLOOR)
     else:
-        fail(work, t1, h, 1, 0.1, NOT_FINITE)
+        reject(work, t1, h, 1, 0.1, NOT_FINITE)
 
 
 @compiled_inside
-def find_rates(
+def complete_step(
     work: AdamsState, t1: float, rhs: Function, watch: Function, system: Any, loops: Any
 ) -> bool:
     """The rates at the trial state; False where they are not finite, or it lies across a switch."""
@@ -208,7 +208,7 @@ def accept(work: AdamsState, t1: float, k: int, here: float, below: float, lower
     work.equal_steps += 1
     work.failure_count, work.last_order = 0, k
     plan(work, h, k, here, below, lower)
-    settle(work, h, h, t1)
+    update_switches_after_step(work, h, h, t1)
 
 
 @compiled_inside
@@ -245,7 +245,7 @@ def plan(work: AdamsState, h: float, k: int, here: float, below: float, lower: b
 
 
 @compiled_inside
-def fail(work: AdamsState, t1: float, h: float, order: int, factor: float, cause: int) -> None:
+def reject(work: AdamsState, t1: float, h: float, order: int, factor: float, cause: int) -> None:
     """Try a shorter step again, of another order perhaps; at the floor, stop for ``cause``."""
     work.rejected_count += 1
     work.is_starting, work.equal_steps, work.next_order = 0, 0, order

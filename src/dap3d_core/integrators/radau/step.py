@@ -27,9 +27,9 @@ from dap3d_core.integrators.radau.state import (
 )
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
+    is_sample_across,
     next_length,
-    sample,
-    settle,
+    update_switches_after_step,
 )
 from dap3d_core.integrators.stepping.integration_state import (
     NOT_FINITE,
@@ -42,15 +42,15 @@ from dap3d_core.integrators.stepping.integration_state import (
     Y,
 )
 from dap3d_core.integrators.stepping.output import dense_state, may_step, project_state
-from dap3d_core.integrators.stepping.rounding import note_failure, watch_rounding
+from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.step_control import (
     ACROSS_A_SWITCH,
-    ELSEWHERE,
     LARGEST,
-    RETREAT,
+    STEP_AFTER_FAILURE,
+    STEP_AFTER_SINGULAR_END,
     end_of_step,
     first_step,
-    is_poor,
+    lands_near_singularity,
     reject,
     step_floor,
 )
@@ -93,7 +93,7 @@ def advance(
         else:
             step(work, parts, project, watch, system, loops, tangent, matrix)
             if work.rounding_state != 0:  # a step that rounding failed
-                watch_rounding(work, work.state[SLOPE], h, rejected, rhs, system, loops)
+                update_rounding(work, work.state[SLOPE], h, rejected, rhs, system, loops)
         if work.calls_accepted != 0 and work.step_count > steps:
             functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
 
@@ -149,7 +149,7 @@ def step(
         work.tangent_needed = 1
         shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
     if shorter != 0.0:
-        refuse(work, t1, h, shorter)
+        reject_iteration(work, t1, h, shorter)
         return
     if work.switch_count != 0 and stage_is_across(work, t, h, watch, system, loops):
         return
@@ -157,30 +157,30 @@ def step(
         state[TRIAL, k] = state[Y, k] + work.Z[2, k]
     error = estimate_error(t, h, work, system, loops, tangent, matrix) if adaptive else 0.0
     if error < 1.0:
-        failure = land(work, t1, h, project, system, loops)
+        failure = project_end(work, t1, h, project, system, loops)
         if failure == RUNNING:
             find_slope(t, h, work, system, loops, tangent, matrix)
-            failure = finish(work, t1, h, watch, system, loops)
+            failure = complete_step(work, t1, h, watch, system, loops)
         if failure == ACROSS_A_SWITCH:
             return
-        if failure == RUNNING and adaptive and is_poor(work, t1):
+        if failure == RUNNING and adaptive and lands_near_singularity(work, t1):
             work.near_singular_landings += 1
-            reject(work, t1, h * ELSEWHERE, STEP_FLOOR)
+            reject(work, t1, h * STEP_AFTER_SINGULAR_END, STEP_FLOOR)
         elif failure == RUNNING:
             work.near_singular_landings = 0
             accept(work, t1, h, error)
-            settle(work, h, longest, end)
+            update_switches_after_step(work, h, longest, end)
         else:
-            reject(work, t1, h * RETREAT, failure)
+            reject(work, t1, h * STEP_AFTER_FAILURE, failure)
     elif error <= LARGEST:
-        note_failure(work, error, h, work.last_rejected != 0)
-        factor = max(SHRINKAGE, safety(work) / error**0.25)
+        record_failure(work, error, h, work.last_rejected != 0)
+        factor = max(SHRINKAGE, safety_factor(work) / error**0.25)
         reject(work, t1, h * factor, STEP_FLOOR)
         if work.has_last_step == 0:
             work.h = min(work.h, 0.1 * h)
         work.tangent_needed = max(work.tangent_needed, 1 - work.tangent_is_current)
     else:
-        reject(work, t1, h * RETREAT, NOT_FINITE)
+        reject(work, t1, h * STEP_AFTER_FAILURE, NOT_FINITE)
 
 
 @compiled_inside
@@ -192,7 +192,7 @@ def stage_is_across(
     for i in range(2):
         for k in range(x.shape[0]):
             x[k] = work.state[Y, k] + work.Z[i, k]
-        if sample(work, t + work.method.c[i] * h, x, watch, system, loops):
+        if is_sample_across(work, t + work.method.c[i] * h, x, watch, system, loops):
             return True
     return False
 
@@ -221,27 +221,27 @@ def iterate(
 
 
 @compiled_inside
-def refuse(work: RadauState, t1: float, h: float, shorter: float) -> None:
+def reject_iteration(work: RadauState, t1: float, h: float, shorter: float) -> None:
     """Shorten a step whose stages were not found; a fixed one is tried with a new tangent first."""
     stale = work.tangent_is_current == 0
     work.tangent_needed = 1
     if not shorter > 0.0:  # NaN
-        reject(work, t1, h * RETREAT, NOT_FINITE)
+        reject(work, t1, h * STEP_AFTER_FAILURE, NOT_FINITE)
     elif work.fixed_step == 0.0 or not stale:
         if work.state_change > newton_limit(work):
-            note_failure(work, work.state_change, h, work.last_rejected != 0)
+            record_failure(work, work.state_change, h, work.last_rejected != 0)
         reject(work, t1, h * shorter, STEP_FLOOR)
 
 
 @compiled_inside
-def safety(work: RadauState) -> float:
+def safety_factor(work: RadauState) -> float:
     """Safety factor of the next step: smaller where the iteration took long (HW IV.8)."""
     most = 2.0 * MOST
     return min(SAFETY, SAFETY * (1.0 + most) / (work.last_iterations + most))
 
 
 @compiled_inside
-def land(
+def project_end(
     work: RadauState, t1: float, h: float, project: Function, system: System, loops: Any
 ) -> int:
     """The work done, and the trial state projected; why that failed, or RUNNING."""
@@ -255,7 +255,7 @@ def land(
 
 
 @compiled_inside
-def finish(
+def complete_step(
     work: RadauState, t1: float, h: float, watch: Function, system: System, loops: Any
 ) -> int:
     """Prepare dense output where a reporting time lies in the step; RUNNING, or why not."""
@@ -298,7 +298,7 @@ def accept(work: RadauState, t1: float, h: float, error: float) -> None:
 @compiled_inside
 def choose_next(work: RadauState, h: float, error: float, good: bool) -> None:
     """The next step, after an accepted one."""
-    divisor = error**0.25 / safety(work)
+    divisor = error**0.25 / safety_factor(work)
     if work.has_last_step != 0:
         trend = (error * error / work.accepted_error) ** 0.25
         divisor = max(divisor, work.accepted_step / h * trend / SAFETY)

@@ -24,16 +24,15 @@ from collections.abc import Sequence
 from typing import Any
 
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
-from dap3d_core.integrators.runge_kutta.stiffness import watch_stiffness
+from dap3d_core.integrators.runge_kutta.stiffness import detect_stiffness
 from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
+    is_sample_across,
     next_length,
-    sample,
-    settle,
+    update_switches_after_step,
 )
 from dap3d_core.integrators.stepping.integration_state import (
-    MEASURES,
     NOT_FINITE,
     OTHER,
     PROJECTED,
@@ -49,41 +48,41 @@ from dap3d_core.integrators.stepping.output import (
     may_step,
     project_state,
 )
-from dap3d_core.integrators.stepping.rounding import note_failure, watch_rounding
+from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.singular_poses import (
-    aim,
-    is_near,
-    look_ahead,
-    look_back,
-    singular_ahead,
+    is_near_singularity,
+    limit_step_at_singularity,
+    predict_measures,
+    time_to_singularity,
+    update_measures,
 )
 from dap3d_core.integrators.stepping.step_control import (
     ACROSS_A_SWITCH,
-    ELSEWHERE,
     LARGEST,
-    RETREAT,
+    STEP_AFTER_FAILURE,
+    STEP_AFTER_SINGULAR_END,
     accept,
-    beyond_rounding,
+    combined_error,
     end_of_step,
+    error_beyond_rounding,
     error_norm,
     first_step,
-    is_poor,
-    joined,
+    lands_near_singularity,
     reject,
-    shrinkage,
     step_floor,
+    step_reduction,
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite, combine, copy, scaled_largest
 from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
 
 #: Near a singular state nothing is known better than to this part of the largest component.
-BLURRED = 1e-11
+POSITION_NOISE = 1e-11
 #: Projection may move a result by this part of it, and no more: the error of what it takes away
 #: tells of no other branch.
-JUMP = 1e-2
+MAX_PROJECTION = 1e-2
 #: An error up to this may be rounding.
-ROUNDED = 100.0
+MAX_ROUNDING_ERROR = 100.0
 
 
 @compiled
@@ -101,7 +100,7 @@ def advance(
         steps, rejected = work.step_count, work.rejected_count
         h = work.h
         step(work, rhs, project, watch, system, loops)
-        watch_rounding(work, work.k[0], h, rejected, rhs, system, loops)
+        update_rounding(work, work.k[0], h, rejected, rhs, system, loops)
         if work.calls_accepted != 0 and work.step_count > steps:
             functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
 
@@ -123,46 +122,46 @@ def step(
         work.h = first_step(work, work.k, rhs, system, loops)
     end = t1 = end_of_step(work)
     longest = t1 - work.t
-    h = aim(work.lengths, work.widest_gap_abscissa, longest) if adaptive else longest
+    h = limit_step_at_singularity(work, longest) if adaptive else longest
     if work.switch_count != 0 or work.t_limit < t1:
         h = min(h, next_length(work, t1, work.k[0], project, watch, system, loops))
         if h == 0.0:
             return
     if h < longest:
         t1 = work.t + h
-    near = work.projects != 0 and is_near(work.lengths, longest)
+    near = work.projects != 0 and is_near_singularity(work, longest)
     if not take_stages(work, t1, h, near, rhs, project, watch, system, loops):
         return
     error = 0.0
     if adaptive and near:
-        error = kept_error(work, t1, h, project, system, loops)
+        error = projected_error_norm(work, t1, h, project, system, loops)
     elif adaptive:
         error = error_norm(work, h)
     if 1.0 < error <= LARGEST:
-        error = judged(work, near, h, error)
+        error = error_above_rounding(work, near, h, error)
     if error <= 1.0:
-        failure = land(work, t1, near, rhs, project, watch, system, loops)
+        failure = complete_step(work, t1, near, rhs, project, watch, system, loops)
         if failure == ACROSS_A_SWITCH:
             return
-        if failure == RUNNING and adaptive and not near and is_poor(work, t1):
+        if failure == RUNNING and adaptive and not near and lands_near_singularity(work, t1):
             work.near_singular_landings += 1
-            look_ahead(work.lengths, work.real[MEASURES:], h)
-            shorter = h if aim(work.lengths, work.widest_gap_abscissa, h) < h else h * ELSEWHERE
-            reject(work, t1, shorter, STEP_FLOOR)
+            predict_measures(work, h)
+            is_ahead = limit_step_at_singularity(work, h) < h
+            reject(work, t1, h if is_ahead else h * STEP_AFTER_SINGULAR_END, STEP_FLOOR)
         elif failure == RUNNING:
             work.near_singular_landings = 0
-            if singular_ahead(work.lengths, h) < h:
+            if time_to_singularity(work, h) < h:
                 work.error_across_singularity = 0.0
-            look_back(work.lengths, work.real[MEASURES:], h)
+            update_measures(work, h)
             accept(work, t1, error)
-            settle(work, h, longest, end)
+            update_switches_after_step(work, h, longest, end)
         else:
-            reject(work, t1, h * RETREAT, failure)
+            reject(work, t1, h * STEP_AFTER_FAILURE, failure)
     elif error <= LARGEST:
-        note_failure(work, error, h, work.last_rejected != 0)
-        reject(work, t1, h * shrinkage(work, error), STEP_FLOOR)
+        record_failure(work, error, h, work.last_rejected != 0)
+        reject(work, t1, h * step_reduction(work, error), STEP_FLOOR)
     else:
-        reject(work, t1, h * RETREAT, NOT_FINITE)
+        reject(work, t1, h * STEP_AFTER_FAILURE, NOT_FINITE)
 
 
 @compiled_inside
@@ -178,12 +177,12 @@ def find_first_stage(work: RungeKuttaState, rhs: Function, system: Any, loops: A
 
 
 @compiled_inside
-def judged(work: RungeKuttaState, near: bool, h: float, error: float) -> float:
+def error_above_rounding(work: RungeKuttaState, near: bool, h: float, error: float) -> float:
     """The error of a step that is too large, but for what a shorter step could not do better."""
     if near:
         return 1.0 if is_rounding(work, h, error) else error
-    if h * shrinkage(work, error) < step_floor(work):
-        return min(error, beyond_rounding(work, h))
+    if h * step_reduction(work, error) < step_floor(work):
+        return min(error, error_beyond_rounding(work, h))
     return error
 
 
@@ -213,9 +212,9 @@ def take_stages(
             c = table[i, ABSCISSA]
             t = t1 if c == 1.0 else work.t + c * h
             if near:
-                on_constraints(work, t, x, project, system, loops)
+                project_stage(work, t, x, project, system, loops)
                 x = work.state[SCRATCH]
-            if watched and sample(work, t, x, watch, system, loops):
+            if watched and is_sample_across(work, t, x, watch, system, loops):
                 return False
             work.rhs_count += 1
             rhs(t, x, k[i], system, loops)
@@ -223,7 +222,7 @@ def take_stages(
 
 
 @compiled_inside
-def on_constraints(
+def project_stage(
     work: RungeKuttaState, t: float, x: Floats, project: Function, system: Any, loops: Any
 ) -> None:
     """The state x of a stage, projected, into the scratch row (x may be that row)."""
@@ -233,28 +232,29 @@ def on_constraints(
 
 
 @compiled_inside
-def kept_error(
+def projected_error_norm(
     work: RungeKuttaState, t1: float, h: float, project: Function, system: Any, loops: Any
 ) -> float:
     """The error of a step as ``error_norm`` has it, but of the projected result.
 
     Near a singular state errors are large in a direction that projection takes away, up to rounding
-    over the square of the distance: below BLURRED nothing is asked for.
+    over the square of the distance: below POSITION_NOISE nothing is asked for.
     """
     table, k = work.table, work.k
     y, trial, result, other = (work.state[Y], work.state[TRIAL], work.state[SCRATCH],
                                work.state[OTHER])  # fmt: skip
-    on_constraints(work, t1, trial, project, system, loops)
+    project_stage(work, t1, trial, project, system, loops)
     jump = 0.0
     for i in range(work.error_size):
-        ratio = abs(result[i] - trial[i]) / (JUMP * (1.0 + max(abs(y[i]), abs(result[i]))))
+        largest = MAX_PROJECTION * (1.0 + max(abs(y[i]), abs(result[i])))
+        ratio = abs(result[i] - trial[i]) / largest
         if not ratio <= jump:
             jump = ratio
     if not jump <= 1.0:
         return jump
     least, main = 0.0, 0.0
     for i in range(work.error_size):
-        least = max(least, BLURRED * abs(y[i]))
+        least = max(least, POSITION_NOISE * abs(y[i]))
     for e in range(work.estimate_count):
         combine(other, 1.0, trial, -h, table, k.shape[0] + e, k)
         project_state(work, t1, other, project, system, loops)
@@ -263,7 +263,7 @@ def kept_error(
         size = scaled_largest(
             other, y, result, work.error_size, work.rtol, work.tolerance, h, least
         )
-        main = size if e == 0 else joined(main, size)
+        main = size if e == 0 else combined_error(main, size)
     return main
 
 
@@ -273,14 +273,14 @@ def is_rounding(work: RungeKuttaState, h: float, error: float) -> bool:
 
     It is mostly in the direction that projection takes away from there on.
     """
-    if not (singular_ahead(work.lengths, h) < h and error < ROUNDED):
+    if not (time_to_singularity(work, h) < h and error < MAX_ROUNDING_ERROR):
         return False
     before, work.error_across_singularity = work.error_across_singularity, error
     return before > 0.0 and error > 0.25 * before
 
 
 @compiled_inside
-def land(
+def complete_step(
     work: RungeKuttaState,
     t1: float,
     near: bool,
@@ -310,8 +310,8 @@ def land(
             at = t + table[i, ABSCISSA] * (t1 - t)
             combine(argument, 1.0, y, t1 - t, table, i, k)
             if near:
-                on_constraints(work, at, argument, project, system, loops)
-            if watched and sample(work, at, argument, watch, system, loops):
+                project_stage(work, at, argument, project, system, loops)
+            if watched and is_sample_across(work, at, argument, watch, system, loops):
                 return ACROSS_A_SWITCH
             rhs(at, argument, k[i], system, loops)
         work.rhs_count += k.shape[0] - 1 - result
@@ -322,7 +322,7 @@ def land(
         rhs(t1, trial, k[result], system, loops)
         known = here = True
     if controlled and known:
-        watch_stiffness(work, t1 - work.t)
+        detect_stiffness(work, t1 - work.t)
     copy(work.state[OTHER], trial)
     failure = project_state(work, t1, trial, project, system, loops, here)
     if failure != RUNNING:

@@ -30,7 +30,7 @@ LEAST, PARALLEL = 0.5, 0.96
 
 
 @compiled_inside
-def watch_stiffness(work: RungeKuttaState, h: float) -> None:
+def detect_stiffness(work: RungeKuttaState, h: float) -> None:
     """Note in STIFF_AT when the scene has become stiff; f at the trial state stands in ``k``.
 
     The trial state is that of the method, not yet projected.

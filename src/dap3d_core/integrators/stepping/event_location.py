@@ -1,17 +1,17 @@
-"""Switches of the model: a step ends where one of them changes its sign, and another law begins.
+"""Location of switches: a step ends where one of them changes its sign, and another law begins.
 
 ``watch(t, y, out, system, loops)`` gives the switches, numbers that vary smoothly with the state.
 A step is taken only if all its stages and its end lie on the sides from which it started; so no
 step mixes two laws, and the location needs no dense output, which would mix them as well
 (docs/decisions/0011). Near a crossing
 
-1. values and rates at both ends of the last step tell when it will be: the step ends shortly before
-   (``reach``); each such step brings it some thousand times nearer;
+1. values and rates at both ends of the last step predict it: the step ends shortly before
+   (``distance_to_crossing``); each such step brings it some thousand times nearer;
 2. an attempt with a sample on the other side is cut to where a parabola through that sample leads
-   (``shorten``); a cubic through both ends tells of a switch that changes its sign twice in a step;
-3. the last bit is an Euler step, so short that its error is below rounding: there the instant is
-   found by bisection, to the last digit of time (``creep``). The state goes to the far side, the
-   integration starts anew; where the switch ends the run, the state stays on the near side.
+   (``cut_step``); a cubic through both ends shows a switch that changes its sign twice in a step;
+3. the rest is an Euler step, so short that its error is below rounding: in it the instant is found
+   by bisection, to the last digit of time (``bisect_crossing``). The state goes to the far side,
+   the integration starts anew; where the switch ends the run, the state stays on the near side.
 """
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
@@ -46,13 +46,13 @@ from dap3d_core.integrators.stepping.integration_state import (
 from dap3d_core.integrators.stepping.output import project_state
 from dap3d_core.integrators.stepping.step_control import EPSILON, FLOOR
 from dap3d_core.integrators.stepping.switch_values import (
+    changes_sign,
     evaluate,
-    find_rates,
+    evaluate_start,
+    find_switch_rates,
     is_across,
-    leaves,
-    log,
-    look,
-    span,
+    record_crossing,
+    time_span,
     usual_step,
 )
 from dap3d_core.kernels.runtime.array_struct import Floats
@@ -60,13 +60,13 @@ from dap3d_core.kernels.runtime.cache import compiled_inside
 
 #: A crossing this part of a usual step away is reached by an Euler step: its error is of the order
 #: of the square.
-SHORT = 1e-9
+EULER_STEP_FRACTION = 1e-9
 #: The least part of the way to a crossing that is left for the next step, and the greatest.
-SPARE, MOST_SPARE = 1e-4, 0.05
+CROSSING_MARGIN, MAX_CROSSING_MARGIN = 1e-4, 0.05
 #: How often an Euler step towards a crossing that is nearer than rounding is doubled at most.
-MOST_STALLS = 20
+MAX_STALLS = 20
 #: Attempts in a row that may be cut because a cubic, and no sample, tells of two crossings.
-SUSPICIONS = 8
+MAX_SUSPICIONS = 8
 #: A switch that changes its sign more often than this while time goes on by less than this part of
 #: the run chatters.
 CHATTER, CHATTER_SPAN = 100, 1e-6
@@ -85,16 +85,16 @@ def next_length(
     h = longest
     if work.switch_count != 0:
         if work.switch_rates_valid == 0:
-            look(work, slope, watch, system, loops)
+            evaluate_start(work, slope, watch, system, loops)
             if work.end_status != 0:
                 return 0.0
-        h = reach(work, h)
-    short = max(SHORT * usual_step(work), 4.0 * FLOOR * span(work))
-    short *= 2.0 ** min(work.stalled_steps, MOST_STALLS)
+        h = distance_to_crossing(work, h)
+    short = max(EULER_STEP_FRACTION * usual_step(work), 4.0 * FLOOR * time_span(work))
+    short *= 2.0 ** min(work.stalled_steps, MAX_STALLS)
     if h > short or h == end - work.t:
         return h
     h = min(min(longest, 2.0 * short), work.times[work.next_report] - work.t)
-    creep(work, h, end, slope, project, watch, system, loops)
+    bisect_crossing(work, h, end, slope, project, watch, system, loops)
     return 0.0
 
 
@@ -112,7 +112,7 @@ def time_to_zero(value: float, rate: float, bend: float) -> float:
 
 
 @compiled_inside
-def reach(work: IntegrationState, h: float) -> float:
+def distance_to_crossing(work: IntegrationState, h: float) -> float:
     """How far a step of length h may go: it ends shortly before the next crossing."""
     s, longest = work.switches, h
     h = min(h, work.step_limit_at_switch)
@@ -126,12 +126,12 @@ def reach(work: IntegrationState, h: float) -> float:
         left = time_to_zero(value, rate, bend)
         if left < longest:
             doubt = 0.5 * left * bend / rate if rate < 0.0 else 1.0
-            h = min(h, left * (1.0 - min(MOST_SPARE, SPARE + doubt * doubt)))
+            h = min(h, left * (1.0 - min(MAX_CROSSING_MARGIN, CROSSING_MARGIN + doubt * doubt)))
     return h
 
 
 @compiled_inside
-def sample(
+def is_sample_across(
     work: IntegrationState, t: float, x: Floats, watch: Function, system: Any, loops: Any
 ) -> bool:
     """Whether a state within a step lies across; then the step is cut.
@@ -145,14 +145,14 @@ def sample(
     for k in range(s.shape[1]):
         if s[DOES, k] == UNSEEN:
             s[SAMPLE, k] = s[SIDE, k]
-    if not leaves(s, SAMPLE):
+    if not changes_sign(s, SAMPLE):
         return False
-    shorten(work, SAMPLE, t - work.t)
+    cut_step(work, SAMPLE, t - work.t)
     return True
 
 
 @compiled_inside
-def shorten(work: IntegrationState, row: int, h: float) -> None:
+def cut_step(work: IntegrationState, row: int, h: float) -> None:
     """Cut the next attempt to before the crossing that a sample at h told of."""
     s = work.switches
     left = h
@@ -178,17 +178,18 @@ def end_is_across(
     """
     s, trial, h = work.switches, work.state[TRIAL], t1 - work.t
     evaluate(work, t1, trial, FOUND, watch, system, loops)
-    if leaves(s, FOUND):
-        shorten(work, FOUND, h)
+    if changes_sign(s, FOUND):
+        cut_step(work, FOUND, h)
         return True
-    find_rates(work, t1, trial, slope, FOUND, FOUND_RATE, watch, system, loops)
-    if work.cut_attempts >= SUSPICIONS:
+    find_switch_rates(work, t1, trial, slope, FOUND, FOUND_RATE, watch, system, loops)
+    if work.cut_attempts >= MAX_SUSPICIONS:
         return False
     part = 1.0
     for k in range(s.shape[1]):
         side = s[SIDE, k]
-        part = min(part, lowest(side * s[VALUE, k], h * side * s[RATE, k], side * s[FOUND, k],
-                                h * side * s[FOUND_RATE, k]))  # fmt: skip
+        low = cubic_minimum(side * s[VALUE, k], h * side * s[RATE, k], side * s[FOUND, k],
+                            h * side * s[FOUND_RATE, k])  # fmt: skip
+        part = min(part, low)
     if part == 1.0:
         return False
     work.cut_attempts += 1
@@ -198,7 +199,7 @@ def end_is_across(
 
 
 @compiled_inside
-def lowest(a: float, b: float, c: float, d: float) -> float:
+def cubic_minimum(a: float, b: float, c: float, d: float) -> float:
     """Where in (0, 1) the cubic with values a, c and slopes b, d at 0, 1 is least and negative.
 
     1 where it is not.
@@ -217,7 +218,9 @@ def lowest(a: float, b: float, c: float, d: float) -> float:
 
 
 @compiled_inside
-def settle(work: IntegrationState, h: float, longest: float, end: float) -> None:
+def update_switches_after_step(
+    work: IntegrationState, h: float, longest: float, end: float
+) -> None:
     """After a step was accepted: what its end told of switches; if cut, the motion's own step.
 
     h: its length; longest, end: the length it might have had, and where it would have ended.
@@ -243,31 +246,31 @@ def settle(work: IntegrationState, h: float, longest: float, end: float) -> None
 
 
 @compiled_inside
-def creep(
+def bisect_crossing(
     work: IntegrationState, h: float, end: float, slope: Floats, project: Function, watch: Function,
     system: Any, loops: Any,
 ) -> None:  # fmt: skip
     """An Euler step of length h, or to the crossing in it: the integration starts anew there."""
     s = work.switches
     t = work.t
-    low, high, least = 0.0, h, 1e-3 * EPSILON * span(work)
-    failure = go_on(work, high, slope, project, watch, system, loops)
+    low, high, least = 0.0, h, 1e-3 * EPSILON * time_span(work)
+    failure = euler_step(work, high, slope, project, watch, system, loops)
     crossed = work.switch_count != 0 and is_across(s, FOUND)
     if crossed:
         middle = 0.5 * high
         while failure == RUNNING and t + low < t + middle < t + high and high - low > least:
-            failure = go_on(work, middle, slope, project, watch, system, loops)
+            failure = euler_step(work, middle, slope, project, watch, system, loops)
             if is_across(s, FOUND):
                 high = middle
             else:
                 low = middle
             middle = 0.5 * (low + high)
         if failure == RUNNING:
-            failure = go_on(work, high, slope, project, watch, system, loops)
-        take_notice(work, t + high)
+            failure = euler_step(work, high, slope, project, watch, system, loops)
+        record_crossings(work, t + high)
         if failure == RUNNING and work.end_status == SWITCHED:
             high = low
-            failure = go_on(work, high, slope, project, watch, system, loops)
+            failure = euler_step(work, high, slope, project, watch, system, loops)
     if failure != RUNNING:
         work.t_stop, work.status = t + high, failure
         return
@@ -284,11 +287,11 @@ def creep(
         if s[VALUE, k] == 0.0 and s[FOUND, k] == 0.0:
             s[SIDE, k] = 0.0  # it stays zero: it has no side until it leaves
     if crossed:
-        forget(work)
+        reset_step_control(work)
 
 
 @compiled_inside
-def go_on(
+def euler_step(
     work: IntegrationState, h: float, slope: Floats, project: Function, watch: Function,
     system: Any, loops: Any,
 ) -> int:  # fmt: skip
@@ -303,14 +306,14 @@ def go_on(
 
 
 @compiled_inside
-def take_notice(work: IntegrationState, t: float) -> None:
+def record_crossings(work: IntegrationState, t: float) -> None:
     """Which switches changed their sign at t, and what follows: end, chatter, or another side."""
     s = work.switches
     for k in range(s.shape[1]):
         if not s[FOUND, k] * s[SIDE, k] < 0.0:
             continue
         s[SIDE, k] = -s[SIDE, k]
-        log(work, k, t)
+        record_crossing(work, k, t)
         if s[DOES, k] == ENDS and s[SIDE, k] < 0.0:
             work.end_status, work.terminal_switch = SWITCHED, k
         if s[COUNT, k] == 0.0 or t - s[SINCE, k] > CHATTER_SPAN * (work.times[-1] - work.times[0]):
@@ -321,7 +324,7 @@ def take_notice(work: IntegrationState, t: float) -> None:
 
 
 @compiled_inside
-def forget(work: IntegrationState) -> None:
+def reset_step_control(work: IntegrationState) -> None:
     """Let the control of the step start anew: what follows is another motion."""
     work.h, work.last_error = 0.0, 1e-4
     work.first_stage_valid = work.switch_rates_valid = work.last_rejected = 0

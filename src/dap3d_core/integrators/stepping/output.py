@@ -22,7 +22,7 @@ from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import compiled_inside, compiled_into
 
 #: What project says in out[1]: it failed; the state is good, but too close to a singular one.
-FAILED, POOR_PLACE = 1.0, 2.0
+FAILED, NEAR_SINGULAR = 1.0, 2.0
 
 
 @compiled_inside

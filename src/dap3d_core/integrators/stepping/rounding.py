@@ -52,7 +52,7 @@ def tolerance_of(size: int, atol: ArrayLike) -> Floats:
 
 
 @compiled_into
-def watch_rounding(
+def update_rounding(
     work: Any, f: Floats, h: float, rejected: int, rhs: Function, system: Any, loops: Any
 ) -> None:
     """Measure the rounding of the rates where the last step, of length h, gives a reason to.
@@ -86,7 +86,7 @@ def watch_rounding(
 
 
 @compiled_inside
-def note_failure(work: Any, error: float, h: float, again: bool) -> None:
+def record_failure(work: Any, error: float, h: float, again: bool) -> None:
     """Have an eye on a step of length h that failed; again: the one before it had failed, too."""
     before, work.failed_error_rate = work.failed_error_rate, error / h
     if again and error / h > SAME * before:

@@ -1,10 +1,10 @@
 """Steps across singular states, where the constraints lose rank for a moment.
 
-``project`` tells lengths (one for each node of joints) that go linearly through zero at a singular
-state. A step across has to keep its stages away from it: rounding of positions changes
-the acceleration at distance d by rounding / d^3. So steps are cut such that the singular state
-falls into the middle of the widest gap between the abscissae of the stages, and stages nearby are
-evaluated on the constraints, where nothing but rounding is left of that error
+``project`` gives singularity measures (one for each node of joints) that go linearly through zero
+at a singular state. A step across has to keep its stages away from it: rounding of positions
+changes the acceleration at distance d by rounding / d^3. So steps are cut such that the singular
+state falls into the middle of the widest gap between the abscissae of the stages, and stages nearby
+are evaluated on the constraints, where nothing but rounding is left of that error
 (docs/decisions/0007).
 """
 
@@ -15,10 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from dap3d_core.integrators.stepping.integration_state import MEASURES
 from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import compiled_inside
 
-#: Rows of ``lengths``: as they are at t, and their rates over the last step.
+#: Rows of ``lengths``: measures at t, and their rates over the last step.
 NOW, RATE = range(2)
 #: The step before the one across leaves this part of the way to the middle of that one's gap.
 SPARE = 0.95
@@ -27,9 +28,9 @@ MARGIN = 0.5
 
 
 @compiled_inside
-def singular_ahead(lengths: Floats, h: float) -> float:
+def time_to_singularity(work: Any, h: float) -> float:
     """Time left until the next singular state; infinite where none is less than 2 h away."""
-    left = np.inf
+    left, lengths = np.inf, work.lengths
     for k in range(lengths.shape[1]):
         now, rate = lengths[NOW, k], lengths[RATE, k]
         if now + 2.0 * h * rate < 0.0:
@@ -38,23 +39,20 @@ def singular_ahead(lengths: Floats, h: float) -> float:
 
 
 @compiled_inside
-def aim(lengths: Floats, calm: float, h: float) -> float:
-    """How long a step that may have length h should be: h, or less for the sake of a crossing.
-
-    calm: the part of a step at which a singular state should lie.
-    """
-    left = singular_ahead(lengths, h)
-    if not left < (1.0 + calm) * h:
+def limit_step_at_singularity(work: Any, h: float) -> float:
+    """Length of a step that may have length h: h, or less to place a singular state in its gap."""
+    left, gap = time_to_singularity(work, h), work.widest_gap_abscissa
+    if not left < (1.0 + gap) * h:
         return h
-    if left <= calm * h:
-        return left / calm
-    return min(h, left - SPARE * calm * h)
+    if left <= gap * h:
+        return left / gap
+    return min(h, left - SPARE * gap * h)
 
 
 @compiled_inside
-def is_near(lengths: Floats, h: float) -> bool:
-    """Whether a singular state lies in a step of length h, or close before or behind it."""
-    found = 0
+def is_near_singularity(work: Any, h: float) -> bool:
+    """True if a singular state lies in a step of length h, or close before or behind it."""
+    found, lengths = 0, work.lengths
     for k in range(lengths.shape[1]):
         now, change = lengths[NOW, k], lengths[RATE, k] * h
         found |= (now < -(1.0 + MARGIN) * change) | (now < MARGIN * change)
@@ -62,8 +60,9 @@ def is_near(lengths: Floats, h: float) -> bool:
 
 
 @compiled_inside
-def look_back(lengths: Floats, found: Floats, h: float) -> None:
-    """Take over the lengths found at the end of a step; beyond zero they count from there."""
+def update_measures(work: Any, h: float) -> None:
+    """Take over the measures at the end of a step; beyond zero they count from there."""
+    lengths, found = work.lengths, work.real[MEASURES:]
     for k in range(lengths.shape[1]):
         before, now = lengths[NOW, k], found[k]
         if before + h * lengths[RATE, k] < 0.0:
@@ -72,8 +71,9 @@ def look_back(lengths: Floats, found: Floats, h: float) -> None:
 
 
 @compiled_inside
-def look_ahead(lengths: Floats, found: Floats, h: float) -> None:
+def predict_measures(work: Any, h: float) -> None:
     """Take rates from the end of a step that is not taken, because it is close to singular."""
+    lengths, found = work.lengths, work.real[MEASURES:]
     for k in range(lengths.shape[1]):
         lengths[RATE, k] = (found[k] - lengths[NOW, k]) / h
 

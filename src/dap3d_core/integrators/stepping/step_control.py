@@ -16,7 +16,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Function,
     Y,
 )
-from dap3d_core.integrators.stepping.output import POOR_PLACE
+from dap3d_core.integrators.stepping.output import NEAR_SINGULAR
 from dap3d_core.integrators.stepping.vector_ops import combine, scaled_beyond, scaled_largest
 from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import compiled_inside
@@ -26,11 +26,11 @@ EPSILON = 2.220446049250313e-16
 FLOOR = 16.0 * EPSILON
 LARGEST = 1.7976931348623157e308
 #: Factor on a step that met a number that is not finite, or whose end could not be projected.
-RETREAT = 0.1
+STEP_AFTER_FAILURE = 0.1
 #: What completing a step gives besides a status: the step was cut.
 ACROSS_A_SWITCH = -1
 #: Factor on a step that ends near a singular state, and how often in a row that is tried.
-ELSEWHERE, ATTEMPTS = 0.6, 4
+STEP_AFTER_SINGULAR_END, SINGULAR_END_ATTEMPTS = 0.6, 4
 #: The last step is stretched by at most this factor, to end at t_end.
 STRETCH = 1.01
 
@@ -103,11 +103,11 @@ def error_norm(work: Any, h: float) -> float:
     if work.estimate_count == 1:
         return main
     combine(error, 0.0, y, h, table, first + 1, k)
-    return joined(main, scaled_largest(error, y, trial, size, rtol, tolerance, h))
+    return combined_error(main, scaled_largest(error, y, trial, size, rtol, tolerance, h))
 
 
 @compiled_inside
-def beyond_rounding(work: Any, h: float) -> float:
+def error_beyond_rounding(work: Any, h: float) -> float:
     """As ``error_norm``, of what is more than the rounding of time makes of the rates."""
     size, rtol, tolerance = work.error_size, work.rtol, work.tolerance
     y, trial, error = work.state[Y], work.state[TRIAL], work.state[SCRATCH]
@@ -116,12 +116,12 @@ def beyond_rounding(work: Any, h: float) -> float:
     for e in range(work.estimate_count):
         combine(error, 0.0, y, h, work.table, first + e, k)
         found = scaled_beyond(error, y, trial, k[0], last, rounding, size, rtol, tolerance)
-        main = found if e == 0 else joined(main, found)
+        main = found if e == 0 else combined_error(main, found)
     return main
 
 
 @compiled_inside
-def joined(main: float, other: float) -> float:
+def combined_error(main: float, other: float) -> float:
     """One error from the estimates of order 5 and 3."""
     total = main * main + 0.01 * other * other
     if total == 0.0:
@@ -130,7 +130,7 @@ def joined(main: float, other: float) -> float:
 
 
 @compiled_inside
-def shrinkage(work: Any, error: float) -> float:
+def step_reduction(work: Any, error: float) -> float:
     """The factor on a step whose error was too large."""
     return max(work.factor_min, work.safety / error**work.exponent)
 
@@ -167,7 +167,7 @@ def reject(work: Any, t1: float, shorter: float, cause: int) -> None:
 
 
 @compiled_inside
-def is_poor(work: Any, t1: float) -> bool:
+def lands_near_singularity(work: Any, t1: float) -> bool:
     """Whether a step should end elsewhere: project found the state close to a singular one.
 
     From there every next step would be inaccurate, while from some way before it one can step
@@ -175,7 +175,7 @@ def is_poor(work: Any, t1: float) -> bool:
     landing is taken.
     """
     return (
-        work.projection_outcome == POOR_PLACE
-        and work.near_singular_landings < ATTEMPTS
+        work.projection_outcome == NEAR_SINGULAR
+        and work.near_singular_landings < SINGULAR_END_ATTEMPTS
         and t1 < work.times[-1]
     )

@@ -45,7 +45,9 @@ def evaluate(
 
 
 @compiled_inside
-def look(work: IntegrationState, slope: Floats, watch: Function, system: Any, loops: Any) -> None:
+def evaluate_start(
+    work: IntegrationState, slope: Floats, watch: Function, system: Any, loops: Any
+) -> None:
     """Values, sides and rates at the state; the run ends where it should have ended before."""
     s = work.switches
     y = work.state[Y]
@@ -57,19 +59,19 @@ def look(work: IntegrationState, slope: Floats, watch: Function, system: Any, lo
         s[BEND, k] = 0.0
         if s[DOES, k] == ENDS and s[SIDE, k] < 0.0:
             work.end_status, work.terminal_switch = SWITCHED, k
-            log(work, k, work.t)
-    find_rates(work, work.t, y, slope, VALUE, RATE, watch, system, loops)
+            record_crossing(work, k, work.t)
+    find_switch_rates(work, work.t, y, slope, VALUE, RATE, watch, system, loops)
     work.switch_rates_valid = 1
 
 
 @compiled_inside
-def find_rates(
+def find_switch_rates(
     work: IntegrationState, t: float, y: Floats, slope: Floats, row: int, out: int, watch: Function,
     system: Any, loops: Any,
 ) -> None:  # fmt: skip
     """Rates of the switches along the slope, by a difference, from their values in a row."""
     h, x, s = (
-        max(DIFFERENCE * usual_step(work), LEAST_DIFFERENCE * span(work)),
+        max(DIFFERENCE * usual_step(work), LEAST_DIFFERENCE * time_span(work)),
         work.state[OTHER],
         work.switches,
     )
@@ -90,7 +92,7 @@ def is_across(s: Floats, row: int) -> bool:
 
 
 @compiled_inside
-def leaves(s: Floats, row: int) -> bool:
+def changes_sign(s: Floats, row: int) -> bool:
     """Whether a switch is on the other side, or zero: then it is not known which law holds."""
     found = 0
     for k in range(s.shape[1]):
@@ -99,7 +101,7 @@ def leaves(s: Floats, row: int) -> bool:
 
 
 @compiled_inside
-def log(work: IntegrationState, k: int, t: float) -> None:
+def record_crossing(work: IntegrationState, k: int, t: float) -> None:
     """Note that a switch changed its sign, where somebody wants to know."""
     if work.switches[DOES, k] == UNSEEN:
         return
@@ -111,7 +113,7 @@ def log(work: IntegrationState, k: int, t: float) -> None:
 
 
 @compiled_inside
-def span(work: IntegrationState) -> float:
+def time_span(work: IntegrationState) -> float:
     """The time, s, whose rounding bounds what can be told apart."""
     return max(abs(work.t), work.times[-1] - work.times[0])
 
