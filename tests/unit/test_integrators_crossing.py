@@ -1,7 +1,5 @@
 """Where steps end for the sake of a singular state ahead, and that a run may be cut there."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from support import redundant
@@ -20,8 +18,10 @@ from dap3d_core.integrators.stepping.singular_poses import (
 
 def state_of(*pairs, gap=0.5):
     """State with (measure, rate) of each node, and the middle of the widest gap."""
-    lengths = np.array(pairs, dtype=float).T.copy()
-    return SimpleNamespace(lengths=lengths, widest_gap_abscissa=gap)
+    run = RungeKutta(TABLEAUS["dop853"], [], (), (), [0.0], [0.0, 1.0], length_count=len(pairs))
+    run.work.lengths[:] = np.transpose(pairs)
+    run.work.widest_gap_abscissa = gap
+    return run.work
 
 
 @pytest.mark.parametrize("gap", [0.25, 7 / 15, 0.55])
@@ -52,7 +52,7 @@ def test_lengths_count_from_the_far_side_after_a_crossing():
     """They are square roots and turn round at zero: -0.2 -> 0.3 is a rate of 0.5, and of the row
     that did not cross -0.1."""
     state = state_of((0.2, -0.5), (1.0, -0.1))
-    state.real = np.array([*np.zeros(MEASURES), 0.3, 0.9])
+    state.real[MEASURES:] = 0.3, 0.9
     update_measures(state, 1.0)
     assert state.lengths[NOW] == pytest.approx([0.3, 0.9])
     assert state.lengths[RATE] == pytest.approx([0.5, -0.1])
