@@ -42,7 +42,7 @@ def _radau(machine: Machine, y0: Any, times: Any, **options: Any) -> Integration
 
 
 def _placed_steps(machine: Machine) -> dict[str, Any]:
-    """What explicit integrators know of singular poses and of turns."""
+    """Options of explicit integrators for singular poses and the counting of turns."""
     return {"length_count": machine.length_count, "watched": machine.counts_turns}
 
 

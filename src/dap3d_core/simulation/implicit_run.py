@@ -47,7 +47,7 @@ def change_note(t: float) -> str:
 
 def stiffness_notes(runs: Sequence[Integration], integrator: str) -> list[str]:
     """That the scene is stiff for the one integration of a run, where it is."""
-    t = runs[0].stiff_at
+    t = runs[0].t_stiff
     if t is None or len(runs) > 1:
         return []
     used = EXPLICIT.name if integrator == "auto" else integrator

@@ -255,9 +255,9 @@ class Run:
 
     def begin(self, integration: Integration) -> None:
         """Compile an integrator before the clock of the run goes on; it is the present one then."""
-        integration.stops = self.compiled.pace(float(self.times[-1])).stops
+        integration.tstops = self.compiled.pace(float(self.times[-1])).stops
         if self.limits is not None:
-            integration.stops = halved(integration.stops)
+            integration.tstops = halved(integration.tstops)
             integration.work.longest_step = self.limits.longest
         before = time.perf_counter()
         integration.compile()
@@ -375,7 +375,7 @@ class Run:
                 "rtol": self.settings.rtol,
                 "atol": self.settings.atol,
                 "length": self.machine.model.length,
-                "most_work": max((run.most_work for run in self.runs), default=0.0),
+                "most_work": max((run.largest_work for run in self.runs), default=0.0),
                 "step": self.settings.step,
                 "project": bool(self.settings.project),
                 "correct": bool(self.settings.correct),

@@ -48,7 +48,7 @@ def _error_constants() -> Floats:
 
 @attrs.define(eq=False, kw_only=True, slots=False)
 class AdamsState(IntegrationState):
-    """What ``advance_adams`` reads and writes; n components."""
+    """State of an integration by Adams methods; n components."""
 
     types: ClassVar[dict[str, Any]] = {
         **IntegrationState.types,

@@ -19,7 +19,7 @@ from dap3d_core.kernels.runtime.array_struct import Floats
 
 
 class AdamsIntegration(Integration):
-    """An initial value problem on its way, integrated by Adams methods of order 1 to 12.
+    """An initial value problem, integrated by Adams methods of order 1 to 12.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class AdamsIntegration(Integration):
         advance_adams(self.work, *self._arguments, budget)
 
     def state_arrays(self) -> list[Any]:
-        """As ``Integration.state_arrays``; here the table holds where the past rates stand."""
+        """As ``Integration.state_arrays``; here the table holds the times of past rates."""
         return [*super().state_arrays(), self.work.table]
 
     def restored(self, name: str, array: Any, found: Any) -> Any:
@@ -72,7 +72,7 @@ class AdamsIntegration(Integration):
         return super().allowed_integers(found) | allowed_adams_integers(found)
 
     @property
-    def slope(self) -> Floats | None:
+    def dy_dt(self) -> Floats | None:
         """(n,) dy/dt at ``t``, a copy; None where it is not known."""
         if self.work.first_stage_valid == 0:
             return None

@@ -70,7 +70,7 @@ PLANNED, PATIENCE = 0.5, 3
 def advance_adams(
     work: AdamsState, functions: Sequence[Function], system: Any, loops: Any, budget: int
 ) -> None:
-    """Go on as ``runge_kutta.advance`` does; functions and budget as there."""
+    """Integrate as ``runge_kutta.advance`` does; functions and budget as there."""
     rhs, project, report = functions[0], functions[1], functions[2]
     watch = functions[4] if work.switch_count != 0 else rhs
     limit = work.rhs_count + budget

@@ -1,4 +1,4 @@
-"""When the iteration of a Radau step has come to its end: at its limit, or at rounding."""
+"""Convergence of the iteration of a Radau step: at its limit, or at rounding."""
 
 # What a compiled function returns is Any to mypy.
 # mypy: disable-error-code="no-any-return"
@@ -45,13 +45,13 @@ def newton_limit(work: RadauState) -> float:
 
 @compiled_inside
 def converges(theta: float, change: float, limit: float, left: int) -> bool:
-    """Whether ``left`` more iterations at the rate theta come to the limit."""
+    """True if ``left`` more iterations at the rate theta reach the limit."""
     return theta < SLOWEST and theta / (1.0 - theta) * change * theta**left < limit
 
 
 @compiled_inside
 def is_stalled(states: float, multipliers: float, limit: float, work: RadauState) -> bool:
-    """Whether an iteration that does not converge has come to rounding, as far as the tangent goes.
+    """True if an iteration that does not converge has reached the rounding of its tangent.
 
     Multipliers are known to their own last digits: under large forces, and near a singular pose,
     these are more than a tolerance allows a state, but move none. States count as found where their
@@ -68,7 +68,7 @@ def is_stalled(states: float, multipliers: float, limit: float, work: RadauState
 
 @compiled_inside
 def is_settling(multipliers: float, work: RadauState) -> bool:
-    """Whether multipliers that have no part in the norm still converge, as they do before states.
+    """True if multipliers that have no part in the norm still converge, as they do before states.
 
     Behind a singular pose they change by much where the motion hardly does.
     """

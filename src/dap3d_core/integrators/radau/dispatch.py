@@ -1,4 +1,4 @@
-"""The parts of a Radau step as first-class functions, each compiled by itself.
+"""The parts of a Radau step as first-class functions, each compiled separately.
 
 A compiled function that calls another one takes in its code, and optimises it again; calls by
 pointer keep the parts apart.

@@ -23,7 +23,7 @@ from dap3d_core.linear.lu.plan import LuPlan, make_lu_plan
 
 
 class Effort(NamedTuple):
-    """What an implicit integration has done besides what ``Statistics`` counts."""
+    """Counts of an implicit integration besides those of ``Statistics``."""
 
     iterations: int
     jacobians: int
@@ -66,7 +66,7 @@ def make_matrix(machine: Machine, tangent: Any) -> tuple[Matrix, LuPlan]:
 
 
 class RadauIntegration(Integration):
-    """An initial value problem on its way, integrated by Radau IIA of order 5.
+    """An initial value problem, integrated by Radau IIA of order 5.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ class RadauIntegration(Integration):
         )  # fmt: skip
 
     def _project(self) -> bool:
-        """Nothing: it starts anew on the constraints by itself."""
+        """Nothing to do: ``start`` projects the state."""
         return True
 
     def state_arrays(self) -> list[Any]:
@@ -170,13 +170,13 @@ class RadauIntegration(Integration):
         return super().allowed_integers(found) | at.ALLOWED
 
     @property
-    def slope(self) -> Any:
-        """As ``Integration.slope``."""
+    def dy_dt(self) -> Any:
+        """As ``Integration.dy_dt``."""
         return self.work.state[at.SLOPE].copy() if self.work.first_stage_valid else None
 
     @property
     def effort(self) -> Effort:
-        """What has been done besides steps and stages."""
+        """Counts of iterations, Jacobians and factorisations so far."""
         work = self.work
         return Effort(
             int(work.iteration_count), int(work.jacobian_count), int(work.factorisation_count)

@@ -95,7 +95,7 @@ def find_tangent(
 
 @compiled_inside
 def pole(poles: Floats, h: float) -> Any:
-    """The complex pole of a step h, 1/s; numpy's, whose arithmetic compiled code has."""
+    """The complex pole of a step h, 1/s; of numpy, with the arithmetic of compiled code."""
     return np.complex128(complex(poles[1] / h, poles[2] / h))
 
 
@@ -295,7 +295,7 @@ def find_stages(
         work.last_iterations = done
         if not change <= LARGEST:
             return math.nan
-        if change == 0.0:  # rounding alone, which tells nothing of the rate of convergence
+        if change == 0.0:  # rounding alone, which shows no rate of convergence
             return 0.0
         if done > 1:
             ratio = change / before

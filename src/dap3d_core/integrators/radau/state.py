@@ -48,7 +48,7 @@ def _integer() -> Scalar[int]:
 
 @attrs.define(eq=False, kw_only=True, slots=False)
 class RadauState(IntegrationState):
-    """What ``advance`` reads and writes besides system, tangent and matrix.
+    """State of an implicit integration, besides system, tangent and matrix.
 
     n = 13 bodies + 1 components, R rows, N unknowns; mu and lambda are the two multipliers of each
     row, C and D v - nu its two residuals.

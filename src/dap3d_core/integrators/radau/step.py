@@ -82,7 +82,7 @@ def advance(
     matrix: Matrix,
     budget: int,
 ) -> None:
-    """Go on until more than ``budget`` stages are evaluated, the rows are full, or the run ends."""
+    """Integrate until more than ``budget`` stages are evaluated, the rows are full, or the end."""
     rhs, project, report = functions[0], functions[1], functions[2]
     watch = functions[4] if work.switch_count != 0 else rhs
     limit = work.rhs_count + budget
@@ -100,7 +100,7 @@ def advance(
 
 @compiled_inside
 def start(work: RadauState, rhs: Function, project: Function, system: System, loops: Any) -> None:
-    """Where a motion starts: on the constraints, with multipliers that belong to the state."""
+    """Project the state where a motion starts, and compute its rates and multipliers."""
     y = work.state[Y]
     failure = project_state(work, work.t, y, project, system, loops)
     if failure == RUNNING:
@@ -187,7 +187,7 @@ def step(
 def stage_is_across(
     work: RadauState, t: float, h: float, watch: Function, system: System, loops: Any
 ) -> bool:
-    """Whether an inner stage lies beyond a switch; then the step is cut."""
+    """True if an inner stage lies beyond a switch; then the step is cut."""
     x = work.state[SCRATCH]
     for i in range(2):
         for k in range(x.shape[0]):
@@ -208,7 +208,7 @@ def iterate(
     tangent: Tangent,
     matrix: Matrix,
 ) -> float:
-    """Find the stages from where they stand, with a new tangent if asked for; as find_stages."""
+    """Find the stages from their present values, with a new tangent if needed; as find_stages."""
     find_tangent, factorise_both, find_stages = parts[0], parts[1], parts[2]
     wrong = 0.0
     if work.tangent_needed != 0:
@@ -244,7 +244,7 @@ def safety_factor(work: RadauState) -> float:
 def project_end(
     work: RadauState, t1: float, h: float, project: Function, system: System, loops: Any
 ) -> int:
-    """The work done, and the trial state projected; why that failed, or RUNNING."""
+    """Compute the work done and project the trial state; the failure, or RUNNING."""
     n = work.state.shape[1]
     A = work.method.A
     for i in range(3):  # the work is a quadrature
@@ -258,7 +258,7 @@ def project_end(
 def complete_step(
     work: RadauState, t1: float, h: float, watch: Function, system: System, loops: Any
 ) -> int:
-    """Prepare dense output where a reporting time lies in the step; RUNNING, or why not."""
+    """Prepare dense output where a reporting time lies in the step; the failure, or RUNNING."""
     slope = work.state[TRIAL_SLOPE]
     if not all_finite(slope):
         return NOT_FINITE

@@ -10,7 +10,7 @@ from dap3d_core.kernels.runtime.array_struct import MATRIX, Floats
 
 @attrs.define(eq=False, kw_only=True, slots=False)
 class RungeKuttaState(IntegrationState):
-    """What ``advance`` reads and writes; n components, S stages (tableau.Tableau)."""
+    """State of an integration; n components, S stages (tableau.Tableau)."""
 
     types: ClassVar[dict[str, Any]] = {
         **IntegrationState.types,

@@ -1,12 +1,12 @@
-"""The one algorithm of all explicit Runge-Kutta methods: a compiled loop that can stop and go on.
+"""Explicit Runge-Kutta methods: a compiled loop that can be stopped and continued.
 
 It knows a vector y and first-class functions ``f(t, y, out, system, loops)``:
 
     rhs      out = dy/dt
-    project  moves y onto its constraints in place; on entry out[0] = 1 tells that rhs was the last
+    project  moves y onto its constraints in place; on entry out[0] = 1 means that rhs was the last
              one called, at this very t and y. Then out[0] = 1 where y changed by more than the
              rounding of a normalisation, out[1] = 1 where that failed, 2 where the state is too
-             close to a singular one to go on from; out[4:] = lengths that go linearly through zero
+             close to a singular one to continue; out[4:] = lengths that go linearly through zero
              at a singular state
     report   out = what else is reported at (t, y): accelerations, multipliers, ...
     accepted (only where something is watched) takes note of an accepted state
@@ -79,7 +79,7 @@ from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
 #: Near a singular state nothing is known better than to this part of the largest component.
 POSITION_NOISE = 1e-11
 #: Projection may move a result by this part of it, and no more: the error of what it takes away
-#: tells of no other branch.
+#: shows no other branch.
 MAX_PROJECTION = 1e-2
 #: An error up to this may be rounding.
 MAX_ROUNDING_ERROR = 100.0
@@ -89,7 +89,7 @@ MAX_ROUNDING_ERROR = 100.0
 def advance(
     work: RungeKuttaState, functions: Sequence[Function], system: Any, loops: Any, budget: int
 ) -> None:
-    """Go on until more than ``budget`` calls of rhs are spent, the rows are full, or the run ends.
+    """Integrate until more than ``budget`` calls of rhs are spent, the rows are full, or the end.
 
     At least one step is tried in each call, whatever the budget.
     """
@@ -178,7 +178,7 @@ def find_first_stage(work: RungeKuttaState, rhs: Function, system: Any, loops: A
 
 @compiled_inside
 def error_above_rounding(work: RungeKuttaState, near: bool, h: float, error: float) -> float:
-    """The error of a step that is too large, but for what a shorter step could not do better."""
+    """The error of a step that is too large, without what a shorter step could not reduce."""
     if near:
         return 1.0 if is_rounding(work, h, error) else error
     if h * step_reduction(work, error) < step_floor(work):
@@ -225,7 +225,7 @@ def take_stages(
 def project_stage(
     work: RungeKuttaState, t: float, x: Floats, project: Function, system: Any, loops: Any
 ) -> None:
-    """The state x of a stage, projected, into the scratch row (x may be that row)."""
+    """Project the state x of a stage into the scratch row (x may be that row)."""
     argument = work.state[SCRATCH]
     copy(argument, x)
     project_state(work, t, argument, project, system, loops)
@@ -235,10 +235,10 @@ def project_stage(
 def projected_error_norm(
     work: RungeKuttaState, t1: float, h: float, project: Function, system: Any, loops: Any
 ) -> float:
-    """The error of a step as ``error_norm`` has it, but of the projected result.
+    """As ``error_norm``, of the projected result.
 
     Near a singular state errors are large in a direction that projection takes away, up to rounding
-    over the square of the distance: below POSITION_NOISE nothing is asked for.
+    over the square of the distance: errors below POSITION_NOISE do not count.
     """
     table, k = work.table, work.k
     y, trial, result, other = (work.state[Y], work.state[TRIAL], work.state[SCRATCH],
@@ -269,7 +269,7 @@ def projected_error_norm(
 
 @compiled_inside
 def is_rounding(work: RungeKuttaState, h: float, error: float) -> bool:
-    """Whether the error of a step across a singular state is rounding: a shorter one had no less.
+    """True if the error of a step across a singular state is rounding: a shorter one had no less.
 
     It is mostly in the direction that projection takes away from there on.
     """
@@ -290,9 +290,9 @@ def complete_step(
     system: Any,
     loops: Any,
 ) -> int:
-    """Prepare dense output, evaluate f, project the trial state; why that failed, or RUNNING.
+    """Prepare dense output, evaluate f, project the trial state; the failure, or RUNNING.
 
-    Dense output belongs to the step as the method took it; what it gives is projected by itself.
+    Dense output belongs to the step as the method took it; what it gives is projected separately.
     f is evaluated before the projection, which then has less to do. Where that moves the state by
     no more than the step's error may be, the next step starts with the value all the same.
     """
@@ -343,7 +343,7 @@ def complete_step(
 
 @compiled_inside
 def is_within_error(work: RungeKuttaState) -> bool:
-    """Whether the trial state is as near to the other one as the error of a step may be."""
+    """True if the trial state differs from the other one by no more than a step may err."""
     y, trial, other = work.state[Y], work.state[TRIAL], work.state[OTHER]
     for i in range(other.size):
         other[i] -= trial[i]

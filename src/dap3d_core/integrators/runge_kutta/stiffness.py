@@ -1,4 +1,4 @@
-"""Whether an explicit method takes small steps because of motions that have died away.
+"""Detection of stiffness: small steps because of motions that have died away.
 
 Two stages at the end of a step, f(g) and f(y1), give h |lambda| = h |f(y1) - f(g)| / |y1 - g| of
 the component that dominates their difference (Hairer, Wanner, Solving Ordinary Differential
@@ -31,7 +31,7 @@ LEAST, PARALLEL = 0.5, 0.96
 
 @compiled_inside
 def detect_stiffness(work: RungeKuttaState, h: float) -> None:
-    """Note in STIFF_AT when the scene has become stiff; f at the trial state stands in ``k``.
+    """Set ``t_stiff`` when the scene has become stiff; f at the trial state is in ``k``.
 
     The trial state is that of the method, not yet projected.
     """

@@ -1,4 +1,4 @@
-"""What an explicit Runge-Kutta method is: coefficients, and facts that control its step."""
+"""Explicit Runge-Kutta methods as data: coefficients, and parameters that control the step."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -59,12 +59,12 @@ class Tableau:
 
     @property
     def adaptive(self) -> bool:
-        """Whether the method estimates its error and so can choose its step."""
+        """True if the method estimates its error and so can choose its step."""
         return len(self.e) > 0
 
     @property
     def dense(self) -> bool:
-        """Whether the method has dense output."""
+        """True if the method has dense output."""
         return len(self.d) > 0
 
     @property
@@ -76,12 +76,12 @@ class Tableau:
 
     @property
     def stiffness_stage(self) -> int:
-        """The last stage before the result that stands at the end of the step; 0: none."""
+        """The last stage before the result at the end of the step; 0: none."""
         return max(i for i in range(self.stages) if i == 0 or self.c[i] == 1.0)
 
     @property
     def error_uses_last_stage(self) -> bool:
-        """Whether the error estimate needs f at the result of the step."""
+        """True if the error estimate needs f at the result of the step."""
         return self.adaptive and bool(np.any(self.e[:, self.stages] != 0.0))
 
 

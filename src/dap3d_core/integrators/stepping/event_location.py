@@ -65,9 +65,9 @@ EULER_STEP_FRACTION = 1e-9
 CROSSING_MARGIN, MAX_CROSSING_MARGIN = 1e-4, 0.05
 #: How often an Euler step towards a crossing that is nearer than rounding is doubled at most.
 MAX_STALLS = 20
-#: Attempts in a row that may be cut because a cubic, and no sample, tells of two crossings.
+#: Attempts in a row that may be cut because a cubic, and no sample, shows two crossings.
 MAX_SUSPICIONS = 8
-#: A switch that changes its sign more often than this while time goes on by less than this part of
+#: A switch that changes its sign more often than this while time advances by less than this part of
 #: the run chatters.
 CHATTER, CHATTER_SPAN = 100, 1e-6
 
@@ -113,7 +113,7 @@ def time_to_zero(value: float, rate: float, bend: float) -> float:
 
 @compiled_inside
 def distance_to_crossing(work: IntegrationState, h: float) -> float:
-    """How far a step of length h may go: it ends shortly before the next crossing."""
+    """Length of a step that may have length h: it ends shortly before the next crossing."""
     s, longest = work.switches, h
     h = min(h, work.step_limit_at_switch)
     for k in range(s.shape[1]):
@@ -134,7 +134,7 @@ def distance_to_crossing(work: IntegrationState, h: float) -> float:
 def is_sample_across(
     work: IntegrationState, t: float, x: Floats, watch: Function, system: Any, loops: Any
 ) -> bool:
-    """Whether a state within a step lies across; then the step is cut.
+    """True if a state within a step lies across a switch; then the step is cut.
 
     Not of what is UNSEEN: where a function takes another form it is smooth: a step may mix both.
     """
@@ -153,7 +153,7 @@ def is_sample_across(
 
 @compiled_inside
 def cut_step(work: IntegrationState, row: int, h: float) -> None:
-    """Cut the next attempt to before the crossing that a sample at h told of."""
+    """Cut the next attempt to before the crossing that a sample at h has shown."""
     s = work.switches
     left = h
     for k in range(s.shape[1]):
@@ -172,7 +172,7 @@ def cut_step(work: IntegrationState, row: int, h: float) -> None:
 def end_is_across(
     work: IntegrationState, t1: float, slope: Floats, watch: Function, system: Any, loops: Any
 ) -> bool:
-    """Whether the trial state, whose dy/dt is ``slope``, lies across, or the motion went there.
+    """True if the trial state, with dy/dt ``slope``, lies across, or the motion went there.
 
     Then the step is cut.
     """
@@ -200,7 +200,7 @@ def end_is_across(
 
 @compiled_inside
 def cubic_minimum(a: float, b: float, c: float, d: float) -> float:
-    """Where in (0, 1) the cubic with values a, c and slopes b, d at 0, 1 is least and negative.
+    """Abscissa in (0, 1) of a negative minimum of the cubic with values a, c, slopes b, d at 0, 1.
 
     1 where it is not.
     """
@@ -221,7 +221,7 @@ def cubic_minimum(a: float, b: float, c: float, d: float) -> float:
 def update_switches_after_step(
     work: IntegrationState, h: float, longest: float, end: float
 ) -> None:
-    """After a step was accepted: what its end told of switches; if cut, the motion's own step.
+    """Take over the switches at the end of an accepted step; if it was cut, restore the usual step.
 
     h: its length; longest, end: the length it might have had, and where it would have ended.
     """
@@ -234,8 +234,8 @@ def update_switches_after_step(
         return
     stalled = 0
     for k in range(s.shape[1]):
-        stands = (work.cut_attempts > 0) & (s[FOUND, k] == s[VALUE, k])
-        stalled |= stands & (s[SIDE, k] * s[RATE, k] < 0.0)
+        is_stalled = (work.cut_attempts > 0) & (s[FOUND, k] == s[VALUE, k])
+        stalled |= is_stalled & (s[SIDE, k] * s[RATE, k] < 0.0)
         s[BEND, k] = (s[FOUND_RATE, k] - s[RATE, k]) / h
         s[VALUE, k], s[RATE, k] = s[FOUND, k], s[FOUND_RATE, k]
         if s[SIDE, k] == 0.0:
@@ -250,7 +250,7 @@ def bisect_crossing(
     work: IntegrationState, h: float, end: float, slope: Floats, project: Function, watch: Function,
     system: Any, loops: Any,
 ) -> None:  # fmt: skip
-    """An Euler step of length h, or to the crossing in it: the integration starts anew there."""
+    """Take an Euler step of length h, or to the crossing in it, where integration starts anew."""
     s = work.switches
     t = work.t
     low, high, least = 0.0, h, 1e-3 * EPSILON * time_span(work)
@@ -307,7 +307,7 @@ def euler_step(
 
 @compiled_inside
 def record_crossings(work: IntegrationState, t: float) -> None:
-    """Which switches changed their sign at t, and what follows: end, chatter, or another side."""
+    """Record sign changes of switches at t, and what follows: end, chatter, or another side."""
     s = work.switches
     for k in range(s.shape[1]):
         if not s[FOUND, k] * s[SIDE, k] < 0.0:
@@ -325,6 +325,6 @@ def record_crossings(work: IntegrationState, t: float) -> None:
 
 @compiled_inside
 def reset_step_control(work: IntegrationState) -> None:
-    """Let the control of the step start anew: what follows is another motion."""
+    """Let step-size control start anew: what follows is another motion."""
     work.h, work.last_error = 0.0, 1e-4
     work.first_stage_valid = work.switch_rates_valid = work.last_rejected = 0

@@ -1,4 +1,4 @@
-"""What an integration may be asked for: states, times, tolerances and steps that make sense."""
+"""Checks of the arguments of an integration: states, times, tolerances and steps."""
 
 from typing import Any
 

@@ -23,7 +23,7 @@ from dap3d_core.kernels.runtime.cache import jit_is_on
 
 
 class Statistics(NamedTuple):
-    """What an integration has done so far."""
+    """Counts of an integration so far."""
 
     steps: int  # accepted
     rejected: int  # tried and thrown away
@@ -33,7 +33,7 @@ class Statistics(NamedTuple):
 
 
 class Integration(Restorable):
-    """An initial value problem on its way: ``advance`` it until its status is no longer RUNNING.
+    """An initial value problem: ``advance`` it until its status is no longer RUNNING.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class Integration(Restorable):
     unscaled_size = 0
     #: Times in ascending order that no step goes over, and whether the right-hand side may jump
     #: there, so that the integration starts anew.
-    stops: Sequence[tuple[float, bool]] = ()
+    tstops: Sequence[tuple[float, bool]] = ()
     #: Whether its formulas are implicit.
     implicit = False
 
@@ -126,7 +126,7 @@ class Integration(Restorable):
         rtol, atol = self.error_tolerances(rtol, atol)
         switches = np.asarray(ends, dtype=np.float64).reshape(2, -1)
         count = switches.shape[1]
-        #: All the state there is, as arrays: copied and put back, the run goes on from there.
+        #: All the state there is, as arrays: copied and restored, the run continues from there.
         self.work: Any = self.state_class(
             real=np.zeros(at.MEASURES + length_count),
             integer=np.zeros(len(self.state_class.indices("integer")), dtype=np.int64),
@@ -168,7 +168,7 @@ class Integration(Restorable):
         raise NotImplementedError
 
     def advance(self, budget: int) -> Status:
-        """Go on until more than ``budget`` calls of rhs are spent, the buffer is full, or the end.
+        """Integrate until more than ``budget`` calls of rhs are spent, or the buffer is full.
 
         How a run is cut into chunks changes no bit of its result. Take the ``rows`` after each.
 
@@ -179,14 +179,14 @@ class Integration(Restorable):
         """
         if self.rows_are_full and self.status is Status.RUNNING:
             raise RuntimeError("the row buffer is full: take rows() before advancing")
-        asked = self.work.t_limit
-        if self.stops:
-            self.work.t_limit = min(asked, self._next_stop())
-        self._go(budget)
-        self.work.t_limit = asked
+        requested = self.work.t_limit
+        if self.tstops:
+            self.work.t_limit = min(requested, self._next_stop())
+        self._call_compiled(budget)
+        self.work.t_limit = requested
         return self.status
 
-    def _go(self, budget: int) -> None:
+    def _call_compiled(self, budget: int) -> None:
         if jit_is_on():
             self._advance(budget)
         else:
@@ -196,18 +196,18 @@ class Integration(Restorable):
     def _next_stop(self) -> float:
         """The time that the next step may not go over.
 
-        Where the right-hand side may jump steps end just before and go on just behind, so that none
+        Where the right-hand side may jump steps end just before and start just behind, so that none
         has samples of both sides; the state stays, which is right to the rounding of time, but for
         what the constraints make of it there. Fixed steps end on their grid, and on what jumps.
         """
         work, is_adaptive = self.work, self.work.fixed_step == 0.0
-        for t, jumps in self.stops[bisect_left(self.stops, (self.t, False)) :]:
+        for t, jumps in self.tstops[bisect_left(self.tstops, (self.t, False)) :]:
             before = float(np.nextafter(t, -np.inf)) if jumps and is_adaptive else t
             if self.t < before:
                 return before
             if before < t:
                 work.t = work.t_limit = t
-                self._go(0)  # no step: what is asked for at t is reported
+                self._call_compiled(0)  # no step: reports what is due at t
                 if self.rows_are_full or self.status is not Status.RUNNING:
                     return t
                 work.t = np.nextafter(t, np.inf)
@@ -219,7 +219,7 @@ class Integration(Restorable):
     def _project(self) -> bool:
         """Bring the state onto its constraints where they have moved, if that is on.
 
-        Whether the run goes on.
+        Returns False if that failed.
         """
         functions, system, loops = self._arguments
         work = self.work
@@ -234,7 +234,7 @@ class Integration(Restorable):
         return bool(work.projection_outcome != FAILED)
 
     def advance_to(self, limit: float) -> Status:
-        """Try one step, or what stands in its place, that ends at time ``limit`` at the latest."""
+        """Try one step, or one towards a switch, that ends at time ``limit`` at the latest."""
         self.work.t_limit = limit
         status = self.advance(0)
         self.work.t_limit = np.inf
@@ -260,7 +260,7 @@ class Integration(Restorable):
         work.switches[at.SIDE] = 0.0
 
     def end(self) -> None:
-        """End the run where it stands: the next ``advance`` reports this state, and stops."""
+        """End the run here: the next ``advance`` reports this state, and stops."""
         self.work.end_status = Status.ENDED
 
     def rows(self) -> Floats:
@@ -271,7 +271,7 @@ class Integration(Restorable):
 
     @property
     def status(self) -> Status:
-        """Where the integration stands."""
+        """State of progress."""
         return Status(int(self.work.status))
 
     @property
@@ -293,7 +293,7 @@ class Integration(Restorable):
         return float(self.work.t_stop)
 
     @property
-    def slope(self) -> Floats | None:
+    def dy_dt(self) -> Floats | None:
         """(n,) dy/dt at ``t``, a copy; None where it is not known."""
         if self.work.first_stage_valid == 0:
             return None
@@ -301,30 +301,30 @@ class Integration(Restorable):
         return slope
 
     @property
-    def most_work(self) -> float:
+    def largest_work(self) -> float:
         """The largest magnitude of the last component at an accepted state."""
         return float(self.work.largest_work)
 
     @property
-    def stiff_at(self) -> float | None:
+    def t_stiff(self) -> float | None:
         """Time since which the scene is stiff for this method, if noticed (stiffness.py)."""
         found = float(self.work.t_stiff)
         return found if 0.0 < found < np.inf else None
 
     @property
     def rows_are_full(self) -> bool:
-        """Whether ``rows`` must be taken before it can go on."""
+        """True if ``rows`` must be taken before it can continue."""
         return int(self.work.row_count) == len(self.work.rows)
 
     @property
-    def culprit(self) -> int:
-        """Which switch ended the run, where one did."""
+    def terminal_switch(self) -> int:
+        """Index of the switch that ended the run."""
         return int(self.work.terminal_switch)
 
     @property
     def chatter(self) -> tuple[float, int]:
         """Since when, s, the changes of the culprit are counted, and how many there were."""
-        since, count = self.work.switches[[at.SINCE, at.COUNT], self.culprit]
+        since, count = self.work.switches[[at.SINCE, at.COUNT], self.terminal_switch]
         return float(since), int(count)
 
     @property
@@ -335,12 +335,12 @@ class Integration(Restorable):
 
     @property
     def crossing_count(self) -> int:
-        """How often a switch has changed its sign."""
+        """Number of sign changes of switches."""
         return int(self.work.crossing_count)
 
     @property
     def statistics(self) -> Statistics:
-        """What has been done so far."""
+        """Counts so far."""
         w = self.work
         counts = w.step_count, w.rejected_count, w.rhs_count, w.projection_count, w.report_count
         return Statistics(*map(int, counts))

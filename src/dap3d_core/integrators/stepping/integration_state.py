@@ -65,7 +65,7 @@ def _integer() -> Scalar[int]:
 
 @attrs.define(eq=False, kw_only=True, slots=False)
 class IntegrationState(Arrays):
-    """What every integrator reads and writes; n components.
+    """State that every integrator has; n components.
 
     Numbers are in ``real`` and ``integer`` in this order, in checkpoints as well. Those of the
     step-size controller are explained at ``Tableau``.

@@ -1,4 +1,4 @@
-"""What is left of a step once it is done: states on the constraints, rows of the result."""
+"""Output of a step: projected states, rows of the result."""
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
@@ -35,7 +35,7 @@ def project_state(
     loops: Any,
     here: bool = False,
 ) -> int:
-    """Project y where that is on; why that failed, or RUNNING.
+    """Project y where that is on; the failure, or RUNNING.
 
     here: whether rhs was the last function called, at this very t and y.
     """
@@ -69,7 +69,7 @@ def may_step(
     system: Any,
     loops: Any,
 ) -> bool:
-    """Report what is reached and end what is over; whether a step is to be tried now.
+    """Report what is reached and end what is over; True if a step is to be tried now.
 
     state_at: as for ``report_reached``. limit: right-hand sides after which this call of the
     integration is left.
@@ -131,7 +131,7 @@ def report_reached(
 
 @compiled_inside
 def report_end(work: Any, report: Function, system: Any, loops: Any) -> bool:
-    """End the run where it stands, with a row for this state; False where the rows are full."""
+    """End the run at t, with a row for this state; False where the rows are full."""
     times = work.times
     t, last = work.t, work.next_report - 1
     if last < 0 or times[last] < t:

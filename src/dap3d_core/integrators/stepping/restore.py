@@ -1,4 +1,4 @@
-"""Continues an integration from arrays of a file, whose every number is checked before.
+"""Continues an integration from arrays of a file, after a check of every number.
 
 Compiled code checks no index. So of a file only what a run changes is taken, and only where it
 lies in the range that is declared next to its definition (integration_state.py, adams/formulas.py,
@@ -24,7 +24,7 @@ class Restorable:
     work: Any
 
     def all_arrays(self) -> Iterator[tuple[str, Any]]:
-        """Name and array of all that a run goes on from, once its ``rows`` are taken.
+        """Name and array of all that a run continues from, once its ``rows`` are taken.
 
         What ``functions`` keep in ``system`` is not among them.
         """
@@ -51,7 +51,11 @@ class Restorable:
                 array[...] = new[name]
 
     def restored(self, name: str, array: Any, found: Any) -> Any:
-        """What an array becomes, given that of a file; ValueError where it is of another model."""
+        """The new contents of an array, given that of a file.
+
+        Raises:
+            ValueError: it is of another model.
+        """
         own = {
             "real": self.indices("real", at.REAL_SETTINGS),
             "integer": self.indices("integer", at.INTEGER_SETTINGS),
@@ -82,7 +86,7 @@ def check_alike(name: str, found: Any, array: Any) -> None:
 
 
 def restored(name: str, array: Any, found: Any, own: Iterable[Any] = ()) -> Any:
-    """What an array becomes: the numbers of a file but for ``own`` places or rows, which it keeps.
+    """The new contents of an array: those of a file, except ``own`` items or rows, which it keeps.
 
     Raises:
         ValueError: the file's has another shape or kind; or these places are integers, and differ.

@@ -87,7 +87,7 @@ def update_rounding(
 
 @compiled_inside
 def record_failure(work: Any, error: float, h: float, again: bool) -> None:
-    """Have an eye on a step of length h that failed; again: the one before it had failed, too."""
+    """Record a step of length h that failed; again: the one before it had failed, too."""
     before, work.failed_error_rate = work.failed_error_rate, error / h
     if again and error / h > SAME * before:
         work.rounding_state = max(work.rounding_state, 1)
@@ -106,7 +106,7 @@ def measure_noise(
     system: Any,
     loops: Any,
 ) -> None:
-    """How much dy/dt at (t, y), which is f, is uncertain in a step h, into ``tolerance``.
+    """Uncertainty of dy/dt at (t, y), which is f, in a step h, into ``tolerance``.
 
     By the last digits of y, and by what these make of y itself in the step. argument, out: scratch.
     """

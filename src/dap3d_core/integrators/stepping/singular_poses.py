@@ -79,7 +79,7 @@ def predict_measures(work: Any, h: float) -> None:
 
 
 def begin_singular(work: Any, slope: Floats, first_step: float) -> None:
-    """Give an integration the rates (n,) at its start, which are not those of its functions there.
+    """Set the rates (n,) at the start of an integration, instead of those of its functions.
 
     The first step is one of those near a singular state, with its stages on the constraints, and
     as long as may be: close to the state rates are known the worse.

@@ -1,4 +1,4 @@
-"""The control of the step: its first length, its error, what follows from acceptance and rejection.
+"""Step-size control: initial step, error norm, acceptance and rejection.
 
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (HNW), II.4 and II.5, and
 their codes DOPRI5 and DOP853.
@@ -108,7 +108,7 @@ def error_norm(work: Any, h: float) -> float:
 
 @compiled_inside
 def error_beyond_rounding(work: Any, h: float) -> float:
-    """As ``error_norm``, of what is more than the rounding of time makes of the rates."""
+    """As ``error_norm``, of what exceeds the rounding of time in the rates."""
     size, rtol, tolerance = work.error_size, work.rtol, work.tolerance
     y, trial, error = work.state[Y], work.state[TRIAL], work.state[SCRATCH]
     k, first, last = work.k, work.k.shape[0], work.k[work.stage_count - 1]
@@ -122,7 +122,7 @@ def error_beyond_rounding(work: Any, h: float) -> float:
 
 @compiled_inside
 def combined_error(main: float, other: float) -> float:
-    """One error from the estimates of order 5 and 3."""
+    """One error from the estimates of order 5 and 3, as in DOP853."""
     total = main * main + 0.01 * other * other
     if total == 0.0:
         return 0.0
@@ -168,7 +168,7 @@ def reject(work: Any, t1: float, shorter: float, cause: int) -> None:
 
 @compiled_inside
 def lands_near_singularity(work: Any, t1: float) -> bool:
-    """Whether a step should end elsewhere: project found the state close to a singular one.
+    """True if a step should end at another state: this one is close to a singular one.
 
     From there every next step would be inaccurate, while from some way before it one can step
     across. A run that stays close to a singular state is not held up: after a few attempts the

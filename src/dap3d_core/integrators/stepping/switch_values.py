@@ -84,7 +84,7 @@ def find_switch_rates(
 
 @compiled_inside
 def is_across(s: Floats, row: int) -> bool:
-    """Whether a switch, in a row of values, is on the other side than at the start of the step."""
+    """True if a switch, in a row of values, is on another side than at the start of the step."""
     found = 0
     for k in range(s.shape[1]):
         found |= s[row, k] * s[SIDE, k] < 0.0
@@ -93,7 +93,7 @@ def is_across(s: Floats, row: int) -> bool:
 
 @compiled_inside
 def changes_sign(s: Floats, row: int) -> bool:
-    """Whether a switch is on the other side, or zero: then it is not known which law holds."""
+    """True if a switch is on another side, or zero: then it is not known which law holds."""
     found = 0
     for k in range(s.shape[1]):
         found |= (s[SIDE, k] != 0.0) & (s[row, k] * s[SIDE, k] <= 0.0)
@@ -102,7 +102,7 @@ def changes_sign(s: Floats, row: int) -> bool:
 
 @compiled_inside
 def record_crossing(work: IntegrationState, k: int, t: float) -> None:
-    """Note that a switch changed its sign, where somebody wants to know."""
+    """Record that a switch changed its sign, unless it is UNSEEN."""
     if work.switches[DOES, k] == UNSEEN:
         return
     count = work.crossing_count
@@ -114,11 +114,11 @@ def record_crossing(work: IntegrationState, k: int, t: float) -> None:
 
 @compiled_inside
 def time_span(work: IntegrationState) -> float:
-    """The time, s, whose rounding bounds what can be told apart."""
+    """The time, s, with the rounding that bounds what can be distinguished."""
     return max(abs(work.t), work.times[-1] - work.times[0])
 
 
 @compiled_inside
 def usual_step(work: IntegrationState) -> float:
-    """The step that the motion asks for."""
+    """The step without switches."""
     return work.fixed_step if work.fixed_step != 0.0 else work.h

@@ -1,4 +1,4 @@
-"""The arithmetic of a step: sums over stages, the norm of the error, interpolation.
+"""Vector operations of a step: sums over stages, the norm of the error, interpolation.
 
 Loops run over the components innermost, four stages at a time, so that a sum of many stages reads
 and writes its result a few times only; the terms come from ``tableau.combinations``.
@@ -49,7 +49,7 @@ def copy(out: Floats, x: Floats) -> None:
 
 @compiled_inside
 def all_finite(x: Floats) -> bool:
-    """Whether no component is not a number, or larger than 1e100, infinite ones included."""
+    """True if no component is NaN, infinite, or larger than 1e100."""
     bad = 0
     for i in range(x.size):
         bad |= not (abs(x[i]) <= _LARGEST)

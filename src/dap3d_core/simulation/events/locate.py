@@ -144,7 +144,7 @@ class Watcher:
 
     def _slope(self, integration: Integration) -> Floats:
         """dy/dt where the integration stands."""
-        slope = integration.slope
+        slope = integration.dy_dt
         if slope is not None:
             return slope
         machine, found = self.compiled.machine, np.zeros_like(integration.y)

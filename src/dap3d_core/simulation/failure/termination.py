@@ -46,8 +46,8 @@ def why_stopped(machine: Machine, integration: Integration, rank: int) -> str:
     t = integration.t
     head = f"the run stopped at t = {t:.9g} s"
     if integration.status is Status.SWITCHED:
-        switch = machine.switches[integration.culprit]
-        return f"{head}: {_title(machine, integration.culprit)}: {switch.words}"
+        switch = machine.switches[integration.terminal_switch]
+        return f"{head}: {_title(machine, integration.terminal_switch)}: {switch.words}"
     if integration.status is Status.CHATTERED:
         return f"{head}: {_chatter(machine, integration)}"
     t_stop = integration.t_stop if integration.t_stop is not None else t
@@ -71,7 +71,7 @@ def occurrences(
     found = []
     for t, which, side in (crossing for run in runs for crossing in run.crossings):
         switch = machine.switches[int(which)]
-        ends = ended and int(which) == last.culprit and side < 0.0 and bool(switch.words)
+        ends = ended and int(which) == last.terminal_switch and side < 0.0 and bool(switch.words)
         kind = switch.group.examined.type.kind
         found.append(
             Occurrence(
@@ -105,7 +105,7 @@ def _chatter(machine: Machine, integration: Integration) -> str:
     """What chatters, how long already, and what helps."""
     since, count = integration.chatter
     return (
-        f"{_title(machine, integration.culprit)} chatters: its switch changed its sign "
+        f"{_title(machine, integration.terminal_switch)} chatters: its switch changed its sign "
         f"{count} times within {integration.t - since:.2g} s (more than {CHATTER} in a millionth "
         "of the run end it). On either side its law drives the motion back to the other; let the "
         "law change over a small range, as tanh does, or give it a range in which it stays as it is"
