@@ -97,8 +97,8 @@ def set_numbers(points: Points, p: int, system: System) -> None:
 
 
 @compiled_inside
-def put_back(points: Points, p: int, work: RungeKuttaState) -> None:
-    """The work as it is before a run, with the state of point p."""
+def reset_work(points: Points, p: int, work: RungeKuttaState) -> None:
+    """Reset the work to that before a run, with the state of point p."""
     copy_into(work.real, points.first_real)
     copy_into(work.integer, points.first_integer)
     for k in range(work.switches.shape[0]):
@@ -119,12 +119,12 @@ def start(
     system: System,
     loops: Any,
 ) -> bool:
-    """Make ready for the run of point p; whether it can be run here."""
-    found, metric = points.found[p], system.metric
-    put_back(points, p, work)
-    put_numbers(points, p, system)
+    """Start the run of point p; returns False if it has to be run individually."""
+    diagnostics, metric = points.diagnostics[p], system.metric
+    reset_work(points, p, work)
+    set_numbers(points, p, system)
     t, y = work.t, work.state[Y]
-    if points.at[ASSEMBLES] != 0:
+    if points.at[START] != 0:
         for b in range(1, metric.shape[0]):
             copy_into(metric[b], points.unit)
         starting[1](t, y, points.starting, system, loops)
@@ -141,7 +141,7 @@ def start(
 
 @compiled_inside
 def restart(work: RungeKuttaState) -> None:
-    """As ``Integration.restart``."""
+    """Restart the step control, as ``Integration.restart``."""
     work.h, work.last_error, work.step_limit_at_switch = 0.0, 1e-4, np.inf
     work.first_stage_valid = work.switch_rates_valid = work.last_rejected = work.cut_attempts = 0
     for q in range(work.switches.shape[1]):
@@ -157,7 +157,7 @@ def next_stop(
     system: System,
     loops: Any,
 ) -> float:
-    """As ``Integration._next_stop``."""
+    """The next time that no step crosses, as ``Integration._next_stop``."""
     adaptive = work.fixed_step == 0.0
     for k in range(stops.shape[0]):
         t = stops[k, 0]
@@ -197,7 +197,7 @@ def run_points(
 
     Rows of a run that is not FINISHED, by its ``diagnostics``, are not valid.
     """
-    at, found = points.at, points.found
+    at, diagnostics = points.at, points.diagnostics
     drive, spent, nt = drives[0], 0, work.rows.shape[0]
     while at[POINT] < diagnostics.shape[0] and spent <= budget:
         p = at[POINT]
@@ -220,8 +220,10 @@ def run_points(
         if work.status != RUNNING:
             for k in range(work.row_count):
                 copy_into(points.rows[p * nt + k], work.rows[k])
-            found[p, ENDED], found[p, ROWS] = work.status, work.row_count
-            found[p, TAKEN], found[p, CALLS] = work.step_count, work.rhs_count
-            found[p, LOOSE] = system.settings[UNSETTLED] + system.settings[DOUBTFUL]
+            diagnostics[p, ENDED], diagnostics[p, ROWS] = work.status, work.row_count
+            diagnostics[p, TAKEN], diagnostics[p, CALLS] = work.step_count, work.rhs_count
+            diagnostics[p, FRICTION_FAILURES] = (
+                system.settings[UNSETTLED] + system.settings[DOUBTFUL]
+            )
             at[POINT] += 1
             at[BEGUN] = 0
