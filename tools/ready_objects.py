@@ -59,7 +59,7 @@ def pack_of(target_name: str, units: dict[str, Any]) -> tuple[bytes, int]:
 
     from dap3d_core.kernels.compiler.objects import OPTIMISED, compile_ir
     from dap3d_core.kernels.compiler.ready import TARGETS, packed
-    from dap3d_core.kernels.compiler.words import EXACT, LIBRARY
+    from dap3d_core.kernels.compiler.writer import EXACT, LIBRARY
 
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()

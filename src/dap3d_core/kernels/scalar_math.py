@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from dap3d_core.kernels.compiler.words import word
+from dap3d_core.kernels.compiler.intrinsics import intrinsic
 
 
 def _symbolic(x):
@@ -38,7 +38,7 @@ def _like(x, value):
 def _generic(name: str, outside: Callable[[float], float] = lambda x: math.nan) -> Any:
     real, other = getattr(math, name), getattr(cmath, name)
 
-    @word(name)
+    @intrinsic(name)
     def function(x):
         if isinstance(x, complex):
             return _like(x, other(x))
@@ -64,7 +64,7 @@ exp = _generic("exp", lambda x: math.inf)
 log = _generic("log", lambda x: -math.inf if x == 0.0 else math.nan)
 
 
-@word("atan2")
+@intrinsic("atan2")
 def atan2(y, x):
     """Angle of the point (x, y) in (-pi, pi]; complex: its first-order continuation."""
     if isinstance(y, complex) or isinstance(x, complex):

@@ -1,18 +1,19 @@
-"""Names, arrays and calls of the typed subset of Python to LLVM IR."""
+"""Expressions of the typed subset of Python to LLVM IR: names, operations, arrays, calls."""
 
 import ast
 import builtins
 import inspect
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
-from dap3d_core.kernels.compiler.operations import Operations
+from dap3d_core.kernels.compiler.intrinsics import FORMS, KNOWN
 from dap3d_core.kernels.compiler.types import (
     BOOL,
     COMPLEX,
     FLOAT,
     INT,
+    NUMBERS,
     Array,
     CompileError,
     Known,
@@ -25,77 +26,94 @@ from dap3d_core.kernels.compiler.types import (
     constant,
     group,
     items_of,
+    name_of,
+    result_type,
+    wider,
 )
-from dap3d_core.kernels.compiler.words import KNOWN, WORDS
-from dap3d_core.kernels.compiler.writing import name_of, result_type
+from dap3d_core.kernels.compiler.writer import Writer
 
-#: Remedies for expressions outside the subset.
+#: Remedies for what is outside the subset.
 INSTEAD = {
     "ListComp": "loop over a range, and write into an array",
     "GeneratorExp": "loop over a range",
     "SetComp": "loop over a range",
     "DictComp": "loop over a range",
-    "List": "hand on an array, or a tuple",
-    "Dict": "hand on arrays",
-    "Set": "hand on arrays",
+    "List": "pass an array, or a tuple",
+    "Dict": "pass arrays",
+    "Set": "pass arrays",
     "Lambda": "put a function at the top of the module",
-    "JoinedStr": "texts are for Python",
+    "JoinedStr": "format texts in Python",
     "NamedExpr": "assign in a line of its own",
     "Yield": "write into an array",
     "Await": "compiled code waits for nothing",
     "Starred": "name each argument",
+    "AnnAssign": "assign without an annotation",
+    "With": "open nothing in compiled code",
+    "Try": "test before, and return a number that says what went wrong",
+    "Raise": "return a number that says what went wrong",
+    "Assert": "return a number that says what went wrong",
+    "FunctionDef": "put the function at the top of its module",
+    "ClassDef": "put the class at the top of its module",
+    "Import": "import at the top of the module",
+    "ImportFrom": "import at the top of the module",
+    "Global": "pass an array that is written to",
+    "Nonlocal": "pass an array that is written to",
+    "Delete": "leave the name as it is",
+    "Match": "write if and elif",
 }
 
 
-class Expressions(Operations):
+class Expressions(Writer):
     """Compiles the expressions of a function; statements are in functions.py."""
 
-    program: Any
-    current: dict[str, Any]
-    stored: set[str]
-    arguments: dict[str, Any]
-    load: Callable[..., Value]
+    def compile_node(self, node: ast.AST) -> Any:
+        """Compile a node of the syntax tree by the method that is named after its type."""
+        kind = type(node).__name__
+        method = getattr(self, f"_{kind}", None)
+        if method is None:
+            self.refuse(node, f"{kind} is not part of compiled code",
+                        INSTEAD.get(kind, "see docs/concepts/compiled-python.md"))  # fmt: skip
+        return method(node)
 
-    def value(self, node: ast.expr) -> Value:
-        """The value of an expression."""
-        value: Value = self.compile_node(node, "expression", INSTEAD)
-        return value
+    #: The value of an expression.
+    value = compile_node
 
     def _Constant(self, node: ast.Constant) -> Value:
-        found = constant(node.value)
-        if found is None:
-            self.refuse(node, f"{node.value!r} is no number of 64 bits", "take numbers")
-        return found
+        value = constant(node.value)
+        if value is None:
+            self.refuse(node, f"{node.value!r} is no real number of 64 bits", "take numbers")
+        return value
 
     def _Tuple(self, node: ast.Tuple) -> Value:
         return group([self.value(item) for item in node.elts])
 
+    # ------------------------------------------------------------------ names
+
     def _Name(self, node: ast.Name) -> Value:
-        name, function = node.id, self.function
-        known = self.arguments.get(name)
-        if isinstance(known, Known) and name not in self.stored:
-            return self._known(node, name, known.value)
+        name, code = node.id, self.function.__code__
+        argument = self.arguments.get(name)
+        if isinstance(argument, Known) and name not in self.stored:
+            return self._known(node, name, argument.value)
         if name in self.current:
             return self.load(node, name)
         if name in self.stored:
-            self.refuse(node, f"{name} has no value yet", "give it one on every way")
-        if name in function.__code__.co_freevars:
-            place = function.__code__.co_freevars.index(name)
-            return self._known(node, name, function.__closure__[place].cell_contents)
-        if name in function.__globals__:
-            return self._known(node, name, function.__globals__[name])
-        if hasattr(builtins, name):
-            return self._known(node, name, getattr(builtins, name))
+            self.refuse(node, f"{name} has no value yet", "assign one on every path")
+        if name in code.co_freevars:
+            cell = self.function.__closure__[code.co_freevars.index(name)]
+            return self._known(node, name, cell.cell_contents)
+        for names in (self.function.__globals__, vars(builtins)):
+            if name in names:
+                return self._known(node, name, names[name])
         self.refuse(node, f"{name} is not defined", "define or import it")
 
-    def _known(self, node: Any, name: str, value: Any) -> Value:
-        found = constant(value)
-        if found is not None:
-            return found
+    def _known(self, node: ast.AST, name: str, value: Any) -> Value:
+        number = constant(value)
+        if number is not None:
+            return number
         if callable(value) or isinstance(value, types.ModuleType):
             return Value(Known(value))
         self.refuse(node, f"{name} is a {type(value).__name__} of the module",
-                    "hand it on as an argument")  # fmt: skip
+                    "pass it as an argument")  # fmt: skip
 
     def _Attribute(self, node: ast.Attribute) -> Value:
         value, name = self.value(node.value), node.attr
@@ -117,13 +135,6 @@ class Expressions(Operations):
         self.refuse(node, f"a {name_of(type_)} has no {name} here",
                     "arrays have shape and size, structs their members")  # fmt: skip
 
-    def count_of(self, lengths: Sequence[str]) -> str:
-        """The product of lengths."""
-        count = lengths[0] if lengths else "1"
-        for length in lengths[1:]:
-            count = self.new(f"mul nsw i64 {count}, {length}")
-        return count
-
     def _member(self, node: ast.Attribute, value: Value, name: str) -> Value:
         first = 0
         for member, type_ in value.type.members:
@@ -139,22 +150,106 @@ class Expressions(Operations):
             words.append(self.new(f"load {word}, ptr {at}, align 8, !invariant.load !0"))
         return Value(type_, tuple(words))
 
+    # ------------------------------------------------------------------ operations
+
+    def _UnaryOp(self, node: ast.UnaryOp) -> Value:
+        if isinstance(node.op, ast.Not):
+            return self.negation(self.condition(node.operand))
+        value = self.value(node.operand)
+        if value.type not in NUMBERS or not isinstance(node.op, ast.USub):
+            self.refuse(node, f"no {type(node.op).__name__} of a {name_of(value.type)}",
+                        "take numbers")  # fmt: skip
+        return self.negative(node, value)
+
+    def _BinOp(self, node: ast.BinOp) -> Value:
+        return self.operation(node, node.op, self.value(node.left), self.value(node.right))
+
+    def _Compare(self, node: ast.Compare) -> Value:
+        values = [self.value(node.left), *(self.value(c) for c in node.comparators)]
+        result = None
+        for op, a, b in zip(node.ops, values[:-1], values[1:], strict=True):
+            part = self.comparison(node, op, a, b)
+            result = part if result is None else self.operation(node, ast.BitAnd(), result, part)
+        return result
+
+    def condition(self, node: ast.expr) -> Value:
+        """The truth value of an expression."""
+        value = self._both(node, True) if isinstance(node, ast.BoolOp) else self.value(node)
+        if value.type not in (BOOL, INT, FLOAT):
+            self.refuse(node, f"a {name_of(value.type)} is a condition", "compare numbers")
+        return self.cast(node, value, BOOL)
+
+    def _BoolOp(self, node: ast.BoolOp) -> Value:
+        return self._both(node, False)
+
+    def _both(self, node: ast.BoolOp, is_condition: bool) -> Value:
+        """``and`` or ``or``; operands may be numbers where only their truth is used."""
+        decides = isinstance(node.op, ast.Or)
+        slots, end, values = self.place(BOOL, "both"), self.label(), []
+        for part in node.values:
+            value = self.condition(part) if is_condition else self.value(part)
+            if value.type != BOOL:
+                self.refuse(part, f"and, or of a {name_of(value.type)}", "compare it: x != 0")
+            values.append(value)
+            self.write_to(slots, value)
+            if value.constant == decides or part is node.values[-1]:
+                break
+            if value.constant is None:
+                more = self.label()
+                self.branch(value, *((end, more) if decides else (more, end)))
+                self.start(more)
+        self.jump(end)
+        self.start(end)
+        if all(v.constant is not None for v in values):
+            return values[-1]
+        return self.read_from(slots, BOOL)
+
+    def _IfExp(self, node: ast.IfExp) -> Value:
+        test = self.condition(node.test)
+        if test.constant is not None:
+            return self.value(node.body if test.constant else node.orelse)
+        labels, end = (self.label(), self.label()), self.label()
+        self.branch(test, *labels)
+        before, parts, values = self.lines, [], []
+        for label, part in zip(labels, (node.body, node.orelse), strict=True):
+            self.lines = []
+            self.start(label)
+            values.append(self.value(part))
+            parts.append(self.lines)
+        type_ = wider(values[0].type, values[1].type)
+        if type_ is None:
+            self.refuse(node, f"a {name_of(values[0].type)} or a {name_of(values[1].type)}",
+                        "let both be of one type")  # fmt: skip
+        slots = self.place(type_, "either")
+        for self.lines, value in zip(parts, values, strict=True):
+            self.write_to(slots, self.cast(node, value, type_))
+            self.line(f"br label %{end}")
+        self.lines = [*before, *parts[0], *parts[1]]
+        self.start(end)
+        return self.read_from(slots, type_)
+
     # ------------------------------------------------------------------ arrays
+
+    def count_of(self, lengths: Sequence[str]) -> str:
+        """The product of lengths."""
+        count = lengths[0] if lengths else "1"
+        for length in lengths[1:]:
+            count = self.new(f"mul nsw i64 {count}, {length}")
+        return count
 
     def index(self, node: ast.expr, length: str) -> str:
         """The word of an index; a negative constant counts from the end."""
-        found = self.integer(node, self.value(node))
-        if found.constant is not None and found.constant < 0:
-            return self.new(f"add nsw i64 {length}, {found.constant}")
-        return found.word
+        index = self.integer(node, self.value(node))
+        if index.constant is not None and index.constant < 0:
+            return self.new(f"add nsw i64 {length}, {index.constant}")
+        return index.word
 
     def address(self, array: Value, places: Sequence[ast.expr]) -> str:
         """Address of the part of an array that leading indices select."""
-        lengths = array.words[1:]
         at = "0"
-        for k, length in enumerate(lengths):
-            if k > 0:
-                at = self.new(f"mul nsw i64 {at}, {length}") if at != "0" else at
+        for k, length in enumerate(array.words[1:]):
+            if k > 0 and at != "0":
+                at = self.new(f"mul nsw i64 {at}, {length}")
             if k < len(places):
                 index = self.index(places[k], length)
                 at = self.new(f"add nsw i64 {at}, {index}") if at != "0" else index
@@ -168,9 +263,8 @@ class Expressions(Operations):
 
     def slots_at(self, address: str, item: Any) -> list[str]:
         """Addresses of the words of an item."""
-        more = range(1, len(item.words))
         step = f"getelementptr inbounds {item.words[0]}, ptr {address}, i64"
-        return [address, *(self.new(f"{step} {k}") for k in more)]
+        return [address, *(self.new(f"{step} {k}") for k in range(1, len(item.words)))]
 
     def _scalar(self, node: ast.Attribute, struct: Value, name: str) -> tuple[list[str], Any]:
         member, k = struct.type.scalars[name]
@@ -217,11 +311,10 @@ class Expressions(Operations):
         return self.read_from(self.slots_at(at, type_.item), type_.item)
 
     def _tuple_item(self, node: ast.Subscript, value: Value) -> Value:
-        k = self.value(node.slice).constant
-        items = items_of(value)
+        k, items = self.value(node.slice).constant, items_of(value)
         if not isinstance(k, int) or not -len(items) <= k < len(items):
             self.refuse(node, f"the index of a tuple of {len(items)} is no constant within it",
-                        "take it apart, or take an array")  # fmt: skip
+                        "unpack it, or take an array")  # fmt: skip
         return items[k]
 
     def _slice(self, node: ast.Slice, array: Value) -> Value:
@@ -234,8 +327,8 @@ class Expressions(Operations):
             if given is None:
                 return default
             k = self.index(given, length)
-            inside = self.new(f"icmp slt i64 {k}, {length}")
-            return self.new(f"select i1 {inside}, i64 {k}, i64 {length}")
+            is_inside = self.new(f"icmp slt i64 {k}, {length}")
+            return self.new(f"select i1 {is_inside}, i64 {k}, i64 {length}")
 
         first, last = bound(node.lower, "0"), bound(node.upper, length)
         at = self.item(array, self.count_of([first, *inner]))
@@ -246,24 +339,25 @@ class Expressions(Operations):
     def _Call(self, node: ast.Call) -> Value:
         called = self.value(node.func)
         if isinstance(called.type, Pointer):
-            return self._through(node, called)
+            return self._call_pointer(node, called)
         if not isinstance(called.type, Known):
             self.refuse(node, f"a {name_of(called.type)} is called", "call functions")
         function = called.type.value
         arguments = [self.value(a) for a in node.args]
-        word = KNOWN.get(_hashable(function)) or getattr(function, "compiled_word", None)
-        if word is not None:
+        name = KNOWN.get(function) if isinstance(function, Hashable) else None
+        name = name or getattr(function, "intrinsic", None)
+        if name is not None:
             if node.keywords:
-                self.refuse(node, f"{word} is called with names", "give its arguments by place")
-            return WORDS[word](self, node, arguments)
+                self.refuse(node, f"{name} is called with names", "give its arguments by position")
+            return FORMS[name](self, node, arguments)
         plain = inspect.unwrap(function)
         if not isinstance(plain, types.FunctionType) or plain.__module__ in ("numpy", "math"):
             name = getattr(function, "__qualname__", repr(function))
             self.refuse(node, f"{name} is not known to compiled code",
-                        "write a function of the subset, or use one of the words")  # fmt: skip
-        return self._call(node, function, plain, arguments)
+                        "call a function of the subset, or one that it names")  # fmt: skip
+        return self._call_function(node, function, plain, arguments)
 
-    def _call(
+    def _call_function(
         self, node: ast.Call, function: Any, plain: types.FunctionType, arguments: list[Value]
     ) -> Value:
         parameters = list(inspect.signature(plain).parameters.values())
@@ -282,7 +376,7 @@ class Expressions(Operations):
         for parameter, value in zip(parameters, arguments, strict=True):
             if parameter.annotation is float and value.type in (INT, BOOL):
                 value = self.cast(node, value, FLOAT)
-            if is_inlined and value.constant is not None and value.type in (BOOL, INT, FLOAT):
+            if is_inlined and value.constant is not None:
                 types_.append(Known(value.constant))
                 continue
             types_.append(value.type)
@@ -293,9 +387,22 @@ class Expressions(Operations):
             if "calls itself" in str(error):
                 self.refuse(node, str(error).split(";")[0], "write a loop")
             raise
-        return self._called(f"@{name}", result, words)
+        return self._result_of(f"@{name}", result, words)
 
-    def _called(self, name: str, result: Any, words: Sequence[str]) -> Value:
+    def _call_pointer(self, node: ast.Call, called: Value) -> Value:
+        """A call of a function from a table."""
+        wanted = called.type.signature.arguments
+        if node.keywords or len(node.args) != len(wanted):
+            self.refuse(node, f"{len(node.args)} arguments for a function of {len(wanted)}",
+                        "give each by its position")  # fmt: skip
+        words = []
+        for part, type_ in zip(node.args, wanted, strict=True):
+            value = self.cast(part, self.value(part), type_)
+            words += [f"{'i64' if w == 'i1' else w} {x}"
+                      for w, x in zip(type_.words, value.words, strict=True)]  # fmt: skip
+        return self._result_of(called.word, called.type.signature.result, words)
+
+    def _result_of(self, name: str, result: Any, words: Sequence[str]) -> Value:
         """Emit a call; returns its result."""
         type_, count = result_type(result), len(result.words)
         call = f"call {type_} {name}({', '.join(words)})"
@@ -308,28 +415,7 @@ class Expressions(Operations):
         parts = (self.new(f"extractvalue {type_} {whole}, {k}") for k in range(count))
         return Value(result, tuple(parts))
 
-    def _through(self, node: ast.Call, called: Value) -> Value:
-        """A call of a function from a table."""
-        wanted = called.type.signature.arguments
-        if node.keywords or len(node.args) != len(wanted):
-            self.refuse(node, f"{len(node.args)} arguments for a function of {len(wanted)}",
-                        "give each by its place")  # fmt: skip
-        words = []
-        for part, type_ in zip(node.args, wanted, strict=True):
-            value = self.cast(part, self.value(part), type_)
-            words += [f"{'i64' if w == 'i1' else w} {x}"
-                      for w, x in zip(type_.words, value.words, strict=True)]  # fmt: skip
-        return self._called(called.word, called.type.signature.result, words)
-
 
 def _parts(node: ast.expr) -> list[ast.expr]:
     """The indices in brackets."""
     return list(node.elts) if isinstance(node, ast.Tuple) else [node]
-
-
-def _hashable(value: Any) -> Any:
-    try:
-        hash(value)
-    except TypeError:
-        return None
-    return value

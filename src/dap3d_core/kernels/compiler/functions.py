@@ -6,8 +6,11 @@ registers. Results have the bits of plain Python: nothing is contracted or reass
 """
 
 import ast
+import contextlib
 import inspect
+import linecache
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 from dap3d_core.kernels.compiler.expressions import Expressions
@@ -22,25 +25,9 @@ from dap3d_core.kernels.compiler.types import (
     Value,
     constant,
     items_of,
+    result_type,
     wider,
 )
-from dap3d_core.kernels.compiler.writing import definition, result_type, stored_names
-
-#: Remedies for statements outside the subset.
-INSTEAD = {
-    "With": "open nothing in compiled code",
-    "Try": "test before, and return a number that says what went wrong",
-    "Raise": "return a number that says what went wrong",
-    "Assert": "return a number that says what went wrong",
-    "FunctionDef": "put the function at the top of its module",
-    "ClassDef": "put the class at the top of its module",
-    "Import": "import at the top of the module",
-    "ImportFrom": "import at the top of the module",
-    "Global": "hand on an array that is written to",
-    "Nonlocal": "hand on an array that is written to",
-    "Delete": "leave the name as it is",
-    "Match": "write if and elif",
-}  # fmt: skip
 
 
 class Program:
@@ -104,18 +91,17 @@ class FunctionCompiler(Expressions):
     ) -> None:
         self.program, self.function, self.name = program, function, name
         self.node = definition(function)
-        self.names = [a.arg for a in self.node.args.args]
         given = self.node.args
         if given.vararg or given.kwarg or given.kwonlyargs or given.posonlyargs:
             self.refuse(self.node, "takes more than plain arguments", "name each of them")
-        self.arguments = dict(zip(self.names, arguments, strict=True))
+        self.arguments = dict(zip([a.arg for a in given.args], arguments, strict=True))
         self.stored = stored_names(self.node)
         self.types: dict[Any, Any] = {}
         self.changes: dict[ast.AST, set[str]] = {}
         self.result: Any = None
         for _ in range(10):
             self.is_settled = True
-            self._write()
+            self._compile()
             if self.is_settled:
                 return
         self.refuse(self.node, "has variables whose types do not settle", "give each one type")
@@ -132,14 +118,13 @@ class FunctionCompiler(Expressions):
             f"{{\n{lines}\n}}\n"
         )
 
-    def _write(self) -> None:
-        self.lines: list[str] = []
-        self.places: list[str] = []
-        self.count = 0
+    def _compile(self) -> None:
+        self.lines, self.places, self.count, self.is_dead = [], [], 0, False
         self.slots: dict[Any, list[str]] = {}
+        #: Variable of each name, None where that depends on the path.
         self.current: dict[str, Any] = {}
+        #: Labels to continue at, and behind, each enclosing loop.
         self.loops: list[tuple[str, str]] = []
-        self.is_dead = False
         for name, type_ in self.arguments.items():
             if not isinstance(type_, Known):
                 words = tuple(f"%{name}.{k}.a" for k in range(len(type_.words)))
@@ -147,7 +132,7 @@ class FunctionCompiler(Expressions):
         self.statements(self.node.body)
         if not self.is_dead:
             if self.result not in (None, NOTHING):
-                self.refuse(self.node, "may end without a result", "return one on every way")
+                self.refuse(self.node, "may end without a result", "return a result on every path")
             self.result = NOTHING
             self.line("ret void")
 
@@ -177,7 +162,7 @@ class FunctionCompiler(Expressions):
         """The value of a variable."""
         key = self.current[name]
         if key is None:
-            self.refuse(node, f"{name} is of another type on another way", "take two names")
+            self.refuse(node, f"{name} is of another type on another path", "take two names")
         if isinstance(self.types[key], Known) or self.types[key] == NOTHING:
             return Value(self.types[key])
         return self.read_from(self.slots[key], self.types[key])
@@ -189,7 +174,7 @@ class FunctionCompiler(Expressions):
         for node in nodes:
             if self.is_dead:
                 return
-            self.compile_node(node, "statement", INSTEAD)
+            self.compile_node(node)
 
     def _Expr(self, node: ast.Expr) -> None:
         if isinstance(node.value, ast.Constant):  # a docstring
@@ -222,16 +207,12 @@ class FunctionCompiler(Expressions):
         for target in node.targets:
             self._assign(target, value)
 
-    def _AnnAssign(self, node: ast.AnnAssign) -> None:
-        if node.value is not None:
-            self._assign(node.target, self.value(node.value))
-
     def _assign(self, target: ast.expr, value: Value) -> None:
         if isinstance(target, ast.Name):
             self.store(target, target.id, value)
-        elif isinstance(target, (ast.Tuple, ast.List)):
+        elif isinstance(target, ast.Tuple):
             if not isinstance(value.type, Tuple) or len(value.type.items) != len(target.elts):
-                self.refuse(target, f"takes {len(target.elts)} values apart that are not there",
+                self.refuse(target, f"unpacks {len(target.elts)} values that are not there",
                             "give it a tuple of as many")  # fmt: skip
             for part, item in zip(target.elts, items_of(value), strict=True):
                 self._assign(part, item)
@@ -240,13 +221,13 @@ class FunctionCompiler(Expressions):
             self.write_to(slots, self.cast(target, value, item))
 
     def _AugAssign(self, node: ast.AugAssign) -> None:
-        if isinstance(node.target, ast.Name):
-            name = ast.copy_location(ast.Name(node.target.id, ast.Load()), node.target)
-            before = self.value(name)
-            self.store(node, node.target.id,
-                       self.operation(node, node.op, before, self.value(node.value)))  # fmt: skip
+        target = node.target
+        if isinstance(target, ast.Name):
+            before = self._Name(target)
+            after = self.operation(node, node.op, before, self.value(node.value))
+            self.store(node, target.id, after)
             return
-        slots, item = self.number_at(node.target)
+        slots, item = self.number_at(target)
         before = self.read_from(slots, item)
         after = self.operation(node, node.op, before, self.value(node.value))
         self.write_to(slots, self.cast(node, after, item))
@@ -334,8 +315,6 @@ class FunctionCompiler(Expressions):
         given = [self.cast(a, self.integer(a, self.value(a)), INT) for a in call.args]
         first, last = (constant(0), given[0]) if len(given) == 1 else given[:2]
         step = given[2] if len(given) > 2 else constant(1)
-        assert first is not None
-        assert step is not None
         if step.constant == 0:
             self.refuse(node, "the step of a range is zero", "take another one")
         [counter] = self.place(INT, "for")
@@ -358,3 +337,36 @@ class FunctionCompiler(Expressions):
         self.line(f"store i64 {following}, ptr {counter}")
         self.jump(head)
         self.start(end)
+
+
+@cache
+def _definitions(file: str, everywhere: bool) -> dict[int, ast.FunctionDef]:
+    """Functions of a file by their first line, decorators included."""
+    tree = ast.parse("".join(linecache.getlines(file)))
+    nodes = ast.walk(tree) if everywhere else tree.body
+    found = (node for node in nodes if isinstance(node, ast.FunctionDef))
+    return {min([d.lineno for d in node.decorator_list] + [node.lineno]): node for node in found}
+
+
+@cache
+def stored_names(node: ast.FunctionDef) -> set[str]:
+    """Names that a function assigns to."""
+    names = (n for n in ast.walk(node) if isinstance(n, ast.Name))
+    return {n.id for n in names if isinstance(n.ctx, ast.Store)}
+
+
+def definition(function: Callable[..., Any]) -> ast.FunctionDef:
+    """The syntax tree of a function.
+
+    Raises:
+        CompileError: its source is not available.
+    """
+    code = function.__code__
+    with contextlib.suppress(SyntaxError):
+        for everywhere in (False, True):
+            if found := _definitions(code.co_filename, everywhere).get(code.co_firstlineno):
+                return found
+    raise CompileError(
+        f"the source of {function.__qualname__} cannot be read; put it into a file, as def "
+        f"[{code.co_filename}:{code.co_firstlineno}]"
+    )

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.types import FLOAT, INT, Array, CompileError, bits
-from dap3d_core.kernels.compiler.words import EXACT, LIBRARY, call_of
+from dap3d_core.kernels.compiler.writer import EXACT, LIBRARY, call_of
 
 _WORDS = "the words of dap3d_core.kernels: sqrt, sin, minimum, ..., where(condition, a, b)"
 #: The trace of this thread.
@@ -197,7 +197,7 @@ class Words:
             raise AttributeError(name)
 
         return lambda *numbers: Symbol(
-            _new(call_of(_current.program, name, [_word(x) for x in numbers]))
+            _new(call_of(_current.program.needs, name, [_word(x) for x in numbers]))
         )
 
     def where(self, condition: Condition, a: Any, b: Any) -> Any:

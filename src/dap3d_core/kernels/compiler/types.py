@@ -40,22 +40,19 @@ class Array:
         return ("ptr", *["i64"] * self.ndim)
 
 
-class _ByAddress:
+class _Address:
     """Base of types of one address; no dataclass, whose equality a struct would inherit."""
 
-    @property
-    def words(self) -> tuple[str, ...]:
-        """One address."""
-        return ("ptr",)
+    words = ("ptr",)
 
 
 @dataclass(frozen=True)
-class Numbers(_ByAddress):
+class Numbers(_Address):
     """Address of the first item of an array, as functions called by address take it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Struct(_ByAddress):
+class Struct(_Address):
     """A struct of arrays and further structs (kernels/runtime/array_struct.py).
 
     ``scalars`` gives array and index of each number that has a name of its own.
@@ -66,7 +63,7 @@ class Struct(_ByAddress):
     scalars: dict[str, tuple[str, int]] = field(default_factory=dict)
 
     def begins_with(self, other: Any) -> bool:
-        """Whether this struct extends the other: its first members are those of the other."""
+        """True if this struct extends the other: its first members are those of the other."""
         return isinstance(other, Struct) and self.members[: len(other.members)] == other.members
 
 
@@ -79,14 +76,14 @@ class Signature:
 
 
 @dataclass(frozen=True)
-class Pointer(_ByAddress):
+class Pointer(_Address):
     """The address of a function."""
 
     signature: Signature
 
 
 @dataclass(frozen=True)
-class Table(_ByAddress):
+class Table(_Address):
     """Addresses of functions of one signature."""
 
     signature: Signature
@@ -106,7 +103,7 @@ class Tuple:
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """A compile-time constant: a function, a module, a number that an inlined function is given."""
+    """A compile-time constant: a function, a module, a number given to an inlined function."""
 
     value: Any
     words: tuple[str, ...] = ()
@@ -143,7 +140,7 @@ def bits(x: float) -> str:
 
 
 def constant(value: Any) -> Value | None:
-    """A number, a tuple of numbers or None as a value; None for anything else."""
+    """A real number, a tuple of them or None as a value; None for anything else."""
     if value is None:
         return Value(NOTHING)
     if isinstance(value, (bool, np.bool_)):
@@ -152,12 +149,8 @@ def constant(value: Any) -> Value | None:
         return Value(INT, (str(int(value)),), int(value)) if -(2**63) <= value < 2**63 else None
     if isinstance(value, (float, np.floating)):
         return Value(FLOAT, (bits(float(value)),), float(value))
-    if isinstance(value, (complex, np.complexfloating)):
-        return Value(COMPLEX, (bits(value.real), bits(value.imag)), complex(value))
-    if isinstance(value, tuple):
-        items = [constant(item) for item in value]
-        return None if None in items else group([item for item in items if item is not None])
-    return None
+    items = [constant(item) for item in value] if isinstance(value, tuple) else [None]
+    return None if None in items else group(items)
 
 
 def group(items: Any) -> Value:
@@ -170,8 +163,8 @@ def items_of(value: Value) -> tuple[Value, ...]:
     """The items of a tuple."""
     if value.items or not value.type.items:
         return value.items
-    words, items = iter(value.words), value.type.items
-    return tuple(Value(item, tuple(next(words) for _ in item.words)) for item in items)
+    words = iter(value.words)
+    return tuple(Value(item, tuple(next(words) for _ in item.words)) for item in value.type.items)
 
 
 def wider(one: Any, other: Any) -> Any:
@@ -184,3 +177,20 @@ def wider(one: Any, other: Any) -> Any:
         items = tuple(wider(a, b) for a, b in zip(one.items, other.items, strict=True))
         return None if None in items else Tuple(items)
     return None
+
+
+def name_of(type_: Any) -> str:
+    """Description of a type for messages."""
+    if isinstance(type_, Array):
+        return f"array of {type_.item.name}s with {type_.ndim} indices"
+    if isinstance(type_, Known):
+        return "function" if callable(type_.value) else "module"
+    return str(getattr(type_, "name", type(type_).__name__.lower()))
+
+
+def result_type(type_: Any) -> str:
+    """LLVM type of a result."""
+    words = type_.words
+    if len(words) > 1:
+        return f"{{{', '.join(words)}}}"
+    return words[0] if words else "void"

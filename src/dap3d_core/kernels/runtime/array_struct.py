@@ -19,9 +19,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.kernels.compiler.intrinsics import intrinsic
 from dap3d_core.kernels.compiler.types import COMPLEX, DTYPES, FLOAT, INT, Array, Struct
 from dap3d_core.kernels.compiler.units import address_of
-from dap3d_core.kernels.compiler.words import word
 
 VECTOR, MATRIX, TENSOR = Array(FLOAT, 1), Array(FLOAT, 2), Array(FLOAT, 3)
 INTEGERS, INTEGER_MATRIX = Array(INT, 1), Array(INT, 2)
@@ -125,7 +125,7 @@ class Arrays:
         return {name: s.index for name, s in cls.scalars.items() if s.array == array}
 
 
-@word("pointer")
+@intrinsic("pointer")
 def pointer(array: Any) -> Any:
     """A C-contiguous array as a loop writes into it: by flat index, never counted from the end."""
     return array.reshape(-1)

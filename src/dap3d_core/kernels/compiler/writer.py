@@ -1,0 +1,302 @@
+"""LLVM IR of one function: instructions, casts, arithmetic, comparisons, blocks, stack slots."""
+
+import ast
+import operator
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, NoReturn
+
+from dap3d_core.kernels.compiler.types import (
+    BOOL,
+    COMPLEX,
+    FLOAT,
+    INT,
+    NOTHING,
+    NUMBERS,
+    Array,
+    CompileError,
+    Numbers,
+    Pointer,
+    Struct,
+    Tuple,
+    Value,
+    bits,
+    constant,
+    group,
+    items_of,
+    name_of,
+    wider,
+)
+
+#: LLVM intrinsics, exact on every platform.
+EXACT = ("sqrt", "fabs", "floor", "ceil", "rint")
+#: Functions of the C library, which plain Python calls as well. LLVM must not replace them
+#: (nobuiltin): its own versions may round differently.
+LIBRARY = ("sin", "cos", "tan", "tanh", "exp", "log", "asin", "acos", "atan", "atan2", "pow",
+           "hypot", "nextafter")  # fmt: skip
+
+
+class Writer:
+    """Writes the instructions of one function: from values to values, without syntax trees."""
+
+    def refuse(self, node: ast.AST, why: str, remedy: str) -> NoReturn:
+        """Raise a CompileError: what is wrong, what to write instead, file and line."""
+        where = f"{self.function.__code__.co_filename}:{node.lineno}"
+        raise CompileError(f"{self.function.__qualname__}: {why}; {remedy} [{where}]")
+
+    def line(self, text: str) -> None:
+        """Add an instruction."""
+        self.lines.append(f"  {text}")
+
+    def new(self, text: str) -> str:
+        """Add an instruction with a result; returns the name of the result."""
+        self.count += 1
+        self.lines.append(f"  %t{self.count} = {text}")
+        return f"%t{self.count}"
+
+    # ------------------------------------------------------------------ blocks, stack slots
+
+    def label(self) -> str:
+        """A new block label."""
+        self.count += 1
+        return f"L{self.count}"
+
+    def start(self, label: str) -> None:
+        """Begin a block."""
+        self.lines.append(f"{label}:")
+        self.is_dead = False
+
+    def jump(self, label: str) -> None:
+        """End a block with a jump, unless it has ended."""
+        if not self.is_dead:
+            self.line(f"br label %{label}")
+        self.is_dead = True
+
+    def branch(self, condition: Value, one: str, other: str) -> None:
+        """End a block with a conditional jump."""
+        self.line(f"br i1 {condition.word}, label %{one}, label %{other}")
+
+    def place(self, type_: Any, name: str) -> list[str]:
+        """Stack slots for the words of a value, initialised to zero."""
+        slots = []
+        for word in type_.words:
+            self.count += 1
+            slots.append(f"%{name}.{self.count}.s")
+            zero = {"ptr": "null", "double": "0.0"}.get(word, "0")
+            self.places += [f"  {slots[-1]} = alloca {word}",
+                            f"  store {word} {zero}, ptr {slots[-1]}"]  # fmt: skip
+        return slots
+
+    def write_to(self, slots: Sequence[str], value: Value) -> None:
+        """Store a value in stack slots, or in the words of an array item."""
+        for word, x, slot in zip(value.type.words, value.words, slots, strict=True):
+            self.line(f"store {word} {x}, ptr {slot}")
+
+    def read_from(self, slots: Sequence[str], type_: Any) -> Value:
+        """Load a value from stack slots, or from the words of an array item."""
+        pairs = zip(type_.words, slots, strict=True)
+        return Value(type_, tuple(self.new(f"load {w}, ptr {s}") for w, s in pairs))
+
+    # ------------------------------------------------------------------ from one type to another
+
+    def cast(self, node: ast.AST, value: Value, type_: Any) -> Value:
+        """A value converted to another type."""
+        have = value.type
+        if have == type_:
+            return value
+        if type_ in NUMBERS and have in NUMBERS:
+            return self._cast_number(node, value, type_)
+        if isinstance(type_, Tuple) and wider(have, type_) == type_:
+            pairs = zip(items_of(value), type_.items, strict=True)
+            return group([self.cast(node, item, t) for item, t in pairs])
+        if isinstance(have, Struct) and have.begins_with(type_):
+            return Value(type_, value.words)
+        if isinstance(type_, Numbers) and isinstance(have, Array):
+            return Value(type_, value.words[:1])
+        if isinstance(type_, Pointer) and isinstance(have, Pointer):
+            return value
+        self.refuse(node, f"a {name_of(have)} is given for a {name_of(type_)}",
+                    "pass what the function takes")  # fmt: skip
+
+    def _cast_number(self, node: ast.AST, value: Value, type_: Any) -> Value:
+        if type_ == COMPLEX:
+            return Value(COMPLEX, (self.cast(node, value, FLOAT).word, bits(0.0)))
+        if value.type == COMPLEX:
+            self.refuse(node, "a complex number is given for a real one", "take .real")
+        if value.constant is not None:
+            return constant({BOOL: bool, INT: int, FLOAT: float}[type_](value.constant))
+        return Value(type_, (self.new(CASTS[value.type, type_].format(value.word)),))
+
+    def integer(self, node: ast.AST, value: Value) -> Value:
+        """A value that must be an integer."""
+        if value.type not in (INT, BOOL):
+            self.refuse(node, f"a {name_of(value.type)} is an index or a count",
+                        "take an integer, int(x)")  # fmt: skip
+        return self.cast(node, value, INT)
+
+    # ------------------------------------------------------------------ arithmetic
+
+    def operation(self, node: ast.AST, op: ast.operator, a: Value, b: Value) -> Value:
+        """An operation of two numbers, in the narrowest type that has it and holds both."""
+        python, instructions = OPERATORS.get(type(op), (None, None))
+        operands = f"no {type(op).__name__} of a {name_of(a.type)} and a {name_of(b.type)}"
+        if python is None or a.type not in NUMBERS or b.type not in NUMBERS:
+            self.refuse(node, operands, "take numbers, one by one")
+        if a.constant is not None and b.constant is not None:
+            try:
+                result, reason = constant(python(a.constant, b.constant)), "more than 64 bits"
+            except (ArithmeticError, TypeError, ValueError) as error:
+                result, reason = None, str(error)
+            if result is None:
+                self.refuse(node, reason, "change the constants")
+            return result
+        common = wider(a.type, b.type)
+        types = [t for t in NUMBERS[NUMBERS.index(common) :] if t in instructions]
+        if not types or (isinstance(op, ast.Pow) and common != FLOAT):
+            self.refuse(node, operands, INSTEAD.get(type(op), "take integers, int(x)"))
+        a, b = self.cast(node, a, types[0]), self.cast(node, b, types[0])
+        instruction = instructions[types[0]]
+        if callable(instruction):
+            return instruction(self, a, b)
+        pairs = zip(a.words, b.words, strict=True)
+        return Value(types[0], tuple(self.new(f"{instruction} {x}, {y}") for x, y in pairs))
+
+    def negative(self, node: ast.AST, value: Value) -> Value:
+        """-x."""
+        if value.constant is not None:
+            return constant(-value.constant)
+        if value.type in (FLOAT, COMPLEX):
+            return Value(value.type, tuple(self.new(f"fneg double {x}") for x in value.words))
+        return Value(INT, (self.new(f"sub nsw i64 0, {self.cast(node, value, INT).word}"),))
+
+    def negation(self, value: Value) -> Value:
+        """The contrary of a truth value."""
+        if value.constant is not None:
+            return constant(not value.constant)
+        return Value(BOOL, (self.new(f"xor i1 {value.word}, true"),))
+
+    def comparison(self, node: ast.AST, op: ast.cmpop, a: Value, b: Value) -> Value:
+        """One comparison."""
+        if isinstance(op, (ast.Is, ast.IsNot)):
+            if NOTHING not in (a.type, b.type):
+                self.refuse(node, "is compares more than None", "write ==")
+            return constant((a.type == b.type) == isinstance(op, ast.Is))
+        if isinstance(op, (ast.In, ast.NotIn)) and isinstance(b.type, Tuple):
+            result = constant(False)
+            for item in items_of(b):
+                same = self.comparison(node, ast.Eq(), a, item)
+                result = self.operation(node, ast.BitOr(), result, same)
+            return result if isinstance(op, ast.In) else self.negation(result)
+        if type(op) not in COMPARISONS or a.type not in NUMBERS or b.type not in NUMBERS:
+            self.refuse(node, f"no {type(op).__name__} of a {name_of(a.type)} and a "
+                        f"{name_of(b.type)}", "compare numbers, one by one")  # fmt: skip
+        python, integer, real, join = COMPARISONS[type(op)]
+        if a.constant is not None and b.constant is not None:
+            return constant(bool(python(a.constant, b.constant)))
+        type_ = wider(wider(a.type, b.type), INT)
+        if type_ == COMPLEX and not join:
+            self.refuse(node, "an order of complex numbers", "compare their parts")
+        pairs = zip(self.cast(node, a, type_).words, self.cast(node, b, type_).words, strict=True)
+        relation = f"icmp {integer} i64" if type_ == INT else f"fcmp {real} double"
+        parts = [self.new(f"{relation} {x}, {y}") for x, y in pairs]
+        return Value(BOOL, (parts[0] if len(parts) == 1 else
+                            self.new(f"{join} i1 {', '.join(parts)}"),))  # fmt: skip
+
+    def call(self, name: str, *words: str) -> str:
+        """A call of an intrinsic or a function of the C library."""
+        return self.new(call_of(self.program.needs, name, words))
+
+
+def call_of(needs: dict[str, str], name: str, words: Sequence[str]) -> str:
+    """LLVM IR of a call of a function of floats; adds its declaration to those needed."""
+    symbol = f"llvm.{name}.f64" if name in EXACT else name
+    kind = "" if name in EXACT else " nobuiltin nounwind willreturn memory(none)"
+    needs[symbol] = f"declare double @{symbol}({', '.join(['double'] * len(words))}){kind}"
+    return f"call double @{symbol}({', '.join(f'double {x}' for x in words)}){kind}"
+
+
+def _floored(writer: Writer, a: Value, b: Value, is_mod: bool) -> Value:
+    """Quotient or remainder: Python rounds down, the processor towards zero."""
+    new = writer.new
+    quotient, rest = (new(f"{name} i64 {a.word}, {b.word}") for name in ("sdiv", "srem"))
+    some = new(f"icmp ne i64 {rest}, 0")
+    signs = new(f"xor i64 {rest}, {b.word}")
+    below = new(f"icmp slt i64 {signs}, 0")
+    off = new(f"and i1 {some}, {below}")
+    exact, other = (
+        (rest, f"add i64 {rest}, {b.word}") if is_mod else (quotient, f"sub i64 {quotient}, 1")
+    )
+    return Value(INT, (new(f"select i1 {off}, i64 {new(other)}, i64 {exact}"),))
+
+
+def _power(writer: Writer, a: Value, b: Value) -> Value:
+    """``pow`` of the C library, as in plain Python."""
+    return Value(FLOAT, (writer.call("pow", a.word, b.word),))
+
+
+def _complex_product(writer: Writer, a: Value, b: Value) -> Value:
+    """(a0 b0 - a1 b1, a0 b1 + a1 b0)."""
+    (a0, a1), (b0, b1), new = a.words, b.words, writer.new
+    p, q, r, s = (new(f"fmul double {x}, {y}")
+                  for x, y in ((a0, b0), (a1, b1), (a0, b1), (a1, b0)))  # fmt: skip
+    return Value(COMPLEX, (new(f"fsub double {p}, {q}"), new(f"fadd double {r}, {s}")))
+
+
+def _complex_quotient(writer: Writer, a: Value, b: Value) -> Value:
+    """Smith's division as numpy does it: by the ratio of the smaller part to the larger one."""
+    (a0, a1), (b0, b1), new = a.words, b.words, writer.new
+    sizes = [writer.call("fabs", x) for x in b.words]
+    test = new(f"fcmp oge double {sizes[0]}, {sizes[1]}")
+
+    def choose(x: str, y: str) -> str:
+        return new(f"select i1 {test}, double {x}, double {y}")
+
+    large, small = choose(b0, b1), choose(b1, b0)
+    ratio = new(f"fdiv double {small}, {large}")
+    share = new(f"fmul double {small}, {ratio}")
+    scale = new(f"fdiv double {bits(1.0)}, {new(f'fadd double {large}, {share}')}")
+    r0, r1 = new(f"fmul double {a0}, {ratio}"), new(f"fmul double {a1}, {ratio}")
+    real = choose(new(f"fadd double {a0}, {r1}"), new(f"fadd double {r0}, {a1}"))
+    imag = choose(new(f"fsub double {a1}, {r0}"), new(f"fsub double {r1}, {a0}"))
+    both = [new(f"fmul double {x}, {scale}") for x in (real, imag)]
+    is_zero = new(f"fcmp oeq double {new(f'fadd double {sizes[0]}, {sizes[1]}')}, 0.0")
+    plain = [new(f"fdiv double {x}, {sizes[0]}") for x in a.words]
+    pairs = zip(plain, both, strict=True)
+    return Value(COMPLEX, tuple(new(f"select i1 {is_zero}, double {x}, double {y}")
+                                for x, y in pairs))  # fmt: skip
+
+
+#: Conversions of numbers.
+CASTS = {
+    (INT, FLOAT): "sitofp i64 {} to double",
+    (BOOL, FLOAT): "uitofp i1 {} to double",
+    (BOOL, INT): "zext i1 {} to i64",
+    (FLOAT, INT): "fptosi double {} to i64",
+    (INT, BOOL): "icmp ne i64 {}, 0",
+    (FLOAT, BOOL): "fcmp une double {}, 0.0",
+}
+#: Of each operator: that of Python, and the instruction for each type of both operands.
+OPERATORS: dict[type, tuple[Any, dict[Any, Any]]] = {
+    ast.Add: (operator.add, {INT: "add nsw i64", FLOAT: "fadd double", COMPLEX: "fadd double"}),
+    ast.Sub: (operator.sub, {INT: "sub nsw i64", FLOAT: "fsub double", COMPLEX: "fsub double"}),
+    ast.Mult: (operator.mul, {INT: "mul nsw i64", FLOAT: "fmul double", COMPLEX: _complex_product}),
+    ast.Div: (operator.truediv, {FLOAT: "fdiv double", COMPLEX: _complex_quotient}),
+    ast.FloorDiv: (operator.floordiv, {INT: partial(_floored, is_mod=False)}),
+    ast.Mod: (operator.mod, {INT: partial(_floored, is_mod=True)}),
+    ast.Pow: (operator.pow, {FLOAT: _power}),
+    ast.BitAnd: (operator.and_, {BOOL: "and i1", INT: "and i64"}),
+    ast.BitOr: (operator.or_, {BOOL: "or i1", INT: "or i64"}),
+    ast.BitXor: (operator.xor, {BOOL: "xor i1", INT: "xor i64"}),
+    ast.LShift: (operator.lshift, {INT: "shl i64"}),
+    ast.RShift: (operator.rshift, {INT: "ashr i64"}),
+}
+INSTEAD = {ast.Pow: "multiply, or take floats"}
+#: Of each comparison: that of Python, of integers, of floats; how complex numbers join their parts.
+COMPARISONS = {
+    ast.Lt: (operator.lt, "slt", "olt", ""),
+    ast.LtE: (operator.le, "sle", "ole", ""),
+    ast.Gt: (operator.gt, "sgt", "ogt", ""),
+    ast.GtE: (operator.ge, "sge", "oge", ""),
+    ast.Eq: (operator.eq, "eq", "oeq", "and"),
+    ast.NotEq: (operator.ne, "ne", "une", "or"),
+}
