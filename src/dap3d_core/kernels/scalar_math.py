@@ -13,14 +13,14 @@ from dap3d_core.kernels.compiler.intrinsics import intrinsic
 
 
 def _symbolic(x):
-    return hasattr(x, "free_symbols") or hasattr(x, "words")
+    return hasattr(x, "free_symbols") or hasattr(x, "tracer")
 
 
 def _library(*numbers: Any) -> Any:
     """What has the words for symbolic numbers: sympy's, or those of a trace."""
     for x in numbers:
-        if hasattr(x, "words"):
-            return x.words
+        if hasattr(x, "tracer"):
+            return x.tracer
     import sympy  # only reached with a sympy argument, so it is there
 
     return sympy
@@ -78,8 +78,8 @@ def atan2(y, x):
 
 def where(condition, a, b):
     """``a`` where the condition holds, else ``b``: a kernel's branch. Both are evaluated."""
-    if hasattr(condition, "words"):
-        return condition.words.where(condition, a, b)
+    if hasattr(condition, "tracer"):
+        return condition.tracer.where(condition, a, b)
     if _symbolic(condition):
         sympy = _library()
         return sympy.Piecewise((a, condition), (b, True))

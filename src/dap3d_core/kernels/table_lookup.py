@@ -11,8 +11,8 @@ def lookup(table, x):
     Before the first row, the first one. Returns the row's numbers, a tuple.
     """
     array, place, rows, sample = table
-    if hasattr(array, "words"):  # while it is compiled
-        at = array.words.row_of(_row, array, place, rows, len(sample), x)
+    if hasattr(array, "tracer"):  # while it is compiled
+        at = array.tracer.row_of(_row, array, place, rows, len(sample), x)
     elif hasattr(x, "free_symbols"):
         raise TypeError("a table has no symbolic rows")
     else:

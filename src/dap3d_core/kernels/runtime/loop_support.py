@@ -71,4 +71,4 @@ def doubtful(change, elapsed):
 
 def whole(x):
     """A number of an array as a place in another."""
-    return x.words.whole(x) if hasattr(x, "words") else int(x)
+    return x.tracer.integer(x) if hasattr(x, "tracer") else int(x)
