@@ -7,29 +7,8 @@ import types
 from collections.abc import Hashable, Sequence
 from typing import Any
 
+from dap3d_core.kernels.compiler import types as t
 from dap3d_core.kernels.compiler.intrinsics import FORMS, KNOWN
-from dap3d_core.kernels.compiler.types import (
-    BOOL,
-    COMPLEX,
-    FLOAT,
-    INT,
-    NUMBERS,
-    Array,
-    CompileError,
-    Known,
-    Pointer,
-    Struct,
-    Table,
-    Tuple,
-    Value,
-    bits,
-    constant,
-    group,
-    items_of,
-    name_of,
-    result_type,
-    wider,
-)
 from dap3d_core.kernels.compiler.writer import Writer
 
 #: Remedies for what is outside the subset.
@@ -78,21 +57,21 @@ class Expressions(Writer):
     #: The value of an expression.
     value = compile_node
 
-    def _Constant(self, node: ast.Constant) -> Value:
-        value = constant(node.value)
+    def _Constant(self, node: ast.Constant) -> t.Value:
+        value = t.constant(node.value)
         if value is None:
             self.refuse(node, f"{node.value!r} is no real number of 64 bits", "take numbers")
         return value
 
-    def _Tuple(self, node: ast.Tuple) -> Value:
-        return group([self.value(item) for item in node.elts])
+    def _Tuple(self, node: ast.Tuple) -> t.Value:
+        return t.group([self.value(item) for item in node.elts])
 
     # ------------------------------------------------------------------ names
 
-    def _Name(self, node: ast.Name) -> Value:
+    def _Name(self, node: ast.Name) -> t.Value:
         name, code = node.id, self.function.__code__
         argument = self.arguments.get(name)
-        if isinstance(argument, Known) and name not in self.stored:
+        if isinstance(argument, t.Known) and name not in self.stored:
             return self._known(node, name, argument.value)
         if name in self.current:
             return self.load(node, name)
@@ -106,36 +85,36 @@ class Expressions(Writer):
                 return self._known(node, name, names[name])
         self.refuse(node, f"{name} is not defined", "define or import it")
 
-    def _known(self, node: ast.AST, name: str, value: Any) -> Value:
-        number = constant(value)
+    def _known(self, node: ast.AST, name: str, value: Any) -> t.Value:
+        number = t.constant(value)
         if number is not None:
             return number
         if callable(value) or isinstance(value, types.ModuleType):
-            return Value(Known(value))
+            return t.Value(t.Known(value))
         self.refuse(node, f"{name} is a {type(value).__name__} of the module",
                     "pass it as an argument")  # fmt: skip
 
-    def _Attribute(self, node: ast.Attribute) -> Value:
+    def _Attribute(self, node: ast.Attribute) -> t.Value:
         value, name = self.value(node.value), node.attr
         type_ = value.type
-        if isinstance(type_, Known) and isinstance(type_.value, types.ModuleType):
+        if isinstance(type_, t.Known) and isinstance(type_.value, types.ModuleType):
             if hasattr(type_.value, name):
                 return self._known(node, name, getattr(type_.value, name))
-        elif isinstance(type_, Array) and name == "shape":
-            return group([Value(INT, (w,)) for w in value.words[1:]])
-        elif isinstance(type_, Array) and name == "size":
-            return Value(INT, (self.count_of(value.words[1:]),))
-        elif isinstance(type_, Struct):
+        elif isinstance(type_, t.Array) and name == "shape":
+            return t.group([t.Value(t.INT, (w,)) for w in value.words[1:]])
+        elif isinstance(type_, t.Array) and name == "size":
+            return t.Value(t.INT, (self.count_of(value.words[1:]),))
+        elif isinstance(type_, t.Struct):
             if name in value.type.scalars:
                 return self.read_from(*self._scalar(node, value, name))
             return self._member(node, value, name)
-        elif type_ in (FLOAT, COMPLEX) and name in ("real", "imag"):
-            words = (*value.words, bits(0.0))
-            return Value(FLOAT, (words[name == "imag"],))
-        self.refuse(node, f"a {name_of(type_)} has no {name} here",
+        elif type_ in (t.FLOAT, t.COMPLEX) and name in ("real", "imag"):
+            words = (*value.words, t.bits(0.0))
+            return t.Value(t.FLOAT, (words[name == "imag"],))
+        self.refuse(node, f"a {t.name_of(type_)} has no {name} here",
                     "arrays have shape and size, structs their members")  # fmt: skip
 
-    def _member(self, node: ast.Attribute, value: Value, name: str) -> Value:
+    def _member(self, node: ast.Attribute, value: t.Value, name: str) -> t.Value:
         first = 0
         for member, type_ in value.type.members:
             if member == name:
@@ -148,23 +127,23 @@ class Expressions(Writer):
         for k, word in enumerate(type_.words):
             at = self.new(f"getelementptr inbounds i64, ptr {value.word}, i64 {first + k}")
             words.append(self.new(f"load {word}, ptr {at}, align 8, !invariant.load !0"))
-        return Value(type_, tuple(words))
+        return t.Value(type_, tuple(words))
 
     # ------------------------------------------------------------------ operations
 
-    def _UnaryOp(self, node: ast.UnaryOp) -> Value:
+    def _UnaryOp(self, node: ast.UnaryOp) -> t.Value:
         if isinstance(node.op, ast.Not):
             return self.negation(self.condition(node.operand))
         value = self.value(node.operand)
-        if value.type not in NUMBERS or not isinstance(node.op, ast.USub):
-            self.refuse(node, f"no {type(node.op).__name__} of a {name_of(value.type)}",
+        if value.type not in t.NUMBERS or not isinstance(node.op, ast.USub):
+            self.refuse(node, f"no {type(node.op).__name__} of a {t.name_of(value.type)}",
                         "take numbers")  # fmt: skip
         return self.negative(node, value)
 
-    def _BinOp(self, node: ast.BinOp) -> Value:
+    def _BinOp(self, node: ast.BinOp) -> t.Value:
         return self.operation(node, node.op, self.value(node.left), self.value(node.right))
 
-    def _Compare(self, node: ast.Compare) -> Value:
+    def _Compare(self, node: ast.Compare) -> t.Value:
         values = [self.value(node.left), *(self.value(c) for c in node.comparators)]
         result = None
         for op, a, b in zip(node.ops, values[:-1], values[1:], strict=True):
@@ -172,24 +151,24 @@ class Expressions(Writer):
             result = part if result is None else self.operation(node, ast.BitAnd(), result, part)
         return result
 
-    def condition(self, node: ast.expr) -> Value:
+    def condition(self, node: ast.expr) -> t.Value:
         """The truth value of an expression."""
         value = self._both(node, True) if isinstance(node, ast.BoolOp) else self.value(node)
-        if value.type not in (BOOL, INT, FLOAT):
-            self.refuse(node, f"a {name_of(value.type)} is a condition", "compare numbers")
-        return self.cast(node, value, BOOL)
+        if value.type not in (t.BOOL, t.INT, t.FLOAT):
+            self.refuse(node, f"a {t.name_of(value.type)} is a condition", "compare numbers")
+        return self.cast(node, value, t.BOOL)
 
-    def _BoolOp(self, node: ast.BoolOp) -> Value:
+    def _BoolOp(self, node: ast.BoolOp) -> t.Value:
         return self._both(node, False)
 
-    def _both(self, node: ast.BoolOp, is_condition: bool) -> Value:
+    def _both(self, node: ast.BoolOp, is_condition: bool) -> t.Value:
         """``and`` or ``or``; operands may be numbers where only their truth is used."""
         decides = isinstance(node.op, ast.Or)
-        slots, end, values = self.place(BOOL, "both"), self.label(), []
+        slots, end, values = self.place(t.BOOL, "both"), self.label(), []
         for part in node.values:
             value = self.condition(part) if is_condition else self.value(part)
-            if value.type != BOOL:
-                self.refuse(part, f"and, or of a {name_of(value.type)}", "compare it: x != 0")
+            if value.type != t.BOOL:
+                self.refuse(part, f"and, or of a {t.name_of(value.type)}", "compare it: x != 0")
             values.append(value)
             self.write_to(slots, value)
             if value.constant == decides or part is node.values[-1]:
@@ -202,9 +181,9 @@ class Expressions(Writer):
         self.start(end)
         if all(v.constant is not None for v in values):
             return values[-1]
-        return self.read_from(slots, BOOL)
+        return self.read_from(slots, t.BOOL)
 
-    def _IfExp(self, node: ast.IfExp) -> Value:
+    def _IfExp(self, node: ast.IfExp) -> t.Value:
         test = self.condition(node.test)
         if test.constant is not None:
             return self.value(node.body if test.constant else node.orelse)
@@ -216,9 +195,9 @@ class Expressions(Writer):
             self.start(label)
             values.append(self.value(part))
             parts.append(self.lines)
-        type_ = wider(values[0].type, values[1].type)
+        type_ = t.wider(values[0].type, values[1].type)
         if type_ is None:
-            self.refuse(node, f"a {name_of(values[0].type)} or a {name_of(values[1].type)}",
+            self.refuse(node, f"a {t.name_of(values[0].type)} or a {t.name_of(values[1].type)}",
                         "let both be of one type")  # fmt: skip
         slots = self.place(type_, "either")
         for self.lines, value in zip(parts, values, strict=True):
@@ -244,7 +223,7 @@ class Expressions(Writer):
             return self.new(f"add nsw i64 {length}, {index.constant}")
         return index.word
 
-    def address(self, array: Value, places: Sequence[ast.expr]) -> str:
+    def address(self, array: t.Value, places: Sequence[ast.expr]) -> str:
         """Address of the part of an array that leading indices select."""
         at = "0"
         for k, length in enumerate(array.words[1:]):
@@ -255,7 +234,7 @@ class Expressions(Writer):
                 at = self.new(f"add nsw i64 {at}, {index}") if at != "0" else index
         return self.item(array, at)
 
-    def item(self, array: Value, k: str) -> str:
+    def item(self, array: t.Value, k: str) -> str:
         """Address of the k-th item of an array."""
         item = array.type.item.words
         kind = f"[{len(item)} x {item[0]}]" if len(item) > 1 else item[0]
@@ -266,7 +245,7 @@ class Expressions(Writer):
         step = f"getelementptr inbounds {item.words[0]}, ptr {address}, i64"
         return [address, *(self.new(f"{step} {k}") for k in range(1, len(item.words)))]
 
-    def _scalar(self, node: ast.Attribute, struct: Value, name: str) -> tuple[list[str], Any]:
+    def _scalar(self, node: ast.Attribute, struct: t.Value, name: str) -> tuple[list[str], Any]:
         member, k = struct.type.scalars[name]
         array = self._member(node, struct, member)
         return self.slots_at(self.item(array, str(k)), array.type.item), array.type.item
@@ -276,30 +255,30 @@ class Expressions(Writer):
         if isinstance(node, ast.Attribute):
             struct = self.value(node.value)
             if node.attr not in getattr(struct.type, "scalars", ()):
-                self.refuse(node, f"{node.attr} of a {name_of(struct.type)} is given a value",
+                self.refuse(node, f"{node.attr} of a {t.name_of(struct.type)} is given a value",
                             "only arrays and scalars of structs change")  # fmt: skip
             return self._scalar(node, struct, node.attr)
         if not isinstance(node, ast.Subscript):
             self.refuse(node, "a value is given to what is no name and no number",
                         "only names, arrays and scalars of structs change")  # fmt: skip
         array, places = self.value(node.value), _parts(node.slice)
-        if not isinstance(array.type, Array):
-            self.refuse(node, f"a {name_of(array.type)} is written into", "only arrays change")
+        if not isinstance(array.type, t.Array):
+            self.refuse(node, f"a {t.name_of(array.type)} is written into", "only arrays change")
         if len(places) != array.type.ndim or any(isinstance(p, ast.Slice) for p in places):
             self.refuse(node, "more than one number is written at once", "write a loop")
         return self.slots_at(self.address(array, places), array.type.item), array.type.item
 
-    def _Subscript(self, node: ast.Subscript) -> Value:
+    def _Subscript(self, node: ast.Subscript) -> t.Value:
         value, places = self.value(node.value), _parts(node.slice)
         type_ = value.type
-        if isinstance(type_, Tuple):
+        if isinstance(type_, t.Tuple):
             return self._tuple_item(node, value)
-        if isinstance(type_, Table):
+        if isinstance(type_, t.Table):
             k = self.integer(node.slice, self.value(node.slice)).word
             at = self.new(f"getelementptr inbounds i64, ptr {value.word}, i64 {k}")
-            return Value(Pointer(type_.signature), (self.new(f"load ptr, ptr {at}"),))
-        if not isinstance(type_, Array) or len(places) > type_.ndim:
-            self.refuse(node, f"a {name_of(type_)} has no such index", "index arrays and tuples")
+            return t.Value(t.Pointer(type_.signature), (self.new(f"load ptr, ptr {at}"),))
+        if not isinstance(type_, t.Array) or len(places) > type_.ndim:
+            self.refuse(node, f"a {t.name_of(type_)} has no such index", "index arrays and tuples")
         if isinstance(node.slice, ast.Slice):
             return self._slice(node.slice, value)
         if any(isinstance(p, ast.Slice) for p in places):
@@ -307,17 +286,17 @@ class Expressions(Writer):
         at = self.address(value, places)
         if len(places) < type_.ndim:
             shape = value.words[1 + len(places) :]
-            return Value(Array(type_.item, type_.ndim - len(places)), (at, *shape))
+            return t.Value(t.Array(type_.item, type_.ndim - len(places)), (at, *shape))
         return self.read_from(self.slots_at(at, type_.item), type_.item)
 
-    def _tuple_item(self, node: ast.Subscript, value: Value) -> Value:
-        k, items = self.value(node.slice).constant, items_of(value)
+    def _tuple_item(self, node: ast.Subscript, value: t.Value) -> t.Value:
+        k, items = self.value(node.slice).constant, t.items_of(value)
         if not isinstance(k, int) or not -len(items) <= k < len(items):
             self.refuse(node, f"the index of a tuple of {len(items)} is no constant within it",
                         "unpack it, or take an array")  # fmt: skip
         return items[k]
 
-    def _slice(self, node: ast.Slice, array: Value) -> Value:
+    def _slice(self, node: ast.Slice, array: t.Value) -> t.Value:
         """Rows of an array; upper bounds are limited to its length, as in Python."""
         if node.step is not None:
             self.refuse(node.step, "a slice with a step", "write a loop")
@@ -332,16 +311,16 @@ class Expressions(Writer):
 
         first, last = bound(node.lower, "0"), bound(node.upper, length)
         at = self.item(array, self.count_of([first, *inner]))
-        return Value(array.type, (at, self.new(f"sub nsw i64 {last}, {first}"), *inner))
+        return t.Value(array.type, (at, self.new(f"sub nsw i64 {last}, {first}"), *inner))
 
     # ------------------------------------------------------------------ calls
 
-    def _Call(self, node: ast.Call) -> Value:
+    def _Call(self, node: ast.Call) -> t.Value:
         called = self.value(node.func)
-        if isinstance(called.type, Pointer):
+        if isinstance(called.type, t.Pointer):
             return self._call_pointer(node, called)
-        if not isinstance(called.type, Known):
-            self.refuse(node, f"a {name_of(called.type)} is called", "call functions")
+        if not isinstance(called.type, t.Known):
+            self.refuse(node, f"a {t.name_of(called.type)} is called", "call functions")
         function = called.type.value
         arguments = [self.value(a) for a in node.args]
         name = KNOWN.get(function) if isinstance(function, Hashable) else None
@@ -358,15 +337,15 @@ class Expressions(Writer):
         return self._call_function(node, function, plain, arguments)
 
     def _call_function(
-        self, node: ast.Call, function: Any, plain: types.FunctionType, arguments: list[Value]
-    ) -> Value:
+        self, node: ast.Call, function: Any, plain: types.FunctionType, arguments: list[t.Value]
+    ) -> t.Value:
         parameters = list(inspect.signature(plain).parameters.values())
         named = {k.arg: self.value(k.value) for k in node.keywords}
         if len(arguments) > len(parameters) or set(named) - {p.name for p in parameters}:
             self.refuse(node, f"{plain.__qualname__} is not called as it is defined",
                         f"it takes {', '.join(p.name for p in parameters)}")  # fmt: skip
         for parameter in parameters[len(arguments) :]:
-            given = named.get(parameter.name) or constant(parameter.default)
+            given = named.get(parameter.name) or t.constant(parameter.default)
             if given is None:
                 self.refuse(node, f"{plain.__qualname__} is called without {parameter.name}",
                             "give it a value")  # fmt: skip
@@ -374,22 +353,22 @@ class Expressions(Writer):
         is_inlined = getattr(function, "is_inlined", False)
         types_, words = [], []
         for parameter, value in zip(parameters, arguments, strict=True):
-            if parameter.annotation is float and value.type in (INT, BOOL):
-                value = self.cast(node, value, FLOAT)
+            if parameter.annotation is float and value.type in (t.INT, t.BOOL):
+                value = self.cast(node, value, t.FLOAT)
             if is_inlined and value.constant is not None:
-                types_.append(Known(value.constant))
+                types_.append(t.Known(value.constant))
                 continue
             types_.append(value.type)
             words += [f"{w} {x}" for w, x in zip(value.type.words, value.words, strict=True)]
         try:
             name, result = self.program.function(function, types_)
-        except CompileError as error:
+        except t.CompileError as error:
             if "calls itself" in str(error):
                 self.refuse(node, str(error).split(";")[0], "write a loop")
             raise
         return self._result_of(f"@{name}", result, words)
 
-    def _call_pointer(self, node: ast.Call, called: Value) -> Value:
+    def _call_pointer(self, node: ast.Call, called: t.Value) -> t.Value:
         """A call of a function from a table."""
         wanted = called.type.signature.arguments
         if node.keywords or len(node.args) != len(wanted):
@@ -402,18 +381,18 @@ class Expressions(Writer):
                       for w, x in zip(type_.words, value.words, strict=True)]  # fmt: skip
         return self._result_of(called.word, called.type.signature.result, words)
 
-    def _result_of(self, name: str, result: Any, words: Sequence[str]) -> Value:
+    def _result_of(self, name: str, result: Any, words: Sequence[str]) -> t.Value:
         """Emit a call; returns its result."""
-        type_, count = result_type(result), len(result.words)
+        type_, count = t.result_type(result), len(result.words)
         call = f"call {type_} {name}({', '.join(words)})"
         if count == 0:
             self.line(call)
-            return Value(result)
+            return t.Value(result)
         whole = self.new(call)
         if count == 1:
-            return Value(result, (whole,))
+            return t.Value(result, (whole,))
         parts = (self.new(f"extractvalue {type_} {whole}, {k}") for k in range(count))
-        return Value(result, tuple(parts))
+        return t.Value(result, tuple(parts))
 
 
 def _parts(node: ast.expr) -> list[ast.expr]:

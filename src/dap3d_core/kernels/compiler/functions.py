@@ -13,21 +13,8 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
+from dap3d_core.kernels.compiler import types as t
 from dap3d_core.kernels.compiler.expressions import Expressions
-from dap3d_core.kernels.compiler.types import (
-    BOOL,
-    INT,
-    NOTHING,
-    CompileError,
-    Known,
-    Signature,
-    Tuple,
-    Value,
-    constant,
-    items_of,
-    result_type,
-    wider,
-)
 
 
 class Program:
@@ -52,17 +39,17 @@ class Program:
             self.text.append(compiler.finished(inlined))
         done = self._done[key]
         if done is None:
-            raise CompileError(f"{function.__qualname__} calls itself; write a loop")
+            raise t.CompileError(f"{function.__qualname__} calls itself; write a loop")
         return done
 
-    def export(self, function: Any, arguments: Sequence[Any], symbol: str) -> Signature:
+    def export(self, function: Any, arguments: Sequence[Any], symbol: str) -> t.Signature:
         """Export a function under a symbol; booleans are integers in its arguments and result."""
         name, result = self.function(function, arguments)
         words = [(w, f"%a{k}") for k, w in enumerate(w for a in arguments for w in a.words)]
         outside = ", ".join(f"{'i64' if w == 'i1' else w} {x}" for w, x in words)
         lines = [f"  {x}.b = trunc i64 {x} to i1" for w, x in words if w == "i1"]
         inside = ", ".join(f"{w} {x}{'.b' if w == 'i1' else ''}" for w, x in words)
-        returned = result_type(result)
+        returned = t.result_type(result)
         if returned == "i1":
             lines += [f"  %r = call i1 @{name}({inside})", "  %i = zext i1 %r to i64"]
             lines, returned = [*lines, "  ret i64 %i"], "i64"
@@ -72,7 +59,7 @@ class Program:
             lines += [f"  %r = call {returned} @{name}({inside})", f"  ret {returned} %r"]
         body = "\n".join(lines)
         self.text.append(f"define {returned} @{symbol}({outside}) nounwind {{\n{body}\n}}\n")
-        return Signature(tuple(arguments), result)
+        return t.Signature(tuple(arguments), result)
 
     def module(self) -> str:
         """The text of the module."""
@@ -108,13 +95,13 @@ class FunctionCompiler(Expressions):
 
     def finished(self, inlined: bool) -> str:
         """The text of the function."""
-        parameters = [(w, f"%{n}.{k}.a") for n, t in self.arguments.items()
-                      for k, w in enumerate(t.words)]  # fmt: skip
+        parameters = [(w, f"%{n}.{k}.a") for n, kind in self.arguments.items()
+                      for k, w in enumerate(kind.words)]  # fmt: skip
         head = ", ".join(f"{w} {x}" for w, x in parameters)
         attributes = "nounwind inlinehint" if inlined else "nounwind"
         lines = "\n".join(["entry:", *self.places, *self.lines])
         return (
-            f"define internal {result_type(self.result)} @{self.name}({head}) {attributes} "
+            f"define internal {t.result_type(self.result)} @{self.name}({head}) {attributes} "
             f"{{\n{lines}\n}}\n"
         )
 
@@ -126,29 +113,29 @@ class FunctionCompiler(Expressions):
         #: Labels to continue at, and behind, each enclosing loop.
         self.loops: list[tuple[str, str]] = []
         for name, type_ in self.arguments.items():
-            if not isinstance(type_, Known):
+            if not isinstance(type_, t.Known):
                 words = tuple(f"%{name}.{k}.a" for k in range(len(type_.words)))
-                self.store(self.node, name, Value(type_, words))
+                self.store(self.node, name, t.Value(type_, words))
         self.statements(self.node.body)
         if not self.is_dead:
-            if self.result not in (None, NOTHING):
+            if self.result not in (None, t.NOTHING):
                 self.refuse(self.node, "may end without a result", "return a result on every path")
-            self.result = NOTHING
+            self.result = t.NOTHING
             self.line("ret void")
 
-    def store(self, node: ast.AST, name: str, value: Value) -> None:
+    def store(self, node: ast.AST, name: str, value: t.Value) -> None:
         """Assign a value to a variable.
 
         Numbers share one variable of the widest type; a value of any other type makes it a new
         variable of the same name.
         """
         type_ = value.type
-        family = "number" if wider(type_, INT) else type_
-        if isinstance(type_, Tuple):
+        family = "number" if t.wider(type_, t.INT) else type_
+        if isinstance(type_, t.Tuple):
             family = "tuple", len(type_.items)
         key = name, family
         before = self.types.setdefault(key, type_)
-        both = wider(before, type_)
+        both = t.wider(before, type_)
         if both is None:
             self.refuse(node, f"{name} holds values of several types", "take two names")
         if both != before:
@@ -158,13 +145,13 @@ class FunctionCompiler(Expressions):
         self.current[name] = key
         self.write_to(self.slots[key], self.cast(node, value, self.types[key]))
 
-    def load(self, node: ast.AST, name: str) -> Value:
+    def load(self, node: ast.AST, name: str) -> t.Value:
         """The value of a variable."""
         key = self.current[name]
         if key is None:
             self.refuse(node, f"{name} is of another type on another path", "take two names")
-        if isinstance(self.types[key], Known) or self.types[key] == NOTHING:
-            return Value(self.types[key])
+        if isinstance(self.types[key], t.Known) or self.types[key] == t.NOTHING:
+            return t.Value(self.types[key])
         return self.read_from(self.slots[key], self.types[key])
 
     # ------------------------------------------------------------------ statements
@@ -187,15 +174,15 @@ class FunctionCompiler(Expressions):
         pass
 
     def _Return(self, node: ast.Return) -> None:
-        value = Value(NOTHING) if node.value is None else self.value(node.value)
+        value = t.Value(t.NOTHING) if node.value is None else self.value(node.value)
         before = value.type if self.result is None else self.result
-        self.result = wider(before, value.type)
+        self.result = t.wider(before, value.type)
         if self.result is None:
             self.refuse(node, "returns values of several types", "return one type")
         if self.result != before:
             self.is_settled = False
         words = self.cast(node, value, self.result).words
-        type_, whole = result_type(self.result), "undef"
+        type_, whole = t.result_type(self.result), "undef"
         if len(words) > 1:
             for k, (kind, word) in enumerate(zip(self.result.words, words, strict=True)):
                 whole = self.new(f"insertvalue {type_} {whole}, {kind} {word}, {k}")
@@ -207,14 +194,14 @@ class FunctionCompiler(Expressions):
         for target in node.targets:
             self._assign(target, value)
 
-    def _assign(self, target: ast.expr, value: Value) -> None:
+    def _assign(self, target: ast.expr, value: t.Value) -> None:
         if isinstance(target, ast.Name):
             self.store(target, target.id, value)
         elif isinstance(target, ast.Tuple):
-            if not isinstance(value.type, Tuple) or len(value.type.items) != len(target.elts):
+            if not isinstance(value.type, t.Tuple) or len(value.type.items) != len(target.elts):
                 self.refuse(target, f"unpacks {len(target.elts)} values that are not there",
                             "give it a tuple of as many")  # fmt: skip
-            for part, item in zip(target.elts, items_of(value), strict=True):
+            for part, item in zip(target.elts, t.items_of(value), strict=True):
                 self._assign(part, item)
         else:
             slots, item = self.number_at(target)
@@ -271,7 +258,7 @@ class FunctionCompiler(Expressions):
             self.line("unreachable")
             self.is_dead = True
 
-    def _repeat(self, node: ast.For | ast.While, again: str, end: str, k: Value | None) -> None:
+    def _repeat(self, node: ast.For | ast.While, again: str, end: str, k: t.Value | None) -> None:
         """The body of a loop; k: the value of its variable.
 
         A variable that changes its type in the body has no type at its start and after the loop.
@@ -302,22 +289,22 @@ class FunctionCompiler(Expressions):
             self._count(node, node.iter)
             return
         over = self.value(node.iter)
-        if not isinstance(over.type, Tuple):
+        if not isinstance(over.type, t.Tuple):
             self.refuse(node, "a loop over what is no range", "write for k in range(...)")
         if any(isinstance(n, (ast.Break, ast.Continue)) for n in ast.walk(node)):
             self.refuse(node, "break or continue in a loop over a tuple", "loop over a range")
-        for item in items_of(over):
+        for item in t.items_of(over):
             self._assign(node.target, item)
             self.statements(node.body)
 
     def _count(self, node: ast.For, call: ast.Call) -> None:
         """``for k in range(...)``; assignments to k do not change the count."""
-        given = [self.cast(a, self.integer(a, self.value(a)), INT) for a in call.args]
-        first, last = (constant(0), given[0]) if len(given) == 1 else given[:2]
-        step = given[2] if len(given) > 2 else constant(1)
+        given = [self.cast(a, self.integer(a, self.value(a)), t.INT) for a in call.args]
+        first, last = (t.constant(0), given[0]) if len(given) == 1 else given[:2]
+        step = given[2] if len(given) > 2 else t.constant(1)
         if step.constant == 0:
             self.refuse(node, "the step of a range is zero", "take another one")
-        [counter] = self.place(INT, "for")
+        [counter] = self.place(t.INT, "for")
         self.line(f"store i64 {first.word}, ptr {counter}")
         head, body, again, end = (self.label() for _ in range(4))
         self.jump(head)
@@ -326,10 +313,10 @@ class FunctionCompiler(Expressions):
         below = self.new(f"icmp slt i64 {k}, {last.word}")
         above = self.new(f"icmp sgt i64 {k}, {last.word}")
         upwards = self.new(f"icmp sgt i64 {step.word}, 0")
-        test = Value(BOOL, (self.new(f"select i1 {upwards}, i1 {below}, i1 {above}"),))
+        test = self.emit(t.BOOL, f"select i1 {upwards}, i1 {below}, i1 {above}")
         self.branch(test, body, end)
         self.start(body)
-        self._repeat(node, again, end, Value(INT, (k,)))
+        self._repeat(node, again, end, t.Value(t.INT, (k,)))
         self.jump(again)
         self.start(again)
         following = self.new(f"load i64, ptr {counter}")
@@ -366,7 +353,7 @@ def definition(function: Callable[..., Any]) -> ast.FunctionDef:
         for everywhere in (False, True):
             if found := _definitions(code.co_filename, everywhere).get(code.co_firstlineno):
                 return found
-    raise CompileError(
+    raise t.CompileError(
         f"the source of {function.__qualname__} cannot be read; put it into a file, as def "
         f"[{code.co_filename}:{code.co_firstlineno}]"
     )

@@ -15,7 +15,7 @@ from dap3d_core.kernels.compiler import types as t
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.writer import EXACT, LIBRARY, call_of
 
-_FUNCTIONS = "functions of dap3d_core.kernels: sqrt, sin, minimum, ..., where(condition, a, b)"
+_REMEDY = "use the functions of dap3d_core.kernels: sqrt, sin, minimum, ..., where(condition, a, b)"
 
 
 class TraceError(TypeError):
@@ -94,7 +94,7 @@ class _Symbolic:
         self.tracer, self.word = tracer, word
 
     def _refuse(self, *arguments: Any) -> NoReturn:
-        raise TraceError(f"needs the number itself; use the {_FUNCTIONS}")
+        raise TraceError(f"needs the number itself; {_REMEDY}")
 
     __float__ = __int__ = __index__ = __complex__ = __len__ = __iter__ = _refuse
     __round__ = __floor__ = __ceil__ = __trunc__ = _refuse
@@ -104,7 +104,7 @@ class _Symbolic:
         raise TraceError("branches on a number; use where(condition, a, b)")
 
     def __getattr__(self, name: str) -> NoReturn:
-        raise _MissingError(f"reads {name} of a number; use the {_FUNCTIONS}")
+        raise _MissingError(f"reads {name} of a number; {_REMEDY}")
 
     def __getitem__(self, k: Any) -> NoReturn:
         raise TraceError("takes a part of a number; tuples have parts")
@@ -243,7 +243,7 @@ class NumberArray:
         self.tracer.lines.append(f"  store double {word}, ptr {at}, align 8")
 
 
-_FUNCTION = """define void @{symbol}(double %t, ptr %arrays, i64 %i0, i64 %p0, i64 %count,
+_LOOP = """define void @{symbol}(double %t, ptr %arrays, i64 %i0, i64 %p0, i64 %count,
                            ptr %out1, ptr %out2, ptr %out3) nounwind {{
 entry:
 {head}
@@ -288,14 +288,14 @@ def trace(
     except Exception as error:
         raise t.CompileError(f"{_reason(error)}{_line_of(error)}") from error
     body = "\n".join(tracer.lines)
-    tracer.program.text.append(_FUNCTION.format(symbol=symbol, head="\n".join(head), body=body))
+    tracer.program.text.append(_LOOP.format(symbol=symbol, head="\n".join(head), body=body))
     return tracer.program.module()
 
 
 def _reason(error: BaseException) -> str:
     if isinstance(error, TraceError):
         return f"it {error}"
-    return f"{type(error).__name__}: {error}; use the {_FUNCTIONS}"
+    return f"{type(error).__name__}: {error}; {_REMEDY}"
 
 
 def _line_of(error: BaseException) -> str:

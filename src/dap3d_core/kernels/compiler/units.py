@@ -14,26 +14,14 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.kernels.compiler import background, objects, ready
-from dap3d_core.kernels.compiler.types import (
-    BOOL,
-    DTYPES,
-    FLOAT,
-    INT,
-    NOTHING,
-    Array,
-    Numbers,
-    Scalar,
-    Signature,
-    Table,
-    Tuple,
-)
+from dap3d_core.kernels.compiler import types as t
 
 #: Time of optimised compilation over that of unoptimised compilation (measured: 55 to 80).
 COST_RATIO = 60.0
 _C_TYPES = {"double": ctypes.c_double, "i64": ctypes.c_int64, "i1": ctypes.c_int64,
             "ptr": ctypes.c_void_p}  # fmt: skip
 _address, _from_buffer = ctypes.addressof, ctypes.c_char.from_buffer
-_ITEMS = {dtype: item for item, dtype in DTYPES.items()}
+_ITEMS = {dtype: item for item, dtype in t.DTYPES.items()}
 #: Names of the units that this process compiled rather than loaded.
 compiled_units: list[str] = []
 #: Of compiled units, by their names among ready-made objects: LLVM IR and results. None where they
@@ -115,7 +103,7 @@ class Unit:
 class Functions:
     """A table of addresses of functions of one signature, for calls from compiled code."""
 
-    def __init__(self, signature: Signature, entries: "Sequence[Entry]") -> None:
+    def __init__(self, signature: t.Signature, entries: "Sequence[Entry]") -> None:
         self.signature = signature
         self.entries = list(entries)
         self.addresses = np.zeros(max(1, len(self.entries)), dtype=np.int64)
@@ -133,9 +121,9 @@ class Functions:
 class Entry:
     """A compiled function as Python calls it: one C call, without the interpreter's lock."""
 
-    def __init__(self, unit: Unit, k: int, signature: Signature) -> None:
+    def __init__(self, unit: Unit, k: int, signature: t.Signature) -> None:
         self.unit, self.k, self.signature = unit, k, signature
-        self._is_bool = signature.result == BOOL
+        self._is_bool = signature.result == t.BOOL
         self._address: int = 0
         self._function: Any = None
         self._call: Any = None
@@ -160,7 +148,7 @@ class Entry:
         if self._call is None:  # many entries are never called from Python
             self._call = _caller(self.signature.arguments)
         self._address = self.unit.addresses[self.k]
-        words = [_C_TYPES[w] for t in self.signature.arguments for w in t.words]
+        words = [_C_TYPES[w] for kind in self.signature.arguments for w in kind.words]
         result = [_C_TYPES[w] for w in self.signature.result.words] or [None]
         self._function = ctypes.CFUNCTYPE(result[0], *words)(self._address)
 
@@ -194,19 +182,19 @@ def _caller(types: Sequence[Any]) -> Callable[..., Any]:
 
 def _words_of(name: str, type_: Any, checks: dict[str, Any]) -> str:
     """Python text of the machine words of an argument; adds the functions that it calls."""
-    if isinstance(type_, Array):
+    if isinstance(type_, t.Array):
         checks[f"array{len(checks)}"] = _array_check(type_)
         return f"array{len(checks) - 1}({name}), *{name}.shape"
-    if isinstance(type_, Tuple):
+    if isinstance(type_, t.Tuple):
         parts = (_words_of(f"{name}[{k}]", item, checks) for k, item in enumerate(type_.items))
         return ", ".join(filter(None, parts))
-    if isinstance(type_, Scalar):
-        return {INT: f"int({name})", BOOL: f"int({name})", NOTHING: ""}.get(type_, name)
-    return f"address_of({name})" if isinstance(type_, Numbers) else f"{name}.address"
+    if isinstance(type_, t.Scalar):
+        return {t.INT: f"int({name})", t.BOOL: f"int({name})", t.NOTHING: ""}.get(type_, name)
+    return f"address_of({name})" if isinstance(type_, t.Numbers) else f"{name}.address"
 
 
-def _array_check(type_: Array) -> Callable[[Any], int]:
-    dtype, ndim = DTYPES[type_.item], type_.ndim
+def _array_check(type_: t.Array) -> Callable[[Any], int]:
+    dtype, ndim = t.DTYPES[type_.item], type_.ndim
 
     def checked_address(array: Any) -> int:
         if array.dtype != dtype or array.ndim != ndim:
@@ -241,18 +229,18 @@ def type_of(value: Any) -> Any:
                 f"compiled code takes C-contiguous arrays of float64, int64 or complex128; this "
                 f"one has dtype {value.dtype} and strides {value.strides}"
             )
-        return Array(_ITEMS[value.dtype], value.ndim)
+        return t.Array(_ITEMS[value.dtype], value.ndim)
     for classes, type_ in _SCALARS:
         if isinstance(value, classes):
             return type_
     if isinstance(value, Functions):
-        return Table(value.signature)
+        return t.Table(value.signature)
     if isinstance(value, tuple):
-        return Tuple(tuple(type_of(item) for item in value))
+        return t.Tuple(tuple(type_of(item) for item in value))
     if hasattr(type(value), "type_of"):
         return type(value).type_of()
     raise TypeError(f"compiled code takes no {type(value).__name__}")
 
 
-_SCALARS = (((bool, np.bool_), BOOL), ((float, np.floating), FLOAT), ((int, np.integer), INT),
-            (type(None), NOTHING))  # fmt: skip
+_SCALARS = (((bool, np.bool_), t.BOOL), ((float, np.floating), t.FLOAT), ((int, np.integer), t.INT),
+            (type(None), t.NOTHING))  # fmt: skip

@@ -6,27 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any, NoReturn
 
-from dap3d_core.kernels.compiler.types import (
-    BOOL,
-    COMPLEX,
-    FLOAT,
-    INT,
-    NOTHING,
-    NUMBERS,
-    Array,
-    CompileError,
-    Numbers,
-    Pointer,
-    Struct,
-    Tuple,
-    Value,
-    bits,
-    constant,
-    group,
-    items_of,
-    name_of,
-    wider,
-)
+from dap3d_core.kernels.compiler import types as t
 
 #: LLVM intrinsics, exact on every platform.
 EXACT = ("sqrt", "fabs", "floor", "ceil", "rint")
@@ -42,7 +22,7 @@ class Writer:
     def refuse(self, node: ast.AST, why: str, remedy: str) -> NoReturn:
         """Raise a CompileError: what is wrong, what to write instead, file and line."""
         where = f"{self.function.__code__.co_filename}:{node.lineno}"
-        raise CompileError(f"{self.function.__qualname__}: {why}; {remedy} [{where}]")
+        raise t.CompileError(f"{self.function.__qualname__}: {why}; {remedy} [{where}]")
 
     def line(self, text: str) -> None:
         """Add an instruction."""
@@ -53,6 +33,10 @@ class Writer:
         self.count += 1
         self.lines.append(f"  %t{self.count} = {text}")
         return f"%t{self.count}"
+
+    def emit(self, type_: t.Scalar, text: str) -> t.Value:
+        """Add an instruction with a number of one word as its result."""
+        return t.Value(type_, (self.new(text),))
 
     # ------------------------------------------------------------------ blocks, stack slots
 
@@ -72,7 +56,7 @@ class Writer:
             self.line(f"br label %{label}")
         self.is_dead = True
 
-    def branch(self, condition: Value, one: str, other: str) -> None:
+    def branch(self, condition: t.Value, one: str, other: str) -> None:
         """End a block with a conditional jump."""
         self.line(f"br i1 {condition.word}, label %{one}, label %{other}")
 
@@ -87,119 +71,119 @@ class Writer:
                             f"  store {word} {zero}, ptr {slots[-1]}"]  # fmt: skip
         return slots
 
-    def write_to(self, slots: Sequence[str], value: Value) -> None:
+    def write_to(self, slots: Sequence[str], value: t.Value) -> None:
         """Store a value in stack slots, or in the words of an array item."""
         for word, x, slot in zip(value.type.words, value.words, slots, strict=True):
             self.line(f"store {word} {x}, ptr {slot}")
 
-    def read_from(self, slots: Sequence[str], type_: Any) -> Value:
+    def read_from(self, slots: Sequence[str], type_: Any) -> t.Value:
         """Load a value from stack slots, or from the words of an array item."""
         pairs = zip(type_.words, slots, strict=True)
-        return Value(type_, tuple(self.new(f"load {w}, ptr {s}") for w, s in pairs))
+        return t.Value(type_, tuple(self.new(f"load {w}, ptr {s}") for w, s in pairs))
 
     # ------------------------------------------------------------------ from one type to another
 
-    def cast(self, node: ast.AST, value: Value, type_: Any) -> Value:
+    def cast(self, node: ast.AST, value: t.Value, type_: Any) -> t.Value:
         """A value converted to another type."""
         have = value.type
         if have == type_:
             return value
-        if type_ in NUMBERS and have in NUMBERS:
+        if type_ in t.NUMBERS and have in t.NUMBERS:
             return self._cast_number(node, value, type_)
-        if isinstance(type_, Tuple) and wider(have, type_) == type_:
-            pairs = zip(items_of(value), type_.items, strict=True)
-            return group([self.cast(node, item, t) for item, t in pairs])
-        if isinstance(have, Struct) and have.begins_with(type_):
-            return Value(type_, value.words)
-        if isinstance(type_, Numbers) and isinstance(have, Array):
-            return Value(type_, value.words[:1])
-        if isinstance(type_, Pointer) and isinstance(have, Pointer):
+        if isinstance(type_, t.Tuple) and t.wider(have, type_) == type_:
+            pairs = zip(t.items_of(value), type_.items, strict=True)
+            return t.group([self.cast(node, item, kind) for item, kind in pairs])
+        if isinstance(have, t.Struct) and have.begins_with(type_):
+            return t.Value(type_, value.words)
+        if isinstance(type_, t.Numbers) and isinstance(have, t.Array):
+            return t.Value(type_, value.words[:1])
+        if isinstance(type_, t.Pointer) and isinstance(have, t.Pointer):
             return value
-        self.refuse(node, f"a {name_of(have)} is given for a {name_of(type_)}",
+        self.refuse(node, f"a {t.name_of(have)} is given for a {t.name_of(type_)}",
                     "pass what the function takes")  # fmt: skip
 
-    def _cast_number(self, node: ast.AST, value: Value, type_: Any) -> Value:
-        if type_ == COMPLEX:
-            return Value(COMPLEX, (self.cast(node, value, FLOAT).word, bits(0.0)))
-        if value.type == COMPLEX:
+    def _cast_number(self, node: ast.AST, value: t.Value, type_: Any) -> t.Value:
+        if type_ == t.COMPLEX:
+            return t.Value(t.COMPLEX, (self.cast(node, value, t.FLOAT).word, t.bits(0.0)))
+        if value.type == t.COMPLEX:
             self.refuse(node, "a complex number is given for a real one", "take .real")
         if value.constant is not None:
-            return constant({BOOL: bool, INT: int, FLOAT: float}[type_](value.constant))
-        return Value(type_, (self.new(CASTS[value.type, type_].format(value.word)),))
+            return t.constant({t.BOOL: bool, t.INT: int, t.FLOAT: float}[type_](value.constant))
+        return self.emit(type_, CASTS[value.type, type_].format(value.word))
 
-    def integer(self, node: ast.AST, value: Value) -> Value:
+    def integer(self, node: ast.AST, value: t.Value) -> t.Value:
         """A value that must be an integer."""
-        if value.type not in (INT, BOOL):
-            self.refuse(node, f"a {name_of(value.type)} is an index or a count",
+        if value.type not in (t.INT, t.BOOL):
+            self.refuse(node, f"a {t.name_of(value.type)} is an index or a count",
                         "take an integer, int(x)")  # fmt: skip
-        return self.cast(node, value, INT)
+        return self.cast(node, value, t.INT)
 
     # ------------------------------------------------------------------ arithmetic
 
-    def operation(self, node: ast.AST, op: ast.operator, a: Value, b: Value) -> Value:
+    def operation(self, node: ast.AST, op: ast.operator, a: t.Value, b: t.Value) -> t.Value:
         """An operation of two numbers, in the narrowest type that has it and holds both."""
         python, instructions = OPERATORS.get(type(op), (None, None))
-        operands = f"no {type(op).__name__} of a {name_of(a.type)} and a {name_of(b.type)}"
-        if python is None or a.type not in NUMBERS or b.type not in NUMBERS:
+        operands = f"no {type(op).__name__} of a {t.name_of(a.type)} and a {t.name_of(b.type)}"
+        if python is None or a.type not in t.NUMBERS or b.type not in t.NUMBERS:
             self.refuse(node, operands, "take numbers, one by one")
         if a.constant is not None and b.constant is not None:
             try:
-                result, reason = constant(python(a.constant, b.constant)), "more than 64 bits"
+                result, reason = t.constant(python(a.constant, b.constant)), "more than 64 bits"
             except (ArithmeticError, TypeError, ValueError) as error:
                 result, reason = None, str(error)
             if result is None:
                 self.refuse(node, reason, "change the constants")
             return result
-        common = wider(a.type, b.type)
-        types = [t for t in NUMBERS[NUMBERS.index(common) :] if t in instructions]
-        if not types or (isinstance(op, ast.Pow) and common != FLOAT):
+        common = t.wider(a.type, b.type)
+        types = [kind for kind in t.NUMBERS[t.NUMBERS.index(common) :] if kind in instructions]
+        if not types or (isinstance(op, ast.Pow) and common != t.FLOAT):
             self.refuse(node, operands, INSTEAD.get(type(op), "take integers, int(x)"))
         a, b = self.cast(node, a, types[0]), self.cast(node, b, types[0])
         instruction = instructions[types[0]]
         if callable(instruction):
             return instruction(self, a, b)
         pairs = zip(a.words, b.words, strict=True)
-        return Value(types[0], tuple(self.new(f"{instruction} {x}, {y}") for x, y in pairs))
+        return t.Value(types[0], tuple(self.new(f"{instruction} {x}, {y}") for x, y in pairs))
 
-    def negative(self, node: ast.AST, value: Value) -> Value:
+    def negative(self, node: ast.AST, value: t.Value) -> t.Value:
         """-x."""
         if value.constant is not None:
-            return constant(-value.constant)
-        if value.type in (FLOAT, COMPLEX):
-            return Value(value.type, tuple(self.new(f"fneg double {x}") for x in value.words))
-        return Value(INT, (self.new(f"sub nsw i64 0, {self.cast(node, value, INT).word}"),))
+            return t.constant(-value.constant)
+        if value.type in (t.FLOAT, t.COMPLEX):
+            return t.Value(value.type, tuple(self.new(f"fneg double {x}") for x in value.words))
+        return self.emit(t.INT, f"sub nsw i64 0, {self.cast(node, value, t.INT).word}")
 
-    def negation(self, value: Value) -> Value:
+    def negation(self, value: t.Value) -> t.Value:
         """The contrary of a truth value."""
         if value.constant is not None:
-            return constant(not value.constant)
-        return Value(BOOL, (self.new(f"xor i1 {value.word}, true"),))
+            return t.constant(not value.constant)
+        return self.emit(t.BOOL, f"xor i1 {value.word}, true")
 
-    def comparison(self, node: ast.AST, op: ast.cmpop, a: Value, b: Value) -> Value:
+    def comparison(self, node: ast.AST, op: ast.cmpop, a: t.Value, b: t.Value) -> t.Value:
         """One comparison."""
         if isinstance(op, (ast.Is, ast.IsNot)):
-            if NOTHING not in (a.type, b.type):
+            if t.NOTHING not in (a.type, b.type):
                 self.refuse(node, "is compares more than None", "write ==")
-            return constant((a.type == b.type) == isinstance(op, ast.Is))
-        if isinstance(op, (ast.In, ast.NotIn)) and isinstance(b.type, Tuple):
-            result = constant(False)
-            for item in items_of(b):
+            return t.constant((a.type == b.type) == isinstance(op, ast.Is))
+        if isinstance(op, (ast.In, ast.NotIn)) and isinstance(b.type, t.Tuple):
+            result = t.constant(False)
+            for item in t.items_of(b):
                 same = self.comparison(node, ast.Eq(), a, item)
                 result = self.operation(node, ast.BitOr(), result, same)
             return result if isinstance(op, ast.In) else self.negation(result)
-        if type(op) not in COMPARISONS or a.type not in NUMBERS or b.type not in NUMBERS:
-            self.refuse(node, f"no {type(op).__name__} of a {name_of(a.type)} and a "
-                        f"{name_of(b.type)}", "compare numbers, one by one")  # fmt: skip
+        if type(op) not in COMPARISONS or a.type not in t.NUMBERS or b.type not in t.NUMBERS:
+            self.refuse(node, f"no {type(op).__name__} of a {t.name_of(a.type)} and a "
+                        f"{t.name_of(b.type)}", "compare numbers, one by one")  # fmt: skip
         python, integer, real, join = COMPARISONS[type(op)]
         if a.constant is not None and b.constant is not None:
-            return constant(bool(python(a.constant, b.constant)))
-        type_ = wider(wider(a.type, b.type), INT)
-        if type_ == COMPLEX and not join:
+            return t.constant(bool(python(a.constant, b.constant)))
+        type_ = t.wider(t.wider(a.type, b.type), t.INT)
+        if type_ == t.COMPLEX and not join:
             self.refuse(node, "an order of complex numbers", "compare their parts")
         pairs = zip(self.cast(node, a, type_).words, self.cast(node, b, type_).words, strict=True)
-        relation = f"icmp {integer} i64" if type_ == INT else f"fcmp {real} double"
+        relation = f"icmp {integer} i64" if type_ == t.INT else f"fcmp {real} double"
         parts = [self.new(f"{relation} {x}, {y}") for x, y in pairs]
-        return Value(BOOL, (parts[0] if len(parts) == 1 else
+        return t.Value(t.BOOL, (parts[0] if len(parts) == 1 else
                             self.new(f"{join} i1 {', '.join(parts)}"),))  # fmt: skip
 
     def call(self, name: str, *words: str) -> str:
@@ -215,7 +199,7 @@ def call_of(needs: dict[str, str], name: str, words: Sequence[str]) -> str:
     return f"call double @{symbol}({', '.join(f'double {x}' for x in words)}){kind}"
 
 
-def _floored(writer: Writer, a: Value, b: Value, is_mod: bool) -> Value:
+def _floored(writer: Writer, a: t.Value, b: t.Value, is_mod: bool) -> t.Value:
     """Quotient or remainder: Python rounds down, the processor towards zero."""
     new = writer.new
     quotient, rest = (new(f"{name} i64 {a.word}, {b.word}") for name in ("sdiv", "srem"))
@@ -226,23 +210,23 @@ def _floored(writer: Writer, a: Value, b: Value, is_mod: bool) -> Value:
     exact, other = (
         (rest, f"add i64 {rest}, {b.word}") if is_mod else (quotient, f"sub i64 {quotient}, 1")
     )
-    return Value(INT, (new(f"select i1 {off}, i64 {new(other)}, i64 {exact}"),))
+    return t.Value(t.INT, (new(f"select i1 {off}, i64 {new(other)}, i64 {exact}"),))
 
 
-def _power(writer: Writer, a: Value, b: Value) -> Value:
+def _power(writer: Writer, a: t.Value, b: t.Value) -> t.Value:
     """``pow`` of the C library, as in plain Python."""
-    return Value(FLOAT, (writer.call("pow", a.word, b.word),))
+    return t.Value(t.FLOAT, (writer.call("pow", a.word, b.word),))
 
 
-def _complex_product(writer: Writer, a: Value, b: Value) -> Value:
+def _complex_product(writer: Writer, a: t.Value, b: t.Value) -> t.Value:
     """(a0 b0 - a1 b1, a0 b1 + a1 b0)."""
     (a0, a1), (b0, b1), new = a.words, b.words, writer.new
     p, q, r, s = (new(f"fmul double {x}, {y}")
                   for x, y in ((a0, b0), (a1, b1), (a0, b1), (a1, b0)))  # fmt: skip
-    return Value(COMPLEX, (new(f"fsub double {p}, {q}"), new(f"fadd double {r}, {s}")))
+    return t.Value(t.COMPLEX, (new(f"fsub double {p}, {q}"), new(f"fadd double {r}, {s}")))
 
 
-def _complex_quotient(writer: Writer, a: Value, b: Value) -> Value:
+def _complex_quotient(writer: Writer, a: t.Value, b: t.Value) -> t.Value:
     """Smith's division as numpy does it: by the ratio of the smaller part to the larger one."""
     (a0, a1), (b0, b1), new = a.words, b.words, writer.new
     sizes = [writer.call("fabs", x) for x in b.words]
@@ -254,7 +238,7 @@ def _complex_quotient(writer: Writer, a: Value, b: Value) -> Value:
     large, small = choose(b0, b1), choose(b1, b0)
     ratio = new(f"fdiv double {small}, {large}")
     share = new(f"fmul double {small}, {ratio}")
-    scale = new(f"fdiv double {bits(1.0)}, {new(f'fadd double {large}, {share}')}")
+    scale = new(f"fdiv double {t.bits(1.0)}, {new(f'fadd double {large}, {share}')}")
     r0, r1 = new(f"fmul double {a0}, {ratio}"), new(f"fmul double {a1}, {ratio}")
     real = choose(new(f"fadd double {a0}, {r1}"), new(f"fadd double {r0}, {a1}"))
     imag = choose(new(f"fsub double {a1}, {r0}"), new(f"fsub double {r1}, {a0}"))
@@ -262,33 +246,42 @@ def _complex_quotient(writer: Writer, a: Value, b: Value) -> Value:
     is_zero = new(f"fcmp oeq double {new(f'fadd double {sizes[0]}, {sizes[1]}')}, 0.0")
     plain = [new(f"fdiv double {x}, {sizes[0]}") for x in a.words]
     pairs = zip(plain, both, strict=True)
-    return Value(COMPLEX, tuple(new(f"select i1 {is_zero}, double {x}, double {y}")
+    return t.Value(t.COMPLEX, tuple(new(f"select i1 {is_zero}, double {x}, double {y}")
                                 for x, y in pairs))  # fmt: skip
 
 
 #: Conversions of numbers.
 CASTS = {
-    (INT, FLOAT): "sitofp i64 {} to double",
-    (BOOL, FLOAT): "uitofp i1 {} to double",
-    (BOOL, INT): "zext i1 {} to i64",
-    (FLOAT, INT): "fptosi double {} to i64",
-    (INT, BOOL): "icmp ne i64 {}, 0",
-    (FLOAT, BOOL): "fcmp une double {}, 0.0",
+    (t.INT, t.FLOAT): "sitofp i64 {} to double",
+    (t.BOOL, t.FLOAT): "uitofp i1 {} to double",
+    (t.BOOL, t.INT): "zext i1 {} to i64",
+    (t.FLOAT, t.INT): "fptosi double {} to i64",
+    (t.INT, t.BOOL): "icmp ne i64 {}, 0",
+    (t.FLOAT, t.BOOL): "fcmp une double {}, 0.0",
 }
 #: Of each operator: that of Python, and the instruction for each type of both operands.
 OPERATORS: dict[type, tuple[Any, dict[Any, Any]]] = {
-    ast.Add: (operator.add, {INT: "add nsw i64", FLOAT: "fadd double", COMPLEX: "fadd double"}),
-    ast.Sub: (operator.sub, {INT: "sub nsw i64", FLOAT: "fsub double", COMPLEX: "fsub double"}),
-    ast.Mult: (operator.mul, {INT: "mul nsw i64", FLOAT: "fmul double", COMPLEX: _complex_product}),
-    ast.Div: (operator.truediv, {FLOAT: "fdiv double", COMPLEX: _complex_quotient}),
-    ast.FloorDiv: (operator.floordiv, {INT: partial(_floored, is_mod=False)}),
-    ast.Mod: (operator.mod, {INT: partial(_floored, is_mod=True)}),
-    ast.Pow: (operator.pow, {FLOAT: _power}),
-    ast.BitAnd: (operator.and_, {BOOL: "and i1", INT: "and i64"}),
-    ast.BitOr: (operator.or_, {BOOL: "or i1", INT: "or i64"}),
-    ast.BitXor: (operator.xor, {BOOL: "xor i1", INT: "xor i64"}),
-    ast.LShift: (operator.lshift, {INT: "shl i64"}),
-    ast.RShift: (operator.rshift, {INT: "ashr i64"}),
+    ast.Add: (
+        operator.add,
+        {t.INT: "add nsw i64", t.FLOAT: "fadd double", t.COMPLEX: "fadd double"},
+    ),
+    ast.Sub: (
+        operator.sub,
+        {t.INT: "sub nsw i64", t.FLOAT: "fsub double", t.COMPLEX: "fsub double"},
+    ),
+    ast.Mult: (
+        operator.mul,
+        {t.INT: "mul nsw i64", t.FLOAT: "fmul double", t.COMPLEX: _complex_product},
+    ),
+    ast.Div: (operator.truediv, {t.FLOAT: "fdiv double", t.COMPLEX: _complex_quotient}),
+    ast.FloorDiv: (operator.floordiv, {t.INT: partial(_floored, is_mod=False)}),
+    ast.Mod: (operator.mod, {t.INT: partial(_floored, is_mod=True)}),
+    ast.Pow: (operator.pow, {t.FLOAT: _power}),
+    ast.BitAnd: (operator.and_, {t.BOOL: "and i1", t.INT: "and i64"}),
+    ast.BitOr: (operator.or_, {t.BOOL: "or i1", t.INT: "or i64"}),
+    ast.BitXor: (operator.xor, {t.BOOL: "xor i1", t.INT: "xor i64"}),
+    ast.LShift: (operator.lshift, {t.INT: "shl i64"}),
+    ast.RShift: (operator.rshift, {t.INT: "ashr i64"}),
 }
 INSTEAD = {ast.Pow: "multiply, or take floats"}
 #: Of each comparison: that of Python, of integers, of floats; how complex numbers join their parts.
