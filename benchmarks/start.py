@@ -1,10 +1,10 @@
 """What a user waits for: the first run on a machine, the next ones, and one after an edit.
 
-Whole processes, in wall and in CPU seconds, their children included: what is compiled beside goes
-on after a first run has ended.
+Wall and CPU seconds of whole processes, their children included: optimisation in the background
+goes on after a first run has ended. The cases are run in turn, so that the load of the machine is
+that of all. One is the first run from a wheel with ready-made objects, as it is published.
 """
 
-import os
 import resource
 import shutil
 import statistics
@@ -14,7 +14,12 @@ import tempfile
 import time
 from pathlib import Path
 
-#: The model, the first scene with radau, and how often a command is repeated.
+from support.outside import Outside, build
+from support.process import REPOSITORY, environment
+
+from dap3d_core.kernels.compiler import objects, ready
+
+#: The model, and how often each case is run.
 MODEL, REPEATS = "fourbar3", 5
 PLUGIN = """
 from dap3d_core.interface import Body, Force, body, hookimpl
@@ -53,47 +58,47 @@ def seconds(command, env, folder):
     return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
+def measure():
+    """Rows of the table: first runs, runs that find all in the cache, a run after an edit."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        sources, own = sys.executable, folder / "pushed"
+        own.mkdir()
+        (own / "scene.toml").write_text(SCENE)
+        cases = {
+            "first run": (sources, MODEL),
+            "first run from a wheel": (_python_with_wheel(folder / "wheel"), MODEL),
+            "warm run": (sources, MODEL),
+            "first run, radau": (sources, MODEL, "--integrator", "radau"),
+            "edit to result": (sources, str(own), "--allow-code"),
+        }
+        times = {case: [] for case in cases}
+        for strength in range(REPEATS + 1):
+            (own / "plugin.py").write_text(PLUGIN.format(strength=float(-strength)))
+            for case, (python, *arguments) in cases.items():
+                cache = folder / case
+                if case.startswith("first run"):
+                    shutil.rmtree(cache, ignore_errors=True)
+                command = [python, "-m", "dap3d_core.cli", "run", *arguments]
+                env = environment(cache)
+                times[case].append(seconds([*command, "-o", "run.nc", "--force"], env, folder))
+                while list(cache.glob("*.ll")):  # optimisation in the background
+                    time.sleep(0.05)
+        # the first round fills caches, and compiles bytecode
+        return [row(case, runs[1:]) for case, runs in times.items()]
+
+
 def row(case, times):
     """A row of the table from (wall, CPU) of some runs."""
     wall, cpu = (statistics.median(column) for column in zip(*times, strict=True))
     return {"case": case, "wall_s": wall, "cpu_s": cpu, "runs": len(times)}
 
 
-def measure():
-    """Rows of the table: first runs, runs that find all in the cache, a run after an edit."""
-    dap3d = [sys.executable, "-m", "dap3d_core.cli"]
-    with tempfile.TemporaryDirectory() as name:
-        folder, cache = Path(name), Path(name) / "cache"
-        env = os.environ | {"DAP3D_CACHE_DIR": str(cache)}
-
-        def runs(case, *arguments, empty=False, count=REPEATS):
-            times = []
-            for _ in range(count):
-                if empty:
-                    _settled(cache)
-                    shutil.rmtree(cache, ignore_errors=True)
-                command = [*dap3d, "run", *arguments, "-o", "run.nc", "--force"]
-                times.append(seconds(command, env, folder))
-            _settled(cache)
-            return row(case, times)
-
-        rows = [
-            runs("first run", MODEL, empty=True),
-            runs("warm run", MODEL),
-            runs("first run, radau", MODEL, "--integrator", "radau", empty=True),
-        ]
-        own, times = folder / "pushed", []
-        own.mkdir()
-        (own / "scene.toml").write_text(SCENE)
-        for strength in range(REPEATS + 1):
-            (own / "plugin.py").write_text(PLUGIN.format(strength=float(-strength)))
-            command = [*dap3d, "run", str(own), "--allow-code", "-o", "run.nc", "--force"]
-            times.append(seconds(command, env, folder))
-            _settled(cache)
-        return [*rows, row("edit to result", times[1:])]
-
-
-def _settled(cache):
-    """Wait until the process beside is done."""
-    while list(cache.glob("*.ll")):
-        time.sleep(0.05)
+def _python_with_wheel(folder):
+    """Python of an environment with the wheel of this tree and this machine's objects."""
+    folder.mkdir()
+    there = Outside(folder)
+    target = ready.target_of(objects.processor().triple, objects.host_features())
+    build(REPOSITORY, there.wheels, DAP3D_READY_OBJECTS=target or "")
+    there.install(*there.wheels.iterdir())
+    return there.python

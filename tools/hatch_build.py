@@ -1,8 +1,8 @@
-"""Ready-made objects for a wheel, where ``DAP3D_READY_OBJECTS`` asks for them (``make wheel``).
+"""Ready-made objects for a wheel, if ``DAP3D_READY_OBJECTS`` names targets (``make wheel``).
 
-Its value is ``all``, or names of targets with commas between them
-(src/dap3d_core/kernels/compiler/ready.py). Without it a wheel holds none, needs nothing to be
-built, and code is made at the first run.
+Its value is ``all``, or names of targets separated by commas
+(src/dap3d_core/kernels/compiler/ready.py). Without it a wheel holds none, its build has no further
+dependencies, and code is compiled at the first run.
 """
 
 import os
@@ -16,10 +16,10 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
 class ReadyObjects(BuildHookInterface[Any]):
-    """The hook that hatchling finds here."""
+    """The build hook that hatchling loads from this file."""
 
     def dependencies(self) -> list[str]:
-        """What a build needs: of the project's own dependencies, those that scenes run with."""
+        """Dependencies of the build: those of the project that simulations need."""
         if not os.environ.get("DAP3D_READY_OBJECTS"):
             return []
         names = ("attrs", "llvmlite", "numpy", "pluggy", "scipy")
@@ -27,7 +27,7 @@ class ReadyObjects(BuildHookInterface[Any]):
         return [one for one in wanted if one.startswith(names)]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Make the objects; a wheel that they cannot be made for is built without them."""
+        """Make the objects; without them the wheel is built with a warning."""
         wanted = os.environ.get("DAP3D_READY_OBJECTS", "")
         if version == "editable" or not wanted:
             return
@@ -47,6 +47,6 @@ class ReadyObjects(BuildHookInterface[Any]):
             build_data["force_include"][str(file)] = f"dap3d_core/ready_objects/{file.name}"
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
-        """Remove what was made aside."""
+        """Remove the temporary folder."""
         if hasattr(self, "_folder"):
             self._folder.cleanup()

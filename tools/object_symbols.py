@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 
 class Symbols(NamedTuple):
-    """Names that an object file defines for others, and those that it takes from elsewhere."""
+    """Global symbols of an object file."""
 
     format: str
     defined: frozenset[str]
@@ -13,10 +13,10 @@ class Symbols(NamedTuple):
 
 
 def symbols_of(code: bytes) -> Symbols:
-    """Read the symbol table of an object file.
+    """The symbol table of an object file.
 
     Raises:
-        ValueError: it is of none of the three formats.
+        ValueError: the file has none of the three formats.
     """
     if code[:5] == b"\x7fELF\x02":
         return _elf(code)
@@ -24,7 +24,7 @@ def symbols_of(code: bytes) -> Symbols:
         return _mach_o(code)
     if code[:2] in (b"\x64\x86", b"\x64\xaa"):
         return _coff(code)
-    raise ValueError(f"no object file begins with {code[:5]!r}")
+    raise ValueError(f"an object file cannot begin with {code[:5]!r}")
 
 
 def _text(code: bytes, at: int) -> str:

@@ -1,7 +1,7 @@
-"""Make the ready-made objects of a wheel: units that most scenes need, for every target.
+"""Ready-made objects of a wheel: units that most scenes need, compiled for every target.
 
-``python tools/ready_objects.py FOLDER [TARGET ...]`` writes a file for each target. It works on the
-source tree that it stands in, installed or not; it needs attrs, llvmlite, numpy, pluggy and scipy.
+``python tools/ready_objects.py FOLDER [TARGET ...]`` writes a file for each target. It compiles the
+source tree that contains it, installed or not; it needs attrs, llvmlite, numpy, pluggy and scipy.
 The loops are those of all standard types; the core's units are those that runs of the shipped
 models make, with each method and integrator.
 """
@@ -19,25 +19,27 @@ from typing import Any
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-#: What objects may take from their system: the C library, and what LLVM itself calls.
+#: External symbols that objects may have besides the C library's: those that LLVM calls.
 SYSTEM = {"memcpy", "memmove", "memset", "bzero", "__bzero", "memset_pattern16", "__chkstk"}
-SYSTEM.add("_fltused")  # a mark of Windows, no function
+SYSTEM.add("_fltused")  # a marker of Windows, no function
 
 
 def main(arguments: list[str]) -> None:
     """Write the files."""
     folder, *names = arguments
     if folder == "--gather":
+        sys.path[:0] = names
+        _add_sources()
         print(json.dumps(gathered()))
         return
     with tempfile.TemporaryDirectory() as scratch:
         _declare_entry_points(Path(scratch))
         units = _gathered_alone(Path(scratch))
-    _reach_sources()
+    _add_sources()
     from dap3d_core.kernels.compiler.ready import TARGETS
 
     Path(folder).mkdir(parents=True, exist_ok=True)
-    with concurrent.futures.ProcessPoolExecutor(initializer=_reach_sources) as pool:
+    with concurrent.futures.ProcessPoolExecutor(initializer=_add_sources) as pool:
         done = {name: pool.submit(pack_of, name, units) for name in names or TARGETS}
         for name, found in done.items():
             content, count = found.result()
@@ -52,7 +54,7 @@ def pack_of(target_name: str, units: dict[str, Any]) -> tuple[bytes, int]:
         target_name: a key of ``ready.TARGETS``.
         units: text and results of each unit, by its name.
 
-    A unit that wants what not every such system has is left out, and made where it is needed.
+    A unit with an external symbol that not every such system has is left out.
     """
     import llvmlite.binding as llvm
     from object_symbols import symbols_of
@@ -98,25 +100,18 @@ def gathered() -> dict[str, Any]:
 
 
 def _gathered_alone(scratch: Path) -> dict[str, Any]:
-    """What a fresh process gathers, with an empty cache and nothing made beside it."""
-    ours = {k: v for k, v in os.environ.items() if not k.startswith("DAP3D_")}
-    paths = (
-        scratch,
-        ROOT / "src",
-        ROOT / "plugins",
-        *os.environ.get("PYTHONPATH", "").split(os.pathsep),
-    )
-    env = ours | {
-        "DAP3D_CACHE_DIR": str(scratch / "cache"),
-        "PYTHONPATH": os.pathsep.join(str(path) for path in paths if path),
-    }
-    done = subprocess.run(
-        [sys.executable, __file__, "--gather"], env=env, check=False, stdout=subprocess.PIPE
-    )
+    """The units that a fresh process gathers, with an empty cache and nothing compiled beside it.
+
+    The process extends its path itself: where pip builds in isolation, it removes the folders of
+    packages that are installed editable from the path, even if PYTHONPATH names them.
+    """
+    env = {k: v for k, v in os.environ.items() if not k.startswith("DAP3D_")}
+    env["DAP3D_CACHE_DIR"] = str(scratch / "cache")
+    command = [sys.executable, __file__, "--gather", str(scratch)]
+    done = subprocess.run(command, env=env, check=False, stdout=subprocess.PIPE)
     if done.returncode:
         sys.exit(done.returncode)  # it has said why
-    found: dict[str, Any] = json.loads(done.stdout)
-    return found
+    return json.loads(done.stdout)
 
 
 def _declare_entry_points(folder: Path) -> None:
@@ -131,7 +126,7 @@ def _declare_entry_points(folder: Path) -> None:
     (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
 
 
-def _reach_sources() -> None:
+def _add_sources() -> None:
     sys.path[:0] = [str(ROOT / "src"), str(ROOT / "plugins"), str(ROOT / "tools")]
 
 

@@ -30,9 +30,10 @@ from dap3d_core.kernels.compiler.types import (
 from dap3d_core.kernels.compiler.units import Functions, type_of
 from dap3d_core.kernels.runtime import cache
 from dap3d_core.kernels.runtime.array_struct import Arrays, pointer
-from dap3d_core.kernels.runtime.cache import COMPILED_FLOORS, Compiled
+from dap3d_core.kernels.runtime.cache import Compiled
 from dap3d_core.kernels.runtime.function_lists import LOOP
-from dap3d_core.kernels.runtime.loop_modules import _members
+from dap3d_core.kernels.runtime.loop_modules import array_members
+from dap3d_core.kernels.runtime.source_digest import COMPILED_FLOORS
 from support.at_all_levels import all_made_of, function_of, made_of, same_bits
 
 #: The calls of a function that are recorded in each scene, from 1: early ones and some later ones.
@@ -247,7 +248,7 @@ def kind(value):
 
 def loop_text(loop):
     """LLVM IR of a group loop."""
-    text = trace("loop", loop.__globals__, _members())
+    text = trace("loop", loop.__globals__, array_members())
     del loop.__globals__["range"]  # its plain Python goes on
     return text
 

@@ -11,7 +11,7 @@ from dap3d_core.kernels.compiler.trace import trace
 from dap3d_core.kernels.runtime import generated_modules
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.kernels.runtime.function_lists import LOOP, LoopArrays
-from dap3d_core.kernels.runtime.loop_modules import _members, source_of
+from dap3d_core.kernels.runtime.loop_modules import array_members, source_of
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.registry import load_registry
 
@@ -67,7 +67,7 @@ def test_traced_loops_have_the_bits_of_plain_python(kind, keyword):
 
         if examined.argument_functions and _calls_functions(examined):
             continue  # its code is made with a scene's function
-        text = trace("tried", python(), _members())
+        text = trace("tried", python(), array_members())
         plain = python()["loop"]
         for level, traced in made_of(text, "tried", LOOP).items():
             for seed in range(TRIALS):

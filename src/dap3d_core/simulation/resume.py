@@ -14,7 +14,7 @@ from dap3d_core.integrators import Status
 from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED
 from dap3d_core.integrators.stepping.restore import check_alike, restored
 from dap3d_core.interface import PluginError
-from dap3d_core.kernels.runtime.cache import driver_digest
+from dap3d_core.kernels.runtime.source_digest import driver_digest
 from dap3d_core.model.state_layout import from_integrated
 from dap3d_core.result import INFORMATION, Result, current_versions
 from dap3d_core.result.file.validate import are_texts

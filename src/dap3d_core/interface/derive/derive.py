@@ -51,7 +51,7 @@ def derive(
     """
     # imported here: finding types by keyword does not need the compiler
     from dap3d_core.kernels.runtime import generated_modules
-    from dap3d_core.kernels.runtime.cache import digest, identities, sources
+    from dap3d_core.kernels.runtime.source_digest import digest, identities, sources
 
     given = {n: k for n, k in type_.kernels().items() if n in GIVEN[type_.kind]}
     offered, here = [repr(q) for q in names.values()], Path(__file__)

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from dap3d_core.kernels.compiler import objects
+from dap3d_core.kernels.runtime.sealed_files import write_file
 
 #: Seconds between two polls for optimised code.
 POLL_INTERVAL = 0.02
@@ -44,7 +45,7 @@ class Optimiser:
         if unit.path is None or core_count() < 2 or self._has_ended():
             return
         path = unit.path.with_name(f"{unit.name}.{os.getpid()}.ll")
-        objects.write_file(path, f"{json.dumps(unit.results)}\n{unit.text}".encode())
+        write_file(path, f"{json.dumps(unit.results)}\n{unit.text}".encode())
         with contextlib.suppress(OSError, ValueError):
             self._start()
             self._process.stdin.write(f"{path}\t{unit.path}\n".encode())

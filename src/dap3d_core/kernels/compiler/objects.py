@@ -10,12 +10,11 @@ import json
 import os
 import threading
 import time
-import uuid
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dap3d_core.kernels.runtime.sealed_files import sealed, sealed_content
+from dap3d_core.kernels.runtime.sealed_files import sealed, sealed_content, write_file
 
 #: Maximum size of the object files of a folder; the oldest are removed first.
 MAX_BYTES = 200_000_000
@@ -130,17 +129,6 @@ def write_object(path: Path, head: Any, code: bytes) -> None:
     write_file(path, sealed(joined(head, code)))
     with contextlib.suppress(OSError):
         _clean(path.parent)
-
-
-def write_file(path: Path, data: bytes) -> None:
-    """Write a complete file, or none."""
-    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-    try:
-        temporary.write_bytes(data)
-        os.replace(temporary, path)
-    except OSError:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
 
 
 def _clean(folder: Path) -> None:

@@ -1,71 +1,56 @@
-"""Modules that are written by dap3d itself: files of the cache folder, each under its digest."""
+"""Python modules written by dap3d: files of the cache folder, each named by a digest."""
 
 import importlib.util
 import linecache
-import os
 import sys
-import uuid
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from dap3d_core.kernels.runtime.cache import cache_folder
-from dap3d_core.kernels.runtime.sealed_files import sealed, sealed_content
+from dap3d_core.kernels.runtime.sealed_files import sealed, sealed_content, write_file
 
 
 def write(name: str, text: str) -> Path | None:
-    """Put a module where every process finds it; None where nothing can be written.
+    """Write a module for all processes; None where nothing can be written.
 
     Args:
-        name: of its folder; a digest of all that decides the text is part of it.
+        name: of its folder; contains a digest of all that decides the text.
         text: its source.
-
-    It is written aside and renamed, for two processes may race.
     """
-    folder = cache_folder()
-    if folder is None:
-        return None
-    path = place_of(folder, name)
-    if kept(name) == text:
+    path = _path_of(name)
+    if path is None or kept(name) == text:
         return path
-    try:
+    with suppress(OSError):
         path.parent.mkdir(exist_ok=True)
-        aside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-        try:
-            with aside.open("xb") as file:
-                file.write(sealed(text.encode()))
-            os.replace(aside, path)
-        finally:
-            aside.unlink(missing_ok=True)
-    except OSError:
-        return None
-    return path
+    return path if write_file(path, sealed(text.encode())) else None
 
 
 def kept(name: str) -> str | None:
     """The source of a module that an earlier process wrote; None where there is none."""
-    folder = cache_folder()
-    content = None if folder is None else sealed_content(place_of(folder, name))
+    path = _path_of(name)
+    content = None if path is None else sealed_content(path)
     return None if content is None else content.decode()
 
 
-def place_of(folder: Path, name: str) -> Path:
-    """Where the module of a name stands in the cache folder."""
-    return folder / name / f"{name.replace('-', '_')}.py"
+def _path_of(name: str) -> Path | None:
+    folder = cache_folder()
+    return None if folder is None else folder / name / f"{name.replace('-', '_')}.py"
 
 
 def load(path: Path | None, name: str, text: str) -> dict[str, Any]:
     """The namespace of a module, made from its text; with a path other modules can import it.
 
-    No bytecode is read or written beside it: that has no checksum.
+    No bytecode is read or written: it has no checksum.
     """
     if path is None:
         file = f"<{name}>"
         namespace = {"__name__": f"dap3d_{name.replace('-', '_')}"}
         linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-        exec(compile(text, file, "exec"), namespace)  # our own text, as importing would do
-        return namespace
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
-    exec(compile(text, str(path), "exec"), vars(module))
-    return vars(module)
+    else:
+        file = str(path)
+        spec = importlib.util.spec_from_file_location(path.stem, path)
+        module = sys.modules[path.stem] = importlib.util.module_from_spec(spec)
+        namespace = vars(module)
+    exec(compile(text, file, "exec"), namespace)  # our own text, as an import would do
+    return namespace

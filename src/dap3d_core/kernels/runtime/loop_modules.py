@@ -6,9 +6,9 @@ one list and is never recompiled for a new type:
 
     loop(t, arrays, i0, p0, count, out1, out2, out3)
 
-    arrays            body, F, idx, par (lists.LoopArrays); row 0 of F is the absent function
-    i0, p0            where this group's integers and numbers begin in idx and par
-    out1, out2, out3  what the kernels return, flat (by_address.pointer)
+    arrays            body, F, idx, par (function_lists.LoopArrays); row 0 of F: no function
+    i0, p0            first integer and first number of this group in idx and par
+    out1, out2, out3  what the kernels return, flat
 """
 
 import threading
@@ -19,9 +19,19 @@ from dap3d_core.kernels import table_lookup
 from dap3d_core.kernels.compiler.trace import trace
 from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.runtime import generated_modules, loop_support
-from dap3d_core.kernels.runtime.cache import cache_folder, jit_is_on, names_of, places, sources
+from dap3d_core.kernels.runtime.cache import cache_folder, jit_is_on, names_of
 from dap3d_core.kernels.runtime.function_lists import LOOP, LoopArrays
-from dap3d_core.kernels.runtime.outer_references import refuse_what_is_outside
+from dap3d_core.kernels.runtime.outer_references import refuse_outer_references
+from dap3d_core.kernels.runtime.source_digest import places, sources
+
+#: Functions that the text of loops calls.
+_SUPPORT = (loop_support.vector_at, loop_support.matrix_at, loop_support.unwound,
+            loop_support.doubtful, table_lookup.lookup)  # fmt: skip
+_built: dict[tuple[str, str], Callable] = {}
+#: Held while a loop is built, as several threads may need it at once.
+_building = threading.Lock()
+#: Names of the loops that this process had to compile (not those it found in the cache).
+compiled_here: list[str] = []
 
 
 class Loop(NamedTuple):
@@ -44,13 +54,6 @@ def source_of(loop: Loop) -> str:
     return head + "".join(f"        {line}\n" for line in loop.lines)
 
 
-_built: dict[tuple[str, str], Callable] = {}
-#: Held while a loop is built, which several threads may ask for at once.
-_building = threading.Lock()
-#: Names of the loops that this process had to compile (not those it found in the cache).
-compiled_here: list[str] = []
-
-
 def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable:
     """The compiled loop, from this process, from the cache folder, or compiled now.
 
@@ -62,52 +65,45 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
         CompileError: a kernel does what only numbers can; names its line, and what to do.
     """
     text = source_of(loop)
-    gathering = (
-        loop_support.vector_at,
-        loop_support.matrix_at,
-        loop_support.unwound,
-        loop_support.doubtful,
-    )
-    gathering += (table_lookup.lookup,)
-    kernels = loop.kernels.values()
-    parts = (text, repr(_members()), *places(*kernels), *sources(*kernels, *gathering))
-    names = names_of("loop", kernels, *parts)
+    names = unit_names(loop, text)
     with _building:
         if names not in _built:
             _built[names] = _build(loop, text, *names, announce)
         return _built[names]
 
 
+def unit_names(loop: Loop, text: str) -> tuple[str, str]:
+    """Names of a loop's unit: digests of its text, its sources, and the layout of its arrays."""
+    kernels = loop.kernels.values()
+    layout = repr(array_members())
+    return names_of("loop", kernels, text, layout, *places(*kernels), *sources(*kernels, *_SUPPORT))
+
+
 def _build(
     loop: Loop, text: str, ready_name: str, name: str, announce: Callable[[str], None] | None
 ) -> Callable:
-    def python() -> dict[str, Any]:
+    def module() -> dict[str, Any]:
         namespace = generated_modules.load(None, name, text)
         namespace.update(loop.kernels)
         return namespace
 
-    if not jit_is_on():
-        return python()["loop"]
-
     def write(symbols: list[str]) -> tuple[str, list[Any]]:
         if announce is not None:
             announce(loop.name)
-        refuse_what_is_outside(*loop.kernels.values())
+        refuse_outer_references(*loop.kernels.values())
         compiled_here.append(loop.name)
-        return trace(symbols[0], python(), _members()), ["None"]
+        return trace(symbols[0], module(), array_members()), ["None"]
 
+    if not jit_is_on():
+        return module()["loop"]
     unit = Unit(name, 1, write, cache_folder(), optimise=True, ready_name=ready_name)
     return Entry(unit, 0, LOOP)
 
 
-def _members() -> dict[str, tuple[int, str, int]]:
+def array_members() -> dict[str, tuple[int, str, int]]:
     """Of each array: its first word in the table, LLVM's type of its items, width of its rows."""
-    found, first = {}, 0
+    members, first, widths = {}, 0, {"body": loop_support.BODY_WIDTH, "F": 5}
     for name, type_ in LoopArrays.type_of().members:
-        found[name] = (
-            first,
-            type_.item.words[0],
-            {"body": loop_support.BODY_WIDTH, "F": 5}.get(name, 0),
-        )
+        members[name] = first, type_.item.words[0], widths.get(name, 0)
         first += len(type_.words)
-    return found
+    return members

@@ -1,6 +1,7 @@
-"""What a kernel may not reach: a trace would keep for ever what it was once told.
+"""Refusal of kernels that reach what is not made of their arguments.
 
-The clock, random numbers, files, names of its module that it changes: none is made of arguments.
+The clock, random numbers, files, names of its module that a kernel changes: a trace would keep
+their values for ever.
 """
 
 import builtins
@@ -10,18 +11,18 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from dap3d_core.kernels.compiler.types import CompileError
-from dap3d_core.kernels.runtime.cache import is_an_authors, reached
+from dap3d_core.kernels.runtime.source_digest import is_an_authors, reached
 
-#: Modules of others whose functions are made of their arguments alone.
+#: Modules of others whose functions depend on their arguments alone.
 PURE = {"builtins", "cmath", "functools", "itertools", "math", "numpy", "operator", "dap3d_core"}
-#: Functions of Python that are not.
+#: Functions of Python that do not.
 IMPURE = {"__import__", "breakpoint", "compile", "eval", "exec", "globals", "input", "locals",
           "open", "print", "vars"}  # fmt: skip
 _CHANGES = {"IMPORT_NAME": "imports", "STORE_GLOBAL": "changes", "DELETE_GLOBAL": "removes"}
 
 
-def refuse_what_is_outside(*kernels: Callable[..., Any]) -> None:
-    """Look through kernels, and what they call of the author's.
+def refuse_outer_references(*kernels: Callable[..., Any]) -> None:
+    """Examine kernels, and the functions of their authors that they call.
 
     Raises:
         CompileError: one reaches what is not made of its arguments; names the line.
@@ -33,11 +34,10 @@ def refuse_what_is_outside(*kernels: Callable[..., Any]) -> None:
             line = code.co_firstlineno
             for step in dis.get_instructions(code):
                 line = step.positions.lineno or line if step.positions else line
-                if why := _why(function, step):
+                if why := _reason(function, step):
                     raise CompileError(
                         f"it {why}; a kernel is made of its arguments alone (DAP3D_PLAIN=1 "
-                        "runs it as it stands) "
-                        f"[{code.co_filename}:{line}]"
+                        f"runs it as it stands) [{code.co_filename}:{line}]"
                     )
 
 
@@ -48,20 +48,23 @@ def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
             yield from _codes(inner)
 
 
-def _why(function: Any, step: dis.Instruction) -> str:
+def _reason(function: Any, step: dis.Instruction) -> str:
     name = step.argval
     if step.opname in _CHANGES:
         return f"{_CHANGES[step.opname]} {name}"
+    if step.opname == "LOAD_ATTR" and name == "random":
+        return "draws random numbers"
     if step.opname not in ("LOAD_GLOBAL", "LOAD_NAME"):
-        return "" if step.opname != "LOAD_ATTR" or name != "random" else "draws random numbers"
+        return ""
     if name not in function.__globals__:
         return f"calls {name}" if name in IMPURE and hasattr(builtins, name) else ""
     value = function.__globals__[name]
     if isinstance(value, types.ModuleType):
-        home, is_own = value.__name__, is_an_authors(getattr(value, "__file__", None) or "")
-    elif isinstance(value, (types.FunctionType, types.BuiltinFunctionType)):
-        home, is_own = value.__module__ or "", isinstance(value, types.FunctionType)
-        is_own = is_own and is_an_authors(value.__code__.co_filename)
+        module, file = value.__name__, getattr(value, "__file__", None) or ""
+    elif isinstance(value, types.FunctionType):
+        module, file = value.__module__ or "", value.__code__.co_filename
+    elif isinstance(value, types.BuiltinFunctionType):
+        module, file = value.__module__ or "", ""
     else:
         return ""
-    return "" if is_own or home.partition(".")[0] in PURE else f"uses {name}"
+    return "" if is_an_authors(file) or module.partition(".")[0] in PURE else f"uses {name}"

@@ -1,27 +1,28 @@
-"""Files of the cache folder with a checksum at their end: what is damaged is made anew.
+"""Files of the cache folder with a checksum at their end: a damaged file is made anew.
 
-Compiled code runs without a look. A damaged file (power loss, a bad disk) would fail in every
-process that loads it, crash it, or compute other numbers.
+A damaged file of compiled code (power loss, a bad disk) would fail in every process that loads it,
+crash it, or compute other numbers.
 """
 
 import hashlib
 import os
+import uuid
 import warnings
 from contextlib import suppress
 from pathlib import Path
 
-#: The last line of a file: a comment in Python, and what ``pickle`` no longer reads.
+#: The last line of a file: a comment in Python.
 _SEAL = b"\n# sha256 %s\n"
 _SEAL_SIZE = len(_SEAL % b"") + 64
 
 
 def sealed(content: bytes) -> bytes:
-    """Content with the line that holds its checksum."""
+    """Content followed by a line with its checksum."""
     return content + _SEAL % hashlib.sha256(content).hexdigest().encode()
 
 
 def unsealed(data: bytes) -> bytes | None:
-    """The content of what ``sealed`` gave; None where it is damaged."""
+    """The content of sealed data; None where it is damaged."""
     content = data[:-_SEAL_SIZE]
     return content if sealed(content) == data else None
 
@@ -29,18 +30,30 @@ def unsealed(data: bytes) -> bytes | None:
 def sealed_content(path: str | os.PathLike[str]) -> bytes | None:
     """The content of a sealed file; None where there is none that can be used.
 
-    A damaged file is removed, and a warning says so.
+    A damaged file is removed with a warning.
     """
     try:
         data = Path(path).read_bytes()
     except OSError:
         return None
     content = unsealed(data)
-    if content is not None:
-        return content
-    with suppress(OSError):
-        os.unlink(path)
-    warnings.warn(
-        f"compiled code was damaged and is made anew: {path}", RuntimeWarning, stacklevel=1
-    )
-    return None
+    if content is None:
+        with suppress(OSError):
+            os.unlink(path)
+        warnings.warn(
+            f"compiled code was damaged and is made anew: {path}", RuntimeWarning, stacklevel=1
+        )
+    return content
+
+
+def write_file(path: Path, data: bytes) -> bool:
+    """Write a complete file, or none: under another name, then renamed, as processes may race."""
+    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+    try:
+        temporary.write_bytes(data)
+        os.replace(temporary, path)
+    except OSError:
+        with suppress(OSError):
+            temporary.unlink()
+        return False
+    return True

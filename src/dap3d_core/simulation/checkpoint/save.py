@@ -12,7 +12,7 @@ import attrs
 from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import KEPT
-from dap3d_core.kernels.runtime.cache import driver_digest
+from dap3d_core.kernels.runtime.source_digest import driver_digest
 from dap3d_core.result import Result, ResultError, open_result
 from dap3d_core.result.metadata import to_json
 from dap3d_core.simulation.checkpoint.file import (

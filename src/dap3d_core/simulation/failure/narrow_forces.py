@@ -5,7 +5,7 @@ from typing import Any
 
 from dap3d_core.interface.codegen.examined import Examined
 from dap3d_core.kernels import lookup, where
-from dap3d_core.kernels.runtime.cache import reached
+from dap3d_core.kernels.runtime.source_digest import reached
 from dap3d_core.model.knots import breaks_are_told
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Checked

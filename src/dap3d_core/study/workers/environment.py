@@ -7,7 +7,7 @@ import attrs
 
 from dap3d_core.interface import PluginError
 from dap3d_core.interface.hooks import GROUPS
-from dap3d_core.kernels.runtime.cache import driver_digest
+from dap3d_core.kernels.runtime.source_digest import driver_digest
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.result import current_versions
 from dap3d_core.scene import SceneError, check

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
-from dap3d_core.kernels.runtime.cache import jit_is_on, reached
+from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.kernels.runtime.source_digest import reached
 from dap3d_core.testing.checks.compare import Comparison, left_out
 from dap3d_core.testing.checks.findings import Outcome
 from dap3d_core.testing.samples.sampled_type import Sample, SampledType, UndefinedError

@@ -1,0 +1,127 @@
+"""Digests of the sources that decide compiled code, and the functions that a kernel reaches."""
+
+import hashlib
+import inspect
+import os
+import sys
+import types
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+#: Floors of the core that hold compiled code, low to high: a function depends on its own floor and
+#: those below.
+COMPILED_FLOORS = ("kernels", "model", "assembly", "linear", "formulations", "integrators", "study")
+
+
+def source_digest(*parts: str | bytes) -> str:
+    """Digest of sources alone."""
+    seal = hashlib.sha256()
+    for part in parts:
+        seal.update(part.encode() if isinstance(part, str) else part)
+        seal.update(b"\0")
+    return seal.hexdigest()[:20]
+
+
+def digest(*parts: str | bytes) -> str:
+    """Digest of sources and of the Python version that reads them."""
+    return source_digest(*parts, f"{sys.version_info[:2]}")
+
+
+@cache
+def driver_digest(floor: str) -> str:
+    """Digest of all sources that decide what the compiled code of a floor of the core computes."""
+    root = Path(__file__).parents[2]
+    below = COMPILED_FLOORS[: COMPILED_FLOORS.index(floor) + 1]
+    files = sorted(f for name in below for f in (root / name).rglob("*.py"))
+    parts = ((f.relative_to(root).as_posix(), f.read_bytes()) for f in files)
+    return source_digest(*(part for both in parts for part in both))
+
+
+def origin(functions: list[Any]) -> list[str | bytes]:
+    """What decides the code of functions: digests of floors of the core, or their sources."""
+    floors = {f.__module__.split(".")[1] if f.__module__.startswith("dap3d_core.") else ""
+              for f in functions}  # fmt: skip
+    if floors <= set(COMPILED_FLOORS):
+        return [driver_digest(floor) for floor in sorted(floors)]
+    return [*places(*functions), *sources(*functions)]
+
+
+def reached(*functions) -> tuple[list, list[str]]:
+    """The functions that these call, themselves included, and values of the constants they read.
+
+    Follows names from function to function through their modules' globals; numpy and the standard
+    library are left out.
+    """
+    visited: dict[object, None] = {}
+    constants: list[str] = []
+    todo = list(functions)
+    while todo:
+        function = inspect.unwrap(todo.pop())
+        if function in visited:
+            continue
+        visited[function] = None
+        for name, value in _named_values(function):
+            plain = inspect.unwrap(value) if callable(value) else value
+            if isinstance(plain, types.FunctionType):
+                if is_an_authors(plain.__code__.co_filename):
+                    todo.append(plain)
+            elif isinstance(value, (bool, int, float, complex, str, tuple)):
+                constants.append(f"{function.__qualname__}.{name}={value!r}")
+    return list(visited), constants
+
+
+def _named_values(function) -> list[tuple[str, Any]]:
+    """Names that a function reads from outside itself, with values; one step through modules."""
+    codes = [function.__code__]
+    for code in codes:
+        codes += [c for c in code.co_consts if isinstance(c, types.CodeType)]
+    names = {name for code in codes for name in code.co_names}
+    cells = (cell.cell_contents for cell in function.__closure__ or ())
+    outer = dict(zip(function.__code__.co_freevars, cells, strict=True))
+    outer |= {n: function.__globals__[n] for n in sorted(names) if n in function.__globals__}
+    for name, value in list(outer.items()):
+        file = getattr(value, "__file__", None) if isinstance(value, types.ModuleType) else None
+        if is_an_authors(file or ""):
+            outer |= {f"{name}.{n}": getattr(value, n) for n in names if hasattr(value, n)}
+    return sorted(outer.items())
+
+
+@cache
+def is_an_authors(filename: str) -> bool:
+    """True if a file is of the core or of a package of types, not of Python or numpy."""
+    path, standard = Path(filename), Path(os.__file__).parent
+    if not filename.endswith(".py") or "numpy" in path.parts:
+        return False
+    return not path.is_relative_to(standard) or "site-packages" in path.parts
+
+
+def sources(*functions) -> list[str | bytes]:
+    """What decides what functions compute: source files, constants, and names of modules.
+
+    Names of modules, because cached code imports them by name: a model's own file has another one
+    in each folder. Files are ordered by name and content, wherever a package is installed.
+    """
+    functions, constants = reached(*functions)
+    modules = sorted({function.__module__ for function in functions})
+    paths = dict.fromkeys(function.__code__.co_filename for function in functions)
+    files = sorted((Path(path).name, _content(path)) for path in paths)
+    return [*constants, *modules, *(part for both in files for part in both)]
+
+
+def _content(path: str) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError:  # typed at a prompt: nothing of it is kept between processes
+        return os.urandom(16)
+
+
+def places(*functions) -> list[str]:
+    """Name and line of functions: a file may define variants of a type."""
+    codes = [function.__code__ for function in functions]
+    return [f"{c.co_qualname} {c.co_firstlineno}" for c in codes]
+
+
+def identities(*functions) -> list[str | bytes]:
+    """The same, and their bytecode: a file may have changed since it was loaded."""
+    return [*places(*functions), *(function.__code__.co_code for function in functions)]

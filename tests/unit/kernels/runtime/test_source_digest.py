@@ -1,0 +1,81 @@
+"""The digests under which compiled code is kept."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+import dap3d_core
+from dap3d_core.kernels.compiler.types import Struct
+from dap3d_core.kernels.runtime import source_digest
+from dap3d_core.kernels.runtime.function_lists import LoopArrays
+from dap3d_core.kernels.runtime.loop_modules import Loop, source_of, unit_names
+
+
+@pytest.fixture
+def core(tmp_path, monkeypatch):
+    """A copy of the core's sources that the digest reads."""
+    source = Path(dap3d_core.__file__).parent
+    root = shutil.copytree(source, tmp_path / "core", ignore=shutil.ignore_patterns("*.pyc"))
+    monkeypatch.setattr(source_digest, "__file__", str(root / "kernels/runtime/source_digest.py"))
+    return root
+
+
+def test_a_change_in_a_sub_folder_changes_the_digest(core):
+    """Else stale code would be run; floors above do not count."""
+    digest = source_digest.driver_digest.__wrapped__
+    before = digest("formulations"), digest("integrators")
+    with (core / "integrators/radau/step.py").open("a") as file:
+        file.write("# changed\n")
+    assert digest("formulations") == before[0]
+    assert digest("integrators") != before[1]
+
+
+def test_files_that_change_places_change_the_digest(core):
+    """Names are compared with their folders: a step.py is in several."""
+    before = source_digest.driver_digest.__wrapped__("integrators")
+    one, other = (core / f"integrators/{name}/step.py" for name in ("adams", "radau"))
+    texts = one.read_bytes(), other.read_bytes()
+    one.write_bytes(texts[1])
+    other.write_bytes(texts[0])
+    assert source_digest.driver_digest.__wrapped__("integrators") != before
+
+
+HELPER = "from functools import cache\n\n\n@cache\ndef helper(x):\n    return {factor} * x\n"
+KERNEL = "def kernel(x):\n    return helper(2.0) * x\n"
+
+
+def kernel_of(folder, places, factor=2.0):
+    """A kernel and the helper that it calls, in files of two sub-folders."""
+    namespace = {"__name__": "package"}
+    texts = {"helper.py": HELPER.format(factor=factor), "kernel.py": KERNEL}
+    for (name, text), place in zip(texts.items(), places, strict=True):
+        path = folder / place / name
+        path.parent.mkdir(parents=True)
+        path.write_text(text)
+        exec(compile(text, str(path), "exec"), namespace)
+    return namespace["kernel"]
+
+
+def test_sources_do_not_depend_on_the_folders_of_packages(tmp_path):
+    """Else ready-made objects of loops would be found in some installations alone."""
+    one = kernel_of(tmp_path / "one", ("a", "b"))
+    other = kernel_of(tmp_path / "other", ("b", "a"))
+    assert source_digest.sources(one) == source_digest.sources(other)
+
+
+def test_a_change_in_a_helper_that_is_cached_changes_the_sources(tmp_path):
+    one = kernel_of(tmp_path / "one", ("a", "b"))
+    other = kernel_of(tmp_path / "other", ("a", "b"), factor=3.0)
+    assert source_digest.sources(one) != source_digest.sources(other)
+
+
+def test_the_layout_of_its_arrays_is_in_both_names_of_a_loop(monkeypatch):
+    """Its code reads addresses by their positions in the struct."""
+    loop = Loop("nothing", {}, ["pass"])
+    before = unit_names(loop, source_of(loop))
+    turned = Struct("LoopArrays", LoopArrays.type_of().members[::-1])
+    monkeypatch.setattr(LoopArrays, "type_of", classmethod(lambda cls: turned))
+    after = unit_names(loop, source_of(loop))
+    assert before[0] != after[0]
+    assert before[1] != after[1]
