@@ -1,7 +1,6 @@
-"""The lowest floor: what kernels are written with, and how they become fast.
+"""The lowest floor: functions that kernels are written with, and the compiler.
 
-A plugin imports from here only the words of its formulas; ``compiled``, the loops and their cache
-serve the core.
+A plugin imports only these functions; the compiler and its runtime serve the core.
 """
 
 from dap3d_core.kernels.scalar_math import (

@@ -17,20 +17,19 @@ def _symbolic(x):
 
 
 def _library(*numbers: Any) -> Any:
-    """What has the words for symbolic numbers: sympy's, or those of a trace."""
+    """The functions for symbolic numbers: those of sympy, or of a trace."""
     for x in numbers:
         if hasattr(x, "tracer"):
             return x.tracer
-    import sympy  # only reached with a sympy argument, so it is there
+    import sympy  # installed, as an argument is of sympy
 
     return sympy
 
 
 def _like(x, value):
-    """A value as the kind of number that x is.
+    """A value as a number of the type of x.
 
-    numpy's floats divide by zero as compiled code does; the complex numbers of derivative checks
-    are compared by their real parts.
+    numpy's floats divide by zero as compiled code does.
     """
     return type(x)(value) if isinstance(x, (float, complex)) else value
 
@@ -87,7 +86,7 @@ def where(condition, a, b):
 
 
 def _order(x):
-    """What a number is compared by: complex numbers of derivative checks by their real parts."""
+    """The real part of a number, by which complex numbers of derivative checks are compared."""
     return x.real if isinstance(x, complex) else x
 
 
@@ -112,7 +111,7 @@ def hypot(x, y):
 
 
 def floor(x):
-    """The whole number at or below x, as a float."""
+    """The largest integer not above x, as a float."""
     if isinstance(x, complex):
         return _like(x, math.floor(x.real))
     if _symbolic(x):

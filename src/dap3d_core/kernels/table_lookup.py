@@ -1,17 +1,14 @@
 """Tables of any length, which kernels read by ``lookup``.
 
-A table stands in an instance's numbers as (array, place, rows, sample of a row): its rows lie in
-the array from the place on, the first number of each row increasing.
+A table is given to a kernel as (array, place, rows, sample of a row): its rows are stored in the
+array from that place on; the first number of each row increases.
 """
 
 
 def lookup(table, x):
-    """The row of a table that x belongs to: the last one whose first number is not above x.
-
-    Before the first row, the first one. Returns the row's numbers, a tuple.
-    """
+    """The last row of a table with a first number not above x, or the first row; a tuple."""
     array, place, rows, sample = table
-    if hasattr(array, "tracer"):  # while it is compiled
+    if hasattr(array, "tracer"):  # in a trace
         at = array.tracer.row_of(_row, array, place, rows, len(sample), x)
     elif hasattr(x, "free_symbols"):
         raise TypeError("a table has no symbolic rows")

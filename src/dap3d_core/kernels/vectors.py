@@ -1,4 +1,4 @@
-"""3-vectors and 3x3 matrices as plain tuples: the words in which a kernel is written.
+"""3-vectors and 3x3 matrices as plain tuples: the functions that kernels are written with.
 
 Every function here is pure and generic: in compiled code the tuples vanish into registers; in plain
 Python the same source runs with floats, complex numbers (derivatives by complex step) and sympy.

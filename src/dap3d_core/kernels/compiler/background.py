@@ -1,14 +1,13 @@
 """Optimisation in the background: units start with unoptimised code, which is then replaced.
 
 A second process compiles the optimised code and writes it to the cache folder; calls poll for it
-and load it. It reads lines from its standard input: a file of LLVM IR, a tab, the object file to
-write. Without a second core or a cache folder, this process optimises once the unoptimised code
-has run for as long as that takes.
+and load it. Each line of its standard input is a file of LLVM IR, a tab, the object file to write.
+Without a second core or a cache folder, this process optimises once the unoptimised code has run
+for as long as that takes.
 """
 
 import atexit
 import contextlib
-import json
 import os
 import subprocess
 import sys
@@ -39,13 +38,13 @@ class Optimiser:
         self._spent = 0.0
 
     def add(self, unit: Any) -> None:
-        """Request optimised code for a unit: from the second process, where there can be one."""
+        """Request optimised code for a unit, from the second process where there can be one."""
         with self._lock:
             self.units.append(unit)
         if unit.path is None or core_count() < 2 or self._has_ended():
             return
         path = unit.path.with_name(f"{unit.name}.{os.getpid()}.ll")
-        write_file(path, f"{json.dumps(unit.results)}\n{unit.text}".encode())
+        write_file(path, objects.encoded(unit.results, unit.text.encode()))
         with contextlib.suppress(OSError, ValueError):
             self._start()
             self._process.stdin.write(f"{path}\t{unit.path}\n".encode())
@@ -120,10 +119,10 @@ def main() -> None:
     for line in sys.stdin:
         path, target = map(Path, line.rstrip("\n").split("\t"))
         with contextlib.suppress(OSError, ValueError, RuntimeError):
-            head, _, text = path.read_text(encoding="utf-8").partition("\n")
+            results, text = objects.decoded(path.read_bytes())
             if not target.exists():
-                code = objects.compile_ir(text, objects.OPTIMISED)
-                objects.write_object(target, json.loads(head), code)
+                code = objects.compile_ir(text.decode(), objects.OPTIMISED)
+                objects.write_object(target, results, code)
         with contextlib.suppress(OSError):
             path.unlink()
 

@@ -200,7 +200,8 @@ class Expressions(Writer):
             self.refuse(node, f"a {t.name_of(values[0].type)} or a {t.name_of(values[1].type)}",
                         "let both be of one type")  # fmt: skip
         slots = self.place(type_, "either")
-        for self.lines, value in zip(parts, values, strict=True):
+        for lines, value in zip(parts, values, strict=True):
+            self.lines = lines
             self.write_to(slots, self.cast(node, value, type_))
             self.line(f"br label %{end}")
         self.lines = [*before, *parts[0], *parts[1]]

@@ -1,7 +1,7 @@
 """Object code: compiled from LLVM IR, stored in files, loaded into memory.
 
-An object file starts with a line of JSON about its code and ends with a checksum: a damaged file
-is never loaded. Files are written under another name and renamed, because processes may race.
+An object file starts with a line of JSON, the results of its functions, and ends with a checksum: a
+damaged file is never loaded.
 """
 
 import contextlib
@@ -46,7 +46,7 @@ def processor() -> Processor:
 
 @cache
 def host_features() -> frozenset[str]:
-    """What this processor has, in LLVM's words."""
+    """Features of this processor, by LLVM's names."""
     return frozenset(name for name, has in _llvm().get_host_cpu_features().items() if has)
 
 
@@ -68,7 +68,7 @@ def compiler() -> str:
 
 @cache
 def identity() -> str:
-    """Everything besides the sources that decides the code: compiler, LLVM and processor."""
+    """All that decides the code besides the sources: compiler, LLVM and processor."""
     import llvmlite
 
     return f"{llvmlite.__version__} {_llvm().llvm_version_info} {processor()} {compiler()}"
@@ -107,26 +107,26 @@ def load(code: bytes, symbols: list[str]) -> list[int]:
         return [engine.get_function_address(symbol) for symbol in symbols]
 
 
-def read_object(path: Path) -> tuple[Any, bytes] | None:
-    """The JSON value and the code of an object file; None where there is no usable file."""
-    content = sealed_content(path)
-    return None if content is None else parts(content)
+def encoded(results: list[Any], code: bytes) -> bytes:
+    """Results and code as the content of a file."""
+    return json.dumps(results).encode() + b"\n" + code
 
 
-def joined(about: Any, code: bytes) -> bytes:
-    """Code and what is told of it, as a file holds them."""
-    return json.dumps(about).encode() + b"\n" + code
-
-
-def parts(content: bytes) -> tuple[Any, bytes]:
-    """What ``joined`` put together."""
+def decoded(content: bytes) -> tuple[list[Any], bytes]:
+    """Results and code of the content of a file."""
     head, _, code = content.partition(b"\n")
     return json.loads(head), code
 
 
-def write_object(path: Path, head: Any, code: bytes) -> None:
+def read_object(path: Path) -> tuple[list[Any], bytes] | None:
+    """Results and code of an object file; None where there is no usable file."""
+    content = sealed_content(path)
+    return None if content is None else decoded(content)
+
+
+def write_object(path: Path, results: list[Any], code: bytes) -> None:
     """Write an object file; where that fails, the code stays in memory only."""
-    write_file(path, sealed(joined(head, code)))
+    write_file(path, sealed(encoded(results, code)))
     with contextlib.suppress(OSError):
         _clean(path.parent)
 

@@ -29,11 +29,6 @@ compiled_units: list[str] = []
 collected: dict[str, tuple[str, list[Any]]] | None = None
 
 
-def symbols_of(name: str, count: int) -> list[str]:
-    """Symbols of the functions of a unit: NAME_0, NAME_1, ..."""
-    return [f"{name.replace('-', '_')}_{k}" for k in range(count)]
-
-
 class Unit:
     """Functions of one object file.
 
@@ -52,39 +47,43 @@ class Unit:
         optimise: bool = False,
         ready_name: str = "",
     ) -> None:
-        """Args:
-        name: contains a digest of everything that decides the code.
-        count: number of functions.
-        write: takes the symbols; returns LLVM IR, and JSON values stored with the code.
-        folder: holds object files.
-        optimise: compile optimised code at once; for short code.
-        ready_name: name among ready-made objects, from which symbols are made as well.
+        """Load the unit from its object file or from ready-made objects, or compile it.
+
+        Args:
+            name: contains a digest of everything that decides the code.
+            count: number of functions.
+            write: takes the symbols; returns LLVM IR, and JSON values stored with the code.
+            folder: of object files.
+            optimise: compile optimised code at once; for short code.
+            ready_name: name among ready-made objects, of which symbols are made as well.
         """
         self.name = name
-        self.symbols = symbols_of(ready_name or name, count)
+        symbol = (ready_name or name).replace("-", "_")
+        self.symbols = [f"{symbol}_{k}" for k in range(count)]
         self.path = None if folder is None else folder / f"{name}.o"
         #: Table, index and function of each registered address.
         self._slots: list[tuple[Any, int, int]] = []
         self.text, self.cost = "", 0.0
         stored = None if self.path is None else objects.read_object(self.path)
         stored = stored or ready.read(ready_name)
-        if stored is None:
-            compiled_units.append(name)
-            self.text, self.results = write(self.symbols)
-            if collected is not None:
-                collected[ready_name] = self.text, self.results
-            start = time.perf_counter()
-            level = objects.OPTIMISED if optimise else objects.UNOPTIMISED
-            code = objects.compile_ir(self.text, level)
-            self.cost = COST_RATIO * (time.perf_counter() - start)
-            if optimise and self.path is not None:
-                objects.write_object(self.path, self.results, code)
-        else:
-            self.results, code = stored
         self.is_optimised = stored is not None or optimise
+        self.results, code = stored or self._compile(write, ready_name)
         self.addresses = objects.load(code, self.symbols)
         if not self.is_optimised:
             background.optimiser.add(self)
+
+    def _compile(self, write: Callable[..., Any], ready_name: str) -> tuple[list[Any], bytes]:
+        compiled_units.append(self.name)
+        self.text, results = write(self.symbols)
+        if collected is not None:
+            collected[ready_name] = self.text, results
+        start = time.perf_counter()
+        level = objects.OPTIMISED if self.is_optimised else objects.UNOPTIMISED
+        code = objects.compile_ir(self.text, level)
+        self.cost = COST_RATIO * (time.perf_counter() - start)
+        if self.is_optimised and self.path is not None:
+            objects.write_object(self.path, results, code)
+        return results, code
 
     def register_slot(self, table: Any, index: int, k: int) -> None:
         """Store the address of function k in a table, now and whenever it changes."""

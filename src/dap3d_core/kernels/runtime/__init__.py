@@ -1,1 +1,1 @@
-"""Around compiled code: its cache, function tables, structs of arrays, generated modules."""
+"""Runtime of compiled code: cache, function tables, structs of arrays, generated modules."""

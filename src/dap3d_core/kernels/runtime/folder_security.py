@@ -1,4 +1,4 @@
-"""Whether a folder is the user's alone: compiled code in it is loaded and run without a look."""
+"""Check that a folder is the user's alone: compiled code in it is loaded and run unchecked."""
 
 import os
 import stat
@@ -9,13 +9,13 @@ OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def distrust(folder: Path) -> str:
-    """Why others could put code into a folder; "" where only this user, or the system's, can.
+    """Reason why others could put code into a folder; "" if only this user can.
 
-    It belongs to this user, nobody else may write to it, and no folder above it lets everybody
-    rename what is in it. Where files have no owners (Windows), nothing is asked.
+    A trusted folder belongs to this user, nobody else may write to it, and no folder above it lets
+    everybody rename its content. Where files have no owners (Windows), every folder is trusted.
 
     Raises:
-        OSError: the folder cannot be looked at.
+        OSError: the folder cannot be examined.
     """
     if not hasattr(os, "geteuid"):
         return ""

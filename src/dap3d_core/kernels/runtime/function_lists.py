@@ -1,4 +1,4 @@
-"""Tables of functions by their addresses: what the driver did not know when it was compiled."""
+"""Tables of function addresses, by which the driver calls loops compiled after it."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
@@ -12,7 +12,7 @@ from dap3d_core.kernels.runtime.cache import compiled, table_of
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
 class LoopArrays(Arrays):
-    """What every group loop reads; the driver's system begins with it."""
+    """Arrays that every group loop reads; the driver's system begins with them."""
 
     types: ClassVar[dict[str, Any]] = {"body": MATRIX, "F": MATRIX, "idx": INTEGERS}
 
@@ -46,7 +46,7 @@ def number_signature(*arguments: Any) -> Signature:
 
 
 def loop_list(loops: Sequence[Callable[..., Any]]) -> Any:
-    """Group loops as the one table that the driver takes as an argument of its own."""
+    """Group loops as a table, an argument of the driver."""
     return table_of(LOOP, loops)
 
 

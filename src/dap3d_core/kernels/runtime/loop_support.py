@@ -1,4 +1,4 @@
-"""What a group loop reads an instance's quantities with: vectors, matrices from rows of arrays."""
+"""Functions by which group loops read quantities: vectors and matrices from rows of arrays."""
 
 import numpy as np
 
@@ -60,15 +60,15 @@ def angle_about(u, v, k):
 
 
 def unwound(angle, last):
-    """The angle, whole turns added, that lies within half a turn of the last one."""
+    """The angle plus whole turns, so that it is within half a turn of the last one."""
     return angle + TURN * np.rint((last - angle).real / TURN)
 
 
 def doubtful(change, elapsed):
-    """1 where a rate has changed by so much within a step that a turn may be miscounted, else 0."""
+    """1 if a rate changed so much within a step that a turn may be miscounted, else 0."""
     return where(abs(change) * elapsed > 0.5 * TURN, 1.0, 0.0)
 
 
 def whole(x):
-    """A number of an array as a place in another."""
+    """A number of an array as an integer, an index into another one."""
     return x.tracer.integer(x) if hasattr(x, "tracer") else int(x)
