@@ -62,7 +62,7 @@ NO_FMA := DAP3D_CPU=x86-64-v2 GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2
 no-fma: $(VENV)/.installed-test  ## tests of compiled bits as on a processor without FMA (x86-64)
 	@if [ "$$(uname -m)" != x86_64 ]; then echo "no-fma: only on x86-64"; exit 0; fi; \
 	$(NO_FMA) $(PYTHON) -m pytest -n auto -m "not slow" \
-	    tests/unit/test_compiler_core.py tests/unit/test_compiler_complex.py
+	    tests/unit/kernels/compiler/test_core.py tests/unit/kernels/compiler/test_complex.py
 
 # All checks run, also after one has failed; the last line says which.
 lint: $(VENV)/.installed-dev  ## format, lint, types, floors, sizes

@@ -137,7 +137,7 @@ def test_damaged_code_is_made_anew_and_a_warning_says_so(tmp_path, damage):
     while list(cache.glob("*.ll")):  # the process beside is at work
         time.sleep(0.1)
     files = list(cache.glob("*.o"))
-    assert {f.name.partition("-")[0] for f in files} == {"loop", "lists.call_loop"}
+    assert {f.name.partition("-")[0] for f in files} == {"loop", "function_lists.call_loop"}
     for file in files:
         data = bytearray(file.read_bytes())
         data[len(data) // 2] ^= 1
