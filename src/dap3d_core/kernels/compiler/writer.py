@@ -128,7 +128,7 @@ class Writer:
             self.refuse(node, operands, "take numbers, one by one")
         if a.constant is not None and b.constant is not None:
             try:
-                result, reason = t.constant(python(a.constant, b.constant)), "more than 64 bits"
+                result, reason = t.constant(python(a.constant, b.constant)), "no number of 64 bits"
             except (ArithmeticError, TypeError, ValueError) as error:
                 result, reason = None, str(error)
             if result is None:
