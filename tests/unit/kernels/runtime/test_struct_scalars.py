@@ -86,7 +86,7 @@ def test_compiled_code_reads_and_writes_them_as_python_does():
 @pytest.mark.parametrize(("line", "words"), [
     ("c.real = c.real", "real of a Clock is given a value; only arrays and scalars"),
     ("c.tick = 1", "tick of a Clock is given a value"),
-    ("c.ticks = c.real", "array of floats with 1 indices stands where a int must be"),
+    ("c.ticks = c.real", "array of floats with 1 indices is given for a int"),
     ("x = c.tick", "has no member tick; it has real, integer, t, ticks, h, is_running"),
 ])  # fmt: skip
 def test_what_compiled_code_refuses(line, words):
