@@ -53,9 +53,7 @@ def plot(
     quiet: bool,
     **types: Any,
 ) -> int:
-    """Draw quantities of a RESULT, or outputs of a sweep.
-
-    Without any, the energies of a result and all outputs of a sweep.
+    """Draw quantities of a RESULT, or outputs of a sweep: by default energies or all outputs.
 
     \b
     BODY.r .p .rd .w .wp .rdd .wd .wpd  of a body
@@ -76,9 +74,8 @@ def plot(
     dap3d plot pen1.nc cone.r.y --x cone.r.x    a path
     dap3d plot a.nc b.nc cone.r.z               two runs
 
-    Words that end in .nc are further results, drawn in the same figure.
-
-    A sweep is drawn as lines over one number, a map over two, parallel coordinates over more.
+    Words that end in .nc are further results, drawn in the same figure. A sweep is
+    drawn as lines over one number, a map over two, parallel coordinates over more.
 
     \b
     dap3d plot pen1-sweep.nc cone.r.z:max
@@ -86,24 +83,14 @@ def plot(
     dap3d plot pen1-sweep.nc cone.r.z:max --x bodies.cone.mass
     """
     from dap3d_core.cli.console.console import show_written
-    from dap3d_core.plot import WIDTH, save_plot, show_plot
-    from dap3d_core.result import ResultError, UnknownNameError
 
     files = [result, *(word for word in quantities if word.endswith(SUFFIX))]
-    names = tuple(word for word in quantities if not word.endswith(SUFFIX))
-    data, names, cuts = _open(files, names, x, at, types)
+    data, names, cuts = _open(files, quantities, x, at, types)
     target = None if show and output is None else Path(output or Path(result).stem + ".png")
     axes: dict[str, Any] = {"x": x, "at": cuts}
-    sides = {"width": width, "height": height}.items()
-    size: dict[str, Any] = {side: None if mm is None else mm / MM_PER_INCH for side, mm in sides}
+    size: dict[str, Any] = {"width": _inches(width), "height": _inches(height)}
     _check(data, names, target, axes, size, files, force)
-    size["width"] = size["width"] or WIDTH
-    if target is not None:
-        with refusing(UnknownNameError, ValueError):
-            save_plot(data, names, target, force=force, **axes, **size)
-    if show:
-        with refusing(UnknownNameError, ResultError, ValueError):
-            show_plot(data, names, **axes, **size)
+    _draw(data, names, target, show, force, **axes, **size)
     if target is not None:
         drawn = axes if hasattr(data, "data_vars") else {"x": x or "t"}
         about = {"results": files, "quantities": names} | drawn
@@ -113,7 +100,7 @@ def plot(
 
 def _open(
     files: Sequence[str],
-    names: tuple[str, ...],
+    words: tuple[str, ...],
     x: str | None,
     at: Sequence[str],
     types: Mapping[str, Any],
@@ -126,6 +113,7 @@ def _open(
     from dap3d_core.cli.framework.paths import open_result, open_sweep
     from dap3d_core.study.sweep.dataset import is_sweep
 
+    names = tuple(word for word in words if not word.endswith(SUFFIX))
     sweeps = [file for file in files if is_sweep(file)]
     if sweeps and len(files) > 1:
         raise Refused(f"{sweeps[0]} is a sweep, which is drawn alone")
@@ -208,3 +196,22 @@ def _check(
         checks += [partial(picture_of, data, [name], None, None) for name in names]
         checks += [partial(picture_of, data, ["t"], axes["x"], None)]
     refuse_all(*checks)
+
+
+def _draw(
+    data: Any, names: tuple[str, ...], target: Path | None, show: bool, force: bool, **settings: Any
+) -> None:
+    from dap3d_core.plot import WIDTH, save_plot, show_plot
+    from dap3d_core.result import ResultError, UnknownNameError
+
+    settings["width"] = settings["width"] or WIDTH
+    if target is not None:
+        with refusing(UnknownNameError, ValueError):
+            save_plot(data, names, target, force=force, **settings)
+    if show:
+        with refusing(UnknownNameError, ResultError, ValueError):
+            show_plot(data, names, **settings)
+
+
+def _inches(mm: float | None) -> float | None:
+    return None if mm is None else mm / MM_PER_INCH
