@@ -30,11 +30,11 @@ from dap3d_core.scene import (
     mistake_at,
 )
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
-from dap3d_core.simulation.events.breakpoints import Pace
 from dap3d_core.simulation.explain import explain
 from dap3d_core.simulation.failure.diagnosis import find_offender
 from dap3d_core.simulation.failure.narrow_forces import notes_on_laws
 from dap3d_core.simulation.initial.assemble import model_size
+from dap3d_core.simulation.initial.breakpoints import Pace
 from dap3d_core.simulation.initial.conservative import is_conservative
 from dap3d_core.simulation.initial.driver_notes import notes_on_drivers
 from dap3d_core.simulation.initial.given_state import state_of, time_of

@@ -6,28 +6,21 @@ its sign, and its steps stop short of it. Those of dop853 are placed about it
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations import PROJECT, RHS
 from dap3d_core.formulations.evaluator import AS_COMPILED, Machine
-from dap3d_core.integrators import EXPLICIT, IMPLICIT, Status
+from dap3d_core.integrators import EXPLICIT, IMPLICIT, Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.singular_poses import RATE
 from dap3d_core.result import INFORMATION
-from dap3d_core.simulation.implicit_run import (
-    change_note,
-    implicit_rest,
-    take_over,
-)
-
-if TYPE_CHECKING:
-    from dap3d_core.simulation.run import Run
+from dap3d_core.simulation.run_state import RunState
 
 Floats = NDArray[np.float64]
 
+WHY_STIFF = "motions that have died away limit the steps, not the error of those that go on"
 #: A singular pose is met where it is less than this part of the run away.
 NEAR = 0.05
 #: Rates of lengths are taken over this part of the run.
@@ -40,59 +33,91 @@ HIGHEST = 6.0
 FAILURES = (Status.STEP_FLOOR, Status.NOT_FINITE, Status.PROJECTION_FAILED)
 
 
-def hand_over(run: "Run") -> bool:
+def hand_over(run: RunState) -> bool:
     """Let the other integration go on where the present one leaves the run to it; whether so.
 
     An explicit one does where the scene is stiff, or behind a singular pose; an implicit one
     before such a pose, once.
     """
-    present, settings, left = run.runs[-1], run.settings, np.inf
+    present, settings, left = run.present, run.settings, np.inf
     if present.status in (Status.STIFF, Status.RUNNING):
         run.until = np.inf
         if present.status is Status.RUNNING:
             present.work.status = Status.FINISHED
     else:
         left = _left(run)
-        has_just_begun = len(run.runs) > 1 and run.runs[0].t >= present.t
+        has_just_begun = len(run.integrations) > 1 and run.integrations[0].t >= present.t
         if left == np.inf or has_just_begun or settings.step or not settings.project:
             return False
         run.until = present.t + BEHIND * left
         run.crossed.append(present.t + left)
-    if len(run.runs) == 1:
+    if len(run.integrations) == 1:
         begin_other(run)
     else:
-        take_over(run.runs[0], present)
-        run.runs.reverse()
-        run.look_on()
+        take_over(run.integrations[0], present)
+        run.integrations.reverse()
+        run.observe_present()
     if left < np.inf:
         _aim_across(run, left)
     return True
 
 
-def begin_other(run: "Run") -> None:
-    """Go on with the other one of the explicit and the implicit integrator, set up for that."""
-    present, machine, options = run.runs[-1], run.machine, run.options
+def begin_other(run: RunState) -> None:
+    """Continue with the other one of the explicit and the implicit integrator."""
+    present = run.present
     if not present.implicit:
         run.notes.append(change_note(present.t))
-        run.begin(implicit_rest(machine, present, run.times, options))
-        return
-    other = EXPLICIT.make(machine, present.y, run.times, **options | {"first_step": None})
-    take_over(other, present)
-    run.begin(other)
+    integrator = EXPLICIT if present.implicit else IMPLICIT
+    options = run.options | {"first_step": None}
+    integration = integrator.make(run.machine, present.y, run.times, **options)
+    take_over(integration, present)
+    run.begin(integration)
 
 
-def _left(run: "Run") -> float:
+def take_over(integration: Integration, before: Integration) -> None:
+    """Let an integration of the same run go on from where another one stands."""
+    work = integration.work
+    work.state[at.Y] = before.work.state[at.Y]
+    work.t, work.next_report = before.t, before.work.next_report
+    work.t_stiff, work.status = np.inf, Status.RUNNING
+    work.error_across_singularity = work.failed_error_rate = 0.0
+    work.near_singular_landings = work.stalled_steps = 0
+    work.stiff_steps = work.nonstiff_steps = 0
+    if not integration.implicit:
+        work.lengths[:] = np.nan
+    integration.restart()
+
+
+def change_note(t: float) -> str:
+    """Note on where integrator auto has gone on with the implicit one."""
+    until = f"{EXPLICIT.name} until t = {t:.6g} s"
+    return f"{INFORMATION}integrator auto: {until}, then {IMPLICIT.name}: {WHY_STIFF}"
+
+
+def stiffness_notes(integrations: Sequence[Integration], integrator: str) -> list[str]:
+    """That the scene is stiff for the one integration of a run, where it is."""
+    t = integrations[0].t_stiff
+    if t is None or len(integrations) > 1:
+        return []
+    used = EXPLICIT.name if integrator == "auto" else integrator
+    return [
+        f"{INFORMATION}the scene is stiff from t = {t:.6g} s on: {WHY_STIFF}. {used} takes small "
+        f"steps for that; {IMPLICIT.name}, or auto, takes fewer"
+    ]
+
+
+def _left(run: RunState) -> float:
     """Time left until the pose that has stopped the implicit integrator; infinite if none has."""
-    present, span = run.runs[-1], float(run.times[-1])
+    present, span = run.present, run.t_end
     if not present.implicit or present.status not in FAILURES:
         return np.inf
     return time_left(lengths_at(run.machine, present.t, present.y, span), span)
 
 
-def _aim_across(run: "Run", left: float) -> None:
+def _aim_across(run: RunState, left: float) -> None:
     """Let the first step of the explicit integration be one across: a trial step goes closer."""
-    present = run.runs[-1]
-    span = float(run.times[-1])
+    present = run.present
+    span = run.t_end
     present.work.lengths[:] = lengths_at(run.machine, present.t, present.y, span)
     present.work.h = left / present.work.widest_gap_abscissa
 
@@ -150,7 +175,7 @@ def crossing_notes(crossed: Sequence[float]) -> list[str]:
     ]
 
 
-def cannot_cross(message: str, run: "Run") -> str:
+def cannot_cross(message: str, run: RunState) -> str:
     """Why a run ended, and that a singular pose lies ahead, where the implicit integrator met one.
 
     message: the former.
@@ -160,6 +185,6 @@ def cannot_cross(message: str, run: "Run") -> str:
         return message
     return (
         f"{message}. Integrator {IMPLICIT.name} cannot cross the singular pose at "
-        f"t = {run.runs[-1].t + left:.6g} s; {EXPLICIT.name} and auto can, with project on and "
+        f"t = {run.present.t + left:.6g} s; {EXPLICIT.name} and auto can, with project on and "
         "steps that their error chooses"
     )

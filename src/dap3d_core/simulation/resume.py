@@ -20,12 +20,7 @@ from dap3d_core.result import INFORMATION, Result, current_versions
 from dap3d_core.result.file.validate import are_texts
 from dap3d_core.scene import SceneError, Simulation, check_simulation, load, parse
 from dap3d_core.simulation.checkpoint.file import Checkpoint, path_of, read_checkpoint
-from dap3d_core.simulation.checkpoint.save import (
-    Saver,
-    parts_of,
-    remove_parts,
-    results_of,
-)
+from dap3d_core.simulation.checkpoint.save import parts_of, remove_parts, results_of
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import CheckpointError
 from dap3d_core.simulation.events.event import Event
@@ -34,7 +29,8 @@ from dap3d_core.simulation.initial.given_state import state_of
 from dap3d_core.simulation.open_result import why_unmade
 from dap3d_core.simulation.output.monitor import Standing
 from dap3d_core.simulation.output.type_sources import digests_of
-from dap3d_core.simulation.run import Progress, Run
+from dap3d_core.simulation.run import Run
+from dap3d_core.simulation.run_state import Callbacks, Progress, RunState
 from dap3d_core.simulation.settings import check_checkpoint, report_times
 
 
@@ -137,39 +133,28 @@ class Resumption:
         """Go on to the end; arguments and errors as of ``resume``."""
         check_checkpoint(checkpoint, self.output)
         target = self.output if output is None else Path(output)
+        header, (before, earlier) = self._found.header, self._rows_so_far()
+        is_own = target.exists() and target.samefile(before)
+
+        def restore(run: RunState) -> None:
+            self._restore(run)
+            for block in earlier:
+                run.keeper.add(block, lambda: run.record("done"))
+
         with self.compiled.in_use():
-            run = self._run(target, events, watch, force=force)
-            run.saver = Saver(run, checkpoint, force=force or self._is_ours(target))
+            run = Run(self.compiled, self._settings(),
+                      Callbacks(announce=self._announce, progress=progress, watch=watch), events,
+                      output=target, force=force or is_own, identity=header["run"],
+                      estimate_error=bool(header["estimate_error"]))  # fmt: skip
+            run.save_every(checkpoint, force=force or self._is_ours(target))
             try:
-                result = run.finish(progress)
+                result = run.go(restore)
             except BaseException as error:
                 if hasattr(error, "checkpoint"):  # it takes the place of this one
                     self._remove_what_is_replaced(target)
                 raise
         self._remove_what_is_replaced(target)
         return result
-
-    def _run(
-        self,
-        target: Path,
-        events: Sequence[Event],
-        watch: Callable[[Standing], None] | None,
-        *,
-        force: bool,
-    ) -> Run:
-        """The run, standing where the checkpoint was written, with the rows until there."""
-        header = self._found.header
-        before, earlier = self._rows_so_far()
-        settings, estimate = self._settings(), bool(header["estimate_error"])
-        run = Run(self.compiled, settings, self._announce, events, watch, estimate_error=estimate)
-        ours = target.exists() and target.samefile(before)
-        run.keep(target, force=force or ours, identity=header["run"])
-        assert run.keeper is not None
-        run.prepare()
-        self._restore(run)
-        for block in earlier:
-            run.keeper.add(block, lambda: run.record("done"))
-        return run
 
     def _remove_what_is_replaced(self, target: Path) -> None:
         """Remove the unfinished rows of the run, and this checkpoint where another file goes on.
@@ -221,21 +206,21 @@ class Resumption:
             raise self._damaged(f"its settings make no sense: {error}") from error
         return settings
 
-    def _restore(self, run: Run) -> None:
+    def _restore(self, run: RunState) -> None:
         """Stand where the checkpoint was written."""
         header, stored = self._found.header, self._found.arrays
         self._restore_events(run)
         try:
             if header["integrations"] == 2:
                 begin_other(run)
-                if run.runs[0].implicit != ("0.own" in stored):  # which implicit ones have
-                    run.runs.reverse()
-            for k, integration in enumerate(run.runs):
+                if run.integrations[0].implicit != ("0.own" in stored):  # which implicit ones have
+                    run.integrations.reverse()
+            for k, integration in enumerate(run.integrations):
                 first = f"{k}."
                 integration.restore(
                     {n.removeprefix(first): a for n, a in stored.items() if n.startswith(first)}
                 )
-            if len(run.runs) > 1 and run.runs[0].status is Status.RUNNING:
+            if len(run.integrations) > 1 and run.integrations[0].status is Status.RUNNING:
                 raise ValueError("its first integration goes on, and there is a second")
             run.crossed, until = header["crossed"], header["until"]
             run.until = math.inf if until is None else until
@@ -243,7 +228,7 @@ class Resumption:
             check_position(run, header["rows"])
         except ValueError as error:
             raise self._damaged(str(error)) from error
-        run.notes = [*header["notes"], *self._notes(run.runs[-1].t)]
+        run.notes = [*header["notes"], *self._notes(run.present.t)]
         run.started -= header["wall_time_s"]
         run.compile_time += header["compile_time_s"]
 
@@ -253,7 +238,7 @@ class Resumption:
             "Run the scene anew"
         )
 
-    def _restore_events(self, run: Run) -> None:
+    def _restore_events(self, run: RunState) -> None:
         events = self._found.header.get("events")
         if not isinstance(events, dict | None) or not are_texts((events or {}).get("titles", [])):
             raise self._damaged("its events should be a table")
@@ -299,7 +284,7 @@ def _first(result: Result, count: int) -> Any:
             left -= min(left, len(block))
 
 
-def restore_system(run: Run, stored: Mapping[str, Any]) -> None:
+def restore_system(run: RunState, stored: Mapping[str, Any]) -> None:
     """Give the model the turns, changed numbers and counts of a checkpoint; the rest is its own.
 
     What else ``par`` holds, such as the places of tables, compiled code takes for indices.
@@ -323,13 +308,13 @@ def restore_system(run: Run, stored: Mapping[str, Any]) -> None:
     par[:], settings[[UNSETTLED, DOUBTFUL]] = new, own
 
 
-def check_position(run: Run, rows: int) -> None:
+def check_position(run: RunState, rows: int) -> None:
     """Whether a restored run stands at a state of its model, after so many rows.
 
     Raises:
         ValueError: it does not.
     """
-    model, last = run.machine.model, run.runs[-1]
+    model, last = run.machine.model, run.present
     state_of(from_integrated(last.y[None])[0], model.body_names)
     reported = last.work.next_report
     if rows - reported not in (0, 1):  # an event that ends a run reports its own instant

@@ -1,4 +1,4 @@
-"""The door to a run."""
+"""Public function ``simulate``."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -8,7 +8,8 @@ from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.output.monitor import Standing
-from dap3d_core.simulation.run import Progress, Run
+from dap3d_core.simulation.run import Run
+from dap3d_core.simulation.run_state import Callbacks, Progress
 from dap3d_core.simulation.settings import check_checkpoint, compiled_for, settings_of
 
 
@@ -35,32 +36,28 @@ def simulate(
     events: Sequence[Event] = (),
     watch: Callable[[Standing], None] | None = None,
 ) -> Result:
-    """Simulate a scene from t = 0 to t_end.
-
-    What is left out is the scene's [simulation]'s, else as ``Simulation`` has it.
+    """Simulate a scene from t = 0 to t_end; settings left out are those of its [simulation].
 
     Args:
-        scene: a Scene, what ``load`` takes, or a model that was compiled before.
+        scene: a Scene, what ``load`` takes, or a compiled model.
         t_end, dt: final time, s (0 solves once at t = 0); reporting step, by default t_end / 100.
         method: "auto", "unconstrained", "standard", "penalty" or "lsq".
         integrator: "dopri5", "dop853", "adams", "rk4" (needs ``step``), "radau" (implicit), "auto".
         rtol, atol, step: tolerances of the step's error; a fixed step, s, without error control.
         correct, project: bring the start, and then every state, onto the constraints.
-        progress: called as progress(t, t_end) between chunks of some 0.1 s.
-        allow_code, announce: as ``compile`` has them. events: what to look out for (``Event``).
+        correct_metric: "unit" or "mass": least correction in m and rad, or weighted by masses.
+        progress, watch: called between chunks of some 0.1 s, as progress(t, t_end) and with a
+            ``Standing``. allow_code, announce: as of ``compile``. events: see ``Event``.
         output, force: file to write, and whether over an existing one. Rows of a run of more than
-            a second stand in ``OUTPUT.part`` meanwhile, readable also when it is killed.
-        correct_metric: "unit" or "mass": least correction in m and rad, or by masses.
+            a second are in ``OUTPUT.part`` meanwhile, readable also when the run is killed.
         estimate_error: estimate ``result.error`` by a second, finer run.
         checkpoint: seconds between checkpoints in ``OUTPUT.checkpoint``, for ``resume``; inf: only
             where an exception (Ctrl-C, one of ``progress``) ends the run. Needs ``output``.
-        watch: called between chunks with how the run stands (``Standing``).
 
-    Returns:
-        the result. An exception that ends the integration carries what was computed as ``.result``.
+    An exception that ends the integration has what was computed as ``.result``.
 
     Raises:
-        SceneError, PluginError, ResultError: as ``compile``; settings or an output that won't do.
+        SceneError, PluginError, ResultError: as ``compile``; unusable settings or output.
         SimulationError (RedundantError, AssemblyError): the run stopped, or could not begin.
     """
     compiled = compiled_for(scene, method, allow_code, announce)
@@ -68,6 +65,10 @@ def simulate(
                          rtol=rtol, atol=atol, step=step, correct=correct, project=project,
                          correct_metric=correct_metric)  # fmt: skip
     check_checkpoint(checkpoint, output)
+    callbacks = Callbacks(announce=announce, progress=progress, watch=watch)
     with compiled.in_use():
-        run = Run(compiled, settings, announce, events, watch, estimate_error=estimate_error)
-        return run.go(progress, output, force=force, checkpoint=checkpoint)
+        run = Run(compiled, settings, callbacks, events, output=output, force=force,
+                  estimate_error=estimate_error)  # fmt: skip
+        if checkpoint is not None:
+            run.save_every(checkpoint, force=force)
+        return run.go()

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
 from numpy.typing import NDArray
@@ -22,9 +22,7 @@ from dap3d_core.simulation.checkpoint.file import (
     write_checkpoint,
 )
 from dap3d_core.simulation.errors import CheckpointError
-
-if TYPE_CHECKING:
-    from dap3d_core.simulation.run import Run
+from dap3d_core.simulation.run_state import RunState
 
 
 class Saver:
@@ -35,19 +33,17 @@ class Saver:
         has_written: whether there is one of this run.
     """
 
-    def __init__(self, run: "Run", seconds: float, *, force: bool) -> None:
+    def __init__(self, run: RunState, seconds: float, *, force: bool) -> None:
         """Args:
-            run: whose; its keeper has an output.
+            run: the run, which has an output.
             seconds: from one checkpoint to the next.
-            force: whether a checkpoint of another run is given up.
+            force: give up a checkpoint of another run.
 
         Raises:
             ResultError: there is one of another run.
         """
-        keeper = run.keeper
-        assert keeper is not None
-        assert keeper.output is not None
-        self.path = path_of(keeper.output)
+        assert run.keeper.output is not None
+        self.path = path_of(run.keeper.output)
         if self.path.exists() and not force:
             raise ResultError(
                 f"{self.path} exists: a run that was ended goes on from it (dap3d resume); force "
@@ -71,9 +67,7 @@ class Saver:
             self._save()
 
     def _save(self) -> None:
-        run, keeper = self._run, self._run.keeper
-        assert keeper is not None
-        keeper.to_disk(lambda: run.record("done"))
+        self._run.keeper.to_disk(lambda: self._run.record("done"))
         self.write()
         self._next = time.perf_counter() + self._seconds
 
@@ -98,7 +92,6 @@ class Saver:
         That of another run, which has taken its place, stays.
         """
         keeper = self._run.keeper
-        assert keeper is not None
         assert keeper.output is not None
         remove_parts(keeper.output, keeper.run)
         with suppress(CheckpointError):
@@ -126,17 +119,16 @@ def remove_parts(output: Path, run: str) -> None:
         part.unlink()
 
 
-def checkpoint_of(run: "Run") -> Checkpoint:
+def checkpoint_of(run: RunState) -> Checkpoint:
     """A run as it stands between two chunks, its rows taken."""
     keeper, compiled = run.keeper, run.compiled
-    assert keeper is not None
     assert keeper.output is not None
     header: dict[str, Any] = {
         "run": keeper.run,
         "output": keeper.output.name,
         "rows": keeper.count,
-        "t": run.runs[-1].t,
-        "integrations": len(run.runs),
+        "t": run.present.t,
+        "integrations": len(run.integrations),
         "crossed": run.crossed,
         "until": run.until if math.isfinite(run.until) else None,
         "scene": compiled.scene_text,
@@ -154,11 +146,11 @@ def checkpoint_of(run: "Run") -> Checkpoint:
     return Checkpoint(json.loads(to_json(header)), arrays_of(run))
 
 
-def arrays_of(run: "Run") -> dict[str, NDArray[Any]]:
+def arrays_of(run: RunState) -> dict[str, NDArray[Any]]:
     """All that a run goes on from, by name."""
     found = {
         f"{k}.{name}": array
-        for k, integration in enumerate(run.runs)
+        for k, integration in enumerate(run.integrations)
         for name, array in integration.all_arrays()
     }
     return found | {f"system.{name}": getattr(run.machine.system, name) for name in KEPT}

@@ -10,12 +10,13 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.model import Model
 from dap3d_core.result import Record, Result, ResultError, ResultWriter, check_target
 from dap3d_core.result.arrays import LARGE, Arrays, arrays_of, joined
 from dap3d_core.result.file.atomic_write import check_utf8
 from dap3d_core.result.model_summary import subject_of
 from dap3d_core.result.open import arrays_in
-from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.failure.negative_reactions import Pulling
 
 Floats = NDArray[np.float64]
@@ -36,7 +37,8 @@ class Keeper:
 
     def __init__(
         self,
-        compiled: CompiledModel,
+        model: Model,
+        machine: Callable[[], Machine],
         output: str | os.PathLike[str] | None,
         most: int,
         *,
@@ -44,7 +46,8 @@ class Keeper:
         run: str = "",
     ) -> None:
         """Args:
-            compiled: the model whose rows come.
+            model: the model of the rows.
+            machine: returns its evaluator, for quantities that a result computes later.
             output, force: as ``simulate`` has them.
             most: how many rows come at most.
             run: identity of the run that this one goes on with.
@@ -57,14 +60,14 @@ class Keeper:
         self.run = run or os.urandom(16).hex()
         self.output: Path | None = None if output is None else check_target(output, force)
         self.count = 0
-        self._compiled, self._most, self._force = compiled, most, force
-        self._subject = subject_of(compiled.model)
+        self._model, self._machine, self._most, self._force = model, machine, most, force
+        self._subject = subject_of(model)
         self._parts: list[Arrays] = []
-        self.pulling = Pulling(compiled.model)
+        self.pulling = Pulling(model)
         self._bytes = 0
         self._writer: ResultWriter | None = None
         #: (13 n,) the least and the largest value of each component so far.
-        self.low, self.high = (np.full(compiled.model.u0.size, x) for x in (np.inf, -np.inf))
+        self.low, self.high = (np.full(model.u0.size, x) for x in (np.inf, -np.inf))
         self._began = math.inf  # when the first rows came
 
     def take(self, rows: Floats, record: Callable[[], Record]) -> None:
@@ -120,14 +123,13 @@ class Keeper:
             if self._writer is not None:
                 self._writer.discard()
             return None
-        compiled = self._compiled
         if self._writer is not None:
             self._writer.close()
         result = Result(
             self._subject,
             self._arrays(),
             attrs.evolve(record, run=self.run),
-            lambda: (compiled.model, lambda: compiled.machine),
+            lambda: (self._model, self._machine),
         )
         if self.output is not None:
             try:

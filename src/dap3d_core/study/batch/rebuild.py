@@ -11,8 +11,8 @@ from dap3d_core.model.groups import Floats
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Checked, SceneError, check
 from dap3d_core.simulation import AssemblyError, CompiledModel
-from dap3d_core.simulation.events.breakpoints import stops_of
 from dap3d_core.simulation.initial.assemble import model_size
+from dap3d_core.simulation.initial.breakpoints import stops_of
 from dap3d_core.simulation.initial.undefined_directions import undefined_directions
 from dap3d_core.simulation.initial_state import find_start, start_notes
 from dap3d_core.study.parameters import SceneParameter, with_values

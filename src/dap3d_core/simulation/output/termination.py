@@ -8,8 +8,8 @@ from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping.event_location import CHATTER
 from dap3d_core.integrators.stepping.integration_state import LOGGED
 from dap3d_core.result import INFORMATION, Occurrence
-from dap3d_core.simulation.failure.contradictory_joints import find_contradiction
 from dap3d_core.simulation.failure.diagnosis import fastest_body, find_offender
+from dap3d_core.simulation.redundancy.contradictory_joints import find_contradiction
 
 REASONS = {
     Status.STEP_FLOOR: "the step size fell to the resolution of time",

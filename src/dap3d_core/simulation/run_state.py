@@ -1,0 +1,184 @@
+"""The state of one run: its integrations, rows, notes and clock, which all parts of it share."""
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.integrators import Integration
+from dap3d_core.integrators import Statistics as Counts
+from dap3d_core.result import INFORMATION, Occurrence, Record, Statistics
+from dap3d_core.scene import Simulation
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.events.event import Event
+from dap3d_core.simulation.events.locate import Watcher
+from dap3d_core.simulation.initial.tolerances import atol_notes, resolved_atol
+from dap3d_core.simulation.output.error_estimate import StepLimits, halved
+from dap3d_core.simulation.output.free_space import check_room, row_width
+from dap3d_core.simulation.output.monitor import Observer, Standing
+from dap3d_core.simulation.output.recorder import Keeper
+from dap3d_core.simulation.output.termination import occurrences
+from dap3d_core.simulation.settings import report_times, settings_notes
+
+Progress = Callable[[float, float], None]
+
+
+@attrs.frozen(kw_only=True)
+class Callbacks:
+    """Functions of the caller, or None.
+
+    Attributes:
+        announce: called with the name of each kernel that has to be compiled.
+        progress: called as progress(t, t_end) between chunks.
+        watch: called between chunks with a ``Standing``.
+    """
+
+    announce: Callable[[str], None] | None = None
+    progress: Progress | None = None
+    watch: Callable[[Standing], None] | None = None
+
+
+class RunState:
+    """One run between two chunks; checkpoints and the change of integrator work on it.
+
+    Attributes:
+        compiled, machine, settings: the model, its evaluator, the settings with atol as a number.
+        times: (nt,) reporting times, s.
+        options: what every integration of the run is made with.
+        integrations: the present one last; "auto" and radau may take a second one.
+        crossed, until: times of singular poses that an explicit integration crosses for radau, and
+            the time at which radau takes over again, s.
+        rank: of the constraints at the start.
+        is_whole: the run is between two chunks, its rows taken.
+        estimate_error: a second run is to estimate the error of this one.
+        limits: of the steps of such a second run.
+        keeper, watcher: the rows reported so far; the events of a script.
+        started, compile_time: clock at the start, compilation left out; seconds of compilation.
+    """
+
+    def __init__(
+        self,
+        compiled: CompiledModel,
+        settings: Any,
+        callbacks: Callbacks,
+        events: Sequence[Event] = (),
+        *,
+        output: str | os.PathLike[str] | None = None,
+        force: bool = False,
+        identity: str = "",
+        estimate_error: bool = False,
+        limits: StepLimits | None = None,
+    ) -> None:
+        """Args:
+            compiled, settings, callbacks, events: of the run.
+            output, force: file of the result, and whether over an existing one.
+            identity: of the run that this one continues.
+            estimate_error, limits: as the attributes.
+
+        Raises:
+            ResultError: the output cannot be written.
+            SceneError: there is no final time, or no room for the output.
+        """
+        self.compiled, self.machine, self.callbacks = compiled, compiled.machine, callbacks
+        atol = resolved_atol(settings.atol, self.machine)
+        self.settings: Simulation = attrs.evolve(settings, atol=atol)
+        self.times = report_times(settings.t_end, settings.dt)
+        self.notes = [*compiled.notes, *settings_notes(compiled, settings)]
+        self.notes.append(f"method {compiled.method}: {compiled.reason}")
+        if settings.step is None:
+            self.notes += [
+                INFORMATION + note for note in atol_notes(settings.atol, atol, self.machine)
+            ]
+        self.started = self.compile_time = 0.0
+        self.rank = 0
+        self.estimate_error, self.limits = estimate_error, limits
+        self.is_whole = False
+        self.integrations: list[Integration] = []
+        self.crossed: list[float] = []
+        self.until = np.inf
+        self.options: dict[str, Any] = {}
+        self.watcher = Watcher(compiled, events) if events else None
+        watch = callbacks.watch
+        self.observer = None if watch is None else Observer(self.machine.model, self.t_end, watch)
+        check_room(len(self.times), row_width(self.machine), self.settings.dt, output)
+        most = len(self.times) + 1  # an event may end a run between two of them
+        self.keeper = Keeper(compiled.model, lambda: compiled.machine, output, most, force=force,
+                             run=identity)  # fmt: skip
+
+    @property
+    def t_end(self) -> float:
+        """Final time, s."""
+        return float(self.times[-1])
+
+    @property
+    def present(self) -> Integration:
+        """The integration that the run is in."""
+        return self.integrations[-1]
+
+    def begin(self, integration: Integration) -> None:
+        """Make an integration the present one; it is compiled first, off the clock of the run."""
+        integration.tstops = self.compiled.pace(self.t_end).stops
+        if self.limits is not None:
+            integration.tstops = halved(integration.tstops)
+            integration.work.longest_step = self.limits.longest
+        before = time.perf_counter()
+        integration.compile()
+        spent = time.perf_counter() - before
+        self.compile_time += spent
+        self.started += spent
+        self.integrations.append(integration)
+        self.observe_present()
+
+    def observe_present(self) -> None:
+        """Let the callback ``watch`` follow the present integration."""
+        if self.observer is not None:
+            self.observer.begin(self.present)
+
+    def statistics(self) -> Counts:
+        """Counts of all integrations together."""
+        return Counts(*map(sum, zip(*(i.statistics for i in self.integrations), strict=True)))
+
+    def events(self) -> list[Occurrence]:
+        """Crossings of switches and events of the script so far, by time."""
+        of_script = self.watcher.occurrences if self.watcher else []
+        return occurrences(self.machine, self.integrations, of_script)
+
+    def record(self, status: str, more_notes: Sequence[str] = ()) -> Record:
+        """The metadata of the result so far."""
+        counts, events = self.statistics(), self.events()
+        changes = any(event.changes for event in events)
+        return Record(
+            scene_text=self.compiled.scene_text,
+            stats=Statistics(
+                steps=counts.steps,
+                rejected=counts.rejected,
+                rhs=counts.rhs,
+                projections=counts.projections,
+                wall_time_s=time.perf_counter() - self.started,
+                compile_time_s=self.compiled.compile_time + self.compile_time,
+            ),
+            status=status,
+            method=self.compiled.method,
+            integrator=self.settings.integrator,
+            notes=[*self.notes, *more_notes],
+            events=events,
+            types=self.compiled.types,
+            settings={
+                "t_end": self.t_end,
+                "dt": self.settings.dt,
+                "rtol": self.settings.rtol,
+                "atol": self.settings.atol,
+                "length": self.machine.model.length,
+                "most_work": max((run.largest_work for run in self.integrations), default=0.0),
+                "step": self.settings.step,
+                "project": bool(self.settings.project),
+                "correct": bool(self.settings.correct),
+                "rank": self.rank,
+                "conservative": self.compiled.is_conservative and not changes,
+                "correct_metric": str(self.settings.correct_metric),
+                "method": self.compiled.asked,
+            },
+        )
