@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import VALUE, Floats, System
+from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unscaled
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
@@ -101,17 +102,16 @@ def scale_forces(body: Floats, metric: Floats, force: Floats) -> float:
         f0, f1, f2 = force[o], force[o + 1], force[o + 2]
         n0, n1, n2 = force[o + 3], force[o + 4], force[o + 5]
         power += f0 * s[12] + f1 * s[13] + f2 * s[14] + n0 * s[15] + n1 * s[16] + n2 * s[17]
-        w0 = s[3] * s[15] + s[6] * s[16] + s[9] * s[17]
-        w1 = s[4] * s[15] + s[7] * s[16] + s[10] * s[17]
-        w2 = s[5] * s[15] + s[8] * s[16] + s[11] * s[17]
+        w0, w1, w2 = in_body_axes(s, s[15], s[16], s[17])
         h0 = s[23] * w0 + s[24] * w1 + s[25] * w2
         h1 = s[26] * w0 + s[27] * w1 + s[28] * w2
         h2 = s[29] * w0 + s[30] * w1 + s[31] * w2
         g0, g1, g2 = w1 * h2 - w2 * h1, w2 * h0 - w0 * h2, w0 * h1 - w1 * h0
         force[o], force[o + 1], force[o + 2] = f0 * k[0], f1 * k[0], f2 * k[0]
-        force[o + 3] = k[7] * n0 + k[10] * n1 + k[13] * n2 - k[1] * g0
-        force[o + 4] = k[8] * n0 + k[11] * n1 + k[14] * n2 - (k[2] * g0 + k[4] * g1)
-        force[o + 5] = k[9] * n0 + k[12] * n1 + k[15] * n2 - (k[3] * g0 + k[5] * g1 + k[6] * g2)
+        g0, g1, g2 = scaled_moment(k, g0, g1, g2)
+        force[o + 3] = k[7] * n0 + k[10] * n1 + k[13] * n2 - g0
+        force[o + 4] = k[8] * n0 + k[11] * n1 + k[14] * n2 - g1
+        force[o + 5] = k[9] * n0 + k[12] * n1 + k[15] * n2 - g2
     return power
 
 
@@ -120,13 +120,9 @@ def scale_velocities(body: Floats, metric: Floats, force: Floats) -> None:
     """The velocities of the bodies in scaled coordinates, into ``force``: (sqrt(m) v, L^T w')."""
     for b in range(1, body.shape[0]):
         s, k, o = body[b], metric[b], 6 * b
-        w0 = s[3] * s[15] + s[6] * s[16] + s[9] * s[17]
-        w1 = s[4] * s[15] + s[7] * s[16] + s[10] * s[17]
-        w2 = s[5] * s[15] + s[8] * s[16] + s[11] * s[17]
+        w0, w1, w2 = in_body_axes(s, s[15], s[16], s[17])
         force[o], force[o + 1], force[o + 2] = s[12] / k[0], s[13] / k[0], s[14] / k[0]
-        z2 = w2 / k[6]
-        z1 = (w1 - k[5] * z2) / k[4]
-        force[o + 3], force[o + 4], force[o + 5] = (w0 - k[2] * z1 - k[3] * z2) / k[1], z1, z2
+        force[o + 3], force[o + 4], force[o + 5] = scaled(k, w0, w1, w2)
 
 
 @compiled_into
@@ -145,10 +141,8 @@ def some_rates(
         out[c + 5] = e3 * w0 + e0 * w1 - e1 * w2
         out[c + 6] = -e2 * w0 + e1 * w1 + e0 * w2
         out[f], out[f + 1], out[f + 2] = k[0] * force[o], k[0] * force[o + 1], k[0] * force[o + 2]
-        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
-        out[f + 3] = k[1] * a0 + k[2] * a1 + k[3] * a2
-        out[f + 4] = k[4] * a1 + k[5] * a2
-        out[f + 5] = k[6] * a2
+        a0, a1, a2 = unscaled(k, force[o + 3], force[o + 4], force[o + 5])
+        out[f + 3], out[f + 4], out[f + 5] = a0, a1, a2
 
 
 @compiled_inside

@@ -3,6 +3,7 @@
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats
+from dap3d_core.assembly.metric import unscaled
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.kernels.runtime.cache import compiled_inside
 
@@ -23,10 +24,8 @@ def add_displacement(y: Floats, metric: Floats, force: Floats, out: Floats) -> N
     """Add r and p's share of a scaled displacement (or its rate) in ``force``; out may be y."""
     for b in range(1, metric.shape[0]):
         c, o, k = coordinate_offset(b), 6 * b, metric[b]
-        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
-        w0 = 0.5 * (k[1] * a0 + k[2] * a1 + k[3] * a2)
-        w1 = 0.5 * (k[4] * a1 + k[5] * a2)
-        w2 = 0.5 * k[6] * a2
+        w0, w1, w2 = unscaled(k, force[o + 3], force[o + 4], force[o + 5])
+        w0, w1, w2 = 0.5 * w0, 0.5 * w1, 0.5 * w2
         e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
         for d in range(3):
             out[c + d] += k[0] * force[o + d]
@@ -41,12 +40,12 @@ def add_velocity(metric: Floats, force: Floats, out: Floats) -> None:
     """Add a scaled velocity in ``force`` to the velocities (6 n,)."""
     for b in range(1, metric.shape[0]):
         f, o, k = 6 * (b - 1), 6 * b, metric[b]
-        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
+        w0, w1, w2 = unscaled(k, force[o + 3], force[o + 4], force[o + 5])
         for d in range(3):
             out[f + d] += k[0] * force[o + d]
-        out[f + 3] += k[1] * a0 + k[2] * a1 + k[3] * a2
-        out[f + 4] += k[4] * a1 + k[5] * a2
-        out[f + 5] += k[6] * a2
+        out[f + 3] += w0
+        out[f + 4] += w1
+        out[f + 5] += w2
 
 
 @compiled_inside

@@ -28,6 +28,7 @@ import attrs
 
 from dap3d_core.assembly.arrays import Floats, Integers, System
 from dap3d_core.assembly.evaluate import largest, zero
+from dap3d_core.assembly.metric import in_body_axes, scaled_moment
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, Arrays
 from dap3d_core.kernels.runtime.cache import compiled_inside
 from dap3d_core.kernels.runtime.function_lists import call_loop
@@ -91,9 +92,7 @@ def rotate_body(s: Floats, saved: Floats, axis: int, angle: float) -> None:
     """Turn the body about one of its own axes; it keeps its angular velocity in body axes."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     cosine, sine = math.cos(angle), math.sin(angle)
-    w0 = saved[3] * saved[15] + saved[6] * saved[16] + saved[9] * saved[17]
-    w1 = saved[4] * saved[15] + saved[7] * saved[16] + saved[10] * saved[17]
-    w2 = saved[5] * saved[15] + saved[8] * saved[16] + saved[11] * saved[17]
+    w0, w1, w2 = in_body_axes(saved, saved[15], saved[16], saved[17])
     for r in range(3):
         a, b = saved[3 + 3 * r + i], saved[3 + 3 * r + j]
         s[3 + 3 * r + i] = cosine * a + sine * b
@@ -235,9 +234,7 @@ def differentiate_friction(
 @compiled_inside
 def turn_to_body(block: Floats, o: int, s: Floats) -> None:
     """Three numbers at o along the global axes become those along the axes of body row s."""
-    x, y, z = block[o], block[o + 1], block[o + 2]
-    for c in range(3):
-        block[o + c] = x * s[3 + c] + y * s[6 + c] + z * s[9 + c]
+    block[o], block[o + 1], block[o + 2] = in_body_axes(s, block[o], block[o + 1], block[o + 2])
 
 
 @compiled_inside
@@ -246,10 +243,8 @@ def scale_columns(block: Floats, o: int, k: Floats, s: Floats) -> None:
     turn_to_body(block, o, s)
     for c in range(3):
         block[o + c] *= k[0]
-    x, y, z = block[o + 3], block[o + 4], block[o + 5]
-    block[o + 3] = x * k[1]
-    block[o + 4] = x * k[2] + y * k[4]
-    block[o + 5] = x * k[3] + y * k[5] + z * k[6]
+    x, y, z = scaled_moment(k, block[o + 3], block[o + 4], block[o + 5])
+    block[o + 3], block[o + 4], block[o + 5] = x, y, z
 
 
 @compiled_inside
@@ -263,13 +258,10 @@ def scale_tangent(system: System, tangent: Tangent) -> None:
             scale_columns(block, o + 12 * r, metric[b], system.body[b])
             scale_columns(block, o + 12 * r + 6, metric[b], system.body[b])
         for c in range(o, o + 12):
-            x, y, z = block[c], block[c + 12], block[c + 24]
-            for r in range(3):
-                block[c + 12 * r] = k[0] * (x * s[3 + r] + y * s[6 + r] + z * s[9 + r])
-            x, y, z = block[c + 36], block[c + 48], block[c + 60]
-            block[c + 36] = k[1] * x
-            block[c + 48] = k[2] * x + k[4] * y
-            block[c + 60] = k[3] * x + k[5] * y + k[6] * z
+            x, y, z = in_body_axes(s, block[c], block[c + 12], block[c + 24])
+            block[c], block[c + 12], block[c + 24] = k[0] * x, k[0] * y, k[0] * z
+            x, y, z = scaled_moment(k, block[c + 36], block[c + 48], block[c + 60])
+            block[c + 36], block[c + 48], block[c + 60] = x, y, z
     for q in range(system.blocks.shape[0]):
         o, b = system.blocks[q, 0], system.blocks[q, 1]
         for _ in range(system.blocks[q, 2]):
@@ -284,9 +276,7 @@ def add_gyroscopic(system: System, tangent: Tangent) -> None:
     block = tangent.coupling
     for b in range(1, system.body.shape[0]):
         s, o = system.body[b], tangent.blocks[b - 1, 0] + 45
-        w0 = s[3] * s[15] + s[6] * s[16] + s[9] * s[17]
-        w1 = s[4] * s[15] + s[7] * s[16] + s[10] * s[17]
-        w2 = s[5] * s[15] + s[8] * s[16] + s[11] * s[17]
+        w0, w1, w2 = in_body_axes(s, s[15], s[16], s[17])
         for c in range(3):  # J' e_c x w'
             j0, j1, j2 = s[23 + c], s[26 + c], s[29 + c]
             block[o + c] += j1 * w2 - j2 * w1

@@ -24,6 +24,7 @@ import attrs
 
 from dap3d_core.assembly.arrays import Floats, Integers, System
 from dap3d_core.assembly.evaluate import rates, zero
+from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unscaled
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.assembly.state_update import add_displacement
 from dap3d_core.formulations.common.constraints import (
@@ -138,31 +139,14 @@ def keep_state(system: System, matrix: Matrix, part: float) -> None:
             o += 6
     for b in range(1, system.body.shape[0]):
         s, k, z = system.body[b], system.metric[b], matrix.spin[b]
-        w0 = s[3] * s[15] + s[6] * s[16] + s[9] * s[17]
-        w1 = s[4] * s[15] + s[7] * s[16] + s[10] * s[17]
-        w2 = s[5] * s[15] + s[8] * s[16] + s[11] * s[17]
+        w0, w1, w2 = in_body_axes(s, s[15], s[16], s[17])
         for c in range(3):
-            u0, u1, u2 = k[1 + c], 0.0, 0.0  # column c of U
-            if c > 0:
-                u1 = k[3 + c]
-            if c > 1:
-                u2 = k[6]
+            u0, u1, u2 = unscaled(k, float(c == 0), float(c == 1), float(c == 2))
             a0, a1, a2 = w1 * u2 - w2 * u1, w2 * u0 - w0 * u2, w0 * u1 - w1 * u0
-            unscale(k, a0, a1, a2, 0.5, z, c, 3)
-            z[12 + c] = u0 * w0 + u1 * w1 + u2 * w2
-        unscale(k, w0, w1, w2, 1.0, z, 9, 1)
-
-
-@compiled_inside
-def unscale(
-    k: Floats, a0: float, a1: float, a2: float, factor: float, out: Floats, o: int, stride: int
-) -> None:
-    """Factor U^-1 a, into out at o, o + stride, o + 2 stride."""
-    z2 = a2 / k[6]
-    z1 = (a1 - k[5] * z2) / k[4]
-    out[o] = factor * (a0 - k[2] * z1 - k[3] * z2) / k[1]
-    out[o + stride] = factor * z1
-    out[o + 2 * stride] = factor * z2
+            a0, a1, a2 = scaled(k, a0, a1, a2)
+            z[c], z[c + 3], z[c + 6] = 0.5 * a0, 0.5 * a1, 0.5 * a2
+        z[9], z[10], z[11] = scaled(k, w0, w1, w2)
+        z[12], z[13], z[14] = scaled_moment(k, w0, w1, w2)
 
 
 @compiled_inside
@@ -242,8 +226,9 @@ def scale_residual(
         t1 = -e[11] * p0 - e[12] * p1 + e[9] * p2 + e[10] * p3
         t2 = -e[12] * p0 + e[11] * p1 - e[10] * p2 + e[9] * p3
         n[b] = e[9] * p0 + e[10] * p1 + e[11] * p2 + e[12] * p3
-        unscale(k, t0, t1, t2, 2.0, x, o + 3, 1)
-        unscale(k, R[f + 3], R[f + 4], R[f + 5], 1.0, x, o + 9, 1)
+        t0, t1, t2 = scaled(k, t0, t1, t2)
+        x[o + 3], x[o + 4], x[o + 5] = 2.0 * t0, 2.0 * t1, 2.0 * t2
+        x[o + 9], x[o + 10], x[o + 11] = scaled(k, R[f + 3], R[f + 4], R[f + 5])
     for q in range(blocks.shape[0]):
         m, f, o = blocks[q, 2], blocks[q, 3], matrix.block_place[q, 2]
         for r in range(m):
@@ -288,16 +273,13 @@ def unscale_solution(
             g = 3 * d
             out[c + d] = k[0] * (e[g] * x[o] + e[g + 1] * x[o + 1] + e[g + 2] * x[o + 2])
             out[f + d] = k[0] * (e[g] * x[o + 6] + e[g + 1] * x[o + 7] + e[g + 2] * x[o + 8])
-        w0 = 0.5 * (k[1] * x[o + 3] + k[2] * x[o + 4] + k[3] * x[o + 5])
-        w1 = 0.5 * (k[4] * x[o + 4] + k[5] * x[o + 5])
-        w2 = 0.5 * k[6] * x[o + 5]
+        w0, w1, w2 = unscaled(k, x[o + 3], x[o + 4], x[o + 5])
+        w0, w1, w2 = 0.5 * w0, 0.5 * w1, 0.5 * w2
         out[c + 3] = e[9] * along - e[10] * w0 - e[11] * w1 - e[12] * w2
         out[c + 4] = e[10] * along + e[9] * w0 - e[12] * w1 + e[11] * w2
         out[c + 5] = e[11] * along + e[12] * w0 + e[9] * w1 - e[10] * w2
         out[c + 6] = e[12] * along - e[11] * w0 + e[10] * w1 + e[9] * w2
-        out[f + 3] = k[1] * x[o + 9] + k[2] * x[o + 10] + k[3] * x[o + 11]
-        out[f + 4] = k[4] * x[o + 10] + k[5] * x[o + 11]
-        out[f + 5] = k[6] * x[o + 11]
+        out[f + 3], out[f + 4], out[f + 5] = unscaled(k, x[o + 9], x[o + 10], x[o + 11])
     out[out.shape[0] - 1] = 0.0
     for q in range(blocks.shape[0]):
         m, f, o = blocks[q, 2], blocks[q, 3], matrix.block_place[q, 2]
