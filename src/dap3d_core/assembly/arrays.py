@@ -56,17 +56,23 @@ class System(LoopArrays):
     }
 
     metric: Floats  # (n+1, 16): 1/sqrt(m); U = L^-T by rows, upper triangle; B = A U by rows
-    force: Floats  # (6 (n+1),) force and moment on each body; then the acceleration
-    gamma: Floats  # (rows,)
-    nu: Floats  # (rows,)
-    C: Floats  # (rows,)
-    x: Floats  # (rows,) right-hand side, then -lambda; between these, what regularises the rows
+    force: Floats  # (6 (n+1),) applied force and moment on each body, global axes
+    acceleration: Floats  # (6 (n+1),) scaled; until it is solved for, the scaled forces
+    velocity: Floats  # (6 (n+1),) scaled
+    change: Floats  # (6 (n+1),) scaled displacement, or change of velocity or acceleration
+    gamma: Floats  # (rows,) right-hand side of the acceleration level
+    nu: Floats  # (rows,) right-hand side of the velocity level
+    residual: Floats  # (rows,) of the level evaluated last: C, D v - nu or D a - gamma
+    multipliers: Floats  # (rows,) -lambda; until it is solved for, the right-hand side of the rows
+    right_side: Floats  # (rows,) right-hand side where it is not gamma (penalty.py, lsq.py)
+    total: Floats  # (rows,) sum of the multipliers of all passes (regularised.py)
+    compliance: Floats  # (rows,) E, which regularises the rows
     D: Floats  # blocks of the Jacobian
     K: Floats  # blocks of what remains to be factored
     weight: Floats  # (rows,) from a row's residual to one in m: 1 in scenes of ordinary size
     smallest: Floats  # (rows,) a pivot not above this is singular
     settings: Floats  # (SETTINGS,) see above
-    friction: Floats  # where joints rub: two of the size of ``force``, three of the size of ``x``
+    friction: Floats  # where joints rub: two of the size of ``force``, three of rows
     groups: Integers  # (loops, 3) i0, p0, count
     kinds: Integers  # (KINDS + 1,) first loop of each kind
     row: Integers  # (model rows,) place of each constraint row in the row vectors

@@ -16,11 +16,11 @@ from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
 
 
-@compiled_into
-def place_some(first: int, last: int, y: Floats, body: Floats, metric: Floats) -> None:
-    """``place_bodies`` for the bodies from first to before last."""
+@compiled
+def place_bodies(y: Floats, body: Floats, metric: Floats) -> None:
+    """Poses and velocities of the bodies of a state: fills body (r, A, v, w, p) and B of metric."""
     n = body.shape[0] - 1
-    for b in range(first, last):
+    for b in range(1, n + 1):
         c, f = coordinate_offset(b), velocity_offset(b, n)
         s, k = body[b], metric[b]
         e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
@@ -49,12 +49,6 @@ def place_some(first: int, last: int, y: Floats, body: Floats, metric: Floats) -
         k[7], k[8], k[9] = a00 * u00, a00 * u01 + a01 * u11, a00 * u02 + a01 * u12 + a02 * u22
         k[10], k[11], k[12] = a10 * u00, a10 * u01 + a11 * u11, a10 * u02 + a11 * u12 + a12 * u22
         k[13], k[14], k[15] = a20 * u00, a20 * u01 + a21 * u11, a20 * u02 + a21 * u12 + a22 * u22
-
-
-@compiled
-def place_bodies(y: Floats, body: Floats, metric: Floats) -> None:
-    """Poses and velocities of the bodies of a state: fills body (r, A, v, w, p) and B of metric."""
-    place_some(1, body.shape[0], y, body, metric)
 
 
 @compiled_into
@@ -91,8 +85,8 @@ def zero(values: Floats) -> None:
 
 
 @compiled_inside
-def scale_forces(body: Floats, metric: Floats, force: Floats) -> float:
-    """Power of the applied forces; then ``force`` becomes the scaled right-hand side of the bodies.
+def scale_forces(body: Floats, metric: Floats, force: Floats, out: Floats) -> float:
+    """Scaled right-hand side of the bodies into out, from forces; returns the power of these.
 
     Per body (f, n) becomes (f / sqrt(m), B^T n - U^T (w' x J' w')), the gyroscopic moment included.
     """
@@ -107,31 +101,29 @@ def scale_forces(body: Floats, metric: Floats, force: Floats) -> float:
         h1 = s[26] * w0 + s[27] * w1 + s[28] * w2
         h2 = s[29] * w0 + s[30] * w1 + s[31] * w2
         g0, g1, g2 = w1 * h2 - w2 * h1, w2 * h0 - w0 * h2, w0 * h1 - w1 * h0
-        force[o], force[o + 1], force[o + 2] = f0 * k[0], f1 * k[0], f2 * k[0]
+        out[o], out[o + 1], out[o + 2] = f0 * k[0], f1 * k[0], f2 * k[0]
         g0, g1, g2 = scaled_moment(k, g0, g1, g2)
-        force[o + 3] = k[7] * n0 + k[10] * n1 + k[13] * n2 - g0
-        force[o + 4] = k[8] * n0 + k[11] * n1 + k[14] * n2 - g1
-        force[o + 5] = k[9] * n0 + k[12] * n1 + k[15] * n2 - g2
+        out[o + 3] = k[7] * n0 + k[10] * n1 + k[13] * n2 - g0
+        out[o + 4] = k[8] * n0 + k[11] * n1 + k[14] * n2 - g1
+        out[o + 5] = k[9] * n0 + k[12] * n1 + k[15] * n2 - g2
     return power
 
 
 @compiled_inside
-def scale_velocities(body: Floats, metric: Floats, force: Floats) -> None:
-    """The velocities of the bodies in scaled coordinates, into ``force``: (sqrt(m) v, L^T w')."""
+def scale_velocities(body: Floats, metric: Floats, out: Floats) -> None:
+    """The velocities of the bodies in scaled coordinates: (sqrt(m) v, L^T w')."""
     for b in range(1, body.shape[0]):
         s, k, o = body[b], metric[b], 6 * b
         w0, w1, w2 = in_body_axes(s, s[15], s[16], s[17])
-        force[o], force[o + 1], force[o + 2] = s[12] / k[0], s[13] / k[0], s[14] / k[0]
-        force[o + 3], force[o + 4], force[o + 5] = scaled(k, w0, w1, w2)
+        out[o], out[o + 1], out[o + 2] = s[12] / k[0], s[13] / k[0], s[14] / k[0]
+        out[o + 3], out[o + 4], out[o + 5] = scaled(k, w0, w1, w2)
 
 
-@compiled_into
-def some_rates(
-    first: int, last: int, y: Floats, metric: Floats, force: Floats, out: Floats
-) -> None:
-    """``rates`` of the bodies from first to before last."""
-    n = metric.shape[0] - 1
-    for b in range(first, last):
+@compiled_inside
+def rates(y: Floats, metric: Floats, acceleration: Floats, out: Floats) -> None:
+    """dy/dt: of coordinates from y, of velocities from the scaled accelerations."""
+    n, a = metric.shape[0] - 1, acceleration
+    for b in range(1, n + 1):
         c, f, o, k = coordinate_offset(b), velocity_offset(b, n), 6 * b, metric[b]
         e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
         w0, w1, w2 = 0.5 * y[f + 3], 0.5 * y[f + 4], 0.5 * y[f + 5]
@@ -140,25 +132,19 @@ def some_rates(
         out[c + 4] = e0 * w0 - e3 * w1 + e2 * w2
         out[c + 5] = e3 * w0 + e0 * w1 - e1 * w2
         out[c + 6] = -e2 * w0 + e1 * w1 + e0 * w2
-        out[f], out[f + 1], out[f + 2] = k[0] * force[o], k[0] * force[o + 1], k[0] * force[o + 2]
-        a0, a1, a2 = unscaled(k, force[o + 3], force[o + 4], force[o + 5])
+        out[f], out[f + 1], out[f + 2] = k[0] * a[o], k[0] * a[o + 1], k[0] * a[o + 2]
+        a0, a1, a2 = unscaled(k, a[o + 3], a[o + 4], a[o + 5])
         out[f + 3], out[f + 4], out[f + 5] = a0, a1, a2
 
 
 @compiled_inside
-def rates(y: Floats, metric: Floats, force: Floats, out: Floats) -> None:
-    """dy/dt of coordinates from y and of velocities from the scaled accelerations in ``force``."""
-    some_rates(1, metric.shape[0], y, metric, force, out)
-
-
-@compiled_inside
-def global_accelerations(metric: Floats, force: Floats, out: Floats) -> None:
+def global_accelerations(metric: Floats, acceleration: Floats, out: Floats) -> None:
     """v_dot (6 n: r_ddot, omega_dot, global) from the scaled accelerations: omega_dot = B a."""
     for b in range(1, metric.shape[0]):
         o, k = 6 * b, metric[b]
-        a0, a1, a2 = force[o + 3], force[o + 4], force[o + 5]
+        a0, a1, a2 = acceleration[o + 3], acceleration[o + 4], acceleration[o + 5]
         for c in range(3):
-            out[o - 6 + c] = k[0] * force[o + c]
+            out[o - 6 + c] = k[0] * acceleration[o + c]
             out[o - 3 + c] = k[7 + 3 * c] * a0 + k[8 + 3 * c] * a1 + k[9 + 3 * c] * a2
 
 

@@ -20,15 +20,15 @@ def normalise(y: Floats, n: int) -> None:
 
 
 @compiled_inside
-def add_displacement(y: Floats, metric: Floats, force: Floats, out: Floats) -> None:
-    """Add r and p's share of a scaled displacement (or its rate) in ``force``; out may be y."""
+def add_displacement(y: Floats, metric: Floats, change: Floats, out: Floats) -> None:
+    """Add r and p's share of a scaled displacement (or its rate); out may be y."""
     for b in range(1, metric.shape[0]):
         c, o, k = coordinate_offset(b), 6 * b, metric[b]
-        w0, w1, w2 = unscaled(k, force[o + 3], force[o + 4], force[o + 5])
+        w0, w1, w2 = unscaled(k, change[o + 3], change[o + 4], change[o + 5])
         w0, w1, w2 = 0.5 * w0, 0.5 * w1, 0.5 * w2
         e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
         for d in range(3):
-            out[c + d] += k[0] * force[o + d]
+            out[c + d] += k[0] * change[o + d]
         out[c + 3] += -e1 * w0 - e2 * w1 - e3 * w2
         out[c + 4] += e0 * w0 - e3 * w1 + e2 * w2
         out[c + 5] += e3 * w0 + e0 * w1 - e1 * w2
@@ -36,29 +36,29 @@ def add_displacement(y: Floats, metric: Floats, force: Floats, out: Floats) -> N
 
 
 @compiled_inside
-def add_velocity(metric: Floats, force: Floats, out: Floats) -> None:
-    """Add a scaled velocity in ``force`` to the velocities (6 n,)."""
+def add_velocity(metric: Floats, change: Floats, out: Floats) -> None:
+    """Add a scaled velocity to the velocities (6 n,)."""
     for b in range(1, metric.shape[0]):
         f, o, k = 6 * (b - 1), 6 * b, metric[b]
-        w0, w1, w2 = unscaled(k, force[o + 3], force[o + 4], force[o + 5])
+        w0, w1, w2 = unscaled(k, change[o + 3], change[o + 4], change[o + 5])
         for d in range(3):
-            out[f + d] += k[0] * force[o + d]
+            out[f + d] += k[0] * change[o + d]
         out[f + 3] += w0
         out[f + 4] += w1
         out[f + 5] += w2
 
 
 @compiled_inside
-def move(y: Floats, metric: Floats, force: Floats) -> None:
+def move(y: Floats, metric: Floats, change: Floats) -> None:
     """Add a scaled displacement: r += dr, p += 1/2 L^T dtheta', of unit length again."""
-    add_displacement(y, metric, force, y)
+    add_displacement(y, metric, change, y)
     normalise(y, metric.shape[0] - 1)
 
 
 @compiled_inside
-def change_velocity(y: Floats, metric: Floats, force: Floats) -> None:
+def change_velocity(y: Floats, metric: Floats, change: Floats) -> None:
     """Add a scaled change of velocity to the velocities."""
-    add_velocity(metric, force, y[velocity_offset(1, metric.shape[0] - 1) :])
+    add_velocity(metric, change, y[velocity_offset(1, metric.shape[0] - 1) :])
 
 
 @compiled_inside

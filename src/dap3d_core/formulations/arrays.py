@@ -17,6 +17,11 @@ from dap3d_core.model import Group, Model
 PENALTY = (1e7, 10.0, 1.0)
 
 
+#: Members of ``System`` that begin as zeros: six numbers of each body; one of each row.
+BODY_VECTORS = ("force", "acceleration", "velocity", "change")
+ROW_VECTORS = ("gamma", "nu", "residual", "multipliers", "right_side", "total", "compliance",
+               "smallest")  # fmt: skip
+
 #: Ratio of masses from which on a pivot falls by as much when a light body turns round a heavy one
 #: as it does near a singular pose.
 UNEVEN = 1e3
@@ -72,15 +77,11 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         metric=metric,
         F=np.zeros((model.function_count + 1, 5)),
         par=par,
-        force=np.zeros(6 * (n + 1)),
-        gamma=np.zeros(plan.row_size),
-        nu=np.zeros(plan.row_size),
-        C=np.zeros(plan.row_size),
-        x=np.zeros(plan.row_size),
+        **{name: np.zeros(6 * (n + 1)) for name in BODY_VECTORS},
+        **{name: np.zeros(plan.row_size) for name in ROW_VECTORS},
         D=np.zeros(plan.block_size),
         K=np.zeros(plan.matrix_size),
         weight=np.ones(plan.row_size),
-        smallest=np.zeros(plan.row_size),
         settings=np.array(
             [1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model), 0.0]
         ),

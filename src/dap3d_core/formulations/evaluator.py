@@ -280,7 +280,7 @@ class Machine:
         s.smallest[:] = 0.0
         pivots = self.pivots(t)
         if self.formulation.accepts_redundant:
-            pivots[pivots < REDUNDANT * s.x[s.row]] = 0.0
+            pivots[pivots < REDUNDANT * s.compliance[s.row]] = 0.0
         s.smallest[s.row] = POOR * pivots
 
     def poor_rows(self, t: float) -> Integers:
@@ -320,12 +320,12 @@ class Machine:
         """All constraint rows at time t and state u (13 n,)."""
         s = self.system
         self._place(t, u)
-        s.C[:] = 0.0
-        self._call(POSITION, t, s.C, s.C, s.C)
+        s.residual[:] = 0.0
+        self._call(POSITION, t, s.residual, s.residual, s.residual)
         self._call(ACCELERATION, t, s.D, s.gamma, s.nu)
         row, column, place = self.pattern
         shape = (self.model.row_count, 6 * self.model.body_count)
-        return Rows(s.C[s.row], s.nu[s.row], s.gamma[s.row], row, column, s.D[place], shape)
+        return Rows(s.residual[s.row], s.nu[s.row], s.gamma[s.row], row, column, s.D[place], shape)
 
     def _weigh_rows(self) -> None:
         """Weights of the rows, of residuals in m; in scenes of ordinary size they stay as they are.

@@ -42,43 +42,40 @@ TAKEN, SMALLER, SMALLEST = 1e-9, 1e-2, 1e-12
 
 @compiled_inside
 def take_least(system: System) -> None:
-    """Replace -lambda in ``x`` by the least one that gives the same D^T lambda.
+    """Replace ``multipliers`` by the least ones that give the same D^T lambda.
 
     With one weight e for all rows, n -> e (D^ D^^T + e)^-1 n keeps what D^T does not see, and
-    takes away the rest. That is subtracted. gamma keeps what is given, C holds n. What D^T sees of
-    n in the end, e times the ``force`` of the last pass, says whether e was small enough.
+    takes away the rest: n, in ``right_side``, is then subtracted from ``total``. What D^T sees of
+    n in the end, e times the ``change`` of the last pass, says whether e was small enough.
     """
-    x, given, n = system.x, system.gamma, system.C
-    for k in range(x.shape[0]):
-        given[k] = x[k]
-    weigh_rows(system.blocks, system.D, 1.0, x)
-    longest = largest(x)
-    for k in range(x.shape[0]):
-        if x[k] == 0.0:  # a hub's place, or a row that does nothing
-            given[k] = 0.0
-        n[k] = given[k]
+    total, n = system.total, system.right_side
+    weigh_rows(system.blocks, system.D, 1.0, system.compliance)
+    longest = largest(system.compliance)
+    for k in range(n.shape[0]):
+        if system.compliance[k] == 0.0:  # a hub's place, or a row that does nothing
+            total[k] = 0.0
+        n[k] = total[k]
     e, seen = LEAST_PART * longest, np.inf
-    while seen > TAKEN * np.sqrt(longest) * largest(given) and e > SMALLEST * longest:
+    while seen > TAKEN * np.sqrt(longest) * largest(total) and e > SMALLEST * longest:
         seen = keep_unseen(system, n, e)
         e *= SMALLER
-    for k in range(x.shape[0]):
-        x[k] = given[k] - n[k]
+    for k in range(n.shape[0]):
+        system.multipliers[k] = total[k] - n[k]
 
 
 @compiled_inside
 def keep_unseen(system: System, n: Floats, e: float) -> float:
     """Take from n what D^T sees, as far as a weight e does; the largest seen of the rest."""
-    x, before = system.x, np.inf
+    x, before = system.multipliers, np.inf
     for k in range(x.shape[0]):
-        x[k] = e
-    assemble(system.targets, system.contributions, system.D, system.K)
-    regularise(system.nodes, x, system.K)
-    for k in range(x.shape[0]):
+        system.compliance[k] = e
         x[k] = n[k]
+    assemble(system.targets, system.contributions, system.D, system.K)
+    regularise(system.nodes, system.compliance, system.K)
     factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
     for _ in range(LEAST_SOLVES):
-        zero(system.force)
-        solve_rows(system)
+        zero(system.change)
+        solve_rows(system, system.change)
         change = 0.0
         for q in range(system.hubs.shape[0]):
             for c in range(system.hubs[q, 1], system.hubs[q, 1] + 6):
@@ -90,14 +87,14 @@ def keep_unseen(system: System, n: Floats, e: float) -> float:
         if not change < 0.5 * before:
             break
         before = change
-    return e * largest(system.force)
+    return e * largest(system.change)
 
 
 @compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces and drivers last."""
     power = accelerate(t, y, system, loops)
-    rates(y, system.metric, system.force, out)
+    rates(y, system.metric, system.acceleration, out)
     out[out.shape[0] - 1] = power
 
 
@@ -111,7 +108,7 @@ def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> Non
 def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
     accelerate(t, y, system, loops)
-    global_accelerations(system.metric, system.force, out)
+    global_accelerations(system.metric, system.acceleration, out)
     report_levels(t, out, system, loops)
     take_least(system)
     report_multipliers(system, out)

@@ -41,32 +41,32 @@ from dap3d_core.linear.ldlt.factor import assemble, factor, regularise
 
 @compiled_inside
 def solve(system: System) -> None:
-    """Scaled accelerations from the scaled forces in ``force``, -lambda into ``x``; C is gamma'."""
-    for k in range(system.x.shape[0]):
-        system.x[k] = system.C[k]
-    solve_rows(system)
+    """``acceleration`` and ``multipliers`` from scaled forces, gamma' in ``right_side``."""
+    for k in range(system.right_side.shape[0]):
+        system.multipliers[k] = system.right_side[k]
+    solve_rows(system, system.acceleration)
 
 
 @compiled_inside
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
-    """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers."""
-    body, metric, force = system.body, system.metric, system.force
-    x, C, settings = system.x, system.C, system.settings
+    """Scaled ``acceleration`` and ``multipliers``; returns the power of forces and drivers."""
+    force, right_side, residual = system.force, system.right_side, system.residual
+    settings = system.settings
     place(t, y, system, loops)
     linearise(t, system, loops)
     residuals(t, system, loops)
     stiffness, damping = settings[OMEGA] * settings[OMEGA], 2.0 * settings[MU] * settings[OMEGA]
-    for k in range(x.shape[0]):
-        x[k] = system.gamma[k] - stiffness * C[k]
+    for k in range(right_side.shape[0]):
+        right_side[k] = system.gamma[k] - stiffness * residual[k]
     velocity_residuals(system)
-    for k in range(x.shape[0]):
-        C[k] = x[k] - damping * C[k]
-        x[k] = 1.0 / settings[ALPHA]
+    for k in range(right_side.shape[0]):
+        right_side[k] -= damping * residual[k]
+        system.compliance[k] = 1.0 / settings[ALPHA]
     zero(force)
     call_kinds(WRENCH, WRENCH, t, system, loops, force, force, force)
-    power = scale_forces(body, metric, force)
+    power = scale_forces(system.body, system.metric, force, system.acceleration)
     assemble(system.targets, system.contributions, system.D, system.K)
-    regularise(system.nodes, x, system.K)
+    regularise(system.nodes, system.compliance, system.K)
     factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
     power += solve_rubbing(t, system, loops, solve)
     return power + power_of_drivers(system)
@@ -76,7 +76,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces and drivers last."""
     power = accelerate(t, y, system, loops)
-    rates(y, system.metric, system.force, out)
+    rates(y, system.metric, system.acceleration, out)
     out[out.shape[0] - 1] = power
 
 
@@ -90,6 +90,6 @@ def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> Non
 def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
     accelerate(t, y, system, loops)
-    global_accelerations(system.metric, system.force, out)
+    global_accelerations(system.metric, system.acceleration, out)
     report_multipliers(system, out)
     report_levels(t, out, system, loops)

@@ -35,26 +35,22 @@ ROUGH = 1e-12
 
 @compiled_into
 def solve(system: System) -> None:
-    """Scaled accelerations from the scaled forces in ``force``, -lambda into ``x``."""
-    for k in range(system.x.shape[0]):
-        system.x[k] = system.gamma[k]
-    solve_rows(system)
+    """``acceleration`` and ``multipliers`` from the scaled forces in ``acceleration``."""
+    for k in range(system.gamma.shape[0]):
+        system.multipliers[k] = system.gamma[k]
+    solve_rows(system, system.acceleration)
 
 
 @compiled_into
-def settle_rows(system: System, kept: Floats) -> float:
-    """Solve once more for what the accelerations in ``force`` leave of the rows.
+def settle_rows(system: System) -> float:
+    """Solve once more for what the accelerations leave of the rows.
 
-    kept: (6 n, at least) takes the accelerations of before. -lambda in ``x`` becomes its change, of
-    which the power of drivers is returned.
+    ``multipliers`` becomes the change of -lambda, of which the power of drivers is returned.
     """
-    force, n = system.force, system.metric.shape[0] - 1
     acceleration_residual(system)
-    for k in range(6 * n):
-        kept[k] = force[6 + k]
     correct(system)
-    for k in range(6 * n):
-        force[6 + k] += kept[k]
+    for k in range(system.change.shape[0]):
+        system.acceleration[k] += system.change[k]
     return power_of_drivers(system)
 
 
@@ -63,18 +59,18 @@ def refine(system: System, out: Floats) -> None:
     """Solve once more for what accelerations and multipliers leave of the rows, where that is much.
 
     Where reactions are large beside the accelerations that they leave, or masses differ, rounding
-    of the solution shows in the rows. They stand in ``force`` and out, and are replaced there.
+    of the solution shows in the rows. Those in out are replaced.
     """
-    force, n, length = system.force, system.metric.shape[0] - 1, system.settings[LENGTH]
+    n, length = system.metric.shape[0] - 1, system.settings[LENGTH]
     size = length
     for k in range(6 * n):
         size = max(size, abs(out[k]) * (1.0 if k % 6 < 3 else length))
     if not acceleration_residual(system) > ROUGH * size:
         return
-    settle_rows(system, out)
+    settle_rows(system)
     for k in range(system.row.shape[0]):
-        out[6 * n + k] -= system.x[system.row[k]]
-    global_accelerations(system.metric, force, out)
+        out[6 * n + k] -= system.multipliers[system.row[k]]
+    global_accelerations(system.metric, system.acceleration, out)
 
 
 @compiled
@@ -86,21 +82,21 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """
     power = solve_equations(t, y, system, loops, None, solve)
     if system.settings[EVEN] != 0.0:
-        power += settle_rows(system, out)
-    rates(y, system.metric, system.force, out)
+        power += settle_rows(system)
+    rates(y, system.metric, system.acceleration, out)
     out[out.shape[0] - 1] = power
 
 
 @compiled_into
 def report_accelerations(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """As ``report``, of the accelerations in ``force`` and -lambda in ``x``.
+    """As ``report``, of ``acceleration`` and ``multipliers``.
 
-    Where a pivot is zero they are found anew; where they leave much of the rows, refined.
+    Where a pivot is zero they are computed anew; where they leave much of the rows, refined.
     """
     if not have_pivots(system.nodes, system.K):
         regularised.accelerate(t, y, system, loops)
         system.settings[SINGULAR] += 1.0
-    global_accelerations(system.metric, system.force, out)
+    global_accelerations(system.metric, system.acceleration, out)
     report_multipliers(system, out)
     refine(system, out)
     report_levels(t, out, system, loops)

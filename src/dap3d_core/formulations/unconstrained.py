@@ -28,19 +28,19 @@ from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
 
 @compiled_inside
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
-    """Scaled accelerations into ``force``; returns the power of the forces."""
+    """Scaled ``acceleration``; returns the power of the forces."""
     body, metric, force = system.body, system.metric, system.force
     place_bodies(y, body, metric)
     zero(force)
     call_kinds(VALUE, WRENCH, t, system, loops, force, force, force)
-    return scale_forces(body, metric, force)
+    return scale_forces(body, metric, force, system.acceleration)
 
 
 @compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of the forces last."""
     power = accelerate(t, y, system, loops)
-    rates(y, system.metric, system.force, out)
+    rates(y, system.metric, system.acceleration, out)
     out[out.shape[0] - 1] = power
 
 
@@ -57,7 +57,7 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     value = system.settings[SCRATCH : SCRATCH + 1]
     last = out.shape[0] - 4
     accelerate(t, y, system, loops)
-    global_accelerations(system.metric, system.force, out)
+    global_accelerations(system.metric, system.acceleration, out)
     value[0] = 0.0
     call_kinds(ENERGY, ENERGY, t, system, loops, value, value, value)
     out[last] = value[0]

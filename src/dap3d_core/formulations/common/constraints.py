@@ -96,15 +96,15 @@ def linearise_evenly(t: float, system: System, loops: Any) -> None:
 
 @compiled_into
 def factorise(system: System, part: float | None) -> int:
-    """The factors of D^ as it stands, in K; E, where there is one, is left in x.
+    """The factors of D^ as it stands, in K.
 
     Returns the number of pivots that have become small (``system.smallest``): the pose is near a
     singular one.
     """
     assemble(system.targets, system.contributions, system.D, system.K)
     if part is not None:
-        weigh_rows(system.blocks, system.D, part, system.x)
-        regularise(system.nodes, system.x, system.K)
+        weigh_rows(system.blocks, system.D, part, system.compliance)
+        regularise(system.nodes, system.compliance, system.K)
     return factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
 
 
@@ -117,7 +117,7 @@ def factorise_anyway(system: System, part: float | None) -> None:
 
 @compiled_into
 def gather_forces(t: float, y: Floats, system: System, loops: Any) -> float:
-    """Place the bodies of a state; scaled forces into ``force``; returns the power of the forces.
+    """Place the bodies of a state; scaled forces into ``acceleration``; returns their power.
 
     Functions of time stand ready after that.
     """
@@ -125,22 +125,22 @@ def gather_forces(t: float, y: Floats, system: System, loops: Any) -> float:
     place_bodies(y, body, metric)
     zero(force)
     call_kinds(VALUE, WRENCH, t, system, loops, force, force, force)
-    return scale_forces(body, metric, force)
+    return scale_forces(body, metric, force, system.acceleration)
 
 
 @compiled_into
-def solve_rows(system: System) -> None:
-    """Accelerations from the forces in ``force``, into ``force``; from x = gamma, x = -lambda."""
+def solve_rows(system: System, bodies: Floats) -> None:
+    """Scaled forces in ``bodies`` become accelerations, gamma in ``multipliers`` -lambda."""
     solve_saddle(system.blocks, system.hubs, system.nodes, system.columns, system.D, system.K,
-                 system.x, system.force)  # fmt: skip
+                 system.multipliers, bodies)  # fmt: skip
 
 
 @compiled_into
 def power_of_drivers(system: System) -> float:
-    """Power of the reactions, with -lambda in ``x``: only moving constraints do work."""
+    """Power of the reactions, with -lambda in ``multipliers``: only moving constraints do work."""
     power = 0.0
-    for k in range(system.x.shape[0]):
-        power -= system.x[k] * system.nu[k]
+    for k in range(system.nu.shape[0]):
+        power -= system.multipliers[k] * system.nu[k]
     return power
 
 
@@ -153,9 +153,9 @@ def solve_equations(
     part: float | None,
     solve: Callable[[System], None],
 ) -> float:
-    """Scaled accelerations into ``force``, -lambda into ``x``; power of forces and drivers.
+    """Scaled ``acceleration`` and ``multipliers``; returns the power of forces and drivers.
 
-    solve: of a formulation, from the scaled forces in ``force``, with the factors of ``part``.
+    solve: of a formulation, from the scaled forces in ``acceleration``, with factors of ``part``.
     """
     power = gather_forces(t, y, system, loops)
     linearise(t, system, loops)
@@ -166,8 +166,8 @@ def solve_equations(
 
 @compiled_inside
 def residuals(t: float, system: System, loops: Any) -> float:
-    """Position-level residuals (zero where a row has none) into C; returns the largest, in m."""
-    C = system.C
+    """C, zero where a row has no position level, into ``residual``; returns the largest, m."""
+    C = system.residual
     zero(C)
     call_kinds(POSITION, POSITION, t, system, loops, C, C, C)
     return largest_weighted(C, system.weight)
@@ -175,33 +175,33 @@ def residuals(t: float, system: System, loops: Any) -> float:
 
 @compiled_inside
 def velocity_residuals(system: System) -> float:
-    """D v - nu into C, with D^ as it stands; returns the largest, in m/s."""
-    C = system.C
-    scale_velocities(system.body, system.metric, system.force)
-    for k in range(C.shape[0]):
-        C[k] = -system.nu[k]
-    add_product(system.blocks, system.D, system.force, C)
-    return largest_weighted(C, system.weight)
+    """D v - nu into ``residual``, with D^ as it stands; returns the largest, m/s."""
+    residual = system.residual
+    scale_velocities(system.body, system.metric, system.velocity)
+    for k in range(residual.shape[0]):
+        residual[k] = -system.nu[k]
+    add_product(system.blocks, system.D, system.velocity, residual)
+    return largest_weighted(residual, system.weight)
 
 
 @compiled_inside
 def acceleration_residual(system: System) -> float:
-    """D a - gamma into C, with a in ``force``; returns the largest, in m/s^2."""
-    C = system.C
-    for k in range(C.shape[0]):
-        C[k] = -system.gamma[k]
-    add_product(system.blocks, system.D, system.force, C)
-    return largest_weighted(C, system.weight)
+    """D a - gamma into ``residual``; returns the largest, m/s^2."""
+    residual = system.residual
+    for k in range(residual.shape[0]):
+        residual[k] = -system.gamma[k]
+    add_product(system.blocks, system.D, system.acceleration, residual)
+    return largest_weighted(residual, system.weight)
 
 
 @compiled
 def correct(system: System) -> None:
-    """The least scaled change of the bodies that removes the residuals in C, into ``force``."""
-    x, C = system.x, system.C
-    zero(system.force)
-    for k in range(x.shape[0]):
-        x[k] = -C[k]
-    solve_rows(system)
+    """The least scaled ``change`` of the bodies that removes ``residual``."""
+    multipliers, residual = system.multipliers, system.residual
+    zero(system.change)
+    for k in range(residual.shape[0]):
+        multipliers[k] = -residual[k]
+    solve_rows(system, system.change)
 
 
 @compiled_into
@@ -245,7 +245,7 @@ def project_onto(
         for _ in range(PASSES):
             before = worst
             correct(system)
-            move(y, metric, system.force)
+            move(y, metric, system.change)
             place_bodies(y, system.body, metric)
             worst = residuals(t, system, loops)
             if not worst > limit or not worst < 0.5 * before:
@@ -289,9 +289,9 @@ def project_velocities(
         for _ in range(PASSES):
             before = worst
             correct(system)
-            change_velocity(y, system.metric, system.force)
-            add_product(system.blocks, system.D, system.force, system.C)
-            worst = largest_weighted(system.C, system.weight)
+            change_velocity(y, system.metric, system.change)
+            add_product(system.blocks, system.D, system.change, system.residual)
+            worst = largest_weighted(system.residual, system.weight)
             if not worst > limit or not (stale or worst < 0.5 * before):
                 break
             if stale and not worst < SLOW * before:
@@ -305,7 +305,7 @@ def project_velocities(
 
 @compiled_inside
 def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
-    """Angles, energy and residuals into the end of out, with the accelerations in ``force``.
+    """Angles, energy and residuals into the end of out.
 
     The last four are the potential energy and the largest residuals of position, velocity and
     acceleration; before them stand the angles whose turns are counted.
@@ -325,7 +325,7 @@ def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
 
 @compiled_inside
 def report_multipliers(system: System, out: Floats) -> None:
-    """Multipliers in the order of the model, after the accelerations, from -lambda in ``x``."""
+    """Multipliers in the order of the model, after the accelerations."""
     first = 6 * (system.body.shape[0] - 1)
     for k in range(system.row.shape[0]):
-        out[first + k] = -system.x[system.row[k]]
+        out[first + k] = -system.multipliers[system.row[k]]

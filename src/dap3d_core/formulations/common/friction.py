@@ -30,37 +30,37 @@ def rubs(system: System) -> bool:
 @compiled_inside
 def keep_applied(system: System) -> None:
     """Remember the scaled applied forces before they become accelerations."""
-    for k in range(system.force.shape[0]):
-        system.friction[k] = system.force[k]
+    for k in range(system.acceleration.shape[0]):
+        system.friction[k] = system.acceleration[k]
 
 
 @compiled_inside
 def rub(t: float, system: System, loops: Any) -> float:
-    """Friction for the multipliers in x, added to the scaled applied forces; returns its power."""
-    body, metric, force = system.body, system.metric, system.force
-    size = force.shape[0]
+    """Friction for ``multipliers``, added to the scaled applied forces; returns its power."""
+    body, metric, forces = system.body, system.metric, system.acceleration
+    size = forces.shape[0]
     applied, rubbing = system.friction[:size], system.friction[size : 2 * size]
     zero(rubbing)
-    call_kinds(FRICTION, FRICTION, t, system, loops, rubbing, system.x, system.x)
+    call_kinds(
+        FRICTION, FRICTION, t, system, loops, rubbing, system.multipliers, system.multipliers
+    )
     power = 0.0
-    for k in range(6):
-        force[k] = 0.0
     for b in range(1, body.shape[0]):
         s, k, o = body[b], metric[b], 6 * b
         for c in range(6):
             power += rubbing[o + c] * s[12 + c]
         n0, n1, n2 = rubbing[o + 3], rubbing[o + 4], rubbing[o + 5]
         for c in range(3):
-            force[o + c] = applied[o + c] + k[0] * rubbing[o + c]
+            forces[o + c] = applied[o + c] + k[0] * rubbing[o + c]
             turned = k[7 + c] * n0 + k[10 + c] * n1 + k[13 + c] * n2
-            force[o + 3 + c] = applied[o + 3 + c] + turned
+            forces[o + 3 + c] = applied[o + 3 + c] + turned
     return power
 
 
 @compiled_inside
 def settle(system: System, passes: int) -> bool:
-    """Whether the multipliers in x have settled; else x becomes what the next pass starts from."""
-    x, rows = system.x, system.x.shape[0]
+    """True if ``multipliers`` have settled; else they become the start of the next pass."""
+    x, rows = system.multipliers, system.multipliers.shape[0]
     memory = system.friction[2 * system.force.shape[0] :]
     guess, result, change = memory[:rows], memory[rows : 2 * rows], memory[2 * rows :]
     if passes == 0:
@@ -93,7 +93,7 @@ def settle(system: System, passes: int) -> bool:
 def solve_rubbing(t: float, system: System, loops: Any, solve: Callable[[System], None]) -> float:
     """``solve`` of a formulation, again until friction and multipliers agree; power of friction.
 
-    solve: scaled accelerations from the scaled forces in ``force``, -lambda into ``x``.
+    solve: ``acceleration`` and ``multipliers`` from the scaled forces in ``acceleration``.
     """
     power, passes = 0.0, 0
     if rubs(system):

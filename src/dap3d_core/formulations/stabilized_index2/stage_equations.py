@@ -99,7 +99,7 @@ def evaluate_stage(
         rows: (2, row_size) residuals of the position and the velocity level.
         system, loops: of the machine.
     """
-    x, force, mu = system.x, system.force, multipliers[0]
+    x, mu = system.multipliers, multipliers[0]
     for k in range(x.shape[0]):
         x[k] = -multipliers[1, k]
     power = gather_forces(t, y, system, loops)
@@ -107,18 +107,18 @@ def evaluate_stage(
     if rubs(system):
         keep_applied(system)
         power += rub(t, system, loops)
-    add_transposed(system.blocks, system.D, x, -1.0, force)
-    rates(y, system.metric, force, out)
+    add_transposed(system.blocks, system.D, x, -1.0, system.acceleration)
+    rates(y, system.metric, system.acceleration, out)
     out[out.shape[0] - 1] = power + power_of_drivers(system)
-    zero(force)
-    add_transposed(system.blocks, system.D, mu, 1.0, force)
-    add_displacement(y, system.metric, force, out)
+    zero(system.change)
+    add_transposed(system.blocks, system.D, mu, 1.0, system.change)
+    add_displacement(y, system.metric, system.change, out)
     residuals(t, system, loops)
     for k in range(x.shape[0]):
-        rows[0, k] = system.C[k] if held[k] != 0 else mu[k]
+        rows[0, k] = system.residual[k] if held[k] != 0 else mu[k]
     velocity_residuals(system)
     for k in range(x.shape[0]):
-        rows[1, k] = system.C[k]
+        rows[1, k] = system.residual[k]
 
 
 @compiled_inside

@@ -15,7 +15,13 @@ from typing import Any
 from dap3d_core.assembly.arrays import VALUE, Floats, System
 from dap3d_core.assembly.evaluate import call_kinds, place_bodies, rates, zero
 from dap3d_core.assembly.offsets import velocity_offset, work_offset
-from dap3d_core.formulations.common.constraints import PART, correct, factorise, linearise
+from dap3d_core.formulations.common.constraints import (
+    PART,
+    acceleration_residual,
+    correct,
+    factorise,
+    linearise,
+)
 from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import Matrix
 from dap3d_core.integrators.radau.state import (
@@ -27,7 +33,6 @@ from dap3d_core.integrators.radau.state import (
 )
 from dap3d_core.integrators.stepping.integration_state import TRIAL, Y
 from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
-from dap3d_core.linear.ldlt.saddle_point import add_product
 
 #: A step before that was shorter than this part of the present one says nothing: rounding, divided
 #: by the square, would be seen.
@@ -48,21 +53,19 @@ def find_slope(
     t1 = t + h
     y, out = work.state[TRIAL], work.state[TRIAL_SLOPE]
     inverse, stages = work.method.inverse, work.Z
-    force, metric, C = system.force, system.metric, system.C
+    metric, force = system.metric, system.force
     n = metric.shape[0] - 1
     place_bodies(y, system.body, metric)
     if system.row.shape[0] > 0:
         call_kinds(VALUE, VALUE, t1, system, loops, force, force, force)
         linearise(t1, system, loops)
-        scale_slopes(inverse, stages, h, metric, force)
-        for k in range(C.shape[0]):
-            C[k] = -system.gamma[k]
-        add_product(system.blocks, system.D, force, C)
+        scale_slopes(inverse, stages, h, metric, system.acceleration)
+        acceleration_residual(system)
         factorise(system, PART)
         correct(system)
     else:
-        zero(force)
-    rates(y, metric, force, out)
+        zero(system.change)
+    rates(y, metric, system.change, out)
     for k in range(velocity_offset(1, n), work_offset(n)):
         out[k] += (inverse[2, 0] * stages[0, k] + inverse[2, 1] * stages[1, k]
                    + inverse[2, 2] * stages[2, k]) / h  # fmt: skip

@@ -85,12 +85,12 @@ def find_tangent(
     place(at, argument, system, loops)
     linearise(at, system, loops)
     keep_state(system, matrix, work.regularisation)
-    for k in range(system.x.shape[0]):
-        system.x[k] = -work.multipliers[2, 1, k]
+    for k in range(system.multipliers.shape[0]):
+        system.multipliers[k] = -work.multipliers[2, 1, k]
     work.jacobian_count += 1
     work.tangent_needed, work.tangent_is_current = 0, 1
     work.factored_step = 0.0
-    return 0.0 if differentiate(at, system.x, system, loops, tangent) else math.nan
+    return 0.0 if differentiate(at, system.multipliers, system, loops, tangent) else math.nan
 
 
 @compiled_inside
@@ -229,14 +229,14 @@ def evaluate_stages(
 def size_of_multipliers(h: float, change: Floats, work: RadauState, system: System) -> float:
     """Norm of multipliers (2, R): as changes of y, h M^-1 D^T times them (HW VII.4: index 2)."""
     y, out = work.state[Y], work.state[SCRATCH]
-    force, n = system.force, system.metric.shape[0] - 1
+    moved, n = system.change, system.metric.shape[0] - 1
     zero(out)
-    zero(force)
-    add_transposed(system.blocks, system.D, change[0], h, force)
-    add_displacement(y, system.metric, force, out)
-    zero(force)
-    add_transposed(system.blocks, system.D, change[1], h, force)
-    add_velocity(system.metric, force, out[velocity_offset(1, n) :])
+    zero(moved)
+    add_transposed(system.blocks, system.D, change[0], h, moved)
+    add_displacement(y, system.metric, moved, out)
+    zero(moved)
+    add_transposed(system.blocks, system.D, change[1], h, moved)
+    add_velocity(system.metric, moved, out[velocity_offset(1, n) :])
     return scaled_largest(out, y, y, work.error_size, work.rtol, work.tolerance, h)
 
 

@@ -111,8 +111,8 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
     if failure != RUNNING:
         work.t_stop, work.status = work.t, failure
         return
-    for k in range(system.x.shape[0]):
-        work.last_multipliers[2, 1, k] = -system.x[k]
+    for k in range(system.multipliers.shape[0]):
+        work.last_multipliers[2, 1, k] = -system.multipliers[k]
     for k in range(y.shape[0]):
         work.state[SLOPE, k] = work.k[0, k]
     work.first_stage_valid = work.tangent_needed = 1

@@ -126,10 +126,10 @@ def _rates(machine: Machine, t: float, y: Floats) -> Floats:
 
 def _fault_of(machine: Machine, q: int, k: int, kind: str, group: Group, t: float) -> str:
     s = machine.system
-    for out in (s.force, s.gamma, s.nu, s.C, s.D, s.x):
+    for out in (s.force, s.gamma, s.nu, s.residual, s.D, s.multipliers):
         out[:] = 0.0
-    joint_outs = {"acceleration": (s.D, s.gamma, s.nu), "position": (s.C, s.C, s.C),
-                  "friction": (s.force, s.x, s.x)}  # fmt: skip
+    joint_outs = {"acceleration": (s.D, s.gamma, s.nu), "position": (s.residual,) * 3,
+                  "friction": (s.force, s.multipliers, s.multipliers)}  # fmt: skip
     if kind == "switch":
         joint_outs[kind] = np.zeros(len(group.examined.outputs[kind])), np.zeros(1), np.zeros(1)
     outs = joint_outs.get(kind, (s.force, s.force, s.force))

@@ -278,10 +278,10 @@ def _sparse_least_change(
             row, _, place = machine.pattern
             system.D[place[~machine.model.position_row[row]]] = 0.0
         factor_independent(machine.plan, system.D, system.K)
-        system.C[:] = 0.0
-        system.C[system.row] = -residual
+        system.residual[:] = 0.0
+        system.residual[system.row] = -residual
         correct(system)
-        change = unscaled(system.force[6:].reshape(n, 6), *mass_scaling(machine))
+        change = unscaled(system.change[6:].reshape(n, 6), *mass_scaling(machine))
     finally:
         system.metric[:] = before
     return change.ravel()

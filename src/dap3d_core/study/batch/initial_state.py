@@ -98,20 +98,20 @@ def length_of(a: Floats) -> float:
 
 @compiled_inside
 def limit_displacement(system: System, max_shift: float) -> None:
-    """Shorten a displacement in ``force``, of unit metric, so that no body moves too far."""
-    force, shift, turn = system.force, 0.0, 0.0
-    for b in range(1, force.shape[0] // 6):
+    """Shorten the displacement ``change``, of unit metric, so that no body moves too far."""
+    change, shift, turn = system.change, 0.0, 0.0
+    for b in range(1, change.shape[0] // 6):
         o = 6 * b
-        shift = max(shift, length_of(force[o : o + 3]))
-        turn = max(turn, length_of(force[o + 3 : o + 6]))
+        shift = max(shift, length_of(change[o : o + 3]))
+        turn = max(turn, length_of(change[o + 3 : o + 6]))
     ratio = 1.0
     if shift > max_shift:
         ratio = max_shift / shift
     if turn * ratio > MOST_TURN:
         ratio = MOST_TURN / turn
     if ratio < 1.0:
-        for k in range(force.shape[0]):
-            force[k] *= ratio
+        for k in range(change.shape[0]):
+            change[k] *= ratio
 
 
 @compiled_inside
@@ -153,7 +153,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         factor_positions(system, out[STARTING:])
         correct(system)
         limit_displacement(system, MOST_SHIFT * size / length)
-        move(y, system.metric, system.force)
+        move(y, system.metric, system.change)
         place_with_spin(y, system)
         out[PASSES] += 1.0
     out[C_AFTER] = worst
@@ -162,7 +162,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
     out[LEAST_PIVOT] = least_pivot_fraction(system)
     if velocity_residuals(system) > 0.0:
         correct(system)
-        change_velocity(y, system.metric, system.force)
+        change_velocity(y, system.metric, system.change)
         place_bodies(y, system.body, system.metric)
     out[V_AFTER] = velocity_residuals(system)
 
@@ -193,7 +193,7 @@ def watch_pivots(t: float, system: System, loops: Any, part: float | None) -> No
         size, first, diagonal = nodes[k, 0], nodes[k, 1], nodes[k, 2]
         for i in range(size):
             pivot = abs(1.0 / K[diagonal + i * (size + 1)])
-            if part is not None and pivot < REDUNDANT * system.x[first + i]:
+            if part is not None and pivot < REDUNDANT * system.compliance[first + i]:
                 pivot = 0.0
             smallest[first + i] = POOR * pivot
 
