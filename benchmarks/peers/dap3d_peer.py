@@ -9,6 +9,7 @@ from levels import WHOLE
 from mechanisms import GROUND, rotation_of
 
 import dap3d_core as dap
+from dap3d_core.formulations.pivots import watch_pivots
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status, make_adams
 from dap3d_core.simulation import CompiledModel
 
@@ -62,7 +63,7 @@ class Model:
         self.compiled = CompiledModel(scene, **options)
         self.machine, self.t_end, self.projects = self.compiled.machine, t_end, projects
         self.u0 = self.compiled.model.u0
-        self.machine.watch_pivots(0.0, self.u0)
+        watch_pivots(self.machine, 0.0, self.u0)
         self.machine.start(0.0, self.u0)
         machine, y0 = self.machine, self.machine.integrated(self.u0)
         self.problem = machine.functions, machine.system, machine.loops, y0, [0.0, t_end]

@@ -10,6 +10,7 @@ from support.graphs import chain, star
 from support.plain import in_another_process
 
 import dap3d_core as dap
+from dap3d_core.formulations.pivots import watch_pivots
 from dap3d_core.formulations.stabilized_index2.stage_equations import evaluate_stage, keep_frames
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.radau.integration import RadauIntegration, estimate_tolerances
@@ -116,7 +117,7 @@ def integration(scene, times=(0.0, 1.0), method=None, **settings):
     compiled = dap.compile(scene, method=method)
     machine = compiled.machine
     u = compiled.start(True, ()).u
-    machine.watch_pivots(0.0, u)
+    watch_pivots(machine, 0.0, u)
     machine.start(0.0, u)
     return RadauIntegration(machine, machine.integrated(u), times,
                             report_size=machine.report_size, **settings)  # fmt: skip

@@ -5,6 +5,7 @@ import pytest
 from support import redundant
 
 import dap3d_core as dap
+from dap3d_core.formulations.pivots import watch_pivots
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
 from dap3d_core.integrators.stepping.integration_state import MEASURES
 from dap3d_core.integrators.stepping.singular_poses import (
@@ -73,7 +74,7 @@ def test_a_run_across_is_the_same_however_it_is_cut():
     y0 = machine.integrated(u)
 
     def integration():
-        machine.watch_pivots(0.0, u)
+        watch_pivots(machine, 0.0, u)
         return RungeKutta(
             TABLEAUS["dop853"], machine.functions, machine.system, machine.loops, y0, [0.0, 1.0],
             project_on=True, error_size=len(y0) - 1, report_size=machine.report_size,

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 from support.contact import contact_registry
 
 import dap3d_core as dap
+from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
 from dap3d_core.integrators.stepping.integration_state import LOGGED
 
@@ -92,7 +93,7 @@ def test_a_run_is_the_same_however_it_is_cut(registry, integrator):
         integration = RungeKutta(
             TABLEAUS[integrator], machine.functions, machine.system, machine.loops, y0,
             np.linspace(0.0, 2.0, 21), project_on=True, error_size=len(y0) - 1,
-            report_size=machine.report_size, ends=machine.ending,
+            report_size=machine.report_size, ends=effects_of(machine.switches),
         )  # fmt: skip
         while integration.status is Status.RUNNING:
             integration.advance(budget)

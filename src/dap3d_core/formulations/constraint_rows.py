@@ -1,4 +1,4 @@
-"""The constraint rows of a model at one state, as Python sees them."""
+"""The constraint rows of a model at one state, as arrays of Python."""
 
 from typing import Any
 
@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
+from dap3d_core.linear.ldlt.plan import Plan
 
 
 @attrs.frozen
@@ -62,3 +63,19 @@ def scaled_rows(rows: Rows, length: float) -> tuple[Rows, Floats]:
         gamma=rows.gamma / gradient,
         value=value / gradient[rows.row],
     ), gradient
+
+
+def jacobian_pattern(plan: Plan, row_places: Integers) -> tuple[Integers, Integers, Integers]:
+    """Row, column and place in D of the Jacobian's entries; row_places: ``System.row``."""
+    blocks = plan.blocks
+    heights = blocks[:, 2]
+    count = int(heights.sum())
+    block = np.repeat(np.arange(len(blocks)), heights)
+    within = np.arange(count) - np.repeat(np.cumsum(heights) - heights, heights)
+    model_row = np.zeros(plan.row_size, dtype=np.int64)
+    model_row[row_places] = np.arange(len(row_places))
+    six = np.arange(6)
+    row = np.repeat(model_row[blocks[block, 3] + within], 6)
+    column = (6 * (blocks[block, 1] - 1)[:, None] + six).ravel()
+    place = ((blocks[block, 0] + 6 * within)[:, None] + six).ravel()
+    return row, column, place

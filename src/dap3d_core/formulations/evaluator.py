@@ -1,10 +1,9 @@
-"""A model made ready to be evaluated: plan, arrays, group loops, a formulation; for Python."""
+"""The evaluator of a model: plan, arrays, group loops and formulation, called from Python."""
 
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Any
 
-import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -12,15 +11,11 @@ from dap3d_core.assembly.arrays import (
     ACCELERATION,
     ALPHA,
     ANGLE,
-    BEGINS,
     DOUBTFUL,
-    ENDS,
-    EVEN,
     MU,
     OMEGA,
     POSITION,
     SINGULAR,
-    UNSEEN,
     UNSETTLED,
     VALUE,
     WRENCH,
@@ -31,64 +26,16 @@ from dap3d_core.assembly.arrays import (
 from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 from dap3d_core.formulations import FORMULATIONS, REPORT, RHS
 from dap3d_core.formulations.arrays import build_loops, build_system, load_numbers
-from dap3d_core.formulations.constraint_rows import Rows, scaled_rows
+from dap3d_core.formulations.constraint_rows import Rows, jacobian_pattern, scaled_rows
+from dap3d_core.formulations.switches import Switch, switches_of
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
-from dap3d_core.interface.codegen.specialise import is_knots
-from dap3d_core.linear.ldlt.factor import LESS, POOR
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
-from dap3d_core.model import Group, Model
-from dap3d_core.model.knots import narrowest
+from dap3d_core.model import Model
 from dap3d_core.model.rotations import to_body, to_global
 from dap3d_core.model.state_layout import split, to_integrated, velocities_of
 
-
-@attrs.frozen(eq=False)
-class Switch:
-    """One number whose sign is watched.
-
-    Attributes:
-        group, place: whose it is: an instance of a group.
-        kind: "switch": the element's own; "knot": the distance of an argument from where the
-            function that the element is given takes another form.
-        is_one_of_several, part: where the kernel gives a tuple, which of its numbers.
-    """
-
-    group: Group
-    place: int
-    kind: str
-    is_one_of_several: bool
-    part: int
-
-    @property
-    def words(self) -> str:
-        """Why the run ends where it becomes negative; "" where it starts anew there."""
-        type_: Any = self.group.examined.type
-        return str(type_.switch_words) if self.kind == "switch" else ""
-
-    @property
-    def band(self) -> float:
-        """How far beyond a knot an argument may be until it is said to have passed it."""
-        if self.kind == "switch":
-            return 0.0
-        row, numbers = self.group.numbers[self.place], self.group.examined.layout.numbers
-        own = [place for name, place in numbers.items() if is_knots(name)]
-        knots = [row[at : at + count] for at, (count,) in own]
-        return NEAR_KNOT * min(map(narrowest, knots))
-
-    def name(self, model: Model) -> str:
-        """The element's name; with the number's place, from 1, where there are several."""
-        is_joint = self.group.examined.type.kind == "joint"
-        names = model.joint_names if is_joint else model.force_names
-        name = names[int(self.group.members[self.place])]
-        return f"{name} [{self.part + 1}]" if self.is_one_of_several else name
-
-
-#: The part of the narrowest range between two knots that counts as at the knot.
-NEAR_KNOT = 1e-6
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
 AS_COMPILED = np.errstate(all="ignore")
-#: A row whose pivot is below this many times what regularises it depends on other rows.
-REDUNDANT = 100.0
 
 
 class Machine:
@@ -133,19 +80,7 @@ class Machine:
     @cached_property
     def switches(self) -> tuple[Switch, ...]:
         """The switches of the model's elements, in the order in which ``watch`` gives them."""
-        return tuple(
-            Switch(group, k, kind, len(group.examined.outputs[kind]) > 1, part)
-            for kind, group in self.what
-            if kind in ("switch", "knot")
-            for k in range(group.count)
-            for part in range(len(group.examined.outputs[kind]))
-        )
-
-    @property
-    def ending(self) -> Floats:
-        """(2, switches) what each does, and its band, as an integration takes it."""
-        does = [ENDS if s.words else UNSEEN if s.kind == "knot" else BEGINS for s in self.switches]
-        return np.array([does, [s.band for s in self.switches]], dtype=float).reshape(2, -1)
+        return switches_of(self.what)
 
     @property
     def unsettled(self) -> int:
@@ -179,7 +114,7 @@ class Machine:
         """Make ready for a run from a state u (13 n,): whole turns are counted from here."""
         for places in self.turn_places():
             self.system.par[places] = 0.0
-        self._place(t, u)
+        self.place(t, u)
         s = self.system
         s.settings[[UNSETTLED, SINGULAR, DOUBTFUL]] = 0.0
         self._call(ANGLE, t, s.force, s.force, s.force)
@@ -261,65 +196,16 @@ class Machine:
     def applied_forces(self, t: float, u: ArrayLike) -> Floats:
         """Force and moment about the mass centre on each body, (n, 6), those of joints left out."""
         s = self.system
-        self._place(t, u)
+        self.place(t, u)
         s.force[:] = 0.0
         call_kinds(VALUE, WRENCH, float(t), s, self.loops, s.force, s.force, s.force)
         return s.force[6:].reshape(-1, 6).copy()
 
     @AS_COMPILED
-    def watch_pivots(self, t: float, u: ArrayLike) -> None:
-        """Remember the pivots at a state u (13 n,): below POOR of it a pose is near a singular one.
-
-        Relative to the start, because masses of very different size make small pivots, too. Rows
-        that depend on others from the start are left alone.
-        """
-        if not self.formulation.needs_joints or not self.model.row_count:
-            return
-        s = self.system
-        self._place(t, u)
-        s.smallest[:] = 0.0
-        pivots = self.pivots(t)
-        if self.formulation.accepts_redundant:
-            pivots[pivots < REDUNDANT * s.compliance[s.row]] = 0.0
-        s.smallest[s.row] = POOR * pivots
-
-    def poor_rows(self, t: float) -> Integers:
-        """Rows (model's order) that are nearly singular at the bodies as placed (pivot_lengths)."""
-        s = self.system
-        smallest, pivots = s.smallest[s.row], self.pivots(t)
-        watched = smallest > 0.0
-        ratio = np.ones(self.plan.row_size)
-        ratio[s.row[watched]] = POOR * pivots[watched] / smallest[watched]
-        poor = ~(ratio > POOR)
-        for size, first, *_ in self.plan.nodes[:-1]:
-            poor[first : first + size] &= not np.prod(ratio[first : first + size]) > LESS
-        return np.flatnonzero(poor[s.row])
-
-    @AS_COMPILED
-    def pivots(self, t: float) -> Floats:
-        """(rows,) pivots of the formulation's factors at the bodies as placed; model's order."""
-        from dap3d_core.formulations.common.constraints import (
-            PART,
-            factorise,
-            linearise,
-            linearise_evenly,
-        )
-
-        s = self.system
-        place = linearise_evenly if s.settings[EVEN] else linearise
-        place(float(t), s, self.loops)
-        factorise(s, PART if self.formulation.accepts_redundant else None)
-        inverse = np.ones(self.plan.row_size)
-        for size, first, diagonal, *_ in self.plan.nodes[:-1]:
-            inverse[first : first + size] = s.K[diagonal : diagonal + size * size : size + 1]
-        result: Floats = np.abs(1.0 / inverse[s.row])
-        return result
-
-    @AS_COMPILED
     def rows(self, t: float, u: ArrayLike) -> Rows:
         """All constraint rows at time t and state u (13 n,)."""
         s = self.system
-        self._place(t, u)
+        self.place(t, u)
         s.residual[:] = 0.0
         self._call(POSITION, t, s.residual, s.residual, s.residual)
         self._call(ACCELERATION, t, s.D, s.gamma, s.nu)
@@ -341,7 +227,9 @@ class Machine:
             good = np.where(np.isfinite(gradients), gradients, 1.0)
             self.system.weight[self.system.row] = model.length / good
 
-    def _place(self, t: float, u: ArrayLike) -> None:
+    @AS_COMPILED
+    def place(self, t: float, u: ArrayLike) -> None:
+        """Place the bodies of a state u (13 n,) and evaluate the functions of time."""
         s = self.system
         place_bodies(self.integrated(u), s.body, s.metric)
         self._call(VALUE, t, s.force, s.force, s.force)
@@ -353,19 +241,4 @@ class Machine:
     @cached_property
     def pattern(self) -> tuple[Integers, Integers, Integers]:
         """Row, column and place in D of the Jacobian's entries, in the order of ``rows``."""
-        s = self.system
-        blocks = self.plan.blocks
-        heights = blocks[:, 2]
-        count = int(heights.sum())
-        block = np.repeat(np.arange(len(blocks)), heights)
-        within = np.arange(count) - np.repeat(np.cumsum(heights) - heights, heights)
-        model_row = np.zeros(self.plan.row_size, dtype=np.int64)
-        model_row[s.row] = np.arange(self.model.row_count)
-        six = np.arange(6)
-        row = np.repeat(model_row[blocks[block, 3] + within], 6)
-        column = (6 * (blocks[block, 1] - 1)[:, None] + six).ravel()
-        place = ((blocks[block, 0] + 6 * within)[:, None] + six).ravel()
-        return row, column, place
-
-
-__all__ = ["Machine"]
+        return jacobian_pattern(self.plan, self.system.row)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dap3d_core.formulations.pivots import watch_pivots
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS, Integration, Status
 from dap3d_core.integrators.stepping.singular_poses import begin_singular
 from dap3d_core.result import Result, ResultError
@@ -163,7 +164,7 @@ class Run(RunState):
 
     def _integration(self, start: Start) -> Integration:
         machine, settings, singular, u0 = self.machine, self.settings, self.singular, start.u
-        machine.watch_pivots(0.0, u0 if singular is None else singular.aside)
+        watch_pivots(machine, 0.0, u0 if singular is None else singular.aside)
         machine.start(0.0, u0)
         y0 = machine.integrated(u0)
         width = 1 + len(y0) + machine.report_size

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators import EXPLICIT, INTEGRATORS, Integrator
 from dap3d_core.model.state_layout import state_layout
 from dap3d_core.scene import (
@@ -116,7 +117,7 @@ def integration_options(machine: Machine, settings: Simulation) -> dict[str, Any
             machine.model.body_count
         ).size,  # the work does not steer the step
         "report_size": machine.report_size,
-        "ends": machine.ending,
+        "ends": effects_of(machine.switches),
     }
 
 

@@ -7,6 +7,7 @@ from dap3d_core.assembly.arrays import KINDS
 from dap3d_core.assembly.evaluate import place_bodies
 from dap3d_core.formulations import RHS
 from dap3d_core.formulations.evaluator import AS_COMPILED, Machine
+from dap3d_core.formulations.pivots import poor_rows
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.model import Group
@@ -164,7 +165,7 @@ def _singular(machine: Machine, t: float) -> str:
     """The joint whose rows (nearly) depend on those before, where the pose is (nearly) singular."""
     if not machine.formulation.needs_joints or not machine.model.row_count:
         return ""
-    row = machine.poor_rows(t)
+    row = poor_rows(machine, t)
     if not len(row):
         return ""
     joint = machine.model.row_owner(int(row[0]))

@@ -34,7 +34,7 @@ from dap3d_core.formulations.common.constraints import (
     residuals,
     velocity_residuals,
 )
-from dap3d_core.formulations.evaluator import REDUNDANT
+from dap3d_core.formulations.pivots import REDUNDANT
 from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
 from dap3d_core.kernels.runtime.loop_support import A, W
 from dap3d_core.linear.ldlt.factor import POOR, assemble, factor, weigh_rows
@@ -180,7 +180,7 @@ def store_start(t: float, y: Floats, system: System, loops: Any) -> None:
 
 @compiled_into
 def watch_pivots(t: float, system: System, loops: Any, part: float | None) -> None:
-    """Store reference pivots at the bodies as placed, as ``Machine.watch_pivots``."""
+    """Store reference pivots as ``formulations.pivots.watch_pivots``, at the bodies as placed."""
     smallest, nodes, K = system.smallest, system.nodes, system.K
     for k in range(smallest.shape[0]):
         smallest[k] = 0.0

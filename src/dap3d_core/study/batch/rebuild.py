@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.switches import effects_of
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import INFORMATION
@@ -44,7 +45,7 @@ class ModelRebuilder:
     ) -> None:
         self._compiled, self._machine, self._parameters = compiled, machine, parameters
         self._t_end = t_end
-        self._stops, self._terminal = compiled.pace(t_end).stops, machine.ending
+        self._stops, self._terminal = compiled.pace(t_end).stops, effects_of(machine.switches)
         settings = compiled.scene.simulation
         self._options = (bool(settings.correct), settings.hold, str(settings.correct_metric))
         self._rank = compiled.start(*self._options).redundancy.rank.rank
@@ -75,7 +76,7 @@ class ModelRebuilder:
             return None
         if stops_of(checked, model, self._t_end) != self._stops:
             return None
-        if not np.array_equal(machine.ending, self._terminal):
+        if not np.array_equal(effects_of(machine.switches), self._terminal):
             return None
         if undefined_directions(checked.scene, model, start.u, model_size(machine)):
             return None

@@ -1,0 +1,74 @@
+"""Switches: numbers of a model's elements whose change of sign an integration locates."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.assembly.arrays import BEGINS, ENDS, UNSEEN, Floats
+from dap3d_core.interface.codegen.specialise import is_knots
+from dap3d_core.model import Group, Model
+from dap3d_core.model.knots import narrowest
+
+#: The part of the narrowest range between two knots that counts as at the knot.
+NEAR_KNOT = 1e-6
+
+
+@attrs.frozen(eq=False)
+class Switch:
+    """One number of an element whose sign is watched.
+
+    Attributes:
+        group, place: the element, as an instance of a group.
+        kind: "switch": the element's own; "knot": the distance of an argument from where the
+            function that the element is given takes another form.
+        is_one_of_several, part: where the kernel gives a tuple, which of its numbers.
+    """
+
+    group: Group
+    place: int
+    kind: str
+    is_one_of_several: bool
+    part: int
+
+    @property
+    def words(self) -> str:
+        """Why the run ends where it becomes negative; "" where integration restarts there."""
+        type_: Any = self.group.examined.type
+        return str(type_.switch_words) if self.kind == "switch" else ""
+
+    @property
+    def band(self) -> float:
+        """Distance beyond a knot from which on an argument has passed it."""
+        if self.kind == "switch":
+            return 0.0
+        row, numbers = self.group.numbers[self.place], self.group.examined.layout.numbers
+        own = [place for name, place in numbers.items() if is_knots(name)]
+        knots = [row[at : at + count] for at, (count,) in own]
+        return NEAR_KNOT * min(map(narrowest, knots))
+
+    def name(self, model: Model) -> str:
+        """The element's name; with the number's place, from 1, where there are several."""
+        is_joint = self.group.examined.type.kind == "joint"
+        names = model.joint_names if is_joint else model.force_names
+        name = names[int(self.group.members[self.place])]
+        return f"{name} [{self.part + 1}]" if self.is_one_of_several else name
+
+
+def switches_of(loops: Iterable[tuple[str, Group]]) -> tuple[Switch, ...]:
+    """The switches of a model in the order in which ``watch`` gives them; loops: (kind, group)."""
+    return tuple(
+        Switch(group, k, kind, len(group.examined.outputs[kind]) > 1, part)
+        for kind, group in loops
+        if kind in ("switch", "knot")
+        for k in range(group.count)
+        for part in range(len(group.examined.outputs[kind]))
+    )
+
+
+def effects_of(switches: Iterable[Switch]) -> Floats:
+    """(2, switches) effect of each on a run (ENDS, BEGINS, UNSEEN), and its band."""
+    effects = [(ENDS if s.words else UNSEEN if s.kind == "knot" else BEGINS, s.band)
+               for s in switches]  # fmt: skip
+    return np.array(effects, dtype=float).reshape(-1, 2).T.copy()
