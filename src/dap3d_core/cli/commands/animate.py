@@ -57,12 +57,12 @@ def animate(
     """
     from dap3d_core.cli.console.console import count, show_written, stderr
     from dap3d_core.cli.console.progress import counting
-    from dap3d_core.cli.framework.paths import beside, open_result, writable
+    from dap3d_core.cli.framework.paths import open_result, output_path, writable
     from dap3d_core.plot import animate as draw
     from dap3d_core.result import ResultError
 
     opened = open_result(result)
-    target = beside(result, output, ".gif" if len(opened.t) > 1 else ".png")
+    target = output_path(result, output, ".gif" if len(opened.t) > 1 else ".png")
     options = {name: value for name, value in given.items() if value is not None}
     if size is not None:
         options["size"] = _size(size)

@@ -45,12 +45,12 @@ def export(
     """
     from dap3d_core.cli.console.console import count, show_written, stderr
     from dap3d_core.cli.console.progress import counting
-    from dap3d_core.cli.framework.paths import beside, open_result, refuse_all, writable
+    from dap3d_core.cli.framework.paths import open_result, output_path, refuse_all, writable
     from dap3d_core.exchange import FORMATS, check_fps, format_of
     from dap3d_core.exchange import export as write
     from dap3d_core.result import ResultError
 
-    target = beside(result, output, FORMATS[kind or "vtk"])
+    target = output_path(result, output, FORMATS[kind or "vtk"])
     opened = open_result(result, model=model, allow_code=allow_code)
     refuse_all(
         partial(format_of, target, kind),

@@ -55,11 +55,11 @@ def view(
     """
     from dap3d_core.cli.console.console import show_written
     from dap3d_core.cli.console.progress import PointsProgress
-    from dap3d_core.cli.framework.paths import beside, writable
+    from dap3d_core.cli.framework.paths import output_path, writable
     from dap3d_core.result import UnknownNameError
     from dap3d_core.view import view as make_view
 
-    target = beside(result, output, ".html")
+    target = output_path(result, output, ".html")
     if target.suffix.lower() not in (".html", ".htm"):
         raise Refused(f"cannot write {target}: a page is a .html file")
     check_target = partial(writable, target, force=force, sources=(Path(result),))

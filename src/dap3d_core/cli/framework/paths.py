@@ -26,7 +26,7 @@ def named_after(model: str, output: str | None, tail: str = "") -> Path:
     return Path(f"{path.resolve().name if path.exists() else path.name}{tail}.nc")
 
 
-def beside(result: str, output: str | None, ending: str) -> Path:
+def output_path(result: str, output: str | None, ending: str) -> Path:
     """The file made from a result: ``output``, by default RESULT with another ending."""
     return Path(output) if output is not None else Path(f"{Path(result).stem}{ending}")
 
