@@ -10,7 +10,8 @@ from mechanisms import GROUND, rotation_of
 
 import dap3d_core as dap
 from dap3d_core.formulations.pivots import watch_pivots
-from dap3d_core.integrators import TABLEAUS, RungeKutta, Status, make_adams
+from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
+from dap3d_core.integrators.adams.integration import AdamsIntegration
 from dap3d_core.simulation import CompiledModel
 
 VERSION = importlib.metadata.version("dap3d")
@@ -74,7 +75,7 @@ class Model:
         """Integrate once: state set, integrated to the end; the two ends are reported."""
         options = self.options | control | {"project_on": project}
         if method == "adams":
-            integration = make_adams(*self.problem, **options)
+            integration = AdamsIntegration(*self.problem, **options)
         else:
             integration = RungeKutta(TABLEAUS[method], *self.problem, **options)
         if integration.advance(10**12) is not Status.FINISHED:
