@@ -198,7 +198,7 @@ def test_of_two_sweeps_of_one_file_one_is_refused(dap3d):
     _wait_for(first, dap3d.folder / "a.nc.part", 1)
     second = dap3d(*LONG)
     assert second.returncode == 2
-    assert "resume goes on with it" in second.stderr
+    assert "another sweep is writing it now" in second.stderr
     first.kill()
     first.communicate()
     assert dap.open_sweep(dap3d.folder / "a.nc.part")["status"].values[0] == 1

@@ -120,7 +120,13 @@ def _are_settings(value: Any) -> bool:
         and all(value.get(n) is None or is_number(value[n]) for n in numbers)
         and _is_tolerance(value.get("atol"))
         and type(value.get("rank", 0)) is int
+        and _is_length(value.get("length", 1.0))
     )
+
+
+def _is_length(value: Any) -> bool:
+    """True for a length whose square is neither zero nor infinite."""
+    return is_number(value) and 1e-100 <= value <= 1e100
 
 
 def _is_tolerance(value: Any) -> bool:

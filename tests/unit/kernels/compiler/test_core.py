@@ -73,18 +73,17 @@ NOT_CALLED = {
     f"dap3d_core.{module}.{name}"
     for module, names in {
         "formulations.common.constraints": "linearise_evenly",
-        "formulations.regularised": "rest",
         "formulations.standard": "settle_rows",
-        "integrators.adams.step": "fail",
+        "integrators.adams.step": "reject",
         "integrators.stepping.vector_ops": "scaled_beyond",
-        "integrators.stepping.step_control": "beyond_rounding",
-        "integrators.stepping.singular_poses": "look_ahead",
-        "integrators.radau.step": "refuse stage_is_across",
+        "integrators.stepping.step_control": "error_beyond_rounding",
+        "integrators.stepping.singular_poses": "predict_measures",
+        "integrators.radau.step": "reject_iteration stage_is_across",
         "integrators.radau.convergence": "is_settling is_stalled",
         "integrators.stepping.output": "report_end",
         "integrators.stepping.rounding": "measure_noise",
-        "integrators.runge_kutta.step": "is_rounding kept_error on_constraints",
-        "integrators.stepping.event_location": "shorten",
+        "integrators.runge_kutta.step": "is_rounding project_stage projected_error_norm",
+        "integrators.stepping.event_location": "cut_step",
         "linear.rank.null_space": "solve_each",
     }.items()
     for name in names.split()
