@@ -78,7 +78,8 @@ def test_claims_are_judged_by_the_size_of_the_file(tmp_path):
 WRONG = [
     ("notes", 5), ("notes", {"a": 1}), ("notes", [1]), ("settings", [1]),
     ("settings", {"rtol": "x"}), ("settings", {"rank": "x"}), ("settings", {"a": [[[[1]]]]}),
-    ("settings", {"dt": 10**400}), ("statistics", {"steps": "x"}), ("statistics", {"evil": 1}),
+    ("settings", {"dt": 10**400}), ("settings", {"length": 0.0}),
+    ("statistics", {"steps": "x"}), ("statistics", {"evil": 1}),
     ("statistics", {"steps": float("inf")}), ("versions", {"a": 1}), ("versions", []),
     ("events", {}), ("events", [1]), ("events", [{"name": 1, "t": 0, "direction": 1}]),
     ("events", [{"name": "x", "t": 0, "direction": 1, "kind": "__import__('os')"}]),
