@@ -67,9 +67,8 @@ def sweep(
         outputs: quantities ("crank.r.z:max"), functions of a ``Result``, or label -> one of these.
         sample, design, seed: number of samples (without: a grid), "lhs", "random", "sobol" or
             "halton", seed.
-        t_end, dt, method, integrator, rtol, atol, step: as of ``simulate``.
-        correct, project, correct_metric, allow_code: as of ``simulate``.
-        announce: as of ``compile``.
+        t_end, dt, method, integrator, rtol, atol, step: as of ``simulate``; likewise correct,
+            project, correct_metric, allow_code; announce as of ``compile``.
         threads, client: points at once, or a ``distributed.Client`` whose workers run them.
         pack: points that take their steps together, for speed: equal within the tolerances only.
         output, force, resume: file to write; overwrite it; continue with ``OUTPUT.part``.
