@@ -13,13 +13,14 @@ CALLS, REPEATS = 1000, 15
 
 def call():
     """Microseconds to set up an integration, and to enter and leave its compiled loop."""
-    machine = CompiledModel(scenes.chain(1)).machine
-    y0 = machine.integrated(machine.model.u0)
+    evaluator = CompiledModel(scenes.chain(1)).evaluator
+    y0 = evaluator.integrated(evaluator.model.u0)
 
     def make():
         return RungeKutta(
-            TABLEAUS["dop853"], machine.functions, machine.system, machine.loops, y0, [0.0, 1e-3],
-            report_size=machine.report_size, length_count=machine.length_count, buffer_rows=2,
+            TABLEAUS["dop853"], evaluator.functions, evaluator.system, evaluator.loops, y0,
+            [0.0, 1e-3],
+            report_size=evaluator.report_size, length_count=evaluator.length_count, buffer_rows=2,
         )  # fmt: skip
 
     done = make()

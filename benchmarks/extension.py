@@ -70,11 +70,11 @@ def with_type(scene, table, keyword):
 
 def right_hand_sides(compiled):
     """A function that evaluates right-hand sides for some 10 ms."""
-    machine = compiled.machine
-    y = machine.integrated(machine.model.u0)
+    evaluator = compiled.evaluator
+    y = evaluator.integrated(evaluator.model.u0)
     out = np.zeros_like(y)
     count = WORK // (4 * BODIES)
-    return lambda: repeat(machine.functions, count, y, out, machine.system, machine.loops)
+    return lambda: repeat(evaluator.functions, count, y, out, evaluator.system, evaluator.loops)
 
 
 def whole_run(compiled):

@@ -5,7 +5,7 @@ import time
 
 import scenes
 
-from dap3d_core.formulations.pivots import watch_pivots
+from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
 from dap3d_core.simulation import CompiledModel
 
@@ -13,15 +13,15 @@ from dap3d_core.simulation import CompiledModel
 SIZES, REPEATS = (1, 8, 64), 9
 
 
-def seconds(machine, u, method, rtol, *, project):
+def seconds(evaluator, u, method, rtol, *, project):
     """CPU seconds of one run of a second, without reports between its ends."""
-    watch_pivots(machine, 0.0, u)
-    machine.start(0.0, u)
-    y0 = machine.integrated(u)
+    store_reference_pivots(evaluator, 0.0, u)
+    evaluator.start(0.0, u)
+    y0 = evaluator.integrated(u)
     run = RungeKutta(
-        TABLEAUS[method], machine.functions, machine.system, machine.loops, y0, [0.0, 1.0],
+        TABLEAUS[method], evaluator.functions, evaluator.system, evaluator.loops, y0, [0.0, 1.0],
         rtol=rtol, atol=rtol / 100.0, project_on=project, error_size=len(y0) - 1,
-        report_size=machine.report_size, length_count=machine.length_count,
+        report_size=evaluator.report_size, length_count=evaluator.length_count,
     )  # fmt: skip
     start = time.thread_time()
     assert run.advance(10**9) is Status.FINISHED
@@ -34,11 +34,11 @@ def measure():
     for joint, title in (("sph", "spherical"), ("rev", "revolute")):
         for n in SIZES:
             compiled = CompiledModel(scenes.chain(n, joint))
-            machine, u = compiled.machine, compiled.start(True, ()).u
+            evaluator, u = compiled.evaluator, compiled.start(True, ()).u
             for method in ("dopri5", "dop853"):
                 for rtol in (1e-6, 1e-9):
                     pairs = [
-                        [seconds(machine, u, method, rtol, project=on) for on in (False, True)]
+                        [seconds(evaluator, u, method, rtol, project=on) for on in (False, True)]
                         for _ in range(REPEATS)
                     ]
                     off, on = (statistics.median(column) for column in zip(*pairs, strict=True))

@@ -30,12 +30,12 @@ def repeat(functions, count, y, out, system, loops):
 
 def our(scene):
     """Count right-hand sides, and a function that evaluates them, for a scene."""
-    machine = CompiledModel(scene).machine
-    y = machine.integrated(machine.model.u0)
+    evaluator = CompiledModel(scene).evaluator
+    y = evaluator.integrated(evaluator.model.u0)
     out = np.zeros_like(y)
-    count = max(2, WORK // machine.model.body_count)
-    functions = machine.functions
-    return count, lambda: repeat(functions, count, y, out, machine.system, machine.loops)
+    count = max(2, WORK // evaluator.model.body_count)
+    functions = evaluator.functions
+    return count, lambda: repeat(functions, count, y, out, evaluator.system, evaluator.loops)
 
 
 def plain(n):

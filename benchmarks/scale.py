@@ -80,13 +80,13 @@ def planned(model):
 def row(title, scene):
     """One row of the table."""
     compiled = CompiledModel(scene)
-    machine, model = compiled.machine, compiled.model
+    evaluator, model = compiled.evaluator, compiled.model
     plan, plan_s, alone = planned(model)
-    s, y = machine.system, machine.integrated(model.u0)
+    s, y = evaluator.system, evaluator.integrated(model.u0)
     out = np.zeros_like(y)
 
     def rhs():
-        machine.functions[0](0.0, y, out, s, machine.loops)
+        evaluator.functions[0](0.0, y, out, s, evaluator.loops)
 
     def filled():
         assemble(s.targets, s.contributions, s.D, s.K)

@@ -9,7 +9,7 @@ from levels import WHOLE
 from mechanisms import GROUND, rotation_of
 
 import dap3d_core as dap
-from dap3d_core.formulations.pivots import watch_pivots
+from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
 from dap3d_core.integrators.adams.integration import AdamsIntegration
 from dap3d_core.simulation import CompiledModel
@@ -62,14 +62,18 @@ class Model:
 
     def __init__(self, scene, t_end, projects=False, **options):
         self.compiled = CompiledModel(scene, **options)
-        self.machine, self.t_end, self.projects = self.compiled.machine, t_end, projects
+        self.evaluator, self.t_end, self.projects = self.compiled.evaluator, t_end, projects
         self.u0 = self.compiled.model.u0
-        watch_pivots(self.machine, 0.0, self.u0)
-        self.machine.start(0.0, self.u0)
-        machine, y0 = self.machine, self.machine.integrated(self.u0)
-        self.problem = machine.functions, machine.system, machine.loops, y0, [0.0, t_end]
-        self.options = dict(error_size=len(y0) - 1, report_size=machine.report_size, buffer_rows=2,
-                            length_count=machine.length_count)  # fmt: skip
+        store_reference_pivots(self.evaluator, 0.0, self.u0)
+        self.evaluator.start(0.0, self.u0)
+        evaluator, y0 = self.evaluator, self.evaluator.integrated(self.u0)
+        self.problem = evaluator.functions, evaluator.system, evaluator.loops, y0, [0.0, t_end]
+        self.options = {
+            "error_size": len(y0) - 1,
+            "buffer_rows": 2,
+            "report_size": evaluator.report_size,
+            "length_count": evaluator.length_count,
+        }
 
     def run(self, method, project, **control):
         """Integrate once: state set, integrated to the end; the two ends are reported."""

@@ -10,7 +10,7 @@ import pytest
 from support.motions import Motion, derivative
 from support.scenes import case_names, cases, scene_for
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import build_model
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check as checked
@@ -52,16 +52,16 @@ def test_rows_of_a_scene(case, ground):
     keyword, values = case
     rng = np.random.default_rng(0)
     scene = scene_for(REGISTRY.get("joint", keyword), rng, ground=ground, values=values)
-    machine = Machine(build_model(checked(scene, REGISTRY)), "standard")
-    motion, mask = Motion(3, np.random.default_rng(100)), machine.model.position_row
+    evaluator = Evaluator(build_model(checked(scene, REGISTRY)), "standard")
+    motion, mask = Motion(3, np.random.default_rng(100)), evaluator.model.position_row
 
     def velocity_form(t):
-        rows = machine.rows(t, motion.u(t))
+        rows = evaluator.rows(t, motion.u(t))
         return rows.dense() @ motion.u(t)[-18:] - rows.nu
 
-    rate = derivative(lambda t: machine.rows(t, motion.u(t)).C, 0.1, 3e-3)
+    rate = derivative(lambda t: evaluator.rows(t, motion.u(t)).C, 0.1, 3e-3)
     assert close(rate[mask], velocity_form(0.1)[mask])
-    rows = machine.rows(0.1, motion.u(0.1))
+    rows = evaluator.rows(0.1, motion.u(0.1))
     acceleration_form = rows.dense() @ motion.v_dot(0.1) - rows.gamma
     assert close(derivative(velocity_form, 0.1, 3e-3), acceleration_form)
 

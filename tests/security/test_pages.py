@@ -12,7 +12,7 @@ from support import hostile
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.result import Occurrence, Result
+from dap3d_core.result import EventRecord, Result
 
 VENDOR = REPOSITORY / "src" / "dap3d_core" / "view" / "vendor"
 #: sha256 of the file that tools/vendor_three.py made of three.js 0.187.0.
@@ -25,7 +25,7 @@ def result(tmp_path_factory):
     folder = hostile.write(tmp_path_factory.mktemp("scene"))
     run = dap.simulate(dap.load(folder))
     bad = "".join(hostile.NAMES) + hostile.ESCAPES
-    event = Occurrence(name=bad, t=0.01, direction=1, kind="stop")
+    event = EventRecord(name=bad, t=0.01, direction=1, kind="stop")
     record = attrs.evolve(
         run.record,
         notes=(*run.notes, bad, *hostile.NAMES),

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dap3d_core.matlab.language.interpreter import follow
-from dap3d_core.matlab.language.parse import Grammar, Source, syntax_mistakes
+from dap3d_core.matlab.language.parse import Grammar, SourceFile, syntax_mistakes
 
 #: The models of the manual as its MATLAB program has them, in our own words.
 MODELS = Path(__file__).parents[1] / "matlab"
@@ -41,7 +41,7 @@ def write(folder, **files):
 
 def variables_of(text):
     """Variables after the statements of a text, and what is wrong in it, as messages."""
-    source = Source(Path("file.m"), text)
+    source = SourceFile(Path("file.m"), text)
     root = Grammar().tree(source)
     faults = syntax_mistakes(source, root)
     if faults:

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import build_model
-from dap3d_core.model.state_layout import join, to_integrated
+from dap3d_core.model.state_layout import join, y_from_u
 from dap3d_core.registry import load_registry
-from dap3d_core.result import Record, Result, ResultWriter
+from dap3d_core.result import Result, ResultWriter, RunMetadata
 from dap3d_core.result.arrays import COLUMNS
 from dap3d_core.scene import Scene, check
 
@@ -31,7 +31,7 @@ def rows_of(
     angles = np.zeros((len(t), model.angle_count)) if angles is None else angles
     last = np.tile([0.0, *residuals], (len(t), 1))
     last[:, 0] = potential
-    y = to_integrated(u, work)
+    y = y_from_u(u, work)
     return np.hstack([t[:, None], y, v_dot, Lam, angles, last])
 
 
@@ -39,8 +39,8 @@ def result_of(scene, rows, model=None, method="standard", **more):
     """A result whose machine is made when something asks for it."""
     model = model or model_of(scene)
     given = dict(settings=CONTROLLED, integrator="dop853", method=method) | more
-    record = Record(scene_text=scene.to_toml(), **given)
-    return Result.of_run(model, rows, record, lambda: Machine(model, method))
+    record = RunMetadata(scene_text=scene.to_toml(), **given)
+    return Result.of_run(model, rows, record, lambda: Evaluator(model, method))
 
 
 MASS, ARM, RATE, PIVOT = 3.0, 0.4, 2.5, np.array([0.3, -0.2, 0.5])

@@ -9,7 +9,7 @@ from support.ended import leave, shorten_chunks
 from support.results import same_bits
 
 import dap3d_core as dap
-from dap3d_core.formulations.pivots import watch_pivots
+from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.simulation.checkpoint.file import read_checkpoint
@@ -96,15 +96,15 @@ def test_what_was_counted_before_is_told_at_the_end(tmp_path):
 def test_no_function_reads_what_another_has_left(make, method):
     """Of the model's arrays a checkpoint holds those alone that functions do not write anew."""
     compiled = dap.compile(make(), method=method)
-    machine, u = compiled.machine, compiled.model.u0
-    watch_pivots(machine, 0.0, u)
-    machine.start(0.0, u)
-    y, rng = machine.integrated(u), np.random.default_rng(1)
-    sizes = (y.size, 4 + machine.length_count, machine.report_size)  # of rhs, project, report
+    evaluator, u = compiled.evaluator, compiled.model.u0
+    store_reference_pivots(evaluator, 0.0, u)
+    evaluator.start(0.0, u)
+    y, rng = evaluator.integrated(u), np.random.default_rng(1)
+    sizes = (y.size, 4 + evaluator.length_count, evaluator.report_size)  # of rhs, project, report
 
     def call(k, state, t):
         out, state = np.zeros(sizes[k]), state.copy()
-        machine.functions[k](t, state, out, machine.system, machine.loops)
+        evaluator.functions[k](t, state, out, evaluator.system, evaluator.loops)
         return out.tobytes() + state.tobytes()
 
     for k in range(3):

@@ -141,10 +141,10 @@ def test_what_was_changed_is_put_back_though_the_run_fails(compiled):
         state.set("spring", k=50.0)
         raise RuntimeError("mine")
 
-    before = compiled.machine.system.par.copy()
+    before = compiled.evaluator.system.par.copy()
     with pytest.raises(RuntimeError, match="mine") as caught:
         dap.simulate(compiled, t_end=1.0, events=[dap.Event("t", at=0.55, action=fail)])
-    np.testing.assert_array_equal(compiled.machine.system.par, before)
+    np.testing.assert_array_equal(compiled.evaluator.system.par, before)
     assert caught.value.result.t[-1] == pytest.approx(0.55, abs=0.011)
 
 

@@ -9,7 +9,7 @@ from support.process import run
 
 import dap3d_core as dap
 from dap3d_core.formulations import PROJECT, RHS
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface import Joint, Point, Vector, number, point, vector
 from dap3d_core.kernels import cross, dot, eye, hstack, neg, normals, row, scale, skew, sub
 from dap3d_core.model import build_model
@@ -29,14 +29,14 @@ INDEPENDENT = {name: lambda name=name: dap.load(name) for name in ("pen2", "four
 
 def machines_of(scene, *methods, registry=None):
     model = build_model(check(scene, registry or load_registry()))
-    return [Machine(model, method) for method in methods]
+    return [Evaluator(model, method) for method in methods]
 
 
-def moving(machine, seed=0):
+def moving(evaluator, seed=0):
     """The state given with random velocities that the constraints allow."""
-    u, n = machine.model.u0.copy(), machine.model.body_count
+    u, n = evaluator.model.u0.copy(), evaluator.model.body_count
     u[7 * n :] = np.random.default_rng(seed).normal(size=6 * n)
-    return correct_initial(machine, u).u
+    return correct_initial(evaluator, u).u
 
 
 def mass_matrix(model, u):
@@ -50,14 +50,14 @@ def mass_matrix(model, u):
     return M
 
 
-def parts(machine, free, u):
+def parts(evaluator, free, u):
     """M, M^-1 g, and the rows, each found without the formulation's factors."""
-    n = machine.model.body_count
-    return mass_matrix(machine.model, u), free.rhs(0.0, u)[7 * n :], machine.rows(0.0, u)
+    n = evaluator.model.body_count
+    return mass_matrix(evaluator.model, u), free.rhs(0.0, u)[7 * n :], evaluator.rows(0.0, u)
 
 
-def report_of(machine, u):
-    found, n = machine.report(0.0, u), machine.model.body_count
+def report_of(evaluator, u):
+    found, n = evaluator.report(0.0, u), evaluator.model.body_count
     return found[: 6 * n], found[6 * n : -4]
 
 
@@ -68,14 +68,14 @@ def test_lsq_gives_the_accelerations_and_the_least_multipliers(name):
     Accelerations to 1e-11 of those without joints, out of which they come by subtraction; condition
     numbers of S are up to 1e4. Multipliers to rounding over LEAST_PART = 1e-5, some passes of it.
     """
-    machine, free = machines_of((REDUNDANT | INDEPENDENT)[name](), "lsq", "unconstrained")
-    u = moving(machine)
-    M, a_free, rows = parts(machine, free, u)
+    evaluator, free = machines_of((REDUNDANT | INDEPENDENT)[name](), "lsq", "unconstrained")
+    u = moving(evaluator)
+    M, a_free, rows = parts(evaluator, free, u)
     D = rows.dense()
     S = D @ np.linalg.solve(M, D.T)
     least = np.linalg.pinv(S, rcond=1e-10, hermitian=True) @ (rows.gamma - D @ a_free)
     expected = a_free + np.linalg.solve(M, D.T @ least)
-    a, multipliers = report_of(machine, u)
+    a, multipliers = report_of(evaluator, u)
     size = max(np.max(np.abs(expected)), np.max(np.abs(a_free)))
     assert a == pytest.approx(expected, abs=1e-11 * size)
     assert multipliers == pytest.approx(least, abs=1e-8 * max(size, np.max(np.abs(least))))
@@ -87,23 +87,23 @@ def test_lsq_gives_the_accelerations_and_the_least_multipliers(name):
 def test_penalty_is_that_of_the_manual(name, numbers):
     """Spec 9, dense, off the constraints: every term shows. The dense sum M + alpha D^T D loses
     alpha times the rounding of the masses, 1e-9."""
-    machine, free = machines_of((REDUNDANT | INDEPENDENT)[name](), "penalty", "unconstrained")
-    machine.set_penalty(*numbers)
+    evaluator, free = machines_of((REDUNDANT | INDEPENDENT)[name](), "penalty", "unconstrained")
+    evaluator.set_penalty(*numbers)
     alpha, Omega, mu = numbers
     rng = np.random.default_rng(5)
-    u, n = machine.model.u0.copy(), machine.model.body_count
+    u, n = evaluator.model.u0.copy(), evaluator.model.body_count
     u[: 7 * n] += 0.02 * rng.normal(size=7 * n)
     u[: 7 * n].reshape(n, 7)[:, 3:] /= np.linalg.norm(
         u[: 7 * n].reshape(n, 7)[:, 3:], axis=1, keepdims=True
     )
     u[7 * n :] = rng.normal(size=6 * n)
-    M, a_free, rows = parts(machine, free, u)
+    M, a_free, rows = parts(evaluator, free, u)
     D = rows.dense()
-    C = np.where(machine.model.position_row, rows.C, 0.0)
+    C = np.where(evaluator.model.position_row, rows.C, 0.0)
     assert np.max(np.abs(C)) > 1e-3
     target = rows.gamma - 2 * mu * Omega * (D @ u[7 * n :] - rows.nu) - Omega**2 * C
     expected = np.linalg.solve(M + alpha * D.T @ D, M @ a_free + alpha * D.T @ target)
-    a, multipliers = report_of(machine, u)
+    a, multipliers = report_of(evaluator, u)
     assert a == pytest.approx(expected, abs=1e-8 * np.max(np.abs(expected)))
     # lambda = -alpha (D a - gamma') by its definition, of the accelerations found
     reaction = -alpha * (D @ a - target)
@@ -233,16 +233,16 @@ def test_projection_after_a_right_hand_side_is_the_same(method):
 
     The state is 1e-4 off; rounding of the same arithmetic on numbers of 1 to 10.
     """
-    machine = dap.compile(problems.chain(3), method=method).machine
-    machine.set_penalty(10.0, 10.0, 1.0)
-    u = machine.model.u0 + 1e-4 * np.random.default_rng(5).normal(size=machine.model.u0.size)
+    evaluator = dap.compile(problems.chain(3), method=method).evaluator
+    evaluator.set_penalty(10.0, 10.0, 1.0)
+    u = evaluator.model.u0 + 1e-4 * np.random.default_rng(5).normal(size=evaluator.model.u0.size)
     states = []
     for here in (0.0, 1.0):
-        y = machine.integrated(u)
-        out = np.zeros(4 + machine.length_count)
-        machine.functions[RHS](0.0, y, np.zeros_like(y), machine.system, machine.loops)
+        y = evaluator.integrated(u)
+        out = np.zeros(4 + evaluator.length_count)
+        evaluator.functions[RHS](0.0, y, np.zeros_like(y), evaluator.system, evaluator.loops)
         out[0] = here
-        machine.functions[PROJECT](0.0, y, out, machine.system, machine.loops)
+        evaluator.functions[PROJECT](0.0, y, out, evaluator.system, evaluator.loops)
         assert out[0] == 1.0, "the state was moved"
         assert out[1] == 0.0
         assert out[2] < 1e-14

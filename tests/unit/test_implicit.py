@@ -10,7 +10,7 @@ from support.graphs import chain, star
 from support.plain import in_another_process
 
 import dap3d_core as dap
-from dap3d_core.formulations.pivots import watch_pivots
+from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.formulations.stabilized_index2.stage_equations import evaluate_stage, keep_frames
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.radau.integration import RadauIntegration, estimate_tolerances
@@ -115,12 +115,12 @@ def disk():
 
 def integration(scene, times=(0.0, 1.0), method=None, **settings):
     compiled = dap.compile(scene, method=method)
-    machine = compiled.machine
+    evaluator = compiled.evaluator
     u = compiled.start(True, ()).u
-    watch_pivots(machine, 0.0, u)
-    machine.start(0.0, u)
-    return RadauIntegration(machine, machine.integrated(u), times,
-                            report_size=machine.report_size, **settings)  # fmt: skip
+    store_reference_pivots(evaluator, 0.0, u)
+    evaluator.start(0.0, u)
+    return RadauIntegration(evaluator, evaluator.integrated(u), times,
+                            report_size=evaluator.report_size, **settings)  # fmt: skip
 
 
 @pytest.mark.parametrize("scene", [sprung, disk, problems.pendulum], ids=lambda f: f.__name__)
@@ -131,8 +131,8 @@ def test_tangent_is_that_of_all_equations(scene, h):
     Both kinds of differences err by some 1e-9 of the largest term.
     """
     run = integration(scene())
-    machine, work, matrix = run.machine, run.work, run.matrix
-    system, rows = machine.system, machine.plan.row_size
+    evaluator, work, matrix = run.evaluator, run.work, run.matrix
+    system, rows = evaluator.system, evaluator.plan.row_size
     rng = np.random.default_rng(7)
     there = np.zeros((2, rows))
     there[:, system.row] = 1.0
@@ -140,20 +140,20 @@ def test_tangent_is_that_of_all_equations(scene, h):
     base[1] = 5.0 * rng.normal(size=rows) * there[1]
     work.last_multipliers[2] = base
     work.multipliers[2] = base
-    assert find_tangent(0.0, h, work, system, machine.loops, run.tangent, matrix) == 0.0
-    assert factorise_both(0.0, h, work, system, machine.loops, run.tangent, matrix) == 0.0
+    assert find_tangent(0.0, h, work, system, evaluator.loops, run.tangent, matrix) == 0.0
+    assert factorise_both(0.0, h, work, system, evaluator.loops, run.tangent, matrix) == 0.0
     y0 = run.y
     residual = rng.normal(size=y0.size)
     residual[-1] = 0.0
     of_rows = rng.normal(size=(2, rows)) * there
     of_rows[0] *= matrix.held  # mu of a row without position level is zero from the start
     work.R[0], work.G[0] = residual, of_rows
-    solve_at(0.0, h, y0, base, work, system, machine.loops, matrix)
+    solve_at(0.0, h, y0, base, work, system, evaluator.loops, matrix)
     change, multipliers = work.R[0].copy(), work.G[0].copy()
 
     def equations(y, m):
         out, levels = np.zeros_like(y), np.zeros((2, rows))
-        evaluate(0.0, y, m, matrix.held, out, levels, system, machine.loops)
+        evaluate(0.0, y, m, matrix.held, out, levels, system, evaluator.loops)
         out[-1] = 0.0
         return np.concatenate([out, levels.ravel()])
 

@@ -5,7 +5,7 @@ import pytest
 from support import redundant
 
 import dap3d_core as dap
-from dap3d_core.formulations.pivots import watch_pivots
+from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
 from dap3d_core.integrators.stepping.integration_state import MEASURES
 from dap3d_core.integrators.stepping.singular_poses import (
@@ -69,16 +69,17 @@ def test_a_run_across_is_the_same_however_it_is_cut():
     """All that decides lies in the arrays of Work: step by step, in one go, and copied into a fresh
     integration just before the first crossing (t = 0.7085 s), bit for bit."""
     model = dap.compile(redundant.four_bars(1))
-    machine = model.machine
+    evaluator = model.evaluator
     u = model.start(True, ()).u
-    y0 = machine.integrated(u)
+    y0 = evaluator.integrated(u)
 
     def integration():
-        watch_pivots(machine, 0.0, u)
+        store_reference_pivots(evaluator, 0.0, u)
         return RungeKutta(
-            TABLEAUS["dop853"], machine.functions, machine.system, machine.loops, y0, [0.0, 1.0],
-            project_on=True, error_size=len(y0) - 1, report_size=machine.report_size,
-            length_count=machine.length_count,
+            TABLEAUS["dop853"], evaluator.functions, evaluator.system, evaluator.loops, y0,
+            [0.0, 1.0],
+            project_on=True, error_size=len(y0) - 1, report_size=evaluator.report_size,
+            length_count=evaluator.length_count,
         )  # fmt: skip
 
     whole, cut, fresh = integration(), integration(), integration()

@@ -240,8 +240,8 @@ def test_the_program_is_found_once_for_all_runs_and_steps(monkeypatch):
         scene.add_joint("sph", f"J{k}", P_i=inner, P_j=outer)
         outer = scene.add_point(f"out{k}", f"b{k}", (0.5, 0.0, 0.0))
     compiled = dap.compile(scene)
-    program = compiled.machine.plan.updates
+    program = compiled.evaluator.plan.updates
     steps = [dap.simulate(compiled, t_end=0.1, dt=0.1).stats.steps for _ in range(2)]
     assert min(steps) > 0
     assert len(calls) == 1
-    assert compiled.machine.system.updates is program
+    assert compiled.evaluator.system.updates is program

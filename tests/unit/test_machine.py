@@ -13,7 +13,7 @@ from support.motions import G, Motion
 
 import dap3d_core as dap
 from dap3d_core.formulations import RHS
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import rotation, to_body
 from dap3d_core.model.state_layout import join, split
@@ -85,10 +85,10 @@ def carousel_reference(kkt):
     return kkt.System(bodies=bodies, joints=joints)
 
 
-def machine_of(scene):
+def evaluator_of(scene):
     """The machine of a scene, which need not be assembled."""
     model = build_model(check(scene, load_registry()))
-    return Machine(model, "standard" if model.row_count else "unconstrained")
+    return Evaluator(model, "standard" if model.row_count else "unconstrained")
 
 
 MECHANISMS = ("pen2", "fourbar2", "fourbar3", "carousel")
@@ -98,16 +98,16 @@ SCENES["carousel"] = carousel()
 
 @pytest.fixture(scope="module")
 def machines():
-    return {name: machine_of(scene) for name, scene in SCENES.items()}
+    return {name: evaluator_of(scene) for name, scene in SCENES.items()}
 
 
 mechanisms = pytest.mark.parametrize("name", MECHANISMS)
 seeds = pytest.mark.parametrize("seed", range(3))
 
 
-def state_of(machine, seed):
+def state_of(evaluator, seed):
     """A state taken at random, as u and as the arguments of the reference."""
-    n = machine.model.body_count
+    n = evaluator.model.body_count
     u = Motion(n, np.random.default_rng(seed)).u(0.1)
     r, p, _, _ = split(u)
     return u, (r, rotation(p), u[7 * n :])
@@ -121,12 +121,12 @@ def close(found, wanted, tolerance=TOLERANCE):
 @seeds
 def test_accelerations_and_multipliers_solve_the_dense_system(name, seed, reference, machines):
     """v_dot and lambda are those of [M, -D^T; D, 0] (v_dot; lambda) = (g; gamma) solved by LU."""
-    machine = machines[name]
-    u, arguments = state_of(machine, seed)
+    evaluator = machines[name]
+    u, arguments = state_of(evaluator, seed)
     v_dot, multipliers = reference[name].solve(*arguments)
-    n, m = machine.model.body_count, machine.model.row_count
-    report = machine.report(0.2, u)
-    assert close(machine.rhs(0.2, u)[7 * n :], v_dot)
+    n, m = evaluator.model.body_count, evaluator.model.row_count
+    report = evaluator.report(0.2, u)
+    assert close(evaluator.rhs(0.2, u)[7 * n :], v_dot)
     assert close(report[: 6 * n], v_dot)
     assert close(report[6 * n : 6 * n + m], multipliers)
 
@@ -135,11 +135,11 @@ def test_accelerations_and_multipliers_solve_the_dense_system(name, seed, refere
 @seeds
 def test_rows_are_those_of_the_differentiated_positions(name, seed, reference, machines):
     """C, D, nu and gamma agree row by row, also off the constraints: rounding alone."""
-    machine = machines[name]
-    u, arguments = state_of(machine, seed)
+    evaluator = machines[name]
+    u, arguments = state_of(evaluator, seed)
     C, D, nu, gamma = reference[name].constraints(*arguments)
-    rows = machine.rows(0.2, u)
-    assert close(rows.C[machine.model.position_row], C, 1e-13)
+    rows = evaluator.rows(0.2, u)
+    assert close(rows.C[evaluator.model.position_row], C, 1e-13)
     assert close(rows.dense(), D, 1e-13)
     assert close(rows.nu, nu, 1e-13)
     assert close(rows.gamma, gamma, 1e-13)
@@ -150,12 +150,12 @@ def test_rows_are_those_of_the_differentiated_positions(name, seed, reference, m
 def test_residuals_of_the_three_levels_are_reported(name, seed, machines):
     """The last three numbers of a report are the largest |C|, |D v - nu| and |D v_dot - gamma|, the
     last one rounding; before them stands the potential energy."""
-    machine = machines[name]
-    u, _ = state_of(machine, seed)
-    n, m = machine.model.body_count, machine.model.row_count
-    rows, report = machine.rows(0.2, u), machine.report(0.2, u)
+    evaluator = machines[name]
+    u, _ = state_of(evaluator, seed)
+    n, m = evaluator.model.body_count, evaluator.model.row_count
+    rows, report = evaluator.rows(0.2, u), evaluator.report(0.2, u)
     D, v = rows.dense(), u[7 * n :]
-    assert len(report) == machine.report_size == 6 * n + m + 4
+    assert len(report) == evaluator.report_size == 6 * n + m + 4
     position, velocity, acceleration = report[-3:]
     assert position == pytest.approx(np.max(np.abs(rows.C)), rel=1e-13)
     assert velocity == pytest.approx(np.max(np.abs(D @ v - rows.nu)), rel=1e-12)
@@ -177,16 +177,16 @@ def test_potential_energy_is_reported(machines, reference):
 def test_layout_of_the_rates(name, length, machines):
     """du/dt holds r_dot and p_dot = 1/2 G^T omega of each body, then r_ddot and omega_dot; Euler
     parameters that have drifted off unit length keep it, and change no acceleration."""
-    machine = machines[name]
-    n = machine.model.body_count
-    u, _ = state_of(machine, 4)
+    evaluator = machines[name]
+    n = evaluator.model.body_count
+    u, _ = state_of(evaluator, 4)
     r, p, v, w = split(u)
     stretched = join(r, length * p, v, w)
-    r_dot, p_dot, a, w_dot = split(machine.rhs(0.0, stretched))
+    r_dot, p_dot, a, w_dot = split(evaluator.rhs(0.0, stretched))
     assert np.array_equal(r_dot, v)
     for b in range(n):
         assert p_dot[b] == pytest.approx(0.5 * G(length * p[b]).T @ w[b], abs=1e-14)
-    report = machine.report(0.0, u)[: 6 * n].reshape(n, 6)
+    report = evaluator.report(0.0, u)[: 6 * n].reshape(n, 6)
     assert close(np.hstack([a, w_dot]), report, 1e-11)  # rounding of p, times the condition
 
 
@@ -231,13 +231,13 @@ def test_accelerations_do_not_depend_on_the_axes_of_a_body():
     the factor of J' stands in the right places (condition of J' about 3, some roundings)."""
     rng = np.random.default_rng(12)
     turns = [rotation([1.5, *rng.uniform(-1, 1, 3)]) for _ in range(2)]
-    plain, turned = machine_of(in_other_axes([np.eye(3)] * 2)), machine_of(in_other_axes(turns))
+    plain, turned = evaluator_of(in_other_axes([np.eye(3)] * 2)), evaluator_of(in_other_axes(turns))
     assert np.max(np.abs(turned.model.Jp - plain.model.Jp)) > 0.01
     v = rng.normal(size=12)
     found = []
-    for machine in (plain, turned):
-        u = np.concatenate([machine.model.u0[:14], v])
-        found.append(machine.report(0.0, u))
+    for evaluator in (plain, turned):
+        u = np.concatenate([evaluator.model.u0[:14], v])
+        found.append(evaluator.report(0.0, u))
     assert close(found[1][:12], found[0][:12], 1e-12)
     assert found[1][20:23] == pytest.approx(found[0][20:23], rel=1e-11)  # potential, |C|, |D v|
 
@@ -245,14 +245,14 @@ def test_accelerations_do_not_depend_on_the_axes_of_a_body():
 # ------------------------------------------------------------------ power
 
 
-def power_and_rate(machine, t, u):
+def power_and_rate(evaluator, t, u):
     """Power that the formulation reports, and dT/dt from the accelerations by their definition."""
-    model = machine.model
-    y = machine.integrated(u)
+    model = evaluator.model
+    y = evaluator.integrated(u)
     out = np.zeros_like(y)
-    machine.functions[RHS](t, y, out, machine.system, machine.loops)
+    evaluator.functions[RHS](t, y, out, evaluator.system, evaluator.loops)
     _, p, v, w = split(u)
-    _, _, a, w_dot = split(machine.rhs(t, u))
+    _, _, a, w_dot = split(evaluator.rhs(t, u))
     spin, spin_rate = to_body(p, w), to_body(p, w_dot)
     rate = np.sum(model.mass[:, None] * v * a) + np.einsum("bi,bij,bj", spin, model.Jp, spin_rate)
     return out[-1], rate
@@ -262,9 +262,9 @@ def power_and_rate(machine, t, u):
 def test_power_of_forces_on_free_bodies_is_the_rate_of_kinetic_energy(seed):
     """Springs, dampers and weight on bodies without joints: dT/dt = sum of F . v + n . omega, at
     any state; the gyroscopic moment does no work. Rounding of sums of some hundred watts."""
-    machine = machine_of(dap.load("bodies2"))
-    assert machine.method == "unconstrained"
-    power, rate = power_and_rate(machine, 0.0, Motion(2, np.random.default_rng(seed)).u(0.1))
+    evaluator = evaluator_of(dap.load("bodies2"))
+    assert evaluator.method == "unconstrained"
+    power, rate = power_and_rate(evaluator, 0.0, Motion(2, np.random.default_rng(seed)).u(0.1))
     assert power == pytest.approx(rate, rel=1e-12)
 
 
@@ -272,12 +272,12 @@ def test_power_of_forces_on_free_bodies_is_the_rate_of_kinetic_energy(seed):
 def test_power_of_forces_and_drivers_is_the_rate_of_kinetic_energy(name, machines):
     """On the constraints the reactions work with nu alone: dT/dt = F . v + lambda . nu, to the
     1e-10 of the assembly times forces of some hundred newtons."""
-    machine = machines[name]
-    u = machine.model.u0.copy()
-    n = machine.model.body_count
+    evaluator = machines[name]
+    u = evaluator.model.u0.copy()
+    n = evaluator.model.body_count
     u[7 * n :] = np.random.default_rng(2).normal(size=6 * n)
-    u = correct_initial(machine, u).u
-    power, rate = power_and_rate(machine, 0.0, u)
+    u = correct_initial(evaluator, u).u
+    power, rate = power_and_rate(evaluator, 0.0, u)
     assert abs(rate) > 1e-3
     assert power == pytest.approx(rate, rel=1e-8)
 
@@ -286,6 +286,6 @@ def test_without_joints_both_formulations_agree():
     """The standard formulation of a scene without rows gives the unconstrained accelerations."""
     model = build_model(check(dap.load("bodies2"), load_registry()))
     u = Motion(2, np.random.default_rng(1)).u(0.1)
-    free, standard = (Machine(model, method) for method in ("unconstrained", "standard"))
+    free, standard = (Evaluator(model, method) for method in ("unconstrained", "standard"))
     assert close(free.rhs(0.0, u), standard.rhs(0.0, u), 1e-15)
     assert free.report(0.0, u)[-4:] == pytest.approx(standard.report(0.0, u)[-4:], rel=1e-15)

@@ -9,7 +9,7 @@ from dap3d_core.interface import Body, Force, Joint, Vector, body, number, vecto
 from dap3d_core.kernels import row
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import rotation, to_body, to_global
-from dap3d_core.model.state_layout import from_integrated, join, split, to_integrated
+from dap3d_core.model.state_layout import join, split, u_from_y, y_from_u
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
 from dap3d_core.scene.scene import AnimationPoint
@@ -289,9 +289,9 @@ def test_states_are_split_and_joined_without_loss():
 def test_the_integrated_state_has_body_components_and_work():
     """y is u with w' = A^T w and the work last; back again to rounding of two rotations."""
     u = RNG.normal(size=(6, 26))
-    y = to_integrated(u, work=2.5)
+    y = y_from_u(u, work=2.5)
     assert y.shape == (6, 27)
     assert np.array_equal(y[:, -1], np.full(6, 2.5))
     _, p, _, w = split(u)
     assert np.allclose(split(y)[3], np.einsum("...rc,...r->...c", rotation(p), w), atol=1e-14)
-    assert np.allclose(from_integrated(y), u, atol=1e-14)
+    assert np.allclose(u_from_y(y), u, atol=1e-14)

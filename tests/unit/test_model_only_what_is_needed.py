@@ -45,7 +45,7 @@ def test_a_model_loads_only_its_own_types(model, present, absent):
     script = (
         "import dap3d_core as dap\n"
         f"compiled = dap.compile(dap.load({model!r}))\n"
-        "print('loops', ' '.join(kind for kind, group in compiled.machine.what))\n"
+        "print('loops', ' '.join(kind for kind, group in compiled.evaluator.loop_groups))\n"
     )
     lines = run(f"{script}\n{MODULES}").splitlines()
     found = set(lines[-1].split())

@@ -47,7 +47,7 @@ def test_a_quick_change_in_a_long_rest_is_not_missed(integrator, function):
     compiled = dap.compile(turntable(**function))
     result = dap.simulate(compiled, t_end=10.0, dt=1.0, integrator=integrator,
                           rtol=1e-8, atol=1e-8)  # fmt: skip
-    turned = compiled.machine.function_values(10.0)[0, 0]
+    turned = compiled.evaluator.function_values(10.0)[0, 0]
     assert turned == pytest.approx(function.get("f_end", 1.0), abs=1e-12)
     assert angle(result) == pytest.approx(turned, abs=1e-5)
     assert any("aliasing" in note and note.startswith(INFORMATION) for note in result.notes)
@@ -129,7 +129,7 @@ def test_slow_functions_are_not_spoken_of():
     ],
 )
 def test_breaks_within_the_run(fields, breaks):
-    pace = dap.compile(turntable(**fields)).pace(10.0)
+    pace = dap.compile(turntable(**fields)).breakpoints(10.0)
     assert [t for t, anew in pace.stops if anew] == breaks
 
 
@@ -137,7 +137,7 @@ def test_a_smooth_spline_of_many_points_does_not_shorten_steps():
     """Of a table of a sine the ends alone are breaks: it bends everywhere."""
     x = np.linspace(-1.0, 11.0, 1201)
     scene = turntable(type="spline", x=x, y=np.sin(x))
-    stops = dap.compile(scene).pace(10.0).stops
+    stops = dap.compile(scene).breakpoints(10.0).stops
     assert len(stops) <= 20, "near the zeros of the sine alone, where three points are in line"
 
 
@@ -167,6 +167,6 @@ def test_breaks_of_own_types(tmp_path, breaks, words):
     compiled = dap.compile(tmp_path, allow_code=True)
     if words:
         with pytest.raises(PluginError, match=rf"plugin\.py.*Ramp\.breaks failed: {words}"):
-            compiled.pace(1.0)
+            compiled.breakpoints(1.0)
     else:
-        assert compiled.pace(1.0).stops == []
+        assert compiled.breakpoints(1.0).stops == []

@@ -97,7 +97,7 @@ def test_no_time_to_pass_solves_once():
     """t_end = 0: one instant, with the accelerations and multipliers of the start, and no step."""
     result = dap.simulate(dap.load("pen2"), t_end=0.0)
     compiled = dap.compile(dap.load("pen2"))
-    report = compiled.machine.report(0.0, compiled.model.u0)
+    report = compiled.evaluator.report(0.0, compiled.model.u0)
     assert result.t.tolist() == [0.0]
     assert np.array_equal(result.u[0], compiled.model.u0)
     assert np.array_equal(result.v_dot[0], report[:12])
@@ -428,7 +428,7 @@ def test_projection_holds_at_every_reported_state(model):
         result = dap.simulate(compiled, t_end=1.0, dt=0.004, rtol=1e-4, atol=1e-6, project=project)
         found = np.zeros(2)
         for t, u in zip(result.t, result.u, strict=True):
-            rows = compiled.machine.rows(t, u)
+            rows = compiled.evaluator.rows(t, u)
             velocity = rows.dense() @ u[7 * compiled.model.body_count :] - rows.nu
             found = np.maximum(found, [np.max(np.abs(rows.C)), np.max(np.abs(velocity))])
         worst[project] = found

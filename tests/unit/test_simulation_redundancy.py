@@ -36,9 +36,9 @@ def two_doors(gap=0.0):
 def elsewhere_of(scene):
     """Redundancy at the corrected start and at other poses."""
     compiled = dap.compile(scene)
-    u = correct_initial(compiled.machine, compiled.model.u0).u
+    u = correct_initial(compiled.evaluator, compiled.model.u0).u
     found = compiled.redundancy(u)
-    return found, redundancy_elsewhere(compiled.machine, u, found)
+    return found, redundancy_elsewhere(compiled.evaluator, u, found)
 
 
 # ------------------------------------------------------------------ who shares what
@@ -151,8 +151,8 @@ def test_other_poses_are_the_same_each_time():
     compiled = dap.compile(bricard())
     u = compiled.model.u0.copy()
     found = compiled.redundancy(u)
-    first = redundancy_elsewhere(compiled.machine, u, found)
-    assert first == redundancy_elsewhere(compiled.machine, u, found)
+    first = redundancy_elsewhere(compiled.evaluator, u, found)
+    assert first == redundancy_elsewhere(compiled.evaluator, u, found)
     assert np.array_equal(u, compiled.model.u0)
 
 
@@ -180,7 +180,7 @@ def test_the_count_does_not_depend_on_how_well_the_start_was_closed():
         u[:21] += 10.0 ** rng.uniform(-5, -1) * rng.normal(size=21)
         for b in range(3):
             u[7 * b + 3 : 7 * b + 7] /= np.linalg.norm(u[7 * b + 3 : 7 * b + 7])
-        found = correct_initial(compiled.machine, u)
+        found = correct_initial(compiled.evaluator, u)
         left_open.append(found.residual[0])
         assert compiled.redundancy(found.u).rank.redundant == 3
     assert max(left_open) > 1e-12  # some of them are far above rounding
@@ -206,7 +206,7 @@ def test_drivers_that_part_later_contradict_each_other_in_acceleration():
     scene.functions["fast_angle"].fields["coeff"] = (0.0, 2.0, 1.5)
     compiled = dap.compile(scene)
     assert compiled.redundancy().contradictions == ()  # at rest nothing can be said of gamma
-    start = correct_initial(compiled.machine, compiled.model.u0)
+    start = correct_initial(compiled.evaluator, compiled.model.u0)
     (contradiction,) = compiled.redundancy(start.u).contradictions
     assert (contradiction.level, contradiction.joints) == ("acceleration", ("slow", "fast"))
     assert contradiction.size == pytest.approx(3 / np.sqrt(2), rel=1e-12)
@@ -229,7 +229,7 @@ def test_joints_that_cannot_be_closed_are_named_and_the_others_are_not():
 def test_joints_that_are_merely_open_contradict_nothing(scene):
     """A start that a correction closes is no contradiction, neither before nor after it."""
     compiled = dap.compile(scene)
-    start = correct_initial(compiled.machine, compiled.model.u0)
+    start = correct_initial(compiled.evaluator, compiled.model.u0)
     assert compiled.redundancy().contradictions == ()
     assert compiled.redundancy(start.u).contradictions == ()
 
@@ -263,7 +263,7 @@ def test_what_is_said_to_be_unique_does_not_change_with_the_multipliers():
     each of the others moves; by the dense Jacobian."""
     compiled = dap.compile(four_bar_row(2, np.pi / 2))
     found = compiled.redundancy()
-    D = compiled.machine.rows(0.0, compiled.model.u0).dense()
+    D = compiled.evaluator.rows(0.0, compiled.model.u0).dense()
     left, _, _ = np.linalg.svd(D)
     null = left[:, found.rank.rank :]
     start = compiled.model.joint_start

@@ -24,8 +24,8 @@ from dap3d_core.simulation.redundancy import redundancy
 
 def corrected(scene, **options):
     """A scene's machine and its corrected start."""
-    machine = dap.compile(scene).machine
-    return machine, correct_initial(machine, machine.model.u0, **options)
+    evaluator = dap.compile(scene).evaluator
+    return evaluator, correct_initial(evaluator, evaluator.model.u0, **options)
 
 
 @pytest.fixture
@@ -60,10 +60,10 @@ def test_the_first_pass_is_the_least_change(monkeypatch):
     """A pass moves by -pinv(D) C of the position rows: r in metres, rotations in rad, to the second
     order of a rotation of 1e-3."""
     monkeypatch.setattr(assemble, "TOLERANCE", 1e-5)
-    machine, found = corrected(rough_four_bar())
+    evaluator, found = corrected(rough_four_bar())
     assert found.passes == 1
-    u0, n = machine.model.u0, 3
-    rows, keep = machine.rows(0.0, u0), machine.model.position_row
+    u0, n = evaluator.model.u0, 3
+    rows, keep = evaluator.rows(0.0, u0), evaluator.model.position_row
     change = -np.linalg.pinv(rows.dense()[keep]) @ rows.C[keep]
     shift, turn = change.reshape(n, 6)[:, :3], change.reshape(n, 6)[:, 3:]
     assert split(found.u)[0] - split(u0)[0] == pytest.approx(shift, abs=1e-15)
@@ -75,8 +75,8 @@ def test_the_first_pass_is_the_least_change(monkeypatch):
 def test_a_velocity_row_holds_nothing():
     """The crank of the rough four-bar leaves the vertical by 0.08 degrees (spec 8): its driver does
     not take part in the correction of positions."""
-    machine, found = corrected(rough_four_bar())
-    assert np.degrees(turn_of(machine.model.u0, found.u, 3)[0]) == pytest.approx(0.08, abs=0.005)
+    evaluator, found = corrected(rough_four_bar())
+    assert np.degrees(turn_of(evaluator.model.u0, found.u, 3)[0]) == pytest.approx(0.08, abs=0.005)
 
 
 @pytest.mark.parametrize("rows", ["few", "many"])
@@ -238,8 +238,8 @@ def test_the_metric_of_masses_weighs_rotations_by_inertia(rows, request):
 
 def test_equal_masses_make_no_difference_to_the_metric():
     """With every mass and inertia one, both metrics are the same."""
-    machine, unit = corrected(door(0.02))
-    mass = correct_initial(machine, machine.model.u0, metric="mass")
+    evaluator, unit = corrected(door(0.02))
+    mass = correct_initial(evaluator, evaluator.model.u0, metric="mass")
     assert mass.u == pytest.approx(unit.u, abs=1e-12)
 
 
@@ -272,12 +272,12 @@ def test_corrected_velocities_are_the_least_change():
     """v - pinv(D) (D v - nu) by numpy, and v = D v - nu = 0 after it; from rest and from others."""
     scene = dap.load("fourbar3")
     for seed in (None, 1, 2):
-        machine = dap.compile(scene).machine
-        u = machine.model.u0.copy()
+        evaluator = dap.compile(scene).evaluator
+        u = evaluator.model.u0.copy()
         if seed is not None:
             u[21:] = np.random.default_rng(seed).normal(size=18)
-        found = correct_initial(machine, u)
-        rows = machine.rows(0.0, found.u)
+        found = correct_initial(evaluator, u)
+        rows = evaluator.rows(0.0, found.u)
         D, v = rows.dense(), u[21:]
         wanted = v - np.linalg.pinv(D) @ (D @ v - rows.nu)
         assert found.u[21:] == pytest.approx(wanted, abs=1e-12)
@@ -298,8 +298,8 @@ def test_corrected_velocities_of_the_four_bar_are_those_of_the_specification():
 def test_a_good_start_is_left_alone():
     """pen2 is assembled: its state is used bit for bit, and nothing is noted."""
     scene = dap.load("pen2")
-    machine, found = corrected(scene)
-    assert np.array_equal(found.u, machine.model.u0)
+    evaluator, found = corrected(scene)
+    assert np.array_equal(found.u, evaluator.model.u0)
     assert (found.passes, found.moved, found.turned) == (0, 0.0, 0.0)
     result = dap.simulate(scene, t_end=0.0, correct=True)
     assert not any("corrected" in note for note in result.notes)
@@ -346,9 +346,9 @@ def test_without_correction_the_state_is_left_and_noted():
 
 def test_a_scene_without_joints_needs_no_correction():
     """Nothing is evaluated: no violation, no passes."""
-    machine, found = corrected(dap.load("bodies2"))
-    assert violation(machine, machine.model.u0) == (0.0, 0.0)
-    assert np.array_equal(found.u, machine.model.u0)
+    evaluator, found = corrected(dap.load("bodies2"))
+    assert violation(evaluator, evaluator.model.u0) == (0.0, 0.0)
+    assert np.array_equal(found.u, evaluator.model.u0)
 
 
 # ------------------------------------------------------------------ many rows
@@ -365,13 +365,13 @@ def test_the_correction_of_many_rows_is_that_of_few(scene, monkeypatch):
     _, few = corrected(scene)
     for module in (assemble, redundancy):
         monkeypatch.setattr(module, "DENSE_ROWS", 0)
-    machine, many = corrected(scene)
-    metric = machine.system.metric.copy()
+    evaluator, many = corrected(scene)
+    metric = evaluator.system.metric.copy()
     assert many.passes == few.passes > 0
     assert many.u == pytest.approx(few.u, abs=1e-10)
     assert max(many.residual) < 1e-9
     dap.compile(scene).redundancy()
-    assert np.array_equal(machine.system.metric, metric)  # masses are those of the model again
+    assert np.array_equal(evaluator.system.metric, metric)  # masses are those of the model again
 
 
 def test_contradictory_joints_of_many_rows_are_named(many_rows):

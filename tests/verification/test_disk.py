@@ -118,7 +118,7 @@ def test_a_tumbling_disk_keeps_its_energy(slip):
 def test_other_words_for_slip():
     """zn and zt are nz and tz."""
     for word, slip, rows in (("zn", "nz", 2), ("zt", "tz", 2)):
-        one, other = (dap.compile(disk(w)).machine.model for w in (word, slip))
+        one, other = (dap.compile(disk(w)).evaluator.model for w in (word, slip))
         assert one.row_count == rows
         assert one.joints[0].examined.type.__name__ == other.joints[0].examined.type.__name__
 

@@ -86,14 +86,14 @@ def test_a_run_is_the_same_however_it_is_cut(registry, integrator):
     """Bit for bit: all that decides where a step ends lies in the arrays of the integration."""
     ends = []
     for budget in (1, 7, 10**9):
-        machine = bouncing(registry).machine
-        u0 = machine.model.u0
-        machine.start(0.0, u0)
-        y0 = machine.integrated(u0)
+        evaluator = bouncing(registry).evaluator
+        u0 = evaluator.model.u0
+        evaluator.start(0.0, u0)
+        y0 = evaluator.integrated(u0)
         integration = RungeKutta(
-            TABLEAUS[integrator], machine.functions, machine.system, machine.loops, y0,
+            TABLEAUS[integrator], evaluator.functions, evaluator.system, evaluator.loops, y0,
             np.linspace(0.0, 2.0, 21), project_on=True, error_size=len(y0) - 1,
-            report_size=machine.report_size, ends=effects_of(machine.switches),
+            report_size=evaluator.report_size, ends=effects_of(evaluator.switches),
         )  # fmt: skip
         while integration.status is Status.RUNNING:
             integration.advance(budget)

@@ -109,9 +109,9 @@ def test_a_scene_without_friction_compiles_and_keeps_nothing_of_it():
     """No loop, no memory: the arrays are empty."""
     scene = incline(0.0)
     del scene.forces["rub"]
-    system = dap.compile(scene).machine.system
+    system = dap.compile(scene).evaluator.system
     assert system.friction.size == 0
-    assert "friction" not in {kind for kind, _ in dap.compile(scene).machine.what}
+    assert "friction" not in {kind for kind, _ in dap.compile(scene).evaluator.loop_groups}
 
 
 def test_a_joint_without_friction_is_named():

@@ -18,43 +18,43 @@ def driven(keyword, **fields):
     scene.add_body("a", mass=1.0, Jp=(1.0, 1.0, 1.0))
     scene.add_function(keyword, "curve", **fields)
     scene.add_joint("drive-tran", "drive", body_i="a", a_j="ground.x", function="curve")
-    return dap.compile(scene).machine
+    return dap.compile(scene).evaluator
 
 
-def values(machine, x):
+def values(evaluator, x):
     """(f, f', f'', f''') at x as the compiled driver has them."""
-    machine.rows(x, machine.model.u0)
-    return machine.system.F[1, :4].copy()
+    evaluator.rows(x, evaluator.model.u0)
+    return evaluator.system.F[1, :4].copy()
 
 
 def test_a_spline_is_the_natural_cubic_spline():
     """Value and derivatives are scipy's, inside and at the points; rounding of 1e2 remains."""
-    machine, curve = driven("spline", x=X, y=Y), CubicSpline(X, Y, bc_type="natural")
+    evaluator, curve = driven("spline", x=X, y=Y), CubicSpline(X, Y, bc_type="natural")
     for x in [*np.linspace(0.2, 1.999, 41), *X[:-1]]:
         expected = [float(curve(x, order)) for order in range(4)]
-        assert values(machine, x) == pytest.approx(expected, abs=1e-11)
-    assert [values(machine, x)[0] for x in X] == pytest.approx(Y, abs=1e-14)
+        assert values(evaluator, x) == pytest.approx(expected, abs=1e-11)
+    assert [values(evaluator, x)[0] for x in X] == pytest.approx(Y, abs=1e-14)
 
 
 def test_a_spline_goes_on_straight():
     """Beyond its ends f goes on with the slope there; f, f', f'' are continuous at all points."""
-    machine, curve = driven("spline", x=X, y=Y), CubicSpline(X, Y, bc_type="natural")
+    evaluator, curve = driven("spline", x=X, y=Y), CubicSpline(X, Y, bc_type="natural")
     for end, reach in ((0, (0.15, 0.0, -3.0)), (-1, (2.05, 9.0))):
         for x in reach:
             slope = float(curve(X[end], 1))
             expected = [Y[end] + slope * (x - X[end]), slope, 0.0, 0.0]
-            assert values(machine, x) == pytest.approx(expected, abs=1e-11)
+            assert values(evaluator, x) == pytest.approx(expected, abs=1e-11)
     for x in X:
-        before, after = values(machine, x - 1e-9), values(machine, x + 1e-9)
+        before, after = values(evaluator, x - 1e-9), values(evaluator, x + 1e-9)
         # third derivatives of some 600 change f'' by 1.3e-6 over 2e-9
         assert before[:3] == pytest.approx(after[:3], abs=2e-6)
 
 
 def test_a_spline_through_two_points_is_a_line():
     """The least a spline takes."""
-    machine = driven("spline", x=[1.0, 3.0], y=[2.0, -2.0])
+    evaluator = driven("spline", x=[1.0, 3.0], y=[2.0, -2.0])
     for x in (-1.0, 1.0, 2.5, 3.0, 8.0):
-        assert values(machine, x) == pytest.approx([4.0 - 2.0 * x, -2.0, 0.0, 0.0], abs=1e-14)
+        assert values(evaluator, x) == pytest.approx([4.0 - 2.0 * x, -2.0, 0.0, 0.0], abs=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -75,14 +75,14 @@ def test_a_spline_that_cannot_be(fields, words):
 def test_a_step_is_the_cubic():
     """3 u^2 - 2 u^3 between, constant before and after, and its derivatives."""
     fields = {"x_start": 0.5, "x_end": 2.5, "f_start": 1.0, "f_end": -3.0}
-    machine, h, D = driven("step", **fields), -4.0, 2.0
+    evaluator, h, D = driven("step", **fields), -4.0, 2.0
     for x in (0.5, 0.9, 1.5, 2.5):
         u = (x - 0.5) / D
         expected = [1 + h * (3 * u**2 - 2 * u**3), h * 6 * u * (1 - u) / D,
                     h * (6 - 12 * u) / D**2, -12 * h / D**3]  # fmt: skip
-        assert values(machine, x) == pytest.approx(expected, abs=1e-14)
-    assert values(machine, 0.4) == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=0.0)
-    assert values(machine, 2.6) == pytest.approx([-3.0, 0.0, 0.0, 0.0], abs=1e-15)
+        assert values(evaluator, x) == pytest.approx(expected, abs=1e-14)
+    assert values(evaluator, 0.4) == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=0.0)
+    assert values(evaluator, 2.6) == pytest.approx([-3.0, 0.0, 0.0, 0.0], abs=1e-15)
     with pytest.raises(ValueError, match="x_end = 0 must lie beyond x_start = 1"):
         Step(x_start=1.0, x_end=0.0, f_start=0.0, f_end=1.0).prepare({})
 

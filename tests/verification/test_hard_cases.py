@@ -15,7 +15,7 @@ from support import mechanisms, redundant
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.formulations.pivots import poor_rows, watch_pivots
+from dap3d_core.formulations.pivots import near_singular_rows, store_reference_pivots
 
 sys.path.append(str(REPOSITORY / "benchmarks"))
 
@@ -151,15 +151,15 @@ def test_poor_rows_are_those_of_a_singular_pose_alone():
     compiled = dap.compile(scenes.heavy_bob(1e6))
     swung = dap.simulate(compiled, t_end=0.4, dt=0.2)
     assert abs(swung.r[-1, 1, 1]) > 0.5
-    watch_pivots(compiled.machine, 0.0, swung.u[0])
-    compiled.machine.place(0.0, swung.u[-1])
-    assert len(poor_rows(compiled.machine, 0.0)) == 0
+    store_reference_pivots(compiled.evaluator, 0.0, swung.u[0])
+    compiled.evaluator.place(0.0, swung.u[-1])
+    assert len(near_singular_rows(compiled.evaluator, 0.0)) == 0
 
     upright, flat = (mechanisms.four_bar_row(1, angle) for angle in (0.0, np.pi / 2 - 1e-3))
     compiled = dap.compile(upright)
-    watch_pivots(compiled.machine, 0.0, compiled.model.u0)
-    compiled.machine.place(0.0, dap.compile(flat).model.u0)
-    assert len(poor_rows(compiled.machine, 0.0)) > 0
+    store_reference_pivots(compiled.evaluator, 0.0, compiled.model.u0)
+    compiled.evaluator.place(0.0, dap.compile(flat).model.u0)
+    assert len(near_singular_rows(compiled.evaluator, 0.0)) > 0
 
 
 def test_velocities_are_projected_though_old_factors_do_not_serve():

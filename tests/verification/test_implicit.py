@@ -99,12 +99,14 @@ def test_order_on_the_pendulum():
 def test_order_of_the_multipliers_of_the_stages():
     """A01: lambda of the last stage converges with the stage order 3, mu vanishes (HW VII.4)."""
     compiled = dap.compile(problems.pendulum())
-    machine, u = compiled.machine, compiled.start(True, ()).u
+    evaluator, u = compiled.evaluator, compiled.start(True, ()).u
     errors, held = [], []
     for n in (20, 40, 80):
-        machine.start(0.0, u)
-        run = RadauIntegration(machine, machine.integrated(u), [0.0, 1.0], step=1.0 / n, rtol=1e-13,
-                               atol=1e-14, report_size=machine.report_size)  # fmt: skip
+        evaluator.start(0.0, u)
+        run = RadauIntegration(
+            evaluator, evaluator.integrated(u), [0.0, 1.0], step=1.0 / n, rtol=1e-13, atol=1e-14,
+            report_size=evaluator.report_size,
+        )  # fmt: skip
         while run.advance(10**9) is Status.RUNNING:
             pass
         mu, lam = run.multipliers

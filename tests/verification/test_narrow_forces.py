@@ -131,9 +131,9 @@ def test_scenes_without_such_functions_watch_nothing():
             scene.add_function(function.pop("type"), "f", **function)
             given = {"function": "f"}
         scene.add_force("ptp", "spring", P_i="m.O", P_j="ground.O", k=1.0, l0=0.5, **given)
-        machine = dap.compile(scene).machine
-        assert machine.switches == ()
-        assert not any(kind == "knot" for kind, _ in machine.what)
+        evaluator = dap.compile(scene).evaluator
+        assert evaluator.switches == ()
+        assert not any(kind == "knot" for kind, _ in evaluator.loop_groups)
 
 
 class Untold(Function):

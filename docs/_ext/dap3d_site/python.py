@@ -13,18 +13,18 @@ SECTIONS = {
     ),
     "Runs": (
         ("simulate", "compile", "Event", "resume", "rerun"),
-        ("simulation.CompiledModel", "simulation.Instant", "simulation.Standing",
-         "simulation.Repetition"),
+        ("simulation.CompiledModel", "simulation.Instant", "simulation.RunProgress",
+         "simulation.Reproduction"),
     ),
     "Results": (
         ("Result", "open", "plot", "view", "animate", "export"),
         ("result.Reaction", "result.Energy", "result.Entry", "result.ErrorEstimate",
-         "result.Occurrence", "result.Quantity", "result.Statistics", "plot.Film"),
+         "result.EventRecord", "result.Quantity", "result.RunStatistics", "plot.Film"),
     ),
     "Studies": (("sweep", "open_sweep", "fit", "Fit", "Parameter"), ()),
     "Reports": (
         ("report",),
-        ("report.Report", "report.Run", "report.Setting", "report.Recommendation",
+        ("report.Report", "report.MeasuredRun", "report.Setting", "report.Recommendation",
          "report.Reference"),
     ),
     "Types": (("load_registry",), ("registry.Registry", "registry.PluginInfo")),

@@ -90,7 +90,7 @@ class System(LoopArrays):
 #: (``smallest``), or scratch: a right-hand side, projection, report or stage writes what it reads,
 #: factors too. A projection may use those of the right-hand side before it: both are of one step.
 #: No iteration begins with what another left, so that equal states have equal rates.
-KEPT = ("par", "settings")
+CHECKPOINTED = ("par", "settings")
 
 STEP = step_signature(System.type_of())
 STEPS = Table(STEP)

@@ -13,7 +13,7 @@ from dap3d_core.assembly.arrays import VALUE, Floats, System
 from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unscaled
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.kernels.runtime.array_struct import pointer
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 
 @compiled
@@ -77,14 +77,14 @@ def place(t: float, y: Floats, system: System, loops: Any) -> None:
     call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
 
 
-@compiled_inside
+@compiled
 def zero(values: Floats) -> None:
     """Fill with zeros (a slice assignment would compile numpy's error messages)."""
     for k in range(values.shape[0]):
         values[k] = 0.0
 
 
-@compiled_inside
+@compiled
 def scale_forces(body: Floats, metric: Floats, force: Floats, out: Floats) -> float:
     """Scaled right-hand side of the bodies into out, from forces; returns the power of these.
 
@@ -109,7 +109,7 @@ def scale_forces(body: Floats, metric: Floats, force: Floats, out: Floats) -> fl
     return power
 
 
-@compiled_inside
+@compiled
 def scale_velocities(body: Floats, metric: Floats, out: Floats) -> None:
     """The velocities of the bodies in scaled coordinates: (sqrt(m) v, L^T w')."""
     for b in range(1, body.shape[0]):
@@ -119,7 +119,7 @@ def scale_velocities(body: Floats, metric: Floats, out: Floats) -> None:
         out[o + 3], out[o + 4], out[o + 5] = scaled(k, w0, w1, w2)
 
 
-@compiled_inside
+@compiled
 def rates(y: Floats, metric: Floats, acceleration: Floats, out: Floats) -> None:
     """dy/dt: of coordinates from y, of velocities from the scaled accelerations."""
     n, a = metric.shape[0] - 1, acceleration
@@ -137,7 +137,7 @@ def rates(y: Floats, metric: Floats, acceleration: Floats, out: Floats) -> None:
         out[f + 3], out[f + 4], out[f + 5] = a0, a1, a2
 
 
-@compiled_inside
+@compiled
 def global_accelerations(metric: Floats, acceleration: Floats, out: Floats) -> None:
     """v_dot (6 n: r_ddot, omega_dot, global) from the scaled accelerations: omega_dot = B a."""
     for b in range(1, metric.shape[0]):
@@ -148,7 +148,7 @@ def global_accelerations(metric: Floats, acceleration: Floats, out: Floats) -> N
             out[o - 3 + c] = k[7 + 3 * c] * a0 + k[8 + 3 * c] * a1 + k[9 + 3 * c] * a2
 
 
-@compiled_inside
+@compiled
 def largest_weighted(values: Floats, weights: Floats) -> float:
     """Largest magnitude of values times weights; NaN where one is NaN."""
     found = 0.0
@@ -159,7 +159,7 @@ def largest_weighted(values: Floats, weights: Floats) -> float:
     return found
 
 
-@compiled_inside
+@compiled
 def largest(values: Floats) -> float:
     """Largest magnitude; NaN where one is NaN."""
     found = 0.0

@@ -5,10 +5,10 @@ import numpy as np
 from dap3d_core.assembly.arrays import Floats
 from dap3d_core.assembly.metric import unscaled
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 
-@compiled_inside
+@compiled
 def normalise(y: Floats, n: int) -> None:
     """Bring the Euler parameters of n bodies to unit length."""
     for b in range(1, n + 1):
@@ -19,7 +19,7 @@ def normalise(y: Floats, n: int) -> None:
             y[d] *= h
 
 
-@compiled_inside
+@compiled
 def add_displacement(y: Floats, metric: Floats, change: Floats, out: Floats) -> None:
     """Add r and p's share of a scaled displacement (or its rate); out may be y."""
     for b in range(1, metric.shape[0]):
@@ -35,7 +35,7 @@ def add_displacement(y: Floats, metric: Floats, change: Floats, out: Floats) -> 
         out[c + 6] += -e2 * w0 + e1 * w1 + e0 * w2
 
 
-@compiled_inside
+@compiled
 def add_velocity(metric: Floats, change: Floats, out: Floats) -> None:
     """Add a scaled velocity to the velocities (6 n,)."""
     for b in range(1, metric.shape[0]):
@@ -48,20 +48,20 @@ def add_velocity(metric: Floats, change: Floats, out: Floats) -> None:
         out[f + 5] += w2
 
 
-@compiled_inside
-def move(y: Floats, metric: Floats, change: Floats) -> None:
+@compiled
+def apply_displacement(y: Floats, metric: Floats, change: Floats) -> None:
     """Add a scaled displacement: r += dr, p += 1/2 L^T dtheta', of unit length again."""
     add_displacement(y, metric, change, y)
     normalise(y, metric.shape[0] - 1)
 
 
-@compiled_inside
-def change_velocity(y: Floats, metric: Floats, change: Floats) -> None:
+@compiled
+def apply_velocity_change(y: Floats, metric: Floats, change: Floats) -> None:
     """Add a scaled change of velocity to the velocities."""
     add_velocity(metric, change, y[velocity_offset(1, metric.shape[0] - 1) :])
 
 
-@compiled_inside
+@compiled
 def size_of_positions(y: Floats, n: int, length: float) -> float:
     """The length of the scene and the largest coordinate of n bodies: scale of a tolerance, m."""
     found = 0.0
@@ -72,7 +72,7 @@ def size_of_positions(y: Floats, n: int, length: float) -> float:
     return length + found
 
 
-@compiled_inside
+@compiled
 def size_of_velocities(y: Floats, n: int, length: float) -> float:
     """The same of velocities, m/s: of a radian that length."""
     found = 0.0

@@ -10,7 +10,7 @@ from dap3d_core.linear.ldlt.plan import Plan
 
 
 @attrs.frozen
-class Rows:
+class ConstraintRows:
     """The constraint rows of a model at one state, in the order of the model.
 
     Attributes:
@@ -40,7 +40,7 @@ class Rows:
         return csr_array((self.value, (self.row, self.column)), shape=self.shape)
 
 
-def scaled_rows(rows: Rows, length: float) -> tuple[Rows, Floats]:
+def scaled_rows(rows: ConstraintRows, length: float) -> tuple[ConstraintRows, Floats]:
     """Rows whose gradients have unit length, of displacements in units of a length, m; and lengths.
 
     Neither depends on the units of the scene. A row without gradient stays as it is.

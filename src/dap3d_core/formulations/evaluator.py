@@ -26,19 +26,19 @@ from dap3d_core.assembly.arrays import (
 from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 from dap3d_core.formulations import FORMULATIONS, REPORT, RHS
 from dap3d_core.formulations.arrays import build_loops, build_system, load_numbers
-from dap3d_core.formulations.constraint_rows import Rows, jacobian_pattern, scaled_rows
+from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pattern, scaled_rows
 from dap3d_core.formulations.switches import Switch, switches_of
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import to_body, to_global
-from dap3d_core.model.state_layout import split, to_integrated, velocities_of
+from dap3d_core.model.state_layout import split, velocities_of, y_from_u
 
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
-AS_COMPILED = np.errstate(all="ignore")
+IGNORE_FLOAT_ERRORS = np.errstate(all="ignore")
 
 
-class Machine:
+class Evaluator:
     """Evaluates one model by one formulation. Not for two threads at once: its arrays are its own.
 
     Attributes:
@@ -59,9 +59,9 @@ class Machine:
         self.model = model
         self.formulation = FORMULATIONS[method]
         self.plan: Plan = make_plan(model.body_count, model.joint_slots, model.joint_rows.tolist())
-        self.loops, self.what = build_loops(model, self.formulation.loops, announce)
-        self.system: System = build_system(model, self.plan, self.what)
-        self.start_functions()
+        self.loops, self.loop_groups = build_loops(model, self.formulation.loops, announce)
+        self.system: System = build_system(model, self.plan, self.loop_groups)
+        self.store_initial_function_values()
         self._weigh_rows()
         self.report_size = model.report_layout.size
         self.length_count = len(self.plan.nodes) - 1
@@ -80,10 +80,10 @@ class Machine:
     @cached_property
     def switches(self) -> tuple[Switch, ...]:
         """The switches of the model's elements, in the order in which ``watch`` gives them."""
-        return switches_of(self.what)
+        return switches_of(self.loop_groups)
 
     @property
-    def unsettled(self) -> int:
+    def friction_failure_count(self) -> int:
         """How often since the start the multipliers did not settle with friction."""
         return int(self.system.settings[UNSETTLED])
 
@@ -103,13 +103,13 @@ class Machine:
         Raises:
             ValueError: the structure is another.
         """
-        self.what = load_numbers(self.system, self.model, model, self.what)
+        self.loop_groups = load_numbers(self.system, self.model, model, self.loop_groups)
         self.model = model
         self.__dict__.pop("switches", None)  # they name groups
-        self.start_functions()
+        self.store_initial_function_values()
         self._weigh_rows()
 
-    @AS_COMPILED
+    @IGNORE_FLOAT_ERRORS
     def start(self, t: float, u: ArrayLike) -> None:
         """Make ready for a run from a state u (13 n,): whole turns are counted from here."""
         for places in self.turn_places():
@@ -121,21 +121,21 @@ class Machine:
 
     def turn_places(self) -> Iterator[slice]:
         """Where in ``par`` the turns of angles are counted."""
-        for q, (kind, group) in enumerate(self.what):
+        for q, (kind, group) in enumerate(self.loop_groups):
             if kind == "angle":
                 p0, width = int(self.system.groups[q, 1]), group.examined.layout.par_width
                 for offset in group.examined.layout.angles.values():
                     for k in range(offset, offset + ANGLE_WIDTH):
                         yield slice(p0 + k, p0 + width * group.count, width)
 
-    @AS_COMPILED
-    def start_functions(self, t: float = 0.0) -> None:
+    @IGNORE_FLOAT_ERRORS
+    def store_initial_function_values(self, t: float = 0.0) -> None:
         """Keep each function's value at the start, for drivers that count from it."""
         s = self.system
         self._call(VALUE, t, s.force, s.force, s.force)
         s.F[:, 4] = s.F[:, 0]
 
-    @AS_COMPILED
+    @IGNORE_FLOAT_ERRORS
     def function_values(self, t: float) -> Floats:
         """(functions, 4) values of the functions of time and their first three derivatives at t."""
         s = self.system
@@ -155,9 +155,9 @@ class Machine:
 
     def integrated(self, u: ArrayLike) -> Floats:
         """The integrated state y (13 n + 1,) of a state u (13 n,)."""
-        return to_integrated(np.asarray(u, dtype=float))
+        return y_from_u(np.asarray(u, dtype=float))
 
-    @AS_COMPILED
+    @IGNORE_FLOAT_ERRORS
     def rhs(self, t: float, u: ArrayLike) -> Floats:
         """du/dt (13 n,) at time t in s and state u (13 n,).
 
@@ -170,7 +170,7 @@ class Machine:
         w_dot[:] = to_global(split(y)[1], w_dot)  # omega_dot = A omega'_dot, no extra term
         return out[:-1]
 
-    @AS_COMPILED
+    @IGNORE_FLOAT_ERRORS
     def rates(self, t: float, u: ArrayLike, v_dot: Floats) -> Floats:
         """dy/dt (13 n + 1,) with given accelerations (6 n,): r_ddot, omega_dot of each body."""
         y = self.integrated(u)
@@ -181,7 +181,7 @@ class Machine:
         w_dot[:] = to_body(split(y)[1], w_dot)
         return out
 
-    @AS_COMPILED
+    @IGNORE_FLOAT_ERRORS
     def report(self, t: float, u: ArrayLike) -> Floats:
         """What a run reports at a state, (report_size,).
 
@@ -192,7 +192,7 @@ class Machine:
         self.functions[REPORT](float(t), self.integrated(u), out, self.system, self.loops)
         return out
 
-    @AS_COMPILED
+    @IGNORE_FLOAT_ERRORS
     def applied_forces(self, t: float, u: ArrayLike) -> Floats:
         """Force and moment about the mass centre on each body, (n, 6), those of joints left out."""
         s = self.system
@@ -201,8 +201,8 @@ class Machine:
         call_kinds(VALUE, WRENCH, float(t), s, self.loops, s.force, s.force, s.force)
         return s.force[6:].reshape(-1, 6).copy()
 
-    @AS_COMPILED
-    def rows(self, t: float, u: ArrayLike) -> Rows:
+    @IGNORE_FLOAT_ERRORS
+    def rows(self, t: float, u: ArrayLike) -> ConstraintRows:
         """All constraint rows at time t and state u (13 n,)."""
         s = self.system
         self.place(t, u)
@@ -211,7 +211,9 @@ class Machine:
         self._call(ACCELERATION, t, s.D, s.gamma, s.nu)
         row, column, place = self.pattern
         shape = (self.model.row_count, 6 * self.model.body_count)
-        return Rows(s.residual[s.row], s.nu[s.row], s.gamma[s.row], row, column, s.D[place], shape)
+        return ConstraintRows(
+            s.residual[s.row], s.nu[s.row], s.gamma[s.row], row, column, s.D[place], shape
+        )
 
     def _weigh_rows(self) -> None:
         """Weights of the rows, of residuals in m; in scenes of ordinary size they stay as they are.
@@ -227,7 +229,7 @@ class Machine:
             good = np.where(np.isfinite(gradients), gradients, 1.0)
             self.system.weight[self.system.row] = model.length / good
 
-    @AS_COMPILED
+    @IGNORE_FLOAT_ERRORS
     def place(self, t: float, u: ArrayLike) -> None:
         """Place the bodies of a state u (13 n,) and evaluate the functions of time."""
         s = self.system

@@ -29,7 +29,7 @@ from dap3d_core.formulations.common.constraints import (
     solve_rows,
 )
 from dap3d_core.formulations.regularised import accelerate
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.ldlt.factor import assemble, factor, regularise, weigh_rows
 
 #: For the least multipliers: e as part of the longest row's square, and passes at most. More of
@@ -40,8 +40,8 @@ LEAST_PART, LEAST_SOLVES = 1e-5, 50
 TAKEN, SMALLER, SMALLEST = 1e-9, 1e-2, 1e-12
 
 
-@compiled_inside
-def take_least(system: System) -> None:
+@compiled
+def minimum_norm_multipliers(system: System) -> None:
     """Replace ``multipliers`` by the least ones that give the same D^T lambda.
 
     With one weight e for all rows, n -> e (D^ D^^T + e)^-1 n keeps what D^T does not see, and
@@ -57,14 +57,14 @@ def take_least(system: System) -> None:
         n[k] = total[k]
     e, seen = LEAST_PART * longest, np.inf
     while seen > TAKEN * np.sqrt(longest) * largest(total) and e > SMALLEST * longest:
-        seen = keep_unseen(system, n, e)
+        seen = null_space_component(system, n, e)
         e *= SMALLER
     for k in range(n.shape[0]):
         system.multipliers[k] = total[k] - n[k]
 
 
-@compiled_inside
-def keep_unseen(system: System, n: Floats, e: float) -> float:
+@compiled
+def null_space_component(system: System, n: Floats, e: float) -> float:
     """Take from n what D^T sees, as far as a weight e does; the largest seen of the rest."""
     x, before = system.multipliers, np.inf
     for k in range(x.shape[0]):
@@ -110,5 +110,5 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     accelerate(t, y, system, loops)
     global_accelerations(system.metric, system.acceleration, out)
     report_levels(t, out, system, loops)
-    take_least(system)
+    minimum_norm_multipliers(system)
     report_multipliers(system, out)

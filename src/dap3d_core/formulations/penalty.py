@@ -34,12 +34,12 @@ from dap3d_core.formulations.common.constraints import (
     solve_rows,
     velocity_residuals,
 )
-from dap3d_core.formulations.common.friction import solve_rubbing
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.formulations.common.friction import solve_with_friction
+from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.ldlt.factor import assemble, factor, regularise
 
 
-@compiled_inside
+@compiled
 def solve(system: System) -> None:
     """``acceleration`` and ``multipliers`` from scaled forces, gamma' in ``right_side``."""
     for k in range(system.right_side.shape[0]):
@@ -47,7 +47,7 @@ def solve(system: System) -> None:
     solve_rows(system, system.acceleration)
 
 
-@compiled_inside
+@compiled
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled ``acceleration`` and ``multipliers``; returns the power of forces and drivers."""
     force, right_side, residual = system.force, system.right_side, system.residual
@@ -68,7 +68,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     assemble(system.targets, system.contributions, system.D, system.K)
     regularise(system.nodes, system.compliance, system.K)
     factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
-    power += solve_rubbing(t, system, loops, solve)
+    power += solve_with_friction(t, system, loops, solve)
     return power + power_of_drivers(system)
 
 

@@ -15,7 +15,7 @@ from dap3d_core.formulations.common.constraints import (
     solve_equations,
     solve_rows,
 )
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: How often the rows are solved.
 SOLVES = 3
@@ -23,13 +23,13 @@ SOLVES = 3
 MORE_SOLVES, FALLING = 12, 0.5
 
 
-@compiled_inside
+@compiled
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled ``acceleration`` and ``multipliers``; returns the power of forces and drivers."""
     return solve_equations(t, y, system, loops, PART, solve)
 
 
-@compiled_inside
+@compiled
 def solve(system: System) -> None:
     """``acceleration`` and ``multipliers`` from the scaled forces in ``acceleration``.
 
@@ -50,7 +50,7 @@ def solve(system: System) -> None:
         system.multipliers[k] = system.total[k]
 
 
-@compiled_inside
+@compiled
 def add_pass(system: System) -> None:
     """Solve for what the accelerations leave of the rows; ``total`` takes the change of -lambda."""
     multipliers, total = system.multipliers, system.total

@@ -23,10 +23,10 @@ from dap3d_core.assembly.evaluate import (
     zero,
 )
 from dap3d_core.assembly.state_update import normalise
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 
-@compiled_inside
+@compiled
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled ``acceleration``; returns the power of the forces."""
     body, metric, force = system.body, system.metric, system.force

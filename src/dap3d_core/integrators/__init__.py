@@ -5,13 +5,13 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.runge_kutta.dop853 import DOP853
 from dap3d_core.integrators.runge_kutta.dopri5 import DOPRI5
 from dap3d_core.integrators.runge_kutta.integration import RungeKutta
 from dap3d_core.integrators.runge_kutta.rk4 import RK4
 from dap3d_core.integrators.runge_kutta.tableau import Tableau
-from dap3d_core.integrators.stepping.integration import Integration, Statistics
+from dap3d_core.integrators.stepping.integration import Integration, StepCounts
 from dap3d_core.integrators.stepping.integration_state import Status
 
 #: The explicit Runge-Kutta methods by name.
@@ -19,31 +19,31 @@ TABLEAUS: dict[str, Tableau] = {method.name: method for method in (DOP853, DOPRI
 
 
 def _explicit(name: str) -> Callable[..., Integration]:
-    def make(machine: Machine, y0: Any, times: Any, **options: Any) -> Integration:
-        functions, system, loops = machine.functions, machine.system, machine.loops
-        options |= _placed_steps(machine)
+    def make(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integration:
+        functions, system, loops = evaluator.functions, evaluator.system, evaluator.loops
+        options |= _placed_steps(evaluator)
         return RungeKutta(TABLEAUS[name], functions, system, loops, y0, times, **options)
 
     return make
 
 
-def _adams(machine: Machine, y0: Any, times: Any, **options: Any) -> Integration:
+def _adams(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integration:
     from dap3d_core.integrators.adams.integration import AdamsIntegration
 
-    functions, system, loops = machine.functions, machine.system, machine.loops
-    options |= _placed_steps(machine)
+    functions, system, loops = evaluator.functions, evaluator.system, evaluator.loops
+    options |= _placed_steps(evaluator)
     return AdamsIntegration(functions, system, loops, y0, times, **options)
 
 
-def _radau(machine: Machine, y0: Any, times: Any, **options: Any) -> Integration:
+def _radau(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integration:
     from dap3d_core.integrators.radau.integration import RadauIntegration
 
-    return RadauIntegration(machine, y0, times, **options)
+    return RadauIntegration(evaluator, y0, times, **options)
 
 
-def _placed_steps(machine: Machine) -> dict[str, Any]:
+def _placed_steps(evaluator: Evaluator) -> dict[str, Any]:
     """Options of explicit integrators for singular poses and the counting of turns."""
-    return {"length_count": machine.length_count, "watched": machine.counts_turns}
+    return {"length_count": evaluator.length_count, "watched": evaluator.counts_turns}
 
 
 @attrs.frozen
@@ -91,7 +91,7 @@ __all__ = [
     "Integration",
     "Integrator",
     "RungeKutta",
-    "Statistics",
+    "StepCounts",
     "Status",
     "Tableau",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.interface.body_pose import BodyPose
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.instance_layout import shape_of, size
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.specialise import (
@@ -53,7 +53,7 @@ class Group:
         joints: (m,) of friction, the joints it acts in; None for all else.
     """
 
-    examined: Examined
+    examined: TypeInfo
     members: Integers
     bodies: Integers
     functions: Integers
@@ -131,7 +131,7 @@ class Grouping:
         """
         by_type: dict[Any, list[tuple[int, Instance, int, Instance]]] = {}
         for place, force in forces:
-            row, joint = joints[force.values[force.examined.rubs_in]]
+            row, joint = joints[force.values[force.examined.friction_joint]]
             by_type.setdefault(joint.examined.type, []).append((place, force, row, joint))
         return _each(self._friction, by_type.values())
 
@@ -194,11 +194,11 @@ class Grouping:
 
     def _with_functions(
         self,
-        examined: Examined,
+        examined: TypeInfo,
         functions: list[dict[str, Instance]],
         numbers: Floats,
         members: Sequence[int],
-    ) -> tuple[Examined, Floats, list[tuple[int, int, Floats]]]:
+    ) -> tuple[TypeInfo, Floats, list[tuple[int, int, Floats]]]:
         """The type with its functions known, their numbers behind its own, their tables."""
         types = {field: f.examined for field, f in functions[0].items()}
         tables: list[tuple[int, int, Floats]] = []
@@ -218,7 +218,7 @@ class Grouping:
         return bind_functions(examined, types, counts), numbers, tables
 
     def _numbers(
-        self, examined: Examined, instances: list[Instance], members: Sequence[int]
+        self, examined: TypeInfo, instances: list[Instance], members: Sequence[int]
     ) -> tuple[Floats, list[tuple[int, int, Floats]]]:
         """(m, par_width) numbers of all instances, from their fields and ``prepare``; tables."""
         given, fields = [i.values for i in instances], specs_of(examined.type)
@@ -286,7 +286,7 @@ def _prepares(type_: Any) -> bool:
 
 
 def _prepared(
-    examined: Examined,
+    examined: TypeInfo,
     fields: Mapping[str, FieldSpec],
     instance: Instance,
     member: int,

@@ -21,7 +21,7 @@ from dap3d_core.model.state_layout import (
     row_layout,
     state_layout,
 )
-from dap3d_core.scene import Checked, Instance
+from dap3d_core.scene import Instance, ValidatedScene
 
 #: Sizes, m, of ordinary scenes: their tolerances are in metres as they are.
 ORDINARY = 0.03, 30.0
@@ -201,7 +201,7 @@ class ModelError(ValueError):
         self.faults = faults
 
 
-def build_model(checked: Checked) -> Model:
+def build_model(checked: ValidatedScene) -> Model:
     """Turn a checked scene into a model.
 
     Raises:
@@ -246,15 +246,15 @@ def build_model(checked: Checked) -> Model:
 class _Groups:
     """The groups of a scene's elements; each kind names its own elements where one is refused."""
 
-    def __init__(self, checked: Checked, poses: "_Poses") -> None:
+    def __init__(self, checked: ValidatedScene, poses: "_Poses") -> None:
         n = len(checked.body_names)
         kinds = ("joint", "force", "function")
         by_kind = {k: Grouping(k, poses, n, checked.functions) for k in kinds}
         every = (*checked.joints, *checked.forces)
         used = {place - 1 for instance in every for place in instance.functions}
         functions = [(k, f) for k, f in enumerate(checked.functions) if k in used]
-        through = [(k, f) for k, f in enumerate(checked.forces) if f.examined.rubs_in]
-        direct = [(k, f) for k, f in enumerate(checked.forces) if not f.examined.rubs_in]
+        through = [(k, f) for k, f in enumerate(checked.forces) if f.examined.friction_joint]
+        direct = [(k, f) for k, f in enumerate(checked.forces) if not f.examined.friction_joint]
         joints = {j.name: (k, j) for k, j in enumerate(checked.joints)}
         names = {
             "joint": checked.joints,
@@ -306,7 +306,7 @@ def _position_mask(joint: Instance) -> tuple[bool, ...]:
 class _Poses(dict[int, BodyPose]):
     """Poses as given, made when a type's ``prepare`` asks for them."""
 
-    def __init__(self, checked: Checked) -> None:
+    def __init__(self, checked: ValidatedScene) -> None:
         super().__init__({0: pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))})
         self._checked = checked
 

@@ -11,7 +11,7 @@ from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers
 from dap3d_core.model.model import Model
 from dap3d_core.registry.suggestions import nearest
-from dap3d_core.scene import Checked
+from dap3d_core.scene import ValidatedScene
 from dap3d_core.scene.validate.coerce_values import Fault, bounded, matrix_of, number_of, numbers_of
 
 
@@ -24,7 +24,7 @@ class Change(NamedTuple):
     new: Floats
 
 
-def changed(checked: Checked, model: Model, place: int, fields: Mapping[str, Any]) -> Change:
+def changed(checked: ValidatedScene, model: Model, place: int, fields: Mapping[str, Any]) -> Change:
     """What fields of a force, given anew, make of its numbers.
 
     Args:
@@ -66,7 +66,7 @@ def _value(force: str, specs: Mapping[str, FieldSpec], name: str, value: Any) ->
 
 
 def _of_force(
-    checked: Checked, group: Group, places: Integers, place: int, values: Mapping[str, Any]
+    checked: ValidatedScene, group: Group, places: Integers, place: int, values: Mapping[str, Any]
 ) -> Change:
     force = checked.forces[place]
     n = len(checked.body_names)

@@ -108,14 +108,14 @@ def join(r: ArrayLike, p: ArrayLike, v: ArrayLike, w: ArrayLike) -> Floats:
     return np.concatenate([q.reshape(*q.shape[:-2], -1), s.reshape(*s.shape[:-2], -1)], axis=-1)
 
 
-def to_integrated(u: ArrayLike, work: ArrayLike = 0.0) -> Floats:
+def y_from_u(u: ArrayLike, work: ArrayLike = 0.0) -> Floats:
     """Integrated states y (..., 13 n + 1) of states u (..., 13 n)."""
     r, p, v, w = split(u)
     work = np.broadcast_to(np.asarray(work, dtype=float), r.shape[:-2])[..., None]
     return np.concatenate([join(r, p, v, to_body(p, w)), work], axis=-1)
 
 
-def from_integrated(y: ArrayLike) -> Floats:
+def u_from_y(y: ArrayLike) -> Floats:
     """States u (..., 13 n) of integrated states y (..., 13 n + 1)."""
     r, p, v, w = split(y)
     return join(r, p, v, to_global(p, w))

@@ -12,7 +12,7 @@ from types import ModuleType
 import pluggy
 
 from dap3d_core.interface import INTERFACE_VERSION, PluginError, hooks
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.interface.hooks import GROUPS
@@ -25,7 +25,7 @@ from dap3d_core.registry.suggestions import nearest
 
 def load(
     source: Source, notes: list[str], limit_s: float | None = None, given_up: str = ""
-) -> Examined:
+) -> TypeInfo:
     """Import a plugin and examine the type that its entry point names.
 
     Args:
@@ -52,7 +52,7 @@ def load(
         return examine(type_)
 
 
-def compile_kernels(source: Source, examined: Examined, notes: list[str]) -> None:
+def compile_kernels(source: Source, examined: TypeInfo, notes: list[str]) -> None:
     """Compile all kernels of a loaded type.
 
     Raises:

@@ -6,7 +6,7 @@ from pathlib import Path
 import attrs
 
 from dap3d_core.interface import PluginError
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.registry.declared_types import not_yet_installed
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover
@@ -64,10 +64,10 @@ class Registry:
 
     sources: dict[tuple[str, str], list[Source]]
     notes: list[str] = attrs.field(factory=list)
-    _loaded: dict[Source, Examined | str] = attrs.field(factory=dict, repr=False)
+    _loaded: dict[Source, TypeInfo | str] = attrs.field(factory=dict, repr=False)
     _overdue: dict[str, str] = attrs.field(factory=dict, repr=False)  # packages given up
 
-    def get(self, kind: str, keyword: str, *, limit_s: float | None = None) -> Examined:
+    def get(self, kind: str, keyword: str, *, limit_s: float | None = None) -> TypeInfo:
         """The type of this keyword, loaded and examined on first use.
 
         Args:
@@ -130,7 +130,7 @@ class Registry:
         sources = [s for s in self.sources[kind, keyword] if not s.blocked]
         return _collision([*sources, Source(kind, keyword, str(path))])
 
-    def _load(self, source: Source, limit_s: float | None = None) -> Examined:
+    def _load(self, source: Source, limit_s: float | None = None) -> TypeInfo:
         loaded = self._loaded.get(source)
         if loaded is None:
             package = source.module.partition(".")[0]
@@ -166,7 +166,7 @@ class Registry:
     def _compiled(self, source: Source, info: PluginInfo) -> PluginInfo:
         """The info after compiling the kernels of a type; dap3d's own are compiled by its tests."""
         loaded = self._loaded.get(source)
-        if info.state != "ok" or info.distribution == OWN or not isinstance(loaded, Examined):
+        if info.state != "ok" or info.distribution == OWN or not isinstance(loaded, TypeInfo):
             return info
         try:
             compile_kernels(source, loaded, self.notes)

@@ -7,18 +7,18 @@ from typing import Any
 from dap3d_core.report.recommend import Recommendation
 from dap3d_core.report.reference import Reference
 from dap3d_core.report.report import Report
-from dap3d_core.report.run import Failed, Run
+from dap3d_core.report.run import Failed, MeasuredRun
 from dap3d_core.report.runner import report
 from dap3d_core.report.settings_ladder import Setting
-from dap3d_core.report.timing import Refused
+from dap3d_core.report.timing import RejectedSetting
 
 __all__ = [
     "Failed",
     "Recommendation",
     "Reference",
-    "Refused",
+    "RejectedSetting",
     "Report",
-    "Run",
+    "MeasuredRun",
     "Setting",
     "report",
 ]

@@ -7,7 +7,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.report.run import Run
+from dap3d_core.report.run import MeasuredRun
 
 #: An error counts as smaller than another below this fraction of it: equal motions differ in
 #: their rounding.
@@ -28,7 +28,7 @@ class Recommendation:
     """
 
     target_error: float
-    run: Run | None
+    run: MeasuredRun | None
     reason: str
     flags: str
 
@@ -42,7 +42,7 @@ class Recommendation:
         }
 
 
-def front(runs: Sequence[Run], uncertainty: float | None) -> set[int]:
+def front(runs: Sequence[MeasuredRun], uncertainty: float | None) -> set[int]:
     """Indices of the runs on the Pareto front: no faster run has a smaller error.
 
     Errors below the uncertainty of the reference count as that uncertainty.
@@ -56,13 +56,13 @@ def front(runs: Sequence[Run], uncertainty: float | None) -> set[int]:
     return members
 
 
-def known_error(run: Run, uncertainty: float | None) -> float:
+def known_error(run: MeasuredRun, uncertainty: float | None) -> float:
     """Upper bound of a run's error: at least the uncertainty of the reference."""
     return max(run.error, uncertainty or 0.0)
 
 
 def recommend(
-    runs: Sequence[Run], uncertainty: float | None, target_error: float
+    runs: Sequence[MeasuredRun], uncertainty: float | None, target_error: float
 ) -> Recommendation:
     """The fastest run with an error known to be within the target.
 
@@ -86,14 +86,14 @@ def recommend(
     return Recommendation(target_error, best, _why(best, reaching), best.setting.flags)
 
 
-def _overlap(fast: Run, slow: Run) -> bool:
+def _overlap(fast: MeasuredRun, slow: MeasuredRun) -> bool:
     """True if the timings of two runs overlap."""
     if min(fast.repeats, slow.repeats) < 2:
         return slow.time_s <= ONCE * fast.time_s
     return slow.time_min_s <= fast.time_max_s
 
 
-def _costs(runs: Sequence[Run]) -> dict[tuple[str, str], float]:
+def _costs(runs: Sequence[MeasuredRun]) -> dict[tuple[str, str], float]:
     """Seconds per right-hand side of each method and integrator: the median over their runs."""
     costs: dict[tuple[str, str], list[float]] = {}
     for run in runs:
@@ -102,7 +102,7 @@ def _costs(runs: Sequence[Run]) -> dict[tuple[str, str], float]:
     return {series: statistics.median(values) for series, values in costs.items()}
 
 
-def _why(best: Run, reaching: Sequence[Run]) -> str:
+def _why(best: MeasuredRun, reaching: Sequence[MeasuredRun]) -> str:
     is_fastest = best.time_s <= min(run.time_s for run in reaching)
     rank = "is the fastest" if is_fastest else "takes the least work"
     words = (
@@ -124,7 +124,7 @@ def _why(best: Run, reaching: Sequence[Run]) -> str:
     return f"{words}, which is within the spread of the timings" if within else words
 
 
-def _why_none(runs: Sequence[Run], uncertainty: float | None, target_error: float) -> str:
+def _why_none(runs: Sequence[MeasuredRun], uncertainty: float | None, target_error: float) -> str:
     if not runs:
         return "no setting came to its end"
     if uncertainty is not None and uncertainty > target_error:

@@ -12,8 +12,8 @@ import attrs
 
 from dap3d_core.report.recommend import Recommendation, recommend
 from dap3d_core.report.reference import Reference
-from dap3d_core.report.run import Failed, Run
-from dap3d_core.report.timing import Refused
+from dap3d_core.report.run import Failed, MeasuredRun
+from dap3d_core.report.timing import RejectedSetting
 from dap3d_core.result import current_versions
 from dap3d_core.result.file.atomic_write import whole_file
 from dap3d_core.scene.display import html_table
@@ -21,7 +21,7 @@ from dap3d_core.scene.display import html_table
 #: Columns of the table that are not counts.
 COLUMNS = (
     *("method", "integrator", "rtol", "atol", "step"),
-    *(f.name for f in attrs.fields(Run) if f.name not in ("setting", "counts")),
+    *(f.name for f in attrs.fields(MeasuredRun) if f.name not in ("setting", "counts")),
     "failed",
 )
 
@@ -46,9 +46,9 @@ class Report:
     scene: str
     t_end: float
     dt: float
-    runs: tuple[Run, ...]
+    runs: tuple[MeasuredRun, ...]
     failed: tuple[Failed, ...]
-    refused: tuple[Refused, ...]
+    refused: tuple[RejectedSetting, ...]
     reference: Reference
     target_error: float | None = None
     status: str = "done"

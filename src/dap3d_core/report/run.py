@@ -9,7 +9,7 @@ from dap3d_core.result import Result
 
 
 @attrs.frozen(kw_only=True)
-class Run:
+class MeasuredRun:
     """A setting whose run was completed.
 
     Attributes:
@@ -85,7 +85,7 @@ class Failed:
 
 
 def measures_of(result: Result) -> dict[str, Any]:
-    """The fields of ``Run`` that a result gives without a reference."""
+    """The fields of ``MeasuredRun`` that a result gives without a reference."""
     ledger = {name: entry.value for name, entry in result.ledger.items()}
     counts = attrs.asdict(result.stats)
     return dict(

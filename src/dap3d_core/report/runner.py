@@ -16,7 +16,7 @@ from dap3d_core.report.error_norms import PARTED, final_position_error, trajecto
 from dap3d_core.report.recommend import front
 from dap3d_core.report.reference import Reference, find_reference
 from dap3d_core.report.report import Report
-from dap3d_core.report.run import Failed, Run, measures_of
+from dap3d_core.report.run import Failed, MeasuredRun, measures_of
 from dap3d_core.report.settings_ladder import (
     ADAPTIVE,
     QUICK_TOLERANCES,
@@ -158,9 +158,9 @@ class _Rung:
             return len(self.times)
         return max(1, min(repeat, int(CAP_S / max(self.times[0], 1e-9))))
 
-    def run(self, uncertainty: float | None) -> Run:
+    def run(self, uncertainty: float | None) -> MeasuredRun:
         """The completed run."""
-        return Run(
+        return MeasuredRun(
             setting=self.setting,
             time_s=statistics.median(self.times),
             time_min_s=min(self.times),

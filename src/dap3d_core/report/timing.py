@@ -27,7 +27,7 @@ class _TimeLimitError(Exception):
 
 
 @attrs.frozen
-class Refused:
+class RejectedSetting:
     """A method that does not fit the scene.
 
     Attributes:
@@ -59,7 +59,7 @@ class Bench:
         """
         self.scene, self.limit_s, self.announce = scene, limit_s, announce
         self.models: dict[str, CompiledModel] = {}
-        self.refused: list[Refused] = []
+        self.refused: list[RejectedSetting] = []
         for method in FORMULATIONS:
             try:
                 compiled = CompiledModel(
@@ -76,7 +76,7 @@ class Bench:
     def refuse(self, method: str, reason: str) -> None:
         """Remove a method."""
         self.models.pop(method, None)
-        self.refused.append(Refused(method, reason))
+        self.refused.append(RejectedSetting(method, reason))
 
     def run(
         self, setting: Setting, tick: Callable[[], None], *, limit_s: float | None = None

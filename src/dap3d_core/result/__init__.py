@@ -1,10 +1,10 @@
 """The result floor: what a run left behind, on disk and in memory; the post-processor's arrays."""
 
 from dap3d_core.result.errors import ResultError, UnknownNameError
-from dap3d_core.result.event_record import Occurrence
+from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.file.atomic_write import check_target
 from dap3d_core.result.file.write import ResultWriter
-from dap3d_core.result.metadata import INFORMATION, Record, Statistics, current_versions
+from dap3d_core.result.metadata import INFORMATION, RunMetadata, RunStatistics, current_versions
 from dap3d_core.result.open import open_result
 from dap3d_core.result.post.global_error import ErrorEstimate, estimated_error
 from dap3d_core.result.post.ledger import Entry
@@ -18,14 +18,14 @@ __all__ = [
     "Energy",
     "Entry",
     "ErrorEstimate",
-    "Occurrence",
+    "EventRecord",
     "Quantity",
     "Reaction",
-    "Record",
+    "RunMetadata",
     "Result",
     "ResultError",
     "ResultWriter",
-    "Statistics",
+    "RunStatistics",
     "UnknownNameError",
     "check_target",
     "current_versions",

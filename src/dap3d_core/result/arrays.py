@@ -8,8 +8,8 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import read_only
-from dap3d_core.model.state_layout import Layout, from_integrated, row_layout, state_layout
-from dap3d_core.result.model_summary import Subject
+from dap3d_core.model.state_layout import Layout, row_layout, state_layout, u_from_y
+from dap3d_core.result.model_summary import ModelSummary
 
 #: Components of a vector, and of Euler parameters.
 AXES = ("x", "y", "z")
@@ -143,7 +143,7 @@ def joined(parts: Sequence[Arrays]) -> Arrays:
     return Arrays(*map(np.concatenate, columns))
 
 
-def column_sizes(subject: Subject) -> dict[str, int]:
+def column_sizes(subject: ModelSummary) -> dict[str, int]:
     """Length of each dimension that a column may have besides time."""
     row = _layout(subject)
     sizes = {"velocity": "v_dot", "row": "Lam", "angle": "angles"}
@@ -151,12 +151,12 @@ def column_sizes(subject: Subject) -> dict[str, int]:
     return {"state": state} | {k: row.length(name) for k, name in sizes.items()}
 
 
-def row_width(subject: Subject) -> int:
+def row_width(subject: ModelSummary) -> int:
     """Numbers in a row of integrator output."""
     return _layout(subject).size
 
 
-def _layout(subject: Subject) -> Layout:
+def _layout(subject: ModelSummary) -> Layout:
     return row_layout(subject.body_count, subject.row_count, subject.angle_count)
 
 
@@ -166,11 +166,11 @@ def _states(y: Floats) -> Floats:
     Of one vector alone numpy adds the products in another order than of several.
     """
     if len(y) > 1:
-        return from_integrated(y)
-    return from_integrated(np.repeat(y, 2, axis=0))[:1] if len(y) else y[:, :-1]
+        return u_from_y(y)
+    return u_from_y(np.repeat(y, 2, axis=0))[:1] if len(y) else y[:, :-1]
 
 
-def arrays_of(rows: Floats, subject: Subject) -> Arrays:
+def arrays_of(rows: Floats, subject: ModelSummary) -> Arrays:
     """Splits rows of integrator output into arrays.
 
     Args:

@@ -15,7 +15,7 @@ def _state(u: Any) -> tuple[float, ...] | None:
 
 
 @attrs.frozen(kw_only=True)
-class Occurrence:
+class EventRecord:
     """A switch or an event at a located instant.
 
     Attributes:

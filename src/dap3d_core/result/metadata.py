@@ -9,7 +9,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.result.event_record import Occurrence
+from dap3d_core.result.event_record import EventRecord
 from dap3d_core.scene import SceneError, tables_of
 from dap3d_core.scene.scene import FIXED_STEP
 
@@ -22,7 +22,7 @@ RUNNING = "running"
 
 
 @attrs.frozen(kw_only=True)
-class Statistics:
+class RunStatistics:
     """What a run cost.
 
     Attributes:
@@ -60,7 +60,7 @@ def _words(words: Iterable[str]) -> tuple[str, ...]:
     return tuple(words)
 
 
-def _occurrences(found: Iterable[Occurrence]) -> tuple[Occurrence, ...]:
+def _occurrences(found: Iterable[EventRecord]) -> tuple[EventRecord, ...]:
     return tuple(found)
 
 
@@ -75,7 +75,7 @@ def to_json(value: Any) -> str:
 
 
 @attrs.frozen(kw_only=True)
-class Record:
+class RunMetadata:
     """Everything about a run that is not an array.
 
     Attributes:
@@ -99,8 +99,8 @@ class Record:
     integrator: str = ""
     notes: tuple[str, ...] = attrs.field(default=(), converter=_words)
     settings: dict[str, Any] = attrs.field(factory=dict, converter=_plain)
-    stats: Statistics = attrs.Factory(Statistics)
-    events: tuple[Occurrence, ...] = attrs.field(default=(), converter=_occurrences)
+    stats: RunStatistics = attrs.Factory(RunStatistics)
+    events: tuple[EventRecord, ...] = attrs.field(default=(), converter=_occurrences)
     run: str = attrs.field(default="", eq=False)
     types: Mapping[str, Mapping[str, str]] | None = None
     known_versions: Mapping[str, str] | None = attrs.field(

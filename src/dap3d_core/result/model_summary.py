@@ -10,7 +10,7 @@ from dap3d_core.model.groups import Floats, Integers
 
 
 @attrs.frozen(eq=False)
-class Subject:
+class ModelSummary:
     """The part of a model that a result and its file hold.
 
     Attributes:
@@ -74,7 +74,7 @@ def _index(names: tuple[str, ...]) -> dict[str, int]:
     return {name: k for k, name in enumerate(names)}
 
 
-def is_subject_of(subject: Subject, model: Model) -> bool:
+def is_subject_of(subject: ModelSummary, model: Model) -> bool:
     """True if arrays of a subject have the layout of a model's bodies and rows."""
     return (
         tuple(model.body_names) == tuple(subject.body_names)
@@ -83,9 +83,9 @@ def is_subject_of(subject: Subject, model: Model) -> bool:
     )
 
 
-def subject_of(model: Model) -> Subject:
+def subject_of(model: Model) -> ModelSummary:
     """The summary of a model."""
-    return Subject(
+    return ModelSummary(
         body_names=model.body_names,
         mass=model.mass,
         Jp=model.Jp,

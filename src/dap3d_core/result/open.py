@@ -16,8 +16,8 @@ from dap3d_core.result.file.lazy_arrays import LazyArrays
 from dap3d_core.result.file.library import opened, reading
 from dap3d_core.result.file.schema import CONSTANTS, CONVENTIONS, FORMAT, SWEEP, record_of
 from dap3d_core.result.file.validate import check_attributes, check_claims, check_subject
-from dap3d_core.result.metadata import RUNNING, Record
-from dap3d_core.result.model_summary import Subject, is_subject_of
+from dap3d_core.result.metadata import RUNNING, RunMetadata
+from dap3d_core.result.model_summary import ModelSummary, is_subject_of
 from dap3d_core.result.result import Origin, Rebuild, Result
 
 _JSON = ("notes", "settings", "statistics", "versions", "events", "types")
@@ -57,7 +57,7 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
     return Result(subject, arrays, record, _origin(file, subject, record, rebuild))
 
 
-def arrays_in(path: Path, subject: Subject, count: int) -> LazyArrays:
+def arrays_in(path: Path, subject: ModelSummary, count: int) -> LazyArrays:
     """Arrays of a file that this process has just written, read on first use.
 
     Raises:
@@ -84,7 +84,7 @@ def _check_format(file: Path, dataset: Any) -> None:
         )
 
 
-def _read(dataset: Any) -> tuple[Subject, Record, Arrays]:
+def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, Arrays]:
     older = {"events": "[]", "run": "", "types": "null"}  # absent in files of older programs
     values = older | {name: dataset.getncattr(name) for name in dataset.ncattrs()}
     for name in _JSON:
@@ -101,7 +101,7 @@ def _read(dataset: Any) -> tuple[Subject, Record, Arrays]:
     return subject, record, arrays if large else arrays.part(slice(None))
 
 
-def _subject(dataset: Any, values: dict[str, Any]) -> Subject:
+def _subject(dataset: Any, values: dict[str, Any]) -> ModelSummary:
     parts: dict[str, Any] = {}
     for kind in ("body", "joint", "point"):
         names = dataset.variables[kind][:] if kind in dataset.dimensions else ()
@@ -117,7 +117,7 @@ def _subject(dataset: Any, values: dict[str, Any]) -> Subject:
         parts["angle_count"] = len(dataset.dimensions["angle"])
     for flag in ("has_potential", "is_isolated"):
         parts[flag] = bool(values[flag])
-    return Subject(**parts)
+    return ModelSummary(**parts)
 
 
 def _complete_count(dataset: Any, count: int) -> int:
@@ -129,7 +129,7 @@ def _complete_count(dataset: Any, count: int) -> int:
     return 1 + (len(rising) if rising.all() else int(np.argmin(rising)))
 
 
-def _interrupted(dataset: Any, record: Record, count: int) -> Record:
+def _interrupted(dataset: Any, record: RunMetadata, count: int) -> RunMetadata:
     """The record of a run with a killed writer."""
     last = "nothing was reported"
     if count:
@@ -139,16 +139,16 @@ def _interrupted(dataset: Any, record: Record, count: int) -> Record:
 
 
 def _origin(
-    file: Path, subject: Subject, record: Record, rebuild: Rebuild | None
+    file: Path, subject: ModelSummary, record: RunMetadata, rebuild: Rebuild | None
 ) -> Callable[[], Origin]:
     def origin() -> Origin:
         if rebuild is None:
             raise ResultError(f"the model of {file} is needed: open it with the way to rebuild it")
-        model, machine_of = rebuild(record.scene_text)
+        model, evaluator_of = rebuild(record.scene_text)
         if not is_subject_of(subject, model):
             raise ResultError(
                 f"the scene in {file} gives another model than was run; its types may have changed"
             )
-        return model, machine_of
+        return model, evaluator_of
 
     return origin

@@ -12,9 +12,9 @@ from dap3d_core.model.groups import Floats
 from dap3d_core.model.rotations import read_only
 from dap3d_core.result.arrays import Arrays, arrays_of
 from dap3d_core.result.errors import ResultError, unknown
-from dap3d_core.result.event_record import Occurrence
-from dap3d_core.result.metadata import Record, Statistics
-from dap3d_core.result.model_summary import Subject, subject_of
+from dap3d_core.result.event_record import EventRecord
+from dap3d_core.result.metadata import RunMetadata, RunStatistics
+from dap3d_core.result.model_summary import ModelSummary, subject_of
 from dap3d_core.result.post.force_output import ForceOutput, force_output
 from dap3d_core.result.post.global_error import ErrorEstimate, estimate_of
 from dap3d_core.result.post.ledger import Entry, ledger_of
@@ -26,10 +26,10 @@ from dap3d_core.result.quantities.lookup import find
 if TYPE_CHECKING:
     import xarray
 
-    from dap3d_core.formulations.evaluator import Machine
+    from dap3d_core.formulations.evaluator import Evaluator
 
 #: A model, and a function that returns an evaluator of it.
-Origin = tuple[Model, "Callable[[], Machine]"]
+Origin = tuple[Model, "Callable[[], Evaluator]"]
 #: Makes an origin from the text of a scene.
 Rebuild = Callable[[str], Origin]
 
@@ -67,9 +67,9 @@ class Result:
         record: metadata of the run.
     """
 
-    subject: Subject
+    subject: ModelSummary
     arrays: Arrays
-    record: Record
+    record: RunMetadata
 
     r = _motion("r")
     p = _motion("p")
@@ -84,7 +84,11 @@ class Result:
     rPdd = _motion("rPdd")
 
     def __init__(
-        self, subject: Subject, arrays: Arrays, record: Record, origin: Callable[[], Origin]
+        self,
+        subject: ModelSummary,
+        arrays: Arrays,
+        record: RunMetadata,
+        origin: Callable[[], Origin],
     ) -> None:
         """Composes a result of its parts.
 
@@ -99,7 +103,11 @@ class Result:
 
     @classmethod
     def of_run(
-        cls, model: Model, rows: Floats, record: Record, machine_of: "Callable[[], Machine]"
+        cls,
+        model: Model,
+        rows: Floats,
+        record: RunMetadata,
+        evaluator_of: "Callable[[], Evaluator]",
     ) -> Self:
         """The result of a run.
 
@@ -107,13 +115,13 @@ class Result:
             model: the model that was run.
             rows: (nt, row_width) integrator output (arrays.py).
             record: metadata of the run.
-            machine_of: returns the evaluator of the calling thread, for the Jacobian and reactions.
+            evaluator_of: returns the evaluator of the calling thread, for Jacobian and reactions.
 
         Raises:
             ValueError: the rows have another width.
         """
         subject = subject_of(model)
-        return cls(subject, arrays_of(rows, subject), record, lambda: (model, machine_of))
+        return cls(subject, arrays_of(rows, subject), record, lambda: (model, evaluator_of))
 
     def __reduce__(self) -> Any:
         """For other processes: everything but the model and the evaluator."""
@@ -183,12 +191,12 @@ class Result:
         return list(self.record.notes)
 
     @property
-    def events(self) -> tuple[Occurrence, ...]:
+    def events(self) -> tuple[EventRecord, ...]:
         """Located switches and events, in order."""
         return self.record.events
 
     @property
-    def stats(self) -> Statistics:
+    def stats(self) -> RunStatistics:
         """Cost of the run: steps, rejected, rhs, projections, wall_time_s, compile_time_s."""
         return self.record.stats
 
@@ -223,7 +231,7 @@ class Result:
         return self._make_origin()
 
     @property
-    def machine(self) -> "Machine":
+    def evaluator(self) -> "Evaluator":
         """The evaluator of the model for the calling thread.
 
         Raises:
@@ -239,7 +247,7 @@ class Result:
         Raises:
             ResultError: as ``model``.
         """
-        return jacobians(self.machine, self.t, self.u)
+        return jacobians(self.evaluator, self.t, self.u)
 
     def reaction(self, joint: str) -> Mapping[str, Reaction]:
         """Reaction of a joint on each of its bodies, ground included: D^T lambda (spec 2).
@@ -273,8 +281,8 @@ class Result:
         index = self.subject.joint_index
         missing = {index[name]: name for name in names if name not in self._reactions}
         if missing:
-            machine, angles = self.machine, self._angles()
-            by_joint = reactions(machine, self.t, self.u, self.Lam, missing, angles)
+            evaluator, angles = self.evaluator, self._angles()
+            by_joint = reactions(evaluator, self.t, self.u, self.Lam, missing, angles)
             self._reactions |= {missing[joint]: actions for joint, actions in by_joint.items()}
 
     # ------------------------------------------------------------------ forces
@@ -308,7 +316,7 @@ class Result:
         if name not in self._forces:
             index = self.model.force_names.index(name)
             self._forces[name] = force_output(
-                self.machine, self.t, self.u, self.v_dot, name, index, self._angles()
+                self.evaluator, self.t, self.u, self.v_dot, name, index, self._angles()
             )
         return self._forces[name]
 
@@ -374,7 +382,7 @@ class Result:
         return dataset_of(self)
 
 
-def _received(subject: Subject, arrays: tuple[Any, ...], record: Record) -> Result:
+def _received(subject: ModelSummary, arrays: tuple[Any, ...], record: RunMetadata) -> Result:
     """A result from another process."""
     return Result(subject, Arrays(*arrays), record, _no_origin)
 

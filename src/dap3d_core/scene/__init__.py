@@ -18,7 +18,7 @@ from dap3d_core.scene.scene import (
 from dap3d_core.scene.validate.mistake_collector import mistake_at
 from dap3d_core.scene.validate.settings import check_simulation
 from dap3d_core.scene.validate.validate import check
-from dap3d_core.scene.validate.validated_scene import Checked, Instance
+from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene
 
 __all__ = [
     "INTEGRATORS",
@@ -27,7 +27,7 @@ __all__ = [
     "Animation",
     "AnimationPoint",
     "Body",
-    "Checked",
+    "ValidatedScene",
     "Element",
     "Instance",
     "Mistake",

@@ -9,8 +9,8 @@ from dap3d_core.simulation.errors import (
 )
 from dap3d_core.simulation.events.event import Event, Instant
 from dap3d_core.simulation.open_result import open_result
-from dap3d_core.simulation.output.monitor import Standing
-from dap3d_core.simulation.rerun import Repetition
+from dap3d_core.simulation.output.monitor import RunProgress
+from dap3d_core.simulation.rerun import Reproduction
 from dap3d_core.simulation.settings import report_times
 from dap3d_core.simulation.simulate import simulate
 
@@ -21,9 +21,9 @@ __all__ = [
     "Event",
     "Instant",
     "RedundantError",
-    "Repetition",
+    "Reproduction",
     "SimulationError",
-    "Standing",
+    "RunProgress",
     "compile_scene",
     "open_result",
     "report_times",

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dap3d_core.formulations import FORMULATIONS
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.runtime.cache import cache_notes
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import (
-    Checked,
     Scene,
     SceneError,
+    ValidatedScene,
     check,
     check_simulation,
     load,
@@ -34,12 +34,12 @@ from dap3d_core.simulation.explain import explain
 from dap3d_core.simulation.failure.diagnosis import find_offender
 from dap3d_core.simulation.failure.narrow_forces import notes_on_laws
 from dap3d_core.simulation.initial.assemble import model_size
-from dap3d_core.simulation.initial.breakpoints import Pace
+from dap3d_core.simulation.initial.breakpoints import Breakpoints
 from dap3d_core.simulation.initial.conservative import is_conservative
 from dap3d_core.simulation.initial.driver_notes import notes_on_drivers
 from dap3d_core.simulation.initial.given_state import state_of, time_of
 from dap3d_core.simulation.initial.undefined_directions import undefined_directions
-from dap3d_core.simulation.initial_state import Start, find_start
+from dap3d_core.simulation.initial_state import InitialState, find_start
 from dap3d_core.simulation.output.type_sources import types_of
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
 
@@ -69,7 +69,7 @@ class _Machines(threading.local):
     """
 
     def __init__(self) -> None:
-        self.stack: list[Machine] = []
+        self.stack: list[Evaluator] = []
         self.running = False
 
 
@@ -107,21 +107,21 @@ class CompiledModel:
         announce = announce or (lambda kernel: log_first_compilation())
         registry = registry or load_registry()
         self.scene: Scene = scene
-        self.checked: Checked = check(scene, registry, allow_code=allow_code)
+        self.checked: ValidatedScene = check(scene, registry, allow_code=allow_code)
         self.model: Model = _modelled(self.checked)
         if method is not None:
             settings = attrs.evolve(scene.simulation, method=method)
             check_simulation(settings, self.model.body_names)
         #: The method that was asked for, perhaps "auto".
         self.asked = asked = method or str(scene.simulation.method)
-        self._paces: dict[float, Pace] = {}
-        self._starts: dict[tuple[bool, tuple[str, ...], str], Start] = {}
+        self._breakpoints: dict[float, Breakpoints] = {}
+        self._starts: dict[tuple[bool, tuple[str, ...], str], InitialState] = {}
         self._own = _Machines()
         self._first_method = self.method = choose_method(self.model, asked)[0]
-        self._own.stack.append(self.another_machine(announce))
+        self._own.stack.append(self.new_evaluator(announce))
         self.method, self.reason = self.choice(asked)
-        self.machine.formulation = FORMULATIONS[self.method]
-        _ = self.machine.functions  # compiled here, and not on the clock of the first run
+        self.evaluator.formulation = FORMULATIONS[self.method]
+        _ = self.evaluator.functions  # compiled here, and not on the clock of the first run
         self.notes: list[str] = [
             *self.checked.notes,
             *self.model.notes,
@@ -133,19 +133,19 @@ class CompiledModel:
         self.compile_time = time.perf_counter() - started
 
     @property
-    def machine(self) -> Machine:
+    def evaluator(self) -> Evaluator:
         """What evaluates the model for this thread; made when a thread first asks for it."""
         stack = self._own.stack
         if not stack:
-            stack.append(self.another_machine())
+            stack.append(self.new_evaluator())
         return stack[-1]
 
     @contextmanager
-    def in_use(self) -> Iterator[Machine]:
+    def borrow_evaluator(self) -> Iterator[Evaluator]:
         """A machine for a run: this thread's or, in a callback of a run that has it, another."""
         own = self._own
         if own.running:
-            own.stack.append(self.another_machine())
+            own.stack.append(self.new_evaluator())
             try:
                 yield own.stack[-1]
             finally:
@@ -153,17 +153,17 @@ class CompiledModel:
             return
         own.running = True
         try:
-            yield self.machine
+            yield self.evaluator
         finally:
             own.running = False
 
-    def another_machine(self, announce: Announce | None = None) -> Machine:
+    def new_evaluator(self, announce: Announce | None = None) -> Evaluator:
         """A machine of the model with arrays of its own, for whoever changes its numbers."""
-        machine = Machine(self.model, self._first_method, announce)
-        machine.formulation = FORMULATIONS[self.method]
+        evaluator = Evaluator(self.model, self._first_method, announce)
+        evaluator.formulation = FORMULATIONS[self.method]
         settings = self.scene.simulation
-        machine.set_penalty(settings.alpha, settings.Omega, settings.mu)
-        return machine
+        evaluator.set_penalty(settings.alpha, settings.Omega, settings.mu)
+        return evaluator
 
     def __copy__(self) -> Self:
         """Itself: nothing of it changes."""
@@ -197,7 +197,7 @@ class CompiledModel:
     @cached_property
     def is_conservative(self) -> bool:
         """Whether potentials account for all work that can be done in the scene."""
-        return is_conservative(self.machine, self.model.u0)
+        return is_conservative(self.evaluator, self.model.u0)
 
     @cached_property
     def types(self) -> dict[str, dict[str, str]]:
@@ -219,10 +219,10 @@ class CompiledModel:
             SimulationError: the rates are not finite; names the body, force or joint.
         """
         t, state = time_of(t), state_of(u, self.model.body_names)
-        rates = self.machine.rhs(t, state)
+        rates = self.evaluator.rhs(t, state)
         if not np.all(np.isfinite(rates)):
-            machine = self.machine
-            found = find_offender(machine, t, machine.integrated(state), t)
+            evaluator = self.evaluator
+            found = find_offender(evaluator, t, evaluator.integrated(state), t)
             raise SimulationError(f"the rates are not finite: {found or f't = {t:.9g} s'}")
         return rates
 
@@ -237,18 +237,18 @@ class CompiledModel:
             if np.array_equal(start.u, state):
                 return start.redundancy
         if u is not None:
-            return redundancy_of(self.machine, state)
+            return redundancy_of(self.evaluator, state)
         if self._redundancy is None:
-            self._redundancy = redundancy_of(self.machine, state)
+            self._redundancy = redundancy_of(self.evaluator, state)
         return self._redundancy
 
-    def pace(self, t_end: float) -> Pace:
+    def breakpoints(self, t_end: float) -> Breakpoints:
         """How fast functions of time change in a run from 0 to t_end, found once."""
-        if t_end not in self._paces:
-            self._paces[t_end] = Pace(self.checked, self.machine, t_end)
-        return self._paces[t_end]
+        if t_end not in self._breakpoints:
+            self._breakpoints[t_end] = Breakpoints(self.checked, self.evaluator, t_end)
+        return self._breakpoints[t_end]
 
-    def start(self, correct: bool, hold: tuple[str, ...], metric: str = "unit") -> Start:
+    def start(self, correct: bool, hold: tuple[str, ...], metric: str = "unit") -> InitialState:
         """Where a run starts, found once; arguments and errors as of ``find_start``.
 
         Raises:
@@ -257,11 +257,11 @@ class CompiledModel:
         key = correct, tuple(hold), metric
         if key not in self._starts:
             try:
-                start = find_start(self.machine, *key)
+                start = find_start(self.evaluator, *key)
             except AssemblyError as error:
                 raise self._located(error) from error
             mistakes = undefined_directions(
-                self.scene, self.model, start.u, model_size(self.machine)
+                self.scene, self.model, start.u, model_size(self.evaluator)
             )
             if mistakes:
                 raise SceneError(mistakes)
@@ -308,7 +308,7 @@ class CompiledModel:
         except AssemblyError:
             redundancy = self.redundancy()
         return explain(
-            self.checked, self.model, self.machine, self.method, self.reason, u, redundancy
+            self.checked, self.model, self.evaluator, self.method, self.reason, u, redundancy
         )
 
 
@@ -332,7 +332,7 @@ def choose_method(model: Model, asked: str) -> tuple[str, str]:
     )
 
 
-def _modelled(checked: Checked) -> Model:
+def _modelled(checked: ValidatedScene) -> Model:
     try:
         return build_model(checked)
     except ModelError as error:

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import STATE, VELOCITIES
-from dap3d_core.scene import Checked, Instance, Scene
+from dap3d_core.scene import Instance, Scene, ValidatedScene
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 from dap3d_core.simulation.redundancy.redundancy import Redundancy
 
@@ -18,16 +18,16 @@ Floats = NDArray[np.float64]
 
 
 def explain(
-    checked: Checked,
+    checked: ValidatedScene,
     model: Model,
-    machine: Machine,
+    evaluator: Evaluator,
     method: str,
     reason: str,
     u: Floats,
     redundancy: Redundancy,
 ) -> str:
     """A text for people, one fact a line; u (13 n,) is where a run would start."""
-    n, ordering = model.body_count, machine.plan.ordering
+    n, ordering = model.body_count, evaluator.plan.ordering
     lines = [f"scene {checked.scene.name or '(no name)'}"]
     sizes = f"{STATE * n} states, {VELOCITIES * n} accelerations"
     lines.append(f"  bodies     {n}: {_some(model.body_names)}; {sizes}")
@@ -37,17 +37,17 @@ def explain(
         lines.append(f"  rows       {redundancy.describe()}")
         lines += [f"  reactions  {words}" for words in redundancy.describe_reactions()]
         if redundancy.rank.redundant:
-            elsewhere = redundancy_elsewhere(machine, u, redundancy)
+            elsewhere = redundancy_elsewhere(evaluator, u, redundancy)
             lines.append(f"  poses      {elsewhere.describe(redundancy)}")
             if redundancy.singular:
                 lines.append(f"  start      {redundancy.singular.describe()}")
         lines.append(
             f"  matrix     {len(ordering.early)} bodies eliminated first, then "
             f"{len(ordering.nodes)} joint nodes and {len(ordering.hubs)} hubs; "
-            f"{machine.plan.fill} blocks of fill"
+            f"{evaluator.plan.fill} blocks of fill"
         )
     lines.append(f"  method     {method}, because {reason}")
-    compiled = sorted({f"{group.keyword} ({kind})" for kind, group in machine.what})
+    compiled = sorted({f"{group.keyword} ({kind})" for kind, group in evaluator.loop_groups})
     lines.append(f"  kernels    {', '.join(compiled) or 'none'}")
     left_out = _left_out(checked, model)
     lines.append("left out")
@@ -70,7 +70,7 @@ def _counts(instances: Sequence[Instance]) -> str:
     return ", ".join(f"{count} {word}" for word, count in types_of(instances).items()) or "none"
 
 
-def _left_out(checked: Checked, model: Model) -> list[str]:
+def _left_out(checked: ValidatedScene, model: Model) -> list[str]:
     scene = checked.scene
     elements = {"constraints": model.joints, "forces": model.forces, "functions": model.functions}
     result = []

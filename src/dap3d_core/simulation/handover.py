@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations import PROJECT, RHS
-from dap3d_core.formulations.evaluator import AS_COMPILED, Machine
+from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.singular_poses import RATE
@@ -69,7 +69,7 @@ def begin_other(run: RunState) -> None:
         run.notes.append(change_note(present.t))
     integrator = EXPLICIT if present.implicit else IMPLICIT
     options = run.options | {"first_step": None}
-    integration = integrator.make(run.machine, present.y, run.times, **options)
+    integration = integrator.make(run.evaluator, present.y, run.times, **options)
     take_over(integration, present)
     run.begin(integration)
 
@@ -111,19 +111,19 @@ def _left(run: RunState) -> float:
     present, span = run.present, run.t_end
     if not present.implicit or present.status not in FAILURES:
         return np.inf
-    return time_left(lengths_at(run.machine, present.t, present.y, span), span)
+    return time_left(lengths_at(run.evaluator, present.t, present.y, span), span)
 
 
 def _aim_across(run: RunState, left: float) -> None:
     """Let the first step of the explicit integration be one across: a trial step goes closer."""
     present = run.present
     span = run.t_end
-    present.work.lengths[:] = lengths_at(run.machine, present.t, present.y, span)
+    present.work.lengths[:] = lengths_at(run.evaluator, present.t, present.y, span)
     present.work.h = left / present.work.widest_gap_abscissa
 
 
-@AS_COMPILED
-def lengths_at(machine: Machine, t: float, y: Floats, span: float) -> Floats:
+@IGNORE_FLOAT_ERRORS
+def lengths_at(evaluator: Evaluator, t: float, y: Floats, span: float) -> Floats:
     """(2, m) lengths that projection gives, and their rates, as crossing.py has them.
 
     A length that goes to zero with a power of the time left is given the mean rate until then.
@@ -134,8 +134,8 @@ def lengths_at(machine: Machine, t: float, y: Floats, span: float) -> Floats:
         span: length of the run, s.
     """
     slope, h = np.zeros_like(y), APART * span
-    machine.functions[RHS](t, y, slope, machine.system, machine.loops)
-    now, before, earlier = (_lengths(machine, t - k * h, y - k * h * slope) for k in range(3))
+    evaluator.functions[RHS](t, y, slope, evaluator.system, evaluator.loops)
+    now, before, earlier = (_lengths(evaluator, t - k * h, y - k * h * slope) for k in range(3))
     rate = (now - before) / h
     return np.array([now, rate / _orders(now, rate, (now - 2.0 * before + earlier) / h**2)])
 
@@ -157,9 +157,9 @@ def time_left(lengths: Floats, span: float) -> float:
     return nearest if nearest < NEAR * span else np.inf
 
 
-def _lengths(machine: Machine, t: float, y: Floats) -> Floats:
-    found = np.zeros(at.MEASURES - at.PROJECTED + machine.length_count)
-    machine.functions[PROJECT](t, y.copy(), found, machine.system, machine.loops)
+def _lengths(evaluator: Evaluator, t: float, y: Floats) -> Floats:
+    found = np.zeros(at.MEASURES - at.PROJECTED + evaluator.length_count)
+    evaluator.functions[PROJECT](t, y.copy(), found, evaluator.system, evaluator.loops)
     lengths: Floats = found[at.MEASURES - at.PROJECTED :]
     return lengths
 

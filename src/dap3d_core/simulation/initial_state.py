@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.initial.assemble import (
     Initial,
@@ -21,7 +21,7 @@ OFF_CONSTRAINTS = 1e-6
 
 
 @attrs.frozen(eq=False)
-class Start:
+class InitialState:
     """Where a run starts.
 
     Attributes:
@@ -36,8 +36,8 @@ class Start:
 
 
 def find_start(
-    machine: Machine, correct: bool, hold: tuple[str, ...], metric: str = "unit"
-) -> Start:
+    evaluator: Evaluator, correct: bool, hold: tuple[str, ...], metric: str = "unit"
+) -> InitialState:
     """The start of a run.
 
     Args:
@@ -49,19 +49,19 @@ def find_start(
     Raises:
         AssemblyError: the positions cannot be assembled, or a row is not finite.
     """
-    u, initial = machine.model.u0, None
+    u, initial = evaluator.model.u0, None
     if correct:
-        held = [machine.model.body_names.index(name) + 1 for name in hold]
-        initial = correct_initial(machine, u, hold=held, metric=metric)
+        held = [evaluator.model.body_names.index(name) + 1 for name in hold]
+        initial = correct_initial(evaluator, u, hold=held, metric=metric)
         u = initial.u
-    return Start(u, initial, redundancy_of(machine, u))
+    return InitialState(u, initial, redundancy_of(evaluator, u))
 
 
-def start_notes(start: Start, machine: Machine, scene: Scene) -> list[str]:
+def start_notes(start: InitialState, evaluator: Evaluator, scene: Scene) -> list[str]:
     """How a start was corrected, or that it is off the constraints, in words."""
     if start.initial is not None:
-        return correction_notes(start.initial, machine, scene)
-    position, velocity = violation(machine, start.u)
+        return correction_notes(start.initial, evaluator, scene)
+    position, velocity = violation(evaluator, start.u)
     if max(position, velocity) <= OFF_CONSTRAINTS:
         return []
     return [

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 
 import attrs
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface import PluginError
 from dap3d_core.model import Model
 from dap3d_core.result import INFORMATION, Result, ResultError
@@ -47,7 +47,7 @@ def open_result(
     """
     home = None if model is None else load(model).path
 
-    def rebuild(scene_text: str) -> tuple[Model, Callable[[], Machine]]:
+    def rebuild(scene_text: str) -> tuple[Model, Callable[[], Evaluator]]:
         scene = parse(scene_text)
         scene.path = home
         try:
@@ -55,7 +55,7 @@ def open_result(
         except (PluginError, SceneError, SimulationError) as error:
             raise _unmade(path, error, allow_code and home is not None) from error
         _check_types(path, known, compiled)
-        return compiled.model, lambda: compiled.machine
+        return compiled.model, lambda: compiled.evaluator
 
     result = open_file(path, rebuild)
     known = result.record.types  # read by ``rebuild``, which is called later

@@ -15,7 +15,7 @@ from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.open_result import open_result, why_unmade
-from dap3d_core.simulation.output.monitor import Standing
+from dap3d_core.simulation.output.monitor import RunProgress
 from dap3d_core.simulation.output.type_sources import changed_types
 from dap3d_core.simulation.simulate import simulate
 
@@ -24,7 +24,7 @@ SETTINGS = ("t_end", "dt", "rtol", "atol", "step", "project", "correct", "correc
 
 
 @attrs.frozen(eq=False)
-class Repetition:
+class Reproduction:
     """A run and its repetition.
 
     Attributes:
@@ -56,9 +56,9 @@ def rerun(
     *,
     model: str | os.PathLike[str] | None = None,
     allow_code: bool = False,
-    watch: Callable[[Standing], None] | None = None,
+    watch: Callable[[RunProgress], None] | None = None,
     announce: Callable[[str], None] | None = None,
-) -> Repetition:
+) -> Reproduction:
     """Run a result's scene again with its settings and compare, bit for bit.
 
     Same versions and the same kind of machine give the same arrays. Of a result that ended early,
@@ -91,7 +91,7 @@ def rerun(
         )
     end = first.t[-1]
 
-    def look(standing: Standing) -> None:
+    def look(standing: RunProgress) -> None:
         if watch is not None:
             watch(standing)
         if first.status != "done" and standing.t > end:
@@ -108,7 +108,7 @@ def rerun(
         if current_versions().get(name) != number
     }
     types = changed_types(first.record.types or {}, compiled.types)
-    return Repetition(again, instants, differences, versions, types)
+    return Reproduction(again, instants, differences, versions, types)
 
 
 def _settings(result: Result) -> dict[str, Any]:

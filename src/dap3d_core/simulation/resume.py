@@ -15,7 +15,7 @@ from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED
 from dap3d_core.integrators.stepping.restore import check_alike, restored
 from dap3d_core.interface import PluginError
 from dap3d_core.kernels.runtime.source_digest import driver_digest
-from dap3d_core.model.state_layout import from_integrated
+from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.result import INFORMATION, Result, current_versions
 from dap3d_core.result.file.validate import are_texts
 from dap3d_core.scene import SceneError, Simulation, check_simulation, load, parse
@@ -27,7 +27,7 @@ from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.handover import begin_other
 from dap3d_core.simulation.initial.given_state import state_of
 from dap3d_core.simulation.open_result import why_unmade
-from dap3d_core.simulation.output.monitor import Standing
+from dap3d_core.simulation.output.monitor import RunProgress
 from dap3d_core.simulation.output.type_sources import digests_of
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks, Progress, RunState
@@ -44,7 +44,7 @@ def resume(
     allow_code: bool = False,
     events: Sequence[Event] = (),
     progress: Progress | None = None,
-    watch: Callable[[Standing], None] | None = None,
+    watch: Callable[[RunProgress], None] | None = None,
     announce: Callable[[str], None] | None = None,
 ) -> Result:
     """Go on with a run from its checkpoint; its result is that of a run that was not ended.
@@ -80,14 +80,14 @@ def resumption(
     model: str | os.PathLike[str] | None = None,
     allow_code: bool = False,
     announce: Callable[[str], None] | None = None,
-) -> "Resumption":
+) -> "ResumedRun":
     """A checkpoint read, its model compiled; arguments and errors as of ``resume``."""
     place = Path(path)
     found = read_checkpoint(place)
-    return Resumption(place, found, model=model, allow_code=allow_code, announce=announce)
+    return ResumedRun(place, found, model=model, allow_code=allow_code, announce=announce)
 
 
-class Resumption:
+class ResumedRun:
     """A checkpoint with the model that it belongs to.
 
     Attributes:
@@ -128,7 +128,7 @@ class Resumption:
         checkpoint: float = math.inf,
         events: Sequence[Event] = (),
         progress: Progress | None = None,
-        watch: Callable[[Standing], None] | None = None,
+        watch: Callable[[RunProgress], None] | None = None,
     ) -> Result:
         """Go on to the end; arguments and errors as of ``resume``."""
         check_checkpoint(checkpoint, self.output)
@@ -139,9 +139,9 @@ class Resumption:
         def restore(run: RunState) -> None:
             self._restore(run)
             for block in earlier:
-                run.keeper.add(block, lambda: run.record("done"))
+                run.recorder.add(block, lambda: run.record("done"))
 
-        with self.compiled.in_use():
+        with self.compiled.borrow_evaluator():
             run = Run(self.compiled, self._settings(),
                       Callbacks(announce=self._announce, progress=progress, watch=watch), events,
                       output=target, force=force or is_own, identity=header["run"],
@@ -292,10 +292,10 @@ def restore_system(run: RunState, stored: Mapping[str, Any]) -> None:
     Raises:
         ValueError: they are of another model, or not finite.
     """
-    machine, changed = run.machine, run.watcher.changed_forces if run.watcher else ()
-    par, settings = machine.system.par, machine.system.settings
+    evaluator, changed = run.evaluator, run.watcher.changed_forces if run.watcher else ()
+    par, settings = evaluator.system.par, evaluator.system.settings
     changes = np.zeros(len(par), dtype=bool)
-    for places in machine.turn_places():
+    for places in evaluator.turn_places():
         changes[places] = True
     if run.watcher and changed:
         changes |= run.watcher.numbers.changeable(changed)
@@ -314,8 +314,8 @@ def check_position(run: RunState, rows: int) -> None:
     Raises:
         ValueError: it does not.
     """
-    model, last = run.machine.model, run.present
-    state_of(from_integrated(last.y[None])[0], model.body_names)
+    model, last = run.evaluator.model, run.present
+    state_of(u_from_y(last.y[None])[0], model.body_names)
     reported = last.work.next_report
     if rows - reported not in (0, 1):  # an event that ends a run reports its own instant
         raise ValueError(f"{rows} rows are reported of the {reported} that its instants need")

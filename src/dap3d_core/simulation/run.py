@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dap3d_core.formulations.pivots import watch_pivots
+from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS, Integration, Status
 from dap3d_core.integrators.stepping.singular_poses import begin_singular
 from dap3d_core.result import Result, ResultError
@@ -20,7 +20,7 @@ from dap3d_core.simulation.handover import (
 )
 from dap3d_core.simulation.initial.singular_start import SingularStart
 from dap3d_core.simulation.initial.tolerances import motion_notes, rounding_notes
-from dap3d_core.simulation.initial_state import Start, start_notes
+from dap3d_core.simulation.initial_state import InitialState, start_notes
 from dap3d_core.simulation.output.error_estimate import StepLimits, add_error
 from dap3d_core.simulation.output.termination import doubts, event_notes, why_stopped
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
@@ -33,7 +33,7 @@ from dap3d_core.simulation.settings import (
 )
 
 if TYPE_CHECKING:
-    from dap3d_core.simulation.checkpoint.save import Saver
+    from dap3d_core.simulation.checkpoint.save import CheckpointWriter
 
 #: Seconds that a compiled chunk should take: Ctrl-C and the progress bar wait for its end.
 CHUNK_SECONDS = 0.1
@@ -48,14 +48,14 @@ AGAIN = 0.8
 class Run(RunState):
     """One run of a compiled model: initialise, integrate, finish."""
 
-    saver: "Saver | None" = None
+    saver: "CheckpointWriter | None" = None
     singular: SingularStart | None = None
 
     def save_every(self, seconds: float, *, force: bool) -> None:
-        """Write checkpoints beside the output; arguments and errors as of ``Saver``."""
-        from dap3d_core.simulation.checkpoint.save import Saver
+        """Write checkpoints beside the output; arguments and errors as of ``CheckpointWriter``."""
+        from dap3d_core.simulation.checkpoint.save import CheckpointWriter
 
-        self.saver = Saver(self, seconds, force=force)
+        self.saver = CheckpointWriter(self, seconds, force=force)
 
     def go(self, restore: Callable[[RunState], None] | None = None) -> Result:
         """Run from the start, or from the state that ``restore`` gives the run, to the end."""
@@ -90,7 +90,7 @@ class Run(RunState):
                 self.watcher.numbers.put_back()
         ended = self.present.status
         if ended not in (Status.FINISHED, Status.ENDED):
-            message = cannot_cross(why_stopped(self.machine, self.present, self.rank), self)
+            message = cannot_cross(why_stopped(self.evaluator, self.present, self.rank), self)
             self.notes.append(message)
         result = self._result("done" if ended is Status.FINISHED else "stopped")
         if self.saver is not None:
@@ -99,20 +99,20 @@ class Run(RunState):
             raise SimulationError(message, result)
         assert result is not None
         if self.estimate_error:
-            add_error(result, self.settings, self._again, self.keeper.output)
+            add_error(result, self.settings, self._again, self.recorder.output)
         return result
 
     def _interrupt(self, error: BaseException) -> None:
         """Keep what was computed until an exception ended the integration."""
         if isinstance(error, ResultError):  # the disk: what is there stays as it is
-            error.part = self.keeper.part  # type: ignore[attr-defined]
+            error.part = self.recorder.part  # type: ignore[attr-defined]
             if self.saver is not None and self.saver.has_written:
                 error.checkpoint = self.saver.path  # type: ignore[attr-defined]
             return
         self._take_rows()
         status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
         error.result = self._result(status)  # type: ignore[attr-defined]
-        if self.saver is not None and self.keeper.count:
+        if self.saver is not None and self.recorder.count:
             self.saver.leave(error)
         elif self.saver is not None:
             self.saver.remove()
@@ -122,13 +122,13 @@ class Run(RunState):
         events = self.watcher.events if self.watcher else ()
         return Run(self.compiled, settings, self.callbacks, events, limits=limits).go()
 
-    def _start(self) -> Start:
+    def _start(self) -> InitialState:
         """The initial state, corrected where the settings say so; its rank must suit the method."""
         settings, scene = self.settings, self.compiled.scene
         metric = str(settings.correct_metric)
         start = self.compiled.start(bool(settings.correct), settings.hold, metric)
-        self.notes += start_notes(start, self.machine, scene)
-        self.notes += self.compiled.pace(self.t_end).notes(
+        self.notes += start_notes(start, self.evaluator, scene)
+        self.notes += self.compiled.breakpoints(self.t_end).notes(
             settings, settings.dt or self.t_end / 100.0
         )
         self.rank = start.redundancy.rank.rank
@@ -136,14 +136,14 @@ class Run(RunState):
             self._judge_redundancy(start)
         return start
 
-    def _judge_redundancy(self, start: Start) -> None:
+    def _judge_redundancy(self, start: InitialState) -> None:
         """Refuse redundant rows, or note what they leave open."""
         redundancy, u = start.redundancy, start.u
         self.singular = singular = redundancy.singular
         words = redundancy.describe()
-        formulation = self.machine.formulation
+        formulation = self.evaluator.formulation
         if not formulation.accepts_redundant:
-            elsewhere = redundancy_elsewhere(self.machine, u, redundancy).describe(redundancy)
+            elsewhere = redundancy_elsewhere(self.evaluator, u, redundancy).describe(redundancy)
             raise RedundantError(
                 f"{words}; {elsewhere}. The {formulation.name} method needs independent rows"
             )
@@ -162,27 +162,27 @@ class Run(RunState):
         if singular is not None:
             self.notes.append(singular.describe())
 
-    def _integration(self, start: Start) -> Integration:
-        machine, settings, singular, u0 = self.machine, self.settings, self.singular, start.u
-        watch_pivots(machine, 0.0, u0 if singular is None else singular.aside)
-        machine.start(0.0, u0)
-        y0 = machine.integrated(u0)
-        width = 1 + len(y0) + machine.report_size
-        self.options = options = integration_options(machine, settings) | {
+    def _integration(self, start: InitialState) -> Integration:
+        evaluator, settings, singular, u0 = self.evaluator, self.settings, self.singular, start.u
+        store_reference_pivots(evaluator, 0.0, u0 if singular is None else singular.aside)
+        evaluator.start(0.0, u0)
+        y0 = evaluator.integrated(u0)
+        width = 1 + len(y0) + evaluator.report_size
+        self.options = options = integration_options(evaluator, settings) | {
             "first_step": None if self.limits is None else self.limits.first,
             "buffer_rows": max(1, min(len(self.times), BUFFER_NUMBERS // width)),
         }
         integrator = INTEGRATORS.get(settings.integrator, EXPLICIT)
-        check_fit(integrator, machine.formulation)
+        check_fit(integrator, evaluator.formulation)
         if settings.integrator == "auto":
-            options = options | {"leave_stiff": fits(IMPLICIT, machine.formulation)}
+            options = options | {"stop_when_stiff": fits(IMPLICIT, evaluator.formulation)}
         try:
-            integration = integrator.make(machine, y0, self.times, **options)
+            integration = integrator.make(evaluator, y0, self.times, **options)
         except ValueError as error:
             raise SceneError([Mistake("step", settings.step, str(error))]) from error
         if singular is not None:
             first = singular.first_step * (1.0 if self.limits is None else AGAIN)
-            begin_singular(integration.work, machine.rates(0.0, u0, singular.acceleration), first)
+            begin_singular(integration.work, evaluator.rates(0.0, u0, singular.acceleration), first)
         return integration
 
     def _integrate(self) -> None:
@@ -215,24 +215,24 @@ class Run(RunState):
             return
         rows = self.present.rows()
         if len(rows):
-            if self.singular is not None and not self.keeper.count:
-                first = len(rows[0]) - self.machine.report_size
+            if self.singular is not None and not self.recorder.count:
+                first = len(rows[0]) - self.evaluator.report_size
                 accelerations = self.singular.acceleration
                 rows[0, first : first + len(accelerations)] = accelerations
-            self.keeper.take(rows, lambda: self.record("done"))
+            self.recorder.take(rows, lambda: self.record("done"))
 
     def _result(self, status: str) -> Result | None:
         """The result of what was computed, whole on disk if it has an output; None of nothing."""
-        return self.keeper.result(self.record(status, self._closing_notes()))
+        return self.recorder.result(self.record(status, self._closing_notes()))
 
     def _closing_notes(self) -> list[str]:
         """Notes on a run that has come to an end."""
-        keeper, watcher = self.keeper, self.watcher
-        notes = doubts(self.machine, self.statistics().rhs)
-        if self.settings.step is None and keeper.count:
-            notes += motion_notes(keeper.low, keeper.high, self.settings)
-            notes += rounding_notes(self.integrations, self.machine.model.body_names)
-        notes += keeper.pulling.notes()
+        recorder, watcher = self.recorder, self.watcher
+        notes = doubts(self.evaluator, self.statistics().rhs)
+        if self.settings.step is None and recorder.count:
+            notes += motion_notes(recorder.low, recorder.high, self.settings)
+            notes += rounding_notes(self.integrations, self.evaluator.model.body_names)
+        notes += recorder.pulling.notes()
         notes += watcher.notes() if watcher else []
         notes += event_notes(self.integrations, self.events())
         notes += crossing_notes(self.crossed)

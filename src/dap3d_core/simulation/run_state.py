@@ -8,18 +8,17 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.integrators import Integration
-from dap3d_core.integrators import Statistics as Counts
-from dap3d_core.result import INFORMATION, Occurrence, Record, Statistics
+from dap3d_core.integrators import Integration, StepCounts
+from dap3d_core.result import INFORMATION, EventRecord, RunMetadata, RunStatistics
 from dap3d_core.scene import Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event
-from dap3d_core.simulation.events.locate import Watcher
+from dap3d_core.simulation.events.locate import EventLocator
 from dap3d_core.simulation.initial.tolerances import atol_notes, resolved_atol
 from dap3d_core.simulation.output.error_estimate import StepLimits, halved
 from dap3d_core.simulation.output.free_space import check_room, row_width
-from dap3d_core.simulation.output.monitor import Observer, Standing
-from dap3d_core.simulation.output.recorder import Keeper
+from dap3d_core.simulation.output.monitor import Observer, RunProgress
+from dap3d_core.simulation.output.recorder import ResultRecorder
 from dap3d_core.simulation.output.termination import occurrences
 from dap3d_core.simulation.settings import report_times, settings_notes
 
@@ -33,12 +32,12 @@ class Callbacks:
     Attributes:
         announce: called with the name of each kernel that has to be compiled.
         progress: called as progress(t, t_end) between chunks.
-        watch: called between chunks with a ``Standing``.
+        watch: called between chunks with a ``RunProgress``.
     """
 
     announce: Callable[[str], None] | None = None
     progress: Progress | None = None
-    watch: Callable[[Standing], None] | None = None
+    watch: Callable[[RunProgress], None] | None = None
 
 
 class RunState:
@@ -55,7 +54,7 @@ class RunState:
         is_whole: the run is between two chunks, its rows taken.
         estimate_error: a second run is to estimate the error of this one.
         limits: of the steps of such a second run.
-        keeper, watcher: the rows reported so far; the events of a script.
+        recorder, watcher: the rows reported so far; the events of a script.
         started, compile_time: clock at the start, compilation left out; seconds of compilation.
     """
 
@@ -82,15 +81,15 @@ class RunState:
             ResultError: the output cannot be written.
             SceneError: there is no final time, or no room for the output.
         """
-        self.compiled, self.machine, self.callbacks = compiled, compiled.machine, callbacks
-        atol = resolved_atol(settings.atol, self.machine)
+        self.compiled, self.evaluator, self.callbacks = compiled, compiled.evaluator, callbacks
+        atol = resolved_atol(settings.atol, self.evaluator)
         self.settings: Simulation = attrs.evolve(settings, atol=atol)
         self.times = report_times(settings.t_end, settings.dt)
         self.notes = [*compiled.notes, *settings_notes(compiled, settings)]
         self.notes.append(f"method {compiled.method}: {compiled.reason}")
         if settings.step is None:
             self.notes += [
-                INFORMATION + note for note in atol_notes(settings.atol, atol, self.machine)
+                INFORMATION + note for note in atol_notes(settings.atol, atol, self.evaluator)
             ]
         self.started = self.compile_time = 0.0
         self.rank = 0
@@ -100,13 +99,14 @@ class RunState:
         self.crossed: list[float] = []
         self.until = np.inf
         self.options: dict[str, Any] = {}
-        self.watcher = Watcher(compiled, events) if events else None
+        self.watcher = EventLocator(compiled, events) if events else None
         watch = callbacks.watch
-        self.observer = None if watch is None else Observer(self.machine.model, self.t_end, watch)
-        check_room(len(self.times), row_width(self.machine), self.settings.dt, output)
+        self.observer = None if watch is None else Observer(self.evaluator.model, self.t_end, watch)
+        check_room(len(self.times), row_width(self.evaluator), self.settings.dt, output)
         most = len(self.times) + 1  # an event may end a run between two of them
-        self.keeper = Keeper(compiled.model, lambda: compiled.machine, output, most, force=force,
-                             run=identity)  # fmt: skip
+        self.recorder = ResultRecorder(
+            compiled.model, lambda: compiled.evaluator, output, most, force=force, run=identity
+        )
 
     @property
     def t_end(self) -> float:
@@ -120,7 +120,7 @@ class RunState:
 
     def begin(self, integration: Integration) -> None:
         """Make an integration the present one; it is compiled first, off the clock of the run."""
-        integration.tstops = self.compiled.pace(self.t_end).stops
+        integration.tstops = self.compiled.breakpoints(self.t_end).stops
         if self.limits is not None:
             integration.tstops = halved(integration.tstops)
             integration.work.longest_step = self.limits.longest
@@ -137,22 +137,22 @@ class RunState:
         if self.observer is not None:
             self.observer.begin(self.present)
 
-    def statistics(self) -> Counts:
-        """Counts of all integrations together."""
-        return Counts(*map(sum, zip(*(i.statistics for i in self.integrations), strict=True)))
+    def statistics(self) -> StepCounts:
+        """StepCounts of all integrations together."""
+        return StepCounts(*map(sum, zip(*(i.statistics for i in self.integrations), strict=True)))
 
-    def events(self) -> list[Occurrence]:
+    def events(self) -> list[EventRecord]:
         """Crossings of switches and events of the script so far, by time."""
         of_script = self.watcher.occurrences if self.watcher else []
-        return occurrences(self.machine, self.integrations, of_script)
+        return occurrences(self.evaluator, self.integrations, of_script)
 
-    def record(self, status: str, more_notes: Sequence[str] = ()) -> Record:
+    def record(self, status: str, more_notes: Sequence[str] = ()) -> RunMetadata:
         """The metadata of the result so far."""
         counts, events = self.statistics(), self.events()
         changes = any(event.changes for event in events)
-        return Record(
+        return RunMetadata(
             scene_text=self.compiled.scene_text,
-            stats=Statistics(
+            stats=RunStatistics(
                 steps=counts.steps,
                 rejected=counts.rejected,
                 rhs=counts.rhs,
@@ -171,7 +171,7 @@ class RunState:
                 "dt": self.settings.dt,
                 "rtol": self.settings.rtol,
                 "atol": self.settings.atol,
-                "length": self.machine.model.length,
+                "length": self.evaluator.model.length,
                 "most_work": max((run.largest_work for run in self.integrations), default=0.0),
                 "step": self.settings.step,
                 "project": bool(self.settings.project),

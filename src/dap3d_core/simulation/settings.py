@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations import Formulation
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators import EXPLICIT, INTEGRATORS, Integrator
 from dap3d_core.model.state_layout import state_layout
@@ -106,18 +106,18 @@ def report_times(t_end: float | None, dt: float | None) -> Floats:
     return times
 
 
-def integration_options(machine: Machine, settings: Simulation) -> dict[str, Any]:
+def integration_options(evaluator: Evaluator, settings: Simulation) -> dict[str, Any]:
     """What any integration takes from a machine and the settings of a run."""
     return {
         "rtol": settings.rtol,
-        "atol": atol_vector(resolved_atol(settings.atol, machine), machine.model.body_count),
+        "atol": atol_vector(resolved_atol(settings.atol, evaluator), evaluator.model.body_count),
         "step": settings.step,
         "project_on": settings.project,
         "error_size": state_layout(
-            machine.model.body_count
+            evaluator.model.body_count
         ).size,  # the work does not steer the step
-        "report_size": machine.report_size,
-        "ends": effects_of(machine.switches),
+        "report_size": evaluator.report_size,
+        "ends": effects_of(evaluator.switches),
     }
 
 

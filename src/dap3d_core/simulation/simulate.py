@@ -7,7 +7,7 @@ from dap3d_core.result import Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event
-from dap3d_core.simulation.output.monitor import Standing
+from dap3d_core.simulation.output.monitor import RunProgress
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks, Progress
 from dap3d_core.simulation.settings import check_checkpoint, compiled_for, settings_of
@@ -34,7 +34,7 @@ def simulate(
     estimate_error: bool = False,
     checkpoint: float | None = None,
     events: Sequence[Event] = (),
-    watch: Callable[[Standing], None] | None = None,
+    watch: Callable[[RunProgress], None] | None = None,
 ) -> Result:
     """Simulate a scene from t = 0 to t_end; settings left out are those of its [simulation].
 
@@ -47,7 +47,7 @@ def simulate(
         correct, project: bring the start, and then every state, onto the constraints.
         correct_metric: "unit" or "mass": least correction in m and rad, or weighted by masses.
         progress, watch: called between chunks of some 0.1 s, as progress(t, t_end) and with a
-            ``Standing``. allow_code, announce: as of ``compile``. events: see ``Event``.
+            ``RunProgress``. allow_code, announce: as of ``compile``. events: see ``Event``.
         output, force: file to write, and whether over an existing one. Rows of a run of more than
             a second are in ``OUTPUT.part`` meanwhile, readable also when the run is killed.
         estimate_error: estimate ``result.error`` by a second, finer run.
@@ -66,7 +66,7 @@ def simulate(
                          correct_metric=correct_metric)  # fmt: skip
     check_checkpoint(checkpoint, output)
     callbacks = Callbacks(announce=announce, progress=progress, watch=watch)
-    with compiled.in_use():
+    with compiled.borrow_evaluator():
         run = Run(compiled, settings, callbacks, events, output=output, force=force,
                   estimate_error=estimate_error)  # fmt: skip
         if checkpoint is not None:

@@ -6,11 +6,11 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats
 from dap3d_core.registry.suggestions import nearest
-from dap3d_core.result import Quantity, Record, Result, ResultError, UnknownNameError, find
+from dap3d_core.result import Quantity, Result, ResultError, RunMetadata, UnknownNameError, find
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.scene.errors import shown
 from dap3d_core.simulation import CompiledModel, SimulationError
@@ -208,16 +208,16 @@ class Reduction:
         reduced = self.reduce(rows, np.arange(3.0))
         return all(bool(np.all(np.isfinite(values))) for values in reduced.values())
 
-    def result(self, model: Model, rows: Floats, machine: Machine | None = None) -> Result:
+    def result(self, model: Model, rows: Floats, evaluator: Evaluator | None = None) -> Result:
         """A result in memory, of rows of a model that a machine evaluates."""
-        record = Record(scene_text=self.compiled.scene_text)
-        return Result.of_run(model, rows, record, lambda: machine or self.compiled.machine)
+        record = RunMetadata(scene_text=self.compiled.scene_text)
+        return Result.of_run(model, rows, record, lambda: evaluator or self.compiled.evaluator)
 
     def _look_up(self, outputs: Sequence[Output]) -> tuple[Output, ...]:
-        machine = self.compiled.machine
-        y = machine.integrated(machine.model.u0)
-        row = np.concatenate([[0.0], y, np.zeros(machine.report_size)])
-        probe = self.result(machine.model, row[None])
+        evaluator = self.compiled.evaluator
+        y = evaluator.integrated(evaluator.model.u0)
+        row = np.concatenate([[0.0], y, np.zeros(evaluator.report_size)])
+        probe = self.result(evaluator.model, row[None])
         expanded: list[Output] = []
         mistakes: list[Mistake] = []
         for output in outputs:
@@ -241,10 +241,10 @@ class Reduction:
 
     def _find_columns(self) -> dict[str, int]:
         """Output -> column of the rows: one that a quantity of random rows is equal to."""
-        machine = self.compiled.machine
-        width = 1 + len(machine.integrated(machine.model.u0)) + machine.report_size
+        evaluator = self.compiled.evaluator
+        width = 1 + len(evaluator.integrated(evaluator.model.u0)) + evaluator.report_size
         rows = np.random.default_rng(0).random((3, width))
-        result = self.result(machine.model, rows)
+        result = self.result(evaluator.model, rows)
         columns = {}
         for output in self.outputs:
             if self.of_rows[output.name]:

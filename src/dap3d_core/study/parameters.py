@@ -10,7 +10,7 @@ import attrs
 
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.registry.suggestions import nearest
-from dap3d_core.scene import Checked, Instance, Mistake, Scene, SceneError, Simulation
+from dap3d_core.scene import Instance, Mistake, Scene, SceneError, Simulation, ValidatedScene
 from dap3d_core.scene.scene import NAMED, Element
 from dap3d_core.scene.validate.settings import OPEN
 
@@ -90,7 +90,7 @@ def with_values(
     return changed
 
 
-def parameters_named(checked: Checked, names: Sequence[str]) -> tuple[SceneParameter, ...]:
+def parameters_named(checked: ValidatedScene, names: Sequence[str]) -> tuple[SceneParameter, ...]:
     """Parameters of a scene by name.
 
     Args:
@@ -118,7 +118,7 @@ def parameters_named(checked: Checked, names: Sequence[str]) -> tuple[SceneParam
     return tuple(parameters)
 
 
-def all_parameters(checked: Checked) -> Iterator[SceneParameter]:
+def all_parameters(checked: ValidatedScene) -> Iterator[SceneParameter]:
     """Every parameter of a scene, those that it leaves to its types as well."""
     for table in TABLES:
         for owner in ("",) if table == "simulation" else getattr(checked.scene, table):
@@ -126,7 +126,7 @@ def all_parameters(checked: Checked) -> Iterator[SceneParameter]:
                 yield from field.parameters()
 
 
-def names_under(checked: Checked, begin: str = "") -> list[str]:
+def names_under(checked: ValidatedScene, begin: str = "") -> list[str]:
     """Names that extend a beginning by one part; those that are no parameter end in a dot."""
     *head, _ = begin.split(".")
     table = head[0] if head else ""
@@ -209,7 +209,7 @@ class _Field:
         return tuple(int(p) - 1 for p in digits)
 
 
-def _resolve(checked: Checked, name: Any) -> SceneParameter | Mistake:
+def _resolve(checked: ValidatedScene, name: Any) -> SceneParameter | Mistake:
     """The parameter of a name, or what is wrong with the name."""
     if not isinstance(name, str):
         return Mistake("vary", name, "the name of a number is text such as 'bodies.crank.mass'")
@@ -244,7 +244,7 @@ def _resolve(checked: Checked, name: Any) -> SceneParameter | Mistake:
     return Mistake("vary", name, what, nearest(name, parts))
 
 
-def _fields(checked: Checked, path: tuple[str, ...]) -> Iterator[_Field]:
+def _fields(checked: ValidatedScene, path: tuple[str, ...]) -> Iterator[_Field]:
     """The numeric fields of an owner, or of the settings."""
     table = path[0]
     holder = _holder(checked.scene, (*path, ""))
@@ -295,7 +295,7 @@ def _replaced(value: Any, index: tuple[int, ...], number: float) -> Any:
     return (*value[:k], part, *value[k + 1 :])
 
 
-def _no_table(checked: Checked, name: str, table: str, rest: list[str]) -> Mistake:
+def _no_table(checked: ValidatedScene, name: str, table: str, rest: list[str]) -> Mistake:
     """The mistake of a name without a table, with the name that was probably meant."""
     homes = [t for t in TABLES if t != "simulation" and table in getattr(checked.scene, t)]
     near = ""

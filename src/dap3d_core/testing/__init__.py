@@ -10,7 +10,7 @@
 (docs/check-plugin.md).
 """
 
-from dap3d_core.testing.checks.findings import Finding, Outcome, Report
+from dap3d_core.testing.checks.findings import CheckOutcome, Finding, Report
 from dap3d_core.testing.kit import Check, check_type, checks_for
 
-__all__ = ["Check", "Finding", "Outcome", "Report", "check_type", "checks_for"]
+__all__ = ["Check", "Finding", "CheckOutcome", "Report", "check_type", "checks_for"]

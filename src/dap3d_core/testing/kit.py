@@ -8,11 +8,11 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.testing.checks import forces, functions, joints, plain_kernels, purity
-from dap3d_core.testing.checks.findings import FAILED, LEFT_OUT, Finding, Outcome, Report
+from dap3d_core.testing.checks.findings import FAILED, LEFT_OUT, CheckOutcome, Finding, Report
 from dap3d_core.testing.samples.sampled_type import SampledType, UndefinedError, sampled_types
 
 #: Default number of random poses on and off the manifold, and their seed.
@@ -32,12 +32,12 @@ class Check:
     name: str
     subject: SampledType
     inapplicable: str
-    _run: Callable[[SampledType], Outcome]
+    _run: Callable[[SampledType], CheckOutcome]
 
-    def run(self) -> Outcome:
+    def run(self) -> CheckOutcome:
         """Run the check."""
         if self.inapplicable:
-            return Outcome(self.name, self.subject.variant, LEFT_OUT, self.inapplicable)
+            return CheckOutcome(self.name, self.subject.variant, LEFT_OUT, self.inapplicable)
         with contextlib.redirect_stdout(io.StringIO()) as printed:
             outcome = self._outcome()
         if self.name == "purity" and (said := printed.getvalue().strip()):
@@ -45,17 +45,17 @@ class Check:
             return attrs.evolve(outcome, notes=(*outcome.notes, note))
         return outcome
 
-    def _outcome(self) -> Outcome:
+    def _outcome(self) -> CheckOutcome:
         try:
             if self.name != "purity" and purity.differing(self.subject):
                 words = "its kernels give other numbers each time they are called (see purity)"
-                return Outcome(self.name, self.subject.variant, LEFT_OUT, words)
+                return CheckOutcome(self.name, self.subject.variant, LEFT_OUT, words)
             return attrs.evolve(self._run(self.subject), check=self.name)
         except Exception as error:  # of a kernel, or of random poses that give no number
             known = isinstance(error, UndefinedError)
             words = str(error) if known else f"it could not be carried out: {_reason(error)}"
             finding = Finding(self.name, self.subject.variant, "", 0, words)
-            return Outcome(self.name, self.subject.variant, FAILED, words, findings=(finding,))
+            return CheckOutcome(self.name, self.subject.variant, FAILED, words, findings=(finding,))
 
     def __call__(self) -> None:
         """Run the check.
@@ -87,7 +87,7 @@ def check_type(type_: Any, *, poses: int = POSES, seed: int = SEED) -> Report:
     Raises:
         PluginError: the type cannot be used at all.
     """
-    examined = type_ if isinstance(type_, Examined) else examine(type_)
+    examined = type_ if isinstance(type_, TypeInfo) else examine(type_)
     outcomes = tuple(check.run() for check in _checks(examined, poses, seed))
     kind, keyword = examined.type.kind, examined.type.keyword
     return Report(kind, keyword, where_is(examined.type), seed, poses, outcomes)
@@ -108,18 +108,18 @@ def checks_for(type_: Any, *, poses: int = POSES, seed: int = SEED) -> list[Chec
     Raises:
         PluginError: the type cannot be used at all.
     """
-    examined = type_ if isinstance(type_, Examined) else examine(type_)
+    examined = type_ if isinstance(type_, TypeInfo) else examine(type_)
     return [check for check in _checks(examined, poses, seed) if not check.inapplicable]
 
 
-def _checks(examined: Examined, poses: int, seed: int) -> list[Check]:
+def _checks(examined: TypeInfo, poses: int, seed: int) -> list[Check]:
     if poses < 1:
         raise ValueError(f"poses is {poses}; a check takes one or more")
     of_kind = {"joint": _of_joint, "force": _of_force, "function": _of_function}
     checks = []
     for subject in sampled_types(examined, seed, poses):
         by_joint = "its formulas are the friction of its joint, which is checked with that"
-        if subject.examined.rubs_in:
+        if subject.examined.friction_joint:
             checks.append(Check("energy", subject, by_joint, forces.potential))
             continue
         checks += of_kind[subject.type.kind](subject)
@@ -152,7 +152,9 @@ def _of_joint(subject: SampledType) -> list[Check]:
     return checks
 
 
-def _on_friction(run: Callable[[SampledType], Outcome]) -> Callable[[SampledType], Outcome]:
+def _on_friction(
+    run: Callable[[SampledType], CheckOutcome],
+) -> Callable[[SampledType], CheckOutcome]:
     return lambda subject: run(subject.friction)
 
 

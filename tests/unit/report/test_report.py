@@ -13,7 +13,7 @@ from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.integrators import INTEGRATORS
-from dap3d_core.report import Report, Run, Setting
+from dap3d_core.report import MeasuredRun, Report, Setting
 from dap3d_core.report.error_norms import final_position_error, first_parting, trajectory_error
 from dap3d_core.report.recommend import front, recommend
 from dap3d_core.report.settings_ladder import ADAPTIVE, ladder, ladder_of_steps
@@ -101,7 +101,7 @@ def test_flags_are_those_of_the_command_line():
 
 
 def run(integrator, time_s, error, spread=0.0, repeats=5, rhs=1234):
-    return Run(
+    return MeasuredRun(
         setting=Setting("standard", integrator, 1e-6, 1e-8),
         time_s=time_s, time_min_s=time_s - spread, time_max_s=time_s + spread, repeats=repeats,
         error=error, final_position_error=0.0, energy_error=0.0, constraint_error=0.0,

@@ -18,9 +18,9 @@ from support.results import (
     same_bits,
 )
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model.state_layout import split
-from dap3d_core.result import Record, Result, ResultError, Statistics, open_result
+from dap3d_core.result import Result, ResultError, RunMetadata, RunStatistics, open_result
 from dap3d_core.result.arrays import row_width
 from dap3d_core.scene import load
 from dap3d_core.scene.files.read_toml import scene_of
@@ -28,14 +28,14 @@ from dap3d_core.scene.files.read_toml import scene_of
 ABOUT = dict(
     status="interrupted",
     notes=["Newton's note: Δ|C| = 1e-9", 'a "second"'],
-    stats=Statistics(steps=3, rejected=1, rhs=40, projections=4, wall_time_s=0.25),
+    stats=RunStatistics(steps=3, rejected=1, rhs=40, projections=4, wall_time_s=0.25),
     known_versions={"dap3d": "0.1", "numpy": "2", "llvmlite": "0", "python": "3"},
 )
 
 
 def rebuild(text):
     model = model_of(scene_of(tomllib.loads(text)))
-    return model, lambda: Machine(model, "standard")
+    return model, lambda: Evaluator(model, "standard")
 
 
 # ---------------------------------------------------------------------------- round trip
@@ -45,7 +45,7 @@ def rebuild(text):
 def test_round_trip_is_bit_for_bit(tmp_path, name):
     scene = load(name)
     model = model_of(scene)
-    record = Record(scene_text=scene.to_toml(), settings=CONTROLLED, **ABOUT)
+    record = RunMetadata(scene_text=scene.to_toml(), settings=CONTROLLED, **ABOUT)
     result = Result.of_run(model, noisy(model), record, lambda: None)
     result.save(tmp_path / "run.nc")
     found = open_result(tmp_path / "run.nc")
@@ -89,7 +89,7 @@ def test_another_model_than_was_run_is_refused(tmp_path):
 def test_results_of_no_or_one_instant(tmp_path, nt):
     model = model_of(circling_scene())
     rows = noisy(model, 2)[:nt]
-    result = Result.of_run(model, rows, Record(scene_text="[scene]\n"), lambda: None)
+    result = Result.of_run(model, rows, RunMetadata(scene_text="[scene]\n"), lambda: None)
     result.save(tmp_path / "run.nc")
     assert same_bits(open_result(tmp_path / "run.nc"), result)
 
@@ -100,7 +100,7 @@ def test_text_of_a_large_scene_and_odd_names(tmp_path):
     scene.description = "ä€😀" * 60_000
     scene.add_body("Kurbel ä 手", mass=1.0, Jp=[1, 1, 1], r=[9, 9, 9])
     model = model_of(scene)
-    record = Record(scene_text=scene.to_toml())
+    record = RunMetadata(scene_text=scene.to_toml())
     result = Result.of_run(model, noisy(model), record, lambda: None)
     result.save(tmp_path / "räder.nc")
     found = open_result(tmp_path / "räder.nc")
@@ -213,7 +213,7 @@ def test_a_file_that_lacks_something_is_damaged(tmp_path, change):
 
 def test_width_of_rows_is_that_of_the_integrator():
     model = model_of(load("fourbar3"))
-    result = Result.of_run(model, noisy(model), Record(scene_text=""), lambda: None)
-    size = Machine(model, "standard").report_size
+    result = Result.of_run(model, noisy(model), RunMetadata(scene_text=""), lambda: None)
+    size = Evaluator(model, "standard").report_size
     assert row_width(result.subject) == 1 + 13 * model.body_count + 1 + size
     assert split(result.u)[0].shape == result.r.shape

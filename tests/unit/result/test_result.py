@@ -22,10 +22,10 @@ from support.results import (
     rows_of,
 )
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model.rotations import to_global
-from dap3d_core.model.state_layout import join, to_integrated
-from dap3d_core.result import ResultError, Statistics, UnknownNameError
+from dap3d_core.model.state_layout import join, y_from_u
+from dap3d_core.result import ResultError, RunStatistics, UnknownNameError
 from dap3d_core.scene import Scene, load
 
 # ---------------------------------------------------------------------------- motion
@@ -127,9 +127,9 @@ def test_reaction_is_the_centripetal_force_and_its_opposite_on_the_ground():
 def test_the_reported_multipliers_give_that_reaction():
     """The solver finds the multipliers of the closed form."""
     result, _, _ = circling()
-    machine = Machine(result.model, "standard")
+    evaluator = Evaluator(result.model, "standard")
     for k in (0, 7, 20):
-        found = machine.report(result.t[k], result.u[k])
+        found = evaluator.report(result.t[k], result.u[k])
         np.testing.assert_allclose(found[:6], result.v_dot[k], atol=1e-12)
         np.testing.assert_allclose(found[6:9], result.Lam[k], atol=1e-12)
 
@@ -161,15 +161,15 @@ def thrown(request):
     """A shipped model at its start, its velocities thrown at random: no constraint level holds."""
     scene = load(request.param)
     model = model_of(scene)
-    machine = Machine(model, "standard")
+    evaluator = Evaluator(model, "standard")
     rng = np.random.default_rng(11)
     u = np.tile(model.u0, (3, 1))
     u[:, 7 * model.body_count :] += rng.normal(size=(3, 6 * model.body_count))
     t = np.array([0.0, 0.3, 0.7])
-    report = np.array([machine.report(*each) for each in zip(t, u, strict=True)])
-    y = to_integrated(u)
+    report = np.array([evaluator.report(*each) for each in zip(t, u, strict=True)])
+    y = y_from_u(u)
     result = result_of(scene, np.hstack([t[:, None], y, report]), model)
-    return result, machine
+    return result, evaluator
 
 
 def test_reactions_are_what_the_jacobian_transposed_gives(thrown):
@@ -187,10 +187,10 @@ def test_reactions_are_what_the_jacobian_transposed_gives(thrown):
 
 
 def test_reactions_leave_the_machine_as_it_was(thrown):
-    result, machine = thrown
-    before = machine.report(result.t[0], result.u[0])
+    result, evaluator = thrown
+    before = evaluator.report(result.t[0], result.u[0])
     result.reaction(result.subject.joint_names[-1])
-    np.testing.assert_array_equal(machine.report(result.t[0], result.u[0]), before)
+    np.testing.assert_array_equal(evaluator.report(result.t[0], result.u[0]), before)
 
 
 def test_an_unknown_joint_is_answered_with_the_nearest():
@@ -223,7 +223,7 @@ def test_the_machine_is_made_once_and_only_when_needed():
 
 
 def test_what_the_run_says_of_itself():
-    stats = Statistics(steps=7, rejected=1, rhs=90, projections=8, wall_time_s=0.5)
+    stats = RunStatistics(steps=7, rejected=1, rhs=90, projections=8, wall_time_s=0.5)
     result, _, _ = circling(
         status="interrupted", notes=["one", "two"], stats=stats, known_versions={"dap3d": "9"}
     )

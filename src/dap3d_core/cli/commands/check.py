@@ -36,9 +36,9 @@ def check(
     """
     import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json, stdout
-    from dap3d_core.cli.console.progress import RunProgress
+    from dap3d_core.cli.console.progress import ProgressBar
 
-    with RunProgress(quiet=as_json) as progress:
+    with ProgressBar(quiet=as_json) as progress:
         with refusing(dap.SimulationError):  # a method that does not fit the scene
             compiled = dap.compile(
                 model, method=method, allow_code=allow_code, announce=progress.announce
@@ -75,7 +75,7 @@ def _data(compiled: "CompiledModel", metric: str | None) -> dict[str, Any]:
         mistakes.append({"key": "joints", "what": str(error)})
         redundancy = compiled.redundancy()
     rank = redundancy.rank
-    position, velocity = violation(compiled.machine, model.u0)
+    position, velocity = violation(compiled.evaluator, model.u0)
     return {
         "scene": compiled.scene.name,
         "bodies": model.body_count,
@@ -104,14 +104,14 @@ def _redundancy_data(
     """Redundancy as data; ``about`` has the same in sentences."""
     import attrs
 
-    from dap3d_core.simulation.redundancy.other_poses import Elsewhere, redundancy_elsewhere
+    from dap3d_core.simulation.redundancy.other_poses import GenericRank, redundancy_elsewhere
 
-    rank, elsewhere = redundancy.rank, Elsewhere((), None, None)
+    rank, elsewhere = redundancy.rank, GenericRank((), None, None)
     about: list[str] = []
     if rank.redundant:
         about.append(redundancy.describe_groups())
         if assembled:
-            elsewhere = redundancy_elsewhere(compiled.machine, u, redundancy)
+            elsewhere = redundancy_elsewhere(compiled.evaluator, u, redundancy)
             about.append(elsewhere.describe(redundancy))
         about += redundancy.describe_contradictions()
         if redundancy.singular:

@@ -132,14 +132,16 @@ def _check(registry: "Registry", kind: str, keyword: str, poses: int, seed: int)
     """The report on a type; it has a single finding if the type cannot be loaded."""
     from dap3d_core.interface import PluginError
     from dap3d_core.registry import LOAD_LIMIT
-    from dap3d_core.testing import Finding, Outcome, Report, check_type
+    from dap3d_core.testing import CheckOutcome, Finding, Report, check_type
 
     try:
         examined = registry.get(kind, keyword, limit_s=LOAD_LIMIT)
         return check_type(examined, poses=poses, seed=seed)
     except PluginError as error:
         finding = Finding("loading", "", "", 0, str(error))
-        outcome = Outcome("loading", "", "failed", "it can be loaded", None, None, (), (finding,))
+        outcome = CheckOutcome(
+            "loading", "", "failed", "it can be loaded", None, None, (), (finding,)
+        )
         title = registry.sources[kind, keyword][0].module
         return Report(kind, keyword, title, seed, poses, (outcome,))
 

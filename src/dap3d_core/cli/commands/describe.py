@@ -13,7 +13,7 @@ from dap3d_core.cli.process.exit_codes import DONE, Refused
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
-    from dap3d_core.interface.codegen.examined import Examined
+    from dap3d_core.interface.codegen.examined import TypeInfo
     from dap3d_core.registry import Registry
 
 
@@ -118,7 +118,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
     }
 
 
-def _class_data(examined: "Examined") -> dict[str, Any]:
+def _class_data(examined: "TypeInfo") -> dict[str, Any]:
     """Docstring, kernels and, of a joint, numbers of rows: what variants of a type have, too."""
     type_: Any = examined.type
     kernels = [name for name in type_.kernel_names if name in examined.kernels]

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dap3d_core.interface.codegen.examined import Examined
+    from dap3d_core.interface.codegen.examined import TypeInfo
     from dap3d_core.registry import Registry
 
 #: Body of each slot; points and vectors lie on it.
@@ -22,7 +22,7 @@ _LISTS = {
 ALONG = ("a", "")
 
 
-def example_of(examined: "Examined", registry: "Registry") -> str:
+def example_of(examined: "TypeInfo", registry: "Registry") -> str:
     """The text of a scene file with one element of a type and all that it needs.
 
     It has the required fields of the type, and its numbers with their defaults. Other elements that
@@ -37,7 +37,7 @@ def example_of(examined: "Examined", registry: "Registry") -> str:
     return scene.text()
 
 
-def _has_friction(examined: "Examined") -> bool:
+def _has_friction(examined: "TypeInfo") -> bool:
     """True for a joint with friction that needs no optional field."""
     from dap3d_core.interface.codegen.kernel_arguments import parameters
 
@@ -62,7 +62,7 @@ class _Example:
         settings = "[simulation]\nt_end = 0.2\ndt = 0.1\n"
         return "\n".join([*tables, *self.points.values(), *self.elements.values(), settings])
 
-    def first(self, kind: str, is_suitable: Callable[["Examined"], bool]) -> "Examined":
+    def first(self, kind: str, is_suitable: Callable[["TypeInfo"], bool]) -> "TypeInfo":
         """The first suitable type of a kind, by keyword."""
         from dap3d_core.interface import PluginError
         from dap3d_core.registry import LOAD_LIMIT
@@ -76,7 +76,7 @@ class _Example:
                 return examined
         raise PluginError(f"an example needs a {kind} that no installed package brings")
 
-    def add(self, examined: "Examined", name: str, motor: str = "motor") -> None:
+    def add(self, examined: "TypeInfo", name: str, motor: str = "motor") -> None:
         """Add an element of a type and all that it refers to; ``motor`` names its function."""
         from dap3d_core.interface.fields import specs_of
 

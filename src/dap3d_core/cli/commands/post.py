@@ -131,6 +131,6 @@ def _write_arrays(
 
     with refusing(ResultError, UnknownNameError):
         if jacobian and result.subject.row_count:
-            _ = result.machine
+            _ = result.evaluator
         dataset = selection_of(result, names) if names else dataset_to_write(result, reactions)
     return write_netcdf(result, target, dataset, jacobian=jacobian, force=force)

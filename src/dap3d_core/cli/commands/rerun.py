@@ -10,7 +10,7 @@ from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.exit_codes import refusing
 
 if TYPE_CHECKING:
-    from dap3d_core.simulation.rerun import Repetition
+    from dap3d_core.simulation.rerun import Reproduction
 
 
 @command(
@@ -34,12 +34,12 @@ def rerun(
     """
     import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json
-    from dap3d_core.cli.console.progress import RunProgress
+    from dap3d_core.cli.console.progress import ProgressBar
     from dap3d_core.cli.framework.paths import open_result
     from dap3d_core.result import ResultError
 
     first = open_result(result)
-    with RunProgress(quiet=quiet) as progress, refusing(ResultError):
+    with ProgressBar(quiet=quiet) as progress, refusing(ResultError):
         watch = signals_of(ctx).interruptible(progress.advance)
         repetition = dap.rerun(
             first, model=model, allow_code=allow_code, watch=watch, announce=progress.announce
@@ -55,7 +55,7 @@ def rerun(
     return code
 
 
-def _show(repetition: "Repetition", result: str, *, quiet: bool) -> None:
+def _show(repetition: "Reproduction", result: str, *, quiet: bool) -> None:
     from dap3d_core.cli.console.console import stderr, stdout
 
     compared = f"{repetition.instants:,} instants compared"

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dap3d_core.cli.framework.execute import Announce, Watch
     from dap3d_core.result import Result
     from dap3d_core.simulation import CompiledModel
-    from dap3d_core.simulation.resume import Resumption
+    from dap3d_core.simulation.resume import ResumedRun
 
 
 @command(
@@ -54,7 +54,7 @@ def resume(
     from dap3d_core.simulation import CheckpointError
     from dap3d_core.simulation.resume import resumption
 
-    resumed: list[Resumption] = []
+    resumed: list[ResumedRun] = []
 
     def prepare(announce: "Announce") -> "CompiledModel":
         with refusing(ResultError):

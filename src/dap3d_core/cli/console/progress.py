@@ -21,7 +21,7 @@ from rich.text import Text
 from dap3d_core.cli.console.console import Terminal, clean, seconds, stderr
 
 if TYPE_CHECKING:
-    from dap3d_core.simulation import Standing
+    from dap3d_core.simulation import RunProgress
 
 ONCE = "compiling for the first time; this happens once"
 #: Time of the first line of progress, and the longest time between two lines, s.
@@ -123,7 +123,7 @@ class PreparationProgress:
             self._console.say(words)
 
 
-class RunProgress(PreparationProgress):
+class ProgressBar(PreparationProgress):
     """Shows the progress of a run."""
 
     def __init__(self, *, quiet: bool) -> None:
@@ -131,7 +131,7 @@ class RunProgress(PreparationProgress):
         self._begin: tuple[float, float] | None = None
         self._reached = 0.0
 
-    def advance(self, run: "Standing") -> None:
+    def advance(self, run: "RunProgress") -> None:
         """Show a snapshot of the run."""
         self._end_waiting()
         now = time.monotonic()
@@ -187,7 +187,7 @@ def points_line(done: int, total: int, rate: float, width: int = 80) -> str:
     )
 
 
-def live_line(run: "Standing", rate: float, width: int) -> str:
+def live_line(run: "RunProgress", rate: float, width: int) -> str:
     """Progress of a run in one line of a width; ``rate`` is 0 if it is not known yet.
 
     Numbers have fixed widths, so that the line does not jump.
@@ -212,7 +212,7 @@ def live_line(run: "Standing", rate: float, width: int) -> str:
     )
 
 
-def plain_line(run: "Standing", rate: float) -> str:
+def plain_line(run: "RunProgress", rate: float) -> str:
     """The same for a file or another program."""
     left = seconds((run.t_end - run.t) / rate) if rate else "?"
     return (

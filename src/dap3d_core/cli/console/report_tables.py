@@ -7,10 +7,10 @@ from rich.progress import Progress
 from rich.text import Text
 
 from dap3d_core.cli.console.console import Terminal, clean, count, scene_name, seconds
-from dap3d_core.cli.console.progress import LONGEST_PAUSE, RunProgress, bar_of
+from dap3d_core.cli.console.progress import LONGEST_PAUSE, ProgressBar, bar_of
 
 if TYPE_CHECKING:
-    from dap3d_core.report import Report, Run
+    from dap3d_core.report import MeasuredRun, Report
 
 #: Width from which the counts and the constraints are shown.
 WIDE = 76
@@ -20,7 +20,7 @@ TARGETS = (1e-3, 1e-6, 1e-9)
 PAUSE = 5.0
 
 
-class ReportProgress(RunProgress):
+class ReportProgress(ProgressBar):
     """Shows the progress of a report on stderr."""
 
     def __init__(self, *, quiet: bool) -> None:
@@ -107,7 +107,7 @@ def _expected(report: "Report") -> str:
     )
 
 
-def _show_runs(console: Terminal, runs: "list[Run]") -> None:
+def _show_runs(console: Terminal, runs: "list[MeasuredRun]") -> None:
     wide = console.width >= WIDE
     columns = ["", "setting", "time", "error", "energy"]
     columns += ["|C|", "steps", "rhs"] if wide else ["rhs"]
@@ -116,7 +116,7 @@ def _show_runs(console: Terminal, runs: "list[Run]") -> None:
     console.table(columns, rows, right=tuple(every)[2:], fixed=tuple(every))
 
 
-def _row(run: "Run", *, wide: bool) -> list[str | Text]:
+def _row(run: "MeasuredRun", *, wide: bool) -> list[str | Text]:
     return [
         Text("*" if run.on_front else "", style="bold green"),
         run.setting.control,

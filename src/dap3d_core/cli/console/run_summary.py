@@ -137,7 +137,7 @@ def correction_data(
 
 
 @attrs.frozen(eq=False)
-class Outcome:
+class RunOutcome:
     """A run that has a result.
 
     Attributes:
@@ -155,7 +155,7 @@ class Outcome:
     checkpoint: Path | None
 
 
-def _correction(outcome: Outcome) -> dict[str, Any] | None:
+def _correction(outcome: RunOutcome) -> dict[str, Any] | None:
     """The correction of a run; None if there was none to make."""
     result = outcome.result
     if not (result.settings.get("correct") and result.subject.row_count and len(result.t)):
@@ -165,7 +165,7 @@ def _correction(outcome: Outcome) -> dict[str, Any] | None:
 
 
 def report_run(
-    outcome: Outcome, model: str, target: Path, *, strict: bool, as_json: bool, quiet: bool
+    outcome: RunOutcome, model: str, target: Path, *, strict: bool, as_json: bool, quiet: bool
 ) -> int:
     """Report a run that was saved; returns the exit code."""
     data = run_data(outcome.result)
@@ -191,7 +191,7 @@ def report_run(
 
 
 def _show_run(
-    outcome: Outcome, data: dict[str, Any], initial: dict[str, Any] | None, target: Path
+    outcome: RunOutcome, data: dict[str, Any], initial: dict[str, Any] | None, target: Path
 ) -> None:
     console = stdout()
     name = scene_name(data["scene"])
@@ -210,7 +210,7 @@ def _show_run(
         console.say(f"dap3d {command}", "green", indent=2, whole=True)
 
 
-def _show_early_end(outcome: Outcome, target: Path) -> None:
+def _show_early_end(outcome: RunOutcome, target: Path) -> None:
     console = stderr()
     console.say(outcome.reason, "bold red")
     last = f"t = {outcome.result.t[-1]:.6g} s"

@@ -10,12 +10,12 @@ from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.exit_codes import Terminated, refusing
 
 if TYPE_CHECKING:
-    from dap3d_core.cli.console.run_summary import Outcome
+    from dap3d_core.cli.console.run_summary import RunOutcome
     from dap3d_core.result import Result
-    from dap3d_core.simulation import CompiledModel, Standing
+    from dap3d_core.simulation import CompiledModel, RunProgress
 
     Announce = Callable[[str], None]
-    Watch = Callable[[Standing], None]
+    Watch = Callable[[RunProgress], None]
 
 
 def execute(
@@ -24,13 +24,13 @@ def execute(
     run: "Callable[[Announce, Watch], Result]",
     *,
     quiet: bool,
-) -> "Outcome":
+) -> "RunOutcome":
     """Compile a model and run it; a run that ends early returns what it computed."""
     import dap3d_core as dap
-    from dap3d_core.cli.console.progress import RunProgress
-    from dap3d_core.cli.console.run_summary import Outcome
+    from dap3d_core.cli.console.progress import ProgressBar
+    from dap3d_core.cli.console.run_summary import RunOutcome
 
-    with RunProgress(quiet=quiet) as progress:
+    with ProgressBar(quiet=quiet) as progress:
         with refusing(dap.SimulationError):  # a method that does not fit the scene
             compiled = prepare(progress.announce)
         progress.start()
@@ -38,8 +38,8 @@ def execute(
             result = run(progress.announce, signals_of(ctx).interruptible(progress.advance))
         except (Exception, KeyboardInterrupt) as error:
             partial, code, reason = partial_result(ctx, error)
-            return Outcome(compiled, partial, code, reason, getattr(error, "checkpoint", None))
-        return Outcome(compiled, result, exit_codes.DONE, "", None)
+            return RunOutcome(compiled, partial, code, reason, getattr(error, "checkpoint", None))
+        return RunOutcome(compiled, result, exit_codes.DONE, "", None)
 
 
 def partial_result(ctx: click.Context, error: BaseException) -> tuple[Any, int, str]:

@@ -36,14 +36,14 @@ from dap3d_core.assembly.evaluate import (
     zero,
 )
 from dap3d_core.assembly.state_update import (
-    change_velocity,
-    move,
+    apply_displacement,
+    apply_velocity_change,
     normalise,
     size_of_positions,
     size_of_velocities,
 )
-from dap3d_core.formulations.common.friction import solve_rubbing
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
+from dap3d_core.formulations.common.friction import solve_with_friction
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.linear.ldlt.factor import (
     assemble,
     factor,
@@ -63,12 +63,12 @@ PART = 1e-9
 
 #: Where a pass with the factors of another pose leaves more than this part of the residual, the
 #: next has new ones: with very different masses a small turn changes which body gives way.
-SLOW = 0.1
+REFACTOR_RATIO = 0.1
 
 #: A residual that stays above this many times the tolerance means that the projection did not find
 #: the constraints: with independent rows, and where redundant ones may misfit (by FIT of
 #: simulation/initial/assemble.py).
-LOST, MISFIT = 1e6, 1e8
+PROJECTION_FAILURE_FACTOR, REDUNDANT_FAILURE_FACTOR = 1e6, 1e8
 
 
 @compiled_into
@@ -116,7 +116,7 @@ def factorise_anyway(system: System, part: float | None) -> None:
 
 
 @compiled_into
-def gather_forces(t: float, y: Floats, system: System, loops: Any) -> float:
+def evaluate_forces(t: float, y: Floats, system: System, loops: Any) -> float:
     """Place the bodies of a state; scaled forces into ``acceleration``; returns their power.
 
     Functions of time stand ready after that.
@@ -157,14 +157,14 @@ def solve_equations(
 
     solve: of a formulation, from the scaled forces in ``acceleration``, with factors of ``part``.
     """
-    power = gather_forces(t, y, system, loops)
+    power = evaluate_forces(t, y, system, loops)
     linearise(t, system, loops)
     factorise(system, part)
-    power += solve_rubbing(t, system, loops, solve)
+    power += solve_with_friction(t, system, loops, solve)
     return power + power_of_drivers(system)
 
 
-@compiled_inside
+@compiled
 def residuals(t: float, system: System, loops: Any) -> float:
     """C, zero where a row has no position level, into ``residual``; returns the largest, m."""
     C = system.residual
@@ -173,7 +173,7 @@ def residuals(t: float, system: System, loops: Any) -> float:
     return largest_weighted(C, system.weight)
 
 
-@compiled_inside
+@compiled
 def velocity_residuals(system: System) -> float:
     """D v - nu into ``residual``, with D^ as it stands; returns the largest, m/s."""
     residual = system.residual
@@ -184,7 +184,7 @@ def velocity_residuals(system: System) -> float:
     return largest_weighted(residual, system.weight)
 
 
-@compiled_inside
+@compiled
 def acceleration_residual(system: System) -> float:
     """D a - gamma into ``residual``; returns the largest, m/s^2."""
     residual = system.residual
@@ -227,7 +227,7 @@ def project_onto(
     """
     metric = system.metric
     n = metric.shape[0] - 1
-    lost = LOST if part is None else MISFIT
+    lost = PROJECTION_FAILURE_FACTOR if part is None else REDUNDANT_FAILURE_FACTOR
     linear = out[0] == 1.0
     factored = linear and kept
     stale = False
@@ -245,7 +245,7 @@ def project_onto(
         for _ in range(PASSES):
             before = worst
             correct(system)
-            move(y, metric, system.change)
+            apply_displacement(y, metric, system.change)
             place_bodies(y, system.body, metric)
             worst = residuals(t, system, loops)
             if not worst > limit or not worst < 0.5 * before:
@@ -289,21 +289,24 @@ def project_velocities(
         for _ in range(PASSES):
             before = worst
             correct(system)
-            change_velocity(y, system.metric, system.change)
+            apply_velocity_change(y, system.metric, system.change)
             add_product(system.blocks, system.D, system.change, system.residual)
             worst = largest_weighted(system.residual, system.weight)
             if not worst > limit or not (stale or worst < 0.5 * before):
                 break
-            if stale and not worst < SLOW * before:
+            if stale and not worst < REFACTOR_RATIO * before:
                 factorise_anyway(system, part)
                 stale = False
         out[0] = 1.0
-        if not worst <= (LOST if part is None else MISFIT) * limit:
+        if (
+            not worst
+            <= (PROJECTION_FAILURE_FACTOR if part is None else REDUNDANT_FAILURE_FACTOR) * limit
+        ):
             out[1] = 1.0
     out[3] = worst
 
 
-@compiled_inside
+@compiled
 def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
     """Angles, energy and residuals into the end of out.
 
@@ -323,7 +326,7 @@ def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
     call_kinds(TURNED, TURNED, t, system, loops, angles, value, value)
 
 
-@compiled_inside
+@compiled
 def report_multipliers(system: System, out: Floats) -> None:
     """Multipliers in the order of the model, after the accelerations."""
     first = 6 * (system.body.shape[0] - 1)

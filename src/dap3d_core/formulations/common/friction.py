@@ -13,7 +13,7 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import FRICTION, UNSETTLED, System
 from dap3d_core.assembly.evaluate import call_kinds, zero
-from dap3d_core.kernels.runtime.cache import compiled_inside, compiled_into
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 #: The multipliers have settled where a pass changes them by less than this part of the largest.
 SETTLED = 1e-10
@@ -21,44 +21,44 @@ SETTLED = 1e-10
 PASSES = 25
 
 
-@compiled_inside
-def rubs(system: System) -> bool:
+@compiled
+def has_friction(system: System) -> bool:
     """Whether the scene has friction in joints."""
     return bool(system.kinds[FRICTION + 1] > system.kinds[FRICTION])
 
 
-@compiled_inside
-def keep_applied(system: System) -> None:
+@compiled
+def store_applied_forces(system: System) -> None:
     """Remember the scaled applied forces before they become accelerations."""
     for k in range(system.acceleration.shape[0]):
         system.friction[k] = system.acceleration[k]
 
 
-@compiled_inside
-def rub(t: float, system: System, loops: Any) -> float:
+@compiled
+def apply_friction(t: float, system: System, loops: Any) -> float:
     """Friction for ``multipliers``, added to the scaled applied forces; returns its power."""
     body, metric, forces = system.body, system.metric, system.acceleration
     size = forces.shape[0]
-    applied, rubbing = system.friction[:size], system.friction[size : 2 * size]
-    zero(rubbing)
+    applied, friction = system.friction[:size], system.friction[size : 2 * size]
+    zero(friction)
     call_kinds(
-        FRICTION, FRICTION, t, system, loops, rubbing, system.multipliers, system.multipliers
+        FRICTION, FRICTION, t, system, loops, friction, system.multipliers, system.multipliers
     )
     power = 0.0
     for b in range(1, body.shape[0]):
         s, k, o = body[b], metric[b], 6 * b
         for c in range(6):
-            power += rubbing[o + c] * s[12 + c]
-        n0, n1, n2 = rubbing[o + 3], rubbing[o + 4], rubbing[o + 5]
+            power += friction[o + c] * s[12 + c]
+        n0, n1, n2 = friction[o + 3], friction[o + 4], friction[o + 5]
         for c in range(3):
-            forces[o + c] = applied[o + c] + k[0] * rubbing[o + c]
+            forces[o + c] = applied[o + c] + k[0] * friction[o + c]
             turned = k[7 + c] * n0 + k[10 + c] * n1 + k[13 + c] * n2
             forces[o + 3 + c] = applied[o + 3 + c] + turned
     return power
 
 
-@compiled_inside
-def settle(system: System, passes: int) -> bool:
+@compiled
+def accelerate_fixed_point(system: System, passes: int) -> bool:
     """True if ``multipliers`` have settled; else they become the start of the next pass."""
     x, rows = system.multipliers, system.multipliers.shape[0]
     memory = system.friction[2 * system.force.shape[0] :]
@@ -90,18 +90,20 @@ def settle(system: System, passes: int) -> bool:
 
 
 @compiled_into
-def solve_rubbing(t: float, system: System, loops: Any, solve: Callable[[System], None]) -> float:
+def solve_with_friction(
+    t: float, system: System, loops: Any, solve: Callable[[System], None]
+) -> float:
     """``solve`` of a formulation, again until friction and multipliers agree; power of friction.
 
     solve: ``acceleration`` and ``multipliers`` from the scaled forces in ``acceleration``.
     """
     power, passes = 0.0, 0
-    if rubs(system):
-        keep_applied(system)
+    if has_friction(system):
+        store_applied_forces(system)
     solve(system)
-    if rubs(system):
-        while not settle(system, passes):
+    if has_friction(system):
+        while not accelerate_fixed_point(system, passes):
             passes += 1
-            power = rub(t, system, loops)
+            power = apply_friction(t, system, loops)
             solve(system)
     return power

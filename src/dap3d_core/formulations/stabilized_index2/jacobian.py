@@ -12,7 +12,7 @@ displacement and v a velocity:
 
     coupling  d(force + D^T lambda) / d(x, v), blocks of 6 x 12 for pairs of bodies
     turning   d(D v - nu) / dx, laid out as D
-    rubbing   d(friction) / dlambda, laid out as D (transposed)
+    friction_by_lambda  d(friction) / dlambda, laid out as D (transposed)
 
 In body axes a mechanism that turns as a whole keeps its tangent. What a wrench owes to the body
 axes in which its moment acts is in it; the gyroscopic moment is added in closed form.
@@ -30,7 +30,7 @@ from dap3d_core.assembly.arrays import Floats, Integers, System
 from dap3d_core.assembly.evaluate import largest, zero
 from dap3d_core.assembly.metric import in_body_axes, scaled_moment
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, Arrays
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.runtime.function_lists import call_loop
 
 #: Step of the differences: the cube root of a rounding balances its error with that of the formula.
@@ -61,7 +61,7 @@ class Tangent(Arrays):
     blocks: Integers  # (pairs, 3) place in ``coupling``, body of the rows, body of the columns
     coupling: Floats
     turning: Floats  # (block_size,)
-    rubbing: Floats  # (block_size,)
+    friction_by_lambda: Floats  # (block_size,)
     D: Floats  # (block_size,) scratch: an element's own blocks
     gamma: Floats  # (rows,) scratch
     nu: Floats  # (rows,) scratch
@@ -71,7 +71,7 @@ class Tangent(Arrays):
     behind: Floats  # (outputs,) the same backwards
 
 
-@compiled_inside
+@compiled
 def move_body(s: Floats, saved: Floats, c: int, step: float) -> None:
     """Body row s = ``saved``, moved by ``step`` along coordinate c of 12."""
     for k in range(s.shape[0]):
@@ -87,7 +87,7 @@ def move_body(s: Floats, saved: Floats, c: int, step: float) -> None:
             s[15 + k] += saved[3 + 3 * k + c - 9] * step
 
 
-@compiled_inside
+@compiled
 def rotate_body(s: Floats, saved: Floats, axis: int, angle: float) -> None:
     """Turn the body about one of its own axes; it keeps its angular velocity in body axes."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -106,7 +106,7 @@ def rotate_body(s: Floats, saved: Floats, axis: int, angle: float) -> None:
     s[19 + j] = cosine * ej - sine * ei
 
 
-@compiled_inside
+@compiled
 def call_element(
     t: float, e: int, q: int, x: Floats, out: Floats, system: System, loops: Any, tangent: Tangent
 ) -> None:
@@ -142,7 +142,7 @@ def call_element(
             out[6 * n + 3 + c] = turned
 
 
-@compiled_inside
+@compiled
 def sizes_of(e: int, q: int, system: System, tangent: Tangent) -> tuple[float, float]:
     """Extent of an element, m, and its velocity, m/s: what its steps are parts of."""
     row = tangent.elements[e]
@@ -162,7 +162,7 @@ def sizes_of(e: int, q: int, system: System, tangent: Tangent) -> tuple[float, f
     return extent, max(speed, extent * spin)
 
 
-@compiled_inside
+@compiled
 def differentiate_element(
     t: float, e: int, q: int, x: Floats, system: System, loops: Any, tangent: Tangent
 ) -> None:
@@ -205,7 +205,7 @@ def differentiate_element(
             s[k] = saved[k]
 
 
-@compiled_inside
+@compiled
 def differentiate_friction(
     t: float, e: int, q: int, x: Floats, system: System, loops: Any, tangent: Tangent
 ) -> None:
@@ -228,16 +228,16 @@ def differentiate_friction(
             if system.idx[i0 + n] > 0:
                 for k in range(6):
                     rise = tangent.ahead[6 * n + k] - tangent.behind[6 * n + k]
-                    tangent.rubbing[system.idx[at + n] + 6 * r + k] += 0.5 / step * rise
+                    tangent.friction_by_lambda[system.idx[at + n] + 6 * r + k] += 0.5 / step * rise
 
 
-@compiled_inside
+@compiled
 def turn_to_body(block: Floats, o: int, s: Floats) -> None:
     """Three numbers at o along the global axes become those along the axes of body row s."""
     block[o], block[o + 1], block[o + 2] = in_body_axes(s, block[o], block[o + 1], block[o + 2])
 
 
-@compiled_inside
+@compiled
 def scale_columns(block: Floats, o: int, k: Floats, s: Floats) -> None:
     """Six numbers at o, derivatives by (r, rotation) of a body, become those in scaled ones."""
     turn_to_body(block, o, s)
@@ -247,7 +247,7 @@ def scale_columns(block: Floats, o: int, k: Floats, s: Floats) -> None:
     block[o + 3], block[o + 4], block[o + 5] = x, y, z
 
 
-@compiled_inside
+@compiled
 def scale_tangent(system: System, tangent: Tangent) -> None:
     """Rows and columns of the derivatives into the bodies' scaled coordinates."""
     metric, block = system.metric, tangent.coupling
@@ -266,11 +266,11 @@ def scale_tangent(system: System, tangent: Tangent) -> None:
         o, b = system.blocks[q, 0], system.blocks[q, 1]
         for _ in range(system.blocks[q, 2]):
             scale_columns(tangent.turning, o, metric[b], system.body[b])
-            scale_columns(tangent.rubbing, o, metric[b], system.body[b])
+            scale_columns(tangent.friction_by_lambda, o, metric[b], system.body[b])
             o += 6
 
 
-@compiled_inside
+@compiled
 def add_gyroscopic(system: System, tangent: Tangent) -> None:
     """d(-w' x J' w') / dw' of each body, unscaled, into its own block (the first n of them)."""
     block = tangent.coupling
@@ -293,14 +293,14 @@ def add_gyroscopic(system: System, tangent: Tangent) -> None:
         block[o + 25] += h0
 
 
-@compiled_inside
+@compiled
 def differentiate(t: float, x: Floats, system: System, loops: Any, tangent: Tangent) -> bool:
     """The tangent at the bodies as placed, functions of time as they stand.
 
     Args:
         t: time, s.
         x: (row_size,) -lambda.
-        system, loops: of the machine.
+        system, loops: of the evaluator.
         tangent: its outputs are overwritten.
 
     Returns:
@@ -308,7 +308,7 @@ def differentiate(t: float, x: Floats, system: System, loops: Any, tangent: Tang
     """
     zero(tangent.coupling)
     zero(tangent.turning)
-    zero(tangent.rubbing)
+    zero(tangent.friction_by_lambda)
     for e in range(tangent.elements.shape[0]):
         for q in range(system.groups[tangent.elements[e, LOOP], 2]):
             differentiate_element(t, e, q, x, system, loops, tangent)
@@ -316,5 +316,7 @@ def differentiate(t: float, x: Floats, system: System, loops: Any, tangent: Tang
                 differentiate_friction(t, e, q, x, system, loops, tangent)
     add_gyroscopic(system, tangent)
     scale_tangent(system, tangent)
-    worst = largest(tangent.coupling) + largest(tangent.turning) + largest(tangent.rubbing)
+    worst = (
+        largest(tangent.coupling) + largest(tangent.turning) + largest(tangent.friction_by_lambda)
+    )
     return worst < math.inf

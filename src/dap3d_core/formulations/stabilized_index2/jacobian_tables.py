@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import Integers
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.stabilized_index2.jacobian import (
     FRICTION_ELEMENT,
     JOINT_ELEMENT,
@@ -25,14 +25,14 @@ _KINDS = {
 _BLOCK = 72
 
 
-def make_tangent(machine: Machine) -> Tangent:
+def make_tangent(evaluator: Evaluator) -> Tangent:
     """Tables and arrays of the tangent of a machine's model."""
-    system, plan, n = machine.system, machine.plan, machine.model.body_count
+    system, plan, n = evaluator.system, evaluator.plan, evaluator.model.body_count
     place = {(b, b): _BLOCK * (b - 1) for b in range(1, n + 1)}
     elements: list[tuple[int, ...]] = []
     pairs: list[Integers] = []
     count = widest = 0
-    for loop, (kind, group) in enumerate(machine.what):
+    for loop, (kind, group) in enumerate(evaluator.loop_groups):
         if kind not in _KINDS:
             continue
         slots = len(group.examined.layout.slots)
@@ -50,7 +50,7 @@ def make_tangent(machine: Machine) -> Tangent:
         blocks=np.array(blocks, dtype=np.int64).reshape(-1, 3),
         coupling=np.zeros(_BLOCK * len(place)),
         turning=np.zeros(plan.block_size),
-        rubbing=np.zeros(plan.block_size),
+        friction_by_lambda=np.zeros(plan.block_size),
         D=np.zeros(plan.block_size),
         gamma=np.zeros(plan.row_size),
         nu=np.zeros(plan.row_size),

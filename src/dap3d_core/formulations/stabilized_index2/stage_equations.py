@@ -28,20 +28,24 @@ from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unsc
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.assembly.state_update import add_displacement
 from dap3d_core.formulations.common.constraints import (
-    gather_forces,
+    evaluate_forces,
     linearise,
     power_of_drivers,
     residuals,
     velocity_residuals,
 )
-from dap3d_core.formulations.common.friction import keep_applied, rub, rubs
+from dap3d_core.formulations.common.friction import (
+    apply_friction,
+    has_friction,
+    store_applied_forces,
+)
 from dap3d_core.formulations.stabilized_index2.jacobian import Tangent, turn_to_body
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
-class Matrix(Arrays):
+class StageMatrix(Arrays):
     """Where the parts of s - J stand, and what is kept of the state that it belongs to."""
 
     types: ClassVar[dict[str, Any]] = {
@@ -66,7 +70,7 @@ class Matrix(Arrays):
     compliance: Floats  # (row_size,) what regularises the rows
 
 
-@compiled_inside
+@compiled
 def add_transposed(blocks: Integers, D: Floats, x: Floats, sign: float, g: Floats) -> None:
     """G += sign D^T x, in scaled coordinates."""
     for q in range(blocks.shape[0]):
@@ -78,7 +82,7 @@ def add_transposed(blocks: Integers, D: Floats, x: Floats, sign: float, g: Float
             o += 6
 
 
-@compiled_inside
+@compiled
 def evaluate_stage(
     t: float,
     y: Floats,
@@ -94,19 +98,19 @@ def evaluate_stage(
     Args:
         t, y: time, state (13 n + 1,).
         multipliers: (2, row_size) mu, lambda.
-        held: as in ``Matrix``.
+        held: as in ``StageMatrix``.
         out: (13 n + 1,) rates of y, the power last.
         rows: (2, row_size) residuals of the position and the velocity level.
-        system, loops: of the machine.
+        system, loops: of the evaluator.
     """
     x, mu = system.multipliers, multipliers[0]
     for k in range(x.shape[0]):
         x[k] = -multipliers[1, k]
-    power = gather_forces(t, y, system, loops)
+    power = evaluate_forces(t, y, system, loops)
     linearise(t, system, loops)
-    if rubs(system):
-        keep_applied(system)
-        power += rub(t, system, loops)
+    if has_friction(system):
+        store_applied_forces(system)
+        power += apply_friction(t, system, loops)
     add_transposed(system.blocks, system.D, x, -1.0, system.acceleration)
     rates(y, system.metric, system.acceleration, out)
     out[out.shape[0] - 1] = power + power_of_drivers(system)
@@ -121,8 +125,8 @@ def evaluate_stage(
         rows[1, k] = system.residual[k]
 
 
-@compiled_inside
-def keep_state(system: System, matrix: Matrix, part: float) -> None:
+@compiled
+def keep_state(system: System, matrix: StageMatrix, part: float) -> None:
     """Keep what the matrix needs of the bodies as placed and of D^ as it stands."""
     for q in range(system.blocks.shape[0]):
         s = system.body[system.blocks[q, 1]]
@@ -149,8 +153,8 @@ def keep_state(system: System, matrix: Matrix, part: float) -> None:
         z[12], z[13], z[14] = scaled_moment(k, w0, w1, w2)
 
 
-@compiled_inside
-def fill_matrix(s: Any, K: Any, blocks: Integers, matrix: Matrix, tangent: Tangent) -> None:
+@compiled
+def fill_matrix(s: Any, K: Any, blocks: Integers, matrix: StageMatrix, tangent: Tangent) -> None:
     """K = s - J, for real or complex s in 1/s."""
     for k in range(K.shape[0]):
         K[k] = 0.0
@@ -179,7 +183,7 @@ def fill_matrix(s: Any, K: Any, blocks: Integers, matrix: Matrix, tangent: Tange
                     K[right + 2 * m * c + r] = -v
                 K[e + c] = -tangent.turning[o + c]
                 K[e + 6 + c] = -v
-                K[right + 2 * m * (6 + c) + m + r] = -v - tangent.rubbing[o + c]
+                K[right + 2 * m * (6 + c) + m + r] = -v - tangent.friction_by_lambda[o + c]
             o += 6
     for j in range(matrix.joint_place.shape[0]):
         d, m, f = matrix.joint_place[j, 0], matrix.joint_place[j, 1], matrix.joint_place[j, 2]
@@ -189,7 +193,7 @@ def fill_matrix(s: Any, K: Any, blocks: Integers, matrix: Matrix, tangent: Tange
             K[d + (m + r) * (2 * m + 1)] = -given
 
 
-@compiled_inside
+@compiled
 def keep_frames(body: Floats, frames: Floats) -> None:
     """The axes and Euler parameters of the bodies as placed."""
     for b in range(1, body.shape[0]):
@@ -199,13 +203,13 @@ def keep_frames(body: Floats, frames: Floats) -> None:
             frames[b, 9 + c] = body[b, 18 + c]
 
 
-@compiled_inside
+@compiled
 def scale_residual(
     R: Floats,
     rows: Floats,
     blocks: Integers,
     metric: Floats,
-    matrix: Matrix,
+    matrix: StageMatrix,
     frames: Floats,
     x: Floats,
     n: Floats,
@@ -235,8 +239,8 @@ def scale_residual(
             x[o + r], x[o + m + r] = rows[0, f + r], rows[1, f + r]
 
 
-@compiled_inside
-def couple_length(s: Any, x: Any, n: Any, matrix: Matrix) -> None:
+@compiled
+def couple_length(s: Any, x: Any, n: Any, matrix: StageMatrix) -> None:
     """What the eliminated part along p adds to the right-hand side."""
     for b in range(1, matrix.body_first.shape[0]):
         o, z = matrix.body_first[b] + 3, matrix.spin[b]
@@ -244,8 +248,8 @@ def couple_length(s: Any, x: Any, n: Any, matrix: Matrix) -> None:
             x[o + c] += z[9 + c] * n[b] / s
 
 
-@compiled_inside
-def find_length(s: Any, x: Any, n: Any, matrix: Matrix) -> None:
+@compiled
+def find_length(s: Any, x: Any, n: Any, matrix: StageMatrix) -> None:
     """The part along p from the solution x, into n."""
     for b in range(1, matrix.body_first.shape[0]):
         o, z = matrix.body_first[b] + 3, matrix.spin[b]
@@ -253,13 +257,13 @@ def find_length(s: Any, x: Any, n: Any, matrix: Matrix) -> None:
         n[b] = (n[b] - 0.25 * along) / s
 
 
-@compiled_inside
+@compiled
 def unscale_solution(
     x: Floats,
     n: Floats,
     blocks: Integers,
     metric: Floats,
-    matrix: Matrix,
+    matrix: StageMatrix,
     frames: Floats,
     out: Floats,
     rows: Floats,

@@ -24,7 +24,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Y,
 )
 from dap3d_core.kernels.runtime.array_struct import MATRIX, Floats, Scalar
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 HIGHEST = 12
 #: Rows of differences: up to one more than the order, from zero; one more for a right-hand side.
@@ -83,7 +83,7 @@ def make_table() -> Floats:
     return table
 
 
-@compiled_inside
+@compiled
 def update_coefficients(work: AdamsState, h: float, k: int) -> None:
     """beta, g and sigma of a step h; among equal steps they stay what they were."""
     table = work.table
@@ -107,7 +107,7 @@ def update_coefficients(work: AdamsState, h: float, k: int) -> None:
     weights(table, h, highest)
 
 
-@compiled_inside
+@compiled
 def weights(table: Floats, h: float, order: int) -> None:
     """g_j, j = 0 ... order, by c_j,q = c_j-1,q - c_j-1,q+1 h / psi_j: HNW (III.5.10)."""
     g, line, distance = table[G_ROW], table[LINE], table[PSI_NEXT]
@@ -122,7 +122,7 @@ def weights(table: Floats, h: float, order: int) -> None:
         g[j] = line[0]
 
 
-@compiled_inside
+@compiled
 def predict(work: AdamsState, h: float, k: int) -> None:
     """Phi*_j; the prediction into TRIAL, the sum of Phi*_0 to Phi*_(k-1) into SCRATCH."""
     table, star, f, y = work.table, work.scaled, work.differences, work.state[Y]
@@ -149,7 +149,7 @@ def predict(work: AdamsState, h: float, k: int) -> None:
         trial[i] = y[i] + h * (trial[i] + g0 * v0)
 
 
-@compiled_inside
+@compiled
 def difference_norms(work: AdamsState, k: int, h: float) -> tuple[float, float, float]:
     """Scaled sizes of Phi_k, Phi_(k-1), Phi_(k-2) at the prediction; NaN where a number is none.
 
@@ -176,7 +176,7 @@ def difference_norms(work: AdamsState, k: int, h: float) -> tuple[float, float, 
     return zero, one, two
 
 
-@compiled_inside
+@compiled
 def compare_orders(
     table: Floats, h: float, k: int, sizes: tuple[float, float, float]
 ) -> tuple[float, float, bool]:
@@ -191,7 +191,7 @@ def compare_orders(
     return here, below, max(below, h * sigma[k - 2] * constant[k - 2] * sizes[2]) <= here
 
 
-@compiled_inside
+@compiled
 def interpolate(work: AdamsState, back: float, out: Floats) -> None:
     """The solution at t + back, -h <= back <= 0: the integral of the polynomial through the rates.
 

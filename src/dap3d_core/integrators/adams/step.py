@@ -58,7 +58,7 @@ from dap3d_core.integrators.stepping.step_control import (
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_beyond, scaled_largest
 from dap3d_core.kernels.runtime.array_struct import Floats
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: The step is doubled, kept, or multiplied by a factor in between these.
 SLOWEST, STEADY = 0.5, 0.9
@@ -82,13 +82,13 @@ def advance_adams(
             functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
 
 
-@compiled_inside
+@compiled
 def state_at(work: AdamsState, t: float, y: Floats) -> None:
     """The state at an instant of the last step, by the polynomial of the method."""
     interpolate(work, t - work.t, y)
 
 
-@compiled_inside
+@compiled
 def begin(work: AdamsState, rhs: Function, system: Any, loops: Any) -> None:
     """The rates at the start, the first step, order 1."""
     f = work.differences
@@ -108,7 +108,7 @@ def begin(work: AdamsState, rhs: Function, system: Any, loops: Any) -> None:
     work.next_order, work.is_starting, work.equal_steps = 1, 1, 0
 
 
-@compiled_inside
+@compiled
 def step(
     work: AdamsState, rhs: Function, project: Function, watch: Function, system: Any, loops: Any
 ) -> None:
@@ -169,7 +169,7 @@ def step(
         reject(work, t1, h, 1, 0.1, NOT_FINITE)
 
 
-@compiled_inside
+@compiled
 def complete_step(
     work: AdamsState, t1: float, rhs: Function, watch: Function, system: Any, loops: Any
 ) -> bool:
@@ -187,7 +187,7 @@ def complete_step(
     return not (watched and end_is_across(work, t1, rates, watch, system, loops))
 
 
-@compiled_inside
+@compiled
 def accept(work: AdamsState, t1: float, k: int, here: float, below: float, lower: bool) -> None:
     """Make the trial state the state; its differences; order and length of what comes."""
     star, f = work.scaled, work.differences
@@ -211,7 +211,7 @@ def accept(work: AdamsState, t1: float, k: int, here: float, below: float, lower
     update_switches_after_step(work, h, h, t1)
 
 
-@compiled_inside
+@compiled
 def plan(work: AdamsState, h: float, k: int, here: float, below: float, lower: bool) -> None:
     """Order and length of the next step (Shampine, Gordon, chapter 7; their code STEP, block 4)."""
     f = work.differences
@@ -244,7 +244,7 @@ def plan(work: AdamsState, h: float, k: int, here: float, below: float, lower: b
     work.h = max(h * factor, step_floor(work))
 
 
-@compiled_inside
+@compiled
 def reject(work: AdamsState, t1: float, h: float, order: int, factor: float, cause: int) -> None:
     """Try a shorter step again, of another order perhaps; at the floor, stop for ``cause``."""
     work.rejected_count += 1

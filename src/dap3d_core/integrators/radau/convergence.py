@@ -10,7 +10,7 @@ from dap3d_core.integrators.radau.state import (
 )
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, Y
 from dap3d_core.integrators.stepping.step_control import EPSILON, LARGEST
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.model.state_layout import COORDINATES, STATE, VELOCITIES
 
 #: An iteration that converges slower than this does not.
@@ -24,7 +24,7 @@ SETTLING = 0.1
 STALLED, MOST_ROUNDINGS = 10.0, 1e6
 
 
-@compiled_inside
+@compiled
 def newton_limit(work: RadauState) -> float:
     """Norm of a change at which the iteration ends (HW IV.8), not below what rounding allows."""
     y, rtol = work.state[Y], work.rtol
@@ -43,13 +43,13 @@ def newton_limit(work: RadauState) -> float:
     return min(limit, LOOSEST)
 
 
-@compiled_inside
+@compiled
 def converges(theta: float, change: float, limit: float, left: int) -> bool:
     """True if ``left`` more iterations at the rate theta reach the limit."""
     return theta < SLOWEST and theta / (1.0 - theta) * change * theta**left < limit
 
 
-@compiled_inside
+@compiled
 def is_stalled(states: float, multipliers: float, limit: float, work: RadauState) -> bool:
     """True if an iteration that does not converge has reached the rounding of its tangent.
 
@@ -66,7 +66,7 @@ def is_stalled(states: float, multipliers: float, limit: float, work: RadauState
     )
 
 
-@compiled_inside
+@compiled
 def is_settling(multipliers: float, work: RadauState) -> bool:
     """True if multipliers that have no part in the norm still converge, as they do before states.
 

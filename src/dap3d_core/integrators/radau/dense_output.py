@@ -23,7 +23,7 @@ from dap3d_core.formulations.common.constraints import (
     linearise,
 )
 from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
-from dap3d_core.formulations.stabilized_index2.stage_equations import Matrix
+from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau.state import (
     OLD,
     OLD_SLOPE,
@@ -32,7 +32,7 @@ from dap3d_core.integrators.radau.state import (
     RadauState,
 )
 from dap3d_core.integrators.stepping.integration_state import TRIAL, Y
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: A step before that was shorter than this part of the present one says nothing: rounding, divided
 #: by the square, would be seen.
@@ -47,7 +47,7 @@ def find_slope(
     system: System,
     loops: Any,
     tangent: Tangent,
-    matrix: Matrix,
+    matrix: StageMatrix,
 ) -> float:
     """dy/dt at the trial state, at t + h, into TRIAL_SLOPE."""
     t1 = t + h
@@ -74,7 +74,7 @@ def find_slope(
     return 0.0
 
 
-@compiled_inside
+@compiled
 def scale_slopes(inverse: Floats, stages: Floats, h: float, metric: Floats, force: Floats) -> None:
     """The collocation polynomial's accelerations at the end of the step, scaled, into force."""
     n = metric.shape[0] - 1
@@ -91,7 +91,7 @@ def scale_slopes(inverse: Floats, stages: Floats, h: float, metric: Floats, forc
         force[o + 4], force[o + 5] = z1, z2
 
 
-@compiled_inside
+@compiled
 def prepare_dense(h: float, work: RadauState) -> None:
     """Terms of dense output from t to the trial state, for combination.interpolate."""
     state, terms, stages, c = work.state, work.terms, work.Z, work.method.c

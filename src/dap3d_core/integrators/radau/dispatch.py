@@ -8,7 +8,7 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import System
 from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
-from dap3d_core.formulations.stabilized_index2.stage_equations import Matrix
+from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau.dense_output import find_slope
 from dap3d_core.integrators.radau.newton import (
     estimate_error,
@@ -21,7 +21,7 @@ from dap3d_core.kernels.runtime.cache import table_of
 from dap3d_core.kernels.runtime.function_lists import LOOP_LIST, number_signature
 
 PART = number_signature(
-    RadauState.type_of(), System.type_of(), LOOP_LIST, Tangent.type_of(), Matrix.type_of()
+    RadauState.type_of(), System.type_of(), LOOP_LIST, Tangent.type_of(), StageMatrix.type_of()
 )
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dap3d_core.formulations.common.constraints import PART as REGULAR
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.stabilized_index2.jacobian_tables import coupled_bodies, make_tangent
-from dap3d_core.formulations.stabilized_index2.stage_equations import Matrix
+from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau import state as at
 from dap3d_core.integrators.radau.dispatch import radau_parts
 from dap3d_core.integrators.radau.state import RadauState
@@ -30,9 +30,9 @@ class Effort(NamedTuple):
     factorisations: int
 
 
-def make_matrix(machine: Machine, tangent: Any) -> tuple[Matrix, LuPlan]:
+def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan]:
     """Places of the parts of the matrix s - J, and its elimination program."""
-    plan, model = machine.plan, machine.model
+    plan, model = evaluator.plan, evaluator.model
     nodes, n = plan.ordering.nodes, model.body_count
     lu = make_lu_plan(n, nodes, coupled_bodies(tangent))
     of_row = {}
@@ -46,9 +46,9 @@ def make_matrix(machine: Machine, tangent: Any) -> tuple[Matrix, LuPlan]:
         k = of_row[first]
         places.append((*lu.joint_blocks(k, b), int(lu.joint_first[k])))
     held = np.zeros(plan.row_size, dtype=np.int64)
-    held[machine.system.row] = model.position_row
+    held[evaluator.system.row] = model.position_row
     blocks = tangent.blocks.tolist()
-    matrix = Matrix(
+    matrix = StageMatrix(
         nodes=lu.nodes,
         columns=lu.columns,
         updates=lu.updates,
@@ -88,23 +88,25 @@ class RadauIntegration(Integration):
     state_rows = at.RADAU_STATES
     unscaled_size = 1  # the work done
 
-    def __init__(self, machine: Machine, y0: ArrayLike, times: ArrayLike, **options: Any) -> None:
-        self.machine = machine
+    def __init__(
+        self, evaluator: Evaluator, y0: ArrayLike, times: ArrayLike, **options: Any
+    ) -> None:
+        self.evaluator = evaluator
         super().__init__(
-            machine.functions, machine.system, machine.loops, y0, times,
-            length_count=machine.length_count, watched=machine.counts_turns, **options,
+            evaluator.functions, evaluator.system, evaluator.loops, y0, times,
+            length_count=evaluator.length_count, watched=evaluator.counts_turns, **options,
         )  # fmt: skip
         work = self.work
         work.convergence_factor = work.accepted_error = 1.0
-        work.regularisation = REGULAR if machine.formulation.accepts_redundant else 0.0
+        work.regularisation = REGULAR if evaluator.formulation.accepts_redundant else 0.0
         work.order, work.has_dense_output = ORDER, 1
 
     def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:
         """As ``Integration.own_arrays``; makes the tangent and the matrix, too."""
-        machine = self.machine
-        self.tangent = make_tangent(machine)
-        self.matrix, self.lu_plan = make_matrix(machine, self.tangent)
-        lu, rows, bodies = self.lu_plan, machine.plan.row_size, machine.model.body_count + 1
+        evaluator = self.evaluator
+        self.tangent = make_tangent(evaluator)
+        self.matrix, self.lu_plan = make_matrix(evaluator, self.tangent)
+        lu, rows, bodies = self.lu_plan, evaluator.plan.row_size, evaluator.model.body_count + 1
         shapes: dict[str, Any] = {
             "own": len(RadauState.indices("own")),
             "k": (2, size),
@@ -132,9 +134,9 @@ class RadauIntegration(Integration):
         return radau_parts()
 
     def _advance(self, budget: int) -> None:
-        machine = self.machine
+        evaluator = self.evaluator
         advance(
-            self.work, machine.functions, self._parts, machine.system, machine.loops,
+            self.work, evaluator.functions, self._parts, evaluator.system, evaluator.loops,
             self.tangent, self.matrix, budget,
         )  # fmt: skip
 
@@ -185,7 +187,7 @@ class RadauIntegration(Integration):
     @property
     def multipliers(self) -> tuple[Any, Any]:
         """(rows,) mu and lambda of the last stage, in the order of the model."""
-        row = self.machine.system.row
+        row = self.evaluator.system.row
         last = self.work.last_multipliers[2]
         return last[0, row].copy(), last[1, row].copy()
 

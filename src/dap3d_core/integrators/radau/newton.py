@@ -20,7 +20,7 @@ from dap3d_core.assembly.state_update import add_displacement, add_velocity
 from dap3d_core.formulations.common.constraints import linearise
 from dap3d_core.formulations.stabilized_index2.jacobian import Tangent, differentiate
 from dap3d_core.formulations.stabilized_index2.stage_equations import (
-    Matrix,
+    StageMatrix,
     add_transposed,
     couple_length,
     evaluate_stage,
@@ -47,7 +47,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Y,
 )
 from dap3d_core.integrators.stepping.vector_ops import scaled_largest
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.lu.factor import factor_lu, solve_lu
 
 ROUNDING = 2.220446049250313e-16
@@ -70,7 +70,7 @@ def find_tangent(
     system: System,
     loops: Any,
     tangent: Tangent,
-    matrix: Matrix,
+    matrix: StageMatrix,
 ) -> float:
     """The tangent of a step h at t, at its end as predicted; 0, or NaN where it is not finite.
 
@@ -93,7 +93,7 @@ def find_tangent(
     return 0.0 if differentiate(at, system.multipliers, system, loops, tangent) else math.nan
 
 
-@compiled_inside
+@compiled
 def pole(poles: Floats, h: float) -> Any:
     """The complex pole of a step h, 1/s; of numpy, with the arithmetic of compiled code."""
     return np.complex128(complex(poles[1] / h, poles[2] / h))
@@ -107,7 +107,7 @@ def factorise_both(
     system: System,
     loops: Any,
     tangent: Tangent,
-    matrix: Matrix,
+    matrix: StageMatrix,
 ) -> float:
     """Factors of the real and the complex system of a step h; 0, or UNFOUND if one is singular."""
     poles = work.method.poles
@@ -122,7 +122,7 @@ def factorise_both(
     return UNFOUND
 
 
-@compiled_inside
+@compiled
 def predict(h: float, work: RadauState) -> None:
     """Starting values of the stages: the polynomials of the last step, prolonged (HW IV.8).
 
@@ -151,8 +151,8 @@ def predict(h: float, work: RadauState) -> None:
             stages[i, k] = w0 * old[0, k] + w1 * old[1, k] + w2 * old[2, k]
 
 
-@compiled_inside
-def solve_first(h: float, work: RadauState, system: System, matrix: Matrix) -> None:
+@compiled
+def solve_first(h: float, work: RadauState, system: System, matrix: StageMatrix) -> None:
     """R[0], G[0] from the residual of one equation with the real matrix to the change."""
     x, along, s = work.x[0], work.along[0], work.method.poles[0] / h
     scale_residual(work.R[0], work.G[0], system.blocks, system.metric, matrix, work.frames[0],
@@ -164,7 +164,7 @@ def solve_first(h: float, work: RadauState, system: System, matrix: Matrix) -> N
                      work.G[0])  # fmt: skip
 
 
-@compiled_inside
+@compiled
 def separate(inverse: Floats, x: Floats, real: Floats, pair: Any) -> None:
     """T^-1 x for three rows x: its first row, and the other two as one complex row."""
     for k in range(real.shape[0]):
@@ -174,7 +174,7 @@ def separate(inverse: Floats, x: Floats, real: Floats, pair: Any) -> None:
                           inverse[2, 0] * a + inverse[2, 1] * b + inverse[2, 2] * c)  # fmt: skip
 
 
-@compiled_inside
+@compiled
 def unite(T: Floats, real: Floats, pair: Any, x: Floats) -> None:
     """The inverse of ``separate``."""
     for i in range(3):
@@ -182,8 +182,8 @@ def unite(T: Floats, real: Floats, pair: Any, x: Floats) -> None:
             x[i, k] = T[i, 0] * real[k] + T[i, 1] * pair[k].real + T[i, 2] * pair[k].imag
 
 
-@compiled_inside
-def solve_stages(h: float, work: RadauState, system: System, matrix: Matrix) -> None:
+@compiled
+def solve_stages(h: float, work: RadauState, system: System, matrix: StageMatrix) -> None:
     """R, G from the residuals of the three stages to the changes."""
     x, along, poles = work.x, work.along, work.method.poles
     s, sc = poles[0] / h, pole(poles, h)
@@ -205,9 +205,9 @@ def solve_stages(h: float, work: RadauState, system: System, matrix: Matrix) -> 
                          work.R[i], work.G[i])  # fmt: skip
 
 
-@compiled_inside
+@compiled
 def evaluate_stages(
-    t: float, h: float, work: RadauState, system: System, loops: Any, matrix: Matrix
+    t: float, h: float, work: RadauState, system: System, loops: Any, matrix: StageMatrix
 ) -> None:
     """Residuals of the three stages: F - A^-1 Z / h into R, those of the rows into G."""
     y, argument, c = work.state[Y], work.state[SCRATCH], work.method.c
@@ -225,7 +225,7 @@ def evaluate_stages(
     work.rhs_count += 3
 
 
-@compiled_inside
+@compiled
 def size_of_multipliers(h: float, change: Floats, work: RadauState, system: System) -> float:
     """Norm of multipliers (2, R): as changes of y, h M^-1 D^T times them (HW VII.4: index 2)."""
     y, out = work.state[Y], work.state[SCRATCH]
@@ -240,7 +240,7 @@ def size_of_multipliers(h: float, change: Floats, work: RadauState, system: Syst
     return scaled_largest(out, y, y, work.error_size, work.rtol, work.tolerance, h)
 
 
-@compiled_inside
+@compiled
 def change_stages(h: float, work: RadauState, system: System) -> float:
     """Add the changes in R and G to the stages; returns their norm.
 
@@ -274,7 +274,7 @@ def find_stages(
     system: System,
     loops: Any,
     tangent: Tangent,
-    matrix: Matrix,
+    matrix: StageMatrix,
 ) -> float:
     """Newton's iteration for the stages of a step h.
 
@@ -333,7 +333,7 @@ def estimate_error(
     system: System,
     loops: Any,
     tangent: Tangent,
-    matrix: Matrix,
+    matrix: StageMatrix,
 ) -> float:
     """Norm of the error estimate (HW IV.8, (8.19), (8.20)); 1 is just good enough.
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import System
 from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
-from dap3d_core.formulations.stabilized_index2.stage_equations import Matrix
+from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau.convergence import newton_limit
 from dap3d_core.integrators.radau.dense_output import prepare_dense
 from dap3d_core.integrators.radau.newton import MOST, SAME_STEP, predict
@@ -55,7 +55,7 @@ from dap3d_core.integrators.stepping.step_control import (
     step_floor,
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: Of the steps of RADAU5.
 SAFETY = 0.9
@@ -79,7 +79,7 @@ def advance(
     system: System,
     loops: Any,
     tangent: Tangent,
-    matrix: Matrix,
+    matrix: StageMatrix,
     budget: int,
 ) -> None:
     """Integrate until more than ``budget`` stages are evaluated, the rows are full, or the end."""
@@ -98,7 +98,7 @@ def advance(
             functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
 
 
-@compiled_inside
+@compiled
 def start(work: RadauState, rhs: Function, project: Function, system: System, loops: Any) -> None:
     """Project the state where a motion starts, and compute its rates and multipliers."""
     y = work.state[Y]
@@ -121,7 +121,7 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
         work.h = first_step(work, work.k, rhs, system, loops)  # fmt: skip
 
 
-@compiled_inside
+@compiled
 def step(
     work: RadauState,
     parts: Sequence[Any],
@@ -130,7 +130,7 @@ def step(
     system: System,
     loops: Any,
     tangent: Tangent,
-    matrix: Matrix,
+    matrix: StageMatrix,
 ) -> None:
     """Try one step: accept it, reject it, or stop the run."""
     estimate_error, find_slope = parts[3], parts[4]
@@ -183,7 +183,7 @@ def step(
         reject(work, t1, h * STEP_AFTER_FAILURE, NOT_FINITE)
 
 
-@compiled_inside
+@compiled
 def stage_is_across(
     work: RadauState, t: float, h: float, watch: Function, system: System, loops: Any
 ) -> bool:
@@ -197,7 +197,7 @@ def stage_is_across(
     return False
 
 
-@compiled_inside
+@compiled
 def iterate(
     t: float,
     h: float,
@@ -206,7 +206,7 @@ def iterate(
     system: System,
     loops: Any,
     tangent: Tangent,
-    matrix: Matrix,
+    matrix: StageMatrix,
 ) -> float:
     """Find the stages from their present values, with a new tangent if needed; as find_stages."""
     find_tangent, factorise_both, find_stages = parts[0], parts[1], parts[2]
@@ -220,7 +220,7 @@ def iterate(
     return wrong
 
 
-@compiled_inside
+@compiled
 def reject_iteration(work: RadauState, t1: float, h: float, shorter: float) -> None:
     """Shorten a step whose stages were not found; a fixed one is tried with a new tangent first."""
     stale = work.tangent_is_current == 0
@@ -233,14 +233,14 @@ def reject_iteration(work: RadauState, t1: float, h: float, shorter: float) -> N
         reject(work, t1, h * shorter, STEP_FLOOR)
 
 
-@compiled_inside
+@compiled
 def safety_factor(work: RadauState) -> float:
     """Safety factor of the next step: smaller where the iteration took long (HW IV.8)."""
     most = 2.0 * MOST
     return min(SAFETY, SAFETY * (1.0 + most) / (work.last_iterations + most))
 
 
-@compiled_inside
+@compiled
 def project_end(
     work: RadauState, t1: float, h: float, project: Function, system: System, loops: Any
 ) -> int:
@@ -254,7 +254,7 @@ def project_end(
     return project_state(work, t1, work.state[TRIAL], project, system, loops)
 
 
-@compiled_inside
+@compiled
 def complete_step(
     work: RadauState, t1: float, h: float, watch: Function, system: System, loops: Any
 ) -> int:
@@ -269,7 +269,7 @@ def complete_step(
     return RUNNING
 
 
-@compiled_inside
+@compiled
 def accept(work: RadauState, t1: float, h: float, error: float) -> None:
     """Make the trial state the state; choose the next step (Gustafsson's control, HW IV.8)."""
     state = work.state
@@ -295,7 +295,7 @@ def accept(work: RadauState, t1: float, h: float, error: float) -> None:
     work.has_last_step, work.last_rejected = 1, 0
 
 
-@compiled_inside
+@compiled
 def choose_next(work: RadauState, h: float, error: float, good: bool) -> None:
     """The next step, after an accepted one."""
     divisor = error**0.25 / safety_factor(work)

@@ -20,21 +20,21 @@ class RungeKutta(Integration):
         One of ``TABLEAUS``.
     args, options
         As for ``Integration``.
-    leave_stiff
+    stop_when_stiff
         Whether to stop, with status STIFF, where the scene turns out stiff for the method.
     """
 
     state_class = RungeKuttaState
 
     def __init__(
-        self, method: Tableau, *args: Any, leave_stiff: bool = False, **options: Any
+        self, method: Tableau, *args: Any, stop_when_stiff: bool = False, **options: Any
     ) -> None:
         self.method, self.name, self.adaptive = method, method.name, method.adaptive
         super().__init__(*args, **options)
         for name, value in _facts(method).items():
             setattr(self.work, name, value)
         self.work.last_error, self.work.t_stiff = 1e-4, np.inf
-        self.work.stops_when_stiff = leave_stiff
+        self.work.stops_when_stiff = stop_when_stiff
 
     def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:
         """As ``Integration.own_arrays``."""

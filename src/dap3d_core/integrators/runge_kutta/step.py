@@ -74,7 +74,7 @@ from dap3d_core.integrators.stepping.step_control import (
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite, combine, copy, scaled_largest
 from dap3d_core.kernels.runtime.array_struct import Floats
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: Near a singular state nothing is known better than to this part of the largest component.
 POSITION_NOISE = 1e-11
@@ -105,7 +105,7 @@ def advance(
             functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
 
 
-@compiled_inside
+@compiled
 def step(
     work: RungeKuttaState,
     rhs: Function,
@@ -164,7 +164,7 @@ def step(
         reject(work, t1, h * STEP_AFTER_FAILURE, NOT_FINITE)
 
 
-@compiled_inside
+@compiled
 def find_first_stage(work: RungeKuttaState, rhs: Function, system: Any, loops: Any) -> bool:
     """Evaluate f at the state; False where it is not finite, which ends the run."""
     work.rhs_count += 1
@@ -176,7 +176,7 @@ def find_first_stage(work: RungeKuttaState, rhs: Function, system: Any, loops: A
     return False
 
 
-@compiled_inside
+@compiled
 def error_above_rounding(work: RungeKuttaState, near: bool, h: float, error: float) -> float:
     """The error of a step that is too large, without what a shorter step could not reduce."""
     if near:
@@ -186,7 +186,7 @@ def error_above_rounding(work: RungeKuttaState, near: bool, h: float, error: flo
     return error
 
 
-@compiled_inside
+@compiled
 def take_stages(
     work: RungeKuttaState,
     t1: float,
@@ -221,7 +221,7 @@ def take_stages(
     return True
 
 
-@compiled_inside
+@compiled
 def project_stage(
     work: RungeKuttaState, t: float, x: Floats, project: Function, system: Any, loops: Any
 ) -> None:
@@ -231,7 +231,7 @@ def project_stage(
     project_state(work, t, argument, project, system, loops)
 
 
-@compiled_inside
+@compiled
 def projected_error_norm(
     work: RungeKuttaState, t1: float, h: float, project: Function, system: Any, loops: Any
 ) -> float:
@@ -267,7 +267,7 @@ def projected_error_norm(
     return main
 
 
-@compiled_inside
+@compiled
 def is_rounding(work: RungeKuttaState, h: float, error: float) -> bool:
     """True if the error of a step across a singular state is rounding: a shorter one had no less.
 
@@ -279,7 +279,7 @@ def is_rounding(work: RungeKuttaState, h: float, error: float) -> bool:
     return before > 0.0 and error > 0.25 * before
 
 
-@compiled_inside
+@compiled
 def complete_step(
     work: RungeKuttaState,
     t1: float,
@@ -341,7 +341,7 @@ def complete_step(
     return RUNNING
 
 
-@compiled_inside
+@compiled
 def is_within_error(work: RungeKuttaState) -> bool:
     """True if the trial state differs from the other one by no more than a step may err."""
     y, trial, other = work.state[Y], work.state[TRIAL], work.state[OTHER]
@@ -351,7 +351,7 @@ def is_within_error(work: RungeKuttaState) -> bool:
     return scaled_largest(other, y, trial, size, work.rtol, work.tolerance, 0.0) <= 1.0
 
 
-@compiled_inside
+@compiled
 def prepare_dense(work: RungeKuttaState, t1: float) -> None:
     """Terms of the dense output from t to t1, HNW II.6, from all stages."""
     state, k, terms = work.state, work.k, work.terms

@@ -19,7 +19,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Y,
 )
 from dap3d_core.integrators.stepping.vector_ops import combine
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: Steps between two looks; every step once one looked stiff.
 EVERY = 20
@@ -29,7 +29,7 @@ STIFF, CLEARED = 15, 6
 LEAST, PARALLEL = 0.5, 0.96
 
 
-@compiled_inside
+@compiled
 def detect_stiffness(work: RungeKuttaState, h: float) -> None:
     """Set ``t_stiff`` when the scene has become stiff; f at the trial state is in ``k``.
 

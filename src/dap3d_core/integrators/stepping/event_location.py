@@ -56,7 +56,7 @@ from dap3d_core.integrators.stepping.switch_values import (
     usual_step,
 )
 from dap3d_core.kernels.runtime.array_struct import Floats
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: A crossing this part of a usual step away is reached by an Euler step: its error is of the order
 #: of the square.
@@ -72,7 +72,7 @@ MAX_SUSPICIONS = 8
 CHATTER, CHATTER_SPAN = 100, 1e-6
 
 
-@compiled_inside
+@compiled
 def next_length(
     work: IntegrationState, end: float, slope: Floats, project: Function, watch: Function,
     system: Any, loops: Any,
@@ -98,7 +98,7 @@ def next_length(
     return 0.0
 
 
-@compiled_inside
+@compiled
 def time_to_zero(value: float, rate: float, bend: float) -> float:
     """First t > 0 with value + rate t + bend t^2 / 2 = 0, for value >= 0; infinite if none."""
     if value <= 0.0:
@@ -111,7 +111,7 @@ def time_to_zero(value: float, rate: float, bend: float) -> float:
     return (rate + math.sqrt(inside)) / -bend if bend < 0.0 else np.inf
 
 
-@compiled_inside
+@compiled
 def distance_to_crossing(work: IntegrationState, h: float) -> float:
     """Length of a step that may have length h: it ends shortly before the next crossing."""
     s, longest = work.switches, h
@@ -130,7 +130,7 @@ def distance_to_crossing(work: IntegrationState, h: float) -> float:
     return h
 
 
-@compiled_inside
+@compiled
 def is_sample_across(
     work: IntegrationState, t: float, x: Floats, watch: Function, system: Any, loops: Any
 ) -> bool:
@@ -151,7 +151,7 @@ def is_sample_across(
     return True
 
 
-@compiled_inside
+@compiled
 def cut_step(work: IntegrationState, row: int, h: float) -> None:
     """Cut the next attempt to before the crossing that a sample at h has shown."""
     s = work.switches
@@ -168,7 +168,7 @@ def cut_step(work: IntegrationState, row: int, h: float) -> None:
     work.step_limit_at_switch = left * max(0.25, 1.0 - 0.01 * 4.0**work.cut_attempts)
 
 
-@compiled_inside
+@compiled
 def end_is_across(
     work: IntegrationState, t1: float, slope: Floats, watch: Function, system: Any, loops: Any
 ) -> bool:
@@ -198,7 +198,7 @@ def end_is_across(
     return True
 
 
-@compiled_inside
+@compiled
 def cubic_minimum(a: float, b: float, c: float, d: float) -> float:
     """Abscissa in (0, 1) of a negative minimum of the cubic with values a, c, slopes b, d at 0, 1.
 
@@ -217,7 +217,7 @@ def cubic_minimum(a: float, b: float, c: float, d: float) -> float:
     return x
 
 
-@compiled_inside
+@compiled
 def update_switches_after_step(
     work: IntegrationState, h: float, longest: float, end: float
 ) -> None:
@@ -245,7 +245,7 @@ def update_switches_after_step(
     work.stalled_steps = work.stalled_steps + 1 if stalled else 0
 
 
-@compiled_inside
+@compiled
 def bisect_crossing(
     work: IntegrationState, h: float, end: float, slope: Floats, project: Function, watch: Function,
     system: Any, loops: Any,
@@ -290,7 +290,7 @@ def bisect_crossing(
         reset_step_control(work)
 
 
-@compiled_inside
+@compiled
 def euler_step(
     work: IntegrationState, h: float, slope: Floats, project: Function, watch: Function,
     system: Any, loops: Any,
@@ -305,7 +305,7 @@ def euler_step(
     return failure
 
 
-@compiled_inside
+@compiled
 def record_crossings(work: IntegrationState, t: float) -> None:
     """Record sign changes of switches at t, and what follows: end, chatter, or another side."""
     s = work.switches
@@ -323,7 +323,7 @@ def record_crossings(work: IntegrationState, t: float) -> None:
             work.end_status, work.terminal_switch = CHATTERED, k
 
 
-@compiled_inside
+@compiled
 def reset_step_control(work: IntegrationState) -> None:
     """Let step-size control start anew: what follows is another motion."""
     work.h, work.last_error = 0.0, 1e-4

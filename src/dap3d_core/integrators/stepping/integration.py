@@ -22,7 +22,7 @@ from dap3d_core.kernels.runtime.array_struct import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
 
 
-class Statistics(NamedTuple):
+class StepCounts(NamedTuple):
     """Counts of an integration so far."""
 
     steps: int  # accepted
@@ -339,8 +339,8 @@ class Integration(Restorable):
         return int(self.work.crossing_count)
 
     @property
-    def statistics(self) -> Statistics:
+    def statistics(self) -> StepCounts:
         """Counts so far."""
         w = self.work
         counts = w.step_count, w.rejected_count, w.rhs_count, w.projection_count, w.report_count
-        return Statistics(*map(int, counts))
+        return StepCounts(*map(int, counts))

@@ -19,13 +19,13 @@ from dap3d_core.integrators.stepping.integration_state import (
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite, interpolate
 from dap3d_core.kernels.runtime.array_struct import Floats
-from dap3d_core.kernels.runtime.cache import compiled_inside, compiled_into
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 #: What project says in out[1]: it failed; the state is good, but too close to a singular one.
 FAILED, NEAR_SINGULAR = 1.0, 2.0
 
 
-@compiled_inside
+@compiled
 def project_state(
     work: Any,
     t: float,
@@ -53,7 +53,7 @@ def project_state(
     return RUNNING
 
 
-@compiled_inside
+@compiled
 def dense_state(work: Any, t: float, y: Floats) -> None:
     """The state at an instant of the last step, by the terms of its dense output."""
     interpolate(y, work.terms, (t - work.t_dense) / work.h_dense)
@@ -129,7 +129,7 @@ def report_reached(
     return True
 
 
-@compiled_inside
+@compiled
 def report_end(work: Any, report: Function, system: Any, loops: Any) -> bool:
     """End the run at t, with a row for this state; False where the rows are full."""
     times = work.times
@@ -143,7 +143,7 @@ def report_end(work: Any, report: Function, system: Any, loops: Any) -> bool:
     return True
 
 
-@compiled_inside
+@compiled
 def write_row(work: Any, t: float, y: Floats, report: Function, system: Any, loops: Any) -> bool:
     """One row; False, with the status, where it is not finite."""
     n = y.shape[0]

@@ -26,7 +26,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Y,
 )
 from dap3d_core.kernels.runtime.array_struct import Floats
-from dap3d_core.kernels.runtime.cache import compiled_inside, compiled_into
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 #: Least scale of an error: at atol = 0 a component that is exactly zero is not divided by zero.
 SMALLEST_ATOL = 1e-290
@@ -85,7 +85,7 @@ def update_rounding(
             tolerance[NOISE, i] = 0.0
 
 
-@compiled_inside
+@compiled
 def record_failure(work: Any, error: float, h: float, again: bool) -> None:
     """Record a step of length h that failed; again: the one before it had failed, too."""
     before, work.failed_error_rate = work.failed_error_rate, error / h
@@ -93,7 +93,7 @@ def record_failure(work: Any, error: float, h: float, again: bool) -> None:
         work.rounding_state = max(work.rounding_state, 1)
 
 
-@compiled_inside
+@compiled
 def measure_noise(
     t: float,
     y: Floats,

@@ -17,7 +17,7 @@ import numpy as np
 
 from dap3d_core.integrators.stepping.integration_state import MEASURES
 from dap3d_core.kernels.runtime.array_struct import Floats
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: Rows of ``lengths``: measures at t, and their rates over the last step.
 NOW, RATE = range(2)
@@ -27,7 +27,7 @@ SPARE = 0.95
 MARGIN = 0.5
 
 
-@compiled_inside
+@compiled
 def time_to_singularity(work: Any, h: float) -> float:
     """Time left until the next singular state; infinite where none is less than 2 h away."""
     left, lengths = np.inf, work.lengths
@@ -38,7 +38,7 @@ def time_to_singularity(work: Any, h: float) -> float:
     return left
 
 
-@compiled_inside
+@compiled
 def limit_step_at_singularity(work: Any, h: float) -> float:
     """Length of a step that may have length h: h, or less to place a singular state in its gap."""
     left, gap = time_to_singularity(work, h), work.widest_gap_abscissa
@@ -49,7 +49,7 @@ def limit_step_at_singularity(work: Any, h: float) -> float:
     return min(h, left - SPARE * gap * h)
 
 
-@compiled_inside
+@compiled
 def is_near_singularity(work: Any, h: float) -> bool:
     """True if a singular state lies in a step of length h, or close before or behind it."""
     found, lengths = 0, work.lengths
@@ -59,7 +59,7 @@ def is_near_singularity(work: Any, h: float) -> bool:
     return found != 0
 
 
-@compiled_inside
+@compiled
 def update_measures(work: Any, h: float) -> None:
     """Take over the measures at the end of a step; beyond zero they count from there."""
     lengths, found = work.lengths, work.real[MEASURES:]
@@ -70,7 +70,7 @@ def update_measures(work: Any, h: float) -> None:
         lengths[NOW, k], lengths[RATE, k] = now, (now - before) / h
 
 
-@compiled_inside
+@compiled
 def predict_measures(work: Any, h: float) -> None:
     """Take rates from the end of a step that is not taken, because it is close to singular."""
     lengths, found = work.lengths, work.real[MEASURES:]

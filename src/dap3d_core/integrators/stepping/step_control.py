@@ -19,7 +19,7 @@ from dap3d_core.integrators.stepping.integration_state import (
 from dap3d_core.integrators.stepping.output import NEAR_SINGULAR
 from dap3d_core.integrators.stepping.vector_ops import combine, scaled_beyond, scaled_largest
 from dap3d_core.kernels.runtime.array_struct import Floats
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: A step is never shorter than this part of the time or of the whole span, sixteen roundings.
 EPSILON = 2.220446049250313e-16
@@ -35,7 +35,7 @@ STEP_AFTER_SINGULAR_END, SINGULAR_END_ATTEMPTS = 0.6, 4
 STRETCH = 1.01
 
 
-@compiled_inside
+@compiled
 def first_step(work: Any, k: Floats, rhs: Function, system: Any, loops: Any) -> float:
     """Starting step of HNW II.4: an Euler step guesses the second derivative. One call of rhs."""
     size, rtol, tolerance = work.error_size, work.rtol, work.tolerance
@@ -61,13 +61,13 @@ def first_step(work: Any, k: Floats, rhs: Function, system: Any, loops: Any) -> 
     return max(min(100.0 * h, h1, t_end - t), floor)
 
 
-@compiled_inside
+@compiled
 def step_floor(work: Any) -> float:
     """The shortest step at t."""
     return FLOOR * max(abs(work.t), work.times[-1] - work.times[0])
 
 
-@compiled_inside
+@compiled
 def end_of_step(work: Any) -> float:
     """The time at which the step that comes next ends."""
     t, t_end, fixed = work.t, work.times[-1], work.fixed_step
@@ -87,7 +87,7 @@ def end_of_step(work: Any) -> float:
     return start + (target - start) * (done / work.segment_step_count)
 
 
-@compiled_inside
+@compiled
 def error_norm(work: Any, h: float) -> float:
     """Largest scaled error of the first components; 1 is just good enough.
 
@@ -106,7 +106,7 @@ def error_norm(work: Any, h: float) -> float:
     return combined_error(main, scaled_largest(error, y, trial, size, rtol, tolerance, h))
 
 
-@compiled_inside
+@compiled
 def error_beyond_rounding(work: Any, h: float) -> float:
     """As ``error_norm``, of what exceeds the rounding of time in the rates."""
     size, rtol, tolerance = work.error_size, work.rtol, work.tolerance
@@ -120,7 +120,7 @@ def error_beyond_rounding(work: Any, h: float) -> float:
     return main
 
 
-@compiled_inside
+@compiled
 def combined_error(main: float, other: float) -> float:
     """One error from the estimates of order 5 and 3, as in DOP853."""
     total = main * main + 0.01 * other * other
@@ -129,13 +129,13 @@ def combined_error(main: float, other: float) -> float:
     return main * main / math.sqrt(total)
 
 
-@compiled_inside
+@compiled
 def step_reduction(work: Any, error: float) -> float:
     """The factor on a step whose error was too large."""
     return max(work.factor_min, work.safety / error**work.exponent)
 
 
-@compiled_inside
+@compiled
 def accept(work: Any, t1: float, error: float) -> None:
     """Make the trial state the state, and choose the next step (PI controller of HNW's codes)."""
     state, k, h, result = work.state, work.k, t1 - work.t, work.stage_count
@@ -156,7 +156,7 @@ def accept(work: Any, t1: float, error: float) -> None:
     work.h = max(h * factor, step_floor(work))
 
 
-@compiled_inside
+@compiled
 def reject(work: Any, t1: float, shorter: float, cause: int) -> None:
     """Try a shorter step again; at the floor, or where the step is fixed, stop for ``cause``."""
     work.rejected_count += 1
@@ -166,7 +166,7 @@ def reject(work: Any, t1: float, shorter: float, cause: int) -> None:
         work.t_stop, work.status = t1, cause
 
 
-@compiled_inside
+@compiled
 def lands_near_singularity(work: Any, t1: float) -> bool:
     """True if a step should end at another state: this one is close to a singular one.
 

@@ -23,13 +23,13 @@ from dap3d_core.integrators.stepping.integration_state import (
     Y,
 )
 from dap3d_core.kernels.runtime.array_struct import Floats
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: Part of a usual step over which rates are found by differences, and the least part of the time.
 DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-8
 
 
-@compiled_inside
+@compiled
 def evaluate(
     work: IntegrationState, t: float, x: Floats, row: int, watch: Function, system: Any, loops: Any
 ) -> None:
@@ -44,7 +44,7 @@ def evaluate(
         s[row, k] += s[SIDE, k] * s[BAND, k]
 
 
-@compiled_inside
+@compiled
 def evaluate_start(
     work: IntegrationState, slope: Floats, watch: Function, system: Any, loops: Any
 ) -> None:
@@ -64,7 +64,7 @@ def evaluate_start(
     work.switch_rates_valid = 1
 
 
-@compiled_inside
+@compiled
 def find_switch_rates(
     work: IntegrationState, t: float, y: Floats, slope: Floats, row: int, out: int, watch: Function,
     system: Any, loops: Any,
@@ -82,7 +82,7 @@ def find_switch_rates(
         s[out, k] = (s[out, k] - s[row, k]) / h
 
 
-@compiled_inside
+@compiled
 def is_across(s: Floats, row: int) -> bool:
     """True if a switch, in a row of values, is on another side than at the start of the step."""
     found = 0
@@ -91,7 +91,7 @@ def is_across(s: Floats, row: int) -> bool:
     return found != 0
 
 
-@compiled_inside
+@compiled
 def changes_sign(s: Floats, row: int) -> bool:
     """True if a switch is on another side, or zero: then it is not known which law holds."""
     found = 0
@@ -100,7 +100,7 @@ def changes_sign(s: Floats, row: int) -> bool:
     return found != 0
 
 
-@compiled_inside
+@compiled
 def record_crossing(work: IntegrationState, k: int, t: float) -> None:
     """Record that a switch changed its sign, unless it is UNSEEN."""
     if work.switches[DOES, k] == UNSEEN:
@@ -112,13 +112,13 @@ def record_crossing(work: IntegrationState, k: int, t: float) -> None:
     work.crossing_count = count + 1
 
 
-@compiled_inside
+@compiled
 def time_span(work: IntegrationState) -> float:
     """The time, s, with the rounding that bounds what can be distinguished."""
     return max(abs(work.t), work.times[-1] - work.times[0])
 
 
-@compiled_inside
+@compiled
 def usual_step(work: IntegrationState) -> float:
     """The step without switches."""
     return work.fixed_step if work.fixed_step != 0.0 else work.h

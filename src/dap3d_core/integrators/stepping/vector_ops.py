@@ -6,7 +6,7 @@ and writes its result a few times only; the terms come from ``tableau.combinatio
 
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE
 from dap3d_core.kernels.runtime.array_struct import Floats
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: Terms of a linear combination of stages that are added in one pass over the components.
 GROUP = 4
@@ -20,7 +20,7 @@ _LARGEST = 1e100
 POLE = 1e12
 
 
-@compiled_inside
+@compiled
 def combine(
     out: Floats, share: float, y: Floats, h: float, table: Floats, row: int, k: Floats
 ) -> None:
@@ -40,14 +40,14 @@ def combine(
         out[i] = share * y[i] + h * out[i]
 
 
-@compiled_inside
+@compiled
 def copy(out: Floats, x: Floats) -> None:
     """``out = x``; they may be the same row."""
     for i in range(out.size):
         out[i] = x[i]
 
 
-@compiled_inside
+@compiled
 def all_finite(x: Floats) -> bool:
     """True if no component is NaN, infinite, or larger than 1e100."""
     bad = 0
@@ -56,7 +56,7 @@ def all_finite(x: Floats) -> bool:
     return bad == 0
 
 
-@compiled_inside
+@compiled
 def scaled_largest(
     x: Floats,
     y0: Floats,
@@ -84,7 +84,7 @@ def scaled_largest(
     return largest
 
 
-@compiled_inside
+@compiled
 def scaled_beyond(
     x: Floats, y0: Floats, y1: Floats, f0: Floats, f1: Floats, dt: float, size: int, rtol: float,
     tolerance: Floats,
@@ -107,7 +107,7 @@ def scaled_beyond(
     return largest
 
 
-@compiled_inside
+@compiled
 def interpolate(out: Floats, terms: Floats, theta: float) -> None:
     """Dense output at ``t + theta h`` out of its terms r (rows):
 

@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
 from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.interface.errors import PluginError, where_is
@@ -12,7 +12,7 @@ from dap3d_core.kernels.runtime.loop_modules import build
 
 
 def compiled_loop(
-    examined: Examined, what: str, announce: Callable[[str], None] | None = None
+    examined: TypeInfo, what: str, announce: Callable[[str], None] | None = None
 ) -> Any:
     """The compiled loop of a type for ``what`` (a key of LOOP_KINDS); None where it has none.
 
@@ -37,7 +37,7 @@ def compiled_loop(
         ) from error
 
 
-def compile_all(examined: Examined) -> None:
+def compile_all(examined: TypeInfo) -> None:
     """Compile all loops of a type and of its variants.
 
     Except kernels that call a function of an argument: they are compiled with the function of a
@@ -56,7 +56,7 @@ def compile_all(examined: Examined) -> None:
         compile_all(variant)
 
 
-def _calls_functions(examined: Examined) -> bool:
+def _calls_functions(examined: TypeInfo) -> bool:
     callable_names = {n for n, q in examined.names.items() if q.derivative >= 0}
     return any(callable_names & set(inspect.signature(k).parameters)
                for k in examined.kernels.values())  # fmt: skip

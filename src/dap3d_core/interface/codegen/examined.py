@@ -5,14 +5,14 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.codegen.instance_layout import Layout
-from dap3d_core.interface.codegen.kernel_arguments import Quantity
+from dap3d_core.interface.codegen.instance_layout import InstanceLayout
+from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.interface.types import TypeBase
 
 
 @attrs.frozen
-class Examined:
+class TypeInfo:
     """A type that passed, with what its loops are generated from.
 
     Attributes:
@@ -23,24 +23,24 @@ class Examined:
         kernels: its pure functions.
         variants: types that replace it: (values of fields, the type).
         argument_functions: its function fields of another argument than time.
-        rubs_in: of a force that acts by the friction of a joint, the field that names the joint; ""
-            for all others.
+        friction_joint: of a force that acts by the friction of a joint, the field that names the
+            joint; "" for all others.
         given: the types of its functions of an argument, for titles.
         derived: kernels derived from others.
     """
 
     type: type[TypeBase]
-    layout: Layout
-    names: dict[str, Quantity]
+    layout: InstanceLayout
+    names: dict[str, KernelArgument]
     outputs: dict[str, tuple[str, ...]]
     kernels: dict[str, Callable[..., Any]]
-    variants: tuple[tuple[Mapping[str, Any], "Examined"], ...] = ()
+    variants: tuple[tuple[Mapping[str, Any], "TypeInfo"], ...] = ()
     argument_functions: tuple[str, ...] = ()
-    rubs_in: str = ""
+    friction_joint: str = ""
     given: str = ""
     derived: tuple[str, ...] = ()
 
-    def chosen(self, values: Mapping[str, Any]) -> "Examined":
+    def chosen(self, values: Mapping[str, Any]) -> "TypeInfo":
         """The variant for the values of an instance's fields; itself where none fits."""
         specs = specs_of(self.type)
 

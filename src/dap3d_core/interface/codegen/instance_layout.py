@@ -18,7 +18,7 @@ Place = tuple[int, tuple[int, ...]]
 
 
 @attrs.frozen
-class Layout:
+class InstanceLayout:
     """Indices of the integers and numbers of an instance.
 
     Attributes:
@@ -72,7 +72,7 @@ def shape_of(value: Any) -> tuple[int, ...]:
     return ()
 
 
-def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> Layout:
+def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> InstanceLayout:
     """The layout of the instances of a type, given the constants of one of them."""
     numbers: dict[str, Place] = {}
     tables: dict[str, tuple[int, int]] = {}
@@ -104,4 +104,6 @@ def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> Layout:
     for name in stored:
         numbers[name] = width, shape_of(constants[name])
         width += size(numbers[name][1])
-    return Layout(slots, tuple(functions), tuple(others), stored, numbers, tables, angles, width)
+    return InstanceLayout(
+        slots, tuple(functions), tuple(others), stored, numbers, tables, angles, width
+    )

@@ -10,7 +10,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.codegen.instance_layout import Layout, size
+from dap3d_core.interface.codegen.instance_layout import InstanceLayout, size
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import TypeBase
 
@@ -23,7 +23,7 @@ DERIVATIVES = ("", "_dot", "_ddot")
 
 
 @attrs.frozen
-class Quantity:
+class KernelArgument:
     """One name: its meaning and its code.
 
     Attributes:
@@ -57,9 +57,9 @@ class Quantity:
     derivable: bool = True
 
 
-def namespace(type_: type[TypeBase], layout: Layout) -> dict[str, Quantity]:
+def namespace(type_: type[TypeBase], layout: InstanceLayout) -> dict[str, KernelArgument]:
     """Every name that the kernels of a type may use."""
-    names: dict[str, Quantity] = {}
+    names: dict[str, KernelArgument] = {}
 
     def offer(
         name: str,
@@ -70,7 +70,7 @@ def namespace(type_: type[TypeBase], layout: Layout) -> dict[str, Quantity]:
         doc: str = "",
         **more: Any,
     ) -> None:
-        names[name] = Quantity(name, shape, velocity, code, tuple(needs), doc, **more)
+        names[name] = KernelArgument(name, shape, velocity, code, tuple(needs), doc, **more)
 
     offer("t", (), "t", doc="time, s", rate="1.0")
     if type_.kind == "function":
@@ -86,13 +86,13 @@ def namespace(type_: type[TypeBase], layout: Layout) -> dict[str, Quantity]:
     return names
 
 
-def friction_names(rows: int) -> dict[str, Quantity]:
+def friction_names(rows: int) -> dict[str, KernelArgument]:
     """Further names of the kernel ``friction`` of a joint; their numbers follow its own."""
     reaction = f"({''.join(f'-out2[row + {k}], ' for k in range(rows))})"
     docs = ("friction coefficient", "velocity below which friction fades, m/s", "of the pin, m")
-    names = {"lam": Quantity("lam", (rows,), True, reaction, doc="its multipliers")}
+    names = {"lam": KernelArgument("lam", (rows,), True, reaction, doc="its multipliers")}
     for name, doc in zip(FRICTION_NUMBERS, docs, strict=True):
-        names[name] = Quantity(name, (), False, "", doc=doc)
+        names[name] = KernelArgument(name, (), False, "", doc=doc)
     return names
 
 
@@ -114,7 +114,9 @@ def _offer_body(offer: Callable[..., None], s: str) -> None:
     offer(f"Jp_{s}", (3, 3), f"matrix_at(body, {b}, JP)", doc=inertia)
 
 
-def _offer_field(offer: Callable[..., None], name: str, spec: FieldSpec, layout: Layout) -> None:
+def _offer_field(
+    offer: Callable[..., None], name: str, spec: FieldSpec, layout: InstanceLayout
+) -> None:
     if spec.kind == "point" and (slot := slot_of(name)):
         _offer_point(offer, name, slot, layout)
     elif spec.kind == "vector" and spec.ground:
@@ -144,7 +146,9 @@ def _offer_field(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
         _offer_angle(offer, name, spec, layout)
 
 
-def _offer_function(offer: Callable[..., None], name: str, spec: FieldSpec, layout: Layout) -> None:
+def _offer_function(
+    offer: Callable[..., None], name: str, spec: FieldSpec, layout: InstanceLayout
+) -> None:
     f = "f" if name == "function" else name
     if spec.argument:
         for order, suffix in enumerate(DERIVATIVES):
@@ -160,7 +164,9 @@ def _offer_function(offer: Callable[..., None], name: str, spec: FieldSpec, layo
     offer(f"{f}_0", (), f"F[{at}, 4]", doc="its value at t = 0")
 
 
-def _offer_angle(offer: Callable[..., None], name: str, spec: FieldSpec, layout: Layout) -> None:
+def _offer_angle(
+    offer: Callable[..., None], name: str, spec: FieldSpec, layout: InstanceLayout
+) -> None:
     u, v, k = spec.axes
     at, axes = layout.angles[name], f"x_{u}, x_{v}, x_{k}"
     ahead = f"par[p1 + {at}] + par[p1 + {at + 1}] * (t - par[p1 + {at + 2}])"
@@ -176,7 +182,7 @@ def _offer_angle(offer: Callable[..., None], name: str, spec: FieldSpec, layout:
     offer(f"{name}_dot", (), rate, needs, True, f"rate of {name}, rad/s", motion=motion)
 
 
-def _offer_point(offer: Callable[..., None], name: str, s: str, layout: Layout) -> None:
+def _offer_point(offer: Callable[..., None], name: str, s: str, layout: InstanceLayout) -> None:
     arm, rate, local = f"s_{name}", f"s_{name}_dot", stored(layout, name)
     place, speed = f"position of {name}, m", f"velocity of {name}, m/s"
     turns = {"rate": f"cross(W_{s}, x_{arm})", "rate_name": rate}
@@ -189,7 +195,9 @@ def _offer_point(offer: Callable[..., None], name: str, s: str, layout: Layout) 
     offer(f"v_{name}", (3,), code, (rate,), True, speed)
 
 
-def _offer_vector(offer: Callable[..., None], name: str, s: str | None, layout: Layout) -> None:
+def _offer_vector(
+    offer: Callable[..., None], name: str, s: str | None, layout: InstanceLayout
+) -> None:
     """A vector fixed in the body of slot s, or in a body of its own where s is its own name."""
     local = stored(layout, name)
     needs: tuple[str, ...] = ()
@@ -206,7 +214,7 @@ def _offer_vector(offer: Callable[..., None], name: str, s: str | None, layout: 
     offer(f"{name}_dot", (3,), rate, (*needs[1:], name), True, f"rate of {name}, 1/s")
 
 
-def _offer_constant(offer: Callable[..., None], name: str, layout: Layout) -> None:
+def _offer_constant(offer: Callable[..., None], name: str, layout: InstanceLayout) -> None:
     slot, shape = slot_of(name), layout.numbers[name][1]
     if shape == (3,) and slot in layout.slots:
         _offer_vector(offer, name, slot, layout)
@@ -214,7 +222,7 @@ def _offer_constant(offer: Callable[..., None], name: str, layout: Layout) -> No
         offer(name, shape, stored(layout, name), doc="constant found by prepare")
 
 
-def stored(layout: Layout, name: str) -> str:
+def stored(layout: InstanceLayout, name: str) -> str:
     """Expression for a number of an instance."""
     offset, shape = layout.numbers[name]
     if shape == ():
@@ -243,9 +251,9 @@ def parameters(kernel: Callable[..., Any]) -> tuple[str, ...]:
     return tuple(n for n, p in signature(kernel).parameters.items() if p.kind in positional)
 
 
-def in_order(names: Mapping[str, Quantity], wanted: Iterable[str]) -> list[Quantity]:
+def in_order(names: Mapping[str, KernelArgument], wanted: Iterable[str]) -> list[KernelArgument]:
     """The wanted quantities and all they need, each after what it needs."""
-    done: dict[str, Quantity] = {}
+    done: dict[str, KernelArgument] = {}
 
     def visit(name: str) -> None:
         if name not in done:

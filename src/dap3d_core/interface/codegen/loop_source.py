@@ -7,7 +7,7 @@ the row vectors and for each slot that of its block in D; its numbers are in ``p
 
 from collections.abc import Iterable, Sequence
 
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
 from dap3d_core.interface.types import Joint
 from dap3d_core.kernels.runtime.loop_modules import Loop
@@ -28,7 +28,7 @@ LOOP_KINDS = {
 }
 
 
-def stride(examined: Examined) -> int:
+def stride(examined: TypeInfo) -> int:
     """Number of integers of an instance in ``idx``."""
     n = examined.layout.integers
     if examined.type.kind == "joint":
@@ -36,7 +36,7 @@ def stride(examined: Examined) -> int:
     return n + 1 if examined.type.kind == "function" else n
 
 
-def write(examined: Examined, what: str) -> Loop | None:
+def write(examined: TypeInfo, what: str) -> Loop | None:
     """The loop that computes ``what`` (a key of LOOP_KINDS); None where there is no such kernel."""
     kernels = {n: k for n, k in examined.kernels.items() if n in LOOP_KINDS[what]}
     layout = examined.layout
@@ -82,7 +82,7 @@ def _append(values: Sequence[str]) -> Iterable[str]:
     yield f"out2[0] += {len(values)}.0"
 
 
-def _store(examined: Examined, kernel: str) -> Iterable[str]:
+def _store(examined: TypeInfo, kernel: str) -> Iterable[str]:
     """Store the numbers that a kernel returned."""
     paths, layout, type_ = examined.outputs[kernel], examined.layout, examined.type
     if kernel == "energy":

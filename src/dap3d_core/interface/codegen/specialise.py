@@ -13,12 +13,12 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.codegen.examined import Examined
-from dap3d_core.interface.codegen.instance_layout import Layout
+from dap3d_core.interface.codegen.examined import TypeInfo
+from dap3d_core.interface.codegen.instance_layout import InstanceLayout
 from dap3d_core.interface.codegen.kernel_arguments import (
     DERIVATIVES,
     FRICTION_NUMBERS,
-    Quantity,
+    KernelArgument,
     friction_names,
     in_order,
     namespace,
@@ -28,7 +28,7 @@ from dap3d_core.interface.codegen.kernel_arguments import (
 from dap3d_core.interface.errors import PluginError, where_is
 
 
-def uncalled(examined: Examined) -> str:
+def uncalled(examined: TypeInfo) -> str:
     """An unknown function that kernels call; "" where there is none."""
     names = {n for kernel in examined.kernels.values() for n in parameters(kernel)}
     return min((n for n in names if n in examined.names and examined.names[n].derivative >= 0),
@@ -42,8 +42,8 @@ CALLING = ("C", "C_dot", "gamma", "wrench")
 
 
 def bind_functions(
-    examined: Examined, functions: Mapping[str, Examined], knots: Mapping[str, int]
-) -> Examined:
+    examined: TypeInfo, functions: Mapping[str, TypeInfo], knots: Mapping[str, int]
+) -> TypeInfo:
     """A type with known functions of an argument.
 
     Args:
@@ -77,7 +77,9 @@ def bind_functions(
             shape = (given.knot_count,)
             numbers = layout.numbers | {given.knots: (width, shape)}
             layout = attrs.evolve(layout, numbers=numbers)
-            names[given.knots] = Quantity(given.knots, shape, False, stored(layout, given.knots))
+            names[given.knots] = KernelArgument(
+                given.knots, shape, False, stored(layout, given.knots)
+            )
     kernels = {n: _with_functions(examined, n, k, calls) for n, k in examined.kernels.items()}
     title = f"({', '.join(g.type.keyword for g in functions.values())})"
     bound = attrs.evolve(examined, layout=layout, names=names, kernels=kernels, given=title)
@@ -118,7 +120,7 @@ class _Given:
     knot_count: int
 
 
-def bind_friction(examined: Examined) -> Examined:
+def bind_friction(examined: TypeInfo) -> TypeInfo:
     """A joint's kernel ``friction`` as a separate element: mu, v_tol, radius follow its numbers.
 
     Raises:
@@ -139,7 +141,7 @@ def bind_friction(examined: Examined) -> Examined:
     return attrs.evolve(examined, layout=layout, names=names, kernels={"friction": kernel})
 
 
-def _behind(layout: Layout, start: int) -> Layout:
+def _behind(layout: InstanceLayout, start: int) -> InstanceLayout:
     """A layout with its numbers shifted to ``start``."""
     return attrs.evolve(
         layout,
@@ -150,7 +152,7 @@ def _behind(layout: Layout, start: int) -> Layout:
 
 
 def _with_functions(
-    examined: Examined,
+    examined: TypeInfo,
     name: str,
     kernel: Callable[..., Any],
     calls: Mapping[str, tuple[_Given, int]],

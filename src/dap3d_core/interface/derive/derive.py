@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from dap3d_core.interface.codegen.instance_layout import Layout
-from dap3d_core.interface.codegen.kernel_arguments import Quantity
+from dap3d_core.interface.codegen.instance_layout import InstanceLayout
+from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
 from dap3d_core.interface.types import Joint, TypeBase
 
 Kernel = Callable[..., Any]
@@ -42,7 +42,10 @@ def missing(type_: type[TypeBase], gives_one_number: bool = False) -> tuple[str,
 
 
 def derive(
-    type_: type[TypeBase], layout: Layout, names: Mapping[str, Quantity], wanted: tuple[str, ...]
+    type_: type[TypeBase],
+    layout: InstanceLayout,
+    names: Mapping[str, KernelArgument],
+    wanted: tuple[str, ...],
 ) -> dict[str, Kernel]:
     """The wanted kernels (``missing``), by name; ``nu`` only where it is not zero.
 
@@ -70,8 +73,8 @@ def derive(
 def _text(
     type_: type[TypeBase],
     given: Mapping[str, Kernel],
-    layout: Layout,
-    names: Mapping[str, Quantity],
+    layout: InstanceLayout,
+    names: Mapping[str, KernelArgument],
     wanted: tuple[str, ...],
 ) -> str:
     """The source of the module of derived kernels."""

@@ -8,7 +8,7 @@ from typing import Any
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
 
-from dap3d_core.interface.codegen.kernel_arguments import Quantity
+from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
 from dap3d_core.interface.derive.symbolic import DerivationError, Steps, Symbols, flat
 
 #: sympy's functions that kernels have under the same name.
@@ -95,7 +95,7 @@ def kernel_source(
     value: Sequence[Any],
     steps: Steps,
     symbols: Symbols,
-    offered: Mapping[str, Quantity],
+    offered: Mapping[str, KernelArgument],
 ) -> tuple[str, set[str]]:
     """The source of a kernel that returns these expressions, and the words that it uses.
 
@@ -125,7 +125,7 @@ def kernel_source(
 
 
 def _ordered(
-    steps: Steps, numbers: Sequence[Any], symbols: Symbols, offered: Mapping[str, Quantity]
+    steps: Steps, numbers: Sequence[Any], symbols: Symbols, offered: Mapping[str, KernelArgument]
 ) -> tuple[list[tuple[Any, Any]], list[Any]]:
     """The steps that the numbers need, in order of dependence (e0, e1, ...), and the numbers."""
     written = [factored(x) for x in (*steps.values(), *numbers)]

@@ -1,7 +1,7 @@
 """Symbolic differentiation of the formulas of a type, with sympy symbols as arguments of kernels.
 
-``Quantity.rate`` is the rate of every name that a kernel may use: an arm s_P_i turns with its body,
-W_i x s_P_i. With V_i, W_i the velocities of the bodies this gives, for an equation C,
+``KernelArgument.rate`` is the rate of every name that a kernel may use: an arm s_P_i turns with
+its body, W_i x s_P_i. With V_i, W_i the velocities of the bodies this gives, for an equation C,
 
     phi = dC/dt = J v - nu,    so J is the coefficients of V and W in phi, and nu is -phi at rest;
     d phi/dt = J v_dot - gamma, so gamma is -d phi/dt with V_dot = W_dot = 0.
@@ -16,7 +16,7 @@ import attrs
 import sympy
 from sympy.logic.boolalg import Boolean
 
-from dap3d_core.interface.codegen.kernel_arguments import Quantity, parameters
+from dap3d_core.interface.codegen.kernel_arguments import KernelArgument, parameters
 from dap3d_core.interface.errors import line_of, plain_words
 from dap3d_core.kernels import add, cross, dot, sub
 
@@ -148,7 +148,7 @@ class Symbols(Mapping[str, Any]):
     ``W_i`` of the bodies.
     """
 
-    def __init__(self, names: Mapping[str, Quantity], slots: Sequence[str]) -> None:
+    def __init__(self, names: Mapping[str, KernelArgument], slots: Sequence[str]) -> None:
         self.names = names
         self.owner: dict[Expression, tuple[str, int]] = {}
         self._values: dict[str, Any] = {}
@@ -227,7 +227,7 @@ class Symbols(Mapping[str, Any]):
         return self._rates[name]
 
     def _evaluated(self, code: str) -> list[Expression]:
-        """The numbers of an expression of ``Quantity`` (text of this program), over symbols."""
+        """The numbers of an expression of ``KernelArgument`` (text of this program)."""
         return [exact(x) for x in flat(eval(code, {"__builtins__": {}, **_WORDS}, self))]
 
     def d_dt(self, program: Program) -> Program:

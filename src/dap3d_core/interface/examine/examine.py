@@ -15,11 +15,11 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.body_pose import BodyPose
-from dap3d_core.interface.codegen.examined import Examined
-from dap3d_core.interface.codegen.instance_layout import Layout, body_slots, layout_of, size
+from dap3d_core.interface.codegen.examined import TypeInfo
+from dap3d_core.interface.codegen.instance_layout import InstanceLayout, body_slots, layout_of, size
 from dap3d_core.interface.codegen.kernel_arguments import (
     VELOCITY_KERNELS,
-    Quantity,
+    KernelArgument,
     friction_names,
     namespace,
     parameters,
@@ -40,7 +40,7 @@ from dap3d_core.interface.types import SYMBOLS, Function, Joint, TypeBase
 ATTEMPTS = 200
 
 
-def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
+def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     """Check a type and return what its loops are generated from.
 
     Raises:
@@ -77,7 +77,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
     for kernel_name in derived:
         call(kernel_name)
     functions = tuple(n for n, s in specs_of(type_).items() if s.kind == "function" and s.argument)
-    return Examined(
+    return TypeInfo(
         type_,
         layout,
         names,
@@ -85,7 +85,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> Examined:
         kernels,
         variants,
         functions,
-        rubs_in=_joint_of_friction(type_),
+        friction_joint=_joint_of_friction(type_),
         derived=derived,
     )
 
@@ -94,7 +94,7 @@ def _output(
     type_: type[TypeBase],
     kernel_name: str,
     kernel: Callable[..., Any],
-    quantities: Sequence[Quantity],
+    quantities: Sequence[KernelArgument],
     rng: random.Random,
 ) -> tuple[str, ...]:
     """Expressions of a kernel's numbers; it may be undefined for some random inputs, not all."""
@@ -163,7 +163,7 @@ def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
     return {name: _constant(name, value, broken) for name, value in constants.items()}
 
 
-def _check_symbol(type_: type[TypeBase], layout: Layout) -> None:
+def _check_symbol(type_: type[TypeBase], layout: InstanceLayout) -> None:
     if not type_.symbol:
         return
     who, symbol = where_is(type_), f"symbol = {type_.symbol!r}"
@@ -311,7 +311,7 @@ def _check_members(type_: type[TypeBase]) -> None:
 
 
 def _check_names(
-    type_: type[TypeBase], kernel: str, wanted: tuple[str, ...], names: Mapping[str, Quantity]
+    type_: type[TypeBase], kernel: str, wanted: tuple[str, ...], names: Mapping[str, KernelArgument]
 ) -> None:
     who = f"{where_is(type_)}.{kernel}"
     for name in wanted:

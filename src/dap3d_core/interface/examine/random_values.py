@@ -5,7 +5,7 @@ import random
 from typing import Any
 
 from dap3d_core.interface.body_pose import BodyPose, pose
-from dap3d_core.interface.codegen.kernel_arguments import Quantity
+from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
 from dap3d_core.interface.fields import FieldSpec
 
 
@@ -38,7 +38,7 @@ def random_value(shape: tuple[int, ...], rng: random.Random) -> Any:
     return numbers(rng, shape[0])
 
 
-def random_quantity(quantity: Quantity, rng: random.Random) -> Any:
+def random_quantity(quantity: KernelArgument, rng: random.Random) -> Any:
     """A random argument of a kernel: numbers, a table, or a function to be called."""
     if quantity.derivative >= 0:
         a, b = rng.uniform(0.5, 1.5), rng.uniform(0.5, 1.5)

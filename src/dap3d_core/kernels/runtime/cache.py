@@ -83,10 +83,6 @@ def compiled(function):
     return Compiled(function) if jit_is_on() else function
 
 
-#: The same for a function that compiled code alone calls.
-compiled_inside = compiled
-
-
 def compiled_into(function):
     """The same for a function that is inlined into its callers, with the constants they pass."""
     return Compiled(function, is_inlined=True) if jit_is_on() else function

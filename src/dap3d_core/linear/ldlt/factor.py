@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.kernels.runtime.array_struct import pointer
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.linear.ldlt.panels import factor_panel, solve_panel_backwards, solve_panel_forwards
 from dap3d_core.linear.ldlt.plan import COPY, DIAGONAL, PRODUCTS, TRANSPOSE, Integers
 from dap3d_core.linear.ordering.supernodes import LEAST_ROWS
@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 #: Pivots are squares of lengths. Near a singular pose one is a hundredth in length of what it was
 #: at the start, and the product of its node has fallen by as much: to LESS at least, where others
 #: have grown.
-POOR, LESS = 1e-4, 1e-2
+SINGULAR_PIVOT_RATIO, SINGULAR_NODE_RATIO = 1e-4, 1e-2
 
 
 @compiled_into
@@ -101,7 +101,7 @@ def assemble(targets: Integers, contributions: Integers, D: Floats, K: Floats) -
                     K[o + r * n + k] = 1.0 if r == k else 0.0
 
 
-@compiled_inside
+@compiled
 def weigh_rows(blocks: Integers, D: Floats, part: float, compliance: Floats) -> None:
     """E of each joint row, ``part`` of the squared length of the row in D^; zero on hub rows."""
     for k in range(compliance.shape[0]):
@@ -231,7 +231,7 @@ def factor(
     return counted
 
 
-@compiled_inside
+@compiled
 def have_pivots(nodes: Integers, K: Floats) -> bool:
     """Whether no pivot has come out as zero or with the wrong sign, from the factors of K."""
     for k in range(nodes.shape[0] - 1):
@@ -242,7 +242,7 @@ def have_pivots(nodes: Integers, K: Floats) -> bool:
     return True
 
 
-@compiled_inside
+@compiled
 def pivot_lengths(nodes: Integers, K: Floats, smallest: Floats, lengths: Floats) -> int:
     """Of each node the square root of its pivots' product, from the factors of K; 0 if none.
 
@@ -262,8 +262,8 @@ def pivot_lengths(nodes: Integers, K: Floats, smallest: Floats, lengths: Floats)
             if smallest[f + r] > 0.0:
                 ratio = 1.0 / (abs(K[d + r * (m + 1)]) * smallest[f + r])
                 small |= not ratio > 1.0
-                product *= POOR * ratio
-        if not product > LESS:
+                product *= SINGULAR_PIVOT_RATIO * ratio
+        if not product > SINGULAR_NODE_RATIO:
             counted += small
         lengths[k] = np.sqrt(product) if product > 0.0 else 0.0
     return counted
@@ -339,7 +339,7 @@ def solve_up(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
             solve_backwards(k, m, nodes, columns, K, x)
 
 
-@compiled_inside
+@compiled
 def solve(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
     """Solve K z = x in place, with the factors of K."""
     solve_down(nodes, columns, pointer(K), pointer(x))

@@ -13,7 +13,7 @@ Contents = dict[tuple[int, int], list[tuple[int, int]]]
 
 
 @attrs.frozen(eq=False)
-class Matrix:
+class FactorLayout:
     """The layout of K. A node is one place of the order, or the places of a panel.
 
     Attributes:
@@ -37,7 +37,7 @@ class Matrix:
     size: int
 
 
-def lay_matrix(found: Ordering, starts: Sequence[int], contents: Contents) -> Matrix:
+def lay_matrix(found: Ordering, starts: Sequence[int], contents: Contents) -> FactorLayout:
     """Places of the blocks of K, node by node.
 
     Args:
@@ -48,7 +48,7 @@ def lay_matrix(found: Ordering, starts: Sequence[int], contents: Contents) -> Ma
     sizes = found.sizes
     spans = list(_spans(found))
     waiting = _waiting(found, spans, contents) if found.panels else {}
-    result = Matrix(spans, [], [], [0], [], [], [], 0)
+    result = FactorLayout(spans, [], [], [0], [], [], [], 0)
     size = 0
     for first, last, end in spans:
         result.place.append(size)
@@ -129,7 +129,7 @@ def _waiting(
 
 
 def list_updates(
-    found: Ordering, starts: Sequence[int], matrix: Matrix
+    found: Ordering, starts: Sequence[int], matrix: FactorLayout
 ) -> tuple[NDArray[np.int64], list[int]]:
     """Products that the elimination of each node subtracts from later blocks, (u, 6), by nodes.
 
@@ -162,7 +162,7 @@ def list_updates(
 class _Panels:
     """Addresses in the columns of nodes, by places of the order."""
 
-    def __init__(self, found: Ordering, starts: Sequence[int], matrix: Matrix) -> None:
+    def __init__(self, found: Ordering, starts: Sequence[int], matrix: FactorLayout) -> None:
         self.found, self.starts, self.matrix = found, starts, matrix
         self.sizes = found.sizes
         self.node = [k for k, span in enumerate(matrix.spans) for _ in range(*span[:2])]

@@ -11,13 +11,13 @@ factored they are those of Cholesky, with inverse diagonal: products then need n
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.ldlt.plan import Integers
 
 Floats = NDArray[np.float64]
 
 
-@compiled_inside
+@compiled
 def factor_panel(
     k: int,
     nodes: Integers,
@@ -50,7 +50,7 @@ def factor_panel(
     return counted
 
 
-@compiled_inside
+@compiled
 def store(m: int, rows: int, d: int, sign: float, K: Floats) -> None:
     """From sign L L^T with inverse diagonal to L d L^T, and the rows below from A L^-T of the one
     to that of the other.
@@ -65,7 +65,7 @@ def store(m: int, rows: int, d: int, sign: float, K: Floats) -> None:
         K[d + c * m + c] = sign * inverse * inverse
 
 
-@compiled_inside
+@compiled
 def gather(source: int, target: int, rows: int, cols: int, flag: int, K: Floats) -> None:
     """Add a block of its own (rows x cols) to its place in a panel; of a diagonal one the lower
     triangle. flag: 2 * (numbers in a row of the panel) + (1 on the diagonal).
@@ -76,7 +76,7 @@ def gather(source: int, target: int, rows: int, cols: int, flag: int, K: Floats)
             K[target + r * stride + c] += K[source + r * cols + c]
 
 
-@compiled_inside
+@compiled
 def factor_diagonal(
     m: int, x: int, d: int, sign: float, K: Floats, smallest: Floats, drop: bool
 ) -> int:
@@ -118,7 +118,7 @@ def factor_diagonal(
     return counted
 
 
-@compiled_inside
+@compiled
 def divide(o: int, rows: int, m: int, d: int, K: Floats) -> None:
     """Solve X L^T = B in place for the rows at o, with the factors of the block at d."""
     r = 0
@@ -150,7 +150,7 @@ def divide(o: int, rows: int, m: int, d: int, K: Floats) -> None:
         r += 1
 
 
-@compiled_inside
+@compiled
 def subtract(
     a: int,
     b: int,
@@ -192,7 +192,7 @@ def subtract(
         r += 4
 
 
-@compiled_inside
+@compiled
 def tile(a: int, b: int, o: int, m: int, stride: int, sign: float, K: Floats) -> None:
     """Four rows by four columns of ``subtract``."""
     s00, s01, s02, s03 = 0.0, 0.0, 0.0, 0.0
@@ -225,7 +225,7 @@ def tile(a: int, b: int, o: int, m: int, stride: int, sign: float, K: Floats) ->
     K[o3 + 3] -= sign * s33
 
 
-@compiled_inside
+@compiled
 def solve_panel_forwards(k: int, nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
     """What node k does to its own unknowns and those below, on the way down."""
     m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
@@ -261,7 +261,7 @@ def solve_panel_forwards(k: int, nodes: Integers, columns: Integers, K: Floats, 
             g += 1
 
 
-@compiled_inside
+@compiled
 def solve_panel_backwards(k: int, nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
     """What the unknowns below node k do to its own, on the way up."""
     m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]

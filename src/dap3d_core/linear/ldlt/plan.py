@@ -12,7 +12,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.linear.ldlt.factor_layout import Contents, Matrix, lay_matrix, list_updates
+from dap3d_core.linear.ldlt.factor_layout import Contents, FactorLayout, lay_matrix, list_updates
 from dap3d_core.linear.ordering.elimination_order import order_nodes
 from dap3d_core.linear.ordering.ordering import Ordering
 
@@ -114,7 +114,7 @@ def make_plan(
 
 
 def _nodes(
-    found: Ordering, starts: Sequence[int], matrix: Matrix, update_start: Sequence[int]
+    found: Ordering, starts: Sequence[int], matrix: FactorLayout, update_start: Sequence[int]
 ) -> Integers:
     rows = []
     for k, (first, last, _) in enumerate(matrix.spans):
@@ -187,7 +187,7 @@ def _contents(
 
 
 def _targets(
-    found: Ordering, starts: Sequence[int], matrix: Matrix, contents: Contents
+    found: Ordering, starts: Sequence[int], matrix: FactorLayout, contents: Contents
 ) -> tuple[Integers, Integers]:
     """What each block of K is made of before the factorisation."""
     targets: list[tuple[int, ...]] = []

@@ -7,7 +7,7 @@ leaves -D^ D^^T between its joints, which linear/ldlt/factor.py factors.
 """
 
 from dap3d_core.kernels.runtime.array_struct import pointer
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.linear.ldlt.factor import Floats, solve
 from dap3d_core.linear.ldlt.plan import Integers
 
@@ -63,7 +63,7 @@ def subtract_column_products(blocks: Integers, q: int, D: Floats, x: Floats, g: 
     g[b], g[b + 1], g[b + 2], g[b + 3], g[b + 4], g[b + 5] = g0, g1, g2, g3, g4, g5
 
 
-@compiled_inside
+@compiled
 def solve_saddle(
     blocks: Integers,
     hubs: Integers,
@@ -99,7 +99,7 @@ def solve_saddle(
             g[6 * hubs[q, 0] + c] = x[hubs[q, 1] + c]
 
 
-@compiled_inside
+@compiled
 def add_product(blocks: Integers, D: Floats, g: Floats, residual: Floats) -> None:
     """Add D^ g to the residual, with g in scaled coordinates (6 (n+1),)."""
     for q in range(blocks.shape[0]):

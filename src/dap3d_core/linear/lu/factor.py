@@ -10,11 +10,11 @@ empty, so factors that are zero are passed over.
 
 from typing import Any
 
-from dap3d_core.kernels.runtime.cache import compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.ldlt.plan import Integers
 
 
-@compiled_inside
+@compiled
 def factor_diagonal(m: int, d: int, first: int, K: Any, pivots: Integers) -> bool:
     """P K = L U of a block of m rows at d, in place; reciprocals on U's diagonal. False: singular.
 
@@ -44,7 +44,7 @@ def factor_diagonal(m: int, d: int, first: int, K: Any, pivots: Integers) -> boo
     return True
 
 
-@compiled_inside
+@compiled
 def factor_lu(
     nodes: Integers, columns: Integers, updates: Integers, K: Any, pivots: Integers
 ) -> bool:
@@ -99,7 +99,7 @@ def factor_lu(
     return True
 
 
-@compiled_inside
+@compiled
 def solve_lu(nodes: Integers, columns: Integers, K: Any, pivots: Integers, x: Any) -> None:
     """Solve K z = x in place, with the factors of K."""
     count = nodes.shape[0] - 1

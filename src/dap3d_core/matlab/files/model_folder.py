@@ -11,7 +11,7 @@ from dap3d_core.matlab.language.interpreter import Workspace, follow
 from dap3d_core.matlab.language.parse import (
     Grammar,
     Place,
-    Source,
+    SourceFile,
     m_files,
     read_source,
     syntax_mistakes,
@@ -52,7 +52,7 @@ class Model:
     arrays: dict[str, list[Struct] | None] = attrs.field(factory=dict)
     absent: set[str] = attrs.field(factory=set)
     limits: dict[str, tuple[Any, Place]] = attrs.field(factory=dict)
-    user_force: Source | None = None
+    user_force: SourceFile | None = None
     mistakes: list[Mistake] = attrs.field(factory=list)
     files: list[FileFacts] = attrs.field(factory=list)
     unused: list[Remark] = attrs.field(factory=list)

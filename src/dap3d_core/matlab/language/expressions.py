@@ -17,7 +17,7 @@ from dap3d_core.matlab.language.operators import (
     checked,
     numbers,
 )
-from dap3d_core.matlab.language.parse import Source, text_of
+from dap3d_core.matlab.language.parse import SourceFile, text_of
 from dap3d_core.matlab.language.structures import MAKERS
 from dap3d_core.matlab.language.values import Broken, Numbers, Struct, kind_of, make, size_of
 from dap3d_core.registry.suggestions import nearest
@@ -63,7 +63,7 @@ class Expressions:
         variables: values by name.
     """
 
-    def __init__(self, source: Source, variables: dict[str, Any]) -> None:
+    def __init__(self, source: SourceFile, variables: dict[str, Any]) -> None:
         self.source, self.variables = source, variables
         self._depth = self._entries = 0
         self._lengths: list[int] = []  # values of ``end``, innermost last

@@ -12,12 +12,12 @@ from dap3d_core.matlab.language.expressions import (
     named_children,
 )
 from dap3d_core.matlab.language.operators import RefusalError, ReportedError, numbers
-from dap3d_core.matlab.language.parse import Place, Source, excerpt, text_of
+from dap3d_core.matlab.language.parse import Place, SourceFile, excerpt, text_of
 from dap3d_core.matlab.language.values import (
     BROKEN,
     LARGEST_MATRIX,
     Broken,
-    Given,
+    GivenValue,
     Struct,
     copied,
     kind_of,
@@ -59,7 +59,7 @@ class Workspace:
     mistakes: list[Mistake] = attrs.field(factory=list)
 
 
-def follow(source: Source, root: "Node") -> Workspace:
+def follow(source: SourceFile, root: "Node") -> Workspace:
     """Interpret the statements of a valid MATLAB file.
 
     A statement outside the language is reported and has no effect; a variable that it might have
@@ -71,7 +71,7 @@ def follow(source: Source, root: "Node") -> Workspace:
 
 
 class _Interpreter:
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: SourceFile) -> None:
         self.source, self.workspace = source, Workspace()
         self.variables = self.workspace.variables
         self.expressions = Expressions(source, self.variables)
@@ -155,7 +155,7 @@ class _Interpreter:
         except (RefusalError, ReportedError):
             return False
         if field in struct.structure.known:
-            struct.given[field] = Given(BROKEN, self.source.place(target))
+            struct.given[field] = GivenValue(BROKEN, self.source.place(target))
         return True
 
     # ---------------------------------------------------------------- assignments
@@ -191,7 +191,7 @@ class _Interpreter:
             matrix = numbers(copied(struct.value(field)), target)
             matrix[self.expressions.at(target, matrix, arguments)] = self._single(value, right)
             value = matrix
-        struct.given[field] = Given(value, self.source.place(target))
+        struct.given[field] = GivenValue(value, self.source.place(target))
 
     def _struct(self, owner: "Node") -> Struct:
         """The structure of a field, to be changed in place."""

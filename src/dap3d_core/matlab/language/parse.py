@@ -44,7 +44,7 @@ class Place:
 
 
 @attrs.frozen
-class Source:
+class SourceFile:
     """A MATLAB file.
 
     Attributes:
@@ -84,7 +84,7 @@ def excerpt(node: "Node", width: int = 60) -> str:
     return words if len(words) <= width else f"{words[: width - 4]} ..."
 
 
-def read_source(path: Path) -> Source:
+def read_source(path: Path) -> SourceFile:
     """The text of a MATLAB file, which is UTF-8 and of reasonable size.
 
     A link out of its folder is refused: a model from others must not put the user's files into a
@@ -99,7 +99,7 @@ def read_source(path: Path) -> Source:
     except OSError as error:
         raise unreadable(path, error) from None
     text = read_text(path, LARGEST_FILE, "save it as UTF-8 (in MATLAB: Save As, encoding UTF-8)")
-    return Source(path, text.replace("\r\n", "\n").replace("\r", "\n"))
+    return SourceFile(path, text.replace("\r\n", "\n").replace("\r", "\n"))
 
 
 class Grammar:
@@ -125,7 +125,7 @@ class Grammar:
             what = f"{needed} in versions that fit each other: {error}"
             raise SceneError([Mistake("", MISSING, what, remedy=remedy)]) from None
 
-    def tree(self, source: Source) -> "Node":
+    def tree(self, source: SourceFile) -> "Node":
         """The root of the tree of a file, which may have syntax errors.
 
         Raises:
@@ -167,7 +167,7 @@ def _peak() -> int:
     return peak if sys.platform == "darwin" else 1024 * peak
 
 
-def syntax_mistakes(source: Source, root: "Node") -> list[Mistake]:
+def syntax_mistakes(source: SourceFile, root: "Node") -> list[Mistake]:
     """The first syntax errors of a file, one for each line."""
     mistakes: dict[int, Mistake] = {}
     lines = source.text.split("\n")

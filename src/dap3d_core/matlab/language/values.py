@@ -23,7 +23,7 @@ BROKEN = Broken()
 
 
 @attrs.frozen(eq=False)
-class Given:
+class GivenValue:
     """A value that a file gives to a field, and its place."""
 
     value: Any
@@ -44,7 +44,7 @@ class Struct:
     structure: Structure
     place: Place
     variable: str
-    given: dict[str, Given] = attrs.field(factory=dict)
+    given: dict[str, GivenValue] = attrs.field(factory=dict)
 
     def copy(self) -> "Struct":
         """A copy with separate fields, as MATLAB assigns structures."""

@@ -6,7 +6,7 @@ import attrs
 
 from dap3d_core.matlab.files.report import remark
 from dap3d_core.matlab.language.structures import DISKS
-from dap3d_core.matlab.language.values import Given, Struct
+from dap3d_core.matlab.language.values import GivenValue, Struct
 from dap3d_core.matlab.translate.field_rules import (
     AT,
     BODY_I,
@@ -242,7 +242,7 @@ def _with_disk(struct: Struct, fields: Fields) -> Struct:
                 what = f"is another value than that of disk {number}"
                 fields.refuse(struct, meant, what, "leave it out")
         elif meant not in struct.given:
-            joint.given[meant] = Given(disk.value(field), disk.place_of(field))
+            joint.given[meant] = GivenValue(disk.value(field), disk.place_of(field))
             if field not in disk.given and field != "mu":
                 default = {"iBindex": "1", "type": "'xyz'", "R": "1"}[field]
                 fields.defaulted(disk, f"{field} = {default}")

@@ -9,7 +9,7 @@ from dap3d_core.result.arrays import COLUMNS, U_ERROR, Arrays, column_sizes, joi
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.library import NETCDF
 from dap3d_core.result.file.validate import check_numbers
-from dap3d_core.result.model_summary import Subject
+from dap3d_core.result.model_summary import ModelSummary
 
 
 class LazyArrays(Arrays):
@@ -18,7 +18,7 @@ class LazyArrays(Arrays):
     The file stays open: another file that takes its name meanwhile changes nothing here.
     """
 
-    def __init__(self, dataset: Any, subject: Subject, count: int) -> None:
+    def __init__(self, dataset: Any, subject: ModelSummary, count: int) -> None:
         """Args: an open netCDF4.Dataset, its model, and the number of complete instants."""
         self._dataset, self._count = dataset, count
         self._sizes = {"": None, **column_sizes(subject)}

@@ -7,9 +7,9 @@ import attrs
 import numpy as np
 
 from dap3d_core.result.arrays import AXES, COLUMNS, EULER, U_ERROR, Arrays, column_sizes
-from dap3d_core.result.event_record import Occurrence
-from dap3d_core.result.metadata import Record, Statistics, to_json
-from dap3d_core.result.model_summary import Subject
+from dap3d_core.result.event_record import EventRecord
+from dap3d_core.result.metadata import RunMetadata, RunStatistics, to_json
+from dap3d_core.result.model_summary import ModelSummary
 
 #: Version of this layout, raised when an older reader would misread it.
 FORMAT = 1
@@ -51,7 +51,7 @@ def about(unit: str, meaning: str) -> dict[str, str]:
     return {"units": unit, "long_name": meaning}
 
 
-def attributes(subject: Subject, record: Record) -> dict[str, Any]:
+def attributes(subject: ModelSummary, record: RunMetadata) -> dict[str, Any]:
     """Global attributes. Lists and tables are JSON."""
     types = {} if record.types is None else {"types": to_json(record.types)}
     return types | {
@@ -74,23 +74,23 @@ def attributes(subject: Subject, record: Record) -> dict[str, Any]:
     }
 
 
-def record_of(values: dict[str, Any]) -> Record:
+def record_of(values: dict[str, Any]) -> RunMetadata:
     """The record in a file's ``attributes``, with JSON decoded."""
     texts = {name: str(values[name]) for name in ("status", "method", "integrator", "run")}
-    return Record(
+    return RunMetadata(
         scene_text=str(values["scene"]),
         types=values["types"],
         notes=values["notes"],
         settings=values["settings"],
-        stats=Statistics(**values["statistics"]),
-        events=[Occurrence(**event) for event in values["events"]],
+        stats=RunStatistics(**values["statistics"]),
+        events=[EventRecord(**event) for event in values["events"]],
         known_versions=values["versions"],
         **texts,
     )
 
 
 def define(
-    dataset: Any, subject: Subject, record: Record, nt: int, *, with_error: bool = False
+    dataset: Any, subject: ModelSummary, record: RunMetadata, nt: int, *, with_error: bool = False
 ) -> int:
     """Defines a new file and writes all but the rows.
 

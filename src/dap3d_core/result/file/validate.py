@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.event_record import KINDS
-from dap3d_core.result.model_summary import Subject
+from dap3d_core.result.model_summary import ModelSummary
 
 #: Arrays up to so many bytes are read whatever the size of the file; larger ones only up to a ratio
 #: of their size to that of the file. dap3d does not compress; other programs may.
@@ -73,7 +73,7 @@ def check_numbers(file: str | Path, name: str, values: NDArray[np.float64]) -> N
         raise ResultError(f"cannot read {file}: it is damaged: {name} holds {fault}")
 
 
-def check_subject(subject: Subject) -> None:
+def check_subject(subject: ModelSummary) -> None:
     """Checks that names are single lines, and that constants and indices are in range.
 
     Raises:

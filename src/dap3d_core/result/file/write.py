@@ -21,13 +21,13 @@ from dap3d_core.result.file.atomic_write import (
 from dap3d_core.result.file.checksum import write_checksums
 from dap3d_core.result.file.library import NETCDF, created, guarded, opened
 from dap3d_core.result.file.schema import allocate_rows, define, write_rows, write_times
-from dap3d_core.result.metadata import RUNNING, Record
-from dap3d_core.result.model_summary import Subject
+from dap3d_core.result.metadata import RUNNING, RunMetadata
+from dap3d_core.result.model_summary import ModelSummary
 
 
 def save(
-    subject: Subject,
-    record: Record,
+    subject: ModelSummary,
+    record: RunMetadata,
     arrays: Arrays,
     path: str | os.PathLike[str],
     force: bool = False,
@@ -120,8 +120,8 @@ class ResultWriter(GrowingFile):
     def __init__(
         self,
         path: str | os.PathLike[str],
-        subject: Subject,
-        record: Record,
+        subject: ModelSummary,
+        record: RunMetadata,
         most: int,
         *,
         force: bool = False,

@@ -13,7 +13,7 @@ from dap3d_core.result.post.point_motion import motion_of
 from dap3d_core.result.post.reactions import InstanceParameters, Reaction, actions_of, place_at
 
 if TYPE_CHECKING:
-    from dap3d_core.formulations.evaluator import Machine
+    from dap3d_core.formulations.evaluator import Evaluator
 
 
 @attrs.frozen(eq=False)
@@ -38,7 +38,7 @@ class ForceOutput:
 
 @np.errstate(all="ignore")  # as compiled code does
 def force_output(
-    machine: "Machine",
+    evaluator: "Evaluator",
     t: Floats,
     u: Floats,
     v_dot: Floats,
@@ -60,11 +60,11 @@ def force_output(
     Raises:
         UnknownNameError: the element acts on every body or in a joint.
     """
-    group, index = _group_of(machine, name, element)
-    loops, bodies = _ForceLoops(machine, group, index), group.bodies[index]
-    force, energy = np.zeros_like(machine.system.force), np.zeros(1)
+    group, index = _group_of(evaluator, name, element)
+    loops, bodies = _ForceLoops(evaluator, group, index), group.bodies[index]
+    force, energy = np.zeros_like(evaluator.system.force), np.zeros(1)
     out, potential = np.zeros((len(t), len(bodies), 6)), np.zeros(len(t))
-    for k, time in place_at(machine, t, u):
+    for k, time in place_at(evaluator, t, u):
         if angles is None:
             loops.call("angle", time, force)
         else:
@@ -73,7 +73,7 @@ def force_output(
         loops.call("wrench", time, force)
         loops.call("energy", time, energy)
         out[k], potential[k] = force.reshape(-1, 6)[bodies], energy[0]
-    on = actions_of(machine.model, u, group, index, out)
+    on = actions_of(evaluator.model, u, group, index, out)
     output = ForceOutput(on, potential if loops.has("energy") else None)
     if any(spec.kind == "vector2" for spec in specs_of(group.examined.type).values()):
         length, rate, tension = _along(group, index, u, v_dot, on["i"].force)
@@ -81,9 +81,9 @@ def force_output(
     return output
 
 
-def _group_of(machine: "Machine", name: str, element: int) -> tuple[Group, int]:
+def _group_of(evaluator: "Evaluator", name: str, element: int) -> tuple[Group, int]:
     """The group of a force element and its index there."""
-    for group in machine.model.forces:
+    for group in evaluator.model.forces:
         indices = np.flatnonzero(group.members == element)
         if len(indices) and not getattr(group.examined.type, "each_body", False):
             return group, int(indices[0])
@@ -113,15 +113,15 @@ def _along(
 class _ForceLoops:
     """The loops over one force element, with a copy of its parameters."""
 
-    def __init__(self, machine: "Machine", group: Group, index: int) -> None:
+    def __init__(self, evaluator: "Evaluator", group: Group, index: int) -> None:
         from dap3d_core.interface.codegen.loop_source import stride
 
-        s = machine.system
-        self._machine = machine
-        self._loops = {kind: q for q, (kind, g) in enumerate(machine.what) if g is group}
+        s = evaluator.system
+        self._evaluator = evaluator
+        self._loops = {kind: q for q, (kind, g) in enumerate(evaluator.loop_groups) if g is group}
         q = self._loops["wrench"]
-        self.parameters = InstanceParameters(machine, q, group, np.array([index]))
-        self.parameters.set_angles(np.zeros(machine.model.angle_count))
+        self.parameters = InstanceParameters(evaluator, q, group, np.array([index]))
+        self.parameters.set_angles(np.zeros(evaluator.model.angle_count))
         self._groups, start = s.groups.copy(), self.parameters.start
         for q in self._loops.values():
             self._groups[q] = s.groups[q, 0] + index * stride(group.examined), start, 1
@@ -135,7 +135,7 @@ class _ForceLoops:
         from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop
 
         if self.has(kind):
-            s = self._machine.system
+            s = self._evaluator.system
             arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=self.parameters.par)
-            q, loops = self._loops[kind], self._machine.loops
+            q, loops = self._loops[kind], self._evaluator.loops
             call_loop(loops, q, time, arrays, self._groups[q], out, out, out)

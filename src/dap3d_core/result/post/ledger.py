@@ -12,8 +12,8 @@ import numpy as np
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.state_layout import split, velocities_of
 from dap3d_core.result.arrays import Arrays
-from dap3d_core.result.metadata import Record
-from dap3d_core.result.model_summary import Subject
+from dap3d_core.result.metadata import RunMetadata
+from dap3d_core.result.model_summary import ModelSummary
 from dap3d_core.result.post.point_motion import kinetic_energy, momentum
 
 #: How many steps' worth of error a run may gather.
@@ -95,7 +95,7 @@ class LedgerSeries:
     sizes: list[float]
 
     @classmethod
-    def of(cls, subject: Subject, arrays: Arrays, length: float) -> "LedgerSeries":
+    def of(cls, subject: ModelSummary, arrays: Arrays, length: float) -> "LedgerSeries":
         """The series of a run, computed block by block in little memory."""
         blocks, sizes = [], np.zeros(3)
         for block in arrays.blocks():
@@ -107,7 +107,7 @@ class LedgerSeries:
         return cls(**series, sizes=sizes.tolist())
 
 
-def _series(subject: Subject, block: Arrays) -> dict[str, Floats]:
+def _series(subject: ModelSummary, block: Arrays) -> dict[str, Floats]:
     """Series of a block of instants by name."""
     r, p, rd, w = split(block.u)
     fast = np.linalg.norm(rd, axis=2)
@@ -134,7 +134,7 @@ def _series(subject: Subject, block: Arrays) -> dict[str, Floats]:
 CONSERVATIVE = 1e-3
 
 
-def ledger_of(subject: Subject, arrays: Arrays, record: Record) -> dict[str, Entry]:
+def ledger_of(subject: ModelSummary, arrays: Arrays, record: RunMetadata) -> dict[str, Entry]:
     """All entries of a run, by name; none for a run without reported instants.
 
     Names: energy; total energy (where potentials alone do work); momentum (where nothing
@@ -153,13 +153,13 @@ def ledger_of(subject: Subject, arrays: Arrays, record: Record) -> dict[str, Ent
     return entries
 
 
-def _relative_limit(record: Record) -> float:
+def _relative_limit(record: RunMetadata) -> float:
     """LOOSE rtol, and rounding."""
     control = record.tolerances
     return FIXED if control is None else LOOSE * control[0] + ROUNDING
 
 
-def _floors(record: Record) -> dict[str, float]:
+def _floors(record: RunMetadata) -> dict[str, float]:
     """Magnitudes below which error control is absolute, not relative: atol / rtol; 0 without it."""
     control = record.tolerances
     if control is None:
@@ -167,7 +167,7 @@ def _floors(record: Record) -> dict[str, float]:
     return {name: atol / control[0] for name, atol in control[1].items()}
 
 
-def _energy_scale(subject: Subject, course: LedgerSeries, record: Record) -> float:
+def _energy_scale(subject: ModelSummary, course: LedgerSeries, record: RunMetadata) -> float:
     """What an imbalance of energy is compared with, J: the largest kinetic energy or work.
 
     Below a speed of atol / rtol error control is absolute: an error atol of the speed v is one of
@@ -189,12 +189,12 @@ def _energy_scale(subject: Subject, course: LedgerSeries, record: Record) -> flo
     return max(float(kinetic), work, at_rest / limit, float(np.finfo(float).tiny))
 
 
-def _inertia(subject: Subject) -> float:
+def _inertia(subject: ModelSummary) -> float:
     """Sum of the bodies' largest principal inertias, kg m^2."""
     return float(np.linalg.norm(subject.Jp, ord=2, axis=(1, 2)).sum())
 
 
-def _energy(subject: Subject, course: LedgerSeries, record: Record) -> Entry:
+def _energy(subject: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:
     """Kinetic energy against the work done by forces and drivers, dampers included."""
     kinetic, work = course.kinetic, course.work
     worst, when = _worst((kinetic - kinetic[0]) - (work - work[0]), course.t)
@@ -206,7 +206,7 @@ def _energy(subject: Subject, course: LedgerSeries, record: Record) -> Entry:
     return _entry(worst / scale, _relative_limit(record), "1", text)
 
 
-def _is_conservative(subject: Subject, course: LedgerSeries, record: Record) -> bool:
+def _is_conservative(subject: ModelSummary, course: LedgerSeries, record: RunMetadata) -> bool:
     """Whether potentials account for all work: by what the elements are, and as measured.
 
     As measured, because a damper may act only where bodies touch.
@@ -217,7 +217,7 @@ def _is_conservative(subject: Subject, course: LedgerSeries, record: Record) -> 
     return little and bool(record.settings.get("conservative"))
 
 
-def _total_energy(subject: Subject, course: LedgerSeries, record: Record) -> Entry:
+def _total_energy(subject: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:
     """Change of kinetic and potential energy together: zero where potentials alone do work."""
     total = course.kinetic + course.potential_energy
     worst, when = _worst(total - total[0], course.t)
@@ -229,7 +229,7 @@ def _total_energy(subject: Subject, course: LedgerSeries, record: Record) -> Ent
     return _entry(worst / scale, _relative_limit(record), "1", text)
 
 
-def _momentum(subject: Subject, course: LedgerSeries, record: Record) -> Entry:
+def _momentum(subject: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:
     """Drift of linear and angular momentum, relative to the momenta of the bodies added up."""
     floors = _floors(record)
     far = floors["v"] * course.far + floors["r"] * course.speed
@@ -248,7 +248,9 @@ def _momentum(subject: Subject, course: LedgerSeries, record: Record) -> Entry:
     return _entry(float(np.max(drifts)), _relative_limit(record), "1", text)
 
 
-def _constraints(subject: Subject, course: LedgerSeries, record: Record) -> dict[str, Entry]:
+def _constraints(
+    subject: ModelSummary, course: LedgerSeries, record: RunMetadata
+) -> dict[str, Entry]:
     """Largest residuals of the constraints at the three levels.
 
     Position and velocity: with projection as far as a projection may leave them, else what errors
@@ -278,7 +280,7 @@ def _constraints(subject: Subject, course: LedgerSeries, record: Record) -> dict
     return found
 
 
-def _rounding_of_accelerations(subject: Subject, course: LedgerSeries, length: float) -> float:
+def _rounding_of_accelerations(subject: ModelSummary, course: LedgerSeries, length: float) -> float:
     """What rounding of the reactions leaves of D v_dot - gamma, m/s^2.
 
     The factors L D L^T of the matrix K of the equations of motion give a solution x of an equation
@@ -295,14 +297,14 @@ def _rounding_of_accelerations(subject: Subject, course: LedgerSeries, length: f
     return BACKWARD * _largest(course.reaction) / lightest
 
 
-def _state_limit(record: Record, size: float, quantity: str) -> float:
+def _state_limit(record: RunMetadata, size: float, quantity: str) -> float:
     if record.projected:
         return PROJECTED * size
     control = record.tolerances
     return FIXED * size if control is None else LOOSE * (control[0] * size + control[1][quantity])
 
 
-def _quaternion(course: LedgerSeries, record: Record) -> Entry:
+def _quaternion(course: LedgerSeries, record: RunMetadata) -> Entry:
     """Euler parameters are normalised by projection; without it their length drifts."""
     worst, when = _worst(course.off_unit, course.t)
     limit = UNIT_LENGTH if record.projected else _state_limit(record, 1.0, "p")

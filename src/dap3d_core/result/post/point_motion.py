@@ -6,7 +6,7 @@ import numpy as np
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import to_body, to_global
 from dap3d_core.model.state_layout import split
-from dap3d_core.result.model_summary import Subject
+from dap3d_core.result.model_summary import ModelSummary
 
 
 def accelerations(v_dot: Floats) -> tuple[Floats, Floats]:
@@ -15,7 +15,9 @@ def accelerations(v_dot: Floats) -> tuple[Floats, Floats]:
     return a[..., :3], a[..., 3:]
 
 
-def point_motion(subject: Subject, u: Floats, v_dot: Floats, points: slice, level: int) -> Floats:
+def point_motion(
+    subject: ModelSummary, u: Floats, v_dot: Floats, points: slice, level: int
+) -> Floats:
     """``motion_of`` points of a model, (nt, k, 3)."""
     return motion_of(subject.point_body[points], subject.point_local[points], u, v_dot, level)
 
@@ -70,7 +72,7 @@ class Energy:
         return self.kinetic + self.potential
 
 
-def kinetic_energy(subject: Subject, u: Floats) -> Floats:
+def kinetic_energy(subject: ModelSummary, u: Floats) -> Floats:
     """(nt,) kinetic energy, J: sum of m |r_dot|^2 / 2 and omega' . J' omega' / 2."""
     _, p, rd, w = split(u)
     wp = to_body(p, w)
@@ -79,7 +81,7 @@ def kinetic_energy(subject: Subject, u: Floats) -> Floats:
     return np.asarray(0.5 * (translation + rotation))
 
 
-def momentum(subject: Subject, u: Floats) -> tuple[Floats, Floats]:
+def momentum(subject: ModelSummary, u: Floats) -> tuple[Floats, Floats]:
     """Linear momentum (nt, 3), kg m/s, and angular momentum about the origin (nt, 3), kg m^2/s."""
     r, p, rd, w = split(u)
     linear = subject.mass[:, None] * rd

@@ -13,8 +13,8 @@ from dap3d_core.model.rotations import read_only, to_body, to_global
 from dap3d_core.model.state_layout import split
 
 if TYPE_CHECKING:
-    from dap3d_core.formulations.constraint_rows import Rows
-    from dap3d_core.formulations.evaluator import Machine
+    from dap3d_core.formulations.constraint_rows import ConstraintRows
+    from dap3d_core.formulations.evaluator import Evaluator
 
 #: With more constraint rows than this the Jacobian is a list of sparse arrays.
 DENSE_ROWS = 1000
@@ -60,13 +60,13 @@ class Reaction:
         return self.moment - np.cross(to_global(self.p, self.local), self.force)
 
 
-def rows_at(machine: "Machine", t: Floats, u: Floats) -> Iterator["Rows"]:
+def rows_at(evaluator: "Evaluator", t: Floats, u: Floats) -> Iterator["ConstraintRows"]:
     """Yields the constraint rows at each instant."""
     for time, state in zip(t, u, strict=True):
-        yield machine.rows(time, state)
+        yield evaluator.rows(time, state)
 
 
-def jacobians(machine: "Machine", t: Floats, u: Floats) -> Any:
+def jacobians(evaluator: "Evaluator", t: Floats, u: Floats) -> Any:
     """The constraint Jacobian D of C(q, t) at each reported instant, D v = nu (spec 2).
 
     Args:
@@ -77,18 +77,18 @@ def jacobians(machine: "Machine", t: Floats, u: Floats) -> Any:
     Returns:
         (nt, m, 6 n) array; beyond 1000 rows a list of nt scipy CSR arrays (m, 6 n).
     """
-    model = machine.model
+    model = evaluator.model
     if model.row_count > DENSE_ROWS:
-        return [rows.sparse() for rows in rows_at(machine, t, u)]
+        return [rows.sparse() for rows in rows_at(evaluator, t, u)]
     D = np.zeros((len(t), model.row_count, 6 * model.body_count))
-    for k, rows in enumerate(rows_at(machine, t, u)):
+    for k, rows in enumerate(rows_at(evaluator, t, u)):
         D[k] = rows.dense()
     return read_only(D)
 
 
 @np.errstate(all="ignore")  # as compiled code does
 def reactions(
-    machine: "Machine",
+    evaluator: "Evaluator",
     t: Floats,
     u: Floats,
     Lam: Floats,
@@ -108,30 +108,30 @@ def reactions(
     Returns:
         For each joint a reaction for each slot, by its letter.
     """
-    loops = _joint_loops(machine, np.array(list(joints), dtype=np.int64))
+    loops = _joint_loops(evaluator, np.array(list(joints), dtype=np.int64))
     wrenches = [np.empty((len(t), *loop.shape)) for loop in loops]
-    for k, time in place_at(machine, t, u):
+    for k, time in place_at(evaluator, t, u):
         for loop, out in zip(loops, wrenches, strict=True):
             if angles is not None:
                 loop.parameters.set_angles(angles[k])
             out[k] = loop.wrenches(time, Lam[k])
     return {
-        int(joint): actions_of(machine.model, u, loop.group, index, out[:, n])
+        int(joint): actions_of(evaluator.model, u, loop.group, index, out[:, n])
         for loop, out in zip(loops, wrenches, strict=True)
         for n, (joint, index) in enumerate(zip(loop.joints, loop.indices, strict=True))
     }
 
 
-def place_at(machine: "Machine", t: Floats, u: Floats) -> Iterator[tuple[int, float]]:
+def place_at(evaluator: "Evaluator", t: Floats, u: Floats) -> Iterator[tuple[int, float]]:
     """Sets bodies and functions of a machine to each instant in turn; yields its index and time."""
     from dap3d_core.assembly.arrays import VALUE
     from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 
-    s = machine.system
-    for k, y in enumerate(machine.integrated(u) if len(t) else ()):
+    s = evaluator.system
+    for k, y in enumerate(evaluator.integrated(u) if len(t) else ()):
         time = float(t[k])
         place_bodies(y, s.body, s.metric)
-        call_kinds(VALUE, VALUE, time, s, machine.loops, s.force, s.force, s.force)
+        call_kinds(VALUE, VALUE, time, s, evaluator.loops, s.force, s.force, s.force)
         yield k, time
 
 
@@ -158,14 +158,14 @@ class InstanceParameters:
         start: first number of the copy.
     """
 
-    def __init__(self, machine: "Machine", q: int, group: Group, indices: Integers) -> None:
+    def __init__(self, evaluator: "Evaluator", q: int, group: Group, indices: Integers) -> None:
         """Args: evaluator, its loop, the loop's group, (k,) indices of the instances."""
-        s, layout = machine.system, group.examined.layout
+        s, layout = evaluator.system, group.examined.layout
         shape, first = (group.count, layout.par_width), s.groups[q, 1]
         of_group = s.par[first : first + group.count * layout.par_width].reshape(shape)
         self.par, self.start = np.concatenate([s.par, of_group[indices].ravel()]), len(s.par)
         self._copy = self.par[self.start :].reshape(len(indices), layout.par_width)
-        self._columns = machine.model.angles_of(group, indices)
+        self._columns = evaluator.model.angles_of(group, indices)
         self._offsets = list(layout.angles.values())
 
     def set_angles(self, angles: Floats) -> None:
@@ -175,14 +175,16 @@ class InstanceParameters:
             self._copy[:, offset] = angles[column]
 
 
-def _joint_loops(machine: "Machine", joints: Integers) -> list["_JointLoop"]:
+def _joint_loops(evaluator: "Evaluator", joints: Integers) -> list["_JointLoop"]:
     """Loops over some joints, one for each type."""
     members = [
         (q, group, np.flatnonzero(np.isin(group.members, joints)))
-        for q, (kind, group) in enumerate(machine.what)
+        for q, (kind, group) in enumerate(evaluator.loop_groups)
         if kind == "acceleration"
     ]
-    return [_JointLoop(machine, q, group, indices) for q, group, indices in members if len(indices)]
+    return [
+        _JointLoop(evaluator, q, group, indices) for q, group, indices in members if len(indices)
+    ]
 
 
 class _JointLoop:
@@ -192,11 +194,11 @@ class _JointLoop:
     blocks are the last integers of an instance (interface/codegen/loop_source.py).
     """
 
-    def __init__(self, machine: "Machine", q: int, group: Group, indices: Integers) -> None:
+    def __init__(self, evaluator: "Evaluator", q: int, group: Group, indices: Integers) -> None:
         from dap3d_core.interface.codegen.loop_source import stride
 
-        s, model, count = machine.system, machine.model, len(indices)
-        self.machine, self.q, self.group, self.indices = machine, q, group, indices
+        s, model, count = evaluator.system, evaluator.model, len(indices)
+        self.evaluator, self.q, self.group, self.indices = evaluator, q, group, indices
         self.joints = group.members[indices]
         slots, rows = len(group.examined.layout.slots), int(model.joint_rows[self.joints[0]])
         self.shape = count, slots, 6
@@ -206,7 +208,7 @@ class _JointLoop:
         idx[:, -slots - 1] = rows * np.arange(count)
         idx[:, -slots:] = 6 * rows * np.arange(count * slots).reshape(count, slots)
         self._idx = idx.ravel()
-        self.parameters = InstanceParameters(machine, q, group, indices)
+        self.parameters = InstanceParameters(evaluator, q, group, indices)
         self._group = np.array([0, self.parameters.start, count])
         self._D = np.zeros((count, slots, rows, 6))
         self._gamma, self._nu = np.zeros(count * rows), np.zeros(count * rows)
@@ -215,7 +217,7 @@ class _JointLoop:
         """(joints, slots, 6) D^T lambda at the current poses, with multipliers Lam (m,)."""
         from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop
 
-        s, D = self.machine.system, self._D.reshape(-1)
+        s, D = self.evaluator.system, self._D.reshape(-1)
         arrays = LoopArrays(body=s.body, F=s.F, idx=self._idx, par=self.parameters.par)
-        call_loop(self.machine.loops, self.q, time, arrays, self._group, D, self._gamma, self._nu)
+        call_loop(self.evaluator.loops, self.q, time, arrays, self._group, D, self._gamma, self._nu)
         return np.asarray(np.einsum("msrv,mr->msv", self._D, Lam[self._rows]))

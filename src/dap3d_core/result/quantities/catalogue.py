@@ -12,8 +12,8 @@ from dap3d_core.model.rotations import to_body
 from dap3d_core.model.state_layout import split
 from dap3d_core.result.arrays import AXES, COLUMNS, EULER, Arrays
 from dap3d_core.result.errors import UnknownNameError
-from dap3d_core.result.metadata import Record
-from dap3d_core.result.model_summary import Subject
+from dap3d_core.result.metadata import RunMetadata
+from dap3d_core.result.model_summary import ModelSummary
 from dap3d_core.result.post.force_output import ForceOutput
 from dap3d_core.result.post.point_motion import Energy, accelerations, point_motion
 from dap3d_core.result.post.reactions import Reaction
@@ -25,9 +25,9 @@ SLOTS = ("i", "j", "k")
 class QuantitySource(Protocol):
     """The part of a ``Result`` that quantities are computed from."""
 
-    subject: Subject
+    subject: ModelSummary
     arrays: Arrays
-    record: Record
+    record: RunMetadata
 
     @property
     def energy(self) -> Energy:

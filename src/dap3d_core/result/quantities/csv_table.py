@@ -94,7 +94,7 @@ def jacobian_columns(result: "Result") -> list[TableColumn]:
             f"{DENSE_ROWS:,}): write a .nc file, which holds its non-zero entries"
         )
     if subject.row_count:
-        _ = result.machine
+        _ = result.evaluator
     velocities = [f"{b}.{q}.{c}" for b in subject.body_names for q in ("rd", "w") for c in AXES]
     return [
         TableColumn(f"{joint}.Jac.{number}.{velocity}", "SI", np.zeros(0))
@@ -137,7 +137,7 @@ def _write(
         rows = slice(start, start + size)
         block = np.column_stack([column.values[rows] for column in columns])
         if jacobian:
-            D = jacobians(result.machine, result.t[rows], result.u[rows])
+            D = jacobians(result.evaluator, result.t[rows], result.u[rows])
             block = np.hstack([block, D.reshape(len(D), -1)])
         writer.writerows(block.tolist())  # repr of a float: reading gives the same number
 

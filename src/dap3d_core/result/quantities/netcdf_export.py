@@ -38,7 +38,7 @@ def why_no_reactions(result: "Result") -> str:
     """The reason that the reactions of joints cannot be computed, "" if they can."""
     try:
         if result.subject.joint_names:
-            _ = result.machine
+            _ = result.evaluator
     except ResultError as error:
         return str(error)
     return ""
@@ -130,7 +130,7 @@ def write_netcdf(
 
     jacobian = jacobian and result.subject.row_count > 0
     if jacobian:
-        _ = result.machine
+        _ = result.evaluator
     with whole_file(path, force) as part, NETCDF:
         try:
             plain = dataset.assign_attrs(Conventions="dap3d-post")  # not opened as a result
@@ -154,7 +154,7 @@ def _add_jacobian(file: Any, result: "Result") -> None:
         if name not in file.dimensions:
             file.createDimension(name, size)
     variable = None
-    for k, rows in enumerate(rows_at(result.machine, result.t, result.u)):
+    for k, rows in enumerate(rows_at(result.evaluator, result.t, result.u)):
         if variable is None and sparse:
             file.createDimension("entry", len(rows.value))
             for name, places in (("row", rows.row), ("column", rows.column)):

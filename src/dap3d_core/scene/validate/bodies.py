@@ -33,7 +33,7 @@ ZERO_REMEDY = (
 
 @attrs.frozen(eq=False)
 class Bodies:
-    """Arrays of n bodies, as in ``Checked``."""
+    """Arrays of n bodies, as in ``ValidatedScene``."""
 
     body_names: tuple[str, ...]
     body_index: dict[str, int]

@@ -6,7 +6,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
 from dap3d_core.scene.scene import GROUND, ZERO, Element
@@ -83,7 +83,7 @@ class Reader:
     """
 
     def __init__(
-        self, examined: Examined, table: str, geometry: Geometry, report: Collector
+        self, examined: TypeInfo, table: str, geometry: Geometry, report: Collector
     ) -> None:
         self.examined, self.table = examined, table
         self.geometry, self.report = geometry, report
@@ -332,7 +332,7 @@ def _of(field: _Field) -> str:
 
 
 def read_elements(
-    report: Collector, geometry: Geometry, table: str, types: dict[str, Examined]
+    report: Collector, geometry: Geometry, table: str, types: dict[str, TypeInfo]
 ) -> list[Instance]:
     """The elements of a table that are without mistakes, in file order.
 

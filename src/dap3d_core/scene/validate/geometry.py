@@ -33,7 +33,7 @@ class Geometry:
         vectors: name -> body index, components on it, unit length.
         raw_vectors: the same with the length as given.
         vectors2: name -> points it runs from and to; None where a mistake was reported.
-        point_names, point_body, point_local, animation_count: as in ``Checked``.
+        point_names, point_body, point_local, animation_count: as in ``ValidatedScene``.
     """
 
     bodies: Bodies

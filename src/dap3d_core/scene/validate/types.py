@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.registry import Registry, UnknownTypeError
 from dap3d_core.registry.declared_types import declares
@@ -35,7 +35,7 @@ class Types:
         self._refused = ""  # the reason why the model's own file gave no types
         self._installed: list[tuple[str, str]] = []  # types taken from packages
 
-    def of(self, table: str) -> dict[str, Examined]:
+    def of(self, table: str) -> dict[str, TypeInfo]:
         """The types of a table's elements by keyword; unusable ones are reported."""
         elements: dict[str, list[str]] = {}
         for name, element in getattr(self.report.scene, table).items():
@@ -59,7 +59,7 @@ class Types:
     def _is_loaded(self) -> bool:
         return any(s.module == str(self.file) for f in self.registry.sources.values() for s in f)
 
-    def _get(self, table: str, keyword: str, names: list[str]) -> Examined | None:
+    def _get(self, table: str, keyword: str, names: list[str]) -> TypeInfo | None:
         """The type, or None where a mistake is reported, at the first element that names it."""
         count, remedy = len(names) - 1, ""
         try:
@@ -74,7 +74,7 @@ class Types:
         self.report.add((table, names[0], "type"), keyword, what, remedy=remedy)
         return None
 
-    def _load(self, kind: str, word: str) -> Examined:
+    def _load(self, kind: str, word: str) -> TypeInfo:
         """The type; one that the model's own file has as well is refused."""
         try:
             examined = self.registry.get(kind, word)

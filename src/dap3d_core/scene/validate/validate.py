@@ -8,13 +8,13 @@ from dap3d_core.registry import Registry
 from dap3d_core.scene.errors import dotted
 from dap3d_core.scene.scene import NAMED, Scene, fault_of_name
 from dap3d_core.scene.validate.mistake_collector import Collector
-from dap3d_core.scene.validate.validated_scene import Checked, Instance
+from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene
 
 if TYPE_CHECKING:
     from dap3d_core.scene.validate.bodies import Bodies
 
 
-def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Checked:
+def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> ValidatedScene:
     """Check a scene and return the arrays and instances that the model is built from.
 
     Args:
@@ -56,7 +56,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Chec
     _note_loose_bodies(report, bodies, [*joints, *forces])
     _note_unused_functions(report, [*joints, *forces])
     notes = [*report.notes(), *notes_of(scene.simulation), *types.registry.notes]
-    return Checked(
+    return ValidatedScene(
         scene=scene,
         registry=types.registry,
         **attrs.asdict(bodies, recurse=False),

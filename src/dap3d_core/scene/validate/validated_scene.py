@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.registry import Registry
 from dap3d_core.scene.scene import Scene
 
@@ -35,7 +35,7 @@ class Instance:
     """
 
     name: str
-    examined: Examined = attrs.field(repr=False)
+    examined: TypeInfo = attrs.field(repr=False)
     bodies: tuple[int, ...]
     functions: tuple[int, ...]
     values: dict[str, Any]
@@ -43,7 +43,7 @@ class Instance:
 
 
 @attrs.frozen(eq=False)
-class Checked:
+class ValidatedScene:
     """A scene without mistakes, as arrays and instances.
 
     Attributes:

@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 from numpy.typing import NDArray
 
-from dap3d_core.assembly.arrays import KEPT
+from dap3d_core.assembly.arrays import CHECKPOINTED
 from dap3d_core.kernels.runtime.source_digest import driver_digest
 from dap3d_core.result import Result, ResultError, open_result
 from dap3d_core.result.metadata import to_json
@@ -25,7 +25,7 @@ from dap3d_core.simulation.errors import CheckpointError
 from dap3d_core.simulation.run_state import RunState
 
 
-class Saver:
+class CheckpointWriter:
     """Writes the checkpoints of a run.
 
     Attributes:
@@ -42,8 +42,8 @@ class Saver:
         Raises:
             ResultError: there is one of another run.
         """
-        assert run.keeper.output is not None
-        self.path = path_of(run.keeper.output)
+        assert run.recorder.output is not None
+        self.path = path_of(run.recorder.output)
         if self.path.exists() and not force:
             raise ResultError(
                 f"{self.path} exists: a run that was ended goes on from it (dap3d resume); force "
@@ -67,7 +67,7 @@ class Saver:
             self._save()
 
     def _save(self) -> None:
-        self._run.keeper.to_disk(lambda: self._run.record("done"))
+        self._run.recorder.to_disk(lambda: self._run.record("done"))
         self.write()
         self._next = time.perf_counter() + self._seconds
 
@@ -91,11 +91,11 @@ class Saver:
 
         That of another run, which has taken its place, stays.
         """
-        keeper = self._run.keeper
-        assert keeper.output is not None
-        remove_parts(keeper.output, keeper.run)
+        recorder = self._run.recorder
+        assert recorder.output is not None
+        remove_parts(recorder.output, recorder.run)
         with suppress(CheckpointError):
-            if read_checkpoint(self.path).header["run"] == keeper.run:
+            if read_checkpoint(self.path).header["run"] == recorder.run:
                 self.path.unlink(missing_ok=True)
 
 
@@ -121,12 +121,12 @@ def remove_parts(output: Path, run: str) -> None:
 
 def checkpoint_of(run: RunState) -> Checkpoint:
     """A run as it stands between two chunks, its rows taken."""
-    keeper, compiled = run.keeper, run.compiled
-    assert keeper.output is not None
+    recorder, compiled = run.recorder, run.compiled
+    assert recorder.output is not None
     header: dict[str, Any] = {
-        "run": keeper.run,
-        "output": keeper.output.name,
-        "rows": keeper.count,
+        "run": recorder.run,
+        "output": recorder.output.name,
+        "rows": recorder.count,
         "t": run.present.t,
         "integrations": len(run.integrations),
         "crossed": run.crossed,
@@ -153,4 +153,4 @@ def arrays_of(run: RunState) -> dict[str, NDArray[Any]]:
         for k, integration in enumerate(run.integrations)
         for name, array in integration.all_arrays()
     }
-    return found | {f"system.{name}": getattr(run.machine.system, name) for name in KEPT}
+    return found | {f"system.{name}": getattr(run.evaluator.system, name) for name in CHECKPOINTED}

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations import REPORT
 from dap3d_core.model.parameter_change import Change, changed
-from dap3d_core.model.state_layout import from_integrated
+from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.registry.suggestions import nearest
-from dap3d_core.result import Record, Result
+from dap3d_core.result import Result, RunMetadata
 from dap3d_core.simulation.compiled_model import CompiledModel
 
 Floats = NDArray[np.float64]
@@ -146,7 +146,7 @@ class Instant:
         """Args: the model, time, the integrated state (13 n + 1,), numbers that may be changed."""
         self._compiled, self._y, self._numbers = compiled, y, numbers
         self.t = t
-        u = from_integrated(y[None])[0]
+        u = u_from_y(y[None])[0]
         u.flags.writeable = False
         self.u: Floats = u
         self.changes: dict[str, dict[str, Any]] = {}
@@ -175,12 +175,14 @@ class Instant:
 
     @cached_property
     def _result(self) -> Result:
-        machine, y = self._compiled.machine, self._y
-        row = np.concatenate([[self.t], y, np.zeros(machine.report_size)])
+        evaluator, y = self._compiled.evaluator, self._y
+        row = np.concatenate([[self.t], y, np.zeros(evaluator.report_size)])
         with np.errstate(all="ignore"):  # as compiled code does
-            machine.functions[REPORT](self.t, y, row[1 + len(y) :], machine.system, machine.loops)
-        record = Record(scene_text=self._compiled.scene_text)
-        return Result.of_run(machine.model, row[None], record, lambda: machine)
+            evaluator.functions[REPORT](
+                self.t, y, row[1 + len(y) :], evaluator.system, evaluator.loops
+            )
+        record = RunMetadata(scene_text=self._compiled.scene_text)
+        return Result.of_run(evaluator.model, row[None], record, lambda: evaluator)
 
 
 class Numbers:
@@ -201,7 +203,7 @@ class Numbers:
             near = nearest(force, names)
             hint = f"did you mean {near!r}?" if near else f"forces: {', '.join(names) or 'none'}"
             raise ValueError(f"there is no force {force!r}; {hint}")
-        model, par = self._compiled.model, self._compiled.machine.system.par
+        model, par = self._compiled.model, self._compiled.evaluator.system.par
         change = changed(self._compiled.checked, model, names.index(force), fields)
         if self.given is None:
             self.given = par.copy()
@@ -212,7 +214,7 @@ class Numbers:
     def changeable(self, forces: Collection[str]) -> NDArray[np.bool_]:
         """Which of ``par`` ``set`` may have changed, given names of forces: no place of a table."""
         model = self._compiled.model
-        found = np.zeros(len(self._compiled.machine.system.par), dtype=bool)
+        found = np.zeros(len(self._compiled.evaluator.system.par), dtype=bool)
         numbers = [k for k, name in enumerate(model.force_names) if name in forces]
         for group in (*model.forces, *model.friction):
             changes = np.zeros(group.numbers.shape, dtype=bool)
@@ -227,23 +229,23 @@ class Numbers:
     def put_back(self) -> None:
         """Make the numbers those of the scene again."""
         if self.given is not None:
-            self._compiled.machine.system.par[:] = self.given
+            self._compiled.evaluator.system.par[:] = self.given
             self.given = None
 
     def _first(self, group: Any) -> int:
-        machine = self._compiled.machine
-        q = next(k for k, (_, g) in enumerate(machine.what) if g is group)
-        return int(machine.system.groups[q, 1])
+        evaluator = self._compiled.evaluator
+        q = next(k for k, (_, g) in enumerate(evaluator.loop_groups) if g is group)
+        return int(evaluator.system.groups[q, 1])
 
     def _rows(self, change: Change) -> Floats:
         count, width = change.group.numbers.shape
         first = self._first(change.group)
-        table = self._compiled.machine.system.par[first : first + count * width]
+        table = self._compiled.evaluator.system.par[first : first + count * width]
         found: Floats = table.reshape(count, width)[change.places]
         return found
 
     def _write(self, change: Change, rows: Floats) -> None:
         count, width = change.group.numbers.shape
         first = self._first(change.group)
-        table = self._compiled.machine.system.par[first : first + count * width]
+        table = self._compiled.evaluator.system.par[first : first + count * width]
         table.reshape(count, width)[change.places] = rows

@@ -13,10 +13,10 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.assembly.arrays import KEPT
+from dap3d_core.assembly.arrays import CHECKPOINTED
 from dap3d_core.formulations import RHS
 from dap3d_core.integrators import Integration, Status
-from dap3d_core.result.event_record import Occurrence
+from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.file.validate import are_events, is_number
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, Instant, Numbers, checked_events
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 EPSILON = float(np.finfo(float).eps)
 
 
-class Watcher:
+class EventLocator:
     """Looks out for events while an integration goes on.
 
     Attributes:
@@ -38,7 +38,7 @@ class Watcher:
     def __init__(self, compiled: CompiledModel, events: Sequence[Event]) -> None:
         self.compiled, self.events = compiled, checked_events(events)
         self.numbers = Numbers(compiled)
-        self.occurrences: list[Occurrence] = []
+        self.occurrences: list[EventRecord] = []
         self._samplers = [Sampler(event.every) for event in self.events]
         self._values: list[float] = []
         self._sides: list[float] = []
@@ -66,7 +66,7 @@ class Watcher:
             raise ValueError("the values and sides of events should be a number for each")
         if not (set(sides) <= {-1.0, 0.0, 1.0} and are_events(found.get("occurrences"))):
             raise ValueError("what events have found is damaged")
-        self.occurrences = [Occurrence(**one) for one in found["occurrences"]]
+        self.occurrences = [EventRecord(**one) for one in found["occurrences"]]
         self._values, self._sides = list(values), list(sides)
         states: Any = found.get("samplers")
         if not (isinstance(states, list) and len(states) == len(self.events)):
@@ -74,7 +74,7 @@ class Watcher:
         for sampler, state in zip(self._samplers, states, strict=True):
             sampler.restore(state)
         if any(one.changes for one in self.occurrences):
-            self.numbers.given = self.compiled.machine.system.par.copy()
+            self.numbers.given = self.compiled.evaluator.system.par.copy()
 
     @property
     def changed_forces(self) -> set[str]:
@@ -129,8 +129,8 @@ class Watcher:
 
     def _arrays(self, integration: Integration) -> list[Any]:
         """All that a step changes."""
-        system = self.compiled.machine.system
-        return [*integration.state_arrays(), *(getattr(system, name) for name in KEPT)]
+        system = self.compiled.evaluator.system
+        return [*integration.state_arrays(), *(getattr(system, name) for name in CHECKPOINTED)]
 
     def _instant(self, integration: Integration) -> Instant:
         return Instant(self.compiled, integration.t, integration.y, self.numbers)
@@ -147,10 +147,10 @@ class Watcher:
         slope = integration.dy_dt
         if slope is not None:
             return slope
-        machine, found = self.compiled.machine, np.zeros_like(integration.y)
+        evaluator, found = self.compiled.evaluator, np.zeros_like(integration.y)
         with np.errstate(all="ignore"):  # as compiled code does
-            machine.functions[RHS](
-                integration.t, integration.y, found, machine.system, machine.loops
+            evaluator.functions[RHS](
+                integration.t, integration.y, found, evaluator.system, evaluator.loops
             )
         return found
 
@@ -242,7 +242,7 @@ class Watcher:
         if kind == "stop":
             integration.end()
         self.occurrences.append(
-            Occurrence(name=event.title, t=here.t, direction=direction, kind=kind, u=here.u,
+            EventRecord(name=event.title, t=here.t, direction=direction, kind=kind, u=here.u,
                        changes=here.changes)
         )  # fmt: skip
         return bool(here.changes)

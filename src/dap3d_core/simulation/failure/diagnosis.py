@@ -6,12 +6,12 @@ from numpy.typing import NDArray
 from dap3d_core.assembly.arrays import KINDS
 from dap3d_core.assembly.evaluate import place_bodies
 from dap3d_core.formulations import RHS
-from dap3d_core.formulations.evaluator import AS_COMPILED, Machine
-from dap3d_core.formulations.pivots import poor_rows
+from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
+from dap3d_core.formulations.pivots import near_singular_rows
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.model import Group
-from dap3d_core.model.state_layout import by_body, from_integrated, velocities_of
+from dap3d_core.model.state_layout import by_body, u_from_y, velocities_of
 from dap3d_core.scene.validate.coerce_values import LARGEST
 
 Floats = NDArray[np.float64]
@@ -25,64 +25,68 @@ STEEP = 1e6
 ENORMOUS = 1e50
 
 
-@AS_COMPILED
-def find_offender(machine: Machine, t: float, y: Floats, t_stop: float) -> str:
+@IGNORE_FLOAT_ERRORS
+def find_offender(evaluator: Evaluator, t: float, y: Floats, t_stop: float) -> str:
     """Name what is not finite, or too large, at or just after time t with the integrated state y.
 
     "" where nothing is.
     """
     for later in (t, t_stop, *(t + part * (1.0 + abs(t)) for part in AHEAD)):
-        found = _at(machine, later, y)
+        found = _at(evaluator, later, y)
         if found:
             return f"{found} (t = {later:.9g} s)"
-    return _steepest(machine, t, y) or _runaway(machine, t, y)
+    return _steepest(evaluator, t, y) or _runaway(evaluator, t, y)
 
 
-def fastest_body(machine: Machine, y: Floats) -> str:
+def fastest_body(evaluator: Evaluator, y: Floats) -> str:
     """Name the body whose velocities are the largest; where all is finite it is to blame."""
-    n = machine.model.body_count
+    n = evaluator.model.body_count
     speeds = np.abs(velocities_of(y)).reshape(n, -1)
     b = int(np.argmax(speeds.max(axis=1)))
     v, w = speeds[b, :3].max(), speeds[b, 3:].max()
     return (
-        f"it was so within a step, not before; body {machine.model.body_names[b]} is the fastest "
+        f"it was so within a step, not before; body {evaluator.model.body_names[b]} is the fastest "
         f"there, with up to {v:.3g} m/s and {w:.3g} rad/s along an axis"
     )
 
 
-def _at(machine: Machine, t: float, y: Floats) -> str:
-    for name, numbers in zip(machine.model.body_names, by_body(y), strict=True):
+def _at(evaluator: Evaluator, t: float, y: Floats) -> str:
+    for name, numbers in zip(evaluator.model.body_names, by_body(y), strict=True):
         if fault := _fault(numbers):
             return f"the state of body {name} is {fault}"
-    s = machine.system
+    s = evaluator.system
     place_bodies(y, s.body, s.metric)
     s.F[:, :4] = 0.0  # filled again one by one: what stands there may be of no finite number
-    for q, (kind, group) in enumerate(machine.what):
+    for q, (kind, group) in enumerate(evaluator.loop_groups):
         for k in range(group.count):
-            if fault := _fault_of(machine, q, k, kind, group, t):
-                name = _name(machine, kind, group, k)
+            if fault := _fault_of(evaluator, q, k, kind, group, t):
+                name = _name(evaluator, kind, group, k)
                 return f"{_title(kind)} {name} (type {group.keyword}) is {fault}"
-    return _without_direction(machine, t, y) or _singular(machine, t) or _accelerated(machine, t, y)
+    return (
+        _without_direction(evaluator, t, y)
+        or _singular(evaluator, t)
+        or _accelerated(evaluator, t, y)
+    )
 
 
-def _without_direction(machine: Machine, t: float, y: Floats) -> str:
+def _without_direction(evaluator: Evaluator, t: float, y: Floats) -> str:
     """The joint of the first row whose gradient is zero: no force of it can hold anything."""
-    if not machine.model.row_count:
+    if not evaluator.model.row_count:
         return ""
-    rows = machine.rows(t, from_integrated(y))
+    rows = evaluator.rows(t, u_from_y(y))
     size = np.bincount(rows.row, np.abs(rows.value), minlength=rows.shape[0])
     zero = np.flatnonzero(size == 0.0)
     if not len(zero):
         return ""
-    return f"the gradient of a row of joint {machine.model.row_owner(int(zero[0]))} is zero"
+    return f"the gradient of a row of joint {evaluator.model.row_owner(int(zero[0]))} is zero"
 
 
-def _steepest(machine: Machine, t: float, y: Floats) -> str:
+def _steepest(evaluator: Evaluator, t: float, y: Floats) -> str:
     """The joint with the largest row, where its pose is so near to a singular one of its own."""
-    model = machine.model
+    model = evaluator.model
     if not model.row_count:
         return ""
-    rows = machine.rows(t, from_integrated(y))
+    rows = evaluator.rows(t, u_from_y(y))
     largest = np.abs(rows.gamma)
     np.maximum.at(largest, rows.row, np.abs(rows.value))
     worst = int(np.argmax(largest))
@@ -92,13 +96,13 @@ def _steepest(machine: Machine, t: float, y: Floats) -> str:
     return f"a row of joint {name} has grown to {size:.2g} (t = {t:.9g} s)"
 
 
-def _runaway(machine: Machine, t: float, y: Floats) -> str:
+def _runaway(evaluator: Evaluator, t: float, y: Floats) -> str:
     """The body with the largest number or rate, where no step can go on with it."""
-    largest = np.max(np.abs(np.hstack([by_body(y), _rates(machine, t, y)])), axis=1)
+    largest = np.max(np.abs(np.hstack([by_body(y), _rates(evaluator, t, y)])), axis=1)
     first = int(np.argmax(largest))
     if not largest[first] > ENORMOUS:
         return ""
-    name = machine.model.body_names[first]
+    name = evaluator.model.body_names[first]
     return f"body {name} runs away: a number or a rate of {largest[first]:.2g} (t = {t:.9g} s)"
 
 
@@ -110,23 +114,23 @@ def _fault(*numbers: Floats) -> str:
     return f"beyond {LARGEST:g}, too large" if too_large else ""
 
 
-def _accelerated(machine: Machine, t: float, y: Floats) -> str:
+def _accelerated(evaluator: Evaluator, t: float, y: Floats) -> str:
     """The body whose acceleration is too large, though all that acts on it is not."""
-    for name, rates in zip(machine.model.body_names, _rates(machine, t, y), strict=True):
+    for name, rates in zip(evaluator.model.body_names, _rates(evaluator, t, y), strict=True):
         if fault := _fault(rates):
             return f"the acceleration of body {name} is {fault}"
     return ""
 
 
-def _rates(machine: Machine, t: float, y: Floats) -> Floats:
+def _rates(evaluator: Evaluator, t: float, y: Floats) -> Floats:
     """(n, 13) dy/dt of each body."""
     out = np.zeros_like(y)
-    machine.functions[RHS](float(t), y, out, machine.system, machine.loops)
+    evaluator.functions[RHS](float(t), y, out, evaluator.system, evaluator.loops)
     return by_body(out)
 
 
-def _fault_of(machine: Machine, q: int, k: int, kind: str, group: Group, t: float) -> str:
-    s = machine.system
+def _fault_of(evaluator: Evaluator, q: int, k: int, kind: str, group: Group, t: float) -> str:
+    s = evaluator.system
     for out in (s.force, s.gamma, s.nu, s.residual, s.D, s.multipliers):
         out[:] = 0.0
     joint_outs = {"acceleration": (s.D, s.gamma, s.nu), "position": (s.residual,) * 3,
@@ -134,18 +138,23 @@ def _fault_of(machine: Machine, q: int, k: int, kind: str, group: Group, t: floa
     if kind == "switch":
         joint_outs[kind] = np.zeros(len(group.examined.outputs[kind])), np.zeros(1), np.zeros(1)
     outs = joint_outs.get(kind, (s.force, s.force, s.force))
-    _call_one(machine, q, k, group, t, outs)
+    _call_one(evaluator, q, k, group, t, outs)
     return _fault(*outs, s.F[:, :4])
 
 
 def _call_one(
-    machine: Machine, q: int, k: int, group: Group, t: float, outs: tuple[Floats, Floats, Floats]
+    evaluator: Evaluator,
+    q: int,
+    k: int,
+    group: Group,
+    t: float,
+    outs: tuple[Floats, Floats, Floats],
 ) -> None:
     """Call loop q for instance k of its group alone."""
-    s = machine.system
+    s = evaluator.system
     i0, p0, _ = s.groups[q]
     i1, p1 = i0 + k * stride(group.examined), p0 + k * group.examined.layout.par_width
-    call_loop(machine.loops, q, t, s, np.array([i1, p1, 1]), *outs)
+    call_loop(evaluator.loops, q, t, s, np.array([i1, p1, 1]), *outs)
 
 
 def _title(kind: str) -> str:
@@ -155,18 +164,18 @@ def _title(kind: str) -> str:
     return titles.get(kind, "joint")
 
 
-def _name(machine: Machine, kind: str, group: Group, k: int) -> str:
-    names = {"value": machine.model.function_names, "wrench": machine.model.force_names}
-    names["energy"] = names["friction"] = machine.model.force_names
-    return str(names.get(kind, machine.model.joint_names)[int(group.members[k])])
+def _name(evaluator: Evaluator, kind: str, group: Group, k: int) -> str:
+    names = {"value": evaluator.model.function_names, "wrench": evaluator.model.force_names}
+    names["energy"] = names["friction"] = evaluator.model.force_names
+    return str(names.get(kind, evaluator.model.joint_names)[int(group.members[k])])
 
 
-def _singular(machine: Machine, t: float) -> str:
+def _singular(evaluator: Evaluator, t: float) -> str:
     """The joint whose rows (nearly) depend on those before, where the pose is (nearly) singular."""
-    if not machine.formulation.needs_joints or not machine.model.row_count:
+    if not evaluator.formulation.needs_joints or not evaluator.model.row_count:
         return ""
-    row = poor_rows(machine, t)
+    row = near_singular_rows(evaluator, t)
     if not len(row):
         return ""
-    joint = machine.model.row_owner(int(row[0]))
+    joint = evaluator.model.row_owner(int(row[0]))
     return f"the pose is (nearly) singular, where the rows of joint {joint} depend on the others"

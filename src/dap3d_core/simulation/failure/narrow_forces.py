@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from typing import Any
 
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.kernels import lookup, where
 from dap3d_core.kernels.runtime.source_digest import reached
 from dap3d_core.model.knots import breaks_are_told
 from dap3d_core.result import INFORMATION
-from dap3d_core.scene import Checked
+from dap3d_core.scene import ValidatedScene
 
 #: Words of kernels that choose between formulas.
 CHOOSING = (where, lookup)
@@ -16,7 +16,7 @@ CHOOSING = (where, lookup)
 LAWS = ("wrench", "energy")
 
 
-def notes_on_laws(checked: Checked) -> list[str]:
+def notes_on_laws(checked: ValidatedScene) -> list[str]:
     """Functions of an argument, and laws with branches, that do not say where they change."""
     functions = {function.name: function for function in checked.functions}
     elements = (*checked.joints, *checked.forces)
@@ -40,7 +40,7 @@ def notes_on_laws(checked: Checked) -> list[str]:
     return [*found, *_branching(by_type, examined)]
 
 
-def _branching(by_type: dict[Any, list[str]], examined: dict[Any, Examined]) -> Iterator[str]:
+def _branching(by_type: dict[Any, list[str]], examined: dict[Any, TypeInfo]) -> Iterator[str]:
     for type_, names in by_type.items():
         kernels = examined[type_].kernels
         if "switch" in kernels or not _chooses(examined[type_]):
@@ -52,7 +52,7 @@ def _branching(by_type: dict[Any, list[str]], examined: dict[Any, Examined]) -> 
         )
 
 
-def _chooses(examined: Examined) -> bool:
+def _chooses(examined: TypeInfo) -> bool:
     """Whether a law of a type chooses between formulas."""
     laws = [examined.kernels[name] for name in LAWS if name in examined.kernels]
     return any(

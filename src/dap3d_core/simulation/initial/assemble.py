@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import System
 from dap3d_core.formulations.arrays import set_metric
-from dap3d_core.formulations.constraint_rows import Rows, scaled_rows
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.linear.ldlt.plan import Integers
 from dap3d_core.linear.rank.rank import DENSE_ROWS, factor_independent
 from dap3d_core.model import Model
@@ -66,43 +66,43 @@ class Initial:
     turned: float
 
 
-def finite_rows(machine: Machine, t: float, u: Floats) -> Rows:
+def finite_rows(evaluator: Evaluator, t: float, u: Floats) -> ConstraintRows:
     """All constraint rows at a state u (13 n,).
 
     Raises:
         AssemblyError: one of them is not finite there; the message names joint or function.
     """
-    rows = machine.rows(t, u)
+    rows = evaluator.rows(t, u)
     good = np.isfinite(rows.C) & np.isfinite(rows.nu) & np.isfinite(rows.gamma)
     good[rows.row[~np.isfinite(rows.value)]] = False
     if not np.all(good):
-        joint = machine.model.row_owner(int(np.argmin(good)))
-        culprit = find_offender(machine, t, machine.integrated(u), t)
+        joint = evaluator.model.row_owner(int(np.argmin(good)))
+        culprit = find_offender(evaluator, t, evaluator.integrated(u), t)
         culprit = culprit or f"joint {joint} is not finite"
         raise AssemblyError(f"the initial positions cannot be assembled: {culprit}")
     return rows
 
 
-def violation(machine: Machine, u: Floats, t: float = 0.0) -> tuple[float, float]:
+def violation(evaluator: Evaluator, u: Floats, t: float = 0.0) -> tuple[float, float]:
     """Largest residuals |C| and |D v - nu| of a state u (13 n,).
 
     In the units of the rows; in m and m/s where the scene is not of ordinary size (Model.length).
     """
-    if not machine.model.row_count:
+    if not evaluator.model.row_count:
         return 0.0, 0.0
-    rows = finite_rows(machine, t, u)
-    weight = weights_of(machine)
+    rows = finite_rows(evaluator, t, u)
+    weight = weights_of(evaluator)
     return _largest(weight * rows.C), _largest(weight * _velocity_residual(rows, u))
 
 
-def weights_of(machine: Machine) -> Floats:
+def weights_of(evaluator: Evaluator) -> Floats:
     """(rows,) weights of the residuals of the model's rows (System.weight)."""
-    weight: Floats = machine.system.weight[machine.system.row]
+    weight: Floats = evaluator.system.weight[evaluator.system.row]
     return weight
 
 
 def correct_initial(
-    machine: Machine,
+    evaluator: Evaluator,
     u: Floats,
     t: float = 0.0,
     hold: Collection[int] = (),
@@ -122,32 +122,32 @@ def correct_initial(
     Raises:
         AssemblyError: the position residual does not vanish; the message has that of each joint.
     """
-    before = violation(machine, u, t)
-    if not machine.model.row_count:
+    before = violation(evaluator, u, t)
+    if not evaluator.model.row_count:
         return Initial(u, before, before, 0, 0.0, 0.0)
     start = u
     held = np.array(sorted(hold), dtype=np.int64)
-    u, passes = correct_positions(machine, u, t, held, metric)
-    rows = finite_rows(machine, t, u)
+    u, passes = correct_positions(evaluator, u, t, held, metric)
+    rows = finite_rows(evaluator, t, u)
     residual = _velocity_residual(rows, u)
     if _largest(residual) > 0.0:
         u = u.copy()
         velocities = velocities_of(u)
-        velocities -= least_change(machine, rows, residual, t, None, metric)
-    moved, turned = distance(start, u, machine.model.body_count)
-    return Initial(u, before, violation(machine, u, t), passes, float(moved), float(turned))
+        velocities -= least_change(evaluator, rows, residual, t, None, metric)
+    moved, turned = distance(start, u, evaluator.model.body_count)
+    return Initial(u, before, violation(evaluator, u, t), passes, float(moved), float(turned))
 
 
-def correction_notes(initial: Initial, machine: Machine, scene: Scene) -> list[str]:
+def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> list[str]:
     """What was changed, in words.
 
     No more than rounding, or velocities that the scene leaves open, is for information.
     """
     notes = []
     position, velocity = initial.violation
-    tolerance = TOLERANCE * machine.model.length
+    tolerance = TOLERANCE * evaluator.model.length
     if position > tolerance:
-        mark = INFORMATION if position <= ROUNDING * model_size(machine) else ""
+        mark = INFORMATION if position <= ROUNDING * model_size(evaluator) else ""
         notes.append(
             f"{mark}initial positions corrected in {initial.passes} passes: "
             f"|C| {position:.2g} -> {initial.residual[0]:.2g}; "
@@ -159,7 +159,7 @@ def correction_notes(initial: Initial, machine: Machine, scene: Scene) -> list[s
             f"stays open. Below {FIT:g} the run goes on as if they fitted"
         )
     if velocity > tolerance:
-        speed = _largest(velocities_of(machine.model.u0))
+        speed = _largest(velocities_of(evaluator.model.u0))
         usual = attrs.fields(Body)
         open_ = all(
             body.r_dot is usual.r_dot.default and body.w is usual.w.default
@@ -174,18 +174,18 @@ def correction_notes(initial: Initial, machine: Machine, scene: Scene) -> list[s
 
 
 def correct_positions(
-    machine: Machine, u: Floats, t: float, held: Integers, metric: str = "unit"
+    evaluator: Evaluator, u: Floats, t: float, held: Integers, metric: str = "unit"
 ) -> tuple[Floats, int]:
     """The position stage of ``correct_initial``: the state with other r and p, and the passes.
 
     Raises:
         AssemblyError: the residual does not vanish.
     """
-    size, limit, before = model_size(machine), 1.0, np.inf
-    length, weight = machine.model.length, weights_of(machine)
-    fit = length * fit_of(machine.model)
+    size, limit, before = model_size(evaluator), 1.0, np.inf
+    length, weight = evaluator.model.length, weights_of(evaluator)
+    fit = length * fit_of(evaluator.model)
     for passes in range(MOST_PASSES + 1):
-        rows = finite_rows(machine, t, u)
+        rows = finite_rows(evaluator, t, u)
         worst = _largest(weight * rows.C)
         stands = worst > 0.5 * before and worst <= fit
         if worst <= TOLERANCE * length or stands:
@@ -193,19 +193,19 @@ def correct_positions(
         before = worst
         if passes == MOST_PASSES:
             break
-        change = least_change(machine, rows, rows.C, t, held, metric).reshape(-1, 6)
+        change = least_change(evaluator, rows, rows.C, t, held, metric).reshape(-1, 6)
         shift = float(np.max(np.linalg.norm(change[:, :3], axis=1)))
         turn = float(np.max(np.linalg.norm(change[:, 3:], axis=1)))
         shift_limit = MOST_SHIFT * size / shift if shift else 1.0
         turn_limit = MOST_TURN / turn if turn else 1.0
         limit = min(1.0, shift_limit, turn_limit)
-        u = displaced(u, -limit * change, machine.model.body_count)
-    raise _failure(machine, rows, passes, held, is_far=limit < 1.0)
+        u = displaced(u, -limit * change, evaluator.model.body_count)
+    raise _failure(evaluator, rows, passes, held, is_far=limit < 1.0)
 
 
 def least_change(
-    machine: Machine,
-    rows: Rows,
+    evaluator: Evaluator,
+    rows: ConstraintRows,
     residual: Floats,
     t: float,
     held: Integers | None = None,
@@ -215,9 +215,9 @@ def least_change(
 
     With ``held`` (bodies, maybe none) on the position rows alone, and zero on these bodies.
     """
-    if machine.model.row_count > DENSE_ROWS:
-        return _sparse_least_change(machine, residual, t, held, metric)
-    length = machine.model.length
+    if evaluator.model.row_count > DENSE_ROWS:
+        return _sparse_least_change(evaluator, residual, t, held, metric)
+    length = evaluator.model.length
     if length != 1.0:  # rows of very different units
         gradient = scaled_rows(rows, length)[1]
         rows = attrs.evolve(rows, value=rows.value / gradient[rows.row])
@@ -226,11 +226,11 @@ def least_change(
     if held is None:
         held = np.zeros(0, dtype=np.int64)
     else:
-        keep = machine.model.position_row
+        keep = evaluator.model.position_row
         D, residual = D[keep], residual[keep]
     block = D.reshape(len(D), -1, 6)
     block[:, held - 1] = 0.0
-    scale, frame = mass_scaling(machine)
+    scale, frame = mass_scaling(evaluator)
     if metric == "mass":
         block[:, :, :3] *= scale
         block[:, :, 3:] = np.einsum("mbr,brc->mbc", block[:, :, 3:], frame)
@@ -246,9 +246,9 @@ def least_change(
     return solution
 
 
-def mass_scaling(machine: Machine) -> tuple[Floats, Floats]:
+def mass_scaling(evaluator: Evaluator) -> tuple[Floats, Floats]:
     """1/sqrt(m) (n, 1) and B (n, 3, 3) of the bodies as placed (linear/ldlt/factor.py)."""
-    metric = machine.system.metric[1:]
+    metric = evaluator.system.metric[1:]
     return metric[:, :1], metric[:, 7:16].reshape(-1, 3, 3)
 
 
@@ -258,30 +258,30 @@ def unscaled(change: Floats, scale: Floats, frame: Floats) -> Floats:
 
 
 def _sparse_least_change(
-    machine: Machine, residual: Floats, t: float, held: Integers | None, metric: str
+    evaluator: Evaluator, residual: Floats, t: float, held: Integers | None, metric: str
 ) -> Floats:
     """The same by the block factorisation, for many rows; metric "unit" sets every mass to one."""
     from dap3d_core.formulations.common.constraints import correct, linearise
 
-    system: System = machine.system
+    system: System = evaluator.system
     before = system.metric.copy()
-    n = machine.model.body_count
+    n = evaluator.model.body_count
     try:
         if metric == "unit":
-            light = np.full(n, machine.model.length**-2)
+            light = np.full(n, evaluator.model.length**-2)
             set_metric(system.metric, light, np.tile(np.eye(3), (n, 1, 1)))
             system.metric[1:, 7:16] = system.body[1:, 3:12]
         if held is not None:
             system.metric[held] = 0.0
-        linearise(t, system, machine.loops)
+        linearise(t, system, evaluator.loops)
         if held is not None:
-            row, _, place = machine.pattern
-            system.D[place[~machine.model.position_row[row]]] = 0.0
-        factor_independent(machine.plan, system.D, system.K)
+            row, _, place = evaluator.pattern
+            system.D[place[~evaluator.model.position_row[row]]] = 0.0
+        factor_independent(evaluator.plan, system.D, system.K)
         system.residual[:] = 0.0
         system.residual[system.row] = -residual
         correct(system)
-        change = unscaled(system.change[6:].reshape(n, 6), *mass_scaling(machine))
+        change = unscaled(system.change[6:].reshape(n, 6), *mass_scaling(evaluator))
     finally:
         system.metric[:] = before
     return change.ravel()
@@ -309,7 +309,7 @@ def distance(u: Floats, other: Floats, n: int) -> tuple[Floats, Floats]:
     return np.max(shift, axis=-1, initial=0.0), np.max(angle, axis=-1, initial=0.0)
 
 
-def _velocity_residual(rows: Rows, u: Floats) -> Floats:
+def _velocity_residual(rows: ConstraintRows, u: Floats) -> Floats:
     v = u[-rows.shape[1] :]
     return np.bincount(rows.row, rows.value * v[rows.column], minlength=rows.shape[0]) - rows.nu
 
@@ -319,15 +319,15 @@ def fit_of(model: Model) -> float:
     return FIT * min(1.0, model.size / model.length)
 
 
-def model_size(machine: Machine) -> float:
+def model_size(evaluator: Evaluator) -> float:
     """A length of the model, m."""
-    return machine.model.size
+    return evaluator.model.size
 
 
-def extent(machine: Machine, v: Floats) -> float:
+def extent(evaluator: Evaluator, v: Floats) -> float:
     """How fast something moves at velocities (6 n,), in rad or parts of the model."""
     x = np.abs(v.reshape(-1, 6))
-    return max(_largest(x[:, :3]) / model_size(machine), _largest(x[:, 3:]))
+    return max(_largest(x[:, :3]) / model_size(evaluator), _largest(x[:, 3:]))
 
 
 def _largest(values: Floats) -> float:
@@ -335,10 +335,10 @@ def _largest(values: Floats) -> float:
 
 
 def _failure(
-    machine: Machine, rows: Rows, passes: int, held: Integers, *, is_far: bool
+    evaluator: Evaluator, rows: ConstraintRows, passes: int, held: Integers, *, is_far: bool
 ) -> AssemblyError:
     """Why it failed: the joints that are open, the worst first, in lines of at most 80 columns."""
-    model, C = machine.model, weights_of(machine) * rows.C
+    model, C = evaluator.model, weights_of(evaluator) * rows.C
     tolerance = TOLERANCE * model.length
     worst = np.array([_largest(C[a:b]) for a, b in pairwise(model.joint_start)])
     still_open = [int(k) for k in np.argsort(-worst, kind="stable") if worst[k] > tolerance]
@@ -356,7 +356,7 @@ def _failure(
     if is_far:
         why = ["the bodies were still on their way: give positions nearer to an assembled pose,",
                "unless the joints contradict each other"]  # fmt: skip
-    if flat := _without_gradient(machine, rows):
+    if flat := _without_gradient(evaluator, rows):
         why = [f"no small change closes {flat}: points coincide there, or axes are",
                "parallel or perpendicular and should not be; begin at another pose"]  # fmt: skip
     text = "\n".join(
@@ -372,16 +372,16 @@ def _failure(
     return AssemblyError(text, [model.joint_names[k] for k in still_open])
 
 
-def _without_gradient(machine: Machine, rows: Rows) -> str:
+def _without_gradient(evaluator: Evaluator, rows: ConstraintRows) -> str:
     """The first open row that no change of the pose affects to first order, in words; else ""."""
-    weight, unit = weights_of(machine), machine.model.length
+    weight, unit = weights_of(evaluator), evaluator.model.length
     length = weight * np.bincount(rows.row, rows.value**2, minlength=rows.shape[0]) ** 0.5
     stuck = np.flatnonzero((weight * np.abs(rows.C) > TOLERANCE * unit) & (length < FLAT * unit))
     if not len(stuck):
         return ""
-    k = int(np.searchsorted(machine.model.joint_start, stuck[0], side="right")) - 1
-    row = int(stuck[0] - machine.model.joint_start[k]) + 1
-    return f"row {row} of {_cut(machine.model.joint_names[k], 30)}"
+    k = int(np.searchsorted(evaluator.model.joint_start, stuck[0], side="right")) - 1
+    row = int(stuck[0] - evaluator.model.joint_start[k]) + 1
+    return f"row {row} of {_cut(evaluator.model.joint_names[k], 30)}"
 
 
 def _cut(words: str, width: int) -> str:

@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import Model
 from dap3d_core.model.knots import breaks_of
 from dap3d_core.result import INFORMATION
-from dap3d_core.scene import Checked, Instance, Simulation
+from dap3d_core.scene import Instance, Simulation, ValidatedScene
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ LEAST_PER_PERIOD = 4.0
 GOLDEN = 0.6180339887498949
 
 
-class Pace:
+class Breakpoints:
     """How fast the functions of time of a model change in a run from 0 to t_end.
 
     Attributes:
@@ -39,8 +39,8 @@ class Pace:
             derivative, where it has these.
     """
 
-    def __init__(self, checked: Checked, machine: Machine, t_end: float) -> None:
-        used = sorted({int(k) for group in machine.model.functions for k in group.members})
+    def __init__(self, checked: ValidatedScene, evaluator: Evaluator, t_end: float) -> None:
+        used = sorted({int(k) for group in evaluator.model.functions for k in group.members})
         functions = {k: checked.functions[k] for k in used}
         breaks = _breaks_of(functions.values(), t_end)
         self.stops = _stops(breaks)
@@ -48,7 +48,7 @@ class Pace:
         self.periods: dict[str, float] = {}
         if functions and t_end > 0.0:
             instants = _instants(breaks, t_end)
-            values = np.array([machine.function_values(t) for t in instants])
+            values = np.array([evaluator.function_values(t) for t in instants])
             spread, bend = np.ptp(values[:, :, 0], axis=0), np.max(np.abs(values[:, :, 2]), axis=0)
             for k, function in functions.items():
                 if 0.0 < spread[k] < np.inf and 0.0 < bend[k] < np.inf:
@@ -79,8 +79,8 @@ class Pace:
         return found
 
 
-def stops_of(checked: Checked, model: Model, t_end: float) -> list[tuple[float, bool]]:
-    """``Pace.stops`` alone."""
+def stops_of(checked: ValidatedScene, model: Model, t_end: float) -> list[tuple[float, bool]]:
+    """``Breakpoints.stops`` alone."""
     used = sorted({int(k) for group in model.functions for k in group.members})
     return _stops(_breaks_of([checked.functions[k] for k in used], t_end))
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import ENERGY, VALUE, WRENCH
 from dap3d_core.assembly.evaluate import call_kinds, place_bodies
-from dap3d_core.formulations.evaluator import AS_COMPILED, Machine
+from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.model.rotations import to_global
 from dap3d_core.model.state_layout import join, split, velocities_of
 
@@ -24,15 +24,15 @@ OFFSETS, WEIGHTS, H = (-2, -1, 1, 2), (1 / 12, -2 / 3, 2 / 3, -1 / 12), 1e-3
 AGREE = 1e-6
 
 
-@AS_COMPILED
-def is_conservative(machine: Machine, u: Floats) -> bool:
+@IGNORE_FLOAT_ERRORS
+def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
     """Whether neither dampers, drivers, friction nor forces without a potential can do work.
 
     Args:
         machine: the model.
         u: (13 n,) a state about which the forces are tried.
     """
-    model = machine.model
+    model = evaluator.model
     driven = any(np.any(g.functions > 0) for g in model.joints)
     if driven or model.friction or any("energy" not in g.examined.kernels for g in model.forces):
         return False
@@ -41,8 +41,8 @@ def is_conservative(machine: Machine, u: Floats) -> bool:
     for _ in range(STATES):
         v, w = rng.normal(size=r.shape), rng.normal(size=r.shape)
         near = _moved(r, p, rng.normal(size=r.shape), rng.normal(size=r.shape), REACH)
-        power, size = _power(machine, join(*near, v, to_global(near[1], w)))
-        rate = sum(c * _energy(machine, *near, v, w, k * H) for k, c in zip(OFFSETS, WEIGHTS,
+        power, size = _power(evaluator, join(*near, v, to_global(near[1], w)))
+        rate = sum(c * _energy(evaluator, *near, v, w, k * H) for k, c in zip(OFFSETS, WEIGHTS,
                    strict=True)) / H  # fmt: skip
         if not abs(power + rate) <= AGREE * (size + abs(rate)):
             return False
@@ -63,27 +63,27 @@ def _moved(r: Floats, p: Floats, v: Floats, w: Floats, h: float) -> tuple[Floats
     return r + h * v, turned
 
 
-def _power(machine: Machine, u: Floats) -> tuple[float, float]:
+def _power(evaluator: Evaluator, u: Floats) -> tuple[float, float]:
     """Power of the applied forces, and the sum of its parts' sizes."""
-    s = machine.system
-    place_bodies(machine.integrated(u), s.body, s.metric)
+    s = evaluator.system
+    place_bodies(evaluator.integrated(u), s.body, s.metric)
     s.force[:] = 0.0
-    _call(machine, VALUE, s.force)
-    _call(machine, WRENCH, s.force)
+    _call(evaluator, VALUE, s.force)
+    _call(evaluator, WRENCH, s.force)
     parts = s.force[6:] * velocities_of(u)
     return float(np.sum(parts)), float(np.sum(np.abs(parts)))
 
 
-def _energy(machine: Machine, r: Floats, p: Floats, v: Floats, w: Floats, h: float) -> float:
+def _energy(evaluator: Evaluator, r: Floats, p: Floats, v: Floats, w: Floats, h: float) -> float:
     """The potential energy h seconds later at constant velocities."""
-    s = machine.system
+    s = evaluator.system
     u = join(*_moved(r, p, v, w, h), v, w)
-    place_bodies(machine.integrated(u), s.body, s.metric)
+    place_bodies(evaluator.integrated(u), s.body, s.metric)
     value = np.zeros(1)
-    _call(machine, ENERGY, value)
+    _call(evaluator, ENERGY, value)
     return float(value[0])
 
 
-def _call(machine: Machine, kind: int, out: Floats) -> None:
-    s = machine.system
-    call_kinds(kind, kind, 0.0, s, machine.loops, out, out, out)
+def _call(evaluator: Evaluator, kind: int, out: Floats) -> None:
+    s = evaluator.system
+    call_kinds(kind, kind, 0.0, s, evaluator.loops, out, out, out)

@@ -3,10 +3,10 @@
 from collections import Counter
 
 from dap3d_core.result import INFORMATION
-from dap3d_core.scene import Checked, Instance
+from dap3d_core.scene import Instance, ValidatedScene
 
 
-def notes_on_drivers(checked: Checked) -> list[str]:
+def notes_on_drivers(checked: ValidatedScene) -> list[str]:
     """Drivers between bodies that nothing else connects: allowed, and perhaps a joint is missing.
 
     Bodies are connected by a chain of joints, ground among them, or by another driver.

@@ -20,8 +20,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.constraint_rows import Rows, scaled_rows
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.linear.rank.rank import DENSE_ROWS, Rank
 from dap3d_core.model.state_layout import split, velocities_of
 from dap3d_core.simulation.initial.assemble import (
@@ -92,7 +92,7 @@ class SingularStart:
         return f"the run starts at a singular pose; {self.words}{':' if listed else ''}{listed}"
 
 
-def singular_start(machine: Machine, u: Floats, rank: Rank, t: float) -> SingularStart | None:
+def singular_start(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> SingularStart | None:
     """What there is to say of a start u (13 n,); None where its pose is not singular.
 
     Args:
@@ -101,52 +101,52 @@ def singular_start(machine: Machine, u: Floats, rank: Rank, t: float) -> Singula
         rank: of its constraints; some of them are redundant.
         t: time, s.
     """
-    if not _loses_rank(machine, u, rank, t):
+    if not _loses_rank(evaluator, u, rank, t):
         return None
-    if machine.model.row_count > DENSE_ROWS or rank.dof > MOST_FREE:
+    if evaluator.model.row_count > DENSE_ROWS or rank.dof > MOST_FREE:
         return _refused([], "the scene is too large for its branches to be found")
-    cone = _Cone(machine, u, rank, t)
+    cone = _Cone(evaluator, u, rank, t)
     if np.any(velocities_of(cone.u)):
         return _moving(cone)
     return _at_rest(cone)
 
 
-def _loses_rank(machine: Machine, u: Floats, rank: Rank, t: float) -> bool:
+def _loses_rank(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> bool:
     """Whether redundant rows forbid, at second order, velocities that all rows allow."""
-    n = machine.model.body_count
+    n = evaluator.model.body_count
     still = u.copy()
     velocities_of(still)[:] = 0.0
-    rows = finite_rows(machine, t, still)
+    rows = finite_rows(evaluator, t, still)
     if not np.bincount(rows.row, rows.value**2, minlength=rows.shape[0]).all():
         return False  # a row without a gradient is named where the run stops
     wish = np.random.default_rng(0).standard_normal(6 * n)
     flow = rows.value * wish[rows.column]
     flow = np.bincount(rows.row, flow, minlength=rows.shape[0]).astype(float)
-    free = wish - least_change(machine, rows, flow, t)
+    free = wish - least_change(evaluator, rows, flow, t)
     if np.linalg.norm(free) <= NONE * np.linalg.norm(wish):
         return False
-    gradient = scaled_rows(rows, machine.model.length)[1]  # dependencies are those of scaled rows
-    quadratic = _quadratic(machine, still, free, t) / gradient
+    gradient = scaled_rows(rows, evaluator.model.length)[1]  # dependencies are those of scaled rows
+    quadratic = _quadratic(evaluator, still, free, t) / gradient
     gaps = [d.combinations @ quadratic[d.rows] for d in rank.dependencies]
     worst = max(float(np.max(np.abs(gap))) for gap in gaps)
     scaled = attrs.evolve(rows, value=rows.value / gradient[rows.row])
-    return worst > FULFILLED * _size(machine, scaled, free)
+    return worst > FULFILLED * _size(evaluator, scaled, free)
 
 
-def _quadratic(machine: Machine, still: Floats, v: Floats, t: float) -> Floats:
+def _quadratic(evaluator: Evaluator, still: Floats, v: Floats, t: float) -> Floats:
     """The part of gamma (rows,) that is quadratic in the velocities, at v (6 n,)."""
-    total = -2.0 * finite_rows(machine, t, still).gamma
+    total = -2.0 * finite_rows(evaluator, t, still).gamma
     for sign in (1.0, -1.0):
         moving = still.copy()
         velocities_of(moving)[:] = sign * v
-        total += finite_rows(machine, t, moving).gamma
+        total += finite_rows(evaluator, t, moving).gamma
     return 0.5 * total
 
 
-def _size(machine: Machine, rows: Rows, v: Floats) -> float:
+def _size(evaluator: Evaluator, rows: ConstraintRows, v: Floats) -> float:
     """Natural size of gamma at velocities v (6 n,)."""
     flow = np.abs(rows.value * v[rows.column])
-    return float(np.max(np.bincount(rows.row, flow))) * extent(machine, v)
+    return float(np.max(np.bincount(rows.row, flow))) * extent(evaluator, v)
 
 
 class _Cone:
@@ -162,13 +162,13 @@ class _Cone:
         load: size of these accelerations.
     """
 
-    def __init__(self, machine: Machine, u: Floats, rank: Rank, t: float) -> None:
-        self.machine, self.u, self.t = machine, u, t
-        n = machine.model.body_count
+    def __init__(self, evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> None:
+        self.evaluator, self.u, self.t = evaluator, u, t
+        n = evaluator.model.body_count
         self.still = u.copy()
         velocities_of(self.still)[:] = 0.0
-        rows = finite_rows(machine, t, u)
-        scale, frame = self._scaling = mass_scaling(machine)
+        rows = finite_rows(evaluator, t, u)
+        scale, frame = self._scaling = mass_scaling(evaluator)
         block = rows.dense().reshape(-1, n, 6)
         block[:, :, :3] *= scale
         block[:, :, 3:] = np.einsum("mbr,brc->mbc", block[:, :, 3:], frame)
@@ -184,11 +184,11 @@ class _Cone:
         self.load = float(np.linalg.norm(free))
         f = self.N.shape[1]
         self.H = np.zeros((len(self.left), f, f))
-        self.size = max(_size(machine, rows, v) for v in self.N.T)
+        self.size = max(_size(evaluator, rows, v) for v in self.N.T)
         for i in range(f):
             for j in range(i + 1):
                 plus, minus = (
-                    _quadratic(machine, self.still, self.N[:, i] + sign * self.N[:, j], t)
+                    _quadratic(evaluator, self.still, self.N[:, i] + sign * self.N[:, j], t)
                     for sign in (1.0, -1.0)
                 )
                 self.H[:, i, j] = self.H[:, j, i] = self.left @ (plus - minus) / 4.0
@@ -201,7 +201,7 @@ class _Cone:
 
     def _without_joints(self) -> Floats:
         """Scaled accelerations (6 n,) that the bodies would have without joints."""
-        force = self.machine.applied_forces(self.t, self.u)
+        force = self.evaluator.applied_forces(self.t, self.u)
         scale, frame = self._scaling
         w = split(self.u)[3]
         inertia = np.linalg.inv(frame @ frame.transpose(0, 2, 1))
@@ -263,7 +263,7 @@ class _Cone:
 
     def _line(self, v: Floats) -> str:
         """Velocities as a scene gives them, the largest component one."""
-        names = self.machine.model.body_names
+        names = self.evaluator.model.body_names
         v = v / v[np.argmax(np.abs(v))]
         moving = [
             f"{name} r_dot = {_vector(x[:3])}, w = {_vector(x[3:])}"
@@ -278,10 +278,10 @@ class _Cone:
 
         way: (6 n,) velocities, or accelerations, along it.
         """
-        n, v = self.machine.model.body_count, velocities_of(self.u)
-        aside = displaced(self.still, ASIDE / extent(self.machine, way) * way.reshape(n, 6), n)
+        n, v = self.evaluator.model.body_count, velocities_of(self.u)
+        aside = displaced(self.still, ASIDE / extent(self.evaluator, way) * way.reshape(n, 6), n)
         acceleration = self.free + self.N @ z
-        speed, rise = extent(self.machine, v), extent(self.machine, acceleration)
+        speed, rise = extent(self.evaluator, v), extent(self.evaluator, acceleration)
         first_step = 2.0 * FIRST / (speed + (speed * speed + 2.0 * rise * FIRST) ** 0.5)
         lines = self.words(self._with(T))
         return SingularStart(tuple(lines), acceleration, aside, first_step, words)
@@ -304,7 +304,7 @@ def _refused(lines: list[str], why: str) -> SingularStart:
 def _moving(cone: _Cone) -> SingularStart:
     """The branch that the velocities are on, and the accelerations there."""
     v, gap = velocities_of(cone.u), cone.left @ cone.rows.gamma
-    size = _size(cone.machine, cone.rows, v)
+    size = _size(cone.evaluator, cone.rows, v)
     if np.max(np.abs(gap)) > FULFILLED * size:
         lines = cone.words(cone.branches())
         return _refused(lines, "its velocities are along none of the motions that lead from there")
@@ -314,7 +314,7 @@ def _moving(cone: _Cone) -> SingularStart:
     if T is None:
         return _refused([], "its velocities are along more than one of the motions from there")
     z = T @ (T.T @ cone.z) - cone.z
-    slow = extent(cone.machine, v) ** 2 <= SLOW * extent(cone.machine, cone.free)
+    slow = extent(cone.evaluator, v) ** 2 <= SLOW * extent(cone.evaluator, cone.free)
     for _ in range(0 if slow else 2):  # again on the branch, where less is neglected
         z += np.linalg.lstsq(across, -_third(cone, v, cone.free + cone.N @ z), rcond=FULFILLED)[0]
     return cone.taken(T, z, v, "it goes on as the velocities do, on branch (1)")
@@ -323,19 +323,19 @@ def _moving(cone: _Cone) -> SingularStart:
 def _gamma(cone: _Cone, v: Floats) -> Floats:
     state = cone.still.copy()
     velocities_of(state)[:] = v
-    return finite_rows(cone.machine, cone.t, state).gamma
+    return finite_rows(cone.evaluator, cone.t, state).gamma
 
 
 def _third(cone: _Cone, v: Floats, a: Floats) -> Floats:
     """d/dt of lambda^T (D a - gamma) (k,) along a motion with velocities v, accelerations a."""
-    n = cone.machine.model.body_count
-    h = SPAN / max(extent(cone.machine, v), extent(cone.machine, a) ** 0.5)
+    n = cone.evaluator.model.body_count
+    h = SPAN / max(extent(cone.evaluator, v), extent(cone.evaluator, a) ** 0.5)
     total = np.zeros(len(cone.left))
     for k, weight in enumerate(FORWARD):
         s = k * h
         state = displaced(cone.still, (s * v + 0.5 * s * s * a).reshape(n, 6), n)
         velocities_of(state)[:] = v + s * a
-        rows = finite_rows(cone.machine, cone.t + s, state)
+        rows = finite_rows(cone.evaluator, cone.t + s, state)
         product = np.bincount(rows.row, rows.value * a[rows.column], minlength=rows.shape[0])
         total += weight * cone.left @ (product - rows.gamma)
     derivative: Floats = total / (12.0 * h)
@@ -368,8 +368,8 @@ def _at_rest(cone: _Cone) -> SingularStart | None:
 
 def _is_driven(cone: _Cone) -> bool:
     """Whether functions of time move constraints."""
-    before = finite_rows(cone.machine, cone.t, cone.still)
+    before = finite_rows(cone.evaluator, cone.t, cone.still)
     if np.any(before.nu) or np.any(before.gamma):
         return True
-    later = (finite_rows(cone.machine, cone.t + after, cone.still) for after in LATER)
+    later = (finite_rows(cone.evaluator, cone.t + after, cone.still) for after in LATER)
     return any(not np.array_equal(rows.C, before.C) or np.any(rows.nu) for rows in later)

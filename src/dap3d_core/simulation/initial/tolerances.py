@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import Integration
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE, Y
 from dap3d_core.model.state_layout import split
@@ -27,7 +27,7 @@ MOST_NAMES = 5
 LONGEST = 1e12
 
 
-def resolved_atol(atol: Any, machine: Machine) -> float | dict[str, float]:
+def resolved_atol(atol: Any, evaluator: Evaluator) -> float | dict[str, float]:
     """Absolute tolerances as a run uses them: one for all, or by quantity.
 
     Args:
@@ -36,28 +36,28 @@ def resolved_atol(atol: Any, machine: Machine) -> float | dict[str, float]:
     """
     if isinstance(atol, (int, float)):
         return float(atol)
-    usual = usual_atol(machine)
+    usual = usual_atol(evaluator)
     if atol is None:
         return usual
     every = usual if isinstance(usual, dict) else dict.fromkeys(QUANTITIES, usual)
     return every | {name: float(value) for name, value in atol.items()}
 
 
-def usual_atol(machine: Machine) -> float | dict[str, float]:
+def usual_atol(evaluator: Evaluator) -> float | dict[str, float]:
     """What is taken where nothing is given."""
-    length = machine.model.length
+    length = evaluator.model.length
     if length == 1.0:
         return USUAL_ATOL
-    time = _time_of(machine)
+    time = _time_of(evaluator)
     scales = {"r": length, "p": 1.0, "v": length / time, "w": 1.0 / time}
     return {name: float(f"{USUAL_ATOL * scale:.6g}") for name, scale in scales.items()}
 
 
-def _time_of(machine: Machine) -> float:
+def _time_of(evaluator: Evaluator) -> float:
     """A time of the scene as given, s, as a power of ten: 1 where nothing moves."""
-    model, size = machine.model, machine.model.part_size
+    model, size = evaluator.model, evaluator.model.part_size
     _, _, v, w = split(model.u0)
-    _, _, a, alpha = split(machine.rhs(0.0, model.u0))
+    _, _, a, alpha = split(evaluator.rhs(0.0, model.u0))
     rates = [_largest(v) / size, _largest(w)]
     rates += [np.sqrt(_largest(a) / size), np.sqrt(_largest(alpha))]
     fastest = float(np.max(rates))
@@ -141,11 +141,11 @@ def words_of(atol: float | Mapping[str, float]) -> str:
     return f"{atol:g}"
 
 
-def atol_notes(given: Any, used: float | Mapping[str, float], machine: Machine) -> list[str]:
+def atol_notes(given: Any, used: float | Mapping[str, float], evaluator: Evaluator) -> list[str]:
     """That the usual tolerances were scaled to the scene, in words."""
     if not isinstance(used, Mapping) or (given is not None and set(given) == set(QUANTITIES)):
         return []
-    if machine.model.length == 1.0:
+    if evaluator.model.length == 1.0:
         return []
     words = words_of(used)
-    return [f"atol follows the size of the parts, {machine.model.part_size:.2g} m: {words}"]
+    return [f"atol follows the size of the parts, {evaluator.model.part_size:.2g} m: {words}"]

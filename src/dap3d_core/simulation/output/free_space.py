@@ -107,6 +107,6 @@ def _size(byte_count: float) -> str:
     return f"{byte_count / 2**30:,.3g} GiB"
 
 
-def row_width(machine: Any) -> int:
+def row_width(evaluator: Any) -> int:
     """Numbers that a run keeps of each instant: time, state, work, and what is reported beside."""
-    return int(1 + integrated_layout(machine.model.body_count).size + machine.report_size)
+    return int(1 + integrated_layout(evaluator.model.body_count).size + evaluator.report_size)

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from dap3d_core.integrators import Integration
 from dap3d_core.model import Model
-from dap3d_core.model.state_layout import from_integrated
+from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.result.model_summary import subject_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 
 
 @attrs.frozen
-class Standing:
+class RunProgress:
     """How a run stands.
 
     Attributes:
@@ -35,7 +35,7 @@ class Standing:
 class Observer:
     """Looks at the integrations of one run between their chunks, and tells who watches."""
 
-    def __init__(self, model: Model, t_end: float, watch: Callable[[Standing], None]) -> None:
+    def __init__(self, model: Model, t_end: float, watch: Callable[[RunProgress], None]) -> None:
         if not callable(watch):
             raise TypeError(
                 f"watch is a function that is called with how the run stands, not {watch!r}"
@@ -66,9 +66,9 @@ class Observer:
         self._largest = max(self._largest, kinetic, abs(work - self._start[1]))
         imbalance = (kinetic - self._start[0]) - (work - self._start[1])
         drift = abs(imbalance) / self._largest if self._largest else 0.0
-        self._watch(Standing(self._of.t, self._t_end, self._earlier + steps, self._step, drift))
+        self._watch(RunProgress(self._of.t, self._t_end, self._earlier + steps, self._step, drift))
 
     def _energies(self, y: NDArray[np.float64]) -> tuple[float, float]:
         """Kinetic energy and the work done so far, J."""
-        u = from_integrated(y)
+        u = u_from_y(y)
         return float(kinetic_energy(self._subject, u[None])[0]), float(y[-1])

@@ -10,9 +10,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import Model
-from dap3d_core.result import Record, Result, ResultError, ResultWriter, check_target
+from dap3d_core.result import Result, ResultError, ResultWriter, RunMetadata, check_target
 from dap3d_core.result.arrays import LARGE, Arrays, arrays_of, joined
 from dap3d_core.result.file.atomic_write import check_utf8
 from dap3d_core.result.model_summary import subject_of
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 SHORT_SECONDS = 1.0
 
 
-class Keeper:
+class ResultRecorder:
     """Keeps the rows of one run.
 
     Attributes:
@@ -38,7 +38,7 @@ class Keeper:
     def __init__(
         self,
         model: Model,
-        machine: Callable[[], Machine],
+        evaluator: Callable[[], Evaluator],
         output: str | os.PathLike[str] | None,
         most: int,
         *,
@@ -60,7 +60,7 @@ class Keeper:
         self.run = run or os.urandom(16).hex()
         self.output: Path | None = None if output is None else check_target(output, force)
         self.count = 0
-        self._model, self._machine, self._most, self._force = model, machine, most, force
+        self._model, self._evaluator, self._most, self._force = model, evaluator, most, force
         self._subject = subject_of(model)
         self._parts: list[Arrays] = []
         self.pulling = Pulling(model)
@@ -70,11 +70,11 @@ class Keeper:
         self.low, self.high = (np.full(model.u0.size, x) for x in (np.inf, -np.inf))
         self._began = math.inf  # when the first rows came
 
-    def take(self, rows: Floats, record: Callable[[], Record]) -> None:
+    def take(self, rows: Floats, record: Callable[[], RunMetadata]) -> None:
         """Keep what was reported since the last time; record: what is known of the run."""
         self.add(arrays_of(rows, self._subject), record)
 
-    def add(self, arrays: Arrays, record: Callable[[], Record]) -> None:
+    def add(self, arrays: Arrays, record: Callable[[], RunMetadata]) -> None:
         """The same for arrays."""
         self._began = min(self._began, time.perf_counter())
         self.count += len(arrays)
@@ -95,7 +95,7 @@ class Keeper:
         if large and self._writer is not None:
             self._parts.clear()
 
-    def write(self, record: Callable[[], Record]) -> None:
+    def write(self, record: Callable[[], RunMetadata]) -> None:
         """Have all rows in a file from now on."""
         if self._writer is None:
             assert self.output is not None
@@ -111,13 +111,13 @@ class Keeper:
         """The unfinished file that holds the rows written so far; None where there is none."""
         return None if self._writer is None or not self._writer.count else self._writer.part
 
-    def to_disk(self, record: Callable[[], Record]) -> None:
+    def to_disk(self, record: Callable[[], RunMetadata]) -> None:
         """Wait until all rows are on the disk."""
         self.write(record)
         assert self._writer is not None
         self._writer.to_disk()
 
-    def result(self, record: Record) -> Result | None:
+    def result(self, record: RunMetadata) -> Result | None:
         """The result of what was kept, whole in the output if there is one; None of nothing."""
         if not self.count:
             if self._writer is not None:
@@ -129,7 +129,7 @@ class Keeper:
             self._subject,
             self._arrays(),
             attrs.evolve(record, run=self.run),
-            lambda: (self._model, self._machine),
+            lambda: (self._model, self._evaluator),
         )
         if self.output is not None:
             try:

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 from dap3d_core.formulations.common.friction import PASSES
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping.event_location import CHATTER
 from dap3d_core.integrators.stepping.integration_state import LOGGED
-from dap3d_core.result import INFORMATION, Occurrence
+from dap3d_core.result import INFORMATION, EventRecord
 from dap3d_core.simulation.failure.diagnosis import fastest_body, find_offender
 from dap3d_core.simulation.redundancy.contradictory_joints import find_contradiction
 
@@ -18,22 +18,22 @@ REASONS = {
 }
 
 
-def doubts(machine: Machine, rhs: int) -> list[str]:
+def doubts(evaluator: Evaluator, rhs: int) -> list[str]:
     """Notes on what was computed less surely than all else; rhs: evaluations of the run."""
     notes = []
-    if count := machine.unsettled:
+    if count := evaluator.friction_failure_count:
         notes.append(
             f"friction: the multipliers did not settle in {PASSES} passes, {count} times of {rhs} "
             "or more; the last ones were used. Motion there is uncertain: a high mu may lock the "
             "joint by itself"
         )
-    if count := machine.singular_reports:
+    if count := evaluator.singular_reports:
         notes.append(
             f"{count} times a pose was singular where it was reported: the rows leave "
             "accelerations open there, and those reported, with their multipliers, are not "
             "determined"
         )
-    if count := machine.doubtful_turns:
+    if count := evaluator.doubtful_turns:
         notes.append(
             f"turns of angles: the rate of turn changed so much within a step, {count} times, "
             "that whole turns may be miscounted; give a tighter rtol, or a shorter step"
@@ -41,41 +41,41 @@ def doubts(machine: Machine, rhs: int) -> list[str]:
     return notes
 
 
-def why_stopped(machine: Machine, integration: Integration, rank: int) -> str:
+def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> str:
     """Why an integration ended before its time, with who is to blame; rank: that of the start."""
     t = integration.t
     head = f"the run stopped at t = {t:.9g} s"
     if integration.status is Status.SWITCHED:
-        switch = machine.switches[integration.terminal_switch]
-        return f"{head}: {_title(machine, integration.terminal_switch)}: {switch.words}"
+        switch = evaluator.switches[integration.terminal_switch]
+        return f"{head}: {_title(evaluator, integration.terminal_switch)}: {switch.words}"
     if integration.status is Status.CHATTERED:
-        return f"{head}: {_chatter(machine, integration)}"
+        return f"{head}: {_chatter(evaluator, integration)}"
     t_stop = integration.t_stop if integration.t_stop is not None else t
     message = f"{head}: {REASONS[integration.status]}"
     if integration.status is not Status.NOT_FINITE:
-        culprit = find_contradiction(machine, t, integration.y, rank)
+        culprit = find_contradiction(evaluator, t, integration.y, rank)
         if culprit:
             return f"{head}: {culprit}"
-    culprit = find_offender(machine, t, integration.y, t_stop)
+    culprit = find_offender(evaluator, t, integration.y, t_stop)
     if not culprit and integration.status is Status.NOT_FINITE:
-        culprit = fastest_body(machine, integration.y)
+        culprit = fastest_body(evaluator, integration.y)
     return f"{message}: {culprit}" if culprit else message
 
 
 def occurrences(
-    machine: Machine, runs: Sequence[Integration], of_script: Sequence[Occurrence]
-) -> list[Occurrence]:
+    evaluator: Evaluator, runs: Sequence[Integration], of_script: Sequence[EventRecord]
+) -> list[EventRecord]:
     """What happened at instants that were located, in their order."""
     last = runs[-1]
     ended = last.status is Status.SWITCHED
     found = []
     for t, which, side in (crossing for run in runs for crossing in run.crossings):
-        switch = machine.switches[int(which)]
+        switch = evaluator.switches[int(which)]
         ends = ended and int(which) == last.terminal_switch and side < 0.0 and bool(switch.words)
         kind = switch.group.examined.type.kind
         found.append(
-            Occurrence(
-                name=f"{kind} {switch.name(machine.model)}",
+            EventRecord(
+                name=f"{kind} {switch.name(evaluator.model)}",
                 t=float(t),
                 direction=int(side),
                 kind="end" if ends else "switch",
@@ -84,7 +84,7 @@ def occurrences(
     return sorted([*found, *of_script], key=lambda event: event.t)
 
 
-def event_notes(runs: Sequence[Integration], events: Sequence[Occurrence]) -> list[str]:
+def event_notes(runs: Sequence[Integration], events: Sequence[EventRecord]) -> list[str]:
     """Notes on what happened: an event that stopped the run, more crossings than are kept."""
     notes = [f"{INFORMATION}the run was stopped by an event, {event.words}"
              for event in events if event.kind == "stop"]  # fmt: skip
@@ -95,17 +95,17 @@ def event_notes(runs: Sequence[Integration], events: Sequence[Occurrence]) -> li
     return notes
 
 
-def _title(machine: Machine, which: int) -> str:
-    switch = machine.switches[which]
+def _title(evaluator: Evaluator, which: int) -> str:
+    switch = evaluator.switches[which]
     group = switch.group
-    return f"{group.examined.type.kind} {switch.name(machine.model)} ({group.keyword})"
+    return f"{group.examined.type.kind} {switch.name(evaluator.model)} ({group.keyword})"
 
 
-def _chatter(machine: Machine, integration: Integration) -> str:
+def _chatter(evaluator: Evaluator, integration: Integration) -> str:
     """What chatters, how long already, and what helps."""
     since, count = integration.chatter
     return (
-        f"{_title(machine, integration.terminal_switch)} chatters: its switch changed its sign "
+        f"{_title(evaluator, integration.terminal_switch)} chatters: its switch changed its sign "
         f"{count} times within {integration.t - since:.2g} s (more than {CHATTER} in a millionth "
         "of the run end it). On either side its law drives the motion back to the other; let the "
         "law change over a small range, as tanh does, or give it a range in which it stays as it is"

@@ -10,13 +10,13 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dap3d_core.scene import Checked
+    from dap3d_core.scene import ValidatedScene
 
 #: Its sources are known by the version of dap3d.
 CORE = "dap3d_core"
 
 
-def digests_of(checked: "Checked") -> dict[str, str]:
+def digests_of(checked: "ValidatedScene") -> dict[str, str]:
     """For each type of a scene, such as "joint rev", a digest of its sources; "" where unknown."""
     elements = (*checked.joints, *checked.forces, *checked.functions)
     types: dict[tuple[str, str], Any] = {
@@ -25,7 +25,7 @@ def digests_of(checked: "Checked") -> dict[str, str]:
     return {f"{kind} {word}": digest_of(type_) for (kind, word), type_ in sorted(types.items())}
 
 
-def types_of(checked: "Checked") -> dict[str, dict[str, str]]:
+def types_of(checked: "ValidatedScene") -> dict[str, dict[str, str]]:
     """For each type of a scene its ``digest``, and the ``distribution`` and ``version`` it is from.
 
     The latter two are "" for a type of a model's own file.

@@ -8,10 +8,10 @@ moment's rounding, so that the joints are put together a little later, too.
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.constraint_rows import Rows
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.constraint_rows import ConstraintRows
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import Model
-from dap3d_core.model.state_layout import from_integrated, velocities_of
+from dap3d_core.model.state_layout import u_from_y, velocities_of
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import (
     FIT,
@@ -40,7 +40,7 @@ HALVINGS = 40
 NONE = np.zeros(0, dtype=np.int64)
 
 
-def find_contradiction(machine: Machine, t: float, y: Floats, rank: int) -> str:
+def find_contradiction(evaluator: Evaluator, t: float, y: Floats, rank: int) -> str:
     """Which joints cannot be fulfilled together from about time t on; "" where all can.
 
     Args:
@@ -48,24 +48,24 @@ def find_contradiction(machine: Machine, t: float, y: Floats, rank: int) -> str:
         t, y: time and integrated state of the last step.
         rank: that of the constraints at the start.
     """
-    model = machine.model
+    model = evaluator.model
     if not 0 < model.row_count <= MOST_ROWS:
         return ""
-    u = from_integrated(y)
+    u = u_from_y(y)
     try:
-        finite_rows(machine, t, u)
+        finite_rows(evaluator, t, u)
     except AssemblyError:  # which find_offender tells
         return ""
-    return _out_of_reach(machine, t, u) or _come_to_hold(machine, t, u, rank)
+    return _out_of_reach(evaluator, t, u) or _come_to_hold(evaluator, t, u, rank)
 
 
-def _out_of_reach(machine: Machine, t: float, u: Floats) -> str:
-    speed = extent(machine, velocities_of(u))
+def _out_of_reach(evaluator: Evaluator, t: float, u: Floats) -> str:
+    speed = extent(evaluator, velocities_of(u))
     span = FAR / speed if speed else FAR * (1.0 + abs(t))
     good = t
     for part in EARLIER:
         late = t + part * span
-        if _closed(machine, u, t, late) is None:
+        if _closed(evaluator, u, t, late) is None:
             break
         good = late
     else:
@@ -74,27 +74,27 @@ def _out_of_reach(machine: Machine, t: float, u: Floats) -> str:
         middle = 0.5 * (good + late)
         if not good < middle < late:
             break
-        if _closed(machine, u, t, middle) is None:
+        if _closed(evaluator, u, t, middle) is None:
             late = middle
         else:
             good = middle
-    closed = _closed(machine, u, t, good)
-    return "" if closed is None else _words(machine, good, closed)
+    closed = _closed(evaluator, u, t, good)
+    return "" if closed is None else _words(evaluator, good, closed)
 
 
-def _closed(machine: Machine, u: Floats, t: float, later: float) -> Floats | None:
+def _closed(evaluator: Evaluator, u: Floats, t: float, later: float) -> Floats | None:
     """The bodies at a later time, put together; None where they cannot be."""
-    n = machine.model.body_count
+    n = evaluator.model.body_count
     moved = displaced(u, (later - t) * velocities_of(u).reshape(n, -1), n)
     try:
-        return correct_positions(machine, moved, later, NONE)[0]
+        return correct_positions(evaluator, moved, later, NONE)[0]
     except AssemblyError:
         return None
 
 
-def _words(machine: Machine, t: float, u: Floats) -> str:
+def _words(evaluator: Evaluator, t: float, u: Floats) -> str:
     """The drivers that ask for too much, and of whom."""
-    model, rows = machine.model, machine.rows(t, u)
+    model, rows = evaluator.model, evaluator.rows(t, u)
     left, values, _ = np.linalg.svd(rows.dense())
     small = np.ones(len(left), dtype=bool)
     small[: len(values)] = values < NEARLY * values[0]
@@ -103,15 +103,15 @@ def _words(machine: Machine, t: float, u: Floats) -> str:
         return ""
     drivers = _owners(model, combination * rows.nu)
     others = [k for k in _owners(model, combination) if k not in drivers]
-    asking = " and ".join(_driver(machine, k, t) for k in drivers)
+    asking = " and ".join(_driver(evaluator, k, t) for k in drivers)
     ask = "asks" if len(drivers) == 1 else "ask"
     against = f"joints {_listed(model, others)} cannot follow" if others else "no motion has both"
     return f"from t = {t:.6g} s on {against}: what {asking} {ask} for is out of reach"
 
 
-def _driver(machine: Machine, k: int, t: float) -> str:
+def _driver(evaluator: Evaluator, k: int, t: float) -> str:
     """A joint with its functions of time and their values."""
-    model, values = machine.model, machine.function_values(t)
+    model, values = evaluator.model, evaluator.function_values(t)
     for group in model.joints:
         for place in np.flatnonzero(group.members == k):
             count = len(group.examined.layout.functions)
@@ -121,18 +121,18 @@ def _driver(machine: Machine, k: int, t: float) -> str:
     return f"joint {model.joint_names[k]}"
 
 
-def _come_to_hold(machine: Machine, t: float, u: Floats, rank: int) -> str:
+def _come_to_hold(evaluator: Evaluator, t: float, u: Floats, rank: int) -> str:
     """Joints whose rows depended on each other at the start and nearly do."""
-    rows: Rows = machine.rows(t, u)
+    rows: ConstraintRows = evaluator.rows(t, u)
     left, values, _ = np.linalg.svd(rows.dense(), full_matrices=False)
-    fit = FIT * min(1.0, model_size(machine))
+    fit = FIT * min(1.0, model_size(evaluator))
     held = [k for k in range(rank, len(values)) if fit < values[k] < HELD * values[0]]
     if not held:
         return ""
-    joints = _owners(machine.model, left[:, held[0]])
+    joints = _owners(evaluator.model, left[:, held[0]])
     return (
-        f"joints {_listed(machine.model, joints)} contradict each other: their rows, redundant at "
-        "the start, have come to hold a motion that they left free"
+        f"joints {_listed(evaluator.model, joints)} contradict each other: their rows, redundant "
+        "at the start, have come to hold a motion that they left free"
     )
 
 

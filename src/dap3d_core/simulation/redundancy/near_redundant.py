@@ -13,8 +13,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.constraint_rows import Rows
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.constraint_rows import ConstraintRows
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.linear.rank.rank import DENSE_ROWS
 from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
@@ -62,19 +62,21 @@ class Binding:
         )
 
 
-def bindings(machine: Machine, rows: Rows, u: Floats, t: float) -> tuple[Binding, ...]:
+def bindings(
+    evaluator: Evaluator, rows: ConstraintRows, u: Floats, t: float
+) -> tuple[Binding, ...]:
     """Joints that bind at a state u (13 n,), whose rows these are, scaled.
 
     Sought among up to DENSE_ROWS rows; those of the position level alone are tried.
     """
-    model = machine.model
+    model = evaluator.model
     if model.row_count > DENSE_ROWS:
         return ()
     left, values, right = np.linalg.svd(rows.dense(), full_matrices=False)
     fit = fit_of(model)
     found = []
     for k in np.flatnonzero((values > fit) & (values < HELD * values[0])):
-        if any(_leads_away(machine, u, t, sign * right[k]) for sign in (1.0, -1.0)):
+        if any(_leads_away(evaluator, u, t, sign * right[k]) for sign in (1.0, -1.0)):
             continue
         taking = np.abs(left[:, k]) > PART_TAKEN * np.max(np.abs(left[:, k]))
         owners = np.searchsorted(model.joint_start, np.flatnonzero(taking), side="right") - 1
@@ -83,17 +85,17 @@ def bindings(machine: Machine, rows: Rows, u: Floats, t: float) -> tuple[Binding
     return tuple(found)
 
 
-def _leads_away(machine: Machine, u: Floats, t: float, direction: Floats) -> bool:
+def _leads_away(evaluator: Evaluator, u: Floats, t: float, direction: Floats) -> bool:
     """Whether the joints can be closed at another pose in this direction (6 n,)."""
-    n, size = machine.model.body_count, model_size(machine)
-    step = direction.reshape(n, 6) * np.repeat([machine.model.length, 1.0], 3)
+    n, size = evaluator.model.body_count, model_size(evaluator)
+    step = direction.reshape(n, 6) * np.repeat([evaluator.model.length, 1.0], 3)
     extent = max(
         float(np.max(np.linalg.norm(step[:, :3], axis=1))) / (SHIFT * size),
         float(np.max(np.linalg.norm(step[:, 3:], axis=1))) / TURN,
     )
     moved = displaced(u, step / extent, n)
     try:
-        closed, _ = correct_positions(machine, moved, t, np.zeros(0, dtype=np.int64))
+        closed, _ = correct_positions(evaluator, moved, t, np.zeros(0, dtype=np.int64))
     except AssemblyError:
         return False
     gone, asked = coordinates_of(closed - u), coordinates_of(moved - u)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import scaled_rows
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import (
@@ -39,7 +39,7 @@ NONE = np.zeros(0, dtype=np.int64)
 
 
 @attrs.frozen
-class Elsewhere:
+class GenericRank:
     """Redundancy of the same scene at other poses.
 
     Attributes:
@@ -73,8 +73,8 @@ class Elsewhere:
 
 
 def redundancy_elsewhere(
-    machine: Machine, u: Floats, redundancy: Redundancy, t: float = 0.0
-) -> Elsewhere:
+    evaluator: Evaluator, u: Floats, redundancy: Redundancy, t: float = 0.0
+) -> GenericRank:
     """Take the rank at other poses that the joints allow; the same ones each time.
 
     Args:
@@ -83,37 +83,41 @@ def redundancy_elsewhere(
         redundancy: that of u.
         t: time, s; functions of time stand still.
     """
-    rows = machine.model.row_count
+    rows = evaluator.model.row_count
     count = next(number for limit, number in POSES if rows <= limit)
     ranks = []
     for k in range(count):
-        other = _other_pose(machine, u, t, np.random.default_rng(k))
+        other = _other_pose(evaluator, u, t, np.random.default_rng(k))
         if other is not None:
-            rows_there = finite_rows(machine, t, other)
-            ranks.append(rank_of(machine, scaled_rows(rows_there, machine.model.length)[0]).rank)
+            rows_there = finite_rows(evaluator, t, other)
+            ranks.append(
+                rank_of(evaluator, scaled_rows(rows_there, evaluator.model.length)[0]).rank
+            )
     if not ranks:
-        return Elsewhere((), None, None)
+        return GenericRank((), None, None)
     redundant = rows - max(ranks)
-    return Elsewhere(tuple(ranks), redundant, redundant == redundancy.rank.redundant)
+    return GenericRank(tuple(ranks), redundant, redundant == redundancy.rank.redundant)
 
 
-def _other_pose(machine: Machine, u: Floats, t: float, rng: np.random.Generator) -> Floats | None:
+def _other_pose(
+    evaluator: Evaluator, u: Floats, t: float, rng: np.random.Generator
+) -> Floats | None:
     """A state at another pose, or None where the joints allow none."""
-    n, size = machine.model.body_count, model_size(machine)
-    rows = finite_rows(machine, t, u)
+    n, size = evaluator.model.body_count, model_size(evaluator)
+    rows = finite_rows(evaluator, t, u)
     wish = rng.standard_normal((n, 6))
     wish[:, :3] *= size
     wish = wish.ravel()
     flow = rows.value * wish[rows.column]
     product: Floats = np.bincount(rows.row, flow, minlength=rows.shape[0]).astype(float)
-    free = (wish - least_change(machine, rows, product, t, NONE)).reshape(n, 6)
+    free = (wish - least_change(evaluator, rows, product, t, NONE)).reshape(n, 6)
     if np.linalg.norm(free) <= FREE * np.linalg.norm(wish):
         return None
     extent = max(_largest(free[:, :3]) / (SHIFT * size), _largest(free[:, 3:]) / TURN)
     for halving in range(HALVINGS + 1):
         step = free / (extent * 2.0**halving)
         try:
-            other, _ = correct_positions(machine, displaced(u, step, n), t, NONE)
+            other, _ = correct_positions(evaluator, displaced(u, step, n), t, NONE)
         except AssemblyError:
             continue
         gone = np.linalg.norm(coordinates_of(other - u))

@@ -7,8 +7,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.constraint_rows import Rows, scaled_rows
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.linear.rank.rank import (
     DENSE_ROWS,
     WEIGHT,
@@ -64,7 +64,7 @@ class Contradiction:
 
 
 @attrs.frozen
-class Reaction:
+class ReactionUniqueness:
     """What is determined of the reaction of a joint that shares a freedom.
 
     Attributes:
@@ -118,7 +118,7 @@ class Redundancy:
     bindings: tuple[Binding, ...] = ()
     singular: SingularStart | None = None
     _model: Model | None = attrs.field(default=None, repr=False)
-    _rows: Rows | None = attrs.field(default=None, repr=False)
+    _rows: ConstraintRows | None = attrs.field(default=None, repr=False)
 
     @property
     def is_plain(self) -> bool:
@@ -132,7 +132,7 @@ class Redundancy:
         names = self._model.joint_names if self._model else ()
         return tuple(name for name in names if name not in involved)
 
-    def reactions(self) -> list[Reaction]:
+    def reactions(self) -> list[ReactionUniqueness]:
         """What is unique of the reactions of ``joints``, in their order.
 
         A multiplier is unique if its row is part of no dependency. The reaction J^T lambda of a
@@ -157,7 +157,9 @@ class Redundancy:
             force, moment = ("".join(a for a, f in zip("xyz", part, strict=True) if f)
                              for part in (free[:3], free[3:]))  # fmt: skip
             unique_rows = tuple(int(row) for row in alone)
-            found.append(Reaction(model.joint_names[k], len(rows), unique_rows, force, moment))
+            found.append(
+                ReactionUniqueness(model.joint_names[k], len(rows), unique_rows, force, moment)
+            )
         return found
 
     def describe_reactions(self) -> list[str]:
@@ -211,19 +213,19 @@ def some(names: Sequence[str], most: int = MOST_NAMES) -> str:
     return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
-def redundancy_of(machine: Machine, u: Floats, t: float = 0.0) -> Redundancy:
+def redundancy_of(evaluator: Evaluator, u: Floats, t: float = 0.0) -> Redundancy:
     """Rank of the constraints of a model at a state u (13 n,).
 
     Raises:
         AssemblyError: a row is not finite there.
     """
-    model = machine.model
+    model = evaluator.model
     if not model.row_count:
         return Redundancy(Rank(0, 6 * model.body_count, 0, 0.0, "svd"))
-    rows, gradient = scaled_rows(finite_rows(machine, t, u), model.length)
-    rank = rank_of(machine, rows)
+    rows, gradient = scaled_rows(finite_rows(evaluator, t, u), model.length)
+    rank = rank_of(evaluator, rows)
     involved = sorted({k for d in rank.dependencies for k, _ in _by_joint(model, d.rows)})
-    binding = bindings(machine, rows, u, t) if rank.redundant else ()
+    binding = bindings(evaluator, rows, u, t) if rank.redundant else ()
     return Redundancy(
         rank,
         tuple(model.joint_names[k] for k in involved),
@@ -231,24 +233,24 @@ def redundancy_of(machine: Machine, u: Floats, t: float = 0.0) -> Redundancy:
         _groups(model, rank.dependencies),
         tuple(_contradictions(model, rank.dependencies, rows, gradient, u)),
         binding,
-        singular_start(machine, u, rank, t) if rank.redundant and not binding else None,
+        singular_start(evaluator, u, rank, t) if rank.redundant and not binding else None,
         model,
         rows,
     )
 
 
-def rank_of(machine: Machine, rows: Rows) -> Rank:
-    """Rank of the rows that ``machine`` has just evaluated, scaled (``scaled_rows``).
+def rank_of(evaluator: Evaluator, rows: ConstraintRows) -> Rank:
+    """Rank of the rows that ``evaluator`` has just evaluated, scaled (``scaled_rows``).
 
     Singular values below FIT count as zero: joints are put together to no more than that, and an
     opening tilts rows that would depend on each other by as much.
     """
-    model, blur = machine.model, fit_of(machine.model)
+    model, blur = evaluator.model, fit_of(evaluator.model)
     if model.row_count <= DENSE_ROWS:
         return dense_rank(rows.dense(), blur)
-    D = machine.system.D.copy()
-    D[machine.pattern[2]] = rows.value
-    return sparse_rank(machine.plan, D, machine.system.row, 6 * model.body_count, blur)
+    D = evaluator.system.D.copy()
+    D[evaluator.pattern[2]] = rows.value
+    return sparse_rank(evaluator.plan, D, evaluator.system.row, 6 * model.body_count, blur)
 
 
 def _by_joint(model: Model, rows: Any) -> list[tuple[int, Any]]:
@@ -288,7 +290,11 @@ def _size(dependency: Dependency, side: Floats, gradient: Floats) -> float:
 
 
 def _contradictions(
-    model: Model, dependencies: Sequence[Dependency], rows: Rows, gradient: Floats, u: Floats
+    model: Model,
+    dependencies: Sequence[Dependency],
+    rows: ConstraintRows,
+    gradient: Floats,
+    u: Floats,
 ) -> list[Contradiction]:
     """At each level, where the one below leaves it a meaning."""
     found: list[Contradiction] = []

@@ -10,7 +10,7 @@ from dap3d_core.scene import SceneError
 from dap3d_core.simulation import AssemblyError
 from dap3d_core.simulation.failure.negative_reactions import Pulling
 from dap3d_core.simulation.initial.assemble import ROUNDING, Initial, correction_notes, distance
-from dap3d_core.simulation.initial_state import Start
+from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.study.batch import driver, initial_state
 from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch
 from dap3d_core.study.batch.packs import PackedBatch
@@ -32,7 +32,7 @@ def batch_runner(reduction: Reduction, times: Floats, pack: int) -> "BatchRunner
     except (AssemblyError, SceneError):
         return None
     redundancy = start.redundancy
-    takes_rows = not redundancy.rank.redundant or compiled.machine.formulation.accepts_redundant
+    takes_rows = not redundancy.rank.redundant or compiled.evaluator.formulation.accepts_redundant
     if not redundancy.is_plain or not takes_rows:
         return None
     return BatchRunner(start, reduction, times, pack)
@@ -48,28 +48,28 @@ class BatchRunner:
         packed: runs them in packs; None where they are not packed.
     """
 
-    def __init__(self, start: Start, reduction: Reduction, times: Floats, pack: int) -> None:
+    def __init__(self, start: InitialState, reduction: Reduction, times: Floats, pack: int) -> None:
         """Args: the start of the scene as given; reduction, times and pack of the ensemble."""
         self._start, self._reduction, self._times = start, reduction, times
         compiled = self._compiled = reduction.compiled
         parameters = reduction.parameters
-        machine = compiled.another_machine()
+        evaluator = compiled.new_evaluator()
         end = float(times[-1])
-        stops = compiled.pace(end).stops
-        self._rebuilder = ModelRebuilder(compiled, machine, parameters, end)
-        self.compiled_batch = CompiledBatch(machine, compiled.scene.simulation, times, stops)
+        stops = compiled.breakpoints(end).stops
+        self._rebuilder = ModelRebuilder(compiled, evaluator, parameters, end)
+        self.compiled_batch = CompiledBatch(evaluator, compiled.scene.simulation, times, stops)
         self._pulling = Pulling(compiled.model)
         self.parameter_map: ParameterMap | None = None
         self.packed: PackedBatch | None = None
         with contextlib.suppress(NotCopiedError):
-            parameter_map = ParameterMap(compiled.checked, machine, parameters)
+            parameter_map = ParameterMap(compiled.checked, evaluator, parameters)
             if not parameter_map.moves_start or self._has_compiled_correction():
                 self.parameter_map = parameter_map
                 # Switches of one copy would interrupt all, friction is iterated for all.
-                shared = machine.formulation.accepts_redundant or bool(machine.switches)
+                shared = evaluator.formulation.accepts_redundant or bool(evaluator.switches)
                 shared = shared or bool(compiled.model.friction)
                 if pack > 1 and not shared and reduction.is_of_single_copies:
-                    self.packed = PackedBatch(compiled, machine, times, pack)
+                    self.packed = PackedBatch(compiled, evaluator, times, pack)
 
     def run(self, values: Floats, batch: Batch, first: int) -> None:
         """Run points (k, d), and store those that reach their end in a batch from ``first`` on."""
@@ -97,7 +97,7 @@ class BatchRunner:
             y0 = parameter_map.states(values[which], model.u0)
         else:
             y0 = np.repeat(
-                self.compiled_batch.machine.integrated(self._start.u)[None], len(which), axis=0
+                self.compiled_batch.evaluator.integrated(self._start.u)[None], len(which), axis=0
             )
         table, places = table[which], parameter_map.places
         start = driver.CORRECT if moves_start and model.row_count else driver.UNCORRECTED
@@ -149,28 +149,28 @@ class BatchRunner:
         others = [o for o in reduction.outputs if not reduction.of_rows[o.name]]
         for k, point, of_run in zip(index, values, rows, strict=True) if others else ():
             _, model = self._rebuilder.load(point)
-            result = reduction.result(model, of_run, self.compiled_batch.machine)
+            result = reduction.result(model, of_run, self.compiled_batch.evaluator)
             batch.store(int(k), result, others)
 
     def _note_corrections(
         self, rows: BatchRows, good: Integers, index: Integers, notes: list[str]
     ) -> None:
         """Warn of starts that were corrected by more than rounding."""
-        machine = self.compiled_batch.machine
+        evaluator = self.compiled_batch.evaluator
         large = rows.diagnostics[good, initial_state.C_BEFORE] > ROUNDING * self.compiled_batch.size
         good, index = good[large], index[large]
-        moved, turned = distance(rows.given[good], rows.y0[good], machine.model.body_count)
+        moved, turned = distance(rows.given[good], rows.y0[good], evaluator.model.body_count)
         for j, k in enumerate(good):
             numbers = rows.diagnostics[k].tolist()
             initial = Initial(
-                u=machine.model.u0,
+                u=evaluator.model.u0,
                 violation=(numbers[initial_state.C_BEFORE], numbers[initial_state.V_BEFORE]),
                 residual=(numbers[initial_state.C_AFTER], numbers[initial_state.V_AFTER]),
                 passes=int(numbers[initial_state.PASSES]),
                 moved=float(moved[j]),
                 turned=float(turned[j]),
             )
-            messages = correction_notes(initial, machine, self._compiled.scene)
+            messages = correction_notes(initial, evaluator, self._compiled.scene)
             notes[index[j]] = "; ".join(m for m in messages if not m.startswith(INFORMATION))
 
     def _has_compiled_correction(self) -> bool:
@@ -179,4 +179,4 @@ class BatchRunner:
         if not model.row_count or not settings.correct:
             return not model.row_count
         is_unit = str(settings.correct_metric) == "unit" and not settings.hold
-        return is_unit and not self._compiled.machine.formulation.accepts_redundant
+        return is_unit and not self._compiled.evaluator.formulation.accepts_redundant

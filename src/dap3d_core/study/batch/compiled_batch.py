@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import STEPS, System, step_functions
 from dap3d_core.formulations import Formulation
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.step import advance
@@ -58,7 +58,11 @@ class CompiledBatch:
     """
 
     def __init__(
-        self, machine: Machine, settings: Simulation, times: Floats, stops: list[tuple[float, bool]]
+        self,
+        evaluator: Evaluator,
+        settings: Simulation,
+        times: Floats,
+        stops: list[tuple[float, bool]],
     ) -> None:
         """Args:
         machine: evaluates the model; its numbers change.
@@ -67,25 +71,25 @@ class CompiledBatch:
         times: (nt,) reporting times.
         stops: times that no step crosses, and whether something jumps there.
         """
-        self.machine, self.size = machine, model_size(machine)
-        y0 = self.last_start = machine.integrated(machine.model.u0)
-        may_turn_stiff = settings.integrator == "auto" and fits(IMPLICIT, machine.formulation)
+        self.evaluator, self.size = evaluator, model_size(evaluator)
+        y0 = self.last_start = evaluator.integrated(evaluator.model.u0)
+        may_turn_stiff = settings.integrator == "auto" and fits(IMPLICIT, evaluator.formulation)
         self.integration = INTEGRATORS.get(str(settings.integrator), EXPLICIT).make(
-            machine,
+            evaluator,
             y0,
             times,
             buffer_rows=len(times),
-            leave_stiff=may_turn_stiff,  # as Run does
-            **integration_options(machine, settings),
+            stop_when_stiff=may_turn_stiff,  # as Run does
+            **integration_options(evaluator, settings),
         )
         work, unit = self.integration.work, UNIT_METRIC.copy()
-        unit[0] = machine.model.length
-        starting = np.zeros(initial_state.STARTING + machine.plan.row_size)
+        unit[0] = evaluator.model.length
+        starting = np.zeros(initial_state.STARTING + evaluator.plan.row_size)
         starting[initial_state.SIZE] = self.size
-        without_position = np.flatnonzero(~machine.model.position_row)
-        starting[initial_state.STARTING + machine.system.row[without_position]] = 1.0
+        without_position = np.flatnonzero(~evaluator.model.position_row)
+        starting[initial_state.STARTING + evaluator.system.row[without_position]] = 1.0
         self.constants: dict[str, Any] = {
-            "metric": machine.system.metric.copy(),
+            "metric": evaluator.system.metric.copy(),
             "unit": unit,
             "stops": np.array(stops, dtype=float).reshape(-1, 2),
             "starting": starting,
@@ -94,7 +98,7 @@ class CompiledBatch:
             "first_switches": work.switches.copy(),
             "first_lengths": work.lengths.copy(),
         }
-        self._begin = _begin_functions(machine.formulation)
+        self._begin = _begin_functions(evaluator.formulation)
         self.run(np.zeros((0, 0)), np.zeros(0, dtype=np.int64), y0[None][:0])  # to compile it
 
     def run(
@@ -120,8 +124,8 @@ class CompiledBatch:
             diagnostics=diagnostics,
             **self.constants,
         )
-        problem = (self.machine.functions, _drives(), self._begin)
-        system, loops = self.machine.system, self.machine.loops
+        problem = (self.evaluator.functions, _drives(), self._begin)
+        system, loops = self.evaluator.system, self.evaluator.loops
         while True:
             with np.errstate(all="ignore"):  # as compiled code does
                 driver.run_points(points, work, *problem, system, loops, CALL)

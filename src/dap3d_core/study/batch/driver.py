@@ -27,7 +27,7 @@ from dap3d_core.integrators.stepping.integration_state import (
 from dap3d_core.integrators.stepping.output import project_state
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
 from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside
+from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.study.batch.initial_state import LEAST_PIVOT, OPEN, STARTING
 
@@ -71,14 +71,14 @@ class Points(Arrays):
     diagnostics: Floats  # (k, COLUMNS)
 
 
-@compiled_inside
+@compiled
 def copy_into(target: Any, source: Any) -> None:
     """Copy a vector."""
     for k in range(source.shape[0]):
         target[k] = source[k]
 
 
-@compiled_inside
+@compiled
 def set_numbers(points: Points, p: int, system: System) -> None:
     """Copy the numbers of point p into the arrays of the system."""
     places, par, body, metric = points.places, system.par, system.body, system.metric
@@ -96,7 +96,7 @@ def set_numbers(points: Points, p: int, system: System) -> None:
             metric[k // metric.shape[1], k % metric.shape[1]] = value
 
 
-@compiled_inside
+@compiled
 def reset_work(points: Points, p: int, work: RungeKuttaState) -> None:
     """Reset the work to that before a run, with the state of point p."""
     copy_into(work.real, points.first_real)
@@ -110,7 +110,7 @@ def reset_work(points: Points, p: int, work: RungeKuttaState) -> None:
     copy_into(work.state[Y], points.y0[p])
 
 
-@compiled_inside
+@compiled
 def start(
     points: Points,
     p: int,
@@ -139,7 +139,7 @@ def start(
     return True
 
 
-@compiled_inside
+@compiled
 def restart(work: RungeKuttaState) -> None:
     """Restart the step control, as ``Integration.restart``."""
     work.h, work.last_error, work.step_limit_at_switch = 0.0, 1e-4, np.inf
@@ -148,7 +148,7 @@ def restart(work: RungeKuttaState) -> None:
         work.switches[SIDE, q] = 0.0
 
 
-@compiled_inside
+@compiled
 def next_stop(
     stops: Floats,
     work: RungeKuttaState,

@@ -2,7 +2,7 @@
 
 Its passes are those of simulation/initial/assemble.py, which solves each by singular values, where
 this uses the block factorisation (equal to rounding), and which also takes redundant rows, held
-bodies and the mass metric. ``begin_...`` stores references of a start as ``Machine.start`` does.
+bodies and the mass metric. ``begin_...`` stores references of a start as ``Evaluator.start`` does.
 """
 
 # What a compiled function returns is Any to mypy.
@@ -24,7 +24,7 @@ from dap3d_core.assembly.arrays import (
 )
 from dap3d_core.assembly.evaluate import call_kinds, place, place_bodies
 from dap3d_core.assembly.offsets import velocity_offset
-from dap3d_core.assembly.state_update import change_velocity, move
+from dap3d_core.assembly.state_update import apply_displacement, apply_velocity_change
 from dap3d_core.formulations.common.constraints import (
     PART,
     correct,
@@ -35,9 +35,9 @@ from dap3d_core.formulations.common.constraints import (
     velocity_residuals,
 )
 from dap3d_core.formulations.pivots import REDUNDANT
-from dap3d_core.kernels.runtime.cache import compiled, compiled_inside, compiled_into
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import A, W
-from dap3d_core.linear.ldlt.factor import POOR, assemble, factor, weigh_rows
+from dap3d_core.linear.ldlt.factor import SINGULAR_PIVOT_RATIO, assemble, factor, weigh_rows
 from dap3d_core.linear.rank.rank import PIVOT_TOLERANCE
 from dap3d_core.simulation.initial.assemble import (
     FIT,
@@ -53,7 +53,7 @@ from dap3d_core.simulation.initial.assemble import (
 SIZE, C_BEFORE, V_BEFORE, C_AFTER, V_AFTER, PASSES, LEAST_PIVOT, OPEN, STARTING = range(9)
 
 
-@compiled_inside
+@compiled
 def zero_rows(system: System, rows: Floats) -> None:
     """Zero the rows of D^ that are marked with 1."""
     blocks, D = system.blocks, system.D
@@ -65,7 +65,7 @@ def zero_rows(system: System, rows: Floats) -> None:
                     D[first + 6 * i + c] = 0.0
 
 
-@compiled_inside
+@compiled
 def factor_positions(system: System, without_position: Floats) -> None:
     """Factorise the rows with a position level; the unknowns of the others become zero."""
     smallest = system.smallest
@@ -75,7 +75,7 @@ def factor_positions(system: System, without_position: Floats) -> None:
     factor(system.nodes, system.columns, system.updates, system.K, smallest, True)
 
 
-@compiled_inside
+@compiled
 def least_pivot_fraction(system: System) -> float:
     """Least pivot of the factors in K as a fraction of the squared length of its row of D^."""
     squares = system.smallest
@@ -96,7 +96,7 @@ def length_of(a: Floats) -> float:
     return np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
-@compiled_inside
+@compiled
 def limit_displacement(system: System, max_shift: float) -> None:
     """Shorten the displacement ``change``, of unit metric, so that no body moves too far."""
     change, shift, turn = system.change, 0.0, 0.0
@@ -114,7 +114,7 @@ def limit_displacement(system: System, max_shift: float) -> None:
             change[k] *= ratio
 
 
-@compiled_inside
+@compiled
 def place_with_spin(y: Floats, system: System) -> None:
     """Place bodies that were rotated; angular velocities stay the same in global axes."""
     body, first = system.body, velocity_offset(1, system.body.shape[0] - 1)
@@ -153,7 +153,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         factor_positions(system, out[STARTING:])
         correct(system)
         limit_displacement(system, MOST_SHIFT * size / length)
-        move(y, system.metric, system.change)
+        apply_displacement(y, system.metric, system.change)
         place_with_spin(y, system)
         out[PASSES] += 1.0
     out[C_AFTER] = worst
@@ -162,7 +162,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
     out[LEAST_PIVOT] = least_pivot_fraction(system)
     if velocity_residuals(system) > 0.0:
         correct(system)
-        change_velocity(y, system.metric, system.change)
+        apply_velocity_change(y, system.metric, system.change)
         place_bodies(y, system.body, system.metric)
     out[V_AFTER] = velocity_residuals(system)
 
@@ -179,8 +179,8 @@ def store_start(t: float, y: Floats, system: System, loops: Any) -> None:
 
 
 @compiled_into
-def watch_pivots(t: float, system: System, loops: Any, part: float | None) -> None:
-    """Store reference pivots as ``formulations.pivots.watch_pivots``, at the bodies as placed."""
+def store_reference_pivots(t: float, system: System, loops: Any, part: float | None) -> None:
+    """Store reference pivots as ``formulations.pivots`` does, at the bodies as placed."""
     smallest, nodes, K = system.smallest, system.nodes, system.K
     for k in range(smallest.shape[0]):
         smallest[k] = 0.0
@@ -195,7 +195,7 @@ def watch_pivots(t: float, system: System, loops: Any, part: float | None) -> No
             pivot = abs(1.0 / K[diagonal + i * (size + 1)])
             if part is not None and pivot < REDUNDANT * system.compliance[first + i]:
                 pivot = 0.0
-            smallest[first + i] = POOR * pivot
+            smallest[first + i] = SINGULAR_PIVOT_RATIO * pivot
 
 
 @compiled
@@ -208,7 +208,7 @@ def begin_free(t: float, y: Floats, out: Floats, system: System, loops: Any) -> 
 def begin_standard(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Begin a run with joints of independent rows."""
     place(t, y, system, loops)
-    watch_pivots(t, system, loops, None)
+    store_reference_pivots(t, system, loops, None)
     store_start(t, y, system, loops)
 
 
@@ -216,5 +216,5 @@ def begin_standard(t: float, y: Floats, out: Floats, system: System, loops: Any)
 def begin_regularised(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Begin a run of the formulations with regularised factors."""
     place(t, y, system, loops)
-    watch_pivots(t, system, loops, PART)
+    store_reference_pivots(t, system, loops, PART)
     store_start(t, y, system, loops)

@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.model import Group, Model
 from dap3d_core.model.groups import Floats, Integers
@@ -24,11 +24,11 @@ from dap3d_core.study.batch.parameter_map import METRIC_WIDTH
 class PackedBatch:
     """Runs points of one model, ``count`` at a time. Not for two threads at once."""
 
-    def __init__(self, compiled: CompiledModel, one: Machine, times: Floats, count: int) -> None:
+    def __init__(self, compiled: CompiledModel, one: Evaluator, times: Floats, count: int) -> None:
         """Args: the model, a machine of it, reporting times, points at a time."""
-        many = Machine(packed(compiled.model, count), compiled.method)
+        many = Evaluator(packed(compiled.model, count), compiled.method)
         self._lanes = LaneLayout(one, many, count)
-        stops = compiled.pace(float(times[-1])).stops
+        stops = compiled.breakpoints(float(times[-1])).stops
         self._batch = CompiledBatch(many, compiled.scene.simulation, times, stops)
         self._shape = len(times), one.model.row_layout.size
         self.count = count
@@ -114,14 +114,14 @@ def _copies(group: Group, model: Model, count: int) -> Group:
 class LaneLayout:
     """Indices of the numbers and of the state of each copy in a machine of many."""
 
-    def __init__(self, one: Machine, many: Machine, count: int) -> None:
+    def __init__(self, one: Evaluator, many: Evaluator, count: int) -> None:
         """Args: a machine of the model, one of ``packed(model, count)``, number of copies."""
         self.count = count
         self._n = one.model.body_count
         self._row, self._row_of_many = one.model.row_layout, many.model.row_layout
         self._angles = [g.count * len(g.examined.layout.angles) for g in one.model.acting]
         self._par = np.full((count, one.system.par.size), -1, dtype=np.int64)
-        for q, (_, group) in enumerate(one.what):
+        for q, (_, group) in enumerate(one.loop_groups):
             first, first_of_many = (int(m.system.groups[q, 1]) for m in (one, many))
             size = group.numbers.size
             lanes = size * np.arange(count)[:, None]

@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.arrays import set_metric
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.types import Function
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
 from dap3d_core.model import Group
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.model.state_layout import from_integrated, join, split, to_integrated
-from dap3d_core.scene import Checked, Instance
+from dap3d_core.model.state_layout import join, split, u_from_y, y_from_u
+from dap3d_core.scene import Instance, ValidatedScene
 from dap3d_core.scene.validate.bodies import SMALLEST_INERTIA, ZERO_INERTIA
 from dap3d_core.scene.validate.coerce_values import LARGEST
 from dap3d_core.simulation.initial.assemble import model_size
@@ -87,14 +87,14 @@ class ParameterMap:
     """
 
     def __init__(
-        self, checked: Checked, machine: Machine, parameters: Sequence[SceneParameter]
+        self, checked: ValidatedScene, evaluator: Evaluator, parameters: Sequence[SceneParameter]
     ) -> None:
         """Find the entries.
 
         Raises:
             NotCopiedError: one of the parameters has none.
         """
-        self._checked, self._machine = checked, machine
+        self._checked, self._evaluator = checked, evaluator
         self._elements = (*checked.joints, *checked.forces, *checked.functions)
         self._poses = poses_of(checked)
         self._dependence: dict[int, Dependence] = {}
@@ -104,9 +104,9 @@ class ParameterMap:
         bodies = {p.path[1] for p in parameters if p.path[0] == "bodies"
                   and p.path[2] in ("mass", "Jp")}  # fmt: skip
         self._bodies = np.array(sorted(checked.body_index[b] - 1 for b in bodies), dtype=np.int64)
-        system, n = machine.system, 1 + self._bodies[:, None]
+        system, n = evaluator.system, 1 + self._bodies[:, None]
         par = np.arange(system.par.size)  # turns are counted from zero at the start of each run
-        counters = np.concatenate([par[:0], *(par[places] for places in machine.turn_places())])
+        counters = np.concatenate([par[:0], *(par[places] for places in evaluator.turn_places())])
         self._counters = len(counters)
         body = system.par.size + n * BODY_WIDTH
         metric = system.par.size + system.body.size + n * METRIC_WIDTH
@@ -152,11 +152,11 @@ class ParameterMap:
             if path[0] == "bodies" and path[2] in parts:
                 body = self._checked.body_index[path[1]] - 1
                 parts[path[2]][:, body, parameter.index[0]] = value
-        return to_integrated(join(r, p, v, w))
+        return y_from_u(join(r, p, v, w))
 
     def are_undefined(self, table: Floats, y0: Floats) -> Booleans:
         """Points at whose start y0 (k, 13 n + 1) the direction of an element is undefined."""
-        machine, count = self._machine, len(table)
+        evaluator, count = self._evaluator, len(table)
         first_of = {id(group): first for group, first in self._groups()}
 
         def numbers_of(group: Group) -> Floats:
@@ -166,7 +166,7 @@ class ParameterMap:
             numbers[:, self.places[own] - first] = table[:, own]
             return numbers.reshape(count, *group.numbers.shape)
 
-        return are_undefined(machine.model, from_integrated(y0), numbers_of, model_size(machine))
+        return are_undefined(evaluator.model, u_from_y(y0), numbers_of, model_size(evaluator))
 
     # ------------------------------------------------------------------ one parameter
 
@@ -261,7 +261,7 @@ class ParameterMap:
     def _rows_of(self, instance: Instance, group: Group) -> Integers:
         """Rows of a group whose numbers come from an element."""
         checked, kind = self._checked, group.examined.type.kind
-        has_friction = any(group is other for other in self._machine.model.friction)
+        has_friction = any(group is other for other in self._evaluator.model.friction)
         own: Any = ()
         if instance in checked.joints and kind == "joint":
             members = group.joints if has_friction else group.members
@@ -275,10 +275,10 @@ class ParameterMap:
     def _groups(self) -> Iterator[tuple[Group, int]]:
         """Each group of the model that has a loop, with the index in par of its first number."""
         seen = set()
-        for q, (_, group) in enumerate(self._machine.what):
+        for q, (_, group) in enumerate(self._evaluator.loop_groups):
             if id(group) not in seen:
                 seen.add(id(group))
-                yield group, int(self._machine.system.groups[q, 1])
+                yield group, int(self._evaluator.system.groups[q, 1])
 
     def _inertias(self, values: Floats) -> tuple[Floats, Floats, Booleans]:
         """Masses (k, b), inertia matrices (k, b, 3, 3) of bodies that vary; (k,) True if valid."""
@@ -301,7 +301,7 @@ class ParameterMap:
         return mass, Jp, valid
 
 
-def poses_of(checked: Checked) -> dict[int, BodyPose]:
+def poses_of(checked: ValidatedScene) -> dict[int, BodyPose]:
     """Poses of the bodies of a scene by index, ground included."""
     poses = {0: pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))}
     for k in range(len(checked.body_names)):
@@ -309,7 +309,7 @@ def poses_of(checked: Checked) -> dict[int, BodyPose]:
     return poses
 
 
-def _point_fields(checked: Checked, instance: Instance, point: str) -> Iterator[str]:
+def _point_fields(checked: ValidatedScene, instance: Instance, point: str) -> Iterator[str]:
     """Fields of an element that hold the coordinates of a declared point."""
     scene, table = checked.scene, f"{instance.examined.type.kind}s"
     element = getattr(scene, table)[instance.name]

@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import INFORMATION
-from dap3d_core.scene import Checked, SceneError, check
+from dap3d_core.scene import SceneError, ValidatedScene, check
 from dap3d_core.simulation import AssemblyError, CompiledModel
 from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.initial.breakpoints import stops_of
@@ -39,20 +39,23 @@ class ModelRebuilder:
     def __init__(
         self,
         compiled: CompiledModel,
-        machine: Machine,
+        evaluator: Evaluator,
         parameters: Sequence[SceneParameter],
         t_end: float,
     ) -> None:
-        self._compiled, self._machine, self._parameters = compiled, machine, parameters
+        self._compiled, self._evaluator, self._parameters = compiled, evaluator, parameters
         self._t_end = t_end
-        self._stops, self._terminal = compiled.pace(t_end).stops, effects_of(machine.switches)
+        self._stops, self._terminal = (
+            compiled.breakpoints(t_end).stops,
+            effects_of(evaluator.switches),
+        )
         settings = compiled.scene.simulation
         self._options = (bool(settings.correct), settings.hold, str(settings.correct_metric))
         self._rank = compiled.start(*self._options).redundancy.rank.rank
-        self.places = np.arange(_table_of(machine).size)
+        self.places = np.arange(_table_of(evaluator).size)
 
-    def load(self, point: Floats) -> tuple[Checked, Model]:
-        """Load the model of a point into the machine.
+    def load(self, point: Floats) -> tuple[ValidatedScene, Model]:
+        """Load the model of a point into the evaluator.
 
         Raises:
             SceneError, ModelError: mistakes of the scene with these values.
@@ -61,30 +64,30 @@ class ModelRebuilder:
         scene = with_values(self._compiled.scene, self._parameters, point.tolist())
         checked = check(scene, self._compiled.checked.registry)
         model = build_model(checked)
-        self._machine.load(model)
+        self._evaluator.load(model)
         return checked, model
 
     def prepare(self, point: Floats) -> RebuiltPoint | None:
         """A point as it starts; None where it cannot be run in a batch."""
-        machine = self._machine
+        evaluator = self._evaluator
         try:
             checked, model = self.load(point)
-            start = find_start(machine, *self._options)
+            start = find_start(evaluator, *self._options)
         except (SceneError, ModelError, AssemblyError, ValueError):
             return None
         if start.redundancy.rank.rank != self._rank or not start.redundancy.is_plain:
             return None
         if stops_of(checked, model, self._t_end) != self._stops:
             return None
-        if not np.array_equal(effects_of(machine.switches), self._terminal):
+        if not np.array_equal(effects_of(evaluator.switches), self._terminal):
             return None
-        if undefined_directions(checked.scene, model, start.u, model_size(machine)):
+        if undefined_directions(checked.scene, model, start.u, model_size(evaluator)):
             return None
-        notes = start_notes(start, machine, checked.scene)
+        notes = start_notes(start, evaluator, checked.scene)
         warnings = tuple(note for note in notes if not note.startswith(INFORMATION))
-        return RebuiltPoint(_table_of(machine), machine.integrated(start.u), warnings)
+        return RebuiltPoint(_table_of(evaluator), evaluator.integrated(start.u), warnings)
 
 
-def _table_of(machine: Machine) -> Floats:
-    s = machine.system
+def _table_of(evaluator: Evaluator) -> Floats:
+    s = evaluator.system
     return np.concatenate([s.par, s.body.ravel(), s.metric.ravel()])

@@ -6,7 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.scene import Checked, Mistake, SceneError
+from dap3d_core.scene import Mistake, SceneError, ValidatedScene
 from dap3d_core.study.parameters import SceneParameter, parameters_named
 
 FORMS = "a start, (start, low, high), a Parameter, or None for the number of the scene"
@@ -39,7 +39,9 @@ class Parameter:
         return span / 10.0 if np.isfinite(span) and span > 0.0 else 1.0
 
 
-def read_parameters(checked: Checked, given: Any) -> tuple[dict[str, Parameter], list[Mistake]]:
+def read_parameters(
+    checked: ValidatedScene, given: Any
+) -> tuple[dict[str, Parameter], list[Mistake]]:
     """Parameters as ``fit`` takes them, by name, with their starts; and mistakes."""
     if isinstance(given, str):
         given = [given]

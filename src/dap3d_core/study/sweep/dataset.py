@@ -67,7 +67,7 @@ class Coordinate(Variable):
 
 
 @attrs.frozen(eq=False)
-class Layout:
+class SweepLayout:
     """What a sweep's data set is made of, but for what the runs give.
 
     Attributes:
@@ -104,7 +104,7 @@ class Layout:
         return tuple(self.sizes[name] for name in variable.dimensions)
 
 
-def layout_of(ensemble: Ensemble, design: Design, points: Floats) -> Layout:
+def layout_of(ensemble: Ensemble, design: Design, points: Floats) -> SweepLayout:
     """The layout of a sweep.
 
     Args:
@@ -137,7 +137,7 @@ def layout_of(ensemble: Ensemble, design: Design, points: Floats) -> Layout:
         for output in ensemble.outputs
     ]
     about_all = _attributes(ensemble, design)
-    return Layout(sizes, design.dimensions, tuple(coordinates), tuple(outputs), about_all)
+    return SweepLayout(sizes, design.dimensions, tuple(coordinates), tuple(outputs), about_all)
 
 
 def _attributes(ensemble: Ensemble, design: Design) -> dict[str, Any]:
@@ -169,7 +169,7 @@ class InMemory:
         layout: of the data set.
     """
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: SweepLayout) -> None:
         self.layout = layout
         count = layout.count
         self._status = np.zeros(count, dtype=np.int8)

@@ -15,8 +15,8 @@ from dap3d_core.result.file.checksum import WHOLE, check_checksums, check_signat
 from dap3d_core.result.file.library import NETCDF, guarded, opened, reading
 from dap3d_core.result.file.write import GrowingFile
 from dap3d_core.study.study import Batch, PointStatus
-from dap3d_core.study.sweep.dataset import Layout, check_format
-from dap3d_core.study.sweep.file_claim import Claim
+from dap3d_core.study.sweep.dataset import SweepLayout, check_format
+from dap3d_core.study.sweep.file_claim import FileLock
 from dap3d_core.study.sweep.schema import boxes, define, note_letters
 
 Integers = NDArray[np.int64]
@@ -38,7 +38,7 @@ IDENTITY = {
 }
 
 
-class Growing(GrowingFile):
+class SweepFile(GrowingFile):
     """The points of a sweep in ``NAME.part``, which gets its name when all are complete.
 
     The status of a point is written once its values are on the disk. The file is open only while
@@ -49,7 +49,7 @@ class Growing(GrowingFile):
     """
 
     def __init__(
-        self, layout: Layout, output: str | os.PathLike[str], *, force: bool, resume: bool
+        self, layout: SweepLayout, output: str | os.PathLike[str], *, force: bool, resume: bool
     ) -> None:
         """Creates the part, or continues that of an interrupted sweep.
 
@@ -68,7 +68,7 @@ class Growing(GrowingFile):
         self._waiting: list[tuple[Integers, Batch]] = []
         self._is_empty = not resume
         self._written = time.monotonic()
-        self._claim = Claim(self.target)
+        self._claim = FileLock(self.target)
         try:
             with NETCDF:
                 if resume:

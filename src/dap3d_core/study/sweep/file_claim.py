@@ -7,7 +7,7 @@ from dap3d_core.result import ResultError
 from dap3d_core.result.file.atomic_write import cannot
 
 
-class Claim:
+class FileLock:
     """A lock on ``NAME.lock`` beside a sweep's file, held from its first point to its end.
 
     The system lets go of it when the process ends, however it ends: a lock file that is left over

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.result.file.schema import write_attributes
 from dap3d_core.study.study import PointStatus
-from dap3d_core.study.sweep.dataset import ABOUT_NOTE, ABOUT_STATUS, Layout
+from dap3d_core.study.sweep.dataset import ABOUT_NOTE, ABOUT_STATUS, SweepLayout
 
 #: Bytes of a note in the file, allocated from the start.
 NOTE = 200
@@ -55,7 +55,7 @@ def note_letters(notes: NDArray[Any]) -> NDArray[np.bytes_]:
     return letters
 
 
-def define(dataset: Any, layout: Layout) -> None:
+def define(dataset: Any, layout: SweepLayout) -> None:
     """Defines a new file, each variable contiguous, and writes what is known.
 
     Outputs are NaN at first; absent notes take no space on a disk.

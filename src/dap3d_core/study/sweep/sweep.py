@@ -16,7 +16,7 @@ from dap3d_core.study.ensemble import Ensemble
 from dap3d_core.study.outputs import outputs_of
 from dap3d_core.study.study import Study
 from dap3d_core.study.sweep.dataset import InMemory, layout_of, open_sweep
-from dap3d_core.study.sweep.file import Growing
+from dap3d_core.study.sweep.file import SweepFile
 from dap3d_core.study.sweep.schema import NOTE
 from dap3d_core.study.workers.threads import RunPoints, run_here
 
@@ -200,12 +200,12 @@ class _Runner:
             ensemble.prepare()
         points = plan.points()
         layout = layout_of(ensemble, plan, points)
-        store: InMemory | Growing = InMemory(layout)
+        store: InMemory | SweepFile = InMemory(layout)
         if output is not None:
-            store = Growing(layout, output, force=self.force, resume=self.resume)
+            store = SweepFile(layout, output, force=self.force, resume=self.resume)
         try:
             self._run_points(ensemble, points, store)
-            if isinstance(store, Growing):
+            if isinstance(store, SweepFile):
                 store.finish()
         except BaseException as error:
             with suppress(ResultError, AttributeError):
@@ -224,7 +224,7 @@ class _Runner:
         if mistakes:
             raise SceneError(mistakes)
 
-    def _run_points(self, ensemble: Ensemble, points: Any, store: InMemory | Growing) -> None:
+    def _run_points(self, ensemble: Ensemble, points: Any, store: InMemory | SweepFile) -> None:
         todo, total = store.todo, len(points)
         done = total - len(todo)
         self._report(done, total)
@@ -248,7 +248,7 @@ class _Runner:
             self.progress(done, total)
 
 
-def _partial_result(store: InMemory | Growing) -> "xarray.Dataset":
+def _partial_result(store: InMemory | SweepFile) -> "xarray.Dataset":
     """The points that an interrupted sweep has computed; its part stays."""
     if isinstance(store, InMemory):
         return store.dataset()

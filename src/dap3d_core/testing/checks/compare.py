@@ -6,7 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.testing.checks.findings import FAILED, LEFT_OUT, OK, Finding, Outcome
+from dap3d_core.testing.checks.findings import FAILED, LEFT_OUT, OK, CheckOutcome, Finding
 from dap3d_core.testing.samples.random_state import Direction, Floats
 from dap3d_core.testing.samples.sampled_type import Sample, SampledType
 
@@ -123,12 +123,12 @@ class Comparison:
         """Add a note, once."""
         self.notes[words] = None
 
-    def outcome(self, *, sized: bool = True) -> Outcome:
+    def outcome(self, *, sized: bool = True) -> CheckOutcome:
         """The outcome of the check."""
         findings = tuple(finding for _, finding in self._worst.values())
         error, state = self.largest if sized else None, FAILED if findings else OK
         variant, notes = self.subject.variant, tuple(self.notes)
-        return Outcome(
+        return CheckOutcome(
             self.check, variant, state, self.words, error, self.differences, notes, findings
         )
 
@@ -146,9 +146,9 @@ class Comparison:
         )
 
 
-def left_out(check: str, subject: SampledType, why: str) -> Outcome:
+def left_out(check: str, subject: SampledType, why: str) -> CheckOutcome:
     """The outcome of a check that does not apply."""
-    return Outcome(check, subject.variant, LEFT_OUT, why)
+    return CheckOutcome(check, subject.variant, LEFT_OUT, why)
 
 
 @attrs.frozen(eq=False)

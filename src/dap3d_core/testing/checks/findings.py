@@ -37,7 +37,7 @@ class Finding:
 
 
 @attrs.frozen
-class Outcome:
+class CheckOutcome:
     """The outcome of one check of a type, or of one of its variants.
 
     Attributes:
@@ -97,7 +97,7 @@ class Report:
     title: str
     seed: int
     poses: int
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[CheckOutcome, ...]
 
     @property
     def ok(self) -> bool:

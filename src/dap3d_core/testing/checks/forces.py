@@ -7,7 +7,7 @@ import numpy as np
 
 from dap3d_core.interface.examine.random_values import numbers, random_pose
 from dap3d_core.testing.checks.compare import Comparison, body_words, rates
-from dap3d_core.testing.checks.findings import Outcome
+from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.samples.random_state import Direction, Floats, State, rotation
 from dap3d_core.testing.samples.sampled_type import UNDEFINED, Sample, SampledType
 
@@ -32,7 +32,7 @@ _ENERGY_FRAME = (
 )
 
 
-def potential(subject: SampledType) -> Outcome:
+def potential(subject: SampledType) -> CheckOutcome:
     """At rest the wrench is minus the derivative of the energy."""
     c = Comparison("energy", subject, "energy", "the wrench at rest against -dE/dq")
     for sample in subject.samples:
@@ -57,7 +57,7 @@ def potential(subject: SampledType) -> Outcome:
     return c.outcome()
 
 
-def balance(subject: SampledType, kernel: str = "wrench") -> Outcome:
+def balance(subject: SampledType, kernel: str = "wrench") -> CheckOutcome:
     """Forces and moments on all bodies sum to zero."""
     c = Comparison("action and reaction", subject, kernel, "forces and moments sum to zero")
     for sample in subject.samples:
@@ -73,7 +73,7 @@ def balance(subject: SampledType, kernel: str = "wrench") -> Outcome:
     return c.outcome()
 
 
-def frame(subject: SampledType, kernel: str = "wrench") -> Outcome:
+def frame(subject: SampledType, kernel: str = "wrench") -> CheckOutcome:
     """A common rigid motion of all bodies: the wrench turns with them."""
     c = Comparison("frame", subject, kernel, "a common rigid motion turns the wrench, no more")
     for k, sample in enumerate(subject.samples):
@@ -96,7 +96,7 @@ def frame(subject: SampledType, kernel: str = "wrench") -> Outcome:
     return c.outcome()
 
 
-def dissipation(subject: SampledType) -> Outcome:
+def dissipation(subject: SampledType) -> CheckOutcome:
     """The power of friction is not positive."""
     c = Comparison("friction", subject, "friction", "the power of friction is negative or zero")
     for sample in subject.samples:

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.testing.checks.compare import Comparison, rates
-from dap3d_core.testing.checks.findings import Outcome
+from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.samples.random_state import Direction
 from dap3d_core.testing.samples.sampled_type import SampledType
 
@@ -19,7 +19,7 @@ _WRONG = (
 NAMES = ("f", "f'", "f''", "f'''")
 
 
-def derivatives(subject: SampledType) -> Outcome:
+def derivatives(subject: SampledType) -> CheckOutcome:
     """Each number that ``value`` returns is the derivative of the previous one."""
     what = "f', f'' and f''' against derivatives of f, f' and f''"
     c = Comparison("derivatives", subject, "value", what)

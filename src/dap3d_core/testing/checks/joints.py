@@ -10,7 +10,7 @@ from dap3d_core.testing.checks.compare import (
     body_words,
     rates,
 )
-from dap3d_core.testing.checks.findings import Outcome
+from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.checks.forces import rigid_motion
 from dap3d_core.testing.samples.random_state import Direction, Floats
 from dap3d_core.testing.samples.sampled_type import Sample, SampledType, position_jacobian
@@ -75,7 +75,7 @@ _BALANCE = (
 )
 
 
-def jacobian(subject: SampledType) -> Outcome:
+def jacobian(subject: SampledType) -> CheckOutcome:
     """J is the derivative of C."""
     c = Comparison("J", subject, "J", "J against dC/dq, by complex step and by differences")
     rows = subject.type.position_rows()
@@ -92,7 +92,7 @@ def jacobian(subject: SampledType) -> Outcome:
     return c.outcome()
 
 
-def velocity_side(subject: SampledType) -> Outcome:
+def velocity_side(subject: SampledType) -> CheckOutcome:
     """The side nu is minus the rate of C in time at a fixed pose."""
     c = Comparison("nu", subject, "nu", "nu against -dC/dt at a fixed pose")
     rows, is_defined = subject.type.position_rows(), "nu" in subject.kernels.names()
@@ -105,7 +105,7 @@ def velocity_side(subject: SampledType) -> Outcome:
     return c.outcome()
 
 
-def velocity_form(subject: SampledType) -> Outcome:
+def velocity_form(subject: SampledType) -> CheckOutcome:
     """The form C_dot that a type gives for its velocity rows is J v - nu."""
     c = Comparison("velocity form", subject, "C_dot", "C_dot against J v - nu")
     rows = subject.type.velocity_rows()
@@ -120,7 +120,7 @@ def velocity_form(subject: SampledType) -> Outcome:
     return c.outcome()
 
 
-def acceleration_side(subject: SampledType) -> Outcome:
+def acceleration_side(subject: SampledType) -> CheckOutcome:
     """Gamma is the right-hand side of J v_dot = gamma, from d/dt (J v - nu) = 0.
 
     Rows with a wrong J or nu are compared with C (or C_dot).
@@ -184,7 +184,7 @@ def _rows_apart(subject: SampledType) -> dict[int, str]:
     return forms
 
 
-def virtual_power(subject: SampledType) -> Outcome:
+def virtual_power(subject: SampledType) -> CheckOutcome:
     """Reactions do no work on velocities that C allows at a fixed time."""
     c = Comparison("virtual power", subject, "J", "reactions J^T lambda do no work where C allows")
     rows = subject.type.position_rows()
@@ -196,7 +196,7 @@ def virtual_power(subject: SampledType) -> Outcome:
     return c.outcome()
 
 
-def frame(subject: SampledType) -> Outcome:
+def frame(subject: SampledType) -> CheckOutcome:
     """A common rigid motion of all bodies: allowed velocities turn with the bodies."""
     c = Comparison(
         "frame", subject, "C", "the same motions are allowed after a common rigid motion"
@@ -223,7 +223,7 @@ def frame(subject: SampledType) -> Outcome:
     return c.outcome()
 
 
-def action_and_reaction(subject: SampledType) -> Outcome:
+def action_and_reaction(subject: SampledType) -> CheckOutcome:
     """Forces, and at C = 0 moments, of a row of J on all bodies sum to zero."""
     c = Comparison(
         "action and reaction", subject, "J", "forces and moments of each row sum to zero"
@@ -243,7 +243,7 @@ def action_and_reaction(subject: SampledType) -> Outcome:
     return c.outcome()
 
 
-def assembly(subject: SampledType) -> Outcome:
+def assembly(subject: SampledType) -> CheckOutcome:
     """There are poses with C = 0."""
     c = Comparison("assembly", subject, "C", "C = 0 is reached from random poses")
     count = len(subject.assembled)
@@ -257,7 +257,7 @@ def assembly(subject: SampledType) -> Outcome:
     return c.outcome()
 
 
-def rank(subject: SampledType) -> Outcome:
+def rank(subject: SampledType) -> CheckOutcome:
     """The rows of J are independent at one or more of the poses."""
     c = Comparison("rank", subject, "J", f"rank of J against {subject.type.rows} declared rows")
     size = np.max([np.linalg.norm(_rows_of_J(s), axis=1) for s in subject.samples], axis=0)

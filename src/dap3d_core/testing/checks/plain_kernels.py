@@ -10,7 +10,7 @@ from dap3d_core.interface.errors import line_of, plain_words
 from dap3d_core.interface.examine.examine import ATTEMPTS
 from dap3d_core.interface.examine.random_values import random_quantity
 from dap3d_core.testing.checks.compare import Comparison
-from dap3d_core.testing.checks.findings import Outcome
+from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.samples.complex_step import Stepped
 from dap3d_core.testing.samples.sampled_type import UNDEFINED, SampledType
 
@@ -69,7 +69,7 @@ class OpaqueNumber(Stepped):
     __round__ = _has_no_digits  # type: ignore[assignment]
 
 
-def plain(subject: SampledType) -> Outcome:
+def plain(subject: SampledType) -> CheckOutcome:
     """Kernels branch by ``where`` only, and take their mathematics from the words of kernels."""
     words = "kernels run on numbers that are no floats, as derivatives and compilers have them"
     c = Comparison("plain", subject, "", words)

@@ -13,7 +13,7 @@ from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.kernels.runtime.source_digest import reached
 from dap3d_core.testing.checks.compare import Comparison, left_out
-from dap3d_core.testing.checks.findings import Outcome
+from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.samples.sampled_type import Sample, SampledType, UndefinedError
 
 #: Compiled and plain code round differently (a b + c in one rounding).
@@ -28,7 +28,7 @@ CONSTANTS = (bool, int, float, complex, str, bytes, type(None), type, types.Func
              types.BuiltinFunctionType, np.generic, np.ufunc)  # fmt: skip
 
 
-def purity(subject: SampledType) -> Outcome:
+def purity(subject: SampledType) -> CheckOutcome:
     """Kernels return the same numbers each time, and read and change nothing outside."""
     c = Comparison("purity", subject, "", "the same numbers each time, nothing from outside")
     for name in _names(subject):
@@ -75,7 +75,7 @@ def _names(subject: SampledType) -> tuple[str, ...]:
     return (*subject.kernels.names(), *(("friction",) if _has_friction(subject) else ()))
 
 
-def compiled(subject: SampledType) -> Outcome:
+def compiled(subject: SampledType) -> CheckOutcome:
     """Compiled kernels return the numbers of plain Python."""
     if not jit_is_on():
         return left_out("compiled", subject, "nothing is compiled (DAP3D_PLAIN)")

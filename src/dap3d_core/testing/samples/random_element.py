@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.interface.body_pose import BodyPose, pose
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH, size
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
 from dap3d_core.interface.errors import where_is
@@ -36,7 +36,7 @@ class RefusalError(ValueError):
 
 
 @attrs.frozen(eq=False)
-class Element:
+class RandomElement:
     """An instance: its numbers as a group loop reads them.
 
     Attributes:
@@ -60,7 +60,7 @@ class Kernels:
         examined: the type, with known functions of an argument.
     """
 
-    examined: Examined
+    examined: TypeInfo
     _plain: dict[str, Any] = attrs.field(factory=dict)
     _compiled: dict[str, Any] = attrs.field(factory=dict)
 
@@ -69,7 +69,7 @@ class Kernels:
         kernels = self.examined.kernels
         return tuple(n for n in kernels if n != "friction" or len(kernels) == 1)
 
-    def value(self, name: str, element: Element, state: State) -> Floats:
+    def value(self, name: str, element: RandomElement, state: State) -> Floats:
         """The value of a kernel, as an array of its rows.
 
         C (position rows,), C_dot (velocity rows,), J (slots, rows, 6), gamma and nu (rows,), wrench
@@ -78,7 +78,7 @@ class Kernels:
         body, table = state.body().astype(object), state.table().astype(object)
         return self._run(name, element, float(state.t), body, table).astype(float)
 
-    def slope(self, name: str, element: Element, state: State, along: Any) -> Floats:
+    def slope(self, name: str, element: RandomElement, state: State, along: Any) -> Floats:
         """The derivative of a kernel along a direction, by complex step.
 
         Raises:
@@ -90,7 +90,9 @@ class Kernels:
         slopes = [x.imag / STEP if isinstance(x, complex) else 0.0 for x in value.ravel()]
         return np.array(slopes).reshape(value.shape)
 
-    def _run(self, name: str, element: Element, t: Any, body: Any, table: Any) -> NDArray[Any]:
+    def _run(
+        self, name: str, element: RandomElement, t: Any, body: Any, table: Any
+    ) -> NDArray[Any]:
         if name not in self._plain:
             kernel = {name: self.examined.kernels[name]}
             loop: Any = write(attrs.evolve(self.examined, kernels=kernel), LOOP_OF[name])
@@ -104,7 +106,7 @@ class Kernels:
         value: NDArray[Any] = self._value_in(name, table, outs)
         return value
 
-    def compiled_values(self, kind: str, element: Element, state: State) -> dict[str, Floats]:
+    def compiled_values(self, kind: str, element: RandomElement, state: State) -> dict[str, Floats]:
         """The values of the kernels of a loop, run compiled, by name.
 
         Raises:
@@ -121,7 +123,7 @@ class Kernels:
         names = [n for n in LOOP_KINDS[kind] if n in self.examined.kernels]
         return {name: self._value_in(name, table, outs) for name in names}
 
-    def _outs(self, dtype: Any, element: Element) -> tuple[NDArray[Any], ...]:
+    def _outs(self, dtype: Any, element: RandomElement) -> tuple[NDArray[Any], ...]:
         """Three outputs, large enough for every kernel; the second holds a joint's multipliers."""
         rows = getattr(self.examined.type, "rows", 0)
         count = 6 * BODIES * max(rows, 1) + len(self.examined.outputs.get("switch", ()))
@@ -164,8 +166,8 @@ def _stepped(values: Floats, rates: Floats) -> NDArray[Any]:
 
 
 def draw(
-    examined: Examined, choices: Mapping[str, Any], rng: random.Random, state: State
-) -> Element:
+    examined: TypeInfo, choices: Mapping[str, Any], rng: random.Random, state: State
+) -> RandomElement:
     """An element with random fields, prepared for the poses of a state.
 
     Args:
@@ -194,7 +196,7 @@ def draw(
     values = _values(examined, fields, poses, rng)
     shown = {n: v for n, v in fields.items() if isinstance(v, (bool, int, float, str, tuple))}
     lam = numbers(rng, getattr(examined.type, "rows", 0))
-    return Element(shown, tuple(idx), tuple(_numbers(examined, values, rng)), lam)
+    return RandomElement(shown, tuple(idx), tuple(_numbers(examined, values, rng)), lam)
 
 
 def _field(spec: FieldSpec, rng: random.Random) -> Any:
@@ -207,7 +209,7 @@ def _field(spec: FieldSpec, rng: random.Random) -> Any:
 
 
 def _values(
-    examined: Examined,
+    examined: TypeInfo,
     fields: dict[str, Any],
     poses: Mapping[str, BodyPose],
     rng: random.Random,
@@ -231,7 +233,7 @@ def _values(
         raise RefusalError(f"{where_is(examined.type)}.prepare refuses: {error}") from error
 
 
-def _numbers(examined: Examined, values: Mapping[str, Any], rng: random.Random) -> list[float]:
+def _numbers(examined: TypeInfo, values: Mapping[str, Any], rng: random.Random) -> list[float]:
     layout, fields = examined.layout, specs_of(examined.type)
     par = [rng.uniform(0.5, 1.5) for _ in range(layout.par_width)]  # of given functions, too
     for name, (offset, shape) in layout.numbers.items():
@@ -254,4 +256,4 @@ def _numbers(examined: Examined, values: Mapping[str, Any], rng: random.Random) 
     return par
 
 
-__all__ = ["ATTEMPTS", "LOOP_OF", "Element", "Kernels", "RefusalError", "draw"]
+__all__ = ["ATTEMPTS", "LOOP_OF", "RandomElement", "Kernels", "RefusalError", "draw"]

@@ -9,13 +9,13 @@ from typing import Any, TypeVar
 import attrs
 import numpy as np
 
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, examine
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.testing.samples.cubic import Cubic
-from dap3d_core.testing.samples.random_element import Element, Kernels, RefusalError, draw
+from dap3d_core.testing.samples.random_element import Kernels, RandomElement, RefusalError, draw
 from dap3d_core.testing.samples.random_state import Direction, Floats, State, random_state
 
 Cached = TypeVar("Cached")
@@ -47,7 +47,7 @@ class Sample:
     """
 
     kernels: Kernels
-    element: Element
+    element: RandomElement
     state: State
     grounded: bool
     label: str
@@ -124,7 +124,7 @@ class SampledType:
         seed, poses: of the samples, and the number of each sort.
     """
 
-    examined: Examined
+    examined: TypeInfo
     choices: Mapping[str, Any]
     seed: int
     poses: int
@@ -219,7 +219,7 @@ class SampledType:
                 yield attrs.evolve(samples[-1], label=f"pose {k + 1} on the manifold")
 
 
-def sampled_types(examined: Examined, seed: int, poses: int) -> list[SampledType]:
+def sampled_types(examined: TypeInfo, seed: int, poses: int) -> list[SampledType]:
     """The type itself, unless variants replace it for all values, and its variants."""
     variants = []
     own = own_values(examined)
@@ -229,13 +229,13 @@ def sampled_types(examined: Examined, seed: int, poses: int) -> list[SampledType
     return [SampledType(_given(e, values), values, seed, poses) for values, e in variants]
 
 
-def _given(examined: Examined, values: Mapping[str, Any]) -> Examined:
+def _given(examined: TypeInfo, values: Mapping[str, Any]) -> TypeInfo:
     """The type with a cubic for each function of an argument, unless the variant has none."""
     given = {f: examine(Cubic) for f in examined.argument_functions if values.get(f, True)}
     return bind_functions(examined, given, dict.fromkeys(given, 0)) if given else examined
 
 
-def own_values(examined: Examined) -> dict[str, Any] | None:
+def own_values(examined: TypeInfo) -> dict[str, Any] | None:
     """Values of choices for which no variant replaces the type; None where there are none."""
     specs = specs_of(examined.type)
     names = [n for n in specs if any(n in conditions for conditions, _ in examined.variants)]

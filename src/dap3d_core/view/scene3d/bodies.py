@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.result.model_summary import Subject
+from dap3d_core.result.model_summary import ModelSummary
 from dap3d_core.view.scene3d.elements import ORIGIN, ElementGeometry
 from dap3d_core.view.scene3d.primitives import Mark, Point, ball, plain, rod
 
@@ -13,7 +13,9 @@ from dap3d_core.view.scene3d.primitives import Mark, Point, ball, plain, rod
 _SAME = 1e-6
 
 
-def attachment_points(subject: Subject, elements: Iterable[ElementGeometry]) -> list[list[Point]]:
+def attachment_points(
+    subject: ModelSummary, elements: Iterable[ElementGeometry]
+) -> list[list[Point]]:
     """The points (m, body axes) of each body, ground first: its own, and those of elements.
 
     The origin is left out, and so are duplicates.

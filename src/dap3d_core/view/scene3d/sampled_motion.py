@@ -52,7 +52,7 @@ def at_instants(result: Result, index: Integers) -> Result:
         result.subject,
         result.arrays.at(index),
         result.record,
-        lambda: (result.model, lambda: result.machine),
+        lambda: (result.model, lambda: result.evaluator),
     )
 
 

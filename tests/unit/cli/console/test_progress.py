@@ -6,12 +6,12 @@ from dap3d_core.cli.console import progress
 from dap3d_core.cli.console.progress import (
     ONCE,
     PointsProgress,
-    RunProgress,
+    ProgressBar,
     live_line,
     plain_line,
     points_line,
 )
-from dap3d_core.simulation import Standing
+from dap3d_core.simulation import RunProgress
 
 
 @pytest.fixture
@@ -23,12 +23,12 @@ def clock(monkeypatch):
 
 
 def standing(t, t_end=100.0):
-    return Standing(t=t, t_end=t_end, steps=int(10 * t), step=0.1, drift=2e-9)
+    return RunProgress(t=t, t_end=t_end, steps=int(10 * t), step=0.1, drift=2e-9)
 
 
 def test_lines_come_ever_more_rarely_and_estimate_what_is_left(clock, capsys, monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)  # lines are as long as they are
-    with RunProgress(quiet=False) as shown:
+    with ProgressBar(quiet=False) as shown:
         for k in range(101):
             clock[0] = float(k)
             shown.advance(standing(0.5 * k))
@@ -43,14 +43,14 @@ def test_lines_come_ever_more_rarely_and_estimate_what_is_left(clock, capsys, mo
 
 
 def test_compilation_is_announced_once_with_its_names(capsys):
-    with RunProgress(quiet=False) as shown:
+    with ProgressBar(quiet=False) as shown:
         shown.announce("sph: C")
         shown.announce("rev: C")
     assert capsys.readouterr().err.splitlines() == [ONCE, "  sph: C", "  rev: C"]
 
 
 def test_quiet_is_quiet(clock, capsys):
-    with RunProgress(quiet=True) as shown:
+    with ProgressBar(quiet=True) as shown:
         shown.announce("sph: C")
         shown.start()
         for k in range(100):
@@ -123,7 +123,7 @@ def test_the_line_of_points_fits(width, total, rate):
 def test_a_long_correction_says_that_it_goes_on(capfd, monkeypatch):
     """Elsewhere than on a terminal, until the run tells of itself: no command hangs wordless."""
     monkeypatch.setattr(progress, "SILENCE", 0.01)
-    with RunProgress(quiet=False) as shown:
+    with ProgressBar(quiet=False) as shown:
         shown.start()
         said = ""
         while said.count("\n") < 2:  # ends as soon as the second line is there
@@ -137,7 +137,7 @@ def test_a_long_correction_says_that_it_goes_on(capfd, monkeypatch):
 
 def test_a_run_that_cannot_leave_its_start_is_told_of(clock, capsys):
     """Steps that are rejected again and again at t = 0 are work without an end, too."""
-    with RunProgress(quiet=False) as shown:
+    with ProgressBar(quiet=False) as shown:
         for k in range(5):
             clock[0] = float(k)
             shown.advance(standing(0.0))

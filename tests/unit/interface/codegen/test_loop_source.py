@@ -188,14 +188,14 @@ MOTION = Motion(3, np.random.default_rng(11))
 
 def wrenches(scene, t, u):
     """(3, 6) sums of forces and moments that the loops of a scene store at a state."""
-    machine = dap.compile(scene, registry=REGISTRY).machine
-    s = machine.system
-    place_bodies(machine.integrated(u), s.body, s.metric)
+    evaluator = dap.compile(scene, registry=REGISTRY).evaluator
+    s = evaluator.system
+    place_bodies(evaluator.integrated(u), s.body, s.metric)
     s.force[:] = 0.0
     for kind in (VALUE, WRENCH):
-        call_kinds(kind, kind, t, s, machine.loops, s.force, s.force, s.force)
+        call_kinds(kind, kind, t, s, evaluator.loops, s.force, s.force, s.force)
     assert np.array_equal(s.force[:6], np.zeros(6)) or scene.points["Q_k"].body == "ground"
-    return s.force[6:].reshape(3, 6), machine
+    return s.force[6:].reshape(3, 6), evaluator
 
 
 class Truth:
@@ -297,8 +297,8 @@ def test_ground_has_the_identity_pose_and_no_velocity():
     """With slot k on ground the arm is the point itself and its velocity zero; ground's forces are
     kept apart."""
     scene = scene_of("points", "velocities", k="ground")
-    _, machine = wrenches(scene, T, U)
-    on_ground = machine.system.force[:6]
+    _, evaluator = wrenches(scene, T, U)
+    on_ground = evaluator.system.force[:6]
     assert np.allclose(on_ground[:3], 2 * np.array(SPOTS["Q_k"]), **CLOSE)
     assert np.allclose(on_ground[3:], 2 * np.array(SPOTS["Q_k"]), **CLOSE)
 
@@ -307,29 +307,29 @@ def test_an_element_on_each_body_has_its_own_constants():
     """``each_body``: wrench and energy for each body in turn, with what ``prepare`` found there."""
     scene = scene_of()
     scene.add_force("pull", k=2.0)
-    found, machine = wrenches(scene, T, U)
+    found, evaluator = wrenches(scene, T, U)
     r = np.array(list(START.r.values()))
     wanted = np.column_stack([2.0 * np.array([1.0, 2.0, 3.0]) * r[:, 0], r[:, 1:]])
     assert np.allclose(found[:, :3], wanted, **CLOSE)
     assert np.allclose(found[:, 3:], list(NOW.w.values()), **CLOSE)
-    s, energy = machine.system, np.zeros(1)
-    call_kinds(ENERGY, ENERGY, T, s, machine.loops, energy, energy, energy)
+    s, energy = evaluator.system, np.zeros(1)
+    call_kinds(ENERGY, ENERGY, T, s, evaluator.loops, energy, energy, energy)
     assert energy[0] == pytest.approx(2.0 * sum(x[2] for x in NOW.r.values()), rel=1e-13)
 
 
 def test_functions_stand_in_their_rows():
     """F has a row for each function in file order, after that of the absent one; what no element
     uses is not evaluated and stays zero; the columns are f, f', f'', f''', and f at t = 0."""
-    _, machine = wrenches(scene_of("functions"), T, U)
+    _, evaluator = wrenches(scene_of("functions"), T, U)
     wanted = [np.zeros(4), np.zeros(4), [*CUBE, 3.0], [*LINE, 0.0]]
-    assert np.allclose(machine.system.F[:, :4], wanted, **CLOSE)
-    assert np.allclose(machine.system.F[:, 4], machine_at_zero(), **CLOSE)
+    assert np.allclose(evaluator.system.F[:, :4], wanted, **CLOSE)
+    assert np.allclose(evaluator.system.F[:, 4], machine_at_zero(), **CLOSE)
 
 
 def machine_at_zero():
     """f(0) of the absent function and of the three of the scene."""
-    _, machine = wrenches(scene_of("functions"), 0.0, U)
-    return machine.system.F[:, 0]
+    _, evaluator = wrenches(scene_of("functions"), 0.0, U)
+    return evaluator.system.F[:, 0]
 
 
 # ------------------------------------------------------------------ rows of joints
@@ -367,8 +367,8 @@ def test_rows_of_a_joint_stand_in_their_places():
     fields = {"P_i": "P_i", "body_j": "two", "function": "line"}
     scene.add_joint("lift", "first", **fields, P_k="Q_k")
     scene.add_joint("lift", "second", **fields, P_k="P_g")
-    machine = dap.compile(scene, registry=registry_of(Lift, Cubic)).machine
-    rows, D = machine.rows(T, U), machine.rows(T, U).dense()
+    evaluator = dap.compile(scene, registry=registry_of(Lift, Cubic)).evaluator
+    rows, D = evaluator.rows(T, U), evaluator.rows(T, U).dense()
     height, speed = NOW.place("Q_k")[2], NOW.speed("Q_k")[2]
     first = [NOW.place("P_i")[2] - LINE[0], 0.0, NOW.r["j"][2] + height]
     assert np.allclose(rows.C, [*first, *first[:2], NOW.r["j"][2] + 0.3], **CLOSE)
@@ -380,4 +380,4 @@ def test_rows_of_a_joint_stand_in_their_places():
     up, turn, none = [0, 0, 1, 0, 0, 0], [0, 0, 0, 0, 0, 1], [0] * 6
     assert np.allclose(D[:3], [i + none + i, up + turn + k, none + up + k], **CLOSE)
     assert np.allclose(D[3:], [i + none + none, up + turn + none, none + up + none], **CLOSE)
-    assert np.array_equal(machine.rows(T, U).sparse().toarray(), D)
+    assert np.array_equal(evaluator.rows(T, U).sparse().toarray(), D)

@@ -160,9 +160,9 @@ def scene_of(**body_fields):
 
 
 def accelerations(scene, u=None):
-    machine = dap.compile(scene, registry=REGISTRY).machine
-    u = machine.model.u0 if u is None else u
-    return machine, machine.report(0.0, u)[: 6 * machine.model.body_count].reshape(-1, 6)
+    evaluator = dap.compile(scene, registry=REGISTRY).evaluator
+    u = evaluator.model.u0 if u is None else u
+    return evaluator, evaluator.report(0.0, u)[: 6 * evaluator.model.body_count].reshape(-1, 6)
 
 
 def test_a_function_of_an_argument_is_called_with_it():
@@ -185,9 +185,9 @@ def test_each_type_of_function_gets_its_own_loop():
     scene.add_function("a", "other", coeff=(0.0, 1.0, 0.0))
     for name in ("law", "wave", "other", None):
         scene.add_force("pull", P_i="ball.O", **({"function": name} if name else {}))
-    machine, a = accelerations(scene)
-    assert [g.count for g in machine.model.forces] == [2, 1, 1]
-    assert not machine.model.functions  # none of them is a function of time
+    evaluator, a = accelerations(scene)
+    assert [g.count for g in evaluator.model.forces] == [2, 1, 1]
+    assert not evaluator.model.functions  # none of them is a function of time
     force = 1.0 + math.sin(5.0) + 5.0 + 5.0  # harmonic: amplitude sin(frequency x)
     assert a[0, :3] == pytest.approx(np.array([-0.6, 0.0, -0.8]) * force / 2.0)
 
@@ -229,9 +229,9 @@ def test_lookup_finds_the_last_row_that_begins_before(x):
     scene.add_function("stairs", "more", x=begin[:2], y=height[:2])
     for name in ("stairs", "more"):
         scene.add_joint("rel-rot", body_i="ball", a_j="ground.z", function=name)
-    machine = dap.compile(scene, registry=REGISTRY, method="standard").machine
-    machine.rows(x, machine.model.u0)
-    for count, F in zip((4, 2), machine.system.F[1:], strict=True):
+    evaluator = dap.compile(scene, registry=REGISTRY, method="standard").evaluator
+    evaluator.rows(x, evaluator.model.u0)
+    for count, F in zip((4, 2), evaluator.system.F[1:], strict=True):
         k = max(0, int(np.searchsorted(begin[:count], x, side="right")) - 1)
         assert F[:4].tolist() == [height[k], 0.0, 0.0, begin[k]]
 
@@ -252,18 +252,18 @@ def test_an_angle_is_unwound_by_the_last_accepted_one(owner):
     half = math.radians(170.0) / 2.0
     scene.bodies["ball"].p = (math.cos(half), 0.0, 0.0, math.sin(half))
     scene.add_force("twist", u_i="ball.x", u_j="ground.x", axis=f"{owner}.z", k=-3.0)
-    machine, a = accelerations(scene)
+    evaluator, a = accelerations(scene)
     assert a[0, 5] == pytest.approx(3.0 * math.radians(170.0))  # theta is -170 degrees
 
     def turn_to(degrees):
-        u = machine.model.u0.copy()
+        u = evaluator.model.u0.copy()
         half = math.radians(degrees) / 2.0
         u[3:7] = math.cos(half), 0.0, 0.0, math.sin(half)
-        return machine.report(0.0, u)[5]
+        return evaluator.report(0.0, u)[5]
 
     def keep():
-        s = machine.system
-        call_kinds(ANGLE, ANGLE, 0.0, s, machine.loops, s.force, s.force, s.force)
+        s = evaluator.system
+        call_kinds(ANGLE, ANGLE, 0.0, s, evaluator.loops, s.force, s.force, s.force)
 
     for degrees in (170.0, 190.0, 350.0, 370.0, 530.0):
         assert turn_to(degrees) == pytest.approx(3.0 * math.radians(degrees))
@@ -284,9 +284,9 @@ def test_a_vector_of_ground_makes_no_slot():
     """One body, one block; a vector of a body is refused."""
     scene = scene_of()
     scene.add_joint("level", P_i="ball.O", a_j="ground.x")
-    machine = dap.compile(scene, registry=REGISTRY, method="standard").machine
-    assert machine.model.joint_slots == ((1,),)
-    assert machine.rows(0.0, machine.model.u0).C.tolist() == [3.0]
+    evaluator = dap.compile(scene, registry=REGISTRY, method="standard").evaluator
+    assert evaluator.model.joint_slots == ((1,),)
+    assert evaluator.rows(0.0, evaluator.model.u0).C.tolist() == [3.0]
     scene.joints.clear()
     scene.add_joint("level", P_i="ball.O", a_j="ball.x")
     with pytest.raises(SceneError, match="is on ball; it is to be a vector of ground"):
@@ -360,8 +360,8 @@ def test_one_of_two_functions_may_be_left_out():
         for name, coeff in laws.items():
             scene.add_function("a", name, coeff=coeff)
         scene.add_force("two-laws", "push", P_i="ball.O", **given)
-        machine = dap.compile(scene, registry=registry_of(TwoLaws)).machine
-        a = machine.report(0.0, machine.model.u0)[:3]
+        evaluator = dap.compile(scene, registry=registry_of(TwoLaws)).evaluator
+        a = evaluator.report(0.0, evaluator.model.u0)[:3]
         assert (a[0], a[2]) == pytest.approx(wanted)
     scene.forces.clear()
     scene.add_force("two-laws", "push", P_i="ball.O", across="line")

@@ -30,7 +30,7 @@ from support.plain import in_another_process
 from support.process import REPOSITORY, run
 from support.scenes import scene_for
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface import (
     Joint,
     PluginError,
@@ -72,12 +72,12 @@ BY_HAND = [
 ]
 
 
-def machine_of(type_, seed, values=None, more=()):
+def evaluator_of(type_, seed, values=None, more=()):
     """A scene with one element of a type, its numbers at random."""
     registry = registry_of(type_, *more)
     examined = registry.get(type_.kind, type_.keyword)
     scene = scene_for(examined, np.random.default_rng(seed), values=values)
-    return Machine(build_model(check(scene, registry)), "standard"), examined
+    return Evaluator(build_model(check(scene, registry)), "standard"), examined
 
 
 def assert_same_rows(one, other, seed):
@@ -93,13 +93,13 @@ def test_joints_from_C_alone_are_those_by_hand(keyword, values):
     found = load_registry().get("joint", keyword)
     by_hand = next((e.type for conditions, e in found.variants if conditions == values), found.type)
     derived = from_C_alone(by_hand, f"derived-{keyword}")
-    one, examined = machine_of(derived, 7)
+    one, examined = evaluator_of(derived, 7)
     assert {"J", "gamma"} <= set(examined.derived)
     assert ("nu" in examined.derived) == ("nu" in by_hand.kernels())
     plain = from_C_alone(by_hand, f"plain-{keyword}")
     plain.J, plain.gamma = staticmethod(by_hand.J), staticmethod(by_hand.gamma)
     plain.nu = staticmethod(by_hand.nu) if "nu" in by_hand.kernels() else None
-    other, examined = machine_of(plain, 7)
+    other, examined = evaluator_of(plain, 7)
     assert examined.derived == ()
     assert_same_rows(one, other, 20)
 
@@ -114,7 +114,7 @@ def test_rows_of_the_velocity_level_are_derived_from_C_dot():
         for name in ("b1", "b2", "b3"):
             scene.add_body(name, mass=1.0, Jp=[0.1, 0.2, 0.3], r=[0.0, 0.0, 1.0])
         scene.add_joint(keyword, "wheel", body_i="b2", radius=0.7)
-        machines.append(Machine(build_model(check(scene, registry)), "standard"))
+        machines.append(Evaluator(build_model(check(scene, registry)), "standard"))
     order = [machines[1].rows(0.0, Motion(3, np.random.default_rng(1)).u(0.2))]
     assert order[0].C[2] != 0.0
     assert_same_rows(*machines, 30)
@@ -125,16 +125,16 @@ def test_rows_of_the_velocity_level_are_derived_from_C_dot():
 )
 def test_rates_along_a_motion_are_the_derived_ones(type_, values):
     """d/dt C = D v - nu and d/dt (D v - nu) = D v_dot - gamma."""
-    machine, _ = machine_of(type_, 5, values)
+    evaluator, _ = evaluator_of(type_, 5, values)
     motion = Motion(3, np.random.default_rng(40), level=0.5)
 
     def velocity_form(t):
-        rows = machine.rows(t, motion.u(t))
+        rows = evaluator.rows(t, motion.u(t))
         return rows.dense() @ motion.u(t)[-18:] - rows.nu
 
     t, h = 0.1, 3e-3
-    rows = machine.rows(t, motion.u(t))
-    rate = derivative(lambda t: machine.rows(t, motion.u(t)).C, t, h)
+    rows = evaluator.rows(t, motion.u(t))
+    rate = derivative(lambda t: evaluator.rows(t, motion.u(t)).C, t, h)
     assert rate == pytest.approx(velocity_form(t), rel=1e-8, abs=1e-8)
     rate = derivative(velocity_form, t, h)
     assert rate == pytest.approx(rows.dense() @ motion.v_dot(t) - rows.gamma, rel=1e-8, abs=1e-8)
@@ -143,16 +143,16 @@ def test_rates_along_a_motion_are_the_derived_ones(type_, values):
 @pytest.mark.parametrize("type_", [Elastic, Anisotropic])
 def test_a_wrench_is_derived_from_the_energy(type_):
     """At rest its power along any motion is -dV/dt."""
-    machine, examined = machine_of(type_, 6)
+    evaluator, examined = evaluator_of(type_, 6)
     assert examined.derived == ("wrench",)
     motion, t = Motion(3, np.random.default_rng(50), level=0.5), 0.1
     u = motion.u(t)
     at_rest = np.concatenate([u[:-18], np.zeros(18)])
-    v_dot, model = machine.report(0.0, at_rest)[:18].reshape(3, 6), machine.model
+    v_dot, model = evaluator.report(0.0, at_rest)[:18].reshape(3, 6), evaluator.model
     A = rotation(split(u)[1])
     moment = np.einsum("bij,bj->bi", A @ model.Jp @ A.transpose(0, 2, 1), v_dot[:, 3:])
     power = np.hstack([model.mass[:, None] * v_dot[:, :3], moment]).ravel() @ u[-18:]
-    rate = derivative(lambda t: machine.report(0.0, motion.u(t))[18:19], t, 3e-3)
+    rate = derivative(lambda t: evaluator.report(0.0, motion.u(t))[18:19], t, 3e-3)
     assert power == pytest.approx(-rate[0], rel=1e-8)
 
 

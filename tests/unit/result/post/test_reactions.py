@@ -6,7 +6,7 @@ from support.motions import Motion
 from support.results import ARM, MASS, PIVOT, RATE, about_z, circling, model_of, result_of, rows_of
 from support.scenes import scene_for
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model.rotations import rotation
 from dap3d_core.model.state_layout import split
 from dap3d_core.registry import load_registry
@@ -72,8 +72,8 @@ def test_action_and_reaction(keyword, ground):
     examined = REGISTRY.get("joint", keyword)
     scene = scene_for(examined, np.random.default_rng(7), ground=ground)
     model = model_of(scene)
-    machine = Machine(model, "standard")
-    u = correct_initial(machine, Motion(3, np.random.default_rng(8)).u(0.0)).u
+    evaluator = Evaluator(model, "standard")
+    u = correct_initial(evaluator, Motion(3, np.random.default_rng(8)).u(0.0)).u
     Lam = np.random.default_rng(9).normal(size=(2, model.row_count))
     Lam[1, ~model.position_row] = 0.0
     t, u = np.zeros(2), np.tile(u, (2, 1))

@@ -38,11 +38,11 @@ def test_names_of_formulations_and_integrators_are_those_of_their_tables():
     assert set(scene.INTEGRATORS) == {"auto", *INTEGRATORS}
     assert set(scene.FIXED_STEP) == {n for n, one in INTEGRATORS.items() if not one.adaptive}
     model = dap.compile(problems.pendulum())
-    machine, refusing = model.machine, set()
-    y = machine.integrated(model.model.u0)
+    evaluator, refusing = model.evaluator, set()
+    y = evaluator.integrated(model.model.u0)
     for name, integrator in INTEGRATORS.items():
         try:
-            integrator.make(machine, y, [0.0, 0.1], step=0.05)
+            integrator.make(evaluator, y, [0.0, 0.1], step=0.05)
         except ValueError:
             refusing.add(name)
     assert set(scene.NO_STEP) == refusing

@@ -237,7 +237,7 @@ def test_poses_that_prepare_reads():
 
 def test_masses_beyond_what_a_scene_may_have_are_left_to_its_check():
     of = ensemble(pendulum(), ["bodies.bob.Jp.x", "bodies.bob.mass"], ["bob.r.y"])
-    parameter_map = ParameterMap(of.compiled.checked, of.compiled.machine, of.parameters)
+    parameter_map = ParameterMap(of.compiled.checked, of.compiled.evaluator, of.parameters)
     values = np.array(
         [[0.1, 1.0], [0.1, 0.0], [0.5, 1.0], [-0.1, 1.0], [0.1, np.inf], [0.1, 1e-300]]
     )

@@ -7,7 +7,7 @@ from unit.study.batch.test_batch import ensemble, pendulum
 from unit.test_checkpoint import driven, stone, wheel
 
 import dap3d_core as dap
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.study import Ensemble, PointStatus
 from dap3d_core.study.batch.packs import LaneLayout, packed
 
@@ -90,8 +90,8 @@ def test_what_copies_would_share_is_not_run_in_packs(make, name, output):
 def test_copies_have_the_rates_of_the_single_model():
     """Two pendulums of different pose side by side: right-hand side and report, to rounding."""
     compiled = dap.compile(pendulum())
-    one, count = compiled.another_machine(), 3
-    many = Machine(packed(compiled.model, count), compiled.method)
+    one, count = compiled.new_evaluator(), 3
+    many = Evaluator(packed(compiled.model, count), compiled.method)
     lanes = LaneLayout(one, many, count)
     rng = np.random.default_rng(2)
     states = np.array([one.integrated(compiled.model.u0) for _ in range(count)])
