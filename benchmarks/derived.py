@@ -23,8 +23,8 @@ MARK, SECONDS = 1.3, 2.0
 def derivable(registry):
     """(title, hand-written type) of the joints and variants that C determines."""
     for keyword in registry.keywords("joint"):
-        examined = registry.get("joint", keyword)
-        for conditions, e in (({}, examined), *examined.variants):
+        type_info = registry.get("joint", keyword)
+        for conditions, e in (({}, type_info), *type_info.variants):
             if "C" in e.kernels and not e.derived and all_of_position_level(e.type):
                 words = ", ".join(f"{n} = {v}" for n, v in conditions.items())
                 yield f"{keyword}{f' ({words})' if words else ''}", e

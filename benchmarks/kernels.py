@@ -31,8 +31,8 @@ def types(registry):
     for row in registry.listing():
         if row.state != "ok":
             continue
-        examined = registry.get(row.kind, row.keyword)
-        for conditions, e in (({}, examined), *examined.variants):
+        type_info = registry.get(row.kind, row.keyword)
+        for conditions, e in (({}, type_info), *type_info.variants):
             words = ", ".join(f"{n} = {v}" for n, v in conditions.items())
             if any(conditions.get(n) for n in e.argument_functions):
                 e = bind_functions(e, dict.fromkeys(e.argument_functions, line))
@@ -40,20 +40,20 @@ def types(registry):
                 yield f"{row.keyword}{f' ({words})' if words else ''}", e
 
 
-def single(examined):
+def single(type_info):
     """(title of the kernel, kind of loop, type with this kernel alone), and J, gamma, nu at once.
 
     What friction takes besides is put behind the joint's numbers.
     """
     for kind, names in LOOP_KINDS.items():
-        there = [n for n in names if n in examined.kernels]
+        there = [n for n in names if n in type_info.kernels]
         for name in there:
             if name == "friction":
-                yield name, kind, bind_friction(examined)
+                yield name, kind, bind_friction(type_info)
             else:
-                yield name, kind, attrs.evolve(examined, kernels={name: examined.kernels[name]})
+                yield name, kind, attrs.evolve(type_info, kernels={name: type_info.kernels[name]})
         if len(there) > 1:
-            yield " + ".join(there), kind, examined
+            yield " + ".join(there), kind, type_info
 
 
 def numbers(layout, rng):
@@ -76,9 +76,9 @@ def numbers(layout, rng):
     return np.concatenate([par, *tables])
 
 
-def integers(examined):
+def integers(type_info):
     """A chain of bodies, one function for all, places of rows and blocks one after the other."""
-    layout, n = examined.layout, stride(examined)
+    layout, n = type_info.layout, stride(type_info)
     idx = np.zeros((INSTANCES, n), dtype=np.int64)
     q = np.arange(INSTANCES)
     slots = len(layout.slots)
@@ -86,12 +86,12 @@ def integers(examined):
         idx[:, k] = 1 + (q + k) % INSTANCES
     idx[:, slots : slots + len(layout.functions)] = 1
     idx[:, slots + len(layout.functions) : layout.integers] = 1 + q[:, None]
-    if examined.type.kind == "joint":
-        rows = examined.type.rows
+    if type_info.type.kind == "joint":
+        rows = type_info.type.rows
         idx[:, layout.integers] = q * rows
         for k in range(slots):
             idx[:, layout.integers + 1 + k] = (q * slots + k) * 6 * rows
-    elif examined.type.kind == "function":
+    elif type_info.type.kind == "function":
         idx[:, -1] = 1
     return idx.ravel()
 
@@ -107,13 +107,13 @@ def bodies(rng):
     return body
 
 
-def run(examined, kind, body, rng):
+def run(type_info, kind, body, rng):
     """A function that calls a loop CALLS times over all instances; another, over none."""
-    loop = build(write(examined, kind))
-    rows = getattr(examined.type, "rows", 1)
+    loop = build(write(type_info, kind))
+    rows = getattr(type_info.type, "rows", 1)
     F = np.array([[random_value((), rng) for _ in range(5)] for _ in range(2)])
     size = INSTANCES * 6 * max(rows, 2) * 3
-    idx, par = integers(examined), numbers(examined.layout, rng)
+    idx, par = integers(type_info), numbers(type_info.layout, rng)
     arrays, loops = LoopArrays(body=body, F=F, idx=idx, par=par), loop_list([loop])
     outputs = (np.zeros(size), np.ones(size), np.zeros(size))
 
@@ -125,12 +125,12 @@ def run(examined, kind, body, rng):
     return partial(repeat, INSTANCES), partial(repeat, 0)
 
 
-def nanoseconds(examined, kind, body, rng):
+def nanoseconds(type_info, kind, body, rng):
     """The least of many runs, for whatever else runs on the machine only adds.
 
     What the call itself costs from Python is taken off.
     """
-    functions = run(examined, kind, body, rng)
+    functions = run(type_info, kind, body, rng)
     runs = [median_seconds(functions, 1) for _ in range(RUNS)]
     seconds, empty = (min(column) for column in zip(*runs, strict=True))
     return (seconds - empty) / (CALLS * INSTANCES) * 1e9
@@ -140,10 +140,10 @@ def measure():
     """Rows of the table: type, kernel, nanoseconds an instance, and whether that is in the mark."""
     rng = random.Random(1)
     body, rows = bodies(rng), []
-    for title, examined in types(load_registry()):
-        for name, kind, one in single(examined):
+    for title, type_info in types(load_registry()):
+        for name, kind, one in single(type_info):
             ns = nanoseconds(one, kind, body, rng)
-            row = {"kind": examined.type.kind, "type": title, "kernel": name, "ns": ns}
+            row = {"kind": type_info.type.kind, "type": title, "kernel": name, "ns": ns}
             if "+" not in name:
                 row["in_mark"] = "yes" if ns <= MARK else "no"
             rows.append(row)

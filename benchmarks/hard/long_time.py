@@ -67,7 +67,7 @@ def drifts(result):
         "energy": np.abs(total - total[0]) / kinetic.max(),
         "p": np.abs(np.linalg.norm(result.p, axis=2) - 1.0).max(axis=1),
     }
-    if result.subject.row_count:
+    if result.summary.row_count:
         found["C"] = result.arrays.position_residual
         found["Cv"] = result.arrays.velocity_residual
     else:

@@ -36,7 +36,7 @@ class CommandLine:
         self.folder, self.capfd = folder, capfd
 
     def start(self, *arguments, **variables):
-        """Start a command as a process of its own, where that is the subject."""
+        """Start a command as a process of its own, where that is the summary."""
         return subprocess.Popen(
             [*COMMAND, *map(str, arguments)],
             cwd=self.folder,

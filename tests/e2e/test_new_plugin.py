@@ -40,9 +40,9 @@ def test_the_package_is_complete(kind, tmp_path):
     assert project["project"]["entry-points"] == {f"dap3d.{kind}s": {"My.own-Type": module}}
     (dependency,) = project["project"]["dependencies"]
     registry = load_registry().with_file(folder / "src" / module / "__init__.py")
-    examined = registry.get(kind, "My.own-Type")
-    assert bool(examined.derived) == dependency.startswith("dap3d[derive]>=")
-    assert examined.type.__name__ == "MyOwnType"
+    type_info = registry.get(kind, "My.own-Type")
+    assert bool(type_info.derived) == dependency.startswith("dap3d[derive]>=")
+    assert type_info.type.__name__ == "MyOwnType"
     assert "My.own-Type" in (folder / "scene.toml").read_text()
     for name in files:
         assert "$" not in (folder / name).read_text(), name

@@ -111,13 +111,13 @@ def test_what_is_drawn_is_the_pose_of_the_result(opened, four):
     for k in (0, 1, 37, 100):
         opened.run("t => dap3d.seek(t)", float(four.t[k]))
         assert opened.run("dap3d.time") == four.t[k]
-        for b, name in enumerate(four.subject.body_names):
+        for b, name in enumerate(four.summary.body_names):
             expected = four.r[k, b] + to_global(four.p[k, b], np.array(s))
             drawn = opened.run("([n, s]) => dap3d.drawnAt(n, s)", [name, list(s)])
             np.testing.assert_allclose(drawn, expected, atol=3e-6)
     fine = dap.simulate("fourbar3", t_end=0.405, dt=0.405)
     opened.run("t => dap3d.seek(t)", 0.405)
-    drawn = [opened.run("n => dap3d.drawnAt(n)", n) for n in four.subject.body_names]
+    drawn = [opened.run("n => dap3d.drawnAt(n)", n) for n in four.summary.body_names]
     np.testing.assert_allclose(drawn, fine.r[-1], atol=2e-3)
 
 

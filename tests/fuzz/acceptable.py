@@ -157,7 +157,7 @@ def examine_result(result):
     for name, entry in result.ledger.items():
         assert np.isfinite(entry.value), f"{name}: {entry}"
         assert entry.ok is (None if entry.limit is None else entry.value <= entry.limit)
-    for joint in result.subject.joint_names:
+    for joint in result.summary.joint_names:
         for action in result.reaction(joint).values():
             assert np.isfinite(action.force).all(), joint
             assert np.isfinite(action.moment).all(), joint

@@ -35,7 +35,7 @@ def result(tmp_path_factory):
         settings={**run.settings, bad: bad, "__proto__": {"x": bad}},
         known_versions={bad: bad},
     )
-    return Result(run.subject, run.arrays, record, run._make_origin)
+    return Result(run.summary, run.arrays, record, run._make_origin)
 
 
 class Page(HTMLParser):

@@ -163,7 +163,7 @@ def test_completion_offers_no_words_that_a_shell_would_run(changed, monkeypatch)
 
     for name in ("x;touch pwned;", "$(touch pwned)", "`a`", "a b", "'", '"', "|a", "-o=x", ">x"):
         path = changed(lambda d, n=name: d["body"].__setitem__(0, n))
-        assert dap.open(path).subject.body_names[0] == name
+        assert dap.open(path).summary.body_names[0] == name
         ctx = click.Context(click.Command("plot"))
         ctx.params = {"result": str(path)}
         offered = [str(getattr(w, "value", w)) for w in quantities(ctx, None, "")]

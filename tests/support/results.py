@@ -119,4 +119,4 @@ def noisy(model, nt=9, seed=3):
 def grown(path, result, *, most=None, force=False):
     """A writer for as many rows as a result has."""
     most = len(result.t) if most is None else most
-    return ResultWriter(path, result.subject, result.record, most, force=force)
+    return ResultWriter(path, result.summary, result.record, most, force=force)

@@ -16,10 +16,10 @@ def cases(registry, kind):
     found = []
     for row in registry.listing():
         if row.kind == kind and row.state == "ok":
-            examined = registry.get(kind, row.keyword)
-            own = own_values(examined)
+            type_info = registry.get(kind, row.keyword)
+            own = own_values(type_info)
             found += [] if own is None else [(row.keyword, own)]
-            found += [(row.keyword, dict(conditions)) for conditions, _ in examined.variants]
+            found += [(row.keyword, dict(conditions)) for conditions, _ in type_info.variants]
     return found
 
 
@@ -28,7 +28,7 @@ def case_names(found):
     return [f"{k}{[f'{n}={v}' for n, v in values.items()] or ''}" for k, values in found]
 
 
-def scene_for(examined, rng, *, ground=None, values=None):
+def scene_for(type_info, rng, *, ground=None, values=None):
     """A scene of three bodies with one element of a type; slot ``ground`` is put on ground.
 
     Args:
@@ -49,16 +49,16 @@ def scene_for(examined, rng, *, ground=None, values=None):
     if ground:
         owner[ground] = "ground"
     fields = {}
-    for name, spec in specs_of(examined.type).items():
+    for name, spec in specs_of(type_info.type).items():
         value = _field(scene, name, spec, owner, rng, values.get(name))
         if value is not None:
             fields[name] = value
-    for name, spec in specs_of(examined.type).items():
+    for name, spec in specs_of(type_info.type).items():
         if spec.kind == "vector2":
             del fields[name]
             for end in ("P_i", "P_j"):
                 fields[end] = scene.add_point(end, owner[end[-1]], rng.uniform(-1, 1, 3))
-    getattr(scene, f"add_{examined.type.kind}")(examined.type.keyword, "element", **fields)
+    getattr(scene, f"add_{type_info.type.kind}")(type_info.type.keyword, "element", **fields)
     return scene
 
 

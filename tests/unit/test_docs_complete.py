@@ -67,17 +67,17 @@ def test_every_type_has_a_page_with_all_its_fields(pages, kind):
     assert own
     index = pages[f"reference/{kind}s/index.md"]
     for keyword in own:
-        examined = registry.get(kind, keyword)
+        type_info = registry.get(kind, keyword)
         page = pages[f"reference/{kind}s/{keyword}.md"]
         assert f"[`{keyword}`]({keyword}.md)" in index
-        assert inspect.cleandoc(examined.type.__doc__) in page
-        for name, spec in specs_of(examined.type).items():
+        assert inspect.cleandoc(type_info.type.__doc__) in page
+        for name, spec in specs_of(type_info.type).items():
             if spec.given:
                 assert f"| `{name}` | {spec.kind} |" in page, (keyword, name)
                 assert spec.doc, f"{keyword}.{name} has no doc"
-        for name in examined.names:
+        for name in type_info.names:
             assert f"| `{name}` |" in page, (keyword, name)
-        for _, variant in examined.variants:
+        for _, variant in type_info.variants:
             assert variant.type.__doc__.partition("\n\n")[0].split()[0] in page
         assert "```toml\n" in page
 

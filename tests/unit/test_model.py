@@ -83,12 +83,12 @@ def test_instances_of_a_type_stand_together(model):
     assert sph.members.tolist() == [0, 3]
     assert sph.bodies.tolist() == [[1, 2], [3, 1]]
     assert sph.count == 2
-    offset, shape = sph.examined.layout.numbers["P_j"]
+    offset, shape = sph.type_info.layout.numbers["P_j"]
     assert shape == (3,)
     assert sph.numbers[:, offset : offset + 3].tolist() == [[0.4, 0.5, 0.6], [0.1, 0.2, 0.3]]
     assert rel.members.tolist() == [2, 4]
     assert rel.functions.tolist() == [[2], [0]]  # motor is the second; absent is row 0
-    assert {"n_j", "m_j"} <= set(rev.examined.layout.numbers)  # what prepare returned
+    assert {"n_j", "m_j"} <= set(rev.type_info.layout.numbers)  # what prepare returned
     assert model.function_names == ("still", "motor")
     assert model.function_count == 2
     (functions,) = model.functions
@@ -102,7 +102,7 @@ def test_an_element_on_each_body_is_there_once_for_each(model):
     weight, spring = model.forces
     assert weight.members.tolist() == [0, 0, 0, 2, 2, 2]
     assert weight.bodies.tolist() == [[1], [2], [3], [1], [2], [3]]
-    column = weight.examined.layout.numbers["gravity"][0]
+    column = weight.type_info.layout.numbers["gravity"][0]
     assert weight.numbers[:, column].tolist() == [9.81] * 3 + [1.0] * 3
     assert spring.members.tolist() == [1]
     assert spring.bodies.tolist() == [[1, 3]]
@@ -253,7 +253,7 @@ def test_a_number_left_out_is_found_by_prepare_or_kept_where_given():
     s.add_force("fussy", body_i="a")
     s.add_force("fussy", body_i="a", l0=7.0, k=2.0)
     (group,) = build_model(check(s, REGISTRY)).forces
-    assert group.numbers[:, group.examined.layout.numbers["l0"][0]].tolist() == [1.0, 7.0]
+    assert group.numbers[:, group.type_info.layout.numbers["l0"][0]].tolist() == [1.0, 7.0]
 
 
 # ------------------------------------------------------------------ kinematics of many at once

@@ -120,7 +120,7 @@ def test_other_words_for_slip():
     for word, slip, rows in (("zn", "nz", 2), ("zt", "tz", 2)):
         one, other = (dap.compile(disk(w)).evaluator.model for w in (word, slip))
         assert one.row_count == rows
-        assert one.joints[0].examined.type.__name__ == other.joints[0].examined.type.__name__
+        assert one.joints[0].type_info.type.__name__ == other.joints[0].type_info.type.__name__
 
 
 def test_the_switch_is_the_sine_of_the_lean():

@@ -17,8 +17,8 @@ def laws():
     found = {}
     for row in REGISTRY.listing():
         if row.kind == "joint" and row.state == "ok":
-            examined = REGISTRY.get("joint", row.keyword)
-            for e in (examined, *(variant for _, variant in examined.variants)):
+            type_info = REGISTRY.get("joint", row.keyword)
+            for e in (type_info, *(variant for _, variant in type_info.variants)):
                 if "friction" in e.kernels:
                     found[f"{row.keyword} {e.type.__name__}"] = e.type
     return found

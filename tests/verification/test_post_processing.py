@@ -36,8 +36,8 @@ def near(found, expected):
 
 def test_shapes(result):
     """As spec 10 lists them: time first, then bodies, points or rows, then components."""
-    nt, nB = len(result.t), result.subject.body_count
-    nP, m = len(result.subject.point_names), result.subject.row_count
+    nt, nB = len(result.t), result.summary.body_count
+    nP, m = len(result.summary.point_names), result.summary.row_count
     for name in ("r", "rd", "w", "wp", "rdd", "wd", "wpd"):
         assert getattr(result, name).shape == (nt, nB, 3), name
     assert result.p.shape == (nt, nB, 4)
@@ -45,7 +45,7 @@ def test_shapes(result):
         assert getattr(result, name).shape == (nt, nP, 3), name
     assert result.Jac.shape == (nt, m, 6 * nB)
     assert result.Lam.shape == (nt, m)
-    drawn = [name.startswith("animation.") for name in result.subject.point_names]
+    drawn = [name.startswith("animation.") for name in result.summary.point_names]
     assert drawn == sorted(drawn)  # animation points come last
     assert any(drawn) == (result.record.title == "pen1")
 
@@ -77,7 +77,7 @@ def test_points(result):
     """rPd and rPdd are derivatives of rP: on bodies, on ground, and of animation points, last."""
     near(result.rPd, rate(result.rP))
     near(result.rPdd, rate(result.rPd))
-    bodies = np.array(result.subject.point_body)
+    bodies = np.array(result.summary.point_body)
     assert np.all(result.rPdd[:, bodies == 0] == 0)
     assert np.abs(result.rPdd[:, bodies > 0]).max() > 1.0
 
@@ -86,7 +86,7 @@ def test_jacobian_is_that_of_the_motion(result):
     """D v = nu and D v_dot = gamma, here with nu = 0 but for the motor: D's rows see no motion."""
     v = np.concatenate([result.rd, result.w], axis=2).reshape(len(result.t), -1)
     motion = np.einsum("trc,tc->tr", result.Jac, v)
-    expected = np.zeros(result.subject.row_count)
+    expected = np.zeros(result.summary.row_count)
     if result.record.title == "fourbar3":
         expected[-1] = 2 * np.pi  # spec 4.7: a_j . (omega_j - omega_i) = f_dot
     np.testing.assert_allclose(motion, np.broadcast_to(expected, motion.shape), atol=1e-10)
@@ -94,17 +94,17 @@ def test_jacobian_is_that_of_the_motion(result):
 
 def test_multipliers_fulfil_the_equations_of_motion(result):
     """M v_dot = g + D^T lambda for every body, forces from the scene's own numbers (spec 9)."""
-    subject = result.subject
+    summary = result.summary
     wp, wpd, A = result.wp, result.wpd, rotation(result.p)
-    force = subject.mass[:, None] * result.rdd
-    spin = np.einsum("bij,tbj->tbi", subject.Jp, wp)
-    turn = np.einsum("bij,tbj->tbi", subject.Jp, wpd) + np.cross(wp, spin)
+    force = summary.mass[:, None] * result.rdd
+    spin = np.einsum("bij,tbj->tbi", summary.Jp, wp)
+    turn = np.einsum("bij,tbj->tbi", summary.Jp, wpd) + np.cross(wp, spin)
     moment = np.einsum("tbij,tbj->tbi", A, turn)
     given_f, given_n = np.zeros_like(force), np.zeros_like(moment)
     if result.record.title == "pen1":
-        given_f[..., 2] = -9.81 * subject.mass
+        given_f[..., 2] = -9.81 * summary.mass
     else:  # fourbar3: a spring, 50 N/m and 8 m, from the coupler's end (0, 0, 3.2) to the origin
-        coupler = subject.body_index["coupler"]
+        coupler = summary.body_index["coupler"]
         arm = 3.2 * A[:, coupler, :, 2]
         d = -(result.r[:, coupler] + arm)
         length = np.linalg.norm(d, axis=1, keepdims=True)

@@ -36,21 +36,21 @@ def test_rounding_of_large_reactions_is_no_wrong_acceleration(pressed):
 @pytest.mark.parametrize("row", [0, 40, 71])
 def test_a_multiplier_that_is_off_by_a_millionth_is_found(pressed, row):
     """Accelerations change by M^-1 D^T of the change; the ledger is given the residual of that."""
-    subject, k = pressed.subject, 2
-    D, change = pressed.Jac[k], np.zeros(subject.row_count)
+    summary, k = pressed.summary, 2
+    D, change = pressed.Jac[k], np.zeros(summary.row_count)
     change[row] = 1e-6 * np.abs(pressed.arrays.Lam[k]).max()
     force = D.T @ change
     moved = np.zeros_like(force)
-    for b, mass in enumerate(subject.mass):
+    for b, mass in enumerate(summary.mass):
         A = _matrix(pressed.p[k, b])
         moved[6 * b : 6 * b + 3] = force[6 * b : 6 * b + 3] / mass
         moved[6 * b + 3 : 6 * b + 6] = np.linalg.solve(
-            A @ subject.Jp[b] @ A.T, force[6 * b + 3 : 6 * b + 6]
+            A @ summary.Jp[b] @ A.T, force[6 * b + 3 : 6 * b + 6]
         )
     residual = np.array(pressed.arrays.acceleration_residual)
     residual[k] = np.abs(D @ moved).max()
     arrays = attrs.evolve(pressed.arrays, acceleration_residual=residual)
-    assert ledger_of(subject, arrays, pressed.record)["acceleration"].ok is False
+    assert ledger_of(summary, arrays, pressed.record)["acceleration"].ok is False
 
 
 def _matrix(p):

@@ -123,7 +123,7 @@ def test_a_driven_parallelogram_turns_through_all_crossings(rtol, rate):
     expected = np.column_stack([np.sin(turned), np.cos(turned)])
     pivots = np.array([[0.0, 0.0], [1.0, 0.0]])
     for crank, pivot in zip((0, 1), pivots, strict=True):
-        body = result.subject.body_names.index(f"crank{crank}")
+        body = result.summary.body_names.index(f"crank{crank}")
         assert 2.0 * (result.r[:, body, :2] - pivot) == pytest.approx(expected, abs=rtol)
 
 

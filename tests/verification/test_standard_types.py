@@ -118,13 +118,13 @@ def test_a_force_off_the_mass_centre_turns_the_body():
 
 def values(keyword, fields, x):
     """(f, f', f'', f''') of a function at x, by the kernel itself."""
-    examined = dap.load_registry().get("function", keyword)
-    instance = examined.type(**fields)
+    type_info = dap.load_registry().get("function", keyword)
+    instance = type_info.type(**fields)
     known = {**fields, **instance.prepare({})}
     from inspect import signature
 
-    names = signature(examined.type.value).parameters
-    return np.array(examined.type.value(*(x if n == "x" else known[n] for n in names)))
+    names = signature(type_info.type.value).parameters
+    return np.array(type_info.type.value(*(x if n == "x" else known[n] for n in names)))
 
 
 def test_functions_meet_their_ends():

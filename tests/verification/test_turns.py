@@ -48,7 +48,7 @@ def test_a_spring_between_two_reports_winds_up(tmp_path):
 def test_a_file_of_an_older_program_has_no_turns_and_says_so(tmp_path):
     result = dap.simulate(winding(), dt=0.02)  # less than half a turn between two
     older = Result(
-        attrs.evolve(result.subject, angle_count=0),
+        attrs.evolve(result.summary, angle_count=0),
         attrs.evolve(result.arrays, angles=np.zeros((len(result.t), 0))),
         result.record,
         lambda: None,

@@ -88,7 +88,7 @@ class _Document:
         self.tree["buffers"] = [{"byteLength": len(self.data) + -len(self.data) % 4}]
 
     def _bodies(self, scene: MovingScene, root: int, progress: Progress) -> None:
-        names = scene.result.subject.body_names
+        names = scene.result.summary.body_names
         nodes = [root, *(self._body(scene, k, name) for k, name in enumerate(names))]
         children: list[list[int]] = [[] for _ in nodes]
         children[0] += nodes[1:]

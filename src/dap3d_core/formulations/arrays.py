@@ -43,7 +43,7 @@ def build_loops(
         if kind not in kinds:
             continue
         for group in _groups_for(model, kind):
-            loop = compiled_loop(group.examined, kind, announce)
+            loop = compiled_loop(group.type_info, kind, announce)
             if loop is not None:
                 loops.append(loop)
                 what.append((kind, group))
@@ -138,7 +138,7 @@ def _twins(model: Model, other: Model) -> dict[int, Group]:
     found = {}
     for mine, theirs in zip(_all_groups(model), _all_groups(other), strict=True):
         same = (
-            mine.examined.type is theirs.examined.type
+            mine.type_info.type is theirs.type_info.type
             and mine.numbers.shape == theirs.numbers.shape
             and all(
                 np.array_equal(getattr(mine, name), getattr(theirs, name))
@@ -215,7 +215,7 @@ def _numbers_of(group: Group, p0: int) -> Floats:
 
 def _integers_of(group: Group, plan: Plan) -> Integers:
     """The rows of ``idx`` of a group, as interface/codegen/loop_source.py lays them out."""
-    kind = group.examined.type.kind
+    kind = group.type_info.type.kind
     parts = [group.bodies, group.functions]
     if kind == "joint":
         joints = group.members if group.joints is None else group.joints
@@ -224,5 +224,5 @@ def _integers_of(group: Group, plan: Plan) -> Integers:
     elif kind == "function":
         parts.append(1 + group.members[:, None])
     table = np.ascontiguousarray(np.hstack(parts), dtype=np.int64)
-    assert table.shape[1] == stride(group.examined)
+    assert table.shape[1] == stride(group.type_info)
     return table

@@ -123,8 +123,8 @@ class Evaluator:
         """Where in ``par`` the turns of angles are counted."""
         for q, (kind, group) in enumerate(self.loop_groups):
             if kind == "angle":
-                p0, width = int(self.system.groups[q, 1]), group.examined.layout.par_width
-                for offset in group.examined.layout.angles.values():
+                p0, width = int(self.system.groups[q, 1]), group.type_info.layout.par_width
+                for offset in group.type_info.layout.angles.values():
                     for k in range(offset, offset + ANGLE_WIDTH):
                         yield slice(p0 + k, p0 + width * group.count, width)
 

@@ -35,7 +35,7 @@ class Switch:
     @property
     def words(self) -> str:
         """Why the run ends where it becomes negative; "" where integration restarts there."""
-        type_: Any = self.group.examined.type
+        type_: Any = self.group.type_info.type
         return str(type_.switch_words) if self.kind == "switch" else ""
 
     @property
@@ -43,14 +43,14 @@ class Switch:
         """Distance beyond a knot from which on an argument has passed it."""
         if self.kind == "switch":
             return 0.0
-        row, numbers = self.group.numbers[self.place], self.group.examined.layout.numbers
+        row, numbers = self.group.numbers[self.place], self.group.type_info.layout.numbers
         own = [place for name, place in numbers.items() if is_knots(name)]
         knots = [row[at : at + count] for at, (count,) in own]
         return NEAR_KNOT * min(map(narrowest, knots))
 
     def name(self, model: Model) -> str:
         """The element's name; with the number's place, from 1, where there are several."""
-        is_joint = self.group.examined.type.kind == "joint"
+        is_joint = self.group.type_info.type.kind == "joint"
         names = model.joint_names if is_joint else model.force_names
         name = names[int(self.group.members[self.place])]
         return f"{name} [{self.part + 1}]" if self.is_one_of_several else name
@@ -59,11 +59,11 @@ class Switch:
 def switches_of(loops: Iterable[tuple[str, Group]]) -> tuple[Switch, ...]:
     """The switches of a model in the order in which ``watch`` gives them; loops: (kind, group)."""
     return tuple(
-        Switch(group, k, kind, len(group.examined.outputs[kind]) > 1, part)
+        Switch(group, k, kind, len(group.type_info.outputs[kind]) > 1, part)
         for kind, group in loops
         if kind in ("switch", "knot")
         for k in range(group.count)
-        for part in range(len(group.examined.outputs[kind]))
+        for part in range(len(group.type_info.outputs[kind]))
     )
 
 

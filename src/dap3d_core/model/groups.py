@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.interface.body_pose import BodyPose
-from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.instance_layout import shape_of, size
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.specialise import (
@@ -17,6 +16,7 @@ from dap3d_core.interface.codegen.specialise import (
     bind_functions,
     uncalled,
 )
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.types import TypeBase
@@ -53,7 +53,7 @@ class Group:
         joints: (m,) of friction, the joints it acts in; None for all else.
     """
 
-    examined: TypeInfo
+    type_info: TypeInfo
     members: Integers
     bodies: Integers
     functions: Integers
@@ -64,7 +64,7 @@ class Group:
     @property
     def keyword(self) -> str:
         """The type's word in a scene."""
-        return self.examined.type.keyword
+        return self.type_info.type.keyword
 
     @property
     def count(self) -> int:
@@ -108,8 +108,8 @@ class Grouping:
         """
         by_type: dict[Any, list[int]] = {}
         for place, instance in enumerate(instances):
-            given = tuple((n, f.examined.type) for n, f in self._given(instance).items())
-            by_type.setdefault((instance.examined.type, given), []).append(place)
+            given = tuple((n, f.type_info.type) for n, f in self._given(instance).items())
+            by_type.setdefault((instance.type_info.type, given), []).append(place)
         return _each(
             lambda places: self._group(
                 [instances[k] for k in places], [members[k] for k in places]
@@ -131,54 +131,54 @@ class Grouping:
         """
         by_type: dict[Any, list[tuple[int, Instance, int, Instance]]] = {}
         for place, force in forces:
-            row, joint = joints[force.values[force.examined.friction_joint]]
-            by_type.setdefault(joint.examined.type, []).append((place, force, row, joint))
+            row, joint = joints[force.values[force.type_info.friction_joint]]
+            by_type.setdefault(joint.type_info.type, []).append((place, force, row, joint))
         return _each(self._friction, by_type.values())
 
     def _friction(self, pairs: list[tuple[int, Instance, int, Instance]]) -> Group:
-        examined = pairs[0][3].examined
-        if "friction" not in examined.kernels:
-            words = f"type {examined.type.keyword} has no friction"
+        type_info = pairs[0][3].type_info
+        if "friction" not in type_info.kernels:
+            words = f"type {type_info.type.keyword} has no friction"
             raise PrepareError(*[(place, f"joint {j.name}: {words}") for place, _, _, j in pairs])
-        bound = bind_friction(examined)
+        bound = bind_friction(type_info)
         group = self._group([joint for *_, joint in pairs], [row for _, _, row, _ in pairs])
-        wanted = [n for n in bound.layout.numbers if n not in examined.layout.numbers]
+        wanted = [n for n in bound.layout.numbers if n not in type_info.layout.numbers]
         asked = {q for q in wanted if q in parameters(bound.kernels["friction"])}
         extra, faults = np.zeros((len(pairs), len(wanted))), []
         for k, (place, force, _, _) in enumerate(pairs):
             for c, name in enumerate(wanted):
                 value = force.values.get(name)
                 if value is None and name in asked:
-                    words = f"{name} is missing, which friction in {examined.type.keyword} needs"
+                    words = f"{name} is missing, which friction in {type_info.type.keyword} needs"
                     faults.append((place, words))
                 extra[k, c] = 0.0 if value is None else value
         if faults:
             raise PrepareError(*faults)
         members = np.array([place for place, *_ in pairs], dtype=np.int64)
         numbers = np.hstack([group.numbers, extra])
-        return attrs.evolve(group, examined=bound, numbers=numbers, joints=group.members,
+        return attrs.evolve(group, type_info=bound, numbers=numbers, joints=group.members,
                             members=members)  # fmt: skip
 
     def _given(self, instance: Instance) -> dict[str, Instance]:
         """The functions of an argument that an instance is given, by field."""
-        names = {field: instance.values[field] for field in instance.examined.argument_functions}
+        names = {field: instance.values[field] for field in instance.type_info.argument_functions}
         return {field: self.functions[name] for field, name in names.items() if name is not None}
 
     def _group(self, instances: list[Instance], members: list[int]) -> Group:
-        examined = instances[0].examined
-        on_each = bool(getattr(examined.type, "each_body", False))
+        type_info = instances[0].type_info
+        on_each = bool(getattr(type_info.type, "each_body", False))
         n = self.body_count
-        if on_each and _prepares(examined.type):  # its constants may differ from body to body
+        if on_each and _prepares(type_info.type):  # its constants may differ from body to body
             on_each = False
             members = [m for m in members for _ in range(n)]
             instances = [attrs.evolve(i, bodies=(b,)) for i in instances for b in range(1, n + 1)]
         count = len(instances)
-        numbers, tables = self._numbers(examined, instances, members)
+        numbers, tables = self._numbers(type_info, instances, members)
         functions = [self._given(i) for i in instances]
         if functions[0]:
-            examined, numbers, more = self._with_functions(examined, functions, numbers, members)
+            type_info, numbers, more = self._with_functions(type_info, functions, numbers, members)
             tables += more
-        if missing := uncalled(examined):
+        if missing := uncalled(type_info):
             words = f"{missing} is missing, which this type calls"
             raise PrepareError(*[(member, words) for member in members])
         bodies = np.array([i.bodies for i in instances], dtype=np.int64).reshape(count, -1)
@@ -190,17 +190,17 @@ class Grouping:
             numbers = np.repeat(numbers, n, axis=0)
             integers = np.repeat(integers, n, axis=0)
             places = np.repeat(places, n)
-        return Group(examined, places, bodies, integers, numbers, tuple(tables))
+        return Group(type_info, places, bodies, integers, numbers, tuple(tables))
 
     def _with_functions(
         self,
-        examined: TypeInfo,
+        type_info: TypeInfo,
         functions: list[dict[str, Instance]],
         numbers: Floats,
         members: Sequence[int],
     ) -> tuple[TypeInfo, Floats, list[tuple[int, int, Floats]]]:
         """The type with its functions known, their numbers behind its own, their tables."""
-        types = {field: f.examined for field, f in functions[0].items()}
+        types = {field: f.type_info for field, f in functions[0].items()}
         tables: list[tuple[int, int, Floats]] = []
         counts: dict[str, int] = {}
         for field, given in types.items():
@@ -215,29 +215,29 @@ class Grouping:
             knots = knots_of(column)
             counts[field] = knots.shape[1]
             numbers = np.hstack([numbers, more, knots])
-        return bind_functions(examined, types, counts), numbers, tables
+        return bind_functions(type_info, types, counts), numbers, tables
 
     def _numbers(
-        self, examined: TypeInfo, instances: list[Instance], members: Sequence[int]
+        self, type_info: TypeInfo, instances: list[Instance], members: Sequence[int]
     ) -> tuple[Floats, list[tuple[int, int, Floats]]]:
         """(m, par_width) numbers of all instances, from their fields and ``prepare``; tables."""
-        given, fields = [i.values for i in instances], specs_of(examined.type)
-        if _prepares(examined.type):
+        given, fields = [i.values for i in instances], specs_of(type_info.type)
+        if _prepares(type_info.type):
             with warnings.catch_warnings(record=True) as record:
                 warnings.simplefilter("always")
                 found: list[dict[str, Any]] = []
                 faults: list[tuple[int, str]] = []
                 for instance, member in zip(instances, members, strict=True):
                     try:
-                        found.append(_prepared(examined, fields, instance, member, self.poses))
+                        found.append(_prepared(type_info, fields, instance, member, self.poses))
                     except PrepareError as error:
                         faults += error.faults
                     self._note(record, instance)
             if faults:
                 raise PrepareError(*faults)
             given = [values | constants for values, constants in zip(given, found, strict=True)]
-        numbers = np.zeros((len(instances), examined.layout.par_width))
-        for name, (offset, shape) in examined.layout.numbers.items():
+        numbers = np.zeros((len(instances), type_info.layout.par_width))
+        for name, (offset, shape) in type_info.layout.numbers.items():
             column = [values.get(name) for values in given]
             if None in column:
                 words = "is missing" if name in fields else "is not among what prepare returned"
@@ -245,7 +245,7 @@ class Grouping:
             values = np.asarray(column, dtype=float).reshape(len(instances), -1)
             numbers[:, offset : offset + size(shape)] = values
         tables = []
-        for name, (offset, columns) in examined.layout.tables.items():
+        for name, (offset, columns) in type_info.layout.tables.items():
             for k, of_instance in enumerate(given):
                 rows = np.asarray(of_instance[name], dtype=float).reshape(-1, columns)
                 numbers[k, offset + 1] = len(rows)
@@ -254,7 +254,7 @@ class Grouping:
 
     def _note(self, record: list[warnings.WarningMessage], instance: Instance) -> None:
         """What ``prepare`` warned about becomes a note."""
-        keyword = instance.examined.type.keyword
+        keyword = instance.type_info.type.keyword
         for warning in record:
             note = f"{self.kind} {instance.name} ({keyword}): {warning.message}"
             if note not in self.notes:
@@ -286,27 +286,27 @@ def _prepares(type_: Any) -> bool:
 
 
 def _prepared(
-    examined: TypeInfo,
+    type_info: TypeInfo,
     fields: Mapping[str, FieldSpec],
     instance: Instance,
     member: int,
     poses: Mapping[int, BodyPose],
 ) -> dict[str, Any]:
     """What ``prepare`` returns for an instance: the names and shapes that were examined."""
-    type_: Any = examined.type
+    type_: Any = type_info.type
     values = instance.values
     thing = type_(**{n: values[n] for n in fields if n in values})
     if any(spec.kind == "vector2" for spec in fields.values()):
         thing.P_i, thing.P_j = values["P_i"], values["P_j"]
-    bodies = {s: poses[b] for s, b in zip(examined.layout.slots, instance.bodies, strict=True)}
+    bodies = {s: poses[b] for s, b in zip(type_info.layout.slots, instance.bodies, strict=True)}
     try:
         constants = prepared(thing, bodies)
     except ValueError as error:
         raise PrepareError((member, str(error))) from error
     for name, value in constants.items():
-        if name in examined.layout.tables:
+        if name in type_info.layout.tables:
             continue
-        _, shape = examined.layout.numbers.get(name, (0, None))
+        _, shape = type_info.layout.numbers.get(name, (0, None))
         if shape_of(value) != shape:
             usual = "none" if shape is None else shape
             words = (

@@ -23,7 +23,7 @@ def breaks_of(function: Instance) -> Floats:
     Raises:
         PluginError: ``breaks`` of the type failed.
     """
-    type_: Any = function.examined.type
+    type_: Any = function.type_info.type
     fields = specs_of(type_)
     thing = type_(**{n: v for n, v in function.values.items() if n in fields})
     try:
@@ -37,7 +37,7 @@ def breaks_of(function: Instance) -> Floats:
 
 def breaks_are_told(function: Instance) -> bool:
     """Whether the type of a function says where it takes another form, or that it never does."""
-    type_: Any = function.examined.type
+    type_: Any = function.type_info.type
     return bool(type_.smooth) or type_.breaks is not Function.breaks
 
 

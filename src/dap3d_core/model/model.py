@@ -90,15 +90,15 @@ class Model:
     @cached_property
     def angle_count(self) -> int:
         """Number of angles whose turns are counted."""
-        return sum(g.count * len(g.examined.layout.angles) for g in self.acting)
+        return sum(g.count * len(g.type_info.layout.angles) for g in self.acting)
 
     def angles_of(self, group: Group, places: Integers) -> Integers:
         """(k, angles) where those of instances of a group stand among all that are reported."""
-        first, width = 0, len(group.examined.layout.angles)
+        first, width = 0, len(group.type_info.layout.angles)
         for other in self.acting:
             if other is group:
                 break
-            first += other.count * len(other.examined.layout.angles)
+            first += other.count * len(other.type_info.layout.angles)
         found: Integers = first + width * np.asarray(places)[:, None] + np.arange(width)
         return found
 
@@ -253,8 +253,8 @@ class _Groups:
         every = (*checked.joints, *checked.forces)
         used = {place - 1 for instance in every for place in instance.functions}
         functions = [(k, f) for k, f in enumerate(checked.functions) if k in used]
-        through = [(k, f) for k, f in enumerate(checked.forces) if f.examined.friction_joint]
-        direct = [(k, f) for k, f in enumerate(checked.forces) if not f.examined.friction_joint]
+        through = [(k, f) for k, f in enumerate(checked.forces) if f.type_info.friction_joint]
+        direct = [(k, f) for k, f in enumerate(checked.forces) if not f.type_info.friction_joint]
         joints = {j.name: (k, j) for k, j in enumerate(checked.joints)}
         names = {
             "joint": checked.joints,
@@ -295,11 +295,11 @@ def _faults(
 
 
 def _rows(joint: Instance) -> int:
-    return int(joint.examined.type.rows)  # type: ignore[attr-defined]
+    return int(joint.type_info.type.rows)  # type: ignore[attr-defined]
 
 
 def _position_mask(joint: Instance) -> tuple[bool, ...]:
-    mask = joint.examined.type.holonomic  # type: ignore[attr-defined]
+    mask = joint.type_info.type.holonomic  # type: ignore[attr-defined]
     return (mask,) * _rows(joint) if isinstance(mask, bool) else tuple(mask)
 
 

@@ -37,7 +37,7 @@ def changed(checked: ValidatedScene, model: Model, place: int, fields: Mapping[s
         ValueError: the force has no such field, or it cannot be changed, or not to this value.
     """
     force = checked.forces[place]
-    specs = specs_of(force.examined.type)
+    specs = specs_of(force.type_info.type)
     values = {name: _value(force.name, specs, name, value) for name, value in fields.items()}
     for group in model.forces:
         places = np.flatnonzero(group.members == place)
@@ -101,11 +101,11 @@ def _of_friction(model: Model, name: str, place: int, values: Mapping[str, Any])
             continue
         numbers = group.numbers[places].copy()
         where = np.zeros(numbers.shape, dtype=bool)
-        own = specs_of(group.examined.type)
+        own = specs_of(group.type_info.type)
         for field, value in values.items():
-            if field in own or field not in group.examined.layout.numbers:
+            if field in own or field not in group.type_info.layout.numbers:
                 raise ValueError(f"force {name}: {field} is not used in this joint")
-            at, _ = group.examined.layout.numbers[field]
+            at, _ = group.type_info.layout.numbers[field]
             numbers[:, at], where[:, at] = value, True
         return Change(group, places, where, numbers)
     raise ValueError(f"force {name} has no numbers")

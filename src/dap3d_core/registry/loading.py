@@ -12,7 +12,7 @@ from types import ModuleType
 import pluggy
 
 from dap3d_core.interface import INTERFACE_VERSION, PluginError, hooks
-from dap3d_core.interface.codegen.examined import TypeInfo
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.interface.hooks import GROUPS
@@ -52,7 +52,7 @@ def load(
         return examine(type_)
 
 
-def compile_kernels(source: Source, examined: TypeInfo, notes: list[str]) -> None:
+def compile_kernels(source: Source, type_info: TypeInfo, notes: list[str]) -> None:
     """Compile all kernels of a loaded type.
 
     Raises:
@@ -62,7 +62,7 @@ def compile_kernels(source: Source, examined: TypeInfo, notes: list[str]) -> Non
     from dap3d_core.interface.codegen.compile_loops import compile_all
 
     with guard(source, notes):
-        compile_all(examined)
+        compile_all(type_info)
 
 
 def load_file(path: Path, notes: list[str]) -> list[Source]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import attrs
 
 from dap3d_core.interface import PluginError
-from dap3d_core.interface.codegen.examined import TypeInfo
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.registry.declared_types import not_yet_installed
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover

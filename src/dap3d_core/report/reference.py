@@ -197,7 +197,7 @@ def compare_with_expected(bench: Bench, result: Result) -> Expected | None:
     count, deviation, within = 0, 0.0, True
     for check in checks:
         head, _, body = str(check["quantity"]).partition(".")
-        index = result.subject.body_index.get(body)
+        index = result.summary.body_index.get(body)
         if head not in ("r", "p", "rd", "w") or index is None or not check.get("t"):
             continue
         (rows,) = np.nonzero(np.abs(result.t - check["t"]) <= 1e-12 * abs(check["t"]))

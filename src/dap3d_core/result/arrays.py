@@ -143,21 +143,21 @@ def joined(parts: Sequence[Arrays]) -> Arrays:
     return Arrays(*map(np.concatenate, columns))
 
 
-def column_sizes(subject: ModelSummary) -> dict[str, int]:
+def column_sizes(summary: ModelSummary) -> dict[str, int]:
     """Length of each dimension that a column may have besides time."""
-    row = _layout(subject)
+    row = _layout(summary)
     sizes = {"velocity": "v_dot", "row": "Lam", "angle": "angles"}
-    state = state_layout(subject.body_count).size
+    state = state_layout(summary.body_count).size
     return {"state": state} | {k: row.length(name) for k, name in sizes.items()}
 
 
-def row_width(subject: ModelSummary) -> int:
+def row_width(summary: ModelSummary) -> int:
     """Numbers in a row of integrator output."""
-    return _layout(subject).size
+    return _layout(summary).size
 
 
-def _layout(subject: ModelSummary) -> Layout:
-    return row_layout(subject.body_count, subject.row_count, subject.angle_count)
+def _layout(summary: ModelSummary) -> Layout:
+    return row_layout(summary.body_count, summary.row_count, summary.angle_count)
 
 
 def _states(y: Floats) -> Floats:
@@ -170,22 +170,22 @@ def _states(y: Floats) -> Floats:
     return u_from_y(np.repeat(y, 2, axis=0))[:1] if len(y) else y[:, :-1]
 
 
-def arrays_of(rows: Floats, subject: ModelSummary) -> Arrays:
+def arrays_of(rows: Floats, summary: ModelSummary) -> Arrays:
     """Splits rows of integrator output into arrays.
 
     Args:
         rows: (nt, row_width): t; the integrated state (angular velocity in body axes, work last);
             v_dot; lambda; angles; potential energy; largest residuals of the three levels.
-        subject: the model of the rows.
+        summary: the model of the rows.
 
     Raises:
         ValueError: the rows have another width.
     """
     rows = np.asarray(rows, dtype=float)
-    width = row_width(subject)
+    width = row_width(summary)
     if rows.ndim != 2 or rows.shape[1] != width:
         raise ValueError(f"rows should have the shape (nt, {width}), not {rows.shape}")
-    layout = _layout(subject)
+    layout = _layout(summary)
     t, *_, work, v_dot, Lam, angles, energy, residuals = (rows[:, layout[n]] for n in layout.names)
     u = _states(rows[:, layout["coordinates"].start : layout["work"].stop])
     columns = (t[:, 0], u, v_dot, Lam, work[:, 0], energy[:, 0], *residuals.T, angles)

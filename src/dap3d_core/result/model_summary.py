@@ -74,16 +74,16 @@ def _index(names: tuple[str, ...]) -> dict[str, int]:
     return {name: k for k, name in enumerate(names)}
 
 
-def is_subject_of(subject: ModelSummary, model: Model) -> bool:
-    """True if arrays of a subject have the layout of a model's bodies and rows."""
+def is_summary_of(summary: ModelSummary, model: Model) -> bool:
+    """True if arrays of a summary have the layout of a model's bodies and rows."""
     return (
-        tuple(model.body_names) == tuple(subject.body_names)
-        and tuple(model.joint_names) == tuple(subject.joint_names)
-        and np.array_equal(model.joint_rows, subject.joint_rows)
+        tuple(model.body_names) == tuple(summary.body_names)
+        and tuple(model.joint_names) == tuple(summary.joint_names)
+        and np.array_equal(model.joint_rows, summary.joint_rows)
     )
 
 
-def subject_of(model: Model) -> ModelSummary:
+def summary_of(model: Model) -> ModelSummary:
     """The summary of a model."""
     return ModelSummary(
         body_names=model.body_names,
@@ -94,7 +94,7 @@ def subject_of(model: Model) -> ModelSummary:
         point_names=model.point_names,
         point_body=model.point_body,
         point_local=model.point_local,
-        has_potential=all("energy" in g.examined.type.kernels() for g in model.forces),
+        has_potential=all("energy" in g.type_info.type.kernels() for g in model.forces),
         is_isolated=not model.forces
         and all(len(slots) > 1 and 0 not in slots for slots in model.joint_slots),
         angle_count=model.angle_count,

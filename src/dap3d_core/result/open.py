@@ -17,7 +17,7 @@ from dap3d_core.result.file.library import opened, reading
 from dap3d_core.result.file.schema import CONSTANTS, CONVENTIONS, FORMAT, SWEEP, record_of
 from dap3d_core.result.file.validate import check_attributes, check_claims, check_subject
 from dap3d_core.result.metadata import RUNNING, RunMetadata
-from dap3d_core.result.model_summary import ModelSummary, is_subject_of
+from dap3d_core.result.model_summary import ModelSummary, is_summary_of
 from dap3d_core.result.result import Origin, Rebuild, Result
 
 _JSON = ("notes", "settings", "statistics", "versions", "events", "types")
@@ -48,23 +48,23 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
         try:
             _check_format(file, dataset)
             check_claims(file, dataset)
-            subject, record, arrays = _read(dataset)
+            summary, record, arrays = _read(dataset)
         except BaseException:
             dataset.close()
             raise
         if not isinstance(arrays, LazyArrays):
             dataset.close()
-    return Result(subject, arrays, record, _origin(file, subject, record, rebuild))
+    return Result(summary, arrays, record, _origin(file, summary, record, rebuild))
 
 
-def arrays_in(path: Path, subject: ModelSummary, count: int) -> LazyArrays:
+def arrays_in(path: Path, summary: ModelSummary, count: int) -> LazyArrays:
     """Arrays of a file that this process has just written, read on first use.
 
     Raises:
         ResultError: it cannot be read.
     """
     with reading(path):
-        return LazyArrays(opened(path), subject, count)
+        return LazyArrays(opened(path), summary, count)
 
 
 def _check_format(file: Path, dataset: Any) -> None:
@@ -90,15 +90,15 @@ def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, Arrays]:
     for name in _JSON:
         values[name] = json.loads(values[name])
     check_attributes(values)
-    subject, record = _subject(dataset, values), record_of(values)
-    check_subject(subject)
+    summary, record = _subject(dataset, values), record_of(values)
+    check_subject(summary)
     count = len(dataset.dimensions["time"])
     if record.status == RUNNING:
         count = _complete_count(dataset, count)
         record = _interrupted(dataset, record, count)
-    arrays = LazyArrays(dataset, subject, count)
+    arrays = LazyArrays(dataset, summary, count)
     large = 8 * count * arrays.width > LARGE
-    return subject, record, arrays if large else arrays.part(slice(None))
+    return summary, record, arrays if large else arrays.part(slice(None))
 
 
 def _subject(dataset: Any, values: dict[str, Any]) -> ModelSummary:
@@ -139,13 +139,13 @@ def _interrupted(dataset: Any, record: RunMetadata, count: int) -> RunMetadata:
 
 
 def _origin(
-    file: Path, subject: ModelSummary, record: RunMetadata, rebuild: Rebuild | None
+    file: Path, summary: ModelSummary, record: RunMetadata, rebuild: Rebuild | None
 ) -> Callable[[], Origin]:
     def origin() -> Origin:
         if rebuild is None:
             raise ResultError(f"the model of {file} is needed: open it with the way to rebuild it")
         model, evaluator_of = rebuild(record.scene_text)
-        if not is_subject_of(subject, model):
+        if not is_summary_of(summary, model):
             raise ResultError(
                 f"the scene in {file} gives another model than was run; its types may have changed"
             )

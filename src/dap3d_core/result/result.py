@@ -14,7 +14,7 @@ from dap3d_core.result.arrays import Arrays, arrays_of
 from dap3d_core.result.errors import ResultError, unknown
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.metadata import RunMetadata, RunStatistics
-from dap3d_core.result.model_summary import ModelSummary, subject_of
+from dap3d_core.result.model_summary import ModelSummary, summary_of
 from dap3d_core.result.post.force_output import ForceOutput, force_output
 from dap3d_core.result.post.global_error import ErrorEstimate, estimate_of
 from dap3d_core.result.post.ledger import Entry, ledger_of
@@ -62,12 +62,12 @@ class Result:
     global axes except for names that end in p (body axes). Animation points are the last points.
 
     Attributes:
-        subject: names and constants of bodies, joints and points.
+        summary: names and constants of bodies, joints and points.
         arrays: the stored arrays.
         record: metadata of the run.
     """
 
-    subject: ModelSummary
+    summary: ModelSummary
     arrays: Arrays
     record: RunMetadata
 
@@ -85,7 +85,7 @@ class Result:
 
     def __init__(
         self,
-        subject: ModelSummary,
+        summary: ModelSummary,
         arrays: Arrays,
         record: RunMetadata,
         origin: Callable[[], Origin],
@@ -93,10 +93,10 @@ class Result:
         """Composes a result of its parts.
 
         Args:
-            subject, arrays, record: the parts.
+            summary, arrays, record: the parts.
             origin: returns the model and access to an evaluator when they are needed.
         """
-        self.subject, self.arrays, self.record = subject, arrays, record
+        self.summary, self.arrays, self.record = summary, arrays, record
         self._make_origin = origin
         self._reactions: dict[str, dict[str, Reaction]] = {}
         self._forces: dict[str, ForceOutput] = {}
@@ -120,19 +120,19 @@ class Result:
         Raises:
             ValueError: the rows have another width.
         """
-        subject = subject_of(model)
-        return cls(subject, arrays_of(rows, subject), record, lambda: (model, evaluator_of))
+        summary = summary_of(model)
+        return cls(summary, arrays_of(rows, summary), record, lambda: (model, evaluator_of))
 
     def __reduce__(self) -> Any:
         """For other processes: everything but the model and the evaluator."""
         arrays = (*self.arrays.columns(), self.arrays.u_error)
-        return _received, (self.subject, arrays, self.record)
+        return _received, (self.summary, arrays, self.record)
 
     def __repr__(self) -> str:
         times = f", t = {self.t[0]:g} ... {self.t[-1]:g} s" if len(self.t) else ""
         return (
-            f"<Result {self.record.title!r}: {self.status}, {self.subject.body_count} bodies, "
-            f"{self.subject.row_count} rows, {len(self.t)} instants{times}>"
+            f"<Result {self.record.title!r}: {self.status}, {self.summary.body_count} bodies, "
+            f"{self.summary.row_count} rows, {len(self.t)} instants{times}>"
         )
 
     # ------------------------------------------------------------------ stored
@@ -267,18 +267,18 @@ class Result:
             UnknownNameError: there is no such joint; names the nearest.
             ResultError: as ``model``.
         """
-        if joint not in self.subject.joint_index:
-            raise unknown("joint", joint, self.subject.joint_names)
+        if joint not in self.summary.joint_index:
+            raise unknown("joint", joint, self.summary.joint_names)
         self._compute_reactions([joint])
         return dict(self._reactions[joint])
 
     def reactions(self) -> dict[str, Mapping[str, Reaction]]:
         """Reactions of all joints by name, computed in one pass; otherwise as ``reaction``."""
-        self._compute_reactions(self.subject.joint_names)
-        return {name: dict(self._reactions[name]) for name in self.subject.joint_names}
+        self._compute_reactions(self.summary.joint_names)
+        return {name: dict(self._reactions[name]) for name in self.summary.joint_names}
 
     def _compute_reactions(self, names: Iterable[str]) -> None:
-        index = self.subject.joint_index
+        index = self.summary.joint_index
         missing = {index[name]: name for name in names if name not in self._reactions}
         if missing:
             evaluator, angles = self.evaluator, self._angles()
@@ -322,7 +322,7 @@ class Result:
 
     def _angles(self) -> Floats | None:
         """(nt, k) angles with counted turns; None if an older file lacks them."""
-        if self.subject.angle_count == self.model.angle_count:
+        if self.summary.angle_count == self.model.angle_count:
             return self.arrays.angles
         note = (
             "the file holds no turns of angles, for an older dap3d wrote it: they are counted from "
@@ -338,12 +338,12 @@ class Result:
     @cached_property
     def energy(self) -> Energy:
         """Energies at the reported instants: kinetic, potential, total, (nt,) each, J."""
-        return Energy(kinetic_energy(self.subject, self.u), self.arrays.potential_energy)
+        return Energy(kinetic_energy(self.summary, self.u), self.arrays.potential_energy)
 
     @cached_property
     def ledger(self) -> dict[str, Entry]:
         """Errors of conserved and vanishing quantities (post/ledger.py): entries by name."""
-        return ledger_of(self.subject, self.arrays, self.record)
+        return ledger_of(self.summary, self.arrays, self.record)
 
     def quantity(self, name: str) -> Values:
         """A quantity by name, such as ``crank.r.z``, ``P3.v``, ``J1.force.norm``, ``energy.total``.
@@ -373,7 +373,7 @@ class Result:
         """
         from dap3d_core.result.file.write import save
 
-        save(self.subject, self.record, self.arrays, path, force)
+        save(self.summary, self.record, self.arrays, path, force)
 
     def to_xarray(self) -> "xarray.Dataset":
         """All arrays with named dimensions and units, as an xarray.Dataset."""
@@ -382,9 +382,9 @@ class Result:
         return dataset_of(self)
 
 
-def _received(subject: ModelSummary, arrays: tuple[Any, ...], record: RunMetadata) -> Result:
+def _received(summary: ModelSummary, arrays: tuple[Any, ...], record: RunMetadata) -> Result:
     """A result from another process."""
-    return Result(subject, Arrays(*arrays), record, _no_origin)
+    return Result(summary, Arrays(*arrays), record, _no_origin)
 
 
 def _no_origin() -> Origin:

@@ -60,7 +60,7 @@ def log_first_compilation() -> None:
     logging.getLogger("dap3d").warning("compiling for the first time; this happens once")
 
 
-class _Machines(threading.local):
+class _Evaluators(threading.local):
     """The machines of one thread.
 
     Attributes:
@@ -113,13 +113,13 @@ class CompiledModel:
             settings = attrs.evolve(scene.simulation, method=method)
             check_simulation(settings, self.model.body_names)
         #: The method that was asked for, perhaps "auto".
-        self.asked = asked = method or str(scene.simulation.method)
+        self.requested_method = requested = method or str(scene.simulation.method)
         self._breakpoints: dict[float, Breakpoints] = {}
         self._starts: dict[tuple[bool, tuple[str, ...], str], InitialState] = {}
-        self._own = _Machines()
-        self._first_method = self.method = choose_method(self.model, asked)[0]
+        self._own = _Evaluators()
+        self._first_method = self.method = choose_method(self.model, requested)[0]
         self._own.stack.append(self.new_evaluator(announce))
-        self.method, self.reason = self.choice(asked)
+        self.method, self.reason = self.choice(requested)
         self.evaluator.formulation = FORMULATIONS[self.method]
         _ = self.evaluator.functions  # compiled here, and not on the clock of the first run
         self.notes: list[str] = [
@@ -276,14 +276,14 @@ class CompiledModel:
         places = [f"{m.file}:{m.line}: {m.key}" for m in found if m.line is not None]
         return AssemblyError("\n".join([str(error), *places]), error.joints)
 
-    def choice(self, asked: str) -> tuple[str, str]:
-        """The formulation that a run takes when ``asked`` for one, and the reason in words.
+    def choice(self, requested: str) -> tuple[str, str]:
+        """The formulation that a run takes for a requested method, and the reason in words.
 
         Raises:
             SimulationError: the method asked for does not fit the scene.
         """
-        method, reason = choose_method(self.model, asked)
-        if asked != "auto" or not self.model.row_count:
+        method, reason = choose_method(self.model, requested)
+        if requested != "auto" or not self.model.row_count:
             return method, reason
         settings = self.scene.simulation
         try:
@@ -312,7 +312,7 @@ class CompiledModel:
         )
 
 
-def choose_method(model: Model, asked: str) -> tuple[str, str]:
+def choose_method(model: Model, requested: str) -> tuple[str, str]:
     """The formulation for a model, as far as its number of rows decides, and the reason in words.
 
     Raises:
@@ -320,14 +320,14 @@ def choose_method(model: Model, asked: str) -> tuple[str, str]:
     """
     constrained = model.row_count > 0
     usual = next(f.name for f in FORMULATIONS.values() if f.needs_joints == constrained)
-    if asked == "auto":
+    if requested == "auto":
         return usual, f"the scene has {'' if constrained else 'no '}joints"
-    if FORMULATIONS[asked].needs_joints == constrained:
-        return asked, "asked for"
+    if FORMULATIONS[requested].needs_joints == constrained:
+        return requested, "asked for"
     if not constrained:
-        return usual, f"asked for {asked}, but the scene has no joints"
+        return usual, f"asked for {requested}, but the scene has no joints"
     raise SimulationError(
-        f"method {asked} does not fit: the scene has {len(model.joint_names)} joints with "
+        f"method {requested} does not fit: the scene has {len(model.joint_names)} joints with "
         f"{model.row_count} rows; use {usual} or auto"
     )
 

@@ -63,7 +63,7 @@ def _some(names: tuple[str, ...], most: int = 8) -> str:
 
 def types_of(instances: Sequence[Instance]) -> dict[str, int]:
     """Keyword -> how many elements of this type there are, in the order of the file."""
-    return dict(Counter(instance.examined.type.keyword for instance in instances))
+    return dict(Counter(instance.type_info.type.keyword for instance in instances))
 
 
 def _counts(instances: Sequence[Instance]) -> str:
@@ -77,7 +77,7 @@ def _left_out(checked: ValidatedScene, model: Model) -> list[str]:
     for title, groups in elements.items():
         if not groups:
             result.append(f"{title}: the scene has none, so no code for them was loaded")
-    if model.forces and not any(g.examined.type.keyword == "weight" for g in model.forces):
+    if model.forces and not any(g.type_info.type.keyword == "weight" for g in model.forces):
         result.append("weight: no force of this type, so there is no gravity")
     for word, declared in _declared(scene).items():
         unused = [name for name in declared if name not in _used(scene)]

@@ -10,7 +10,7 @@ import numpy as np
 from dap3d_core.interface import PluginError
 from dap3d_core.result import Result, ResultError, current_versions
 from dap3d_core.result.arrays import COLUMNS, Arrays
-from dap3d_core.result.model_summary import is_subject_of
+from dap3d_core.result.model_summary import is_summary_of
 from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
@@ -84,7 +84,7 @@ def rerun(
     except (PluginError, SceneError) as error:
         words = why_unmade(error, allowed=allow_code and model is not None)
         raise ResultError(f"the run cannot be made again: {words}") from error
-    if not is_subject_of(first.subject, compiled.model):
+    if not is_summary_of(first.summary, compiled.model):
         raise ResultError(
             "the run cannot be made again: the scene in its result gives other bodies or joints "
             "than its arrays are of; the file was changed, or its types were"

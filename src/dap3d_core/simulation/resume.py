@@ -243,15 +243,15 @@ class ResumedRun:
         if not isinstance(events, dict | None) or not are_texts((events or {}).get("titles", [])):
             raise self._damaged("its events should be a table")
         titles = events.get("titles", []) if events else []
-        asked = [event.title for event in run.watcher.events] if run.watcher else []
+        asked = [event.title for event in run.event_locator.events] if run.event_locator else []
         if titles != asked:
             raise CheckpointError(
                 f"cannot resume from {self.path}: the run has the events {titles or 'none'}, given "
                 f"are {asked or 'none'}; give the same again, in their order"
             )
-        if events and run.watcher is not None:
+        if events and run.event_locator is not None:
             try:
-                run.watcher.restore(events)
+                run.event_locator.restore(events)
             except ValueError as error:
                 raise self._damaged(str(error)) from error
 
@@ -292,13 +292,16 @@ def restore_system(run: RunState, stored: Mapping[str, Any]) -> None:
     Raises:
         ValueError: they are of another model, or not finite.
     """
-    evaluator, changed = run.evaluator, run.watcher.changed_forces if run.watcher else ()
+    evaluator, changed = (
+        run.evaluator,
+        run.event_locator.changed_forces if run.event_locator else (),
+    )
     par, settings = evaluator.system.par, evaluator.system.settings
     changes = np.zeros(len(par), dtype=bool)
     for places in evaluator.turn_places():
         changes[places] = True
-    if run.watcher and changed:
-        changes |= run.watcher.numbers.changeable(changed)
+    if run.event_locator and changed:
+        changes |= run.event_locator.numbers.changeable(changed)
     new = restored("system.par", par, stored.get("system.par"), np.flatnonzero(~changes))
     counts: Any = stored.get("system.settings")
     check_alike("system.settings", counts, settings)

@@ -48,22 +48,22 @@ AGAIN = 0.8
 class Run(RunState):
     """One run of a compiled model: initialise, integrate, finish."""
 
-    saver: "CheckpointWriter | None" = None
+    checkpoint_writer: "CheckpointWriter | None" = None
     singular: SingularStart | None = None
 
     def save_every(self, seconds: float, *, force: bool) -> None:
         """Write checkpoints beside the output; arguments and errors as of ``CheckpointWriter``."""
         from dap3d_core.simulation.checkpoint.save import CheckpointWriter
 
-        self.saver = CheckpointWriter(self, seconds, force=force)
+        self.checkpoint_writer = CheckpointWriter(self, seconds, force=force)
 
     def go(self, restore: Callable[[RunState], None] | None = None) -> Result:
         """Run from the start, or from the state that ``restore`` gives the run, to the end."""
         self.initialise()
         if restore is not None:
             restore(self)
-        elif self.saver is not None:
-            self.saver.begin()
+        elif self.checkpoint_writer is not None:
+            self.checkpoint_writer.begin()
         return self.finish()
 
     def initialise(self) -> None:
@@ -86,15 +86,15 @@ class Run(RunState):
             self._interrupt(error)
             raise
         finally:
-            if self.watcher:
-                self.watcher.numbers.put_back()
+            if self.event_locator:
+                self.event_locator.numbers.put_back()
         ended = self.present.status
         if ended not in (Status.FINISHED, Status.ENDED):
             message = cannot_cross(why_stopped(self.evaluator, self.present, self.rank), self)
             self.notes.append(message)
         result = self._result("done" if ended is Status.FINISHED else "stopped")
-        if self.saver is not None:
-            self.saver.remove()
+        if self.checkpoint_writer is not None:
+            self.checkpoint_writer.remove()
         if ended not in (Status.FINISHED, Status.ENDED):
             raise SimulationError(message, result)
         assert result is not None
@@ -106,20 +106,20 @@ class Run(RunState):
         """Keep what was computed until an exception ended the integration."""
         if isinstance(error, ResultError):  # the disk: what is there stays as it is
             error.part = self.recorder.part  # type: ignore[attr-defined]
-            if self.saver is not None and self.saver.has_written:
-                error.checkpoint = self.saver.path  # type: ignore[attr-defined]
+            if self.checkpoint_writer is not None and self.checkpoint_writer.has_written:
+                error.checkpoint = self.checkpoint_writer.path  # type: ignore[attr-defined]
             return
         self._take_rows()
         status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
         error.result = self._result(status)  # type: ignore[attr-defined]
-        if self.saver is not None and self.recorder.count:
-            self.saver.leave(error)
-        elif self.saver is not None:
-            self.saver.remove()
+        if self.checkpoint_writer is not None and self.recorder.count:
+            self.checkpoint_writer.leave(error)
+        elif self.checkpoint_writer is not None:
+            self.checkpoint_writer.remove()
 
     def _again(self, settings: Simulation, limits: StepLimits | None) -> Result:
         """The result of a second run with other settings and limits of its steps, in memory."""
-        events = self.watcher.events if self.watcher else ()
+        events = self.event_locator.events if self.event_locator else ()
         return Run(self.compiled, settings, self.callbacks, events, limits=limits).go()
 
     def _start(self) -> InitialState:
@@ -193,14 +193,14 @@ class Run(RunState):
         while integration.status is Status.RUNNING and integration.t < self.until:
             before, clock = integration.statistics.rhs, time.perf_counter()
             self.is_whole = False
-            if self.watcher:
-                self.watcher.advance(integration, budget)
+            if self.event_locator:
+                self.event_locator.advance(integration, budget)
             else:
                 integration.advance(budget)
             self._take_rows()
             self.is_whole = True
-            if self.saver is not None:
-                self.saver.look()
+            if self.checkpoint_writer is not None:
+                self.checkpoint_writer.look()
             done, seconds = integration.statistics.rhs - before, time.perf_counter() - clock
             if progress is not None:
                 progress(integration.t, self.t_end)
@@ -227,13 +227,13 @@ class Run(RunState):
 
     def _closing_notes(self) -> list[str]:
         """Notes on a run that has come to an end."""
-        recorder, watcher = self.recorder, self.watcher
+        recorder, event_locator = self.recorder, self.event_locator
         notes = doubts(self.evaluator, self.statistics().rhs)
         if self.settings.step is None and recorder.count:
             notes += motion_notes(recorder.low, recorder.high, self.settings)
             notes += rounding_notes(self.integrations, self.evaluator.model.body_names)
         notes += recorder.pulling.notes()
-        notes += watcher.notes() if watcher else []
+        notes += event_locator.notes() if event_locator else []
         notes += event_notes(self.integrations, self.events())
         notes += crossing_notes(self.crossed)
         return notes + stiffness_notes(self.integrations, self.settings.integrator)

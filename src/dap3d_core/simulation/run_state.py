@@ -99,7 +99,7 @@ class RunState:
         self.crossed: list[float] = []
         self.until = np.inf
         self.options: dict[str, Any] = {}
-        self.watcher = EventLocator(compiled, events) if events else None
+        self.event_locator = EventLocator(compiled, events) if events else None
         watch = callbacks.watch
         self.observer = None if watch is None else Observer(self.evaluator.model, self.t_end, watch)
         check_room(len(self.times), row_width(self.evaluator), self.settings.dt, output)
@@ -143,7 +143,7 @@ class RunState:
 
     def events(self) -> list[EventRecord]:
         """Crossings of switches and events of the script so far, by time."""
-        of_script = self.watcher.occurrences if self.watcher else []
+        of_script = self.event_locator.occurrences if self.event_locator else []
         return occurrences(self.evaluator, self.integrations, of_script)
 
     def record(self, status: str, more_notes: Sequence[str] = ()) -> RunMetadata:
@@ -179,6 +179,6 @@ class RunState:
                 "rank": self.rank,
                 "conservative": self.compiled.is_conservative and not changes,
                 "correct_metric": str(self.settings.correct_metric),
-                "method": self.compiled.asked,
+                "method": self.compiled.requested_method,
             },
         )

@@ -266,7 +266,7 @@ def _fields(checked: ValidatedScene, path: tuple[str, ...]) -> Iterator[_Field]:
 def _element_fields(
     element: Element, path: tuple[str, ...], instance: Instance
 ) -> Iterator[_Field]:
-    for name, spec in specs_of(instance.examined.type).items():
+    for name, spec in specs_of(instance.type_info.type).items():
         value = element.fields.get(name)
         is_given = value is not None
         if not is_given and spec.kind in NUMERIC and spec.given:

@@ -8,7 +8,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.codegen.examined import TypeInfo
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.testing.checks import forces, functions, joints, plain_kernels, purity
@@ -87,10 +87,10 @@ def check_type(type_: Any, *, poses: int = POSES, seed: int = SEED) -> Report:
     Raises:
         PluginError: the type cannot be used at all.
     """
-    examined = type_ if isinstance(type_, TypeInfo) else examine(type_)
-    outcomes = tuple(check.run() for check in _checks(examined, poses, seed))
-    kind, keyword = examined.type.kind, examined.type.keyword
-    return Report(kind, keyword, where_is(examined.type), seed, poses, outcomes)
+    type_info = type_ if isinstance(type_, TypeInfo) else examine(type_)
+    outcomes = tuple(check.run() for check in _checks(type_info, poses, seed))
+    kind, keyword = type_info.type.kind, type_info.type.keyword
+    return Report(kind, keyword, where_is(type_info.type), seed, poses, outcomes)
 
 
 def checks_for(type_: Any, *, poses: int = POSES, seed: int = SEED) -> list[Check]:
@@ -108,18 +108,18 @@ def checks_for(type_: Any, *, poses: int = POSES, seed: int = SEED) -> list[Chec
     Raises:
         PluginError: the type cannot be used at all.
     """
-    examined = type_ if isinstance(type_, TypeInfo) else examine(type_)
-    return [check for check in _checks(examined, poses, seed) if not check.inapplicable]
+    type_info = type_ if isinstance(type_, TypeInfo) else examine(type_)
+    return [check for check in _checks(type_info, poses, seed) if not check.inapplicable]
 
 
-def _checks(examined: TypeInfo, poses: int, seed: int) -> list[Check]:
+def _checks(type_info: TypeInfo, poses: int, seed: int) -> list[Check]:
     if poses < 1:
         raise ValueError(f"poses is {poses}; a check takes one or more")
     of_kind = {"joint": _of_joint, "force": _of_force, "function": _of_function}
     checks = []
-    for subject in sampled_types(examined, seed, poses):
+    for subject in sampled_types(type_info, seed, poses):
         by_joint = "its formulas are the friction of its joint, which is checked with that"
-        if subject.examined.friction_joint:
+        if subject.type_info.friction_joint:
             checks.append(Check("energy", subject, by_joint, forces.potential))
             continue
         checks += of_kind[subject.type.kind](subject)
@@ -144,7 +144,7 @@ def _of_joint(subject: SampledType) -> list[Check]:
         Check("frame", subject, ground, joints.frame),
         Check("action and reaction", subject, ground, joints.action_and_reaction),
     ]
-    if "friction" in subject.examined.kernels:
+    if "friction" in subject.type_info.kernels:
         checks.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))
         for name, run in (("friction frame", forces.frame), ("friction balance", forces.balance)):
             on_friction = _on_friction(partial(run, kernel="friction"))

@@ -43,7 +43,7 @@ def page_data(
         raise ValueError("the result has no instants: there is nothing to show")
     if fps is not None and not (math.isfinite(fps) and 0.0 < fps <= 1e6):
         raise ValueError(f"fps = {fps:g}: the number of frames a second is greater than 0")
-    index = instants_to_show(result.t, share * result.subject.body_count, fps)
+    index = instants_to_show(result.t, share * result.summary.body_count, fps)
     shown = at_instants(result, index)
     elements = elements_of(result)
     geometry = geometry_of(shown, scene, elements)

@@ -184,7 +184,7 @@ def test_an_instant_that_is_reported_twice_has_a_rate_before_and_after(result, t
     u = arrays.u.copy()
     u[2, 14:17] *= -1.0  # the velocity of the first body
     struck = dap.Result(
-        result.subject, attrs.evolve(arrays, u=u), result.record, lambda: result._origin
+        result.summary, attrs.evolve(arrays, u=u), result.record, lambda: result._origin
     )
     made = dap.export(struck, tmp_path / "a.glb")
     t, before, r, after = Document(made.path).course("a", "translation")

@@ -432,8 +432,8 @@ def test_a_stub_for_the_force_of_the_user(tmp_path):
         load_registry().with_file(tmp_path / "plugin.py").get("force", "user")
     filled = report.stub.replace('        raise NotImplementedError("write it here")\n', "")
     (tmp_path / "plugin.py").write_text(filled)
-    examined = load_registry().with_file(tmp_path / "plugin.py").get("force", "user")
-    assert examined.layout.slots == ("i", "j")
+    type_info = load_registry().with_file(tmp_path / "plugin.py").get("force", "user")
+    assert type_info.layout.slots == ("i", "j")
 
 
 def test_what_the_stub_cannot_hold_is_told(tmp_path):

@@ -81,12 +81,12 @@ def test_a_type_is_imported_when_asked_for_and_not_before(install):
     assert "push" in registry.keywords("force")
     assert "push" not in registry.keywords("joint")
     assert module not in sys.modules
-    examined = registry.get("force", "push")
+    type_info = registry.get("force", "push")
     assert module in sys.modules
-    assert examined.type.__name__ == "Push"
-    assert examined.type.__doc__ == "A constant push along x."
-    assert examined.layout.slots == ("i",)
-    assert registry.get("force", "push") is examined, "examined once"
+    assert type_info.type.__name__ == "Push"
+    assert type_info.type.__doc__ == "A constant push along x."
+    assert type_info.layout.slots == ("i",)
+    assert registry.get("force", "push") is type_info, "type_info once"
 
 
 def test_listing_says_ok_with_distribution_and_version(install):
@@ -436,10 +436,10 @@ def test_a_model_file_adds_its_types_to_a_new_registry(tmp_path):
 
     registry = load_registry()
     more = registry.with_file(write(tmp_path))
-    examined = more.get("force", "push")
-    assert examined.type.__doc__ == "A constant push along x."
-    assert "def wrench(k)" in inspect.getsource(examined.type), "its source can be found"
-    assert inspect.getsourcefile(examined.type) == str(tmp_path / "plugin.py")
+    type_info = more.get("force", "push")
+    assert type_info.type.__doc__ == "A constant push along x."
+    assert "def wrench(k)" in inspect.getsource(type_info.type), "its source can be found"
+    assert inspect.getsourcefile(type_info.type) == str(tmp_path / "plugin.py")
     assert "push" not in registry.keywords("force"), "the first registry is as before"
     assert not (tmp_path / "__pycache__").exists()
     (info,) = [i for i in more.listing() if i.keyword == "push"]

@@ -51,9 +51,10 @@ def test_round_trip_is_bit_for_bit(tmp_path, name):
     found = open_result(tmp_path / "run.nc")
     assert same_bits(found, result)
     assert found.record == result.record
-    for constant in attrs.fields(type(result.subject)):
+    for constant in attrs.fields(type(result.summary)):
         np.testing.assert_array_equal(
-            getattr(found.subject, constant.name), getattr(result.subject, constant.name)
+            getattr(found.summary, constant.name),
+            getattr(result.summary, constant.name),
         )
     for array in ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd", "rP", "rPd", "rPdd"):
         np.testing.assert_array_equal(getattr(found, array), getattr(result, array))
@@ -105,7 +106,7 @@ def test_text_of_a_large_scene_and_odd_names(tmp_path):
     result.save(tmp_path / "räder.nc")
     found = open_result(tmp_path / "räder.nc")
     assert found.scene_text == result.scene_text
-    assert found.subject.body_names == ("bob", "Kurbel ä 手")
+    assert found.summary.body_names == ("bob", "Kurbel ä 手")
 
 
 # ---------------------------------------------------------------------------- what others read
@@ -215,5 +216,5 @@ def test_width_of_rows_is_that_of_the_integrator():
     model = model_of(load("fourbar3"))
     result = Result.of_run(model, noisy(model), RunMetadata(scene_text=""), lambda: None)
     size = Evaluator(model, "standard").report_size
-    assert row_width(result.subject) == 1 + 13 * model.body_count + 1 + size
+    assert row_width(result.summary) == 1 + 13 * model.body_count + 1 + size
     assert split(result.u)[0].shape == result.r.shape

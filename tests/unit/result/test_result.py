@@ -63,7 +63,7 @@ def test_angular_velocity_of_the_rows_is_in_body_axes_and_of_the_result_in_globa
 
 def test_points_move_as_on_a_circle_and_those_of_the_ground_stand():
     result, out, ahead = circling()
-    P = result.subject.point_index
+    P = result.summary.point_index
     assert result.rP.shape == result.rPd.shape == result.rPdd.shape == (21, 3, 3)
     far = ARM + 0.1
     np.testing.assert_allclose(result.rP[:, P["P"]], PIVOT + far * out, atol=1e-14)
@@ -175,12 +175,12 @@ def thrown(request):
 def test_reactions_are_what_the_jacobian_transposed_gives(thrown):
     """Two ways to D^T lambda: block by block, and through the assembled Jacobian."""
     result, _ = thrown
-    n = result.subject.body_count
+    n = result.summary.body_count
     total = np.zeros((3, n, 6))
-    for name in result.subject.joint_names:
+    for name in result.summary.joint_names:
         for one in result.reaction(name).values():
             if one.body != "ground":
-                k = result.subject.body_index[one.body]
+                k = result.summary.body_index[one.body]
                 total[:, k] += np.concatenate([one.force, one.moment], axis=1)
     expected = np.einsum("trc,tr->tc", result.Jac, result.Lam).reshape(3, n, 6)
     np.testing.assert_allclose(total, expected, atol=1e-12 * np.abs(expected).max())
@@ -189,7 +189,7 @@ def test_reactions_are_what_the_jacobian_transposed_gives(thrown):
 def test_reactions_leave_the_machine_as_it_was(thrown):
     result, evaluator = thrown
     before = evaluator.report(result.t[0], result.u[0])
-    result.reaction(result.subject.joint_names[-1])
+    result.reaction(result.summary.joint_names[-1])
     np.testing.assert_array_equal(evaluator.report(result.t[0], result.u[0]), before)
 
 
@@ -246,7 +246,7 @@ def test_what_the_run_says_of_itself():
 
 def test_a_result_travels_between_processes_without_its_model():
     result, _, _ = circling()
-    _ = result.reaction("J1"), result.subject.body_index
+    _ = result.reaction("J1"), result.summary.body_index
     found = pickle.loads(pickle.dumps(result))
     np.testing.assert_array_equal(found.u, result.u)
     np.testing.assert_array_equal(found.rP, result.rP)

@@ -135,8 +135,8 @@ def _check(registry: "Registry", kind: str, keyword: str, poses: int, seed: int)
     from dap3d_core.testing import CheckOutcome, Finding, Report, check_type
 
     try:
-        examined = registry.get(kind, keyword, limit_s=LOAD_LIMIT)
-        return check_type(examined, poses=poses, seed=seed)
+        type_info = registry.get(kind, keyword, limit_s=LOAD_LIMIT)
+        return check_type(type_info, poses=poses, seed=seed)
     except PluginError as error:
         finding = Finding("loading", "", "", 0, str(error))
         outcome = CheckOutcome(

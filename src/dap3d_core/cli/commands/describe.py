@@ -13,7 +13,7 @@ from dap3d_core.cli.process.exit_codes import DONE, Refused
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
-    from dap3d_core.interface.codegen.examined import TypeInfo
+    from dap3d_core.interface.codegen.type_info import TypeInfo
     from dap3d_core.registry import Registry
 
 
@@ -74,8 +74,8 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
     from dap3d_core.interface.errors import where_is
     from dap3d_core.interface.fields import specs_of
 
-    examined = registry.get(kind, keyword)
-    type_: Any = examined.type
+    type_info = registry.get(kind, keyword)
+    type_: Any = type_info.type
     source = registry.sources[kind, keyword][0]
     return {
         "kind": kind,
@@ -85,8 +85,8 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
         "version": source.version,
         "module": source.module,
         "file": where_is(type_).removesuffix(f": {type_.__name__}"),
-        "bodies": list(examined.layout.slots),
-        **_class_data(examined),
+        "bodies": list(type_info.layout.slots),
+        **_class_data(type_info),
         "fields": [
             {
                 "name": name,
@@ -107,32 +107,32 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
                 "level": "velocity" if argument.velocity else "position",
                 "doc": argument.doc,
             }
-            for argument in examined.names.values()
+            for argument in type_info.names.values()
         ],
         "variants": [
             {"with": dict(conditions), "class": e.type.__name__, **_class_data(e)}
-            for conditions, e in examined.variants
+            for conditions, e in type_info.variants
         ],
-        "example": example_of(examined, registry),
+        "example": example_of(type_info, registry),
         **({"each_body": bool(type_.each_body)} if kind == "force" else {}),
     }
 
 
-def _class_data(examined: "TypeInfo") -> dict[str, Any]:
+def _class_data(type_info: "TypeInfo") -> dict[str, Any]:
     """Docstring, kernels and, of a joint, numbers of rows: what variants of a type have, too."""
-    type_: Any = examined.type
-    kernels = [name for name in type_.kernel_names if name in examined.kernels]
+    type_: Any = type_info.type
+    kernels = [name for name in type_.kernel_names if name in type_info.kernels]
     data: dict[str, Any] = {
         "doc": inspect.cleandoc(type_.__doc__ or ""),
         "kernels": kernels,
-        "derived": list(examined.derived),
-        "source": {name: _source(examined.kernels[name]) for name in kernels},
+        "derived": list(type_info.derived),
+        "source": {name: _source(type_info.kernels[name]) for name in kernels},
     }
     if type_.kind == "joint":
         data |= {
             "rows": type_.rows,
             "position_rows": len(type_.position_rows()),
-            "freedoms": 6 * max(len(examined.layout.slots) - 1, 1) - type_.rows,
+            "freedoms": 6 * max(len(type_info.layout.slots) - 1, 1) - type_.rows,
         }
     return data
 

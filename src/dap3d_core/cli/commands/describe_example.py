@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dap3d_core.interface.codegen.examined import TypeInfo
+    from dap3d_core.interface.codegen.type_info import TypeInfo
     from dap3d_core.registry import Registry
 
 #: Body of each slot; points and vectors lie on it.
@@ -22,27 +22,27 @@ _LISTS = {
 ALONG = ("a", "")
 
 
-def example_of(examined: "TypeInfo", registry: "Registry") -> str:
+def example_of(type_info: "TypeInfo", registry: "Registry") -> str:
     """The text of a scene file with one element of a type and all that it needs.
 
     It has the required fields of the type, and its numbers with their defaults. Other elements that
     it needs are of the first suitable types in the registry.
     """
     scene = _Example(registry)
-    type_: Any = examined.type
+    type_: Any = type_info.type
     name = "J1" if type_.kind == "joint" else f"{_element_name(type_.keyword)}1"
-    scene.add(examined, name)
+    scene.add(type_info, name)
     if type_.kind == "function":
         scene.add(scene.first("joint", lambda joint: bool(joint.layout.functions)), "J1", name)
     return scene.text()
 
 
-def _has_friction(examined: "TypeInfo") -> bool:
+def _has_friction(type_info: "TypeInfo") -> bool:
     """True for a joint with friction that needs no optional field."""
     from dap3d_core.interface.codegen.kernel_arguments import parameters
 
-    kernel = examined.kernels.get("friction")
-    own = examined.layout.numbers
+    kernel = type_info.kernels.get("friction")
+    own = type_info.layout.numbers
     return kernel is not None and ("radius" in own or "radius" not in parameters(kernel))
 
 
@@ -69,18 +69,18 @@ class _Example:
 
         for keyword in self.registry.keywords(kind):
             try:
-                examined = self.registry.get(kind, keyword, limit_s=LOAD_LIMIT)
+                type_info = self.registry.get(kind, keyword, limit_s=LOAD_LIMIT)
             except PluginError:
                 continue
-            if is_suitable(examined):
-                return examined
+            if is_suitable(type_info):
+                return type_info
         raise PluginError(f"an example needs a {kind} that no installed package brings")
 
-    def add(self, examined: "TypeInfo", name: str, motor: str = "motor") -> None:
+    def add(self, type_info: "TypeInfo", name: str, motor: str = "motor") -> None:
         """Add an element of a type and all that it refers to; ``motor`` names its function."""
         from dap3d_core.interface.fields import specs_of
 
-        type_: Any = examined.type
+        type_: Any = type_info.type
         owners = dict(OWNERS)
         specs = {n: s for n, s in specs_of(type_).items() if s.given}
         for field, spec in specs.items():

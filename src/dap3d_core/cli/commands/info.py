@@ -41,11 +41,11 @@ def _show_run(file: str, as_json: bool) -> None:
 
     result = open_result(file)
     data, byte_count = run_data(result), Path(file).stat().st_size
-    subject = result.subject
+    summary = result.summary
     names = {
-        "body_names": subject.body_names,
-        "joint_names": subject.joint_names,
-        "point_names": subject.point_names,
+        "body_names": summary.body_names,
+        "joint_names": summary.joint_names,
+        "point_names": summary.point_names,
     }
     if as_json:
         about = {"file": file, "size_bytes": byte_count}
@@ -57,9 +57,9 @@ def _show_run(file: str, as_json: bool) -> None:
     console.facts(
         [
             ("file", f"{file}, {size(byte_count)}"),
-            ("bodies", some(subject.body_names, 12)),
-            ("joints", some(subject.joint_names, 12)),
-            ("points", some(subject.point_names, 12)),
+            ("bodies", some(summary.body_names, 12)),
+            ("joints", some(summary.joint_names, 12)),
+            ("points", some(summary.point_names, 12)),
             *run_pairs(data),
             ("settings", ", ".join(settings)),
             ("made with", ", ".join(f"{name} {v}" for name, v in result.versions.items())),

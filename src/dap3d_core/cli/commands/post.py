@@ -130,7 +130,7 @@ def _write_arrays(
     )
 
     with refusing(ResultError, UnknownNameError):
-        if jacobian and result.subject.row_count:
+        if jacobian and result.summary.row_count:
             _ = result.evaluator
         dataset = selection_of(result, names) if names else dataset_to_write(result, reactions)
     return write_netcdf(result, target, dataset, jacobian=jacobian, force=force)

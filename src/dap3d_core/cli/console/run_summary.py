@@ -46,17 +46,17 @@ CHANGED = 1e-12
 
 def run_data(result: "Result") -> dict[str, Any]:
     """The summary of a result as data."""
-    subject, error = result.subject, result.error
+    summary, error = result.summary, result.error
     instants = len(result.t)
-    dof = 6 * subject.body_count - result.settings.get("rank", subject.row_count)
+    dof = 6 * summary.body_count - result.settings.get("rank", summary.row_count)
     return {
         "scene": result.record.title,
         "status": result.status,
-        "bodies": subject.body_count,
-        "joints": len(subject.joint_names),
-        "rows": subject.row_count,
+        "bodies": summary.body_count,
+        "joints": len(summary.joint_names),
+        "rows": summary.row_count,
         "dof": dof,
-        "points": len(subject.point_names),
+        "points": len(summary.point_names),
         "method": result.method,
         "integrator": result.integrator,
         "settings": result.settings,
@@ -158,10 +158,10 @@ class RunOutcome:
 def _correction(outcome: RunOutcome) -> dict[str, Any] | None:
     """The correction of a run; None if there was none to make."""
     result = outcome.result
-    if not (result.settings.get("correct") and result.subject.row_count and len(result.t)):
+    if not (result.settings.get("correct") and result.summary.row_count and len(result.t)):
         return None
     first = result.arrays.part(slice(1)).u[0]
-    return correction_data(result.subject.body_names, outcome.compiled.model.u0, first)
+    return correction_data(result.summary.body_names, outcome.compiled.model.u0, first)
 
 
 def report_run(
@@ -204,7 +204,7 @@ def _show_run(
     show_details(console, data)
     console.say(f"{target} written ({size(target.stat().st_size)}). Next:", whole=True)
     file = shlex.quote(str(target))
-    quantity = shlex.quote(f"{outcome.result.subject.body_names[0]}.r")
+    quantity = shlex.quote(f"{outcome.result.summary.body_names[0]}.r")
     commands = (f"plot {file} {quantity}", f"view {file} --open", f"animate {file}", f"info {file}")
     for command in commands:
         console.say(f"dap3d {command}", "green", indent=2, whole=True)

@@ -35,10 +35,10 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
         if kind not in _KINDS:
             continue
-        slots = len(group.examined.layout.slots)
-        rows = int(getattr(group.examined.type, "rows", 0))
-        elements.append((loop, _KINDS[kind], stride(group.examined),
-                         group.examined.layout.par_width, slots, group.examined.layout.integers,
+        slots = len(group.type_info.layout.slots)
+        rows = int(getattr(group.type_info.type, "rows", 0))
+        elements.append((loop, _KINDS[kind], stride(group.type_info),
+                         group.type_info.layout.par_width, slots, group.type_info.layout.integers,
                          rows, count, int(_sees_velocity(kind, group))))  # fmt: skip
         pairs.append(_pairs(group.bodies, place))
         count += pairs[-1].size
@@ -88,5 +88,5 @@ def _sees_velocity(kind: str, group: Group) -> bool:
     """
     if kind == "acceleration":
         return False
-    wanted: Sequence[Any] = parameters(group.examined.kernels[kind])
-    return any(q.velocity for q in in_order(group.examined.names, wanted))
+    wanted: Sequence[Any] = parameters(group.type_info.kernels[kind])
+    return any(q.velocity for q in in_order(group.type_info.names, wanted))

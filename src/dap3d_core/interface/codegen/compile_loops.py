@@ -4,15 +4,15 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
 from dap3d_core.interface.codegen.specialise import bind_friction
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.kernels.runtime.loop_modules import build
 
 
 def compiled_loop(
-    examined: TypeInfo, what: str, announce: Callable[[str], None] | None = None
+    type_info: TypeInfo, what: str, announce: Callable[[str], None] | None = None
 ) -> Any:
     """The compiled loop of a type for ``what`` (a key of LOOP_KINDS); None where it has none.
 
@@ -24,20 +24,20 @@ def compiled_loop(
     Raises:
         PluginError: it cannot be compiled; names file, type, kernels, line, reason and remedy.
     """
-    loop = write(examined, what)
+    loop = write(type_info, what)
     if loop is None:
         return None
     try:
         return build(loop, announce)
     except Exception as error:
         raise PluginError(
-            f"{where_is(examined.type)}: its kernels cannot be compiled ({loop.name}): {error}. "
+            f"{where_is(type_info.type)}: its kernels cannot be compiled ({loop.name}): {error}. "
             "A kernel is plain: tuples of numbers, the words of dap3d_core.kernels, where() for "
             "branches"
         ) from error
 
 
-def compile_all(examined: TypeInfo) -> None:
+def compile_all(type_info: TypeInfo) -> None:
     """Compile all loops of a type and of its variants.
 
     Except kernels that call a function of an argument: they are compiled with the function of a
@@ -46,17 +46,17 @@ def compile_all(examined: TypeInfo) -> None:
     Raises:
         PluginError: one of them cannot be compiled.
     """
-    if not examined.argument_functions or not _calls_functions(examined):
+    if not type_info.argument_functions or not _calls_functions(type_info):
         for what in LOOP_KINDS:
             if what != "friction":
-                compiled_loop(examined, what)
-        if examined.type.kind == "joint" and "friction" in examined.kernels:
-            compiled_loop(bind_friction(examined), "friction")
-    for _, variant in examined.variants:
+                compiled_loop(type_info, what)
+        if type_info.type.kind == "joint" and "friction" in type_info.kernels:
+            compiled_loop(bind_friction(type_info), "friction")
+    for _, variant in type_info.variants:
         compile_all(variant)
 
 
-def _calls_functions(examined: TypeInfo) -> bool:
-    callable_names = {n for n, q in examined.names.items() if q.derivative >= 0}
+def _calls_functions(type_info: TypeInfo) -> bool:
+    callable_names = {n for n, q in type_info.names.items() if q.derivative >= 0}
     return any(callable_names & set(inspect.signature(k).parameters)
-               for k in examined.kernels.values())  # fmt: skip
+               for k in type_info.kernels.values())  # fmt: skip

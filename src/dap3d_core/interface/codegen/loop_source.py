@@ -7,8 +7,8 @@ the row vectors and for each slot that of its block in D; its numbers are in ``p
 
 from collections.abc import Iterable, Sequence
 
-from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.types import Joint
 from dap3d_core.kernels.runtime.loop_modules import Loop
 
@@ -28,31 +28,31 @@ LOOP_KINDS = {
 }
 
 
-def stride(examined: TypeInfo) -> int:
+def stride(type_info: TypeInfo) -> int:
     """Number of integers of an instance in ``idx``."""
-    n = examined.layout.integers
-    if examined.type.kind == "joint":
-        return n + 1 + len(examined.layout.slots)
-    return n + 1 if examined.type.kind == "function" else n
+    n = type_info.layout.integers
+    if type_info.type.kind == "joint":
+        return n + 1 + len(type_info.layout.slots)
+    return n + 1 if type_info.type.kind == "function" else n
 
 
-def write(examined: TypeInfo, what: str) -> Loop | None:
+def write(type_info: TypeInfo, what: str) -> Loop | None:
     """The loop that computes ``what`` (a key of LOOP_KINDS); None where there is no such kernel."""
-    kernels = {n: k for n, k in examined.kernels.items() if n in LOOP_KINDS[what]}
-    layout = examined.layout
+    kernels = {n: k for n, k in type_info.kernels.items() if n in LOOP_KINDS[what]}
+    layout = type_info.layout
     wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
     if what in ("angle", "turned"):
         wanted += [n for name in layout.angles for n in (name, f"{name}_dot")]
     if not kernels and not wanted:
         return None
-    lines = [f"b0 = i0 + q * {stride(examined)}"]
+    lines = [f"b0 = i0 + q * {stride(type_info)}"]
     lines += [f"p1 = p0 + q * {layout.par_width}"]
     lines += [f"b_{s} = idx[b0 + {n}]" for n, s in enumerate(layout.slots)]
     first = len(layout.slots) + len(layout.functions)
     lines += [f"b_{name} = idx[b0 + {first + n}]" for n, name in enumerate(layout.others)]
-    if examined.type.kind == "joint":
+    if type_info.type.kind == "joint":
         lines.append(f"row = idx[b0 + {layout.integers}]")
-    lines += [f"x_{q.name} = {q.code}" for q in in_order(examined.names, wanted) if q.code]
+    lines += [f"x_{q.name} = {q.code}" for q in in_order(type_info.names, wanted) if q.code]
     if what == "angle":
         for name, at in layout.angles.items():
             lines += _store_angle(name, at)
@@ -61,8 +61,8 @@ def write(examined: TypeInfo, what: str) -> Loop | None:
     for name, kernel in kernels.items():
         arguments = ", ".join(f"x_{n}" for n in parameters(kernel))
         lines.append(f"out = kernel_{name}({arguments})")
-        lines += _store(examined, name)
-    title = f"{examined.type.keyword}{examined.given}: {', '.join(kernels) or what}"
+        lines += _store(type_info, name)
+    title = f"{type_info.type.keyword}{type_info.given}: {', '.join(kernels) or what}"
     return Loop(title, {f"kernel_{n}": k for n, k in kernels.items()}, lines)
 
 
@@ -82,9 +82,9 @@ def _append(values: Sequence[str]) -> Iterable[str]:
     yield f"out2[0] += {len(values)}.0"
 
 
-def _store(examined: TypeInfo, kernel: str) -> Iterable[str]:
+def _store(type_info: TypeInfo, kernel: str) -> Iterable[str]:
     """Store the numbers that a kernel returned."""
-    paths, layout, type_ = examined.outputs[kernel], examined.layout, examined.type
+    paths, layout, type_ = type_info.outputs[kernel], type_info.layout, type_info.type
     if kernel == "energy":
         yield f"out1[0] += {paths[0]}"
     elif kernel == "value":

@@ -13,7 +13,6 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.instance_layout import InstanceLayout
 from dap3d_core.interface.codegen.kernel_arguments import (
     DERIVATIVES,
@@ -25,13 +24,14 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     parameters,
     stored,
 )
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 
 
-def uncalled(examined: TypeInfo) -> str:
+def uncalled(type_info: TypeInfo) -> str:
     """An unknown function that kernels call; "" where there is none."""
-    names = {n for kernel in examined.kernels.values() for n in parameters(kernel)}
-    return min((n for n in names if n in examined.names and examined.names[n].derivative >= 0),
+    names = {n for kernel in type_info.kernels.values() for n in parameters(kernel)}
+    return min((n for n in names if n in type_info.names and type_info.names[n].derivative >= 0),
                key=len, default="")  # fmt: skip
 
 
@@ -42,7 +42,7 @@ CALLING = ("C", "C_dot", "gamma", "wrench")
 
 
 def bind_functions(
-    examined: TypeInfo, functions: Mapping[str, TypeInfo], knots: Mapping[str, int]
+    type_info: TypeInfo, functions: Mapping[str, TypeInfo], knots: Mapping[str, int]
 ) -> TypeInfo:
     """A type with known functions of an argument.
 
@@ -59,7 +59,7 @@ def bind_functions(
     Raises:
         PluginError: a kernel does more with a function than to call it, or has no source.
     """
-    layout, names = examined.layout, dict(examined.names)
+    layout, names = type_info.layout, dict(type_info.names)
     calls: dict[str, tuple[_Given, int]] = {}
     for field, of_argument in functions.items():
         prefix = "f" if field == "function" else field
@@ -80,16 +80,16 @@ def bind_functions(
             names[given.knots] = KernelArgument(
                 given.knots, shape, False, stored(layout, given.knots)
             )
-    kernels = {n: _with_functions(examined, n, k, calls) for n, k in examined.kernels.items()}
+    kernels = {n: _with_functions(type_info, n, k, calls) for n, k in type_info.kernels.items()}
     title = f"({', '.join(g.type.keyword for g in functions.values())})"
-    bound = attrs.evolve(examined, layout=layout, names=names, kernels=kernels, given=title)
+    bound = attrs.evolve(type_info, layout=layout, names=names, kernels=kernels, given=title)
     calling = [
-        n for n in CALLING if set(parameters(examined.kernels.get(n, _nothing))) & set(calls)
+        n for n in CALLING if set(parameters(type_info.kernels.get(n, _nothing))) & set(calls)
     ]
     if not calling or not any(knots.values()):
         return bound
     distances = _Distances(calls)
-    kernel = _with_functions(examined, calling[0], examined.kernels[calling[0]], calls, distances)
+    kernel = _with_functions(type_info, calling[0], type_info.kernels[calling[0]], calls, distances)
     paths = tuple(f"out[{k}]" for k in range(len(distances.found)))
     return attrs.evolve(
         bound, kernels=bound.kernels | {"knot": kernel}, outputs=bound.outputs | {"knot": paths}
@@ -120,25 +120,25 @@ class _Given:
     knot_count: int
 
 
-def bind_friction(examined: TypeInfo) -> TypeInfo:
+def bind_friction(type_info: TypeInfo) -> TypeInfo:
     """A joint's kernel ``friction`` as a separate element: mu, v_tol, radius follow its numbers.
 
     Raises:
         PluginError: the joint has no such kernel.
     """
-    kernel = examined.kernels.get("friction")
+    kernel = type_info.kernels.get("friction")
     if kernel is None:
-        raise PluginError(f"{where_is(examined.type)} defines no friction")
-    layout, names = examined.layout, dict(examined.names)
+        raise PluginError(f"{where_is(type_info.type)} defines no friction")
+    layout, names = type_info.layout, dict(type_info.names)
     numbers, width = dict(layout.numbers), layout.par_width
-    for name, quantity in friction_names(examined.type.rows).items():  # type: ignore[attr-defined]
-        if name in FRICTION_NUMBERS and name not in examined.layout.numbers:
+    for name, quantity in friction_names(type_info.type.rows).items():  # type: ignore[attr-defined]
+        if name in FRICTION_NUMBERS and name not in type_info.layout.numbers:
             numbers[name] = width, ()
             quantity = attrs.evolve(quantity, code=f"par[p1 + {width}]")
             width += 1
-        names[name] = quantity if name not in examined.layout.numbers else names[name]
+        names[name] = quantity if name not in type_info.layout.numbers else names[name]
     layout = attrs.evolve(layout, numbers=numbers, par_width=width)
-    return attrs.evolve(examined, layout=layout, names=names, kernels={"friction": kernel})
+    return attrs.evolve(type_info, layout=layout, names=names, kernels={"friction": kernel})
 
 
 def _behind(layout: InstanceLayout, start: int) -> InstanceLayout:
@@ -152,7 +152,7 @@ def _behind(layout: InstanceLayout, start: int) -> InstanceLayout:
 
 
 def _with_functions(
-    examined: TypeInfo,
+    type_info: TypeInfo,
     name: str,
     kernel: Callable[..., Any],
     calls: Mapping[str, tuple[_Given, int]],
@@ -162,7 +162,7 @@ def _with_functions(
     called = [n for n in parameters(kernel) if n in calls]
     if not called:
         return kernel
-    who = f"{where_is(examined.type)}.{name}"
+    who = f"{where_is(type_info.type)}.{name}"
     try:
         lines, first = inspect.getsourcelines(kernel)
         tree = ast.parse(textwrap.dedent("".join(lines)))

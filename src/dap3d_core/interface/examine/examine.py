@@ -15,7 +15,6 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.body_pose import BodyPose
-from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.instance_layout import InstanceLayout, body_slots, layout_of, size
 from dap3d_core.interface.codegen.kernel_arguments import (
     VELOCITY_KERNELS,
@@ -25,6 +24,7 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     parameters,
 )
 from dap3d_core.interface.codegen.return_shapes import ShapeError, checked_shape, entries, value_at
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
 from dap3d_core.interface.examine.random_values import (

@@ -110,15 +110,15 @@ def sticks_of(result: Result, model: str | os.PathLike[str] | None = None) -> St
         result: whose.
         model: in whose folder meshes of shapes lie, where they are drawn.
     """
-    subject = result.subject
+    summary = result.summary
     scene = _scene(result.scene_text)
     if model is not None:
         scene.path = load(model).path
-    n = subject.body_count
-    body = [*range(1, n + 1), *(int(b) for b in subject.point_body)]
-    local = [*np.zeros((n, 3)), *subject.point_local]
-    place = {f"{name}.O": k for k, name in enumerate(subject.body_names)}
-    place |= {name: n + k for k, name in enumerate(subject.point_names)}
+    n = summary.body_count
+    body = [*range(1, n + 1), *(int(b) for b in summary.point_body)]
+    local = [*np.zeros((n, 3)), *summary.point_local]
+    place = {f"{name}.O": k for k, name in enumerate(summary.body_names)}
+    place |= {name: n + k for k, name in enumerate(summary.point_names)}
     pairs = {kind: list(_ends(scene, kind)) for kind in ("forces", "joints")}
     for name in {end for found in pairs.values() for pair in found for end in pair} - set(place):
         if name == "ground.O":
@@ -127,21 +127,21 @@ def sticks_of(result: Result, model: str | os.PathLike[str] | None = None) -> St
             local.append(np.zeros(3))
     springs, links = (_places(pairs[kind], place) for kind in ("forces", "joints"))
     pairs_of_bodies = [(body[a], body[b]) for a, b in links if body[a] and body[b]]
-    colors = _colors(scene, subject.body_names, pairs_of_bodies)
+    colors = _colors(scene, summary.body_names, pairs_of_bodies)
     shapes = None
     if scene.shapes:
         from dap3d_core.plot.film.shaded_solids import shapes_of
 
-        shapes = shapes_of(scene, subject.body_names, [to_hex(color) for color in colors])
+        shapes = shapes_of(scene, summary.body_names, [to_hex(color) for color in colors])
         colors = tuple(shapes.hues.get(k, color) for k, color in enumerate(colors, 1))
     found, shaped = np.array(body), [] if shapes is None else [*shapes.hues]
     bare = np.isin(found, shaped, invert=True)
-    wheels = [(k, R) for k, R in _wheels(scene, subject.body_names) if k not in shaped]
+    wheels = [(k, R) for k, R in _wheels(scene, summary.body_names) if k not in shaped]
     rims = [pair for n, (k, _) in enumerate(wheels) for pair in _rim(k, len(body) + n * SIDES)]
     around = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
     circle = np.stack([np.cos(around), 0.0 * around, np.sin(around)], axis=1)
     return Sticks(
-        names=subject.body_names,
+        names=summary.body_names,
         colors=colors,
         markers=tuple(MARKERS[k % len(MARKERS)] for k in range(n)),
         body=np.array([*body, *(k for k, _ in wheels for _ in circle)]),

@@ -18,10 +18,10 @@ class LazyArrays(Arrays):
     The file stays open: another file that takes its name meanwhile changes nothing here.
     """
 
-    def __init__(self, dataset: Any, subject: ModelSummary, count: int) -> None:
+    def __init__(self, dataset: Any, summary: ModelSummary, count: int) -> None:
         """Args: an open netCDF4.Dataset, its model, and the number of complete instants."""
         self._dataset, self._count = dataset, count
-        self._sizes = {"": None, **column_sizes(subject)}
+        self._sizes = {"": None, **column_sizes(summary)}
         optional = (U_ERROR,) if U_ERROR.name in dataset.variables else ()
         self._columns = {c.name: c for c in (*COLUMNS, *optional)}
 

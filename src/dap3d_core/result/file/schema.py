@@ -51,7 +51,7 @@ def about(unit: str, meaning: str) -> dict[str, str]:
     return {"units": unit, "long_name": meaning}
 
 
-def attributes(subject: ModelSummary, record: RunMetadata) -> dict[str, Any]:
+def attributes(summary: ModelSummary, record: RunMetadata) -> dict[str, Any]:
     """Global attributes. Lists and tables are JSON."""
     types = {} if record.types is None else {"types": to_json(record.types)}
     return types | {
@@ -68,8 +68,8 @@ def attributes(subject: ModelSummary, record: RunMetadata) -> dict[str, Any]:
         "statistics": to_json(attrs.asdict(record.stats)),
         "events": to_json([attrs.asdict(event) for event in record.events]),
         "versions": to_json(record.versions),
-        "has_potential": np.int32(subject.has_potential),
-        "is_isolated": np.int32(subject.is_isolated),
+        "has_potential": np.int32(summary.has_potential),
+        "is_isolated": np.int32(summary.is_isolated),
         "scene": record.scene_text,
     }
 
@@ -90,7 +90,12 @@ def record_of(values: dict[str, Any]) -> RunMetadata:
 
 
 def define(
-    dataset: Any, subject: ModelSummary, record: RunMetadata, nt: int, *, with_error: bool = False
+    dataset: Any,
+    summary: ModelSummary,
+    record: RunMetadata,
+    nt: int,
+    *,
+    with_error: bool = False,
 ) -> int:
     """Defines a new file and writes all but the rows.
 
@@ -98,7 +103,7 @@ def define(
 
     Args:
         dataset: a netCDF4.Dataset, empty.
-        subject, record: model and metadata of the run.
+        summary, record: model and metadata of the run.
         nt: number of reported instants to make room for.
         with_error: True to make room for an estimate of the error of u.
 
@@ -106,13 +111,13 @@ def define(
         Offset of the rows, in bytes: what lies before it describes the file.
     """
     entries = {
-        "body": subject.body_names,
+        "body": summary.body_names,
         "axis": AXES,
         "axis_2": AXES,
         "euler": EULER,
-        **{name: range(size) for name, size in column_sizes(subject).items()},
-        "joint": subject.joint_names,
-        "point": subject.point_names,
+        **{name: range(size) for name, size in column_sizes(summary).items()},
+        "joint": summary.joint_names,
+        "point": summary.point_names,
     }
     dataset.createDimension("time", nt or None)
     for name, values in entries.items():
@@ -125,7 +130,7 @@ def define(
             variable[:] = np.array(entries[name], dtype=object)
     for constant in CONSTANTS:
         if constant.dimensions[0] in dataset.dimensions:
-            array = getattr(subject, constant.name)
+            array = getattr(summary, constant.name)
             kind = "i8" if array.dtype.kind == "i" else "f8"
             variable = dataset.createVariable(
                 constant.name, kind, constant.dimensions, fill_value=False
@@ -140,7 +145,7 @@ def define(
             )
             coordinates = {"coordinates": "t"} if column.name != "t" else {}
             write_attributes(variable, about(column.unit, column.meaning) | coordinates)
-    write_attributes(dataset, attributes(subject, record))
+    write_attributes(dataset, attributes(summary, record))
     dataset.sync()
     return os.path.getsize(dataset.filepath())
 

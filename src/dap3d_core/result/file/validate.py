@@ -73,24 +73,24 @@ def check_numbers(file: str | Path, name: str, values: NDArray[np.float64]) -> N
         raise ResultError(f"cannot read {file}: it is damaged: {name} holds {fault}")
 
 
-def check_subject(subject: ModelSummary) -> None:
+def check_subject(summary: ModelSummary) -> None:
     """Checks that names are single lines, and that constants and indices are in range.
 
     Raises:
         ValueError: describes the first that is not.
     """
     for kind in ("body", "joint", "point"):
-        for name in getattr(subject, f"{kind}_names"):
+        for name in getattr(summary, f"{kind}_names"):
             if not name or not name.isprintable():
                 raise ValueError(f"{name!r} is no name of a {kind}")
     for constant in ("mass", "Jp", "point_local"):
-        if not (np.abs(getattr(subject, constant)) <= MOST).all():
+        if not (np.abs(getattr(summary, constant)) <= MOST).all():
             raise ValueError(f"{constant} holds a number that no scene may have")
-    if not (subject.mass > 0.0).all():
+    if not (summary.mass > 0.0).all():
         raise ValueError("a mass is not positive")
-    if not all(0 <= k <= subject.body_count for k in subject.point_body.tolist()):
+    if not all(0 <= k <= summary.body_count for k in summary.point_body.tolist()):
         raise ValueError("point_body names a body that there is not")
-    if not all(0 <= k <= MOST_ROWS for k in subject.joint_rows.tolist()):
+    if not all(0 <= k <= MOST_ROWS for k in summary.joint_rows.tolist()):
         raise ValueError("joint_rows are no numbers of rows")
 
 

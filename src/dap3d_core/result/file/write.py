@@ -26,7 +26,7 @@ from dap3d_core.result.model_summary import ModelSummary
 
 
 def save(
-    subject: ModelSummary,
+    summary: ModelSummary,
     record: RunMetadata,
     arrays: Arrays,
     path: str | os.PathLike[str],
@@ -43,7 +43,7 @@ def save(
         with created(part, target) as dataset:
 
             def write() -> int:
-                rows = define(dataset, subject, record, len(arrays), with_error=arrays.has_error)
+                rows = define(dataset, summary, record, len(arrays), with_error=arrays.has_error)
                 first = 0
                 for block in arrays.blocks():
                     write_rows(dataset, block, first)
@@ -120,7 +120,7 @@ class ResultWriter(GrowingFile):
     def __init__(
         self,
         path: str | os.PathLike[str],
-        subject: ModelSummary,
+        summary: ModelSummary,
         record: RunMetadata,
         most: int,
         *,
@@ -130,7 +130,7 @@ class ResultWriter(GrowingFile):
 
         Args:
             path: the requested file.
-            subject: model of the rows.
+            summary: model of the rows.
             record: metadata at the start of the run; its status is ignored.
             most: largest number of rows.
             force: True if ``path`` may exist.
@@ -152,7 +152,7 @@ class ResultWriter(GrowingFile):
 
         with NETCDF:
             try:
-                self.part = self._create(lambda d: define(d, subject, started, most), allocate)
+                self.part = self._create(lambda d: define(d, summary, started, most), allocate)
             except BaseException:
                 with suppress(ResultError):
                     self.close()

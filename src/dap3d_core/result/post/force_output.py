@@ -75,7 +75,7 @@ def force_output(
         out[k], potential[k] = force.reshape(-1, 6)[bodies], energy[0]
     on = actions_of(evaluator.model, u, group, index, out)
     output = ForceOutput(on, potential if loops.has("energy") else None)
-    if any(spec.kind == "vector2" for spec in specs_of(group.examined.type).values()):
+    if any(spec.kind == "vector2" for spec in specs_of(group.type_info.type).values()):
         length, rate, tension = _along(group, index, u, v_dot, on["i"].force)
         return attrs.evolve(output, length=length, length_rate=rate, tension=tension)
     return output
@@ -85,7 +85,7 @@ def _group_of(evaluator: "Evaluator", name: str, element: int) -> tuple[Group, i
     """The group of a force element and its index there."""
     for group in evaluator.model.forces:
         indices = np.flatnonzero(group.members == element)
-        if len(indices) and not getattr(group.examined.type, "each_body", False):
+        if len(indices) and not getattr(group.type_info.type, "each_body", False):
             return group, int(indices[0])
     raise UnknownNameError(
         f"the force {name!r} has no quantities: it acts on every body or in a joint, not on bodies "
@@ -97,7 +97,7 @@ def _along(
     group: Group, index: int, u: Floats, v_dot: Floats, force: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Length, its rate and the tension (nt,) of an element between points P_i and P_j."""
-    numbers, ends = group.examined.layout.numbers, []
+    numbers, ends = group.type_info.layout.numbers, []
     for end in ("P_i", "P_j"):
         at, _ = numbers[end]
         ends.append(group.numbers[index, at : at + 3])
@@ -124,7 +124,7 @@ class _ForceLoops:
         self.parameters.set_angles(np.zeros(evaluator.model.angle_count))
         self._groups, start = s.groups.copy(), self.parameters.start
         for q in self._loops.values():
-            self._groups[q] = s.groups[q, 0] + index * stride(group.examined), start, 1
+            self._groups[q] = s.groups[q, 0] + index * stride(group.type_info), start, 1
 
     def has(self, kind: str) -> bool:
         """True if there is a loop of a kind."""

@@ -95,37 +95,37 @@ class LedgerSeries:
     sizes: list[float]
 
     @classmethod
-    def of(cls, subject: ModelSummary, arrays: Arrays, length: float) -> "LedgerSeries":
+    def of(cls, summary: ModelSummary, arrays: Arrays, length: float) -> "LedgerSeries":
         """The series of a run, computed block by block in little memory."""
         blocks, sizes = [], np.zeros(3)
         for block in arrays.blocks():
-            blocks.append(_series(subject, block))
-            arms = np.tile(np.repeat([1.0, length], 3), subject.body_count)
+            blocks.append(_series(summary, block))
+            arms = np.tile(np.repeat([1.0, length], 3), summary.body_count)
             sized = (split(block.u)[0], arms * velocities_of(block.u), arms * block.v_dot)
             sizes = np.maximum(sizes, [_largest(a) for a in sized])
         series = {name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]}
         return cls(**series, sizes=sizes.tolist())
 
 
-def _series(subject: ModelSummary, block: Arrays) -> dict[str, Floats]:
+def _series(summary: ModelSummary, block: Arrays) -> dict[str, Floats]:
     """Series of a block of instants by name."""
     r, p, rd, w = split(block.u)
     fast = np.linalg.norm(rd, axis=2)
-    inertia = np.linalg.norm(subject.Jp, ord=2, axis=(1, 2))
+    inertia = np.linalg.norm(summary.Jp, ord=2, axis=(1, 2))
     off = np.abs(np.linalg.norm(p, axis=2) - 1.0)
     residuals = ("position_residual", "velocity_residual", "acceleration_residual")
     series = {name: getattr(block, name) for name in ("t", "work", "potential_energy", *residuals)}
     series |= {
-        "kinetic": kinetic_energy(subject, block.u),
-        "speed": fast @ subject.mass,
+        "kinetic": kinetic_energy(summary, block.u),
+        "speed": fast @ summary.mass,
         "spin": np.linalg.norm(w, axis=2) @ inertia,
         "off_unit": off.max(axis=1, initial=0.0),
         "reaction": np.abs(block.Lam).sum(axis=1),
     }
-    if subject.is_isolated:
+    if summary.is_isolated:
         far = np.linalg.norm(r, axis=2)
-        series |= {"far": far @ subject.mass, "orbit": (far * fast) @ subject.mass}
-        series |= dict(zip(("linear", "angular"), momentum(subject, block.u), strict=True))
+        series |= {"far": far @ summary.mass, "orbit": (far * fast) @ summary.mass}
+        series |= dict(zip(("linear", "angular"), momentum(summary, block.u), strict=True))
     return series
 
 
@@ -134,7 +134,7 @@ def _series(subject: ModelSummary, block: Arrays) -> dict[str, Floats]:
 CONSERVATIVE = 1e-3
 
 
-def ledger_of(subject: ModelSummary, arrays: Arrays, record: RunMetadata) -> dict[str, Entry]:
+def ledger_of(summary: ModelSummary, arrays: Arrays, record: RunMetadata) -> dict[str, Entry]:
     """All entries of a run, by name; none for a run without reported instants.
 
     Names: energy; total energy (where potentials alone do work); momentum (where nothing
@@ -142,13 +142,13 @@ def ledger_of(subject: ModelSummary, arrays: Arrays, record: RunMetadata) -> dic
     """
     if not len(arrays):
         return {}
-    course = LedgerSeries.of(subject, arrays, record.length)
-    entries = {"energy": _energy(subject, course, record)}
-    if subject.has_potential and _is_conservative(subject, course, record):
-        entries["total energy"] = _total_energy(subject, course, record)
-    if subject.is_isolated:
-        entries["momentum"] = _momentum(subject, course, record)
-    entries |= _constraints(subject, course, record)
+    course = LedgerSeries.of(summary, arrays, record.length)
+    entries = {"energy": _energy(summary, course, record)}
+    if summary.has_potential and _is_conservative(summary, course, record):
+        entries["total energy"] = _total_energy(summary, course, record)
+    if summary.is_isolated:
+        entries["momentum"] = _momentum(summary, course, record)
+    entries |= _constraints(summary, course, record)
     entries["quaternion"] = _quaternion(course, record)
     return entries
 
@@ -167,7 +167,7 @@ def _floors(record: RunMetadata) -> dict[str, float]:
     return {name: atol / control[0] for name, atol in control[1].items()}
 
 
-def _energy_scale(subject: ModelSummary, course: LedgerSeries, record: RunMetadata) -> float:
+def _energy_scale(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> float:
     """What an imbalance of energy is compared with, J: the largest kinetic energy or work.
 
     Below a speed of atol / rtol error control is absolute: an error atol of the speed v is one of
@@ -184,21 +184,21 @@ def _energy_scale(subject: ModelSummary, course: LedgerSeries, record: RunMetada
     at_rest += PROJECTED * (record.length + course.sizes[0]) * _largest(course.reaction)
     if record.tolerances is not None:
         atol = record.tolerances[1]
-        at_rest += atol["v"] ** 2 * subject.mass.sum() + atol["w"] ** 2 * _inertia(subject)
+        at_rest += atol["v"] ** 2 * summary.mass.sum() + atol["w"] ** 2 * _inertia(summary)
     work = max(_largest(course.work - course.work[0]), float(record.settings.get("most_work", 0.0)))
     return max(float(kinetic), work, at_rest / limit, float(np.finfo(float).tiny))
 
 
-def _inertia(subject: ModelSummary) -> float:
+def _inertia(summary: ModelSummary) -> float:
     """Sum of the bodies' largest principal inertias, kg m^2."""
-    return float(np.linalg.norm(subject.Jp, ord=2, axis=(1, 2)).sum())
+    return float(np.linalg.norm(summary.Jp, ord=2, axis=(1, 2)).sum())
 
 
-def _energy(subject: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:
+def _energy(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:
     """Kinetic energy against the work done by forces and drivers, dampers included."""
     kinetic, work = course.kinetic, course.work
     worst, when = _worst((kinetic - kinetic[0]) - (work - work[0]), course.t)
-    scale = _energy_scale(subject, course, record)
+    scale = _energy_scale(summary, course, record)
     text = (
         f"change of kinetic energy less work of forces and drivers: {worst:.2g} J "
         f"at t = {when:g} s, relative to {scale:.3g} J"
@@ -206,22 +206,22 @@ def _energy(subject: ModelSummary, course: LedgerSeries, record: RunMetadata) ->
     return _entry(worst / scale, _relative_limit(record), "1", text)
 
 
-def _is_conservative(subject: ModelSummary, course: LedgerSeries, record: RunMetadata) -> bool:
+def _is_conservative(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> bool:
     """Whether potentials account for all work: by what the elements are, and as measured.
 
     As measured, because a damper may act only where bodies touch.
     """
     work, potential = course.work, course.potential_energy
     other = (work - work[0]) + (potential - potential[0])
-    little = _largest(other) <= CONSERVATIVE * _energy_scale(subject, course, record)
+    little = _largest(other) <= CONSERVATIVE * _energy_scale(summary, course, record)
     return little and bool(record.settings.get("conservative"))
 
 
-def _total_energy(subject: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:
+def _total_energy(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:
     """Change of kinetic and potential energy together: zero where potentials alone do work."""
     total = course.kinetic + course.potential_energy
     worst, when = _worst(total - total[0], course.t)
-    scale = _energy_scale(subject, course, record)
+    scale = _energy_scale(summary, course, record)
     text = (
         f"change of kinetic and potential energy: {worst:.2g} J at t = {when:g} s, relative to "
         f"{scale:.3g} J"
@@ -229,13 +229,13 @@ def _total_energy(subject: ModelSummary, course: LedgerSeries, record: RunMetada
     return _entry(worst / scale, _relative_limit(record), "1", text)
 
 
-def _momentum(subject: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:
+def _momentum(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:
     """Drift of linear and angular momentum, relative to the momenta of the bodies added up."""
     floors = _floors(record)
     far = floors["v"] * course.far + floors["r"] * course.speed
     scales = (
-        np.max(course.speed) + floors["v"] * subject.mass.sum(),
-        np.max(course.orbit + far + course.spin) + floors["w"] * _inertia(subject),
+        np.max(course.speed) + floors["v"] * summary.mass.sum(),
+        np.max(course.orbit + far + course.spin) + floors["w"] * _inertia(summary),
     )
     drifts = []
     for values, scale in zip((course.linear, course.angular), scales, strict=True):
@@ -249,7 +249,7 @@ def _momentum(subject: ModelSummary, course: LedgerSeries, record: RunMetadata) 
 
 
 def _constraints(
-    subject: ModelSummary, course: LedgerSeries, record: RunMetadata
+    summary: ModelSummary, course: LedgerSeries, record: RunMetadata
 ) -> dict[str, Entry]:
     """Largest residuals of the constraints at the three levels.
 
@@ -260,7 +260,7 @@ def _constraints(
     sizes = [record.length + size for size in course.sizes]
     limits: list[float | None] = [
         *(_state_limit(record, size, q) for size, q in zip(sizes[:2], "rv", strict=True)),
-        SOLVED * sizes[2] + _rounding_of_accelerations(subject, course, record.length),
+        SOLVED * sizes[2] + _rounding_of_accelerations(summary, course, record.length),
     ]
     from dap3d_core.formulations import FORMULATIONS  # results are read without it
 
@@ -273,14 +273,14 @@ def _constraints(
         strict=True,
     ):  # fmt: skip
         worst, when = _worst(getattr(course, f"{name}_residual"), course.t)
-        text = f"largest |{residual}| of {subject.row_count} constraint rows, at t = {when:g} s"
-        if not subject.row_count:
+        text = f"largest |{residual}| of {summary.row_count} constraint rows, at t = {when:g} s"
+        if not summary.row_count:
             text = "no constraints"
         found[name] = _entry(worst, limit, "SI", text)
     return found
 
 
-def _rounding_of_accelerations(subject: ModelSummary, course: LedgerSeries, length: float) -> float:
+def _rounding_of_accelerations(summary: ModelSummary, course: LedgerSeries, length: float) -> float:
     """What rounding of the reactions leaves of D v_dot - gamma, m/s^2.
 
     The factors L D L^T of the matrix K of the equations of motion give a solution x of an equation
@@ -292,8 +292,8 @@ def _rounding_of_accelerations(subject: ModelSummary, course: LedgerSeries, leng
     A moment turns the lightest body about its second smallest principal axis: the joints of a thin
     rod have no lever about the first.
     """
-    second = np.linalg.eigvalsh(subject.Jp)[:, 1] / length**2
-    lightest = float(np.min(np.minimum(subject.mass, second), initial=np.inf))
+    second = np.linalg.eigvalsh(summary.Jp)[:, 1] / length**2
+    lightest = float(np.min(np.minimum(summary.mass, second), initial=np.inf))
     return BACKWARD * _largest(course.reaction) / lightest
 
 

@@ -16,10 +16,10 @@ def accelerations(v_dot: Floats) -> tuple[Floats, Floats]:
 
 
 def point_motion(
-    subject: ModelSummary, u: Floats, v_dot: Floats, points: slice, level: int
+    summary: ModelSummary, u: Floats, v_dot: Floats, points: slice, level: int
 ) -> Floats:
     """``motion_of`` points of a model, (nt, k, 3)."""
-    return motion_of(subject.point_body[points], subject.point_local[points], u, v_dot, level)
+    return motion_of(summary.point_body[points], summary.point_local[points], u, v_dot, level)
 
 
 def motion_of(body: Integers, local: Floats, u: Floats, v_dot: Floats, level: int) -> Floats:
@@ -72,18 +72,18 @@ class Energy:
         return self.kinetic + self.potential
 
 
-def kinetic_energy(subject: ModelSummary, u: Floats) -> Floats:
+def kinetic_energy(summary: ModelSummary, u: Floats) -> Floats:
     """(nt,) kinetic energy, J: sum of m |r_dot|^2 / 2 and omega' . J' omega' / 2."""
     _, p, rd, w = split(u)
     wp = to_body(p, w)
-    translation = np.einsum("b,tbc,tbc->t", subject.mass, rd, rd)
-    rotation = np.einsum("tbc,bcd,tbd->t", wp, subject.Jp, wp)
+    translation = np.einsum("b,tbc,tbc->t", summary.mass, rd, rd)
+    rotation = np.einsum("tbc,bcd,tbd->t", wp, summary.Jp, wp)
     return np.asarray(0.5 * (translation + rotation))
 
 
-def momentum(subject: ModelSummary, u: Floats) -> tuple[Floats, Floats]:
+def momentum(summary: ModelSummary, u: Floats) -> tuple[Floats, Floats]:
     """Linear momentum (nt, 3), kg m/s, and angular momentum about the origin (nt, 3), kg m^2/s."""
     r, p, rd, w = split(u)
-    linear = subject.mass[:, None] * rd
-    spin = to_global(p, np.einsum("bcd,tbd->tbc", subject.Jp, to_body(p, w)))
+    linear = summary.mass[:, None] * rd
+    spin = to_global(p, np.einsum("bcd,tbd->tbc", summary.Jp, to_body(p, w)))
     return linear.sum(axis=1), (np.cross(r, linear) + spin).sum(axis=1)

@@ -139,7 +139,7 @@ def actions_of(
     model: Model, u: Floats, group: Group, index: int, wrenches: Floats
 ) -> dict[str, Reaction]:
     """Wrenches (nt, slots, 6) of an instance of a group, by slot."""
-    layout, p = group.examined.layout, split(u)[1]
+    layout, p = group.type_info.layout, split(u)[1]
     names, actions = ("ground", *model.body_names), {}
     for n, (slot, body) in enumerate(zip(layout.slots, group.bodies[index], strict=True)):
         at, shape = layout.numbers.get(f"P_{slot}", (0, ()))
@@ -160,7 +160,7 @@ class InstanceParameters:
 
     def __init__(self, evaluator: "Evaluator", q: int, group: Group, indices: Integers) -> None:
         """Args: evaluator, its loop, the loop's group, (k,) indices of the instances."""
-        s, layout = evaluator.system, group.examined.layout
+        s, layout = evaluator.system, group.type_info.layout
         shape, first = (group.count, layout.par_width), s.groups[q, 1]
         of_group = s.par[first : first + group.count * layout.par_width].reshape(shape)
         self.par, self.start = np.concatenate([s.par, of_group[indices].ravel()]), len(s.par)
@@ -200,10 +200,10 @@ class _JointLoop:
         s, model, count = evaluator.system, evaluator.model, len(indices)
         self.evaluator, self.q, self.group, self.indices = evaluator, q, group, indices
         self.joints = group.members[indices]
-        slots, rows = len(group.examined.layout.slots), int(model.joint_rows[self.joints[0]])
+        slots, rows = len(group.type_info.layout.slots), int(model.joint_rows[self.joints[0]])
         self.shape = count, slots, 6
         self._rows = model.joint_start[self.joints][:, None] + np.arange(rows)
-        width, i0 = stride(group.examined), s.groups[q, 0]
+        width, i0 = stride(group.type_info), s.groups[q, 0]
         idx = s.idx[i0 : i0 + group.count * width].reshape(-1, width)[indices]
         idx[:, -slots - 1] = rows * np.arange(count)
         idx[:, -slots:] = 6 * rows * np.arange(count * slots).reshape(count, slots)

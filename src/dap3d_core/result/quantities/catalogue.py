@@ -25,7 +25,7 @@ SLOTS = ("i", "j", "k")
 class QuantitySource(Protocol):
     """The part of a ``Result`` that quantities are computed from."""
 
-    subject: ModelSummary
+    summary: ModelSummary
     arrays: Arrays
     record: RunMetadata
 
@@ -138,7 +138,7 @@ def _in_body_axes(vectors: MotionFunction) -> MotionFunction:
 
 def _points(level: int) -> MotionFunction:
     return lambda source, points: point_motion(
-        source.subject, source.arrays.u, source.arrays.v_dot, points, level
+        source.summary, source.arrays.u, source.arrays.v_dot, points, level
     )
 
 
@@ -202,7 +202,7 @@ def _force_output(part: str) -> QuantityFunction:
 
 
 def _multipliers(source: QuantitySource, owner: QuantityOwner) -> Floats:
-    start = source.subject.joint_start
+    start = source.summary.joint_start
     return source.arrays.Lam[:, start[owner.place] : start[owner.place + 1]]
 
 

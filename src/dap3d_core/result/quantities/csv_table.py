@@ -87,15 +87,15 @@ def jacobian_columns(result: "Result") -> list[TableColumn]:
     Raises:
         ResultError: it is too large for a table, or the model is not available.
     """
-    subject = result.subject
-    if subject.row_count > DENSE_ROWS:
+    summary = result.summary
+    if summary.row_count > DENSE_ROWS:
         raise ResultError(
-            f"a Jacobian of {subject.row_count:,} rows does not go into a table (at most "
+            f"a Jacobian of {summary.row_count:,} rows does not go into a table (at most "
             f"{DENSE_ROWS:,}): write a .nc file, which holds its non-zero entries"
         )
-    if subject.row_count:
+    if summary.row_count:
         _ = result.evaluator
-    velocities = [f"{b}.{q}.{c}" for b in subject.body_names for q in ("rd", "w") for c in AXES]
+    velocities = [f"{b}.{q}.{c}" for b in summary.body_names for q in ("rd", "w") for c in AXES]
     return [
         TableColumn(f"{joint}.Jac.{number}.{velocity}", "SI", np.zeros(0))
         for joint, number, _ in _rows(result)
@@ -145,8 +145,8 @@ def _write(
 def _of_motion(result: "Result", kind: str) -> Iterator[TableColumn]:
     """Columns of the motion of all bodies or all points."""
     motions = [(m, getattr(result, m.array)) for m in MOTION if m.owner == kind]
-    for k, owner in enumerate(getattr(result.subject, f"{kind}_names")):
-        is_shared = kind == "point" and owner in result.subject.body_index
+    for k, owner in enumerate(getattr(result.summary, f"{kind}_names")):
+        is_shared = kind == "point" and owner in result.summary.body_index
         for motion, values in motions:
             name = f"{owner}.{motion.array if is_shared else motion.quantity}"
             yield from _components(name, motion.unit, values[:, k], motion.components)
@@ -170,9 +170,9 @@ def _components(
 
 def _rows(result: "Result") -> Iterator[tuple[str, int, int]]:
     """(joint, row of the joint from 1, row of the model)."""
-    subject = result.subject
+    summary = result.summary
     for joint, start, count in zip(
-        subject.joint_names, subject.joint_start, subject.joint_rows, strict=False
+        summary.joint_names, summary.joint_start, summary.joint_rows, strict=False
     ):
         for k in range(int(count)):
             yield joint, k + 1, int(start) + k

@@ -101,7 +101,7 @@ def _quantity(
 def _columns(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tuple[str, ...]:
     """Names of the columns of a quantity."""
     if attribute == "lambda" and owner.kind == "joint":
-        return tuple(str(k + 1) for k in range(result.subject.joint_rows[owner.place]))
+        return tuple(str(k + 1) for k in range(result.summary.joint_rows[owner.place]))
     return QUANTITIES[owner.kind][attribute].components
 
 
@@ -118,7 +118,7 @@ def _indices(
     return {
         kind: {name: k for k, name in enumerate(result.force_names)}
         if kind == "force"
-        else getattr(result.subject, f"{kind}_index")
+        else getattr(result.summary, f"{kind}_index")
         for kind in kinds
     }
 

@@ -29,7 +29,7 @@ def dataset_to_write(result: "Result", reactions: bool = True) -> "xarray.Datase
         ResultError: the model for the reactions is not available.
     """
     dataset = dataset_of(result)
-    if reactions and result.subject.joint_names:
+    if reactions and result.summary.joint_names:
         dataset = dataset.merge(reactions_of(result), combine_attrs="override")
     return dataset.drop_dims([name for name, count in dataset.sizes.items() if not count])
 
@@ -37,7 +37,7 @@ def dataset_to_write(result: "Result", reactions: bool = True) -> "xarray.Datase
 def why_no_reactions(result: "Result") -> str:
     """The reason that the reactions of joints cannot be computed, "" if they can."""
     try:
-        if result.subject.joint_names:
+        if result.summary.joint_names:
             _ = result.evaluator
     except ResultError as error:
         return str(error)
@@ -104,7 +104,7 @@ def selection_of(result: "Result", names: Iterable[str]) -> "xarray.Dataset":
             if quantity.components in (AXES, EULER):
                 coordinates[dimension] = (dimension, list(quantity.components))
         variables[name] = (dimensions, quantity.values, about(quantity.unit, quantity.label))
-    return xarray.Dataset(variables, coordinates, attributes(result.subject, result.record))
+    return xarray.Dataset(variables, coordinates, attributes(result.summary, result.record))
 
 
 def write_netcdf(
@@ -128,7 +128,7 @@ def write_netcdf(
     """
     import netCDF4
 
-    jacobian = jacobian and result.subject.row_count > 0
+    jacobian = jacobian and result.summary.row_count > 0
     if jacobian:
         _ = result.evaluator
     with whole_file(path, force) as part, NETCDF:
@@ -148,8 +148,8 @@ def write_netcdf(
 
 def _add_jacobian(file: Any, result: "Result") -> None:
     meaning = "constraint Jacobian D, D v = nu"
-    sparse = result.subject.row_count > DENSE_ROWS
-    sizes = {"row": result.subject.row_count, "velocity": 6 * result.subject.body_count}
+    sparse = result.summary.row_count > DENSE_ROWS
+    sizes = {"row": result.summary.row_count, "velocity": 6 * result.summary.body_count}
     for name, size in sizes.items():
         if name not in file.dimensions:
             file.createDimension(name, size)

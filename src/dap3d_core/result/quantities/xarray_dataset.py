@@ -22,7 +22,7 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
     """
     import xarray
 
-    subject, arrays = result.subject, result.arrays
+    summary, arrays = result.summary, result.arrays
     variables: dict[str, Any] = {}
     for column in (*COLUMNS[1:], U_ERROR) if arrays.has_error else COLUMNS[1:]:
         values = getattr(arrays, column.name)
@@ -36,17 +36,17 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
         values = energy.values(result)
         variables[f"{name}_energy"] = (("time",), values, about(energy.unit, energy.label))
     for constant in CONSTANTS:
-        values = getattr(subject, constant.name)
+        values = getattr(summary, constant.name)
         variables[constant.name] = (
             constant.dimensions,
             values,
             about(constant.unit, constant.meaning),
         )
-    joint_of_row = np.repeat(np.array(subject.joint_names, dtype=str), subject.joint_rows)
+    joint_of_row = np.repeat(np.array(summary.joint_names, dtype=str), summary.joint_rows)
     labels = {
-        "body": subject.body_names,
-        "point": subject.point_names,
-        "joint": subject.joint_names,
+        "body": summary.body_names,
+        "point": summary.point_names,
+        "joint": summary.joint_names,
         "axis": AXES,
         "euler": EULER,
     }
@@ -57,4 +57,4 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
         "time": ("time", arrays.t, about("s", "time")),
         "row_joint": ("row", joint_of_row, about("1", "joint of the constraint row")),
     }
-    return xarray.Dataset(variables, coordinates, attributes(subject, result.record))
+    return xarray.Dataset(variables, coordinates, attributes(summary, result.record))

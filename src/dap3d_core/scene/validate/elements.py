@@ -6,7 +6,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.codegen.examined import TypeInfo
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
 from dap3d_core.scene.scene import GROUND, ZERO, Element
@@ -83,14 +83,14 @@ class Reader:
     """
 
     def __init__(
-        self, examined: TypeInfo, table: str, geometry: Geometry, report: Collector
+        self, type_info: TypeInfo, table: str, geometry: Geometry, report: Collector
     ) -> None:
-        self.examined, self.table = examined, table
+        self.type_info, self.table = type_info, table
         self.geometry, self.report = geometry, report
         self.body_names = (GROUND, *geometry.bodies.body_names)
-        self.slots = () if getattr(examined.type, "each_body", False) else examined.layout.slots
+        self.slots = () if getattr(type_info.type, "each_body", False) else type_info.layout.slots
         self.function_index = {name: k for k, name in enumerate(report.scene.functions, 1)}
-        specs = {n: s for n, s in specs_of(examined.type).items() if s.given}
+        specs = {n: s for n, s in specs_of(type_info.type).items() if s.given}
         takes_ends = ENDS[0] not in specs and any(s.kind == "vector2" for s in specs.values())
         self.ends = ENDS if takes_ends else ()
         self.fields = [self._field(name, spec) for name, spec in specs.items()]
@@ -130,12 +130,12 @@ class Reader:
             if values[field.name] is None:
                 is_point = field.spec.kind == "point"
                 values[field.name] = ZERO if is_point else self.body_names[bodies[field.slot]]
-        examined = self.examined.chosen(values) if self.examined.variants else self.examined
+        type_info = self.type_info.chosen(values) if self.type_info.variants else self.type_info
         functions = tuple(
-            [self.function_index.get(values[name], 0) for name in examined.layout.functions]
+            [self.function_index.get(values[name], 0) for name in type_info.layout.functions]
         )
-        others = tuple([reading.others[name] for name in examined.layout.others])
-        return Instance(element.name, examined, bodies, functions, values, others)
+        others = tuple([reading.others[name] for name in type_info.layout.others])
+        return Instance(element.name, type_info, bodies, functions, values, others)
 
 
 class _Reading:
@@ -359,7 +359,7 @@ def report_twins(report: Collector, table: str, instances: Iterable[Instance]) -
         references = tuple(
             v for v in instance.values.values() if not isinstance(v, (float, type(None)))
         )
-        key = (id(instance.examined), instance.bodies, references)
+        key = (id(instance.type_info), instance.bodies, references)
         twin = seen.setdefault(key, instance)
         if twin is instance:
             continue

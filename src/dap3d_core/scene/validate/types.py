@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dap3d_core.interface.codegen.examined import TypeInfo
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.registry import Registry, UnknownTypeError
 from dap3d_core.registry.declared_types import declares
@@ -77,7 +77,7 @@ class Types:
     def _load(self, kind: str, word: str) -> TypeInfo:
         """The type; one that the model's own file has as well is refused."""
         try:
-            examined = self.registry.get(kind, word)
+            type_info = self.registry.get(kind, word)
         except UnknownTypeError as error:
             if self.file is None or self._is_loaded() or self._refused:
                 raise
@@ -91,7 +91,7 @@ class Types:
                 if declares(self.file, kind, word):
                     raise PluginError(self.registry.clash(kind, word, self.file))
                 self._installed.append((kind, word))
-            return examined
+            return type_info
         try:
             self.registry = self.registry.with_file(self.file)
         except PluginError as error:

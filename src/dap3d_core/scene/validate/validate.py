@@ -84,7 +84,7 @@ def _check_names(report: Collector) -> None:
 
 def _note_loose_bodies(report: Collector, bodies: "Bodies", elements: list[Instance]) -> None:
     """Note bodies without joints and forces."""
-    if any(getattr(e.examined.type, "each_body", False) for e in elements):
+    if any(getattr(e.type_info.type, "each_body", False) for e in elements):
         return
     used = {body for e in elements for body in e.bodies}
     for k, name in enumerate(bodies.body_names, 1):
@@ -94,7 +94,7 @@ def _note_loose_bodies(report: Collector, bodies: "Bodies", elements: list[Insta
 
 def _note_unused_functions(report: Collector, elements: list[Instance]) -> None:
     used = {index for e in elements for index in e.functions}
-    called = {e.values[field] for e in elements for field in e.examined.argument_functions}
+    called = {e.values[field] for e in elements for field in e.type_info.argument_functions}
     for index, name in enumerate(report.scene.functions, 1):
         if index not in used and name not in called:
             key = dotted(("functions", name))

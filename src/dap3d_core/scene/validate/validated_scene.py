@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from dap3d_core.interface.codegen.examined import TypeInfo
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.registry import Registry
 from dap3d_core.scene.scene import Scene
 
@@ -23,11 +23,11 @@ class Instance:
     Attributes:
         name: its name in the scene.
         examined: its type.
-        bodies: body index of each slot of ``examined.layout.slots`` (ground 0); empty for an
+        bodies: body index of each slot of ``type_info.layout.slots`` (ground 0); empty for an
             element that acts on each body.
-        functions: for each of ``examined.layout.functions`` 0 where absent, else 1 + its index
+        functions: for each of ``type_info.layout.functions`` 0 where absent, else 1 + its index
             in the functions of the scene.
-        others: body index of each of ``examined.layout.others``, vectors that no slot belongs to.
+        others: body index of each of ``type_info.layout.others``, vectors that no slot belongs to.
         values: field -> plain value. Points and vectors: 3 numbers on their body, vectors of unit
             length; a vector2 gives the two points ``P_i`` and ``P_j``; numbers: floats, or None
             where ``prepare`` returns them; vec3, table: tuples; matrix: three rows; references to
@@ -35,7 +35,7 @@ class Instance:
     """
 
     name: str
-    examined: TypeInfo = attrs.field(repr=False)
+    type_info: TypeInfo = attrs.field(repr=False)
     bodies: tuple[int, ...]
     functions: tuple[int, ...]
     values: dict[str, Any]

@@ -132,7 +132,7 @@ def checkpoint_of(run: RunState) -> Checkpoint:
         "crossed": run.crossed,
         "until": run.until if math.isfinite(run.until) else None,
         "scene": compiled.scene_text,
-        "method": compiled.asked,
+        "method": compiled.requested_method,
         "settings": attrs.asdict(run.settings),
         "estimate_error": run.estimate_error,
         "notes": run.notes,
@@ -141,8 +141,8 @@ def checkpoint_of(run: RunState) -> Checkpoint:
         "driver": driver_digest("integrators"),
         "types": {name: one["digest"] for name, one in compiled.types.items()},
     }
-    if run.watcher is not None:
-        header["events"] = run.watcher.state()
+    if run.event_locator is not None:
+        header["events"] = run.event_locator.state()
     return Checkpoint(json.loads(to_json(header)), arrays_of(run))
 
 

@@ -136,7 +136,7 @@ def _fault_of(evaluator: Evaluator, q: int, k: int, kind: str, group: Group, t: 
     joint_outs = {"acceleration": (s.D, s.gamma, s.nu), "position": (s.residual,) * 3,
                   "friction": (s.force, s.multipliers, s.multipliers)}  # fmt: skip
     if kind == "switch":
-        joint_outs[kind] = np.zeros(len(group.examined.outputs[kind])), np.zeros(1), np.zeros(1)
+        joint_outs[kind] = np.zeros(len(group.type_info.outputs[kind])), np.zeros(1), np.zeros(1)
     outs = joint_outs.get(kind, (s.force, s.force, s.force))
     _call_one(evaluator, q, k, group, t, outs)
     return _fault(*outs, s.F[:, :4])
@@ -153,7 +153,7 @@ def _call_one(
     """Call loop q for instance k of its group alone."""
     s = evaluator.system
     i0, p0, _ = s.groups[q]
-    i1, p1 = i0 + k * stride(group.examined), p0 + k * group.examined.layout.par_width
+    i1, p1 = i0 + k * stride(group.type_info), p0 + k * group.type_info.layout.par_width
     call_loop(evaluator.loops, q, t, s, np.array([i1, p1, 1]), *outs)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from dap3d_core.interface.codegen.examined import TypeInfo
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.kernels import lookup, where
 from dap3d_core.kernels.runtime.source_digest import reached
 from dap3d_core.model.knots import breaks_are_told
@@ -23,11 +23,11 @@ def notes_on_laws(checked: ValidatedScene) -> list[str]:
     called = dict.fromkeys(
         name
         for element in elements
-        for field in element.examined.argument_functions
+        for field in element.type_info.argument_functions
         if (name := element.values[field]) is not None
     )
     found = [
-        f"functions.{name} ({functions[name].examined.type.keyword}): its type says neither where "
+        f"functions.{name} ({functions[name].type_info.type.keyword}): its type says neither where "
         "it takes another form (breaks) nor that it does not (smooth): steps may pass over what it "
         "does over a short way"
         for name in called
@@ -35,15 +35,15 @@ def notes_on_laws(checked: ValidatedScene) -> list[str]:
     ]
     by_type: dict[Any, list[str]] = {}
     for element in checked.forces:
-        by_type.setdefault(element.examined.type, []).append(element.name)
-    examined = {force.examined.type: force.examined for force in checked.forces}
-    return [*found, *_branching(by_type, examined)]
+        by_type.setdefault(element.type_info.type, []).append(element.name)
+    type_info = {force.type_info.type: force.type_info for force in checked.forces}
+    return [*found, *_branching(by_type, type_info)]
 
 
-def _branching(by_type: dict[Any, list[str]], examined: dict[Any, TypeInfo]) -> Iterator[str]:
+def _branching(by_type: dict[Any, list[str]], type_info: dict[Any, TypeInfo]) -> Iterator[str]:
     for type_, names in by_type.items():
-        kernels = examined[type_].kernels
-        if "switch" in kernels or not _chooses(examined[type_]):
+        kernels = type_info[type_].kernels
+        if "switch" in kernels or not _chooses(type_info[type_]):
             continue
         more = f" and {len(names) - 1} more" if len(names) > 1 else ""
         yield (
@@ -52,9 +52,9 @@ def _branching(by_type: dict[Any, list[str]], examined: dict[Any, TypeInfo]) -> 
         )
 
 
-def _chooses(examined: TypeInfo) -> bool:
+def _chooses(type_info: TypeInfo) -> bool:
     """Whether a law of a type chooses between formulas."""
-    laws = [examined.kernels[name] for name in LAWS if name in examined.kernels]
+    laws = [type_info.kernels[name] for name in LAWS if name in type_info.kernels]
     return any(
         word in (plain.__globals__.get(name) for name in plain.__code__.co_names)
         for plain in reached(*laws)[0]

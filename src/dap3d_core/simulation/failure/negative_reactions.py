@@ -43,7 +43,7 @@ class Pulling:
     def __init__(self, model: Model) -> None:
         self._rows: list[_Row] = []
         for group in model.joints:
-            type_: Any = group.examined.type
+            type_: Any = group.type_info.type
             for joint in group.members.tolist() if type_.unilateral else ():
                 first, last = model.joint_start[joint : joint + 2].tolist()
                 for k in type_.unilateral:

@@ -38,4 +38,4 @@ def notes_on_drivers(checked: ValidatedScene) -> list[str]:
 
 
 def _drives(joint: Instance) -> bool:
-    return bool(getattr(joint.examined.type, "drives", False))
+    return bool(getattr(joint.type_info.type, "drives", False))

@@ -35,7 +35,7 @@ def undefined_directions(scene: Scene, model: Model, u: Floats, size: float) -> 
     r, A = _frames(u, model.body_count)
     for group, fields in _asking(model):
         table, names = "joints", model.joint_names
-        if group.examined.type.kind == "force":
+        if group.type_info.type.kind == "force":
             table, names = "forces", model.force_names
         for name, spec in fields.items():
             measure, least = _measured(group, name, spec, group.numbers, r, A, size)
@@ -70,7 +70,7 @@ def _asking(model: Model) -> Iterator[tuple[Group, dict[str, FieldSpec]]]:
     for group in (*model.joints, *model.forces):
         asking = {
             name: spec
-            for name, spec in specs_of(group.examined.type).items()
+            for name, spec in specs_of(group.type_info.type).items()
             if spec.kind in ("vector", "vector2") and (spec.direction or spec.across)
         }
         if asking:
@@ -116,7 +116,7 @@ def _words(name: str, spec: FieldSpec, measure: float) -> tuple[str, str]:
 
 def _turned(group: Group, name: str, numbers: Floats, A: Floats) -> Floats:
     """(..., m, 3) a point or vector of the instances of a group, in global axes."""
-    offset, _ = group.examined.layout.numbers[name]
+    offset, _ = group.type_info.layout.numbers[name]
     local = numbers[..., offset : offset + 3]
     turned: Floats = np.einsum("...mrc,...mc->...mr", A[..., _bodies(group, name), :, :], local)
     return turned
@@ -124,7 +124,7 @@ def _turned(group: Group, name: str, numbers: Floats, A: Floats) -> Floats:
 
 def _bodies(group: Group, name: str) -> NDArray[np.int64]:
     """(m,) the bodies that a point or vector of the instances of a group stands on."""
-    layout = group.examined.layout
+    layout = group.type_info.layout
     slot = slot_of(name)
     if slot in layout.slots:
         found: NDArray[np.int64] = group.bodies[:, layout.slots.index(slot)]

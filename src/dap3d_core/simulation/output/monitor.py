@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from dap3d_core.integrators import Integration
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import u_from_y
-from dap3d_core.result.model_summary import subject_of
+from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 
 
@@ -40,7 +40,7 @@ class Observer:
             raise TypeError(
                 f"watch is a function that is called with how the run stands, not {watch!r}"
             )
-        self._subject, self._t_end, self._watch = subject_of(model), t_end, watch
+        self._subject, self._t_end, self._watch = summary_of(model), t_end, watch
         self._of: Integration | None = None
         self._t = self._step = self._largest = 0.0
         self._steps = self._earlier = 0

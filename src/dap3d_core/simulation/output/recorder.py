@@ -15,7 +15,7 @@ from dap3d_core.model import Model
 from dap3d_core.result import Result, ResultError, ResultWriter, RunMetadata, check_target
 from dap3d_core.result.arrays import LARGE, Arrays, arrays_of, joined
 from dap3d_core.result.file.atomic_write import check_utf8
-from dap3d_core.result.model_summary import subject_of
+from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.open import arrays_in
 from dap3d_core.simulation.failure.negative_reactions import Pulling
 
@@ -61,7 +61,7 @@ class ResultRecorder:
         self.output: Path | None = None if output is None else check_target(output, force)
         self.count = 0
         self._model, self._evaluator, self._most, self._force = model, evaluator, most, force
-        self._subject = subject_of(model)
+        self._subject = summary_of(model)
         self._parts: list[Arrays] = []
         self.pulling = Pulling(model)
         self._bytes = 0

@@ -72,7 +72,7 @@ def occurrences(
     for t, which, side in (crossing for run in runs for crossing in run.crossings):
         switch = evaluator.switches[int(which)]
         ends = ended and int(which) == last.terminal_switch and side < 0.0 and bool(switch.words)
-        kind = switch.group.examined.type.kind
+        kind = switch.group.type_info.type.kind
         found.append(
             EventRecord(
                 name=f"{kind} {switch.name(evaluator.model)}",
@@ -98,7 +98,7 @@ def event_notes(runs: Sequence[Integration], events: Sequence[EventRecord]) -> l
 def _title(evaluator: Evaluator, which: int) -> str:
     switch = evaluator.switches[which]
     group = switch.group
-    return f"{group.examined.type.kind} {switch.name(evaluator.model)} ({group.keyword})"
+    return f"{group.type_info.type.kind} {switch.name(evaluator.model)} ({group.keyword})"
 
 
 def _chatter(evaluator: Evaluator, integration: Integration) -> str:

@@ -20,7 +20,7 @@ def digests_of(checked: "ValidatedScene") -> dict[str, str]:
     """For each type of a scene, such as "joint rev", a digest of its sources; "" where unknown."""
     elements = (*checked.joints, *checked.forces, *checked.functions)
     types: dict[tuple[str, str], Any] = {
-        (e.examined.type.kind, e.examined.type.keyword): e.examined.type for e in elements
+        (e.type_info.type.kind, e.type_info.type.keyword): e.type_info.type for e in elements
     }
     return {f"{kind} {word}": digest_of(type_) for (kind, word), type_ in sorted(types.items())}
 

@@ -114,7 +114,7 @@ def _driver(evaluator: Evaluator, k: int, t: float) -> str:
     model, values = evaluator.model, evaluator.function_values(t)
     for group in model.joints:
         for place in np.flatnonzero(group.members == k):
-            count = len(group.examined.layout.functions)
+            count = len(group.type_info.layout.functions)
             used = [int(f) - 1 for f in group.functions[place, :count] if f > 0]
             words = [f"function {model.function_names[f]}: {values[f, 0]:.6g}" for f in used]
             return f"joint {model.joint_names[k]}" + (f" ({', '.join(words)})" if words else "")

@@ -84,7 +84,7 @@ def packed(model: Model, count: int) -> Model:
 
 def _copies(group: Group, model: Model, count: int) -> Group:
     """A group with the instances of all copies, those of one after another."""
-    kind, n, m = group.examined.type.kind, model.body_count, group.count
+    kind, n, m = group.type_info.type.kind, model.body_count, group.count
     sizes = {
         "joint": len(model.joint_names),
         "force": len(model.force_names),
@@ -94,7 +94,7 @@ def _copies(group: Group, model: Model, count: int) -> Group:
     joints = group.joints  # of friction
     members = group.members + sizes[kind if joints is None else "force"] * lanes
     shift = np.full(group.functions.shape[1], n)
-    shift[: len(group.examined.layout.functions)] = model.function_count
+    shift[: len(group.type_info.layout.functions)] = model.function_count
     bodies, functions = group.bodies[None], group.functions[None]
     return attrs.evolve(
         group,
@@ -119,7 +119,7 @@ class LaneLayout:
         self.count = count
         self._n = one.model.body_count
         self._row, self._row_of_many = one.model.row_layout, many.model.row_layout
-        self._angles = [g.count * len(g.examined.layout.angles) for g in one.model.acting]
+        self._angles = [g.count * len(g.type_info.layout.angles) for g in one.model.acting]
         self._par = np.full((count, one.system.par.size), -1, dtype=np.int64)
         for q, (_, group) in enumerate(one.loop_groups):
             first, first_of_many = (int(m.system.groups[q, 1]) for m in (one, many))

@@ -214,7 +214,7 @@ class ParameterMap:
     def _of_element(self, parameter: SceneParameter) -> MappedParameter:
         table, name, field = parameter.path
         instance = next(i for i in getattr(self._checked, table) if i.name == name)
-        type_: Any = instance.examined.type
+        type_: Any = instance.type_info.type
         spec = specs_of(type_).get(field)
         if spec is None or spec.kind not in ("number", "vec3"):
             raise NotCopiedError
@@ -233,9 +233,9 @@ class ParameterMap:
         called = any(
             instance.values.get(field) == function.name
             for instance in self._elements
-            for field in instance.examined.argument_functions
+            for field in instance.type_info.argument_functions
         )
-        type_: Any = function.examined.type
+        type_: Any = function.type_info.type
         return not called and type_.breaks is Function.breaks
 
     # ------------------------------------------------------------------ entries of elements
@@ -253,14 +253,14 @@ class ParameterMap:
             raise NotCopiedError
         component = index[0] if index else 0
         for group, first in self._groups():
-            spot = group.examined.layout.numbers.get(field)
+            spot = group.type_info.layout.numbers.get(field)
             if spot is not None:
                 for k in self._rows_of(instance, group):
                     yield first + k * group.numbers.shape[1] + spot[0] + component
 
     def _rows_of(self, instance: Instance, group: Group) -> Integers:
         """Rows of a group whose numbers come from an element."""
-        checked, kind = self._checked, group.examined.type.kind
+        checked, kind = self._checked, group.type_info.type.kind
         has_friction = any(group is other for other in self._evaluator.model.friction)
         own: Any = ()
         if instance in checked.joints and kind == "joint":
@@ -311,9 +311,9 @@ def poses_of(checked: ValidatedScene) -> dict[int, BodyPose]:
 
 def _point_fields(checked: ValidatedScene, instance: Instance, point: str) -> Iterator[str]:
     """Fields of an element that hold the coordinates of a declared point."""
-    scene, table = checked.scene, f"{instance.examined.type.kind}s"
+    scene, table = checked.scene, f"{instance.type_info.type.kind}s"
     element = getattr(scene, table)[instance.name]
-    for field, spec in specs_of(instance.examined.type).items():
+    for field, spec in specs_of(instance.type_info.type).items():
         if spec.kind == "point" and element.fields.get(field) == point:
             yield field
         if spec.kind == "vector2":

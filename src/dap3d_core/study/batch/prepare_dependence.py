@@ -36,12 +36,12 @@ def dependence_of(instance: Instance, poses: Mapping[int, BodyPose], body_count:
         poses: of each body index, ground included.
         body_count: for elements that act on each body.
     """
-    type_: Any = instance.examined.type
+    type_: Any = instance.type_info.type
     fields: set[str] = set()
     read: set[tuple[int, str]] = set()
     constants: set[str] = set()
     if type_.prepare not in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__()):
-        slots = instance.examined.layout.slots
+        slots = instance.type_info.layout.slots
         each = bool(getattr(type_, "each_body", False))
         for bodies in [(b,) for b in range(1, body_count + 1)] if each else [instance.bodies]:
             recorded = {
@@ -54,7 +54,7 @@ def dependence_of(instance: Instance, poses: Mapping[int, BodyPose], body_count:
 
 def _recorded(instance: Instance, read: set[str]) -> Any:
     """The element as ``prepare`` gets it, of a class that records reads of its fields."""
-    type_: Any = instance.examined.type
+    type_: Any = instance.type_info.type
     specs = specs_of(type_)
     ends = ("P_i", "P_j") if any(s.kind == "vector2" for s in specs.values()) else ()
     names = frozenset((*specs, *ends))

@@ -182,7 +182,7 @@ def rates(sample: Sample, name: str, along: Direction, comparison: Comparison) -
 
 def body_words(sample: Sample, slot: int, component: int) -> str:
     """A direction of motion of a body: "the position of body i along x"."""
-    letter = sample.kernels.examined.layout.slots[slot]
+    letter = sample.kernels.type_info.layout.slots[slot]
     axis = "xyz"[component % 3]
     if component < 3:
         return f"the position of body {letter} along {axis}"

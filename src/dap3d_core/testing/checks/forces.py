@@ -45,7 +45,7 @@ def potential(subject: SampledType) -> CheckOutcome:
             for column in range(6):
                 for rate in rates(still, "energy", Direction.of(slot, column), c):
                     got = wrench[slot, column // 3, column % 3]
-                    letter = still.kernels.examined.layout.slots[slot]
+                    letter = still.kernels.type_info.layout.slots[slot]
                     words = dict(
                         part="force" if column < 3 else "moment", letter=letter,
                         axis="xyz"[column % 3], by=body_words(still, slot, column), way=rate.way,
@@ -85,7 +85,7 @@ def frame(subject: SampledType, kernel: str = "wrench") -> CheckOutcome:
             if got is not None:
                 for slot in range(len(wrench)):
                     motion = "velocity" if velocity else "rigid motion"
-                    letter = sample.kernels.examined.layout.slots[slot]
+                    letter = sample.kernels.type_info.layout.slots[slot]
                     words = {"kernel": kernel, "motion": motion, "letter": letter}
                     c.compare(sample, got[None, slot], (wrench[slot] @ R.T)[None], _FRAME,
                               words=words, scale=float(np.max(np.abs(wrench))),

@@ -84,7 +84,7 @@ def jacobian(subject: SampledType) -> CheckOutcome:
         for slot in range(J.shape[0]):
             for column in range(6):
                 for rate in rates(sample, "C", Direction.of(slot, column), c):
-                    letter = sample.kernels.examined.layout.slots[slot]
+                    letter = sample.kernels.type_info.layout.slots[slot]
                     by = body_words(sample, slot, column)
                     words = dict(column=column + 1, letter=letter, by=by, way=rate.way)
                     c.compare(sample, J[slot, rows, column], rate.value, _J, words=words,
@@ -314,7 +314,7 @@ def against_ground(subject: SampledType) -> str:
     fixed = [name for name, spec in specs.items() if spec.kind == "vector" and spec.ground]
     if fixed:
         return f"{fixed[0]} is a vector of ground"
-    if len(subject.examined.layout.slots) < 2:
+    if len(subject.type_info.layout.slots) < 2:
         return "it acts between one body and ground"
     if subject.type.ground_axes:
         return "it is declared to use the axes of ground (ground_axes = True)"
@@ -322,5 +322,5 @@ def against_ground(subject: SampledType) -> str:
 
 
 def _velocities(sample: Sample) -> Floats:
-    count = len(sample.kernels.examined.layout.slots)
+    count = len(sample.kernels.type_info.layout.slots)
     return np.hstack([sample.state.v, sample.state.w])[1 : count + 1]

@@ -73,7 +73,7 @@ def plain(subject: SampledType) -> CheckOutcome:
     """Kernels branch by ``where`` only, and take their mathematics from the words of kernels."""
     words = "kernels run on numbers that are no floats, as derivatives and compilers have them"
     c = Comparison("plain", subject, "", words)
-    for name, kernel in subject.examined.kernels.items():
+    for name, kernel in subject.type_info.kernels.items():
         if reason := _not_plain(subject, name, kernel):
             c.kernel = name
             c.fail(f"{name} {reason}; {plain_words()}")
@@ -82,7 +82,7 @@ def plain(subject: SampledType) -> CheckOutcome:
 
 def _not_plain(subject: SampledType, name: str, kernel: Callable[..., Any]) -> str:
     """The reason why a kernel is not plain, with its line; "" where it is."""
-    offered, rng = subject.examined.names, random.Random(f"{subject.seed} {name}")
+    offered, rng = subject.type_info.names, random.Random(f"{subject.seed} {name}")
     if name == "friction":
         offered = friction_names(subject.type.rows) | offered
     tries = 0

@@ -33,7 +33,7 @@ def purity(subject: SampledType) -> CheckOutcome:
     c = Comparison("purity", subject, "", "the same numbers each time, nothing from outside")
     for name in _names(subject):
         c.kernel = name
-        for words in _outside(subject.examined.kernels[name]):
+        for words in _outside(subject.type_info.kernels[name]):
             c.fail(f"{name} is not pure: {words}")
     for name, difference in differing(subject).items():
         c.kernel = name
@@ -111,7 +111,7 @@ def _compare_compiled(c: Comparison, subject: SampledType, kind: str) -> None:
 
 
 def _has_friction(subject: SampledType) -> bool:
-    return "friction" in subject.examined.kernels and subject.type.kind == "joint"
+    return "friction" in subject.type_info.kernels and subject.type.kind == "joint"
 
 
 def _outside(kernel: Callable[..., Any]) -> Iterator[str]:

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 import attrs
 import numpy as np
 
-from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, examine
 from dap3d_core.interface.fields import specs_of
@@ -98,7 +98,7 @@ class Sample:
     def is_good(self) -> bool:
         """True if all kernels return finite numbers, and no switch ends a run here."""
         names = self.kernels.names()
-        type_: Any = self.kernels.examined.type
+        type_: Any = self.kernels.type_info.type
         if "switch" in names and type_.switch_words and np.min(self.value("switch")) <= 0.0:
             return False
         return all(np.isfinite(self.value(name)).all() for name in names)
@@ -106,7 +106,7 @@ class Sample:
     def pose(self) -> dict[str, Any]:
         """The pose by name, for messages."""
         s = self.state
-        slots = self.kernels.examined.layout.slots
+        slots = self.kernels.type_info.layout.slots
         pose: dict[str, Any] = {"seed": self.seed, "pose": self.label, "t": float(s.t)}
         for k, slot in enumerate(slots, start=1):
             pose |= {f"{n}_{slot}": tuple(x[k].tolist()) for n, x in
@@ -124,7 +124,7 @@ class SampledType:
         seed, poses: of the samples, and the number of each sort.
     """
 
-    examined: TypeInfo
+    type_info: TypeInfo
     choices: Mapping[str, Any]
     seed: int
     poses: int
@@ -133,7 +133,7 @@ class SampledType:
     @property
     def type(self) -> Any:
         """The class."""
-        return self.examined.type
+        return self.type_info.type
 
     @property
     def variant(self) -> str:
@@ -144,14 +144,14 @@ class SampledType:
     @property
     def kernels(self) -> Kernels:
         """Its kernels."""
-        return self.cached("kernels", lambda: Kernels(self.examined))
+        return self.cached("kernels", lambda: Kernels(self.type_info))
 
     @property
     def friction(self) -> "SampledType":
         """The friction of a joint as a separate element."""
         return self.cached(
             "friction",
-            lambda: SampledType(bind_friction(self.examined), self.choices, self.seed, self.poses),
+            lambda: SampledType(bind_friction(self.type_info), self.choices, self.seed, self.poses),
         )
 
     @property
@@ -182,11 +182,11 @@ class SampledType:
     def _sample(self, k: int, start: int = 0) -> Sample:
         title = f"{self.seed} {self.type.__qualname__} {k} {start}"
         rng = random.Random(title)
-        layout = self.examined.layout
+        layout = self.type_info.layout
         grounded = k == self.poses - 1 > 0 and layout.slots[1:2] == ("j",)
         given = [k % 2 == 0 or rng.random() < 0.5 for _ in layout.functions]
         given += [False] if self.type.kind == "function" else []  # the row that it fills itself
-        conditions = dict.fromkeys(self.examined.argument_functions, True) | dict(self.choices)
+        conditions = dict.fromkeys(self.type_info.argument_functions, True) | dict(self.choices)
         choices = {n: "cubic" if specs_of(self.type)[n].kind == "function" else v
                    for n, v in conditions.items() if v is not False or
                    specs_of(self.type)[n].kind == "choice"}  # fmt: skip
@@ -194,7 +194,7 @@ class SampledType:
         for _ in range(ATTEMPTS):
             state = random_state(rng, given, grounded=grounded)
             try:
-                element = draw(self.examined, choices, rng, state)
+                element = draw(self.type_info, choices, rng, state)
                 state = random_state(rng, given, grounded=grounded)
                 sample = Sample(self.kernels, element, state, grounded,
                                 f"pose {k + 1} off the manifold", self.seed)  # fmt: skip
@@ -219,31 +219,31 @@ class SampledType:
                 yield attrs.evolve(samples[-1], label=f"pose {k + 1} on the manifold")
 
 
-def sampled_types(examined: TypeInfo, seed: int, poses: int) -> list[SampledType]:
+def sampled_types(type_info: TypeInfo, seed: int, poses: int) -> list[SampledType]:
     """The type itself, unless variants replace it for all values, and its variants."""
     variants = []
-    own = own_values(examined)
+    own = own_values(type_info)
     if own is not None:
-        variants.append((own, examined))
-    variants += [(dict(conditions), e) for conditions, e in examined.variants]
+        variants.append((own, type_info))
+    variants += [(dict(conditions), e) for conditions, e in type_info.variants]
     return [SampledType(_given(e, values), values, seed, poses) for values, e in variants]
 
 
-def _given(examined: TypeInfo, values: Mapping[str, Any]) -> TypeInfo:
+def _given(type_info: TypeInfo, values: Mapping[str, Any]) -> TypeInfo:
     """The type with a cubic for each function of an argument, unless the variant has none."""
-    given = {f: examine(Cubic) for f in examined.argument_functions if values.get(f, True)}
-    return bind_functions(examined, given, dict.fromkeys(given, 0)) if given else examined
+    given = {f: examine(Cubic) for f in type_info.argument_functions if values.get(f, True)}
+    return bind_functions(type_info, given, dict.fromkeys(given, 0)) if given else type_info
 
 
-def own_values(examined: TypeInfo) -> dict[str, Any] | None:
+def own_values(type_info: TypeInfo) -> dict[str, Any] | None:
     """Values of choices for which no variant replaces the type; None where there are none."""
-    specs = specs_of(examined.type)
-    names = [n for n in specs if any(n in conditions for conditions, _ in examined.variants)]
+    specs = specs_of(type_info.type)
+    names = [n for n in specs if any(n in conditions for conditions, _ in type_info.variants)]
     without = [(False,) * (not specs[n].required) for n in names]
     ways = [specs[n].choices or way for n, way in zip(names, without, strict=True)]
     for values in (dict(zip(names, way, strict=True)) for way in product(*ways)):
         given = {n: v or None if specs[n].kind == "function" else v for n, v in values.items()}
-        if examined.chosen(given) is examined:
+        if type_info.chosen(given) is type_info:
             return values
     return None
 
@@ -252,7 +252,7 @@ def position_jacobian(sample: Sample, state: State | None = None) -> Floats:
     """dC/dq (position rows, slots, 6) by complex step, or by differences where that fails."""
     here = sample if state is None else attrs.evolve(sample, state=state)
     columns = []
-    for slot in range(len(here.kernels.examined.layout.slots)):
+    for slot in range(len(here.kernels.type_info.layout.slots)):
         for component in range(6):
             along = Direction.of(slot, component)
             try:
@@ -265,7 +265,7 @@ def position_jacobian(sample: Sample, state: State | None = None) -> Floats:
 def assembled(sample: Sample) -> Sample | None:
     """The sample brought to C = 0 by Newton's method and to J v = nu; None where that fails."""
     state, kernels, sizes = sample.state, sample.kernels, [math.inf] * STALLED
-    slots = len(kernels.examined.layout.slots)
+    slots = len(kernels.type_info.layout.slots)
     free = [s for s in range(slots) if not (sample.grounded and s == 1)]
     try:
         for _ in range(NEWTON_STEPS if "C" in kernels.names() else 0):

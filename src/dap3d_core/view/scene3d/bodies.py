@@ -14,14 +14,14 @@ _SAME = 1e-6
 
 
 def attachment_points(
-    subject: ModelSummary, elements: Iterable[ElementGeometry]
+    summary: ModelSummary, elements: Iterable[ElementGeometry]
 ) -> list[list[Point]]:
     """The points (m, body axes) of each body, ground first: its own, and those of elements.
 
     The origin is left out, and so are duplicates.
     """
-    attached: list[list[Point]] = [[] for _ in range(subject.body_count + 1)]
-    for body, at in zip(subject.point_body, subject.point_local, strict=True):
+    attached: list[list[Point]] = [[] for _ in range(summary.body_count + 1)]
+    for body, at in zip(summary.point_body, summary.point_local, strict=True):
         attached[int(body)].append(plain(at))
     for one in elements:
         for body, at in one.points.values():

@@ -68,7 +68,7 @@ def joints_of(model: Model) -> list[ElementGeometry]:
 
 def forces_of(model: Model) -> list[ElementGeometry]:
     """The forces of a model that act on bodies of their own, in file order."""
-    groups = [g for g in model.forces if not getattr(g.examined.type, "each_body", False)]
+    groups = [g for g in model.forces if not getattr(g.type_info.type, "each_body", False)]
     return _in_order(groups, model.force_names)
 
 
@@ -78,8 +78,8 @@ def gravity_of(model: Model) -> Point | None:
     It is that of a force on each body with ``gravity`` and the direction ``wgt``, as ``weight``.
     """
     for group in model.forces:
-        numbers = group.examined.layout.numbers
-        if getattr(group.examined.type, "each_body", False) and {"gravity", "wgt"} <= set(numbers):
+        numbers = group.type_info.layout.numbers
+        if getattr(group.type_info.type, "each_body", False) and {"gravity", "wgt"} <= set(numbers):
             g = group.numbers[0, numbers["gravity"][0]]
             at = numbers["wgt"][0]
             return plain(g * group.numbers[0, at : at + 3])
@@ -96,7 +96,7 @@ def _in_order(groups: Any, names: tuple[str, ...]) -> list[ElementGeometry]:
 
 
 def _geometry(group: Group, member: int, name: str) -> ElementGeometry:
-    layout, specs = group.examined.layout, specs_of(group.examined.type)
+    layout, specs = group.type_info.layout, specs_of(group.type_info.type)
     bodies = dict(zip(layout.slots, map(int, group.bodies[member]), strict=True))
     has_ends = any(spec.kind == "vector2" for spec in specs.values())
     on = dict(_bodies_of_vectors(group, member, bodies))
@@ -115,7 +115,7 @@ def _geometry(group: Group, member: int, name: str) -> ElementGeometry:
         elif shape == () and kind == "number":
             numbers[field] = values[0]
     return ElementGeometry(
-        name, group.keyword, group.examined.type.symbol, bodies, points, vectors, numbers, has_ends
+        name, group.keyword, group.type_info.type.symbol, bodies, points, vectors, numbers, has_ends
     )
 
 
@@ -123,9 +123,9 @@ def _bodies_of_vectors(
     group: Group, member: int, bodies: dict[str, int]
 ) -> Iterator[tuple[str, int]]:
     """The body of each vector field: that of its slot, ground, or the one the scene names."""
-    layout = group.examined.layout
+    layout = group.type_info.layout
     others = dict(zip(layout.others, group.functions[member, len(layout.functions) :], strict=True))
-    for field, spec in specs_of(group.examined.type).items():
+    for field, spec in specs_of(group.type_info.type).items():
         slot = slot_of(field)
         if spec.kind != "vector":
             continue

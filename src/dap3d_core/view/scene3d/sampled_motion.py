@@ -49,7 +49,7 @@ def at_instants(result: Result, index: Integers) -> Result:
     if len(index) == len(result.t):
         return result
     return Result(
-        result.subject,
+        result.summary,
         result.arrays.at(index),
         result.record,
         lambda: (result.model, lambda: result.evaluator),

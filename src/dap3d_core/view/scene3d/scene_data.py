@@ -31,7 +31,7 @@ def scene_of(result: Result, model: str | os.PathLike[str] | None = None) -> Sce
         scene = Scene()
     if model is not None:
         scene.path = load(model).path
-    for name in result.subject.body_names:
+    for name in result.summary.body_names:
         if name not in scene.bodies:
             scene.add_body(name)
     return scene
@@ -60,12 +60,12 @@ class SceneGeometry:
 
 def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeometry:
     """The solids of a result with its scene, whose folder, where known, holds its meshes."""
-    subject, motion = result.subject, Motion(result)
-    hues = colors([scene.bodies[n].color for n in subject.body_names], _pairs(elements.joints))
-    shapes = scene_shapes(scene, subject.body_names, hues)
+    summary, motion = result.summary, Motion(result)
+    hues = colors([scene.bodies[n].color for n in summary.body_names], _pairs(elements.joints))
+    shapes = scene_shapes(scene, summary.body_names, hues)
     every = [*elements.joints, *elements.forces]
-    points = attachment_points(subject, every)
-    bodies = range(1, subject.body_count + 1)
+    points = attachment_points(summary, every)
+    bodies = range(1, summary.body_count + 1)
     bounds = [(k, ORIGIN) for k in bodies] + shapes.corners
     bounds += [(k, at) for k, on_body in enumerate(points) for at in on_body]
     bare = [k for k in bodies if not points[k] and k not in shapes.bodies]
@@ -82,7 +82,7 @@ def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeo
     pieces += [piece for f in elements.forces for piece in drawer.force(f)]
     marks += [*ellipsoids, *shapes.marks, *(p for p in pieces if isinstance(p, Mark))]
     spans = [p for p in pieces if isinstance(p, Span)]
-    return SceneGeometry(subject.body_names, hues, marks, spans, shapes, extent, unit)
+    return SceneGeometry(summary.body_names, hues, marks, spans, shapes, extent, unit)
 
 
 def _pairs(joints: Iterable[ElementGeometry]) -> list[tuple[int, ...]]:
@@ -126,7 +126,7 @@ def _bodies(
     """Links of the bodies without shapes; of ground short posts at joints."""
     marks: list[Mark] = []
     joined = {point for joint in joints for point in joint.points.values()}
-    for k, name in enumerate(result.subject.body_names, 1):
+    for k, name in enumerate(result.summary.body_names, 1):
         if k not in shaped and points[k]:
             ends = [at for at in points[k] if (k, at) not in joined]
             marks += links(k, points[k], unit, hues[k - 1], name, ends=ends)
@@ -143,12 +143,17 @@ def _bare_bodies(
     result: Result, bare: list[int], joints: list[ElementGeometry], size: float, hues: Sequence[str]
 ) -> list[Mark]:
     """Bodies without points; a wheel is drawn by its joint."""
-    subject = result.subject
+    summary = result.summary
     wheels = {j.bodies["i"] for j in joints if j.symbol == "wheel"}
     most = 0.2 * size if size > 0.0 else np.inf
     return [
         inertia_ellipsoid(
-            k, subject.mass[k - 1], subject.Jp[k - 1], most, hues[k - 1], subject.body_names[k - 1]
+            k,
+            summary.mass[k - 1],
+            summary.Jp[k - 1],
+            most,
+            hues[k - 1],
+            summary.body_names[k - 1],
         )
         for k in bare
         if k not in wheels
@@ -156,8 +161,8 @@ def _bare_bodies(
 
 
 def _points(result: Result) -> list[dict[str, Any]]:
-    subject = result.subject
-    columns = zip(subject.point_names, subject.point_body, subject.point_local, strict=True)
+    summary = result.summary
+    columns = zip(summary.point_names, summary.point_body, summary.point_local, strict=True)
     return [{"name": n, "body": int(b), "at": at.tolist()} for n, b, at in columns]
 
 

@@ -44,8 +44,8 @@ def test_every_type_is_described(kind, keyword):
     """Fields with unit, default and meaning; the docstring; what stands for it, where; in JSON."""
     types = json.loads(described(keyword, "--json"))["types"]
     (found,) = (t for t in types if t["kind"] == kind)
-    examined = load_registry().get(kind, keyword)
-    specs = {n: s for n, s in specs_of(examined.type).items() if s.given}
+    type_info = load_registry().get(kind, keyword)
+    specs = {n: s for n, s in specs_of(type_info.type).items() if s.given}
     assert [f["name"] for f in found["fields"]] == list(specs)
     for field in found["fields"]:
         spec = specs[field["name"]]
@@ -54,7 +54,7 @@ def test_every_type_is_described(kind, keyword):
         assert field["required"] == spec.required
     assert len(found["doc"].splitlines()) >= 1
     assert [v["class"] for v in found["variants"]] == [
-        e.type.__name__ for _, e in examined.variants
+        e.type.__name__ for _, e in type_info.variants
     ]
     assert all(v["doc"] for v in found["variants"])
     text = described(keyword)

@@ -46,21 +46,21 @@ def test_a_vector_may_be_called_v_i():
 
     All of it by numpy: v_P = v + w x A s, the vector A a and its rate w x A a.
     """
-    examined = examine(Named)
-    assert not examined.names["v_i"].velocity
-    assert examined.names["v_i_dot"].velocity
+    type_info = examine(Named)
+    assert not type_info.names["v_i"].velocity
+    assert type_info.names["v_i_dot"].velocity
     rng = np.random.default_rng(4)
     A = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     v, w, s, a = rng.normal(size=(4, 3))
     one = np.zeros((2, loop_support.BODY_WIDTH))
     one[1, loop_support.A : loop_support.A + 9] = A.ravel()
     one[1, loop_support.V : loop_support.V + 3], one[1, loop_support.W : loop_support.W + 3] = v, w
-    par = np.zeros(examined.layout.par_width)
+    par = np.zeros(type_info.layout.par_width)
     for name, values in (("P_i", s), ("v_i", a)):
-        at = examined.layout.numbers[name][0]
+        at = type_info.layout.numbers[name][0]
         par[at : at + 3] = values
     out = np.zeros(12)
-    loop = build(write(examined, "wrench"))
+    loop = build(write(type_info, "wrench"))
     nothing = np.zeros(1)
     arrays = LoopArrays(body=one, F=np.zeros((1, 5)), idx=np.array([1]), par=par)
     call_loop(loop_list([loop]), 0, 0.0, arrays, np.array([0, 0, 1]), out, nothing, nothing)
@@ -125,9 +125,9 @@ class Down(Push, way="down"):
 
 def test_variants_in_one_file_have_loops_of_their_own():
     """The code of one is not taken for that of another, in this process or from the cache."""
-    examined = examine(Push)
-    ((_, other),) = examined.variants
-    for one, sign in ((examined, 1.0), (other, -1.0)):
+    type_info = examine(Push)
+    ((_, other),) = type_info.variants
+    for one, sign in ((type_info, 1.0), (other, -1.0)):
         out, nothing = np.zeros(12), np.zeros(1)
         body_array = np.zeros((2, loop_support.BODY_WIDTH))
         loop = build(write(one, "wrench"))

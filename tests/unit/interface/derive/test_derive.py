@@ -75,9 +75,9 @@ BY_HAND = [
 def evaluator_of(type_, seed, values=None, more=()):
     """A scene with one element of a type, its numbers at random."""
     registry = registry_of(type_, *more)
-    examined = registry.get(type_.kind, type_.keyword)
-    scene = scene_for(examined, np.random.default_rng(seed), values=values)
-    return Evaluator(build_model(check(scene, registry)), "standard"), examined
+    type_info = registry.get(type_.kind, type_.keyword)
+    scene = scene_for(type_info, np.random.default_rng(seed), values=values)
+    return Evaluator(build_model(check(scene, registry)), "standard"), type_info
 
 
 def assert_same_rows(one, other, seed):
@@ -93,14 +93,14 @@ def test_joints_from_C_alone_are_those_by_hand(keyword, values):
     found = load_registry().get("joint", keyword)
     by_hand = next((e.type for conditions, e in found.variants if conditions == values), found.type)
     derived = from_C_alone(by_hand, f"derived-{keyword}")
-    one, examined = evaluator_of(derived, 7)
-    assert {"J", "gamma"} <= set(examined.derived)
-    assert ("nu" in examined.derived) == ("nu" in by_hand.kernels())
+    one, type_info = evaluator_of(derived, 7)
+    assert {"J", "gamma"} <= set(type_info.derived)
+    assert ("nu" in type_info.derived) == ("nu" in by_hand.kernels())
     plain = from_C_alone(by_hand, f"plain-{keyword}")
     plain.J, plain.gamma = staticmethod(by_hand.J), staticmethod(by_hand.gamma)
     plain.nu = staticmethod(by_hand.nu) if "nu" in by_hand.kernels() else None
-    other, examined = evaluator_of(plain, 7)
-    assert examined.derived == ()
+    other, type_info = evaluator_of(plain, 7)
+    assert type_info.derived == ()
     assert_same_rows(one, other, 20)
 
 
@@ -143,8 +143,8 @@ def test_rates_along_a_motion_are_the_derived_ones(type_, values):
 @pytest.mark.parametrize("type_", [Elastic, Anisotropic])
 def test_a_wrench_is_derived_from_the_energy(type_):
     """At rest its power along any motion is -dV/dt."""
-    evaluator, examined = evaluator_of(type_, 6)
-    assert examined.derived == ("wrench",)
+    evaluator, type_info = evaluator_of(type_, 6)
+    assert type_info.derived == ("wrench",)
     motion, t = Motion(3, np.random.default_rng(50), level=0.5), 0.1
     u = motion.u(t)
     at_rest = np.concatenate([u[:-18], np.zeros(18)])

@@ -197,11 +197,11 @@ CALLED = [Branches, TakesTheGreater, AsksTheLibrary, AsksNumpy, Counts, Writes, 
 def test_a_kernel_that_asks_for_the_number_is_refused_in_its_line(type_):
     """One sentence: type, kernel, reason, remedy, and the line of the author's."""
     try:
-        examined = examine(type_)
+        type_info = examine(type_)
     except PluginError:
         pytest.skip("plain Python refuses it already")
     with pytest.raises(PluginError) as caught:
-        compile_all(examined)
+        compile_all(type_info)
     said = str(caught.value)
     line = type_.wrench.__code__.co_firstlineno + 1
     assert f"{type_.__name__}: its kernels cannot be compiled (pushing: wrench)" in said

@@ -19,33 +19,33 @@ pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 BODIES, INSTANCES, TRIALS = 8, 3, 6
 
 
-def loops_of(examined):
+def loops_of(type_info):
     """Each loop of a type and of its variants, but for those that need a scene's function."""
     for what in LOOP_KINDS:
-        if what != "friction" and (loop := write(examined, what)) is not None:
-            yield examined, loop
-    if examined.type.kind == "joint" and "friction" in examined.kernels:
-        rubbing = bind_friction(examined)
+        if what != "friction" and (loop := write(type_info, what)) is not None:
+            yield type_info, loop
+    if type_info.type.kind == "joint" and "friction" in type_info.kernels:
+        rubbing = bind_friction(type_info)
         yield rubbing, write(rubbing, "friction")
-    for _, variant in examined.variants:
+    for _, variant in type_info.variants:
         yield from loops_of(variant)
 
 
-def arguments_of(examined, rng):
+def arguments_of(type_info, rng):
     """Random arrays of three instances, with tables where the type has some."""
     body, F = rng.standard_normal((BODIES, BODY_WIDTH)), rng.standard_normal((BODIES, 5))
     idx, par = rng.integers(1, BODIES - 1, size=200), rng.standard_normal(600)
-    for offset, _ in examined.layout.tables.values():
+    for offset, _ in type_info.layout.tables.values():
         for q in range(INSTANCES):
-            par[q * examined.layout.par_width + offset :][:2] = 400, 20
+            par[q * type_info.layout.par_width + offset :][:2] = 400, 20
     outs = [rng.standard_normal(600) for _ in range(3)]
     outs[1][0] = 3.0  # where switches begin
     return LoopArrays(body=body, F=F, idx=idx, par=par), outs
 
 
-def run(loop, examined, seed):
+def run(loop, type_info, seed):
     """All that a loop writes."""
-    arrays, outs = arguments_of(examined, np.random.default_rng(seed))
+    arrays, outs = arguments_of(type_info, np.random.default_rng(seed))
     with np.errstate(all="ignore"):
         loop(0.7, arrays, 0, 0, INSTANCES, *outs)
     return np.concatenate([arrays.par, arrays.F.ravel(), *outs])
@@ -58,18 +58,18 @@ TYPES = [(kind, keyword) for kind in ("joint", "force", "function")
 
 @pytest.mark.parametrize(("kind", "keyword"), TYPES)
 def test_traced_loops_have_the_bits_of_plain_python(kind, keyword):
-    for examined, loop in loops_of(REGISTRY.get(kind, keyword)):
+    for type_info, loop in loops_of(REGISTRY.get(kind, keyword)):
 
         def python(loop=loop):
             namespace = generated_modules.load(None, "tried", source_of(loop))
             namespace.update(loop.kernels)
             return namespace
 
-        if examined.argument_functions and _calls_functions(examined):
+        if type_info.argument_functions and _calls_functions(type_info):
             continue  # its code is made with a scene's function
         text = trace("tried", python(), array_members())
         plain = python()["loop"]
         for level, traced in made_of(text, "tried", LOOP).items():
             for seed in range(TRIALS):
-                assert same_bits(run(plain, examined, seed), run(traced, examined, seed)), (
+                assert same_bits(run(plain, type_info, seed), run(traced, type_info, seed)), (
                     loop.name, level)  # fmt: skip

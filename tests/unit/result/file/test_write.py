@@ -31,7 +31,7 @@ def test_a_file_grown_in_pieces_is_that_of_the_whole(tmp_path, pieces, name):
     with closing(grown(tmp_path / "run.nc", whole, most=12)) as writer:
         first = 0
         for count in pieces:
-            writer.append(arrays_of(rows[first : first + count], whole.subject))
+            writer.append(arrays_of(rows[first : first + count], whole.summary))
             first += count
         assert writer.count == 9
         assert os.listdir(tmp_path) == ["run.nc.part"]
@@ -178,7 +178,7 @@ def test_an_existing_file_is_kept_unless_forced(tmp_path):
     with pytest.raises(ResultError, match=r"cannot write .*run\.nc: the file exists; force"):
         result.save(path)
     with pytest.raises(ResultError, match="the file exists"):
-        ResultWriter(path, result.subject, result.record, len(result.t))
+        ResultWriter(path, result.summary, result.record, len(result.t))
     assert path.read_text() == "precious"
     assert os.listdir(tmp_path) == ["run.nc"]
     result.save(path, force=True)

@@ -69,8 +69,8 @@ def test_action_and_reaction(keyword, ground):
     On the constraints, where both bodies meet. Rows of the velocity level alone have to balance in
     force only: ``rel-tran`` is the manual's literal equation (spec 4.8).
     """
-    examined = REGISTRY.get("joint", keyword)
-    scene = scene_for(examined, np.random.default_rng(7), ground=ground)
+    type_info = REGISTRY.get("joint", keyword)
+    scene = scene_for(type_info, np.random.default_rng(7), ground=ground)
     model = model_of(scene)
     evaluator = Evaluator(model, "standard")
     u = correct_initial(evaluator, Motion(3, np.random.default_rng(8)).u(0.0)).u

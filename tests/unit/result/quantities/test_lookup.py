@@ -35,7 +35,7 @@ def test_components_and_length(result):
 
 
 def test_points(result):
-    P = result.subject.point_index["P"]
+    P = result.summary.point_index["P"]
     for name, array in {"r": result.rP, "v": result.rPd, "a": result.rPdd}.items():
         np.testing.assert_array_equal(result.quantity(f"P.{name}").values, array[:, P])
     assert result.quantity("P.a.norm").unit == "m/s^2"

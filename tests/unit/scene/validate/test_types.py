@@ -101,7 +101,7 @@ def test_a_models_own_types_are_refused_until_code_is_allowed(model, registry, t
 
     checked = check(scene, registry, allow_code=True)
     assert "the plugin is run" in capfd.readouterr().err
-    assert checked.forces[0].examined.type.__name__ == "Push"
+    assert checked.forces[0].type_info.type.__name__ == "Push"
     assert "push" in checked.registry.keywords("force")
     assert "push" not in registry.keywords("force")
 

@@ -69,7 +69,7 @@ def test_instances_hold_what_types_need(scene_of, registry):
     assert (spring.values["k"], spring.values["c"], spring.values["l0"]) == (10.0, 0.0, 0.5)
     assert spring.values["P_j"] == (0.0, 0.0, 0.0)
     assert checked.functions[0].values["coeff"] == (0.0, 6.28, 0.0)
-    assert J1.examined.type.keyword == "rev"
+    assert J1.type_info.type.keyword == "rev"
 
 
 def test_a_function_that_is_absent_is_zero_and_a_number_left_out_is_none(scene_of, registry):

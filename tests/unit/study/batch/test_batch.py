@@ -230,7 +230,7 @@ def test_a_number_that_prepare_reads_is_not_copied():
 def test_poses_that_prepare_reads():
     """``fix`` keeps the relative pose that the bodies are given in."""
     compiled = dap.compile("fourbar4")
-    joint = next(j for j in compiled.checked.joints if j.examined.type.keyword == "fix")
+    joint = next(j for j in compiled.checked.joints if j.type_info.type.keyword == "fix")
     found = dependence_of(joint, poses_of(compiled.checked), len(compiled.checked.body_names))
     assert {part for _, part in found.poses} == {"r", "p"}
 
@@ -252,7 +252,7 @@ def test_runs_report_only_their_end_where_nothing_else_is_needed():
 
 def test_a_function_of_the_user_that_raises_fails_its_point():
     def of_small_masses(result):
-        return 1.0 / (float(result.subject.mass[0]) - 2.0)
+        return 1.0 / (float(result.summary.mass[0]) - 2.0)
 
     of = ensemble(
         pendulum(), ["bodies.bob.mass"], [of_small_masses, "bob.r.x"], t_end=0.02, dt=0.01

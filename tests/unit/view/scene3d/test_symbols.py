@@ -82,10 +82,10 @@ def test_a_rail_is_as_long_as_the_motion():
 @pytest.mark.parametrize(("kind", "keyword"), TYPES)
 def test_every_installed_type_is_drawn_with_finite_sizes(kind, keyword, ground):
     """In any pose, free or tied to ground: numbers are finite, axes of unit length."""
-    examined = load_registry().get(kind, keyword)
-    if any(spec.kind == "joint" for spec in specs_of(examined.type).values()):
+    type_info = load_registry().get(kind, keyword)
+    if any(spec.kind == "joint" for spec in specs_of(type_info.type).values()):
         pytest.skip("it acts in a joint, which is drawn itself")
-    scene = scene_for(examined, np.random.default_rng(5), ground=ground)
+    scene = scene_for(type_info, np.random.default_rng(5), ground=ground)
     model = model_of(scene)
     t = np.array([0.0, 1.0])
     v_dot, Lam = np.zeros((2, 18)), np.zeros((2, model.row_count))
@@ -99,7 +99,7 @@ def test_every_installed_type_is_drawn_with_finite_sizes(kind, keyword, ground):
         assert np.linalg.norm(row[5]) == pytest.approx(1.0, abs=1e-6)
     drawn = [row for row in found["marks"] if row[-1] == "element"]
     drawn += [span for span in found["spans"] if span["owner"] == "element"]
-    assert drawn or keyword in LOADS or getattr(examined.type, "each_body", False)
+    assert drawn or keyword in LOADS or getattr(type_info.type, "each_body", False)
 
 
 class Hook(Joint):

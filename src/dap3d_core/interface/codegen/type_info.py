@@ -49,7 +49,7 @@ class TypeInfo:
             is_function = specs[name].kind == "function"
             return (value is not None) == wanted if is_function else bool(value == wanted)
 
-        for conditions, examined in self.variants:
+        for conditions, type_info in self.variants:
             if all(holds(name, wanted) for name, wanted in conditions.items()):
-                return examined
+                return type_info
         return self
