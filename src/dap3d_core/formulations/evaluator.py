@@ -73,7 +73,7 @@ class Evaluator:
 
     @property
     def counts_turns(self) -> bool:
-        """Whether there are angles, whose turns are counted at accepted steps."""
+        """True if the model has angles; their turns are counted at accepted steps."""
         kinds = self.system.kinds
         return bool(kinds[ANGLE + 1] > kinds[ANGLE])
 
@@ -84,17 +84,17 @@ class Evaluator:
 
     @property
     def friction_failure_count(self) -> int:
-        """How often since the start the multipliers did not settle with friction."""
+        """Number of friction iterations since the start that did not converge."""
         return int(self.system.settings[UNSETTLED])
 
     @property
     def singular_reports(self) -> int:
-        """How often since the start a pose was singular where something was reported."""
+        """Number of reports since the start at singular poses."""
         return int(self.system.settings[SINGULAR])
 
     @property
     def doubtful_turns(self) -> int:
-        """How often since the start a step was too long to count the turns of an angle safely."""
+        """Number of steps since the start too long to count the turns of an angle safely."""
         return int(self.system.settings[DOUBTFUL])
 
     def load(self, model: Model) -> None:
@@ -120,7 +120,7 @@ class Evaluator:
         self._call(ANGLE, t, s.force, s.force, s.force)
 
     def turn_places(self) -> Iterator[slice]:
-        """Where in ``par`` the turns of angles are counted."""
+        """Slices of ``par`` that count the turns of angles."""
         for q, (kind, group) in enumerate(self.loop_groups):
             if kind == "angle":
                 p0, width = int(self.system.groups[q, 1]), group.type_info.layout.par_width
@@ -183,7 +183,7 @@ class Evaluator:
 
     @IGNORE_FLOAT_ERRORS
     def report(self, t: float, u: ArrayLike) -> Floats:
-        """What a run reports at a state, (report_size,).
+        """Report of a run at a state, (report_size,).
 
         v_dot, lambda, angles whose turns are counted, potential energy and the largest residuals of
         the three levels.

@@ -34,7 +34,7 @@ class Switch:
 
     @property
     def words(self) -> str:
-        """Why the run ends where it becomes negative; "" where integration restarts there."""
+        """Reason to end the run where it becomes negative; "" if integration restarts there."""
         type_: Any = self.group.type_info.type
         return str(type_.switch_words) if self.kind == "switch" else ""
 

@@ -68,7 +68,7 @@ class Group:
 
     @property
     def count(self) -> int:
-        """How many instances."""
+        """Number of instances."""
         return len(self.members)
 
 
@@ -253,7 +253,7 @@ class Grouping:
         return numbers, tables
 
     def _note(self, record: list[warnings.WarningMessage], instance: Instance) -> None:
-        """What ``prepare`` warned about becomes a note."""
+        """Turns the warnings of ``prepare`` into notes."""
         keyword = instance.type_info.type.keyword
         for warning in record:
             note = f"{self.kind} {instance.name} ({keyword}): {warning.message}"
@@ -281,7 +281,7 @@ def _each(make: Callable[[Any], Group], parts: Iterable[Any]) -> tuple[Group, ..
 
 
 def _prepares(type_: Any) -> bool:
-    """Whether a type defines ``prepare``."""
+    """True if a type defines ``prepare``."""
     return type_.prepare not in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__())
 
 
@@ -292,7 +292,7 @@ def _prepared(
     member: int,
     poses: Mapping[int, BodyPose],
 ) -> dict[str, Any]:
-    """What ``prepare`` returns for an instance: the names and shapes that were examined."""
+    """Values that ``prepare`` returns for an instance, with the names and shapes examined."""
     type_: Any = type_info.type
     values = instance.values
     thing = type_(**{n: values[n] for n in fields if n in values})

@@ -1,4 +1,4 @@
-"""Where functions take another form: what ``breaks`` of their types says."""
+"""Arguments at which functions change their form, as ``breaks`` of their types gives them."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -36,7 +36,7 @@ def breaks_of(function: Instance) -> Floats:
 
 
 def breaks_are_told(function: Instance) -> bool:
-    """Whether the type of a function says where it takes another form, or that it never does."""
+    """True if the type of a function gives its breaks, or says that it has none."""
     type_: Any = function.type_info.type
     return bool(type_.smooth) or type_.breaks is not Function.breaks
 

@@ -33,7 +33,7 @@ EXTENT = 1e-12
 
 @attrs.frozen(eq=False)
 class Model:
-    """What a scene is to the solvers.
+    """A scene as the solvers take it.
 
     Attributes:
         body_names: (n,) without ground, for reports only.
@@ -140,7 +140,7 @@ class Model:
 
     @cached_property
     def size(self) -> float:
-        """How far from the origin the model reaches, m; at the origin alone, its extent."""
+        """Largest distance of the model from the origin, m; if that is zero, its extent."""
         points = np.vstack([self.r, self.point_local])
         return float(np.max(np.abs(points), initial=0.0)) or self.extent
 
@@ -290,7 +290,7 @@ class _Groups:
 def _faults(
     kind: str, instances: Sequence[Instance], error: PrepareError
 ) -> list[tuple[str, str, str]]:
-    """What is wrong with instances, with their names."""
+    """Mistakes in instances, with their names."""
     return [(kind, instances[member].name, words) for member, words in error.faults]
 
 

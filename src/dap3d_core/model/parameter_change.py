@@ -25,7 +25,7 @@ class Change(NamedTuple):
 
 
 def changed(checked: ValidatedScene, model: Model, place: int, fields: Mapping[str, Any]) -> Change:
-    """What fields of a force, given anew, make of its numbers.
+    """Parameters of a force for changed fields.
 
     Args:
         checked: the scene.

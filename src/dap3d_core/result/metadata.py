@@ -1,4 +1,4 @@
-"""What a run says of itself: where it came from, how it went, what it cost."""
+"""Metadata of a run: origin, course, cost."""
 
 import json
 import platform
@@ -23,7 +23,7 @@ RUNNING = "running"
 
 @attrs.frozen(kw_only=True)
 class RunStatistics:
-    """What a run cost.
+    """Cost of a run.
 
     Attributes:
         steps, rejected: integration steps taken, and tried but thrown away.
@@ -146,5 +146,5 @@ class RunMetadata:
 
     @property
     def projected(self) -> bool:
-        """Whether states were projected on the constraints."""
+        """True if states were projected on the constraints."""
         return bool(self.settings.get("project", False))

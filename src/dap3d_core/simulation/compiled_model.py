@@ -74,7 +74,7 @@ class _Evaluators(threading.local):
 
 
 class CompiledModel:
-    """What ``compile`` returns: a frozen model that can be evaluated and explained.
+    """A frozen model that can be evaluated and explained, as ``compile`` returns it.
 
     Threads may use one at once: each has arrays of its own to work on. So may a callback of a run,
     which may run the model again.
@@ -134,7 +134,7 @@ class CompiledModel:
 
     @property
     def evaluator(self) -> Evaluator:
-        """What evaluates the model for this thread; made when a thread first asks for it."""
+        """Evaluator of the model for the calling thread, made at its first use."""
         stack = self._own.stack
         if not stack:
             stack.append(self.new_evaluator())
@@ -196,12 +196,12 @@ class CompiledModel:
 
     @cached_property
     def is_conservative(self) -> bool:
-        """Whether potentials account for all work that can be done in the scene."""
+        """True if potentials account for all work that can be done in the scene."""
         return is_conservative(self.evaluator, self.model.u0)
 
     @cached_property
     def types(self) -> dict[str, dict[str, str]]:
-        """Where the scene's types come from (type_sources.py), for the record of its results."""
+        """Sources of the scene's types (type_sources.py), for the metadata of its results."""
         return types_of(self.checked)
 
     @cached_property
@@ -243,13 +243,13 @@ class CompiledModel:
         return self._redundancy
 
     def breakpoints(self, t_end: float) -> Breakpoints:
-        """How fast functions of time change in a run from 0 to t_end, found once."""
+        """Break points of functions of time in a run from 0 to t_end, computed once."""
         if t_end not in self._breakpoints:
             self._breakpoints[t_end] = Breakpoints(self.checked, self.evaluator, t_end)
         return self._breakpoints[t_end]
 
     def start(self, correct: bool, hold: tuple[str, ...], metric: str = "unit") -> InitialState:
-        """Where a run starts, found once; arguments and errors as of ``find_start``.
+        """Initial state of a run, computed once; arguments and errors as of ``find_start``.
 
         Raises:
             SceneError: a direction that an element needs is undefined there.
@@ -297,7 +297,7 @@ class CompiledModel:
         return method, f"{reason}, and their rows are independent"
 
     def explain(self) -> str:
-        """What was modelled, what was left out and why, and which method was chosen and why.
+        """Text on what is modelled, what is left out and why, and why the method was chosen.
 
         The rank is that where a run would start, or as given where that cannot be assembled.
         """

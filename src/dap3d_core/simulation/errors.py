@@ -1,4 +1,4 @@
-"""What can go wrong with a run."""
+"""Errors of runs."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""What was modelled, what was left out and why."""
+"""Text on what is modelled, and on what is left out and why."""
 
 from collections import Counter
 from collections.abc import Sequence

@@ -176,7 +176,7 @@ def crossing_notes(crossed: Sequence[float]) -> list[str]:
 
 
 def cannot_cross(message: str, run: RunState) -> str:
-    """Why a run ended, and that a singular pose lies ahead, where the implicit integrator met one.
+    """Message for a run that the implicit integrator ended before a singular pose.
 
     message: the former.
     """

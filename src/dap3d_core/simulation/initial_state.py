@@ -22,7 +22,7 @@ OFF_CONSTRAINTS = 1e-6
 
 @attrs.frozen(eq=False)
 class InitialState:
-    """Where a run starts.
+    """Initial state of a run.
 
     Attributes:
         u: (13 n,) the state.
@@ -58,7 +58,7 @@ def find_start(
 
 
 def start_notes(start: InitialState, evaluator: Evaluator, scene: Scene) -> list[str]:
-    """How a start was corrected, or that it is off the constraints, in words."""
+    """Text on the correction of a start, or that it is off the constraints."""
     if start.initial is not None:
         return correction_notes(start.initial, evaluator, scene)
     position, velocity = violation(evaluator, start.u)

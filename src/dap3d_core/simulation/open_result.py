@@ -88,7 +88,7 @@ def _unmade(path: str | os.PathLike[str], error: Exception, allowed: bool) -> Re
 
 
 def why_unmade(error: Exception, *, allowed: bool) -> str:
-    """Why the model of a stored scene cannot be made, and what helps.
+    """Message for a stored scene whose model cannot be made, with the remedy.
 
     Args:
         error: what came of it.

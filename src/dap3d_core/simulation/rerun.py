@@ -43,7 +43,7 @@ class Reproduction:
 
     @property
     def equal(self) -> bool:
-        """Whether all arrays are equal bit for bit."""
+        """True if all arrays are equal bit for bit."""
         return not self.differences
 
 
@@ -125,7 +125,7 @@ def _settings(result: Result) -> dict[str, Any]:
 
 
 def _compared(first: Result, again: Result) -> tuple[int, dict[str, float]]:
-    """How many instants there are, and the largest differences where bits differ."""
+    """Number of instants, and the largest differences where bits differ."""
     count = len(first.arrays)
     if first.status == "done" and len(again.arrays) != count:
         return min(count, len(again.arrays)), {"t": float("nan")}

@@ -166,7 +166,7 @@ class ResumedRun:
             self.path.unlink(missing_ok=True)
 
     def _is_ours(self, target: Path) -> bool:
-        """Whether the checkpoints of the run that goes on replace this one."""
+        """True if checkpoints of the resumed run replace this one."""
         other = path_of(target)
         return other.exists() and other.samefile(self.path)
 
@@ -256,7 +256,7 @@ class ResumedRun:
                 raise self._damaged(str(error)) from error
 
     def _notes(self, t: float) -> list[str]:
-        """Where the run went on, and whether its digits may differ."""
+        """Notes on the time of resumption, and on digits that may differ."""
         header = self._found.header
         notes = [f"{INFORMATION}resumed from a checkpoint at t = {t:.9g} s"]
         here = current_versions()
@@ -312,7 +312,7 @@ def restore_system(run: RunState, stored: Mapping[str, Any]) -> None:
 
 
 def check_position(run: RunState, rows: int) -> None:
-    """Whether a restored run stands at a state of its model, after so many rows.
+    """Checks that a restored run is at a state of its model, after so many rows.
 
     Raises:
         ValueError: it does not.

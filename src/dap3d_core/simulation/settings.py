@@ -1,4 +1,4 @@
-"""What a run was asked for: its model, its settings, its reporting times."""
+"""Settings of a run, checked and completed, and its reporting times."""
 
 import os
 from collections.abc import Callable
@@ -43,7 +43,7 @@ def settings_of(compiled: CompiledModel, **asked: Any) -> Simulation:
 
 
 def settings_notes(compiled: CompiledModel, settings: Simulation) -> list[str]:
-    """What looks odd in the settings of a run, and is not so in its scene, which notes its own."""
+    """Warnings on odd settings of a run that its scene does not have."""
     return [note for note in notes_of(settings) if note not in compiled.notes]
 
 
@@ -107,7 +107,7 @@ def report_times(t_end: float | None, dt: float | None) -> Floats:
 
 
 def integration_options(evaluator: Evaluator, settings: Simulation) -> dict[str, Any]:
-    """What any integration takes from a machine and the settings of a run."""
+    """Arguments common to all integrations, from an evaluator and the settings of a run."""
     return {
         "rtol": settings.rtol,
         "atol": atol_vector(resolved_atol(settings.atol, evaluator), evaluator.model.body_count),
@@ -122,7 +122,7 @@ def integration_options(evaluator: Evaluator, settings: Simulation) -> dict[str,
 
 
 def fits(integrator: Integrator, formulation: Formulation) -> bool:
-    """Whether an integrator can take the accelerations of a formulation."""
+    """Checks that an integrator can take the accelerations of a formulation."""
     return formulation.is_exact or not integrator.requires
 
 

@@ -1,1 +1,1 @@
-"""What commands share: options, paths, execution, error messages, completion."""
+"""Framework of the commands: options, paths, execution, error messages, completion."""

@@ -78,7 +78,7 @@ def leave_stderr() -> None:
 
 
 def stdout_fault() -> str:
-    """Why stdout could not be written since ``prepare_streams``; "" if it could."""
+    """Reason why stdout could not be written since ``prepare_streams``; "" if it could."""
     return "" if _fault is None else _fault.strerror or str(_fault)
 
 

@@ -1,4 +1,4 @@
-"""What the formulations with joints share: rows, factors, projection onto the constraints, reports.
+"""Common parts of formulations with joints: rows, factors, projection onto constraints, reports.
 
 Each formulation compiles what it uses of them. ``part`` says which matrix is factored: None for
 [I D^^T; D^ 0], which needs independent rows, a number for [I D^^T; D^ -E] with e_i = part |D^_i|^2.
@@ -267,7 +267,7 @@ def project_onto(
 
 @compiled_into
 def is_poor(t: float, system: System, loops: Any, part: float | None, lengths: Floats) -> bool:
-    """Whether the pose is close to a singular one; D^ and its factors may be others after that."""
+    """True if the pose is close to a singular one; D^ and its factors may have changed."""
     if system.settings[EVEN] != 0.0:
         linearise_evenly(t, system, loops)
         factorise(system, part)

@@ -23,7 +23,7 @@ PASSES = 25
 
 @compiled
 def has_friction(system: System) -> bool:
-    """Whether the scene has friction in joints."""
+    """True if joints of the scene have friction."""
     return bool(system.kinds[FRICTION + 1] > system.kinds[FRICTION])
 
 

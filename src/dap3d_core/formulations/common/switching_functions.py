@@ -1,4 +1,4 @@
-"""What is asked of a state besides its rate: turns of angles are counted, switches evaluated."""
+"""Evaluated at accepted states: revolution counters and switching functions."""
 
 # What a compiled function returns is Any to mypy.
 # mypy: disable-error-code="no-any-return"

@@ -48,7 +48,7 @@ LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY = rang
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
 class Tangent(Arrays):
-    """What the differences need, and what they give."""
+    """Tables of the differences, and the derivatives that they give."""
 
     types: ClassVar[dict[str, Any]] = {
         "elements": INTEGER_MATRIX,

@@ -1,4 +1,4 @@
-"""Which element couples which bodies, and where its derivatives stand; made once for a model."""
+"""Tables of the bodies that each element couples, and of the places of its derivatives."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -82,7 +82,7 @@ def _pairs(bodies: Integers, place: dict[tuple[int, int], int]) -> Integers:
 
 
 def _sees_velocity(kind: str, group: Group) -> bool:
-    """Whether the force kernel of a group names a quantity of the velocity level.
+    """True if the force kernel of a group names a quantity of the velocity level.
 
     The rate D v - nu of a joint is linear in the velocities: its derivative is D.
     """

@@ -46,7 +46,7 @@ from dap3d_core.kernels.runtime.cache import compiled
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
 class StageMatrix(Arrays):
-    """Where the parts of s - J stand, and what is kept of the state that it belongs to."""
+    """Layout of s - J, and data of the state that it belongs to."""
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(
@@ -241,7 +241,7 @@ def scale_residual(
 
 @compiled
 def couple_length(s: Any, x: Any, n: Any, matrix: StageMatrix) -> None:
-    """What the eliminated part along p adds to the right-hand side."""
+    """Adds the eliminated part along p to the right-hand side."""
     for b in range(1, matrix.body_first.shape[0]):
         o, z = matrix.body_first[b] + 3, matrix.spin[b]
         for c in range(3):

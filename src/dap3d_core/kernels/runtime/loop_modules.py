@@ -35,7 +35,7 @@ compiled_here: list[str] = []
 
 
 class Loop(NamedTuple):
-    """What a loop module is written from."""
+    """Input of a loop module."""
 
     name: str  # of the type and what it computes: shown while compiling
     kernels: dict[str, Callable]  # the pure functions, by the name under which ``lines`` call them

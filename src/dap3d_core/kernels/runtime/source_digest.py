@@ -39,7 +39,7 @@ def driver_digest(floor: str) -> str:
 
 
 def origin(functions: list[Any]) -> list[str | bytes]:
-    """What decides the code of functions: digests of floors of the core, or their sources."""
+    """Digests of all that determines the code of functions: floors of the core, or sources."""
     floors = {f.__module__.split(".")[1] if f.__module__.startswith("dap3d_core.") else ""
               for f in functions}  # fmt: skip
     if floors <= set(COMPILED_FLOORS):
@@ -97,7 +97,7 @@ def is_an_authors(filename: str) -> bool:
 
 
 def sources(*functions) -> list[str | bytes]:
-    """What decides what functions compute: source files, constants, and names of modules.
+    """All that determines the results of functions: source files, constants, names of modules.
 
     Names of modules, because cached code imports them by name: a model's own file has another one
     in each folder. Files are ordered by name and content, wherever a package is installed.

@@ -163,7 +163,7 @@ def divide_row(m: int, d: int, o: int, K: Floats) -> None:
 def subtract_product(
     m: int, rows: int, cols: int, diagonal: bool, d: int, a: int, e: int, o: int, K: Floats
 ) -> None:
-    """What the elimination of m rows at d takes from the block at o: its rows at a, at e."""
+    """Subtract from the block at o what eliminates m rows at d: its rows at a, at e."""
     for r in range(rows):
         for c in range(r + 1 if diagonal else cols):
             s = K[o + r * cols + c]
@@ -233,7 +233,7 @@ def factor(
 
 @compiled
 def have_pivots(nodes: Integers, K: Floats) -> bool:
-    """Whether no pivot has come out as zero or with the wrong sign, from the factors of K."""
+    """True if no pivot in the factors of K is zero or has the wrong sign."""
     for k in range(nodes.shape[0] - 1):
         m, d = nodes[k, 0], nodes[k, 2]
         for r in range(d, d + m * m, m + 1):
@@ -273,7 +273,7 @@ def pivot_lengths(nodes: Integers, K: Floats, smallest: Floats, lengths: Floats)
 def solve_forwards(
     k: int, m: int, nodes: Integers, columns: Integers, K: Floats, x: Floats
 ) -> None:
-    """What node k, of m rows, does to its own unknowns and those below, on the way down."""
+    """Forward step of node k, of m rows: updates its own unknowns and those below."""
     f, d = nodes[k, 1], nodes[k, 2]
     for c in range(1, m):
         s = x[f + c]
@@ -295,7 +295,7 @@ def solve_forwards(
 def solve_backwards(
     k: int, m: int, nodes: Integers, columns: Integers, K: Floats, x: Floats
 ) -> None:
-    """What the unknowns below node k, of m rows, do to its own, on the way up."""
+    """Backward step of node k, of m rows: updates its own unknowns by those below."""
     f, d = nodes[k, 1], nodes[k, 2]
     for q in range(nodes[k, 4], nodes[k + 1, 4]):
         o, g = columns[q, 0], columns[q, 1]
@@ -311,7 +311,7 @@ def solve_backwards(
 
 @compiled_into
 def solve_down(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
-    """What all nodes do on the way down; K, x: pointers."""
+    """Forward substitution by all nodes; K, x: pointers."""
     for k in range(nodes.shape[0] - 1):
         m = nodes[k, 0]
         if m == 3:
@@ -326,7 +326,7 @@ def solve_down(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None
 
 @compiled_into
 def solve_up(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
-    """What all nodes do on the way up; K, x: pointers."""
+    """Backward substitution by all nodes; K, x: pointers."""
     for k in range(nodes.shape[0] - 2, -1, -1):
         m = nodes[k, 0]
         if m == 3:

@@ -1,4 +1,4 @@
-"""Where the blocks of K stand, and what each node subtracts from later ones."""
+"""Layout of the blocks of K, and of the updates of each node to later ones."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -169,7 +169,7 @@ class _Panels:
         self.rows: list[dict[int, int]] = [{} for _ in matrix.spans]
 
     def address(self, row: int, column: int) -> int:
-        """Where the block (row, column) begins in the columns of its node."""
+        """Offset of the block (row, column) in the columns of its node."""
         k = self.node[column]
         first, last, end = self.matrix.spans[k]
         at = self.rows[k]
@@ -196,7 +196,7 @@ class _Panels:
                 yield block, block, self.address(row, column), sizes[row], m, -flag
 
     def products(self, k: int) -> Iterator[tuple[int, ...]]:
-        """What a panel subtracts: from ranges of columns of one node, ranges of rows."""
+        """Updates by a panel: ranges of rows from ranges of columns of one node."""
         first, last, end = self.matrix.spans[k]
         runs = list(_runs(_below(self.found, last, end)))
         for n, run in enumerate(runs):

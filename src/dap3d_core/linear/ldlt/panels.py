@@ -227,7 +227,7 @@ def tile(a: int, b: int, o: int, m: int, stride: int, sign: float, K: Floats) ->
 
 @compiled
 def solve_panel_forwards(k: int, nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
-    """What node k does to its own unknowns and those below, on the way down."""
+    """Forward step of node k: updates its own unknowns and those below."""
     m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
     for c in range(1, m):
         s = 0.0
@@ -263,7 +263,7 @@ def solve_panel_forwards(k: int, nodes: Integers, columns: Integers, K: Floats, 
 
 @compiled
 def solve_panel_backwards(k: int, nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
-    """What the unknowns below node k do to its own, on the way up."""
+    """Backward step of node k: updates its own unknowns by those below."""
     m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
     for c in range(m):
         inverse = K[d + c * m + c]

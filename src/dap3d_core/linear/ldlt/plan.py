@@ -163,7 +163,7 @@ def _lay_blocks(
 def _contents(
     found: Ordering, place: dict[int, int], block_of: dict[tuple[int, int], int]
 ) -> Contents:
-    """What the blocks of K (row, column; places in the order) are made of, where they are not zero.
+    """Contributions to the nonzero blocks of K (row, column; indices in the order).
 
     Pairs of blocks of D whose products are summed up, or one block that is copied.
     """
@@ -189,7 +189,7 @@ def _contents(
 def _targets(
     found: Ordering, starts: Sequence[int], matrix: FactorLayout, contents: Contents
 ) -> tuple[Integers, Integers]:
-    """What each block of K is made of before the factorisation."""
+    """Contributions to each block of K before the factorisation."""
     targets: list[tuple[int, ...]] = []
     contributions: list[tuple[int, int]] = []
 

@@ -95,7 +95,7 @@ def _neighbours(
     early: Iterable[int],
     hubs: Sequence[int],
 ) -> list[set[int]]:
-    """Which joint nodes and hubs share a block once the early bodies are gone."""
+    """Pairs of joint nodes and hubs that share a block once the early bodies are eliminated."""
     result: list[set[int]] = [set() for _ in range(len(nodes) + len(hubs))]
     for b in early:
         for k in of_body[b]:

@@ -45,7 +45,7 @@ class Ordering:
     panels: tuple[tuple[int, int, int], ...] = ()
 
     def is_hub(self, place: int) -> bool:
-        """Whether a hub, not a joint node, is at a place of ``order``."""
+        """True if an index of ``order`` holds a hub, not a joint node."""
         return self.order[place] >= len(self.nodes)
 
     @property

@@ -1,4 +1,4 @@
-"""How many constraint rows are independent, and which are not (spec 8).
+"""Rank of the constraint rows, and the redundant ones.
 
 Up to DENSE_ROWS rows: singular values of the whole Jacobian. Beyond, what is not part of a loop is
 left out first: where one joint alone holds a body by independent rows, no combination of rows that
@@ -250,7 +250,7 @@ def _core(plan: Plan, D: Floats) -> list[int]:
 
 
 def _holds(plan: Plan, D: Floats) -> np.ndarray:
-    """Whether the rows of each block are independent by themselves."""
+    """True if the rows of each block are independent of each other."""
     result = np.zeros(len(plan.blocks), dtype=bool)
     heights = plan.blocks[:, 2]
     for height in range(1, 7):

@@ -36,7 +36,7 @@ BLOCK = 1_000_000
 
 @attrs.frozen(eq=False)
 class Sticks:
-    """What is drawn of a result, as places on bodies: first the n mass centres.
+    """Points on bodies that are drawn of a result: first the n mass centres.
 
     Attributes:
         names, colors, markers: of the bodies; what tells one from the others twice over.

@@ -168,7 +168,7 @@ def _floors(record: RunMetadata) -> dict[str, float]:
 
 
 def _energy_scale(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> float:
-    """What an imbalance of energy is compared with, J: the largest kinetic energy or work.
+    """Scale for an imbalance of energy, J: the largest kinetic energy or work.
 
     Below a speed of atol / rtol error control is absolute: an error atol of the speed v is one of
     m v atol in the energy, to which m v (atol / rtol) is the scale, and without a speed it is one
@@ -207,7 +207,7 @@ def _energy(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) ->
 
 
 def _is_conservative(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> bool:
-    """Whether potentials account for all work: by what the elements are, and as measured.
+    """True if potentials account for all work: by the kinds of the elements, and as measured.
 
     As measured, because a damper may act only where bodies touch.
     """
@@ -281,7 +281,7 @@ def _constraints(
 
 
 def _rounding_of_accelerations(summary: ModelSummary, course: LedgerSeries, length: float) -> float:
-    """What rounding of the reactions leaves of D v_dot - gamma, m/s^2.
+    """Residual D v_dot - gamma due to rounding of the reactions, m/s^2.
 
     The factors L D L^T of the matrix K of the equations of motion give a solution x of an equation
     that is off by a few roundings: |K x - b| <= c eps |K| |x| (Higham, Accuracy and Stability of

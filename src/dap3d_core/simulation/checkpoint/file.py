@@ -42,7 +42,7 @@ def _is_text(value: Any) -> bool:
 
 
 def is_count(value: Any) -> bool:
-    """Whether this is a count, which a double holds exactly."""
+    """True for a count that a double holds exactly."""
     return type(value) is int and 0 <= value <= MOST_COUNTED
 
 
@@ -94,7 +94,7 @@ class Checkpoint:
 
 
 def path_of(output: Path) -> Path:
-    """Where the checkpoint of a run stands, given its result file."""
+    """Path of the checkpoint of a run, from its result file."""
     return output.with_name(output.name + SUFFIX)
 
 

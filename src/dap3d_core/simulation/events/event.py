@@ -86,7 +86,7 @@ class Event:
 
     @property
     def title(self) -> str:
-        """What it is called."""
+        """Title of the event."""
         if self.name:
             return self.name
         of = self.of if isinstance(self.of, str) else getattr(self.of, "__name__", "event")
@@ -94,7 +94,7 @@ class Event:
         return f"{of} {way} {self.level:g}"
 
     def value(self, instant: "Instant") -> float:
-        """How far the number is above its level.
+        """Difference of the watched number and its level.
 
         Raises:
             ValueError: it is not one finite number.
@@ -114,7 +114,7 @@ class Event:
 
 
 def _is_number(value: Any) -> bool:
-    """Whether this is one finite real number; a truth value is none."""
+    """True for one finite real number; a truth value is none."""
     number = np.asarray(value)
     return number.dtype.kind in "iuf" and not number.shape and bool(np.isfinite(number))
 
@@ -212,7 +212,7 @@ class Numbers:
         self._write(change, rows)
 
     def changeable(self, forces: Collection[str]) -> NDArray[np.bool_]:
-        """Which of ``par`` ``set`` may have changed, given names of forces: no place of a table."""
+        """Mask of the numbers in ``par`` that ``set`` may have changed, given names of forces."""
         model = self._compiled.model
         found = np.zeros(len(self._compiled.evaluator.system.par), dtype=bool)
         numbers = [k for k, name in enumerate(model.force_names) if name in forces]

@@ -44,7 +44,7 @@ class EventLocator:
         self._sides: list[float] = []
 
     def state(self) -> dict[str, Any]:
-        """What was found and is known so far, as plain data."""
+        """State of the search, as plain data."""
         return {
             "titles": [event.title for event in self.events],
             "occurrences": [attrs.asdict(one) for one in self.occurrences],
@@ -82,7 +82,7 @@ class EventLocator:
         return {force for one in self.occurrences for force in one.changes}
 
     def notes(self) -> list[str]:
-        """Which events changed faster than they could be looked at."""
+        """Notes on events that changed faster than they could be sampled."""
         return [
             f"event {event.title}: from t = {sampler.lost:.6g} s on it changed too fast to be "
             "followed, at some times at least: it may have passed its level unseen. Let it change "
@@ -139,7 +139,7 @@ class EventLocator:
         return [event.value(instant) for event in self.events]
 
     def _is_past(self, k: int, value: float) -> bool:
-        """Whether a number has passed its level since the last step; that it may be zero counts."""
+        """True if a number has passed its level since the last step; reaching it counts."""
         return self._sides[k] != 0.0 and value * self._sides[k] <= 0.0
 
     def _slope(self, integration: Integration) -> Floats:
@@ -192,7 +192,7 @@ class EventLocator:
     def _end(
         self, go_to: Callable[[float], Instant], start: float, k: int, end: float, sought: bool
     ) -> float:
-        """Where a step is to end for event k."""
+        """Time at which a step shall end for event k."""
         return self._locate(go_to, start, k, end) if sought else end
 
     def _locate(self, go_to: Callable[[float], Instant], start: float, k: int, end: float) -> float:

@@ -1,4 +1,4 @@
-"""Where the function of an event is looked at within a step: as closely as it changes."""
+"""Sampling of the function of an event within a step, as closely as it changes."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -54,7 +54,7 @@ class Sampler:
         self._width, self._largest = self._widest, 0.0
 
     def state(self) -> tuple[float | None, float | None, float]:
-        """What it goes on from, as plain data."""
+        """State of the sampling, as plain data."""
         return self.lost, None if np.isinf(self._width) else self._width, self._largest
 
     def restore(self, state: Any) -> None:
@@ -96,7 +96,7 @@ class Sampler:
             a, first = b, values[-1]
 
     def _is_followed(self, values: Floats) -> bool:
-        """Whether values of a window are those of a function that is smooth there."""
+        """True if the values of a window are those of a function that is smooth there."""
         self._largest = max(self._largest, float(np.max(np.abs(values))))
         miss = np.max(np.abs(MISFITS @ values))
         return bool(miss <= MISFIT * np.ptp(values) + ROUNDING * self._largest)

@@ -1,4 +1,4 @@
-"""Who made a number that no run can have: the first body, force or joint to blame."""
+"""Finds the body, force or joint that first produced a non-finite or overflowing value."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +107,7 @@ def _runaway(evaluator: Evaluator, t: float, y: Floats) -> str:
 
 
 def _fault(*numbers: Floats) -> str:
-    """What is wrong with numbers: not finite, or too large for a run; "" if nothing is."""
+    """Fault of numbers: not finite, or too large for a run; "" if they have none."""
     if not all(bool(np.all(np.isfinite(part))) for part in numbers):
         return "not finite"
     too_large = any(bool(np.any(np.abs(part) > LARGEST)) for part in numbers)

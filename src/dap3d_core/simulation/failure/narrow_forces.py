@@ -53,7 +53,7 @@ def _branching(by_type: dict[Any, list[str]], type_info: dict[Any, TypeInfo]) ->
 
 
 def _chooses(type_info: TypeInfo) -> bool:
-    """Whether a law of a type chooses between formulas."""
+    """True if a law of a type chooses between formulas."""
     laws = [type_info.kernels[name] for name in LAWS if name in type_info.kernels]
     return any(
         word in (plain.__globals__.get(name) for name in plain.__code__.co_names)

@@ -78,7 +78,7 @@ class Pulling:
         return found
 
     def notes(self) -> list[str]:
-        """What was negative, since when, and what that means."""
+        """Note on a negative reaction: since when, and what that means."""
         return [
             f"{one.words}: its multiplier is negative from t = {one.since:.6g} s on, or at some "
             f"instants since; at least {one.least:.6g}, at t = {one.least_at:.6g} s"

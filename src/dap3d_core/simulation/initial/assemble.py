@@ -139,7 +139,7 @@ def correct_initial(
 
 
 def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> list[str]:
-    """What was changed, in words.
+    """Description of the changes.
 
     No more than rounding, or velocities that the scene leaves open, is for information.
     """
@@ -315,7 +315,7 @@ def _velocity_residual(rows: ConstraintRows, u: Floats) -> Floats:
 
 
 def fit_of(model: Model) -> float:
-    """What counts as closed, as a part of the scene's length (FIT)."""
+    """Residual at which joints count as closed, as a fraction of the scene's length (FIT)."""
     return FIT * min(1.0, model.size / model.length)
 
 
@@ -325,7 +325,7 @@ def model_size(evaluator: Evaluator) -> float:
 
 
 def extent(evaluator: Evaluator, v: Floats) -> float:
-    """How fast something moves at velocities (6 n,), in rad or parts of the model."""
+    """Largest speed at velocities (6 n,), in rad/s or lengths of the model a second."""
     x = np.abs(v.reshape(-1, 6))
     return max(_largest(x[:, :3]) / model_size(evaluator), _largest(x[:, 3:]))
 
@@ -337,7 +337,7 @@ def _largest(values: Floats) -> float:
 def _failure(
     evaluator: Evaluator, rows: ConstraintRows, passes: int, held: Integers, *, is_far: bool
 ) -> AssemblyError:
-    """Why it failed: the joints that are open, the worst first, in lines of at most 80 columns."""
+    """Reason of the failure: the open joints, the worst first, in lines of at most 80 columns."""
     model, C = evaluator.model, weights_of(evaluator) * rows.C
     tolerance = TOLERANCE * model.length
     worst = np.array([_largest(C[a:b]) for a, b in pairwise(model.joint_start)])

@@ -1,4 +1,4 @@
-"""How fast functions of time change: instants that no step goes over, steps too long for one."""
+"""Break points of functions of time: instants that no step passes, steps too long for one."""
 
 from collections.abc import Iterable
 from itertools import pairwise
@@ -29,7 +29,7 @@ GOLDEN = 0.6180339887498949
 
 
 class Breakpoints:
-    """How fast the functions of time of a model change in a run from 0 to t_end.
+    """Break points and rates of the functions of time of a model in a run from 0 to t_end.
 
     Attributes:
         t_end: s.
@@ -95,7 +95,7 @@ def _stops(breaks: list[float]) -> list[tuple[float, bool]]:
 
 
 def _instants(breaks: list[float], t_end: float) -> list[float]:
-    """Where functions are looked at."""
+    """Instants at which functions are sampled."""
     corners = [0.0, *breaks[:STRETCHES], t_end]
     inner = [a + part * (b - a) for a, b in pairwise(corners) for part in BETWEEN]
     return [*corners, *inner, *(t_end * (GOLDEN * np.arange(1, SAMPLES) % 1.0)).tolist()]

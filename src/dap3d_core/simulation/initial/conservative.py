@@ -1,4 +1,4 @@
-"""Whether potentials account for all work that can be done in a scene: tried, not guessed.
+"""Tests by evaluation if potentials account for all work that can be done in a scene.
 
 A force with an energy may have a damper beside its spring; what its kernels say is compared at a
 few states taken at random about the start.
@@ -26,7 +26,7 @@ AGREE = 1e-6
 
 @IGNORE_FLOAT_ERRORS
 def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
-    """Whether neither dampers, drivers, friction nor forces without a potential can do work.
+    """True if neither dampers, drivers, friction nor forces without a potential can do work.
 
     Args:
         machine: the model.

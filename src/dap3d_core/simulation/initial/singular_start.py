@@ -83,7 +83,7 @@ class SingularStart:
 
     @property
     def leads_on(self) -> bool:
-        """Whether it can be told which way the motion goes on."""
+        """True if the branch on which the motion continues is determined."""
         return len(self.acceleration) > 0
 
     def describe(self) -> str:
@@ -93,7 +93,7 @@ class SingularStart:
 
 
 def singular_start(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> SingularStart | None:
-    """What there is to say of a start u (13 n,); None where its pose is not singular.
+    """Description of a singular start u (13 n,); None if its pose is not singular.
 
     Args:
         machine: the model.
@@ -112,7 +112,7 @@ def singular_start(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> Sin
 
 
 def _loses_rank(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> bool:
-    """Whether redundant rows forbid, at second order, velocities that all rows allow."""
+    """True if redundant rows forbid, at second order, velocities that all rows allow."""
     n = evaluator.model.body_count
     still = u.copy()
     velocities_of(still)[:] = 0.0
@@ -367,7 +367,7 @@ def _at_rest(cone: _Cone) -> SingularStart | None:
 
 
 def _is_driven(cone: _Cone) -> bool:
-    """Whether functions of time move constraints."""
+    """True if functions of time move constraints."""
     before = finite_rows(cone.evaluator, cone.t, cone.still)
     if np.any(before.nu) or np.any(before.gamma):
         return True

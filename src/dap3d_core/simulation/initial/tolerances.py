@@ -44,7 +44,7 @@ def resolved_atol(atol: Any, evaluator: Evaluator) -> float | dict[str, float]:
 
 
 def usual_atol(evaluator: Evaluator) -> float | dict[str, float]:
-    """What is taken where nothing is given."""
+    """Default of the absolute tolerances."""
     length = evaluator.model.length
     if length == 1.0:
         return USUAL_ATOL

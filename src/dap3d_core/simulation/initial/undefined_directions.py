@@ -100,7 +100,7 @@ def _measured(
 
 
 def _words(name: str, spec: FieldSpec, measure: float) -> tuple[str, str]:
-    """What is wrong and what to do."""
+    """Message with fault and remedy."""
     if spec.kind == "vector2":
         return (
             f"its points P_i and P_j coincide at the start (distance {measure:.2g} m), "

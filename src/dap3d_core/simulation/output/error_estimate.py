@@ -94,7 +94,7 @@ def add_error(
 
 
 def _same_instants(result: Result, second: Result) -> bool:
-    """Whether two runs reported at the same times; those of an event differ by its error."""
+    """True if two runs reported at the same times; those of an event differ by its error."""
     if len(result.t) != len(second.t):
         return False
     spacing = float(np.max(np.diff(result.t))) if len(result.t) > 1 else 0.0

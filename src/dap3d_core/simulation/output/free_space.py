@@ -1,4 +1,4 @@
-"""Whether there is room for what a run will report: asked before it begins."""
+"""Checks the free disk and memory for the reports of a run before it begins."""
 
 import os
 import shutil
@@ -75,7 +75,7 @@ def check_room_of_points(count: int, width: int, output: str | os.PathLike[str] 
 
 
 def _room(output: str | os.PathLike[str] | None) -> tuple[str, int | None]:
-    """Where numbers go that ``output`` takes, or nobody, and the bytes that are free there."""
+    """Destination of the numbers of a run, and the bytes that are free there."""
     if output is not None:
         return "on the disk", _free_disk(Path(output).parent)
     return "in memory", _free_memory()

@@ -1,4 +1,4 @@
-"""How a run stands while it goes on: for who watches it."""
+"""Progress snapshots of a running simulation, for user callbacks."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ from dap3d_core.result.post.point_motion import kinetic_energy
 
 @attrs.frozen
 class RunProgress:
-    """How a run stands.
+    """Progress of a run.
 
     Attributes:
         t, t_end: simulated time, and where the run ends, s.

@@ -1,4 +1,4 @@
-"""What a run reports, kept: in memory while it is little, in a file beside the output when not."""
+"""Records the reports of a run: in memory while they are few, else in a file next to the output."""
 
 import math
 import os

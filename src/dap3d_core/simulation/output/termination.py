@@ -1,4 +1,4 @@
-"""How a run ended, in words, and what happened on the way."""
+"""Messages on the end of a run and on the events before it."""
 
 from collections.abc import Sequence
 
@@ -42,7 +42,7 @@ def doubts(evaluator: Evaluator, rhs: int) -> list[str]:
 
 
 def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> str:
-    """Why an integration ended before its time, with who is to blame; rank: that of the start."""
+    """Reason why an integration ended early, with the element to blame; rank: that of the start."""
     t = integration.t
     head = f"the run stopped at t = {t:.9g} s"
     if integration.status is Status.SWITCHED:
@@ -65,7 +65,7 @@ def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> st
 def occurrences(
     evaluator: Evaluator, runs: Sequence[Integration], of_script: Sequence[EventRecord]
 ) -> list[EventRecord]:
-    """What happened at instants that were located, in their order."""
+    """Records of the located events, in their order."""
     last = runs[-1]
     ended = last.status is Status.SWITCHED
     found = []
@@ -102,7 +102,7 @@ def _title(evaluator: Evaluator, which: int) -> str:
 
 
 def _chatter(evaluator: Evaluator, integration: Integration) -> str:
-    """What chatters, how long already, and what helps."""
+    """Message on a chattering switch, its duration, and the remedy."""
     since, count = integration.chatter
     return (
         f"{_title(evaluator, integration.terminal_switch)} chatters: its switch changed its sign "

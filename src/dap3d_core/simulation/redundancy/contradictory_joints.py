@@ -41,7 +41,7 @@ NONE = np.zeros(0, dtype=np.int64)
 
 
 def find_contradiction(evaluator: Evaluator, t: float, y: Floats, rank: int) -> str:
-    """Which joints cannot be fulfilled together from about time t on; "" where all can.
+    """Message on joints that contradict each other from about time t on; "" if none do.
 
     Args:
         machine: the model.

@@ -86,7 +86,7 @@ def bindings(
 
 
 def _leads_away(evaluator: Evaluator, u: Floats, t: float, direction: Floats) -> bool:
-    """Whether the joints can be closed at another pose in this direction (6 n,)."""
+    """True if the joints can be closed at another pose in this direction (6 n,)."""
     n, size = evaluator.model.body_count, model_size(evaluator)
     step = direction.reshape(n, 6) * np.repeat([evaluator.model.length, 1.0], 3)
     extent = max(

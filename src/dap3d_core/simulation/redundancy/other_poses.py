@@ -1,4 +1,4 @@
-"""Whether redundant constraints are so everywhere, or only at one pose (spec 8).
+"""Tests if redundant constraints are so at all poses, or only at one.
 
 The rank can drop at special poses: links in line, axes parallel. Near a pose it can only be higher,
 so other poses of the same assembly tell: the bodies are moved along a random direction that the

@@ -65,7 +65,7 @@ class Contradiction:
 
 @attrs.frozen
 class ReactionUniqueness:
-    """What is determined of the reaction of a joint that shares a freedom.
+    """Components of a reaction that are unique, of a joint with redundant rows.
 
     Attributes:
         joint: its name.
@@ -83,11 +83,11 @@ class ReactionUniqueness:
 
     @property
     def partly(self) -> bool:
-        """Whether something of it is unique."""
+        """True if some component is unique."""
         return bool(self.unique_rows or self.force or self.moment)
 
     def describe(self) -> str:
-        """What is unique, in words."""
+        """Text on the unique components."""
         parts = {"force": self.force, "moment": self.moment}
         words = [f"{name} {', '.join(axes)}" for name, axes in parts.items() if axes]
         if words:
@@ -122,7 +122,7 @@ class Redundancy:
 
     @property
     def is_plain(self) -> bool:
-        """Whether a run may start as from independent rows: redundant ones agree, and stay so."""
+        """True if redundant rows agree and stay so: a run may start as from independent ones."""
         return not (self.contradictions or self.bindings or self.singular)
 
     @property
@@ -133,7 +133,7 @@ class Redundancy:
         return tuple(name for name in names if name not in involved)
 
     def reactions(self) -> list[ReactionUniqueness]:
-        """What is unique of the reactions of ``joints``, in their order.
+        """Uniqueness of the reactions of ``joints``, in their order.
 
         A multiplier is unique if its row is part of no dependency. The reaction J^T lambda of a
         joint can change by J^T c for each combination c of its rows; components that no c touches
@@ -279,7 +279,7 @@ def _groups(model: Model, dependencies: Sequence[Dependency]) -> tuple[Shared, .
 
 
 def _gap(dependency: Dependency, side: Floats) -> Floats:
-    """What no motion can fulfil of a right-hand side, on a basis of the combinations."""
+    """Part of a right-hand side that no motion fulfils, on a basis of the combinations."""
     gap: Floats = dependency.combinations @ side[dependency.rows]
     return gap
 

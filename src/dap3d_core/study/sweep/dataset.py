@@ -68,7 +68,7 @@ class Coordinate(Variable):
 
 @attrs.frozen(eq=False)
 class SweepLayout:
-    """What a sweep's data set is made of, but for what the runs give.
+    """Layout of the data set of a sweep, without the values that its runs give.
 
     Attributes:
         sizes: length of each dimension, ``time`` last where there is a series.
@@ -190,7 +190,7 @@ class InMemory:
         self._status[places] = batch.status
 
     def dataset(self) -> "xarray.Dataset":
-        """What there is so far."""
+        """Content so far."""
         from dap3d_core.study.sweep.display import Sweep
 
         layout = self.layout
@@ -235,7 +235,7 @@ def _patiently(file: Path, read: Callable[[Path], Read]) -> Read:
 
 
 def _opened(file: Path) -> "xarray.Dataset":
-    """What a file holds."""
+    """Content of a file."""
     import xarray
 
     from dap3d_core.study.sweep.display import Sweep
@@ -261,7 +261,7 @@ def _opened(file: Path) -> "xarray.Dataset":
 
 
 def is_sweep(path: str | os.PathLike[str]) -> bool:
-    """Whether there is a file, and it is that of a sweep."""
+    """True if the file exists and is that of a sweep."""
     try:
         check_signature(Path(path))
         return bool(_patiently(Path(path), lambda file: SWEEP in _attributes_of(file)))
