@@ -180,7 +180,7 @@ def test_the_names_besides_those_of_fields_are_those_of_the_sources():
         found = names_of(constants=eval(f"{{{constant}}}"))
         assert [a - b for a, b in zip(found, names_of(), strict=True)] == levels
     velocity = ", ".join(f"`{name}`" for name in VELOCITY_KERNELS)
-    assert f"may be asked for by {velocity}." in " ".join(page.split())
+    assert f"may be used by {velocity}." in " ".join(page.split())
     methods = {f"{n}(s)" for n, v in vars(BodyPose).items() if callable(v) and n[0] != "_"}
     rows = rows_of(page, '`bodies["i"]` has | which is')
     fields = {field.name for field in attrs.fields(BodyPose)}
