@@ -104,7 +104,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     floor, attribute = _HOMES[name]
     value = getattr(import_module(f"dap3d_core.{floor}"), attribute)
-    if name not in ("plot", "report", "view"):  # modules of these names stand beside them
+    if name not in ("plot", "report", "view"):  # modules have the same names
         globals()[name] = value
     return value
 

@@ -28,7 +28,7 @@ KINDS = (
 ) = range(len(KINDS))  # fmt: skip
 
 # What a switch does where it becomes negative, or changes its sign: the run ends; the integration
-# begins anew; the same, and nobody is told.
+# begins anew; the same without a note.
 ENDS, BEGINS, UNSEEN = 1, 0, -1
 
 # Places in ``settings``: projection tolerances of position and velocity, a scratch number, how
@@ -85,7 +85,7 @@ class System(LoopArrays):
     hubs: Integers
 
 
-#: What a run changes and goes on from: ``par`` holds the turns of angles and the numbers that an
+#: Part of the state of a run: ``par`` holds the turns of angles and the numbers that an
 #: event has set, ``settings`` counts. All else is constant, found at the start of a run
 #: (``smallest``), or scratch: a right-hand side, projection, report or stage writes what it reads,
 #: factors too. A projection may use those of the right-hand side before it: both are of one step.

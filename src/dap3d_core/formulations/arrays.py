@@ -30,7 +30,7 @@ UNEVEN = 1e3
 def build_loops(
     model: Model, kinds: tuple[str, ...], announce: Callable[[str], None] | None = None
 ) -> Any:
-    """The compiled group loops of a model, only of the kinds asked for, and what they run over.
+    """The compiled group loops of a model, only of the requested kinds, and their groups.
 
     Returns:
         (table of loops, [(kind, group)] in the order of the list).
@@ -134,7 +134,7 @@ def load_numbers(
 
 
 def _twins(model: Model, other: Model) -> dict[int, Group]:
-    """Id of each group of a model -> the group of another that stands in its place."""
+    """Id of each group of a model -> the corresponding group of another."""
     found = {}
     for mine, theirs in zip(_all_groups(model), _all_groups(other), strict=True):
         same = (
@@ -178,7 +178,7 @@ def rows_of(model: Model, plan: Plan) -> Integers:
 
 
 def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[Any, Any, Any, Any]:
-    """Integers and numbers of all instances; a group that serves two loops stands there once."""
+    """Integers and numbers of all instances; a group that serves two loops is stored once."""
     idx: list[Integers] = []
     par: list[Floats] = []
     at: dict[int, tuple[int, int]] = {}

@@ -58,7 +58,7 @@ def settle_rows(system: System) -> float:
 def refine(system: System, out: Floats) -> None:
     """Solve once more for what accelerations and multipliers leave of the rows, where that is much.
 
-    Where reactions are large beside the accelerations that they leave, or masses differ, rounding
+    Where reactions exceed by far the accelerations that they leave, or masses differ, rounding
     of the solution shows in the rows. Those in out are replaced.
     """
     n, length = system.metric.shape[0] - 1, system.settings[LENGTH]

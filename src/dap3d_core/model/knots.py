@@ -13,7 +13,7 @@ from dap3d_core.scene import Instance
 
 Floats = NDArray[np.float64]
 
-#: Where the knots of a function without any stand, beside functions that have some.
+#: Knots of a function without any, next to functions that have some.
 FAR = 1e100
 
 

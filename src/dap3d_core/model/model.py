@@ -109,7 +109,7 @@ class Model:
 
     @property
     def report_layout(self) -> Layout:
-        """Layout of what is reported beside the state."""
+        """Layout of what is reported in addition to the state."""
         return report_layout(self.body_count, self.row_count, self.angle_count)
 
     @property

@@ -57,7 +57,7 @@ def integrated_layout(n: int) -> Layout:
 
 @cache
 def report_layout(n: int, rows: int, angles: int) -> Layout:
-    """Layout of what is reported beside the state: of n bodies, constraint rows, counted angles."""
+    """Layout of reports in addition to the state: n bodies, constraint rows, counted angles."""
     sizes = {"v_dot": VELOCITIES * n, "Lam": rows, "angles": angles}
     return Layout(**sizes, potential_energy=1, residuals=3)
 

@@ -163,7 +163,7 @@ def _reference(
     for each in settings:
         if each.rtol is None or each.rtol > TIGHTEST[0]:
             tight = f"rtol {TIGHTEST[0]:g}"
-            notes.append(f"{each} stands in as reference: at {tight} none like it came to its end")
+            notes.append(f"{each} serves as reference: at {tight} none like it came to its end")
     expected = compare_with_expected(bench, result)
     if expected is not None and not expected.within:
         notes.append(

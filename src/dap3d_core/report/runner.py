@@ -311,7 +311,7 @@ class _Measurement:
         best = front(runs, uncertainty)
         if header["reference"].meaningless_from is not None and all(r.error > PARTED for r in runs):
             self.notes.append(
-                "no setting follows the reference up to there: a shorter final time tells more"
+                "no setting follows the reference up to there: a shorter final time shows more"
             )
         refused = {each.method for each in self.bench.refused}
         failed = [

@@ -15,7 +15,7 @@ from dap3d_core.scene.scene import FIXED_STEP
 
 #: How a run can have ended.
 STATUSES = ("done", "interrupted", "stopped")
-#: How a note begins that changes nothing of what was asked for: no warning to ``--strict``.
+#: How a note begins that changes nothing of what was requested: no warning to ``--strict``.
 INFORMATION = "for information: "
 #: Stands in a file that is still being written, or whose writer was killed.
 RUNNING = "running"

@@ -72,7 +72,7 @@ def _check_format(file: Path, dataset: Any) -> None:
     if SWEEP in names:
         raise ResultError(
             f"cannot read {file}: it holds the points of a sweep, not the result of one run; "
-            "dap.open_sweep reads it, dap3d info tells of it"
+            "dap.open_sweep reads it, dap3d info describes it"
         )
     if "Conventions" not in names or dataset.getncattr("Conventions") != CONVENTIONS:
         raise ResultError(f"cannot read {file}: a NetCDF-4 file, but no result of dap3d")

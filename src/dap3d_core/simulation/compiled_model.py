@@ -54,8 +54,8 @@ MOST_PLACES = 10
 def log_first_compilation() -> None:
     """Tell a script, once in a process, that kernels are compiled, which takes a while.
 
-    It is a warning of the logger "dap3d", which Python shows on stderr unless it is told otherwise:
-    ``logging.getLogger("dap3d").setLevel("ERROR")``. Who passes ``announce`` is told there alone.
+    It is a warning of the logger "dap3d", which Python shows on stderr unless configured otherwise:
+    ``logging.getLogger("dap3d").setLevel("ERROR")``. With ``announce`` it is reported there alone.
     """
     logging.getLogger("dap3d").warning("compiling for the first time; this happens once")
 
@@ -112,7 +112,7 @@ class CompiledModel:
         if method is not None:
             settings = attrs.evolve(scene.simulation, method=method)
             check_simulation(settings, self.model.body_names)
-        #: The method that was asked for, perhaps "auto".
+        #: The requested method, perhaps "auto".
         self.requested_method = requested = method or str(scene.simulation.method)
         self._breakpoints: dict[float, Breakpoints] = {}
         self._starts: dict[tuple[bool, tuple[str, ...], str], InitialState] = {}
@@ -280,7 +280,7 @@ class CompiledModel:
         """The formulation that a run takes for a requested method, and the reason in words.
 
         Raises:
-            SimulationError: the method asked for does not fit the scene.
+            SimulationError: the requested method does not fit the scene.
         """
         method, reason = choose_method(self.model, requested)
         if requested != "auto" or not self.model.row_count:
@@ -288,7 +288,7 @@ class CompiledModel:
         settings = self.scene.simulation
         try:
             start = self.start(settings.correct, settings.hold, str(settings.correct_metric))
-        except AssemblyError:  # a run tells it
+        except AssemblyError:  # a run reports it
             return method, reason
         found = start.redundancy
         if found.rank.redundant:
@@ -316,7 +316,7 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
     """The formulation for a model, as far as its number of rows decides, and the reason in words.
 
     Raises:
-        SimulationError: the method asked for does not fit the scene.
+        SimulationError: the requested method does not fit the scene.
     """
     constrained = model.row_count > 0
     usual = next(f.name for f in FORMULATIONS.values() if f.needs_joints == constrained)
@@ -358,7 +358,7 @@ def compile_scene(
         allow_code: whether the model's own types (plugin.py in its folder) may be loaded.
         registry: where types come from; by default the installed plugins.
         announce: called with the name of each kernel that has to be compiled anew; by default the
-            first one is told as a warning of the logger "dap3d".
+            first one is a warning of the logger "dap3d".
 
     Raises:
         SceneError: the scene has mistakes; all of them are in the message.

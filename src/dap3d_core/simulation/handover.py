@@ -75,7 +75,7 @@ def begin_other(run: RunState) -> None:
 
 
 def take_over(integration: Integration, before: Integration) -> None:
-    """Let an integration of the same run go on from where another one stands."""
+    """Continue the run with another integration, from the state of the present one."""
     work = integration.work
     work.state[at.Y] = before.work.state[at.Y]
     work.t, work.next_report = before.t, before.work.next_report
@@ -130,7 +130,7 @@ def lengths_at(evaluator: Evaluator, t: float, y: Floats, span: float) -> Floats
 
     Args:
         machine: the model.
-        t, y: where the motion stands, on the constraints.
+        t, y: state of the motion, on the constraints.
         span: length of the run, s.
     """
     slope, h = np.zeros_like(y), APART * span

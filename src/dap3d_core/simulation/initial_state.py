@@ -1,4 +1,4 @@
-"""The state that a run starts from: corrected if asked for, with the rank of its constraints."""
+"""The state that a run starts from: corrected if requested, with the rank of its constraints."""
 
 import attrs
 import numpy as np

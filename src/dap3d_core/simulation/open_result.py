@@ -31,7 +31,7 @@ def open_result(
     """Open a result file.
 
     Positions, velocities, accelerations, multipliers and energies come from the file; the Jacobian,
-    reactions and quantities of forces are computed when asked for, which loads the types that the
+    reactions and quantities of forces are computed on demand, which loads the types that the
     stored scene names.
 
     Args:
@@ -91,7 +91,7 @@ def why_unmade(error: Exception, *, allowed: bool) -> str:
     """Message for a stored scene whose model cannot be made, with the remedy.
 
     Args:
-        error: what came of it.
+        error: the error that was raised.
         allowed: whether the types of a model's own file were allowed.
     """
     mistakes = getattr(error, "mistakes", None)

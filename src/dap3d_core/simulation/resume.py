@@ -54,7 +54,7 @@ def resume(
 
     Args:
         path: the checkpoint, ``RESULT.checkpoint``. The rows that the run had reported are in a
-            file beside it: RESULT, or ``RESULT.part`` where the run was killed.
+            file next to it: RESULT, or ``RESULT.part`` where the run was killed.
         output, force: another result file, and whether over an existing one. By default RESULT.
         checkpoint: as ``simulate`` has it.
         model, allow_code: where the model's own types stand, and whether they may be loaded; as
@@ -157,7 +157,7 @@ class ResumedRun:
         return result
 
     def _remove_what_is_replaced(self, target: Path) -> None:
-        """Remove the unfinished rows of the run, and this checkpoint where another file goes on.
+        """Remove the unfinished rows of the run, and this checkpoint where another file continues.
 
         A result file stays, whatever it holds.
         """

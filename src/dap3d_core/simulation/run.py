@@ -52,7 +52,7 @@ class Run(RunState):
     singular: SingularStart | None = None
 
     def save_every(self, seconds: float, *, force: bool) -> None:
-        """Write checkpoints beside the output; arguments and errors as of ``CheckpointWriter``."""
+        """Write checkpoints next to the output; arguments and errors as of ``CheckpointWriter``."""
         from dap3d_core.simulation.checkpoint.save import CheckpointWriter
 
         self.checkpoint_writer = CheckpointWriter(self, seconds, force=force)

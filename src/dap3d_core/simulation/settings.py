@@ -53,7 +53,7 @@ def compiled_for(
     allow_code: bool,
     announce: Callable[[str], None] | None,
 ) -> CompiledModel:
-    """The compiled model of a scene; one that was compiled before must have the method asked for.
+    """The compiled model of a scene; one that was compiled before must have the requested method.
 
     Raises:
         SceneError: there is no such method.

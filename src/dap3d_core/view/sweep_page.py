@@ -32,7 +32,7 @@ WORDS = {status.value: status.name.lower() for status in PointStatus}
 
 
 def _check_types(data: "xarray.Dataset", compiled: CompiledModel) -> None:
-    """Refuse to run points again with other formulas than those of the outputs beside them."""
+    """Refuse to run points again with other formulas than those of the stored outputs."""
     try:
         known = dict(json.loads(data.attrs.get("types", "{}")))
     except (TypeError, ValueError) as error:

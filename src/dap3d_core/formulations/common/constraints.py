@@ -54,7 +54,7 @@ from dap3d_core.linear.ldlt.factor import (
 )
 from dap3d_core.linear.ldlt.saddle_point import add_product, scale_blocks, solve_saddle
 
-#: Newton passes of one projection; the second already stands at rounding.
+#: Newton passes of one projection; the second already reaches rounding.
 PASSES = 5
 
 #: e_i of regularised factors as part of the squared length of row i: far above rounding, and small
@@ -96,7 +96,7 @@ def linearise_evenly(t: float, system: System, loops: Any) -> None:
 
 @compiled_into
 def factorise(system: System, part: float | None) -> int:
-    """The factors of D^ as it stands, in K.
+    """Factors of the current D^, in K.
 
     Returns the number of pivots that have become small (``system.smallest``): the pose is near a
     singular one.
@@ -175,7 +175,7 @@ def residuals(t: float, system: System, loops: Any) -> float:
 
 @compiled
 def velocity_residuals(system: System) -> float:
-    """D v - nu into ``residual``, with D^ as it stands; returns the largest, m/s."""
+    """D v - nu into ``residual``, with the current D^; returns the largest, m/s."""
     residual = system.residual
     scale_velocities(system.body, system.metric, system.velocity)
     for k in range(residual.shape[0]):
@@ -219,7 +219,7 @@ def project_onto(
     With regularised factors the passes are those of the proximal method as well: each leaves a
     ``part`` of what the one before has left.
 
-    out: on entry 1.0 where rhs was evaluated last at this very t and y: D^ stands as it should,
+    out: on entry 1.0 where rhs was evaluated last at this very t and y: D^ is valid,
     and the factors, too, if rhs leaves those of ``part`` (``kept``). Then: 1.0 if y changed beyond
     rounding; 1.0 if it did not converge, 2.0 if the pose is close to a singular one; largest
     residuals of position and velocity; lengths (nodes) that go linearly through zero at a singular

@@ -56,7 +56,7 @@ class Tangent(Arrays):
         "blocks": INTEGER_MATRIX,
     }
 
-    elements: Integers  # (groups, 9): LOOP, KIND, ...; ROW_AT: where in idx the joint's row stands
+    elements: Integers  # (groups, 9): LOOP, KIND, ...; ROW_AT: place of the joint's row in idx
     pairs: Integers  # places in ``coupling`` for the slots (a, b) of each element, -1 for none
     blocks: Integers  # (pairs, 3) place in ``coupling``, body of the rows, body of the columns
     coupling: Floats

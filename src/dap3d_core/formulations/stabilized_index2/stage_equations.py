@@ -127,7 +127,7 @@ def evaluate_stage(
 
 @compiled
 def keep_state(system: System, matrix: StageMatrix, part: float) -> None:
-    """Keep what the matrix needs of the bodies as placed and of D^ as it stands."""
+    """Store what the matrix needs of the bodies as placed and of the current D^."""
     for q in range(system.blocks.shape[0]):
         s = system.body[system.blocks[q, 1]]
         for o in range(system.blocks[q, 0], system.blocks[q, 0] + 6 * system.blocks[q, 2], 6):

@@ -19,7 +19,7 @@ SLOWEST = 0.99
 ROUNDINGS, LOOSEST = 10.0, 0.1
 #: Where multipliers fall by this much in an iteration the stages are yet to follow them.
 SETTLING = 0.1
-#: Changes up to this many limits may be rounding where the iteration stands still, if they are up
+#: Changes up to this many limits may be rounding where the iteration stagnates, if they are up
 #: to this many roundings: near a singular pose a state is known to one over its distance squared.
 STALLED, MOST_ROUNDINGS = 10.0, 1e6
 

@@ -187,7 +187,7 @@ class _Panels:
         return self.starts[last] - self.starts[first]
 
     def gathered(self, k: int) -> Iterator[tuple[int, ...]]:
-        """Blocks that were assembled beside a panel and are added to it."""
+        """Blocks that were assembled apart from a panel and are added to it."""
         flag, matrix, sizes = 2 * self.width(k), self.matrix, self.sizes
         for column in range(*matrix.spans[k][:2]):
             m, at = sizes[column], matrix.diagonal[column]

@@ -59,7 +59,7 @@ class GrowingFile:
     """A NetCDF-4 file ``NAME.part`` that grows with a computation, readable at any moment.
 
     All numbers have fixed locations from the start, and a mark (time, status) is written after the
-    values that it stands for: a killed process leaves what it had written.
+    values that it represents: a killed process leaves what it had written.
 
     Attributes:
         target: the requested file.

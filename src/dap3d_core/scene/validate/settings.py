@@ -172,5 +172,5 @@ def notes_of(simulation: Simulation) -> list[str]:
     atol = simulation.atol
     parts = atol.values() if isinstance(atol, Mapping) else [atol]
     if any(part == 0.0 and type(part) in (int, float) for part in parts):
-        return ["simulation.atol = 0: a quantity that is zero is then asked for without any error"]
+        return ["simulation.atol = 0: a quantity that is zero then allows no error"]
     return []

@@ -54,7 +54,7 @@ def _are_durations(value: Any) -> bool:
     return isinstance(value, list) and all(map(_is_duration, value))
 
 
-#: What stands in a header.
+#: Keys of a header.
 KEYS: dict[str, Form] = {
     **dict.fromkeys(("run", "output", "scene", "driver"), (_is_text, "a text")),
     "method": (lambda value: value in METHODS, f"one of {', '.join(METHODS)}"),

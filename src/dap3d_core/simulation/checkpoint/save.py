@@ -1,4 +1,4 @@
-"""When a run writes checkpoints, and what stands in them."""
+"""Checkpoints of a run: when they are written, and their content."""
 
 import json
 import math
@@ -56,7 +56,7 @@ class CheckpointWriter:
     def begin(self) -> None:
         """Write the first checkpoint before anything is integrated, where more are to follow.
 
-        So a run that is killed at any later moment goes on.
+        So a run that is killed at any later moment can be resumed.
         """
         if math.isfinite(self._seconds):
             self._save()
@@ -74,7 +74,7 @@ class CheckpointWriter:
     def leave(self, error: BaseException) -> None:
         """Write a checkpoint where a run is ended from outside, its result being saved.
 
-        ``error.checkpoint`` names it, where the run stands between two chunks.
+        ``error.checkpoint`` names it, if the run is between two chunks.
         """
         run = self._run
         if run.is_whole:
@@ -82,12 +82,12 @@ class CheckpointWriter:
             error.checkpoint = self.path  # type: ignore[attr-defined]
 
     def write(self) -> None:
-        """Write a checkpoint of the run as it stands, once its rows are in a file."""
+        """Write a checkpoint of the present run, once its rows are in a file."""
         write_checkpoint(self.path, checkpoint_of(self._run))
         self.has_written = True
 
     def remove(self) -> None:
-        """The run has ended by itself: nothing goes on from here. The checkpoint goes last.
+        """The run has finished and is not resumed. The checkpoint is removed last.
 
         That of another run, which has taken its place, stays.
         """
@@ -109,18 +109,18 @@ def results_of(files: Iterable[Path], run: str) -> Iterator[tuple[Path, Result]]
 
 
 def parts_of(output: Path) -> list[Path]:
-    """The unfinished files beside a result file."""
+    """Unfinished files next to a result file."""
     return sorted(output.parent.glob(f"{output.name}.part*"))
 
 
 def remove_parts(output: Path, run: str) -> None:
-    """Remove the unfinished files that a run has left beside its result file."""
+    """Remove the unfinished files that a run has left next to its result file."""
     for part, _ in results_of(parts_of(output), run):
         part.unlink()
 
 
 def checkpoint_of(run: RunState) -> Checkpoint:
-    """A run as it stands between two chunks, its rows taken."""
+    """State of a run between two chunks, its rows taken."""
     recorder, compiled = run.recorder, run.compiled
     assert recorder.output is not None
     header: dict[str, Any] = {
@@ -147,7 +147,7 @@ def checkpoint_of(run: RunState) -> Checkpoint:
 
 
 def arrays_of(run: RunState) -> dict[str, NDArray[Any]]:
-    """All that a run goes on from, by name."""
+    """Arrays from which a run is resumed, by name."""
     found = {
         f"{k}.{name}": array
         for k, integration in enumerate(run.integrations)

@@ -28,7 +28,7 @@ EPSILON = float(np.finfo(float).eps)
 
 
 class EventLocator:
-    """Looks out for events while an integration goes on.
+    """Locates events during an integration.
 
     Attributes:
         occurrences: what was found.
@@ -143,7 +143,7 @@ class EventLocator:
         return self._sides[k] != 0.0 and value * self._sides[k] <= 0.0
 
     def _slope(self, integration: Integration) -> Floats:
-        """dy/dt where the integration stands."""
+        """dy/dt at the state of the integration."""
         slope = integration.dy_dt
         if slope is not None:
             return slope
@@ -178,7 +178,7 @@ class EventLocator:
     def _ahead(self, k: int, values: Iterator[tuple[float, float]]) -> tuple[float, bool] | None:
         """A time in the step at which event k is past, and whether in its direction.
 
-        One in the other direction is told where the event comes after it in the same step.
+        One in the other direction is reported where the event comes after it in the same step.
         """
         side, passed = self._sides[k], None
         for time, value in values:

@@ -19,9 +19,9 @@ Floats = NDArray[np.float64]
 #: Where to look behind the last good state, as parts of the time.
 AHEAD = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
 
-#: A row this many times the others, in its own units, tells of a pose that its joint cannot have.
+#: A row this many times the others, in its own units, indicates a pose that its joint cannot have.
 STEEP = 1e6
-#: A state or a rate, in SI units, beyond which no step goes on for long: cubes of it overflow soon.
+#: A state or a rate, in SI units, beyond which no step succeeds for long: cubes soon overflow.
 ENORMOUS = 1e50
 
 
@@ -56,7 +56,7 @@ def _at(evaluator: Evaluator, t: float, y: Floats) -> str:
             return f"the state of body {name} is {fault}"
     s = evaluator.system
     place_bodies(y, s.body, s.metric)
-    s.F[:, :4] = 0.0  # filled again one by one: what stands there may be of no finite number
+    s.F[:, :4] = 0.0  # filled again one by one: the present values may not be finite
     for q, (kind, group) in enumerate(evaluator.loop_groups):
         for k in range(group.count):
             if fault := _fault_of(evaluator, q, k, kind, group, t):

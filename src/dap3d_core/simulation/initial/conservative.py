@@ -1,6 +1,6 @@
 """Tests by evaluation if potentials account for all work that can be done in a scene.
 
-A force with an energy may have a damper beside its spring; what its kernels say is compared at a
+A force with an energy may have a damper and a spring; what its kernels say is compared at a
 few states taken at random about the start.
 """
 

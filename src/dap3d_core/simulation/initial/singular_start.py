@@ -68,7 +68,7 @@ class SingularStart:
     Attributes:
         branches: a line for each motion that leads from there, with velocities along it.
         acceleration: (6 n,) r_ddot, omega_dot of each body on the branch that the run takes; empty
-            where none can be told.
+            where none can be determined.
         aside: (13 n,) a state close to that branch, off the singular pose.
         first_step: length of a step that leads away from it, s.
         words: which branch that is, or why there is none, with what to do; a sentence without its

@@ -123,7 +123,7 @@ def _turned(group: Group, name: str, numbers: Floats, A: Floats) -> Floats:
 
 
 def _bodies(group: Group, name: str) -> NDArray[np.int64]:
-    """(m,) the bodies that a point or vector of the instances of a group stands on."""
+    """(m,) the bodies of a point or vector of the instances of a group."""
     layout = group.type_info.layout
     slot = slot_of(name)
     if slot in layout.slots:

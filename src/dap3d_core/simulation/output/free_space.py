@@ -24,7 +24,7 @@ def check_room(
     Args:
         rows: reported instants.
         numbers: of each.
-        dt: reporting step, s, as it was asked for.
+        dt: reporting step, s, as given.
         output: the file that takes them, or None.
 
     Raises:
@@ -108,5 +108,5 @@ def _size(byte_count: float) -> str:
 
 
 def row_width(evaluator: Any) -> int:
-    """Numbers that a run keeps of each instant: time, state, work, and what is reported beside."""
+    """Numbers that a run stores for each instant: time, state, work, and further reports."""
     return int(1 + integrated_layout(evaluator.model.body_count).size + evaluator.report_size)

@@ -33,7 +33,7 @@ class RunProgress:
 
 
 class Observer:
-    """Looks at the integrations of one run between their chunks, and tells who watches."""
+    """Reports the progress of the integrations of a run between their chunks to a callback."""
 
     def __init__(self, model: Model, t_end: float, watch: Callable[[RunProgress], None]) -> None:
         if not callable(watch):
@@ -47,15 +47,15 @@ class Observer:
         self._start: tuple[float, float] | None = None
 
     def begin(self, integration: Integration) -> None:
-        """An integration begins, or another one goes on with the run."""
-        steps = integration.statistics.steps  # of one that goes on once more, those it has taken
+        """An integration begins, or another one continues the run."""
+        steps = integration.statistics.steps  # of one that continues, those it has taken
         self._earlier, self._steps = self._earlier + self._steps - steps, steps
         self._of, self._t = integration, integration.t
         if self._start is None:
             self._start = self._energies(integration.y)
 
     def look(self) -> None:
-        """Tell how the run stands now."""
+        """Report the present progress."""
         assert self._of is not None
         assert self._start is not None
         steps = self._of.statistics.steps

@@ -50,7 +50,7 @@ class ResultRecorder:
             machine: returns its evaluator, for quantities that a result computes later.
             output, force: as ``simulate`` has them.
             most: how many rows come at most.
-            run: identity of the run that this one goes on with.
+            run: identity of the run that this one continues.
 
         Raises:
             ResultError: the output cannot be written.

@@ -54,7 +54,7 @@ def find_contradiction(evaluator: Evaluator, t: float, y: Floats, rank: int) -> 
     u = u_from_y(y)
     try:
         finite_rows(evaluator, t, u)
-    except AssemblyError:  # which find_offender tells
+    except AssemblyError:  # which find_offender reports
         return ""
     return _out_of_reach(evaluator, t, u) or _come_to_hold(evaluator, t, u, rank)
 

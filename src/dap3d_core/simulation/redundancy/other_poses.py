@@ -32,7 +32,7 @@ TURN, SHIFT = 0.4, 0.2
 HALVINGS = 5
 #: What is left of a random direction below this part is rounding: nothing can move.
 FREE = 1e-8
-#: A pose counts as another one if it differs by this part of what was asked for.
+#: A pose counts as another one if it differs by this part of the requested one.
 ANOTHER = 0.05
 
 NONE = np.zeros(0, dtype=np.int64)

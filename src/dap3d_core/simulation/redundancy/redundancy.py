@@ -107,7 +107,7 @@ class Redundancy:
         contradictions: where redundant rows ask for different things; empty if they agree.
         bindings: where redundant rows, besides, are nearly dependent on others and so lock a
             motion that they hardly hold.
-        singular: which way a motion goes on from here where the pose is a singular one.
+        singular: branch on which the motion continues where the pose is singular.
     """
 
     rank: Rank

@@ -34,7 +34,7 @@ class Fit:
         iterations, runs: evaluations of the derivatives; runs of the scene in all.
         status: "converged", or "stopped" where the iterations were used up.
         message: why the search ended.
-        notes: parameters that cannot be told apart, have no effect, are at a bound; errors of
+        notes: parameters that cannot be distinguished, have no effect, are at a bound; errors of
             interpolation.
         scene: with the fitted values.
         result: the run of that scene.

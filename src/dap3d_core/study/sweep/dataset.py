@@ -182,7 +182,7 @@ class InMemory:
         return np.flatnonzero(self._status == PointStatus.OPEN)
 
     def put(self, places: Integers, batch: Batch) -> None:
-        """Keep what came of some points."""
+        """Store the results of some points."""
         for name, whole in self._values.items():
             values = batch.values[name]
             whole.reshape(len(self._status), *values.shape[1:])[places] = values
@@ -211,7 +211,7 @@ def open_sweep(path: str | os.PathLike[str]) -> "xarray.Dataset":
 
     Returns:
         The data set as ``sweep`` gives it. Variables of a large one stay in the file until they
-        are asked for.
+        are requested.
 
     Raises:
         ResultError: there is no such file, it is no sweep, damaged, or of a newer dap3d.

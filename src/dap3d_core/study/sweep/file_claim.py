@@ -8,10 +8,10 @@ from dap3d_core.result.file.atomic_write import cannot
 
 
 class FileLock:
-    """A lock on ``NAME.lock`` beside a sweep's file, held from its first point to its end.
+    """A lock on ``NAME.lock`` next to a sweep's file, held from its first point to its end.
 
     The system lets go of it when the process ends, however it ends: a lock file that is left over
-    stands in nobody's way. Where the system has no such locks nothing is held.
+    blocks nobody. Where the system has no such locks nothing is held.
     """
 
     def __init__(self, target: Path) -> None:

@@ -11,7 +11,7 @@ from dap3d_core.model.groups import Floats, Integers
 #: Coordinates in a body, m; a point with its body (ground 0).
 Point = tuple[float, ...]
 Located = tuple[int, Point]
-#: Solids of unit size about their origin; axes along z. A cone stands on the origin.
+#: Solids of unit size about their origin; axes along z. The base of a cone is at the origin.
 SOLIDS = ("sphere", "cylinder", "cone", "box", "ring")
 #: Groups that a user switches on and off; inertia is translucent.
 LAYERS = ("bodies", "inertia", "shapes", "joints", "forces")
