@@ -52,7 +52,7 @@ class Integrator:
 
     Attributes:
         name: its name in scenes.
-        make: an ``Integration`` of (machine, y0, times, **options), with the options of
+        make: an ``Integration`` of (evaluator, y0, times, **options), with the options of
             ``Integration``; imports and compiles what no other integrator needs.
         adaptive: steps are chosen by their error; else ``step`` is needed.
         one_step: explicit and of one step, so that runs may share one compiled call.

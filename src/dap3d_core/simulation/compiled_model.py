@@ -61,7 +61,7 @@ def log_first_compilation() -> None:
 
 
 class _Evaluators(threading.local):
-    """The machines of one thread.
+    """The evaluators of one thread.
 
     Attributes:
         stack: the last one is what the thread works with.
@@ -142,7 +142,7 @@ class CompiledModel:
 
     @contextmanager
     def borrow_evaluator(self) -> Iterator[Evaluator]:
-        """A machine for a run: this thread's or, in a callback of a run that has it, another."""
+        """An evaluator for a run: this thread's or, in a callback of a run that has it, another."""
         own = self._own
         if own.running:
             own.stack.append(self.new_evaluator())
@@ -158,7 +158,7 @@ class CompiledModel:
             own.running = False
 
     def new_evaluator(self, announce: Announce | None = None) -> Evaluator:
-        """A machine of the model with arrays of its own, for whoever changes its numbers."""
+        """An evaluator of the model with arrays of its own, for whoever changes its numbers."""
         evaluator = Evaluator(self.model, self._first_method, announce)
         evaluator.formulation = FORMULATIONS[self.method]
         settings = self.scene.simulation

@@ -129,7 +129,7 @@ def lengths_at(evaluator: Evaluator, t: float, y: Floats, span: float) -> Floats
     A length that goes to zero with a power of the time left is given the mean rate until then.
 
     Args:
-        machine: the model.
+        evaluator: the model.
         t, y: state of the motion, on the constraints.
         span: length of the run, s.
     """

@@ -44,7 +44,7 @@ class RunState:
     """One run between two chunks; checkpoints and the change of integrator work on it.
 
     Attributes:
-        compiled, machine, settings: the model, its evaluator, the settings with atol as a number.
+        compiled, evaluator, settings: the model, its evaluator, the settings with atol as a number.
         times: (nt,) reporting times, s.
         options: what every integration of the run is made with.
         integrations: the present one last; "auto" and radau may take a second one.

@@ -209,7 +209,7 @@ class Reduction:
         return all(bool(np.all(np.isfinite(values))) for values in reduced.values())
 
     def result(self, model: Model, rows: Floats, evaluator: Evaluator | None = None) -> Result:
-        """A result in memory, of rows of a model that a machine evaluates."""
+        """A result in memory, of rows of a model that an evaluator evaluates."""
         record = RunMetadata(scene_text=self.compiled.scene_text)
         return Result.of_run(model, rows, record, lambda: evaluator or self.compiled.evaluator)
 

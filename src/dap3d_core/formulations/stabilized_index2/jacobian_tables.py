@@ -26,7 +26,7 @@ _BLOCK = 72
 
 
 def make_tangent(evaluator: Evaluator) -> Tangent:
-    """Tables and arrays of the tangent of a machine's model."""
+    """Tables and arrays of the tangent of an evaluator's model."""
     system, plan, n = evaluator.system, evaluator.plan, evaluator.model.body_count
     place = {(b, b): _BLOCK * (b - 1) for b in range(1, n + 1)}
     elements: list[tuple[int, ...]] = []

@@ -70,7 +70,7 @@ class RadauIntegration(Integration):
 
     Parameters
     ----------
-    machine
+    evaluator
         The model; its formulation is unconstrained, standard or lsq (whose rows may depend on each
         other), not penalty.
     y0, times, options

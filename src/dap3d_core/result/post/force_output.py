@@ -49,7 +49,7 @@ def force_output(
     """Evaluates a force element.
 
     Args:
-        machine: evaluates the model.
+        evaluator: evaluates the model.
         t: (nt,) s.
         u: (nt, 13 n) states.
         v_dot: (nt, 6 n) accelerations.

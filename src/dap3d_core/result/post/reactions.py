@@ -70,7 +70,7 @@ def jacobians(evaluator: "Evaluator", t: Floats, u: Floats) -> Any:
     """The constraint Jacobian D of C(q, t) at each reported instant, D v = nu (spec 2).
 
     Args:
-        machine: evaluates the model.
+        evaluator: evaluates the model.
         t: (nt,) s.
         u: (nt, 13 n) states.
 
@@ -98,7 +98,7 @@ def reactions(
     """Reactions of joints on each of their bodies: D_slot^T lambda (spec 2).
 
     Args:
-        machine: evaluates the model.
+        evaluator: evaluates the model.
         t: (nt,) s.
         u: (nt, 13 n) states.
         Lam: (nt, m) multipliers, m rows in the order of the model.
@@ -123,7 +123,7 @@ def reactions(
 
 
 def place_at(evaluator: "Evaluator", t: Floats, u: Floats) -> Iterator[tuple[int, float]]:
-    """Sets bodies and functions of a machine to each instant in turn; yields its index and time."""
+    """Sets bodies and functions to each instant in turn; yields its index and time."""
     from dap3d_core.assembly.arrays import VALUE
     from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 

@@ -113,7 +113,7 @@ def correct_initial(
     Rows without a position level do not take part in the position stage.
 
     Args:
-        machine: the model.
+        evaluator: the model.
         u: (13 n,) the state as given.
         t: time, s.
         hold: bodies, from 1, that the position stage leaves where they are.

@@ -29,7 +29,7 @@ def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
     """True if neither dampers, drivers, friction nor forces without a potential can do work.
 
     Args:
-        machine: the model.
+        evaluator: the model.
         u: (13 n,) a state about which the forces are tried.
     """
     model = evaluator.model

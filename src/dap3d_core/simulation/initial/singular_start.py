@@ -96,7 +96,7 @@ def singular_start(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> Sin
     """Description of a singular start u (13 n,); None if its pose is not singular.
 
     Args:
-        machine: the model.
+        evaluator: the model.
         u: the state, corrected.
         rank: of its constraints; some of them are redundant.
         t: time, s.

@@ -32,7 +32,7 @@ def resolved_atol(atol: Any, evaluator: Evaluator) -> float | dict[str, float]:
 
     Args:
         atol: as given: None, a number, or a table of some quantities.
-        machine: what evaluates the model.
+        evaluator: what evaluates the model.
     """
     if isinstance(atol, (int, float)):
         return float(atol)

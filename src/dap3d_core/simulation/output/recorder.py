@@ -47,7 +47,7 @@ class ResultRecorder:
     ) -> None:
         """Args:
             model: the model of the rows.
-            machine: returns its evaluator, for quantities that a result computes later.
+            evaluator: returns its evaluator, for quantities that a result computes later.
             output, force: as ``simulate`` has them.
             most: how many rows come at most.
             run: identity of the run that this one continues.

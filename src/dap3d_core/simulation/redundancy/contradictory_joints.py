@@ -44,7 +44,7 @@ def find_contradiction(evaluator: Evaluator, t: float, y: Floats, rank: int) -> 
     """Message on joints that contradict each other from about time t on; "" if none do.
 
     Args:
-        machine: the model.
+        evaluator: the model.
         t, y: time and integrated state of the last step.
         rank: that of the constraints at the start.
     """

@@ -78,7 +78,7 @@ def redundancy_elsewhere(
     """Take the rank at other poses that the joints allow; the same ones each time.
 
     Args:
-        machine: the model.
+        evaluator: the model.
         u: (13 n,) an assembled state.
         redundancy: that of u.
         t: time, s; functions of time stand still.

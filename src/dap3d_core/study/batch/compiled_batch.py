@@ -50,7 +50,7 @@ class CompiledBatch:
     """Runs one model with other numbers in its arrays. Not for two threads at once.
 
     Attributes:
-        machine: evaluates the model.
+        evaluator: evaluates the model.
         integration: of the runs.
         size: a length of the model, m.
         constants: arguments of ``Points`` that all points share.
@@ -65,7 +65,7 @@ class CompiledBatch:
         stops: list[tuple[float, bool]],
     ) -> None:
         """Args:
-        machine: evaluates the model; its numbers change.
+        evaluator: evaluates the model; its numbers change.
         settings: of the runs; the integrator is a one-step one, or "auto": a run that turns
             out stiff is then not done.
         times: (nt,) reporting times.

@@ -25,7 +25,7 @@ class PackedBatch:
     """Runs points of one model, ``count`` at a time. Not for two threads at once."""
 
     def __init__(self, compiled: CompiledModel, one: Evaluator, times: Floats, count: int) -> None:
-        """Args: the model, a machine of it, reporting times, points at a time."""
+        """Args: the model, an evaluator of it, reporting times, points at a time."""
         many = Evaluator(packed(compiled.model, count), compiled.method)
         self._lanes = LaneLayout(one, many, count)
         stops = compiled.breakpoints(float(times[-1])).stops
@@ -112,10 +112,10 @@ def _copies(group: Group, model: Model, count: int) -> Group:
 
 
 class LaneLayout:
-    """Indices of the numbers and of the state of each copy in a machine of many."""
+    """Indices of the numbers and of the state of each copy in an evaluator of many."""
 
     def __init__(self, one: Evaluator, many: Evaluator, count: int) -> None:
-        """Args: a machine of the model, one of ``packed(model, count)``, number of copies."""
+        """Args: an evaluator of the model, one of ``packed(model, count)``, number of copies."""
         self.count = count
         self._n = one.model.body_count
         self._row, self._row_of_many = one.model.row_layout, many.model.row_layout
@@ -130,7 +130,7 @@ class LaneLayout:
         self._first = (many.system.par.size, many.system.par.size + many.system.body.size)
 
     def places(self, places: Integers) -> Integers:
-        """(count, w) indices in the machine of many of indices (w,) in that of one.
+        """(count, w) indices in the evaluator of many of indices (w,) in that of one.
 
         Both are in par, body and metric, concatenated.
         """

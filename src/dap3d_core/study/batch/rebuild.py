@@ -34,7 +34,7 @@ class RebuiltPoint(NamedTuple):
 
 
 class ModelRebuilder:
-    """Rebuilds models of points, without compilation. It works on a machine that is its own."""
+    """Rebuilds models of points, without compilation. It has an evaluator of its own."""
 
     def __init__(
         self,
