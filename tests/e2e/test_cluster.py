@@ -76,8 +76,8 @@ def another_worker(client, **variables):
         client.wait_for_workers(len(there) + 1, timeout=60)
         yield (set(client.nthreads()) - there).pop()
     finally:
-        process.terminate()
-        process.wait(30)
+        process.kill()  # as clusters lose workers; SIGTERM waits for a loop that may be busy
+        process.wait()
         wait_until(lambda: set(client.nthreads()) <= there)
 
 
