@@ -43,7 +43,7 @@ RUNS = [
 #: Friction, packs of points, dense supernodes, radau with elements of many kinds.
 MORE = """
 from support.problems import everything
-from unit.test_checkpoint import wheel
+from support.on_axles import wheel
 from unit.study.batch.test_batch import ensemble, pendulum
 from unit.study.batch.test_packs import CASES, in_packs
 
@@ -60,11 +60,11 @@ recorder.record(pack, *CASES["functions and their breaks"], t_end=0.6)
 recorder.record(pack, pendulum, {"bodies.bob.mass": (1.0, 3.0)}, "bob.w", method="penalty")
 recorder.record(dap.simulate, "pen1", t_end=0.1, dt=0.1, rtol=1e-13, atol=1e-15)
 from dap3d_core.linear.ordering import elimination_order, nested_dissection, supernodes
-from unit import test_linear_nets as nets
+from support.graphs import Case, check_solution
+from support.nets import plate_net
 usual = elimination_order.WIDE, nested_dissection.LEAF, supernodes.ZEROS
 elimination_order.WIDE, nested_dissection.LEAF, supernodes.ZEROS = 0, 4, 0.3
-recorder.record(lambda: nets.check_solution(
-    nets.Case(nets.NETS["plates"](), np.random.default_rng(1))))
+recorder.record(lambda: check_solution(Case(plate_net(8), np.random.default_rng(1))))
 elimination_order.WIDE, nested_dissection.LEAF, supernodes.ZEROS = usual
 recorder.record(dap.simulate, everything(), t_end=1e-4, dt=1e-4, integrator="radau")
 """

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from support import mechanisms
+from support.on_axles import driven, stone, wheel
 from support.plain import long_in_plain_python
-from unit.test_checkpoint import driven, stone, wheel
 
 import dap3d_core as dap
 from dap3d_core.study import Ensemble, PointStatus, Study, outputs_of, with_values

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.on_axles import driven, stone, wheel
 from support.plain import long_in_plain_python
 from unit.study.batch.test_batch import ensemble, pendulum
-from unit.test_checkpoint import driven, stone, wheel
 
 import dap3d_core as dap
 from dap3d_core.formulations.evaluator import Evaluator

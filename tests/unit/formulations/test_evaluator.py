@@ -5,11 +5,10 @@ alone, and get Jacobian and accelerations by exact differentiation along a motio
 at random, far off the constraints, where a simplified row would show.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from support.motions import G, Motion
+from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core.formulations import RHS
@@ -21,7 +20,7 @@ from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
 from dap3d_core.simulation.initial.assemble import correct_initial
 
-REFERENCE = Path(__file__).parents[1] / "models" / "reference"
+REFERENCE = REPOSITORY / "tests/models/reference"
 #: Relative: condition numbers up to 1e5 of matrices that are inverted by another method.
 TOLERANCE = 1e-9
 

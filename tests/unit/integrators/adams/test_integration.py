@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from unit import test_integrators_problems as toys
-from unit.test_integrators_problems import finish, kepler, kepler_f, kepler_orbit, slope
+from support import integrands as toys
+from support.integrands import finish, kepler, kepler_f, kepler_orbit, slope
 
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.adams import formulas as adams

@@ -128,7 +128,7 @@ def test_nets_are_solved(name, panels_everywhere):
 
 @pytest.mark.parametrize("name", [*GRAPHS, *RANDOM])
 def test_any_graph_is_solved_with_panels(name, panels_everywhere):
-    """Hubs, floating bodies, joints of three bodies, as in test_linear.py."""
+    """Hubs, floating bodies, joints of three bodies, as in ../ldlt."""
     for seed in range(20):
         case = Case((GRAPHS | RANDOM)[name](np.random.default_rng(seed)),
                     np.random.default_rng([seed, 1]))  # fmt: skip
@@ -198,7 +198,7 @@ def test_rows_that_depend_on_others_are_found_in_panels(panels_everywhere, monke
 
 
 def test_small_pivots_of_panels_are_counted_or_dropped(panels_everywhere):
-    """A row of 1e-6 leaves a pivot near 1e-12, below 1e-9: used, or left out (test_linear.py)."""
+    """A row of 1e-6 leaves a pivot near 1e-12, below 1e-9: used, or left out."""
     case = Case(plate_net(8), np.random.default_rng(4))
     first, last = case.plan.nodes[:-1][case.plan.nodes[:-1, 0] > 6][0, :2][::-1]
     weak = int(np.flatnonzero(case.places == first + last // 2)[0])

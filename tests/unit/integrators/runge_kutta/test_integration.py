@@ -1,14 +1,8 @@
 """The integrators: bookkeeping, chunks, projection, and what they do where a run cannot go on."""
 
-import json
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-from unit.test_integrators_problems import (
+from support.integrands import (
     ADAPTIVE,
     ALL,
     TIGHT,
@@ -28,7 +22,6 @@ from unit.test_integrators_problems import (
 )
 
 from dap3d_core.integrators import TABLEAUS, Status
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 # ------------------------------------------------------------------ bookkeeping
 
@@ -306,26 +299,3 @@ def test_what_makes_no_sense_is_refused(name, options, words):
     options = {"y0": [0.0, 1.0], "times": [0.0, 1.0]} | options
     with pytest.raises(ValueError, match=words):
         start(name, oscillator, **options)
-
-
-# ------------------------------------------------------------------ without compilation
-
-
-def reference_rows():
-    """Some rows of each method, with projection and interpolation."""
-    return np.concatenate([chunked(name, 10**9)[0] for name in ALL])
-
-
-@pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
-def test_plain_python_gives_the_same_numbers():
-    """With DAP3D_PLAIN=1 the same sources run and agree to rounding."""
-    code = (
-        "import json, runpy, sys\n"
-        "names = runpy.run_path(sys.argv[1], run_name='plain')\n"
-        "print(json.dumps(names['reference_rows']().tolist()))"
-    )
-    command = [sys.executable, "-c", code, __file__]
-    paths = [str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
-    environment = os.environ | {"DAP3D_PLAIN": "1", "PYTHONPATH": os.pathsep.join(paths)}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    assert np.allclose(json.loads(done.stdout), reference_rows(), rtol=1e-12, atol=1e-13)

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.integrate._ivp import dop853_coefficients
 from scipy.integrate._ivp.rk import RK45
-from unit.test_integrators_problems import (
+from support.integrands import (
     ADAPTIVE,
     ALL,
     TIGHT,
