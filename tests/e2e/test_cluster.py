@@ -14,7 +14,6 @@ from contextlib import contextmanager
 import attrs
 import numpy as np
 import pytest
-from support.process import REPOSITORY
 from support.studies import POINTS, bob, collected, same
 
 import dap3d_core as dap
@@ -141,17 +140,6 @@ def test_functions_of_the_script_are_sent(client, tmp_path, monkeypatch):
     with pytest.raises(ClusterError, match="2 of 2 workers") as error:
         run_on(client, elsewhere, POINTS, PLACES)
     assert "functions among the outputs must be defined in the script" in str(error.value)
-
-
-def test_a_function_that_raises_fails_its_points(client):
-    """The points have failed, as in one process; their notes name the exception."""
-
-    def fails(result):
-        raise ArithmeticError("mine")
-
-    found = collected(run_on(client, bob({"none": fails}), POINTS, PLACES))
-    assert {found[k][0] for k in PLACES} == {PointStatus.FAILED}
-    assert all("raises ArithmeticError: mine" in found[k][1] for k in PLACES)
 
 
 def test_a_point_that_fails_is_no_task_that_fails(client):
@@ -482,13 +470,3 @@ def test_without_dask_there_is_one_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ClusterError, match=r'pip install "dap3d\[cluster\]"'):
         connect("tcp://127.0.0.1:8786")
-
-
-def test_dask_is_not_imported_by_a_run():
-    """Nor by a study on this machine."""
-    script = "import sys, dap3d_core.study.workers.threads; print('dask' in sys.modules"
-    done = subprocess.run(
-        [sys.executable, "-c", f"{script}, 'distributed' in sys.modules)"],
-        capture_output=True, text=True, check=True, cwd=REPOSITORY,
-    )  # fmt: skip
-    assert done.stdout.split() == ["False", "False"]

@@ -5,7 +5,6 @@ import shutil
 
 import numpy as np
 import pytest
-from support.mechanisms import four_bar_row, torn, two_motors
 
 import dap3d_core as dap
 
@@ -54,35 +53,6 @@ def test_check_tells_redundant_joints(dap3d, scene_file):
 
 
 @pytest.mark.slow
-def test_check_tells_what_is_redundant_at_this_pose_alone(dap3d):
-    """Two four-bars with all links in line: 27 of 35 rows are independent, 29 elsewhere (IFToMM
-    A02)."""
-    four_bar_row(2, np.pi / 2).save(dap3d.folder / "flat.toml")
-    found = json.loads(dap3d("check", "flat.toml", "--json").stdout)
-    assert (found["rows"], found["rank"], found["redundant"], found["dof"]) == (35, 27, 8, 3)
-    assert (found["everywhere"], found["redundant_elsewhere"]) == (False, 6)
-    assert found["poses"] == [29, 29, 29]
-    told = " ".join(dap3d("check", "flat.toml").stdout.split())
-    assert "2 of the 8 are redundant only at this pose" in told
-
-
-@pytest.mark.slow
-def test_check_names_joints_that_contradict_each_other(dap3d):
-    """Two drivers of one angle at rates 1 and 2, and two joints 2 m apart: the second cannot be
-    assembled, and the command says which joints are open."""
-    two_motors().save(dap3d.folder / "motors.toml")
-    found = json.loads(dap3d("check", "motors.toml", "--json").stdout)
-    (contradiction,) = found["contradictions"]
-    assert (contradiction["level"], contradiction["joints"]) == ("velocity", ["slow", "fast"])
-    assert contradiction["size"] == pytest.approx(1 / np.sqrt(2), rel=1e-12)
-    torn().save(dap3d.folder / "torn.toml")
-    done = dap3d("check", "torn.toml")
-    assert done.returncode == 2
-    assert max(map(len, done.stdout.splitlines())) <= 80
-    assert "first sph 1 1" in " ".join(done.stdout.split())
-
-
-@pytest.mark.slow
 def test_models_and_plugins_are_listed(dap3d):
     shown = dap3d("models")
     listed = json.loads(dap3d("models", "--json").stdout)["models"]
@@ -107,14 +77,6 @@ def test_a_model_of_a_group_runs_with_and_without_it(dap3d):
         done = dap3d("run", name, "--t-end", "0.1", "--force")
         assert done.returncode == 0, done.stderr
         (dap3d.folder / "N1.nc").unlink()
-
-
-@pytest.mark.slow
-def test_a_blocked_type_is_listed_with_the_reason(dap3d):
-    done = dap3d("plugins", DAP3D_BLOCK="dap3d")
-    assert done.returncode == 0
-    assert "blocked" in done.stdout
-    assert "DAP3D_BLOCK" in done.stdout
 
 
 @pytest.fixture(scope="module")

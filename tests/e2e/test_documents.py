@@ -19,7 +19,10 @@ from dap3d_core.cli import main
 #: Pages that are followed from the first step to the last, in an empty folder.
 FOLLOWED = [
     REPOSITORY / "docs" / "index.md",
-    REPOSITORY / "docs" / "bad-input.md",
+    *(
+        REPOSITORY / "docs" / f"{name}.md"
+        for name in ("bad-input", "events", "methods", "post-processing", "report", "view")
+    ),
     *(
         page
         for folder in ("start", "tutorials", "how-to", "concepts", "reference")
@@ -74,72 +77,20 @@ def test_the_readme(tmp_path):
     found = commands(text, ".venv/bin/dap3d")
     assert [words[0] for words in found] == ["check", "run", "plot", "sweep", "plot"]
     for words in found:
-        done = process(words, tmp_path)
+        done = dap3d(words, tmp_path)
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "cone.png").stat().st_size > 1000
     assert (tmp_path / "sweep.png").stat().st_size > 1000
     (tmp_path / "cone.nc").unlink()
     script, joint = blocks(text, "python")
     (tmp_path / "plugin.py").write_text(joint)
-    done = process(["check-plugin", "plugin.py", "--allow-code"], tmp_path)
+    done = dap3d(["check-plugin", "plugin.py", "--allow-code"], tmp_path)
     assert done.returncode == 0, done.stdout
     done = subprocess.run(
         [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "cone.nc").exists()
-
-
-@pytest.mark.slow
-def test_the_page_on_post_processing(tmp_path):
-    """Its commands, in their order, and its scripts, which hold assertions of their own."""
-    text = (REPOSITORY / "docs" / "post-processing.md").read_text()
-    found = commands(text, "dap3d")
-    assert [words[0] for words in found] == ["run", "post", "post", "post", "plot", "run", "post"]
-    for words in found:
-        done = dap3d(words, tmp_path)
-        assert done.returncode == 0, done.stderr
-    assert (tmp_path / "contact.csv").read_text().startswith("t [s],contact.force.z [N]\n0.0,0.0\n")
-    scripts = blocks(text, "python")
-    assert len(scripts) == 3
-    for script in scripts:
-        done = subprocess.run(
-            [sys.executable, "-c", script],
-            cwd=tmp_path, env=environment(), capture_output=True, text=True,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.slow
-def test_the_page_on_methods(tmp_path):
-    """Its commands and its scripts, which hold assertions of their own."""
-    text = (REPOSITORY / "docs" / "methods.md").read_text()
-    runs = [dap3d(words, tmp_path) for words in commands(text, "dap3d")]
-    assert [done.returncode for done in runs] == [0, 0]
-    assert "have died away" in " ".join(runs[1].stdout.split())
-    for script in blocks(text, "python"):
-        done = subprocess.run(
-            [sys.executable, "-c", script],
-            cwd=tmp_path, env=environment(), capture_output=True, text=True,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.slow
-def test_the_page_on_events(tmp_path):
-    """Its script, which holds assertions of its own, and its commands."""
-    text = (REPOSITORY / "docs" / "events.md").read_text()
-    (script,) = blocks(text, "python")
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        cwd=tmp_path, env=environment(), capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    for words in commands(text, "dap3d"):
-        done = dap3d(words, tmp_path)
-        assert done.returncode == 0, done.stderr
-        assert "force contact: its switch became negative" in done.stdout
-        assert "and 19 more" in done.stdout
 
 
 @pytest.mark.slow
@@ -222,30 +173,6 @@ def test_the_steps_of_a_page(page, tmp_path, monkeypatch):
     """Files, scripts and commands of a page, in their order; scripts hold assertions."""
     monkeypatch.setenv("MPLBACKEND", "Agg")
     assert follow(page, tmp_path)
-
-
-@pytest.mark.slow
-def test_the_page_on_looking_at_results(tmp_path):
-    """Its commands in their order, its script, and its scene with shapes."""
-    text = (REPOSITORY / "docs" / "view.md").read_text()
-    found = commands(text, "dap3d")
-    assert [words[0] for words in found] == ["run", "view", "view", "run", "view"]
-    (scene,) = blocks(text, "toml")
-    (tmp_path / "pendulum.toml").write_text(scene)
-    found += [["run", "pendulum.toml", "-o", "pendulum.nc"], ["view", "pendulum.nc"]]
-    for words in found:
-        done = dap3d(words, tmp_path)
-        assert done.returncode == 0, done.stderr
-        assert "not drawn" not in done.stderr
-    (script,) = blocks(text, "python")
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        cwd=tmp_path, env=environment(), capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    pages = sorted(page.name for page in tmp_path.glob("*.html"))
-    assert pages == ["ball1.html", "crank.html", "fourbar3-again.html", "fourbar3.html",
-                     "pendulum.html"]  # fmt: skip
 
 
 def test_the_first_commands_of_the_readme_are_targets():

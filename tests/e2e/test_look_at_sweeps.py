@@ -202,8 +202,9 @@ def test_gravity_is_that_of_the_point(chromium, tmp_path):
     assert found.complaints == []
 
 
-@pytest.mark.parametrize("size", [(1000, 700), (390, 844)])
-def test_sliders_and_plots_have_room(chromium, page, size):
+def test_sliders_and_plots_have_room(chromium, page):
+    """On a telephone."""
+    size = (390, 844)
     found = Opened(chromium, page, width=size[0], height=size[1])
     assert found.run("document.documentElement.scrollWidth") <= size[0]
     boxes = [found.page.locator(one).bounding_box() for one in ("#sweep", "#tabs", "#tab-plots")]

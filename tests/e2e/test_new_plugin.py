@@ -1,6 +1,7 @@
 """``dap3d new-plugin``: what it writes works, and what it cannot write is refused with a reason."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -49,39 +50,35 @@ def test_the_package_is_complete(kind, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_tests_of_the_package_pass(kind, tmp_path):
-    """Those that it brings: the kit, and the scene against its closed form.
+def test_the_tests_of_the_packages_pass(tmp_path):
+    """Those that they bring: the kit, and the scene against its closed form.
 
-    The type is found as plugin.py of the scene's folder: nothing is installed here.
+    A type is found as plugin.py of the scene's folder: nothing is installed here.
     """
-    folder = tmp_path / "package"
-    new_plugin(folder, "mine", "--kind", kind)
-    shutil.copy(folder / "src" / "dap3d_mine" / "__init__.py", folder / "plugin.py")
-    test = folder / "tests" / "test_mine.py"
-    text = test.read_text()
-    assert "dap.simulate(scene, rtol" in text
-    test.write_text(text.replace("dap.simulate(scene, ", "dap.simulate(scene, allow_code=True, "))
+    sources = []
+    for kind in KINDS:
+        folder = tmp_path / kind
+        new_plugin(folder, f"my-{kind}", "--kind", kind)
+        sources.append(str(folder / "src"))
+        shutil.copy(folder / "src" / f"dap3d_my_{kind}" / "__init__.py", folder / "plugin.py")
+        test = folder / "tests" / f"test_my_{kind}.py"
+        text = test.read_text()
+        assert "dap.simulate(scene, rtol" in text
+        test.write_text(
+            text.replace("dap.simulate(scene, ", "dap.simulate(scene, allow_code=True, ")
+        )
+    paths = os.pathsep.join([*sources, os.environ.get("PYTHONPATH", "")])
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests"],
-        cwd=folder, env=environment(PYTHONPATH=_path(folder / "src")), capture_output=True,
-        text=True,
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *KINDS],
+        cwd=tmp_path, env=environment(PYTHONPATH=paths), capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def _path(folder):
-    import os
-
-    before = os.environ.get("PYTHONPATH")
-    return os.pathsep.join([str(folder), *([before] if before else [])])
-
-
 @pytest.mark.parametrize(
     ("name", "class_name"),
-    [("3bar", "Joint3bar"), ("joint", "JointJoint"), ("none", "NoneJoint"), ("a", "A"),
-     ("sphere_2", "Sphere2")],
-)  # fmt: skip
+    [("3bar", "Joint3bar"), ("joint", "JointJoint"), ("sphere_2", "Sphere2")],
+)
 def test_every_keyword_makes_a_class(name, class_name, tmp_path):
     """Also those that start with a digit, or whose class would hide a name."""
     new_plugin(tmp_path / "p", name)
@@ -89,7 +86,7 @@ def test_every_keyword_makes_a_class(name, class_name, tmp_path):
     assert load_registry().with_file(file).get("joint", name).type.__name__ == class_name
 
 
-@pytest.mark.parametrize("name", ["-a", "a-", "a b", "a/b", "..", "ä", "a=b", "a" * 61, "a\nb"])
+@pytest.mark.parametrize("name", ["-a", "a/b", "..", "ä", "a" * 61, "a\nb"])
 def test_a_name_that_is_no_keyword_is_refused(refuse, dap3d, name):
     said = refuse("new-plugin", "--", name)
     assert "letters, digits" in said

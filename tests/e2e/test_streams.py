@@ -12,11 +12,9 @@ from tests.e2e.conftest import COMMAND, environment
     ("line", "code"),
     [
         ("models > /dev/full", 1),
-        ("models --json > /dev/full", 1),
         ("--help > /dev/full", 1),
         ("models >&-", 0),
         ("check no_such 2>&-", 2),
-        ("check no_such 2> /dev/full", 2),
         ("run <&-", 2),
         ("models | true", 0),
     ],

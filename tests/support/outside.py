@@ -71,9 +71,9 @@ class Outside:
         site = self.run(self.python, "-c", "import site; print(site.getsitepackages()[0])").stdout
         Path(site.strip(), "lent.pth").write_text(f"{folder}\n")
 
-    def run(self, *words, code=0, cwd=None):
+    def run(self, *words, code=0, cwd=None, **variables):
         """Run a program there; it ends with this code and never with a traceback."""
-        env = shell(DAP3D_CACHE_DIR=str(self.cache), MPLBACKEND="Agg")
+        env = shell(DAP3D_CACHE_DIR=str(self.cache), MPLBACKEND="Agg", **variables)
         done = subprocess.run(
             list(map(str, words)), cwd=cwd or self.folder, env=env, capture_output=True, text=True,
             timeout=300,
