@@ -31,12 +31,6 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_a_matplotlibrc_does_not_govern_pictures(folder):
-    """With usetex the name of a body would be TeX source."""
-    (folder / "matplotlibrc").write_text("text.usetex: True\nlines.linewidth: 77\n")
-    assert run(PLOT, cwd=folder, MPLCONFIGDIR=folder / "none") == "1.5 False"
-
-
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes as POSIX has them")
 def test_a_matplotlibrc_is_not_opened(folder):
     """Whatever it holds, also what would stop the import: whoever opens this pipe waits."""

@@ -95,8 +95,11 @@ def test_attributes_of_another_form(changed, name, value):
         dap.open(path)
 
 
-@pytest.mark.parametrize("name", ["notes", "settings", "statistics", "versions", "events"])
-@pytest.mark.parametrize("text", ["[" * 100_000, "", "{", "nan", '{"a": 1' + "0" * 5000 + "}"])
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("notes", "[" * 100_000), ("settings", ""), ("statistics", "{"), ("versions", "nan"),
+     ("events", '{"a": 1' + "0" * 5000 + "}")],
+)  # fmt: skip
 def test_attributes_that_are_no_json(changed, name, text):
     path = changed(lambda d: d.setncattr_string(name, text))
     with pytest.raises(ResultError, match="damaged"):

@@ -34,12 +34,10 @@ def refusal(path, text=None):
     [
         "a." * 100_000 + "a = 1",
         "[" + "a . " * 100_000 + "a]",
-        "[[" + "a." * 100_000 + "a]]",
         "x = {b = 1, " + '"a\\"".' * 100_000 + "a = 1}",
-        "x = [{" + "'a'." * 100_000 + "a = 1}]",
         "'a'\t.\t" * 100_000 + "a = 1",
     ],
-    ids=["key", "table", "list", "inline", "in a list", "quoted"],
+    ids=["key", "table", "inline", "quoted"],
 )
 def test_keys_of_very_many_parts(tmp_path, line):
     """Python's reader takes the square of their number in memory: 200 kB would fill it."""
@@ -53,8 +51,7 @@ def test_keys_of_few_parts_are_keys(tmp_path, count):
     assert "a key of more than" not in said
 
 
-@pytest.mark.parametrize("run", ["x" * 3_000_000, "{" * 900, '\\"' * 500_000, ", " * 500_000,
-                                 "a " * 500_000, "1.0, " * 200_000])  # fmt: skip
+@pytest.mark.parametrize("run", ["x" * 3_000_000, "{" * 900, "1.0, " * 200_000])
 def test_long_texts_are_no_keys(tmp_path, run):
     """The search for such keys takes no more than the length of the text."""
     text = f'[scene]\ndescription = "{run}"\n{BODY}'
@@ -76,8 +73,6 @@ def test_deep_nests(tmp_path, text):
         BODY.replace("mass = 1.0", "mass = {}"),
         BODY.replace("mass = 1.0", "{0} = 1\nmass = [{0}]"),
         BODY + "[scene]\nname = {}\n",
-        BODY + "[scene]\nschema = {}\n",
-        BODY + "[simulation]\nt_end = {}\n",
         BODY + '[forces.g]\ntype = "weight"\ngravity = {}\n',
         BODY + "other = {}\n",
     ],
@@ -152,11 +147,11 @@ def test_a_link_inside_the_folder_is_followed(tmp_path):
 def test_very_many_names_are_refused_before_the_memory_is_gone(tmp_path):
     """Very many bodies that are not right: no failure but mistakes."""
     resource = pytest.importorskip("resource")
-    count = 150_000
+    count = 37_500
     text = "".join(f"[bodies.k{k}]\nmass = -1\n" for k in range(count))
     (tmp_path / "scene.toml").write_text(text)
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with pytest.raises(SceneError) as caught:
         check(dap.load(tmp_path / "scene.toml"), dap.load_registry())
     assert len(caught.value.mistakes) == count
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < most + 2**20  # kB: 7 kB a body
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < most + 2**18  # kB: 7 kB a body

@@ -80,7 +80,7 @@ def test_pendulums_against_elliptic_functions(model, t):
 
 
 @pytest.mark.parametrize("model", [fourbar3, fourbar2, fourbar4])
-@pytest.mark.parametrize("t", [0.0, 0.25, 0.5, 0.9, 2.0])
+@pytest.mark.parametrize("t", [0.25, 2.0])
 class TestFourbar:
     def test_closed_form_against_the_simulator(self, model, t):
         closed, simulated = model.quantities(t), model.simulated(t)
