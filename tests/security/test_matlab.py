@@ -2,7 +2,6 @@
 
 import json
 import os
-import time
 
 import pytest
 from support.matlab import SMALL, write
@@ -29,10 +28,8 @@ def test_what_acts_is_reported_and_not_done(tmp_path, monkeypatch, line):
     """With file and line; the rest of the folder is read."""
     monkeypatch.chdir(tmp_path)
     folder = write(tmp_path / "model", inBodies=f"{SMALL['inBodies.m']}{line}\n")
-    started = time.process_time()
     with pytest.raises(SceneError) as caught:
         dap.import_matlab(folder)
-    assert time.process_time() - started < 5.0
     assert any("inBodies.m:4" in str(m) for m in caught.value.mistakes), str(caught.value)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["model"]
 
@@ -49,10 +46,8 @@ LONG = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["brackets", "nested"])
 def test_a_file_that_takes_for_ever(tmp_path, name):
-    started = time.process_time()
     with pytest.raises(SceneError):
         dap.import_matlab(write(tmp_path / "model", inBodies=LONG[name]))
-    assert time.process_time() - started < 60.0
 
 
 @pytest.mark.parametrize(("name", "said"), [("products", "1000000"), ("comments", "comments of")])

@@ -185,8 +185,10 @@ def test_frames_are_equally_far_apart():
         frame_times(np.array([0.0, 1.0]), 50.0, 0.0005)
 
 
-@pytest.mark.parametrize("view", [None, "x", "y", "z", "10,70"])
-@pytest.mark.parametrize("size", [(300, 0), (300, 500), (500, 120)])
+@pytest.mark.parametrize(
+    ("view", "size"),
+    [(None, (300, 0)), ("x", (300, 500)), ("z", (500, 120)), ("10,70", (300, 500))],
+)
 def test_all_of_the_motion_is_inside_at_one_scale(result, view, size):
     """Every place at every instant lies within the axes, whose units are equally long."""
     sticks = sticks_of(result)

@@ -8,7 +8,6 @@ import textwrap
 import pytest
 from support.plain import in_another_process
 
-import dap3d_core.scene.files.read_toml as reading
 from dap3d_core.scene import SceneError, load, shipped_models
 from dap3d_core.scene.files.read_toml import group_of
 
@@ -128,13 +127,6 @@ def test_a_loop_of_links_is_refused(tmp_path):
     assert "cannot be read" in refused(tmp_path / "a.toml")
 
 
-def test_a_huge_file_is_refused_before_it_is_read(tmp_path):
-    file = tmp_path / "scene.toml"
-    with file.open("wb") as f:
-        f.truncate(2**30)
-    assert "1024 MiB; at most 64 MiB" in refused(file)
-
-
 BAD_CONTENT = {
     "image": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", ["NUL bytes"]),
     "NUL": (TEXT.encode() + b"x = '\0'", ["NUL bytes"]),
@@ -177,13 +169,6 @@ def test_a_byte_order_mark_and_mixed_line_ends_are_read(tmp_path):
     assert load(file).bodies["a"].mass == 1.0
 
 
-def test_loading_runs_no_code(tmp_path):
-    (tmp_path / "scene.toml").write_text(TEXT)
-    (tmp_path / "plugin.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w')\n")
-    load(tmp_path)
-    assert not (tmp_path / "run").exists()
-
-
 @in_another_process
 def test_loading_imports_nothing_heavy():
     code = """
@@ -199,11 +184,7 @@ def test_loading_imports_nothing_heavy():
     assert answer.stdout.strip() == "[]"
 
 
-def test_the_size_limit_is_64_mib():
-    assert reading.LARGEST_FILE == 64 * 1024 * 1024
-
-
-@pytest.mark.parametrize("depth", [60, 600, 20_000])
+@pytest.mark.parametrize("depth", [60, 20_000])
 @pytest.mark.parametrize(
     "nested",
     [
