@@ -36,27 +36,6 @@ SPOILED = changed(
 )
 
 
-@pytest.mark.slow
-def test_all_mistakes_come_at_once_with_their_places(dap3d):
-    """In a process of its own: nothing is written, the code is 2."""
-    (dap3d.folder / "scene.toml").write_text(SPOILED)
-    done = dap3d("run", "scene.toml")
-    assert (done.returncode, done.stdout) == (2, "")
-    said = " ".join(done.stderr.split())
-    lines = SPOILED.splitlines()
-    assert said.startswith("4 mistakes:")
-    for key, value, word in (
-        ("bodies.rod.mas", "1.0", "did you mean 'mass'?"),
-        ("bodies.rod.Jp", "[0.1, 0.1]", "it has 2 numbers"),
-        ("simulation.dt", "-0.02", "greater than 0"),
-        ("joints.hinge.P_j", '"grund.O"', "did you mean 'ground.O'?"),
-    ):
-        line = 1 + lines.index(f"{key.rpartition('.')[2]} = {value}")
-        assert f"scene.toml:{line}: {key} = {value}:" in said
-        assert word in said
-    assert [file.name for file in dap3d.folder.iterdir()] == ["scene.toml"]
-
-
 def test_mistakes_are_json_too(run):
     code, out, _ = run(SPOILED, "check", "scene.toml", "--json")
     found = json.loads(out)

@@ -113,15 +113,3 @@ def test_plot_draws_into_files(dap3d, result):
     curves = dap3d("plot", "pen1.nc", "cone.r.z", "J1.force", "--x", "cone.r.y", "-o", "a.svg")
     assert curves.returncode == 0, curves.stderr
     assert "position of cone" in (dap3d.folder / "a.svg").read_text()
-
-
-@pytest.mark.slow
-def test_check_tells_that_joints_cannot_be_assembled(dap3d, scene_file):
-    scene_file(("[simulation]", '[points.P]\nbody = "ground"\nsPp = [0.0, 0.0, 1.0]\n'
-                '[joints.J]\ntype = "sph"\nP_i = "stone.O"\nP_j = "ground.O"\n'
-                '[joints.K]\ntype = "sph"\nP_i = "stone.O"\nP_j = "P"\n[simulation]'))  # fmt: skip
-    refused = dap3d("check", "fall.toml", "--json")
-    assert refused.returncode == 2
-    found = json.loads(refused.stdout)
-    assert "cannot be assembled" in found["mistakes"][0]["what"]
-    assert (found["rows"], found["rank"], found["joints"]) == (6, 3, ["J", "K"])

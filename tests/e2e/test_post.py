@@ -105,19 +105,6 @@ def test_a_file_with_named_dimensions(dap3d, result):
 
 
 @pytest.mark.slow
-def test_picked_quantities_in_a_file(dap3d, result):
-    picked = ("cone.r", "cone.p", "J1.lambda", "energy.total", "cone.w.norm")
-    assert dap3d("post", "pen1.nc", "--format", "nc", "-o", "some", *picked).returncode == 0
-    with xarray.open_dataset(dap3d.folder / "some") as data:
-        assert set(data.data_vars) == set(picked)
-        for name in picked:
-            quantity = result.quantity(name)
-            assert data[name].values.tolist() == quantity.values.tolist()
-            assert data[name].attrs["units"] == quantity.unit
-        assert data["cone.r"].sel(axis="z").values.tolist() == result.r[:, 0, 2].tolist()
-
-
-@pytest.mark.slow
 def test_what_was_written_as_json(dap3d, result):
     done = dap3d("post", "pen1.nc", "--json")
     found = json.loads(done.stdout)
@@ -164,16 +151,6 @@ def test_types_of_the_model_itself_are_loaded_only_when_allowed(dap3d, result, r
     assert done.returncode == 0, done.stderr
     column = table_of(dap3d.folder / "a.csv")
     assert set(column["contact.force.z [N]"]) == {0.0}  # it has not reached the ground
-
-
-@pytest.mark.slow
-def test_a_plot_of_such_a_force_takes_what_its_message_advises(dap3d, result, refuse):
-    words = refuse("plot", "ball1.nc", "contact.force", "-o", "a.png")
-    assert "--model FOLDER --allow-code" in words
-    done = dap3d("plot", "ball1.nc", "contact.force", "-o", "a.png", "--model", "ball1",
-                 "--allow-code", "-q")  # fmt: skip
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-    assert (dap3d.folder / "a.png").stat().st_size > 0
 
 
 @pytest.mark.slow

@@ -57,12 +57,6 @@ def test_the_corrected_initial_conditions_are_reported(dap3d):
 
 
 @pytest.mark.slow
-def test_quiet_prints_nothing(dap3d):
-    done = dap3d("run", "pen1", "--t-end", "0.1", "--quiet")
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-
-
-@pytest.mark.slow
 def test_strict_makes_changes_a_failure_and_saves_all_the_same(dap3d):
     """Velocities that the scene leaves open are for information; positions that were corrected by
     a millimetre are a change of what was given."""
@@ -102,12 +96,3 @@ def test_without_a_model_and_without_a_terminal_it_is_a_usage_error(dap3d):
     refused = dap3d("run")
     assert refused.returncode == 2
     assert "MODEL" in refused.stderr
-
-
-@pytest.mark.slow
-def test_file_names_of_any_kind(dap3d, scene_file):
-    for name in ('it\'s a "stone".toml', "-dash.toml", "päper\nclip.toml"):
-        scene_file(name=name)
-        done = dap3d("run", "--", name)
-        assert done.returncode == 0, done.stderr
-        assert (dap3d.folder / f"{name.removesuffix('.toml')}.nc").is_file()

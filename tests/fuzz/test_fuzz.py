@@ -12,14 +12,14 @@ from fuzz.targets import TARGETS
 
 #: How many inputs, quick and slow. A scene takes some 50 ms, what is refused some 5 ms.
 COUNTS = {
-    "scenes": (6, 40),
-    "damaged": (20, 150),
-    "matlab": (30, 200),
-    "results": (10, 60),
-    "numbers": (10, 150),
-    "quantities": (50, 300),
-    "commands": (10, 60),
-    "programs": (12, 150),
+    "scenes": (3, 15),
+    "damaged": (10, 60),
+    "matlab": (15, 100),
+    "results": (5, 25),
+    "numbers": (5, 50),
+    "quantities": (20, 150),
+    "commands": (5, 25),
+    "programs": (6, 60),
 }
 
 

@@ -8,7 +8,6 @@ from support.matlab import SMALL, write
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.matlab.language.interpreter import MOST_COPIES
 from dap3d_core.scene import SceneError
 
 pytest.importorskip("tree_sitter_matlab")
@@ -55,15 +54,6 @@ def test_a_file_that_takes_for_ever_is_refused_at_once(tmp_path, name, said):
     folder = write(tmp_path / "model", inBodies=LONG[name][: 4 * 1024].rpartition("\n")[0])
     with pytest.raises(SceneError, match=said):
         dap.import_matlab(folder)
-
-
-@pytest.mark.slow
-def test_too_many_copies_are_said_once(tmp_path):
-    text = "B = Body_struct;\nBodies = [B B];\n" + "Bodies = [Bodies Bodies];\n" * 9
-    text += "x = Bodies;\n" * (MOST_COPIES // 1000)
-    with pytest.raises(SceneError, match="what follows is not read") as caught:
-        dap.import_matlab(write(tmp_path / "model", inBodies=text))
-    assert sum("is not read" in str(m) for m in caught.value.mistakes) == 1
 
 
 @pytest.mark.skipif(os.name != "posix", reason="no links")

@@ -117,15 +117,6 @@ def test_nothing_of_a_scene_a_result_or_a_matlab_folder_is_run(folder):
     assert not [e[:2] for e in ran if hostile.MARK in e[2]]
 
 
-@pytest.mark.slow
-def test_what_is_written_is_what_was_asked_for(folder):
-    events = watched(folder, [["run", ".", "-o", "../run.nc"], ["view", "../run.nc"]])
-    written = {Path(e[1]).name.partition(".part")[0] for e in events
-               if e[0] == "open" and set(e[2]) & set("wxa+") and e[1] != "/dev/null"
-               and not Path(e[1]).is_relative_to("/proc")}  # fmt: skip
-    assert {n for n in written if not n.startswith(("tmp", "run."))} <= {"cache", "model"}
-
-
 def test_a_models_own_file_is_named_and_not_run(folder):
     text = hostile.text_of_scene() + '[forces.own]\ntype = "trap"\n'
     scene = dap.load(hostile.write(folder / "model", text))

@@ -61,7 +61,7 @@ def nearest(points, wanted):
 
 
 def test_vtk_shows_the_scene_where_the_result_has_it(result, folder, tmp_path):
-    """VTK's own reader finds every instant, and the bodies there."""
+    """VTK's own reader finds every instant, and the bodies in each fifth one."""
     hdf = pytest.importorskip("vtkmodules.vtkIOHDF", reason="pip install -e '.[test]'")
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
@@ -76,7 +76,7 @@ def test_vtk_shows_the_scene_where_the_result_has_it(result, folder, tmp_path):
     kite, brick = places(result, 0, CORNERS), places(result, 1, box_corners())
     tail = places(result, 1, np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))
     ends = places(result, 0, np.array([[0.0, 0.0, 0.5]]))[:, 0], result.r[:, 1]
-    for k, t in enumerate(times):
+    for k, t in list(enumerate(times))[::5]:
         reader.UpdateTimeStep(t)
         shown = reader.GetOutput()
         points = vtk_to_numpy(shown.GetPoints().GetData())

@@ -10,14 +10,19 @@ from dap3d_core.matlab.language.parse import LARGEST_FILE
 from dap3d_core.scene import MISSING, SceneError
 
 
+@pytest.fixture(scope="module")
+def registry():
+    return dap.load_registry()
+
+
 @pytest.fixture
-def refused(tmp_path):
+def refused(tmp_path, registry):
     """The mistakes of the small model with some files replaced, as messages without the folder."""
 
     def call(**files):
         folder = write(tmp_path / "small", **files)
         with pytest.raises(SceneError) as caught:
-            dap.import_matlab(folder)
+            dap.import_matlab(folder, registry)
         return [str(m).replace(f"{folder}/", "") for m in caught.value.mistakes]
 
     return call

@@ -19,9 +19,7 @@ from support.results import (
 )
 
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.model.state_layout import split
 from dap3d_core.result import Result, ResultError, RunMetadata, RunStatistics, open_result
-from dap3d_core.result.arrays import row_width
 from dap3d_core.scene import load
 from dap3d_core.scene.files.read_toml import scene_of
 
@@ -210,11 +208,3 @@ def test_a_file_that_lacks_something_is_damaged(tmp_path, change):
     circling()[0].save(tmp_path / "run.nc")
     with pytest.raises(ResultError, match="it is damaged"):
         open_result(changed(tmp_path / "run.nc", change))
-
-
-def test_width_of_rows_is_that_of_the_integrator():
-    model = model_of(load("fourbar3"))
-    result = Result.of_run(model, noisy(model), RunMetadata(scene_text=""), lambda: None)
-    size = Evaluator(model, "standard").report_size
-    assert row_width(result.summary) == 1 + 13 * model.body_count + 1 + size
-    assert split(result.u)[0].shape == result.r.shape

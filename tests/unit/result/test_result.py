@@ -13,13 +13,11 @@ from support.results import (
     MASS,
     PIVOT,
     RATE,
-    about_z,
     circling,
     circling_scene,
     drifting,
     model_of,
     result_of,
-    rows_of,
 )
 
 from dap3d_core.formulations.evaluator import Evaluator
@@ -73,28 +71,6 @@ def test_points_move_as_on_a_circle_and_those_of_the_ground_stand():
         np.testing.assert_allclose(result.rP[:, P[name]] - PIVOT, 0, atol=1e-15)
         np.testing.assert_allclose(result.rPd[:, P[name]], 0, atol=1e-14)
         np.testing.assert_allclose(result.rPdd[:, P[name]], 0, atol=1e-14)
-
-
-def test_velocity_and_acceleration_of_a_point_are_derivatives_of_its_position():
-    nt, h = 3, 1e-4
-    scene = Scene(name="derivatives")
-    scene.add_body("top", mass=1.0, Jp=[1.0, 1.0, 1.0])
-    scene.add_point("P", body="top", sPp=[0.3, -0.5, 0.7])
-    model = model_of(scene)
-    t = h * np.arange(-1, nt - 1)
-    # A rotation about z by 2 t + t^2 while the mass centre runs along a parabola.
-    angle, rate = 2 * t + t**2, 2 + 2 * t
-    r = np.stack([t, t**2, 3 * t], axis=1)[:, None]
-    v = np.stack([1 + 0 * t, 2 * t, 3 + 0 * t], axis=1)[:, None]
-    w = np.stack([0 * t, 0 * t, rate], axis=1)[:, None]
-    v_dot = np.tile([0.0, 2.0, 0.0, 0.0, 0.0, 2.0], (nt, 1))
-    rows = rows_of(model, t, join(r, about_z(angle), v, w), v_dot, np.zeros((nt, 0)))
-    result = result_of(scene, rows, model, "unconstrained")
-    rP = result.rP[:, 0]
-    # Central differences: truncation h^2 |r'''| / 6 about 1e-8; rounding of the second 1e-16 / h^2.
-    np.testing.assert_allclose((rP[2] - rP[0]) / (2 * h), result.rPd[1, 0], atol=1e-7)
-    second = (rP[2] - 2 * rP[1] + rP[0]) / h**2
-    np.testing.assert_allclose(second, result.rPdd[1, 0], atol=1e-6)
 
 
 def test_stored_arrays_cannot_be_changed_by_accident():

@@ -59,9 +59,8 @@ def test_quiet_is_quiet(clock, capsys):
     assert capsys.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("width", [58, 78, 108])
-@pytest.mark.parametrize("t_end", [0.05, 1.0, 20.0, 100.0])
-@pytest.mark.parametrize("rate", [0.00123, 0.5, 12.0, 345.0])
+@pytest.mark.parametrize("width", [58, 108])
+@pytest.mark.parametrize(("t_end", "rate"), [(0.05, 0.00123), (1.0, 12.0), (100.0, 345.0)])
 def test_the_live_line_says_everything_from_60_columns_on(width, t_end, rate):
     """Time, step, pace, drift and what is left, whenever that is less than an hour."""
     run = standing(0.37 * t_end, t_end)
@@ -78,9 +77,9 @@ def test_the_live_line_keeps_its_width_in_the_course_of_a_run():
     assert len({len(line) for line in lines}) == 1
 
 
-@pytest.mark.parametrize("width", range(4, 60))
-def test_the_live_line_fits_any_terminal(width):
-    assert len(live_line(standing(37.0), 0.01, width)) <= width
+def test_the_live_line_fits_any_terminal():
+    for width in range(4, 60):
+        assert len(live_line(standing(37.0), 0.01, width)) <= width
 
 
 @pytest.mark.parametrize(
@@ -107,9 +106,8 @@ def test_points_are_counted_with_their_rate_and_what_is_left(clock, capsys, monk
     assert (shown.ran, shown.elapsed) == (500, 50.0)
 
 
-@pytest.mark.parametrize("width", [20, 40, 58, 78])
-@pytest.mark.parametrize("total", [3, 1000, 10**8])
-@pytest.mark.parametrize("rate", [0.0, 0.0123, 5.0, 98765.4])
+@pytest.mark.parametrize("width", [20, 40, 58])
+@pytest.mark.parametrize(("total", "rate"), [(3, 0.0), (1000, 5.0), (10**8, 0.0123)])
 def test_the_line_of_points_fits(width, total, rate):
     """Its parts all stand from 58 columns on, but where a hundred million take weeks."""
     words = points_line(total // 3, total, rate, width)

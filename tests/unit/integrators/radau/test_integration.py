@@ -239,11 +239,6 @@ def test_body_without_joints():
     assert result.wp[-1, 0] == pytest.approx(w, abs=1e-8)
 
 
-def test_penalty_is_refused():
-    with pytest.raises(dap.SimulationError, match="radau does not fit method penalty"):
-        dap.simulate(problems.pendulum(), t_end=0.1, method="penalty", integrator="radau")
-
-
 def test_a_fixed_step_without_stages_stops_the_run():
     """Ten times the length of a swing: no stages are found, and nothing is reported as good."""
     with pytest.raises(dap.SimulationError, match="the run stopped at t = 0 s"):

@@ -80,31 +80,14 @@ def test_an_edited_helper_gives_the_new_number(tmp_path):
 
 
 @pytest.mark.slow
-def test_two_processes_race_on_an_empty_cache(tmp_path):
-    """Both succeed with the same number; what they leave serves a third."""
-    cache = tmp_path / "cache"
-    write_plugin(tmp_path)
-    racers = [start(EVALUATE, cache, cwd=tmp_path) for _ in range(2)]
-    printed = [p.communicate(timeout=300) for p in racers]
-    assert [p.returncode for p in racers] == [0, 0], printed
-    assert [out.split()[0] for out, _ in printed] == ["6.5", "6.5"]
-    assert run(EVALUATE, cache, cwd=tmp_path) == "6.5 0"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("where", ["through a file", "nowhere"])
-def test_a_cache_that_cannot_be_written_does_no_harm(tmp_path, where):
+def test_a_cache_that_cannot_be_written_does_no_harm(tmp_path):
     """Without a folder to write to the code is compiled for this process alone."""
     write_plugin(tmp_path)
     blocked = tmp_path / "file"
     blocked.write_text("")
-    script = EVALUATE
-    if where == "nowhere":
-        script = (
-            "import dap3d_core.kernels.runtime.cache as c; c._candidates = lambda: iter(())\n"
-            + script
-        )
-    assert run(script, blocked / "cache", cwd=tmp_path, XDG_CACHE_HOME=blocked).split()[0] == "6.5"
+    assert (
+        run(EVALUATE, blocked / "cache", cwd=tmp_path, XDG_CACHE_HOME=blocked).split()[0] == "6.5"
+    )
 
 
 OWN_TYPE = """
@@ -128,8 +111,7 @@ def run_copy(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damage", ["one bit", "cut off", "empty"])
-def test_damaged_code_is_made_anew_and_a_warning_says_so(tmp_path, damage):
+def test_damaged_code_is_made_anew_and_a_warning_says_so(tmp_path):
     """One bit can crash the process or change a number: no damaged file is loaded or executed."""
     cache = tmp_path / "cache"
     write_plugin(tmp_path)
@@ -141,8 +123,7 @@ def test_damaged_code_is_made_anew_and_a_warning_says_so(tmp_path, damage):
     for file in files:
         data = bytearray(file.read_bytes())
         data[len(data) // 2] ^= 1
-        kept = {"one bit": data, "cut off": data[: len(data) // 2], "empty": b""}[damage]
-        file.write_bytes(bytes(kept))
+        file.write_bytes(bytes(data))
     process = start(EVALUATE, cache, cwd=tmp_path)
     out, err = process.communicate(timeout=300)
     assert (process.returncode, out) == (0, "6.5 1\n"), err

@@ -108,11 +108,6 @@ def test_a_path_through_a_file_is_refused(tmp_path):
     assert "there is no file" in refused(tmp_path / "file" / "scene.toml")
 
 
-def test_a_pipe_is_refused_and_does_not_hang(tmp_path):
-    os.mkfifo(tmp_path / "pipe")
-    assert "not a regular file" in refused(tmp_path / "pipe")
-
-
 def test_a_file_that_may_not_be_read_is_refused(tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text(TEXT)

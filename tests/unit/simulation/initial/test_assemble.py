@@ -431,17 +431,6 @@ def test_a_redundant_scene_is_refused_with_the_joints(shift, rows, request):
         dap.simulate(planar_four_bar(shift), t_end=1.0, method="standard")
 
 
-def test_drivers_that_contradict_each_other_are_told():
-    """Unit combination of the two rows: the rates 1 and 2 disagree by 1 / sqrt(2); where they are
-    equal nothing is said."""
-    found = dap.compile(two_motors()).redundancy()
-    assert found.contradiction == pytest.approx(1 / np.sqrt(2), rel=1e-12)
-    assert "contradict each other" in found.describe()
-    scene = two_motors()
-    scene.functions["fast_angle"].fields["coeff"] = (0.5, 1.0, 0.0)
-    assert dap.compile(scene).redundancy().contradiction < 1e-14
-
-
 def test_redundancy_depends_on_the_state():
     """A state may be given: with the top of the parallelogram lifted by 1 m the four axes are still
     parallel, and three rows dependent; turned bodies make them independent."""

@@ -27,7 +27,10 @@ def angle(result):
 BUMP = [0, 1, 2, 3, 3.9, 3.99, 3.999, 4, 4.0005, 4.001, 4.002, 4.01, 4.1, 5, 6, 7, 8, 9, 10]
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "dopri5", "adams", "auto"])
+@pytest.mark.parametrize(
+    "integrator",
+    ["dop853", *(pytest.param(n, marks=long_in_plain_python) for n in ("dopri5", "adams"))],
+)
 @pytest.mark.parametrize(
     "function",
     [

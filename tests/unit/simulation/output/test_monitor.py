@@ -29,12 +29,3 @@ def test_it_goes_on_from_chunk_to_chunk():
     steps = np.diff([0, *(run.steps for run in seen)])
     spans = np.diff([0.0, *times])
     np.testing.assert_allclose([run.step for run in seen], spans / steps, rtol=1e-12)
-
-
-def test_an_exception_of_the_watcher_ends_the_run_with_what_was_computed():
-    def stop(run):
-        raise RuntimeError("enough")
-
-    with pytest.raises(RuntimeError, match="enough") as caught:
-        dap.simulate(problems.pendulum(), t_end=1.0, watch=stop)
-    assert caught.value.result.status == "stopped"

@@ -24,7 +24,7 @@ def good(tmp_path_factory):
 
 def test_a_byte_changed_anywhere_is_refused(good, tmp_path, no_library):
     """Nor does the library see it when somebody only asks whether it is a sweep."""
-    for bad in changed_files(good, tmp_path / "bad.nc", 200):
+    for bad in changed_files(good, tmp_path / "bad.nc", 80):
         with pytest.raises(ResultError, match=REFUSED):
             dap.open_sweep(bad)
         assert not is_sweep(bad)
