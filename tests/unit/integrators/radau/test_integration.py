@@ -1,4 +1,4 @@
-"""The implicit integrator's parts: elimination program, tangent, coefficients, chunks, refusals."""
+"""Radau on the equations of motion: tangent, chunks, motions, refusals."""
 
 import subprocess
 import sys
@@ -6,7 +6,6 @@ import sys
 import numpy as np
 import pytest
 from support import mechanisms, problems
-from support.graphs import chain, star
 from support.plain import in_another_process
 
 import dap3d_core as dap
@@ -15,11 +14,7 @@ from dap3d_core.formulations.stabilized_index2.stage_equations import evaluate_s
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.radau.integration import RadauIntegration, estimate_tolerances
 from dap3d_core.integrators.radau.newton import factorise_both, find_tangent, solve_first
-from dap3d_core.integrators.radau.tableau import radau_method
 from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
-from dap3d_core.linear.lu.factor import factor_lu, solve_lu
-from dap3d_core.linear.lu.plan import make_lu_plan
-from dap3d_core.linear.ordering.elimination_order import order_nodes
 
 
 @compiled
@@ -33,60 +28,6 @@ def solve_at(t, h, y, multipliers, work, system, loops, matrix):
     evaluate_stage(t, y, multipliers, matrix.held, work.R[1], work.G[1], system, loops)
     keep_frames(system.body, work.frames[0])
     solve_first(h, work, system, matrix)
-
-
-@compiled
-def factor_and_solve(nodes, columns, updates, K, pivots, x):
-    found = factor_lu(nodes, columns, updates, K, pivots)
-    solve_lu(nodes, columns, K, pivots, x)
-    return found
-
-
-# ---------------------------------------------------------------------------- elimination
-
-
-def lu_of(body_count, slots, rows, coupled=()):
-    nodes = order_nodes(body_count, slots, rows).nodes
-    return nodes, make_lu_plan(body_count, nodes, [*slots, *coupled])
-
-
-LOOP = (4, [(1, 0), (2, 1), (3, 2), (4, 3), (4, 0)], [5, 5, 3, 3, 2])
-
-
-@pytest.mark.parametrize("number", [float, complex])
-def test_block_lu_solves_what_numpy_solves(number):
-    """A loop with springs across it; well conditioned, so that 1e-10 is far above rounding."""
-    nodes, lu = lu_of(*LOOP, coupled=[(1, 3), (2, 4)])
-    rng = np.random.default_rng(3)
-    count = len(nodes)
-    first = np.concatenate([lu.joint_first, lu.body_first[1:]])
-    size = [2 * node.rows for node in nodes] + [12] * 4
-    dense = np.zeros((lu.size, lu.size), dtype=number)
-    K = np.zeros(lu.matrix_size, dtype=number)
-    for (a, b), place in lu._place.items():
-        block = rng.normal(size=(size[a], size[b])) + (4.0 * np.eye(size[a]) if a == b else 0.0)
-        if number is complex:
-            block = block + 1j * rng.normal(size=block.shape)
-        dense[first[a] : first[a] + size[a], first[b] : first[b] + size[b]] = block
-        K[place : place + block.size] = block.ravel()
-    assert count + 4 == len(first)
-    x = rng.normal(size=lu.size).astype(number)
-    expected = np.linalg.solve(dense, x)
-    pivots = np.zeros(lu.size, dtype=np.int64)
-    assert factor_and_solve(lu.nodes, lu.columns, lu.updates, K, pivots, x)
-    assert np.max(np.abs(x - expected)) < 1e-10 * np.max(np.abs(expected)) * np.linalg.cond(dense)
-
-
-@pytest.mark.parametrize("graph", [chain, star])
-def test_trees_have_no_fill_and_linear_size(graph):
-    """Ten times the bodies: ten times the numbers (but for the ends), and no block is added."""
-    plans = []
-    for n in (20, 200):
-        bodies, joints = graph(n)
-        plans.append(lu_of(bodies, [slots for slots, _ in joints], [rows for _, rows in joints])[1])
-    small, large = plans
-    assert small.fill == large.fill == 0
-    assert large.matrix_size / small.matrix_size == pytest.approx(10.0, rel=0.1)
 
 
 # ---------------------------------------------------------------------------- tangent
@@ -174,22 +115,6 @@ def test_tangent_is_that_of_all_equations(scene, h):
 
 
 # ---------------------------------------------------------------------------- method
-
-
-def test_coefficients_have_order_five():
-    """B(5) and C(3) of Radau IIA, b the last row of A; its transformation; HW II, IV.5."""
-    m = radau_method()
-    for q in range(1, 6):
-        assert m.A[2] @ m.c ** (q - 1) == pytest.approx(1.0 / q, abs=1e-15)
-    for q in range(1, 4):
-        assert m.A @ m.c ** (q - 1) == pytest.approx(m.c**q / q, abs=1e-15)
-    gamma, alpha, beta = m.poles
-    blocks = np.array([[gamma, 0, 0], [0, alpha, -beta], [0, beta, alpha]])
-    assert m.T_inverse @ m.inverse @ m.T == pytest.approx(blocks, abs=1e-13)
-    # the error estimate is zero for polynomials up to degree 3: gamma h f(0) + e Z, scaled
-    for q in range(1, 4):
-        f0 = 1.0 if q == 1 else 0.0
-        assert f0 + m.e @ m.c**q == pytest.approx(0.0, abs=1e-13)
 
 
 def test_tolerances_of_the_estimate_keep_their_ratio():
