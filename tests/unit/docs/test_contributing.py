@@ -1,4 +1,4 @@
-"""CONTRIBUTING.md: the files and folders that it names exist."""
+"""CONTRIBUTING.md: the files and folders that it names exist, and unit tests lie as it says."""
 
 import re
 
@@ -29,3 +29,22 @@ def test_the_map_has_every_folder_of_the_core():
     }
     found = {p.parent.relative_to(CORE).as_posix() for p in CORE.rglob("__init__.py")} - {"."}
     assert packages | folders == found
+
+
+#: Unit tests of more than a source file: of the documents, of the compiler as a whole, of imports.
+OF_SEVERAL = {
+    "docs/test_complete.py", "docs/test_contributing.py", "kernels/compiler/test_bits.py",
+    "kernels/compiler/test_complex.py", "kernels/compiler/test_core.py",
+    "kernels/compiler/test_refusals.py", "matlab/test_refusals.py",
+    "simulation/test_only_what_is_needed.py",
+}  # fmt: skip
+
+
+def test_unit_tests_mirror_the_sources():
+    """PACKAGE/FOLDER/test_FILE.py is of PACKAGE/FOLDER/FILE.py, or of the folder of that name."""
+    unit, astray = REPOSITORY / "tests/unit", set()
+    for path in unit.rglob("test_*.py"):
+        place, name = CORE / path.parent.relative_to(unit), path.stem.removeprefix("test_")
+        if not ((place / f"{name}.py").is_file() or (place / name).is_dir() or place.name == name):
+            astray.add(path.relative_to(unit).as_posix())
+    assert astray == OF_SEVERAL

@@ -1,12 +1,15 @@
-"""Arrays handed to compiled code by one address."""
+"""Arrays handed to compiled code by one address, and numbers of them by name."""
 
 from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 import pytest
+from support.at_all_levels import compiled_at_all_levels, function_of
 
-from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, Arrays, pointer
+from dap3d_core.kernels.compiler.functions import Program
+from dap3d_core.kernels.compiler.types import FLOAT, INT, CompileError
+from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, Arrays, Scalar, pointer
 from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 
 
@@ -88,3 +91,90 @@ def test_members_in_order():
     assert [id(member) for member in arrays] == [
         id(x) for x in (arrays.table, arrays.count, arrays.values, arrays.inner)
     ]
+
+
+# ------------------------------------------------------------------ scalars
+
+
+@attrs.define(eq=False, kw_only=True, slots=False)
+class Clock(Arrays):
+    types = {"integer": INTEGERS}  # noqa: RUF012
+
+    t = Scalar[float]("real")
+    ticks = Scalar[int]("integer")
+    h = Scalar[float]("real")
+    is_running = Scalar[int]("integer")
+
+    real: np.ndarray
+    integer: np.ndarray
+
+
+@attrs.define(eq=False, kw_only=True, slots=False)
+class Stopwatch(Clock):
+    laps = Scalar[int]("integer")
+
+    marks: np.ndarray
+
+
+def clock():
+    return Clock(real=np.array([1.0, 0.25, 7.0]), integer=np.array([3, 0]))
+
+
+def test_scalars_are_items_of_their_arrays_in_the_order_of_definition():
+    c = clock()
+    c.t += c.h
+    c.ticks = 5
+    assert c.real.tolist() == [1.25, 0.25, 7.0]
+    assert c.integer.tolist() == [5, 0]
+    assert type(c.t) is np.float64  # division by zero is not raised, as in compiled code
+
+
+def test_scalars_of_a_derived_class_follow_those_of_its_base():
+    assert Clock.indices("integer") == {"ticks": 0, "is_running": 1}
+    assert Stopwatch.indices("integer") == {"ticks": 0, "is_running": 1, "laps": 2}
+    assert Stopwatch.indices("real") == {"t": 0, "h": 1}
+
+
+@pytest.mark.parametrize("name", ["real", "address", "tick"])
+def test_nothing_else_is_assigned(name):
+    with pytest.raises(AttributeError, match=f"{name} is no scalar"):
+        setattr(clock(), name, 1.0)
+
+
+SOURCE = """
+def f(c, x, k):
+    n = 0
+    while c.t < x:
+        c.t += c.h
+        c.ticks = c.ticks + k
+        c.is_running, c.h = c.t < x, c.h * 2
+        n += 1
+    c.real[2] = c.ticks
+    c.ticks += c.real[2] * 0.5
+    return c.ticks / n
+"""
+
+
+@pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
+def test_compiled_code_reads_and_writes_them_as_python_does():
+    """Integers become floats, floats lose their fraction, comparisons are 0 and 1."""
+    function, plain = function_of(SOURCE), clock()
+    expected = function(plain, 4.0, 2)
+    for level, made in compiled_at_all_levels(function, (Clock.type_of(), FLOAT, INT)).items():
+        own = clock()
+        assert made(own, 4.0, 2) == expected, level
+        assert own.real.tobytes() == plain.real.tobytes(), level
+        assert own.integer.tobytes() == plain.integer.tobytes(), level
+
+
+@pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
+@pytest.mark.parametrize(("line", "words"), [
+    ("c.real = c.real", "real of a Clock is given a value; only arrays and scalars"),
+    ("c.tick = 1", "tick of a Clock is given a value"),
+    ("c.ticks = c.real", "array of floats with 1 indices is given for a int"),
+    ("x = c.tick", "has no member tick; it has real, integer, t, ticks, h, is_running"),
+])  # fmt: skip
+def test_what_compiled_code_refuses(line, words):
+    function = function_of(f"def f(c):\n    {line}\n    return c.t\n")
+    with pytest.raises(CompileError, match=words):
+        Program().function(function, (Clock.type_of(),))
