@@ -121,7 +121,7 @@ def load_numbers(
     for _, group in what:
         if id(group) not in seen:
             seen.add(id(group))
-            parts.append(_numbers_of(twins[id(group)], p0))
+            parts.append(twins[id(group)].packed_numbers(p0))
             p0 += parts[-1].size
     if p0 != system.par.size or len(model.mass) != len(other.mass):
         raise ValueError("models of different structure")
@@ -188,7 +188,7 @@ def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[An
         if id(group) not in at:
             table = _integers_of(group, plan)
             at[id(group)] = (i0, p0)
-            numbers = _numbers_of(group, p0)
+            numbers = group.packed_numbers(p0)
             idx.append(table.ravel())
             par.append(numbers)
             i0, p0 = i0 + table.size, p0 + numbers.size
@@ -201,16 +201,6 @@ def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[An
         np.array(rows, dtype=np.int64).reshape(-1, 3),
         np.array(starts, dtype=np.int64),
     )
-
-
-def _numbers_of(group: Group, p0: int) -> Floats:
-    """The numbers of a group, its tables behind them, each table's place put in."""
-    numbers = group.numbers.copy()
-    end = p0 + numbers.size
-    for k, offset, rows in group.tables:
-        numbers[k, offset] = end
-        end += rows.size
-    return np.concatenate([numbers.ravel(), *(rows.ravel() for _, _, rows in group.tables)])
 
 
 def _integers_of(group: Group, plan: Plan) -> Integers:

@@ -71,6 +71,29 @@ class Group:
         """Number of instances."""
         return len(self.members)
 
+    def take(self, places: Integers) -> "Group":
+        """Some of the instances, by their places here."""
+        tables = [(place, offset, rows) for place, k in enumerate(places.tolist())
+                  for member, offset, rows in self.tables if member == k]  # fmt: skip
+        return attrs.evolve(
+            self,
+            members=self.members[places],
+            bodies=self.bodies[places],
+            functions=self.functions[places],
+            numbers=self.numbers[places],
+            tables=tuple(tables),
+            joints=None if self.joints is None else self.joints[places],
+        )
+
+    def packed_numbers(self, p0: int) -> Floats:
+        """The numbers as ``par`` holds them from p0 on, tables behind them, their places put in."""
+        numbers = self.numbers.copy()
+        end = p0 + numbers.size
+        for k, offset, rows in self.tables:
+            numbers[k, offset] = end
+            end += rows.size
+        return np.concatenate([numbers.ravel(), *(rows.ravel() for _, _, rows in self.tables)])
+
 
 class Grouping:
     """Makes groups of a scene's elements.

@@ -1,0 +1,1 @@
+"""Joint motions: the free relative motions of joints, from C and J alone; joint coordinates."""

@@ -1,0 +1,231 @@
+"""Which joints of a model have a motion about constant axes, from their C and J alone.
+
+N, the null space of J for body i in the axes of that body, holds the twists that a joint leaves
+free. Where N is constant, T0 exp(N q) satisfies C = 0: revolute, translational, cylindrical, planar
+and spherical joints. Where some twists are constant in body j (S1) and the others in body i (S2),
+exp(S1 q1) T0 exp(S2 q2) does: universal joints. Neither is taken for granted: C is evaluated at
+random coordinates. All joints of a type are classified at once (docs/decisions/0038).
+"""
+
+from collections.abc import Container, Iterator
+from itertools import product
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.assembly.arrays import Floats, Integers
+from dap3d_core.assembly.motion.closed_joints import OPEN, ClosedJoints
+from dap3d_core.assembly.motion.elementary import elementary
+from dap3d_core.assembly.motion.joint_motion import JointMotions, ModelMotions, Part, merged
+from dap3d_core.assembly.motion.joint_rows import JointRows
+from dap3d_core.assembly.motion.named_axes import aligned, points, vectors
+from dap3d_core.assembly.motion.refusals import (
+    DEPENDENT,
+    NOT_CLOSED,
+    NOT_CONSTANT,
+    NOT_INVARIANT,
+    refused_joints,
+    two_bodies,
+)
+from dap3d_core.model import Group, Model
+from dap3d_core.model.rigid_motion import Pose, adjoint, inverse, relative
+
+#: Eigenvalues of the sum of two projectors: a twist lies in both spaces, or clearly not.
+COMMON, APART = 1e-9, 1e-5
+#: Singular value of unit twists below which one is a combination of others.
+DISTINCT = 1e-6
+#: Length of the way, in rad and lengths of the scene, to a second pose of a joint.
+AWAY = 0.8
+#: Random coordinates that a motion is tried at.
+TRIALS = 2
+#: Seeds of random numbers, one for each attempt: a way may end where both spaces nearly agree.
+SEEDS = 1, 2, 3
+
+
+def classify(model: Model) -> ModelMotions:
+    """The motions of all joints of a model, from the poses of the scene.
+
+    Raises:
+        PluginError: the kernels of a type cannot be compiled.
+    """
+    motions: list[JointMotions] = []
+    refused: dict[int, str] = {}
+    for group in model.joints:
+        refused |= (reasons := refused_joints(group))
+        group = _without(group, reasons)
+        for seed in SEEDS:
+            if group.count:
+                found, reasons = classify_group(group, *_evaluated(group, model), seed)
+                motions += found
+                refused |= reasons
+                known = {k for motion in found for k in motion.joints.tolist()}
+                group = _without(
+                    group, known | {k for k, r in reasons.items() if r != NOT_CONSTANT}
+                )
+    known = {k for motion in motions for k in motion.joints.tolist()}
+    refused = {k: refused[k] for k in sorted(refused) if k not in known}
+    return ModelMotions(merged(motions), refused)
+
+
+def _without(group: Group, members: Container[int]) -> Group:
+    """The joints of a group that are not among members of the model."""
+    return group.take(np.flatnonzero([k not in members for k in group.members.tolist()]))
+
+
+def _evaluated(group: Group, model: Model) -> tuple[JointRows, Pose]:
+    """The rows of a group, and the poses of bodies i relative to bodies j in the scene."""
+    mass = np.concatenate([[np.inf], model.mass])
+    Jp = np.concatenate([np.zeros((1, 3, 3)), model.Jp])
+    r = np.concatenate([np.zeros((1, 3)), model.r])
+    p = np.concatenate([[[1.0, 0.0, 0.0, 0.0]], model.p])
+    i, j = two_bodies(group).T
+    pose = relative(Pose(r[j], p[j]), Pose(r[i], p[i]))
+    return JointRows(group, mass, Jp, model.part_size), pose
+
+
+def classify_group(
+    group: Group, rows: JointRows, pose: Pose, seed: int
+) -> tuple[list[JointMotions], dict[int, str]]:
+    """The motions of the joints of a group, and the reasons for those that have none.
+
+    Args:
+        group: joints that ``refusals`` leaves.
+        rows: evaluates their C and J.
+        pose: of bodies i relative to bodies j, as given.
+        seed: of random numbers.
+    """
+    joints = ClosedJoints(rows, pose)
+    rng = np.random.default_rng(seed)
+    varies = joints.residual(joints.start, _random_poses(rng, joints)) > OPEN
+    usable = joints.is_closed & joints.is_regular & ~varies
+    motions: list[JointMotions] = []
+    for search in (_one_factor, _two_factors):
+        for candidate in search(group, joints, np.flatnonzero(usable), rng):
+            fitting = candidate.take(np.flatnonzero(_fits(candidate, joints, rng)))
+            if fitting.joints.size:
+                usable[fitting.joints] = False
+                members = group.members[fitting.joints]
+                motions.append(attrs.evolve(fitting, joints=members))
+    reasons = np.full(group.count, NOT_CONSTANT, dtype=object)
+    reasons[varies] = NOT_INVARIANT
+    reasons[~joints.is_regular] = DEPENDENT
+    reasons[~joints.is_closed] = NOT_CLOSED
+    known = {k for motion in motions for k in motion.joints.tolist()}
+    named = zip(group.members.tolist(), reasons.tolist(), strict=True)
+    return motions, {member: reason for member, reason in named if member not in known}
+
+
+def _one_factor(
+    group: Group, joints: ClosedJoints, members: Integers, rng: np.random.Generator
+) -> Iterator[JointMotions]:
+    """Motions of constant N, to be tried; their joints are places in the group."""
+    for part in elementary(joints.free[members]):
+        here = members[part.members]
+        parts, screws = _aligned(group, joints, here, part.kinds, part.screws * joints.unit, "ij")
+        yield _motions(group, joints, here, parts, screws)
+
+
+def _two_factors(
+    group: Group, joints: ClosedJoints, members: Integers, rng: np.random.Generator
+) -> Iterator[JointMotions]:
+    """Motions whose twists are constant in body j or in body i, to be tried."""
+    d = joints.free.shape[-1]
+    if not members.size or d < 2:
+        return
+    way = np.einsum("mab,mb->ma", joints.free, rng.normal(size=(joints.count, d)))
+    way *= AWAY / np.linalg.norm(way, axis=-1, keepdims=True)
+    away, is_closed = joints.closed(joints.moved(joints.start, way))
+    free, is_regular = joints.free_twists(away)
+    members = members[(is_closed & is_regular)[members]]
+    in_i, size_i = _common(joints.free[members], free[members])
+    outer = (_seen_from_j(joints, joints.start, joints.free), _seen_from_j(joints, away, free))
+    in_j, size_j = _common(*(N[members] for N in outer))
+    back = adjoint(inverse(joints.start))
+    for size in range(1, d):
+        here = np.flatnonzero((size_i == size) & (size_j == d - size))
+        for one, other in product(
+            elementary(in_j[here, :, : d - size]), elementary(in_i[here, :, :size])
+        ):
+            _, k, n = np.intersect1d(one.members, other.members, return_indices=True)
+            if not k.size:
+                continue
+            both = members[here[one.members[k]]]
+            turned = np.einsum("mab,mdb->mda", back[both], one.screws[k] * joints.unit)
+            first = _aligned(group, joints, both, one.kinds, turned, "j")
+            last = _aligned(group, joints, both, other.kinds, other.screws[n] * joints.unit, "i")
+            screws = np.concatenate([first[1], last[1]], axis=1)
+            yield _motions(group, joints, both, (*first[0], *last[0]), screws)
+
+
+def _common(one: Floats, other: Floats) -> tuple[Floats, Integers]:
+    """Orthonormal columns (m, 6, 6) of which the first span what two spaces share; how many.
+
+    -1 where that is unclear: the spaces nearly agree, and what they share would be inaccurate.
+    """
+    outside = sum(np.eye(6) - N @ np.swapaxes(N, -1, -2) for N in (one, other))
+    values, columns = np.linalg.eigh(outside)
+    unclear = np.any((values > COMMON) & (values < APART), axis=-1)
+    return columns, np.where(unclear, -1, np.sum(values < COMMON, axis=-1))
+
+
+def _seen_from_j(joints: ClosedJoints, pose: Pose, free: Floats) -> Floats:
+    """Orthonormal columns of spaces of twists in the axes of body j, at its mass centre."""
+    scaled = Pose(pose.r / joints.rows.length, pose.p)
+    Q: Floats = np.linalg.qr(adjoint(scaled) @ free)[0]
+    return Q
+
+
+def _aligned(
+    group: Group,
+    joints: ClosedJoints,
+    members: Integers,
+    kinds: tuple[str, ...],
+    screws: Floats,
+    constant_in: str,
+) -> tuple[tuple[Part, ...], Floats]:
+    """The parts of a factor with the names of their axes, and twists aligned with these."""
+    group, start = group.take(members), joints.start
+    start = Pose(start.r[members], start.p[members])
+    named, centres = (
+        [n for n in found if n.slot in constant_in]
+        for found in (vectors(group, start), points(group, start))
+    )
+    slots = {n.name: n.slot for n in (*named, *centres)}
+    names, screws = aligned(kinds, screws, named, centres, joints.rows.length)
+    slot = constant_in[-1]
+    parts = (Part(k, slots.get(n, slot), n) for k, n in zip(kinds, names, strict=True))
+    return tuple(parts), screws
+
+
+def _motions(
+    group: Group,
+    joints: ClosedJoints,
+    members: Integers,
+    parts: tuple[Part, ...],
+    screws: Floats,
+) -> JointMotions:
+    start = Pose(joints.start.r[members], joints.start.p[members])
+    i, j = two_bodies(group)[members].T
+    return JointMotions(group.keyword, parts, members, i, j, start, screws)
+
+
+def _fits(motion: JointMotions, joints: ClosedJoints, rng: np.random.Generator) -> Any:
+    """(m,) True where C = 0 at random coordinates, and no part is a combination of others."""
+    fits = np.ones(len(motion.joints), dtype=bool)
+    if motion.size:
+        sizes = np.linalg.svd(motion.screws / joints.unit, compute_uv=False)
+        fits = sizes[:, -1] > DISTINCT
+    units = motion.units(joints.rows.length)
+    for _ in range(TRIALS):
+        moved = motion.pose(units * rng.normal(size=(len(motion.joints), motion.size)))
+        pose = Pose(joints.start.r.copy(), joints.start.p.copy())
+        pose.r[motion.joints], pose.p[motion.joints] = moved
+        fits &= joints.residual(pose, _random_poses(rng, joints))[motion.joints] < OPEN
+    return fits
+
+
+def _random_poses(rng: np.random.Generator, joints: ClosedJoints) -> Pose:
+    """A random pose for every body j, within a length of the scene of the origin."""
+    r, p = rng.normal(size=(joints.count, 3)), rng.normal(size=(joints.count, 4))
+    return Pose(r * joints.rows.length, p / np.linalg.norm(p, axis=-1, keepdims=True))

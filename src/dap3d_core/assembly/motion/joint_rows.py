@@ -1,0 +1,106 @@
+"""C and J of all joints of a group, each at a pose of its own of body i relative to body j."""
+
+import numpy as np
+
+from dap3d_core.assembly.arrays import Floats
+from dap3d_core.interface.codegen.compile_loops import compiled_loop
+from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P
+from dap3d_core.model.groups import Group
+from dap3d_core.model.rigid_motion import Pose, compose, identity, inverse
+from dap3d_core.model.rotations import rotation
+
+#: The loops in the list: C; J; the angles whose turns are counted.
+LOOPS = POSITION, ACCELERATION, ANGLE = range(3)
+_KINDS = ("position", "acceleration", "angle")
+
+
+class JointRows:
+    """Evaluates the rows of the joints of a group, apart from the mechanism that they belong to.
+
+    Every joint has two bodies of its own. A body that is ground stays where ground is.
+
+    Attributes:
+        count, row_count: joints, and rows of each.
+        length: m, the unit of displacements: velocities of twists and gradients are in units of it.
+    """
+
+    def __init__(self, group: Group, mass: Floats, Jp: Floats, length: float = 1.0) -> None:
+        """Args:
+        group: joints of one or two bodies.
+        mass: (n + 1,) kg, of the bodies and, first, of ground.
+        Jp: (n + 1, 3, 3) their inertia matrices in body axes, kg m^2.
+        length: m, a length of the scene.
+        """
+        self.length, self.count = length, group.count
+        self.row_count = int(group.type_info.type.rows)  # type: ignore[attr-defined]
+        self._slots = len(group.type_info.layout.slots)
+        m, bodies = self.count, group.bodies
+        self._ground_i = bodies[:, 0] == 0
+        self._ground_j = (bodies[:, 1] == 0) if self._slots == 2 else np.ones(m, dtype=bool)
+        local = 1 + np.arange(m)[:, None] + m * np.arange(self._slots)
+        local[bodies == 0] = 0
+        self._body = np.zeros((1 + m * 2, BODY_WIDTH))
+        self._body[0, A : A + 9 : 4] = self._body[0, P] = 1.0
+        for slot in range(self._slots):
+            rows = slice(1 + m * slot, 1 + m * (slot + 1))
+            self._body[rows, MASS] = mass[bodies[:, slot]]
+            self._body[rows, JP : JP + 9] = Jp[bodies[:, slot]].reshape(m, 9)
+        # The longest row of F that an instance names, and as many rows of zeros: time stands still.
+        functions = len(group.type_info.layout.functions)
+        tables = np.zeros((1 + int(np.max(group.functions[:, :functions], initial=0)), 5))
+        integers = group.functions.copy()
+        for column in range(functions, integers.shape[1]):  # bodies of vectors of no slot
+            for slot in range(self._slots):
+                same = group.functions[:, column] == bodies[:, slot]
+                integers[same, column] = local[same, slot]
+        place = np.arange(m)[:, None]
+        blocks = 6 * self.row_count * (place * self._slots + np.arange(self._slots))
+        idx = np.hstack([local, integers, place * self.row_count, blocks])
+        assert idx.shape[1] == stride(group.type_info)
+        par = group.packed_numbers(0)
+        self._arrays = LoopArrays(body=self._body, F=tables, idx=idx.ravel(), par=par)
+        found = [compiled_loop(group.type_info, kind) for kind in _KINDS]
+        self._has_angles = found[ANGLE] is not None
+        self._loops = loop_list([loop for loop in found if loop is not None])
+        self._group = np.array([0, 0, m], dtype=np.int64)
+        self._out = [np.zeros(6 * self.row_count * self._slots * m) for _ in range(3)]
+
+    def place(self, pose: Pose, base: Pose | None = None) -> None:
+        """Set the poses of bodies i relative to bodies j (m), of which ``base`` are the poses."""
+        m = self.count
+        base = identity(m) if base is None else base
+        fixed = self._ground_j[:, None]
+        base = Pose(np.where(fixed, 0.0, base.r), np.where(fixed, [1.0, 0.0, 0.0, 0.0], base.p))
+        back = inverse(pose)
+        held = self._ground_i[:, None]
+        base = Pose(np.where(held, back.r, base.r), np.where(held, back.p, base.p))
+        for slot, at in enumerate((compose(base, pose), base)[: self._slots]):
+            rows = self._body[1 + m * slot : 1 + m * (slot + 1)]
+            rows[:, 0:3], rows[:, P : P + 4] = at.r, at.p
+            rows[:, A : A + 9] = rotation(at.p).reshape(m, 9)
+
+    def count_turns(self) -> None:
+        """Count the turns of angles from the poses set last."""
+        if self._has_angles:
+            self._call(ANGLE)
+
+    def residuals(self) -> Floats:
+        """C (m, rows) at the poses set last."""
+        self._out[0][:] = 0.0
+        self._call(POSITION)
+        return self._out[0][: self.count * self.row_count].reshape(self.count, -1).copy()
+
+    def gradients(self) -> Floats:
+        """(m, rows, 6) C for twists of body i, in units of ``length``, at the poses set last."""
+        for out in self._out:
+            out[:] = 0.0
+        self._call(ACCELERATION)
+        J = self._out[0].reshape(self.count, self._slots, self.row_count, 6)[:, 0]
+        turn = self._body[1 : 1 + self.count, A : A + 9].reshape(-1, 3, 3)
+        turn = np.where(self._ground_i[:, None, None], np.eye(3), turn)
+        return np.concatenate([self.length * (J[:, :, :3] @ turn), J[:, :, 3:] @ turn], axis=-1)
+
+    def _call(self, loop: int) -> None:
+        call_loop(self._loops, loop, 0.0, self._arrays, self._group, *self._out)

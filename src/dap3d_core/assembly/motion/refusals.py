@@ -1,0 +1,68 @@
+"""Joints whose rows are kept whatever their poses, and the reasons in words."""
+
+from inspect import signature
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.interface.codegen.kernel_arguments import DERIVATIVES
+from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.model import Group
+
+#: Rows from which on joint coordinates cost less than the body coordinates and rows they replace.
+LEAST_ROWS = 3
+#: Kernels of the rows themselves.
+_ROWS = ("C", "C_dot", "J", "gamma", "nu")
+
+ON_TIME = "its rows depend on time"
+ON_ITSELF = "it joins a body to itself"
+NOT_CLOSED = "no pose with C = 0 was found from the one given"
+DEPENDENT = "its rows depend on each other where C = 0"
+NOT_CONSTANT = "the axes of its free motions are constant in neither body"
+NOT_INVARIANT = "its rows depend on where ground is"
+
+
+def refusal_of(type_info: TypeInfo) -> str:
+    """The reason why no joint of a type has a known motion, from its declaration; "" for none."""
+    type_: Any = type_info.type
+    slots = len(type_info.layout.slots)
+    if slots > 2:
+        return f"it joins {('three', 'four')[slots - 3] if slots < 5 else slots} bodies"
+    if type_.velocity_rows():
+        return "it has rows of the velocity level"
+    if "t" in _names_in_rows(type_info):
+        return ON_TIME
+    if type_.rows < LEAST_ROWS:
+        rows = "1 row costs" if type_.rows == 1 else f"{type_.rows} rows cost"
+        return f"its {rows} less than {6 - type_.rows} joint coordinates"
+    return ""
+
+
+def refused_joints(group: Group) -> dict[int, str]:
+    """Reasons for joints of a group by their places in the model; those that have one."""
+    if reason := refusal_of(group.type_info):
+        return dict.fromkeys(group.members.tolist(), reason)
+    i, j = two_bodies(group).T
+    on_time = dict.fromkeys(group.members[_depends_on_time(group)].tolist(), ON_TIME)
+    return on_time | dict.fromkeys(group.members[i == j].tolist(), ON_ITSELF)
+
+
+def two_bodies(group: Group) -> Any:
+    """(m, 2) the bodies of the two slots; ground where a type has one."""
+    return np.pad(group.bodies, ((0, 0), (0, 2 - group.bodies.shape[1])))
+
+
+def _depends_on_time(group: Group) -> Any:
+    """(m,) True for joints whose rows take a function of time that they are given."""
+    names = _names_in_rows(group.type_info)
+    depends = np.zeros(group.count, dtype=bool)
+    for column, field in enumerate(group.type_info.layout.functions):
+        f = "f" if field == "function" else field
+        if names & {f"{f}{suffix}" for suffix in (*DERIVATIVES, "_0")}:
+            depends |= group.functions[:, column] > 0
+    return depends
+
+
+def _names_in_rows(type_info: TypeInfo) -> set[str]:
+    kernels = (k for n, k in type_info.kernels.items() if n in _ROWS)
+    return {name for kernel in kernels for name in signature(kernel).parameters}
