@@ -119,7 +119,7 @@ class JointMotions:
                             start=Pose(r, p), screws=self.screws[index])  # fmt: skip
 
     def reversed(self) -> "JointMotions":
-        """The motions of bodies j relative to bodies i, by the same coordinates.
+        """The motions of bodies j relative to bodies i, by the same coordinates, last part first.
 
         T^-1 = T0^-1 ... exp(-Ad s_2 q_2) exp(-Ad s_1 q_1), with Ad that of T0; slots i and j keep
         their names in ``parts``.

@@ -1,0 +1,93 @@
+"""Joint coordinates: recovered from poses, their rates, signs and turns."""
+
+import numpy as np
+import pytest
+from support.joint_pairs import STANDARD, pair
+
+from dap3d_core.assembly.motion.classify import classify
+from dap3d_core.assembly.motion.coordinates import (
+    aliases,
+    coordinate_rates,
+    coordinate_units,
+    coordinates,
+    joint_coordinates,
+)
+from dap3d_core.model.rigid_motion import Pose, compose, inverse, relative, rotation_vector
+from dap3d_core.model.rotations import to_body
+from dap3d_core.simulation import CompiledModel
+
+
+def motion_of(keyword, seed=2, **fields):
+    scene = pair(seed)
+    scene.add_joint(keyword, "J", **(fields or STANDARD[keyword]))
+    return classify(CompiledModel(scene).model).of(0)
+
+
+@pytest.mark.parametrize("reverse", [False, True], ids=["of body i", "of body j"])
+@pytest.mark.parametrize("keyword", STANDARD)
+def test_coordinates_are_recovered(keyword, reverse):
+    """Coordinates of the pose at random coordinates are these; turned round, the same ones."""
+    motion = motion_of(keyword)
+    rng = np.random.default_rng(7)
+    q = rng.uniform(-1.7, 1.7, size=(20, 1, motion.size))  # a ball's vector below half a turn
+    poses = [motion.pose(values) for values in q]
+    pose = Pose(*(np.stack(x) for x in zip(*poses, strict=True)))
+    if reverse:
+        order = np.concatenate([np.arange(motion.size)[c] for c in motion.columns[::-1]])
+        motion, q = motion.reversed(), q[..., order]
+        pose = inverse(pose)
+    np.testing.assert_allclose(coordinates(motion, pose), q, atol=2e-14)
+
+
+@pytest.mark.parametrize("keyword", STANDARD)
+def test_rates_are_those_of_the_coordinates(keyword):
+    """Rates from relative twists, by differences of poses, are those of the coordinates."""
+    motion = motion_of(keyword)
+    rng = np.random.default_rng(8)
+    q, q_dot = rng.uniform(-1.5, 1.5, size=(2, 6, 1, motion.size))
+    h = 1e-5
+    for here, rate in zip(q, q_dot, strict=True):
+        ahead, back = motion.pose(here + h * rate), motion.pose(here - h * rate)
+        step = relative(back, ahead)  # in axes of body i, seen h earlier: even to second order
+        w = rotation_vector(step.p) / (2.0 * h)
+        twist = np.concatenate([_velocity(back, ahead, motion.pose(here), h), w], axis=-1)
+        # differences of second order: h^2 with third derivatives of order 1, and 1e-16 / h
+        np.testing.assert_allclose(coordinate_rates(motion, here, twist), rate, atol=3e-9)
+
+
+def _velocity(back, ahead, pose, h):
+    return to_body(pose.p, (ahead.r - back.r) / (2.0 * h))
+
+
+def test_a_positive_angle_is_a_right_hand_rotation_of_body_i_about_a_j():
+    """Body i turned by 0.3 rad about a_j through P_j, and along it by 0.2 m: q is (0.2, 0.3)."""
+    motion = motion_of("cyl")
+    start = motion.start
+    scene = pair(2)
+    a_j = np.array(scene.vectors["a_j"].sp)
+    P_j = np.array(scene.points["P_j"].sPp)
+    p = np.concatenate([[np.cos(0.15)], np.sin(0.15) * a_j])
+    turn = Pose(P_j + 0.2 * a_j, p)
+    centred = Pose(start.r - P_j, start.p)
+    q = coordinates(motion, compose(Pose(turn.r[None], turn.p[None]), centred))
+    np.testing.assert_allclose(q[0], [0.2, 0.3], atol=1e-14)
+    assert aliases(motion) == {"length": 0, "angle": 1}
+    assert coordinate_units(motion) == ("m", "rad")
+    assert aliases(motion_of("sph")) == {} == aliases(motion_of("univ"))
+
+
+def test_turns_are_counted_between_instants_far_apart():
+    """Twenty turns at a growing rate, eight instants a run: the angle and its rate go on."""
+    scene = pair(4, on_ground=True)
+    scene.add_joint("rev", "J", **STANDARD["rev"])
+    motion = classify(CompiledModel(scene).model).of(0)
+    t = np.linspace(0.0, 10.0, 41)
+    angle, rate = 0.5 * t**2 - 2.0 * t, t - 2.0  # up to 8 rad/s: 2 rad a step, 30 rad in all
+    poses = [motion.pose(np.array([[a]])) for a in angle]
+    r, p = (np.stack(x) for x in zip(*poses, strict=True))
+    a_j = np.array(scene.vectors["a_j"].sp)
+    w = rate[:, None, None] * a_j
+    v = np.cross(w, r - np.array(scene.points["P_j"].sPp))
+    q, q_dot = joint_coordinates(motion, 1.7 * t, r, p, v / 1.7, w / 1.7)
+    np.testing.assert_allclose(q[:, 0, 0], angle, atol=1e-13)
+    np.testing.assert_allclose(q_dot[:, 0, 0], rate / 1.7, atol=1e-13)
