@@ -9,10 +9,18 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.codegen.type_info import TypeInfo
-from dap3d_core.interface.errors import where_is
+from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.testing.checks import forces, functions, joints, plain_kernels, purity
-from dap3d_core.testing.checks.findings import FAILED, LEFT_OUT, CheckOutcome, Finding, Report
+from dap3d_core.testing.checks.findings import (
+    FAILED,
+    LEFT_OUT,
+    CheckOutcome,
+    Finding,
+    Report,
+    TypeMotion,
+)
+from dap3d_core.testing.checks.motion import motion_of_type
 from dap3d_core.testing.samples.sampled_type import SampledType, UndefinedError, sampled_types
 
 #: Default number of random poses on and off the manifold, and their seed.
@@ -82,7 +90,7 @@ def check_type(type_: Any, *, poses: int = POSES, seed: int = SEED) -> Report:
         seed: of the random poses.
 
     Returns:
-        the outcome of each check.
+        the outcome of each check, and of a joint the motion that it leaves free.
 
     Raises:
         PluginError: the type cannot be used at all.
@@ -90,7 +98,24 @@ def check_type(type_: Any, *, poses: int = POSES, seed: int = SEED) -> Report:
     type_info = type_ if isinstance(type_, TypeInfo) else examine(type_)
     outcomes = tuple(check.run() for check in _checks(type_info, poses, seed))
     kind, keyword = type_info.type.kind, type_info.type.keyword
-    return Report(kind, keyword, where_is(type_info.type), seed, poses, outcomes)
+    motions = type_motions(type_info, seed=seed)
+    return Report(kind, keyword, where_is(type_info.type), seed, poses, outcomes, motions)
+
+
+def type_motions(type_info: TypeInfo, *, seed: int = SEED) -> tuple[TypeMotion, ...]:
+    """The motions that a joint type and its variants leave free; none for other types."""
+    if type_info.type.kind != "joint":
+        return ()
+    with contextlib.redirect_stdout(io.StringIO()):
+        return tuple(_motion(subject) for subject in sampled_types(type_info, seed, 1))
+
+
+def _motion(subject: SampledType) -> TypeMotion:
+    try:
+        return motion_of_type(subject)
+    except Exception as error:  # of a kernel
+        what = "cannot be compiled" if isinstance(error, PluginError) else f"fail: {_reason(error)}"
+        return TypeMotion(subject.variant, f"refused: its kernels {what}", None)
 
 
 def checks_for(type_: Any, *, poses: int = POSES, seed: int = SEED) -> list[Check]:

@@ -27,6 +27,7 @@ from dap3d_core.assembly.motion.refusals import (
     NOT_INVARIANT,
     refused_joints,
     two_bodies,
+    two_slots,
 )
 from dap3d_core.model import Group, Model
 from dap3d_core.model.rigid_motion import Pose, adjoint, inverse, relative
@@ -120,9 +121,10 @@ def _one_factor(
     group: Group, joints: ClosedJoints, members: Integers, rng: np.random.Generator
 ) -> Iterator[JointMotions]:
     """Motions of constant N, to be tried; their joints are places in the group."""
+    slots = two_slots(group)
     for part in elementary(joints.free[members]):
         here = members[part.members]
-        parts, screws = _aligned(group, joints, here, part.kinds, part.screws * joints.unit, "ij")
+        parts, screws = _aligned(group, joints, here, part.kinds, part.screws * joints.unit, slots)
         yield _motions(group, joints, here, parts, screws)
 
 
@@ -141,7 +143,7 @@ def _two_factors(
     in_i, size_i = _common(joints.free[members], free[members])
     outer = (_seen_from_j(joints, joints.start, joints.free), _seen_from_j(joints, away, free))
     in_j, size_j = _common(*(N[members] for N in outer))
-    back = adjoint(inverse(joints.start))
+    slots, back = two_slots(group), adjoint(inverse(joints.start))
     for size in range(1, d):
         here = np.flatnonzero((size_i == size) & (size_j == d - size))
         for one, other in product(
@@ -152,8 +154,10 @@ def _two_factors(
                 continue
             both = members[here[one.members[k]]]
             turned = np.einsum("mab,mdb->mda", back[both], one.screws[k] * joints.unit)
-            first = _aligned(group, joints, both, one.kinds, turned, "j")
-            last = _aligned(group, joints, both, other.kinds, other.screws[n] * joints.unit, "i")
+            first = _aligned(group, joints, both, one.kinds, turned, slots[1:])
+            last = _aligned(
+                group, joints, both, other.kinds, other.screws[n] * joints.unit, slots[:1]
+            )
             screws = np.concatenate([first[1], last[1]], axis=1)
             yield _motions(group, joints, both, (*first[0], *last[0]), screws)
 
@@ -182,19 +186,18 @@ def _aligned(
     members: Integers,
     kinds: tuple[str, ...],
     screws: Floats,
-    constant_in: str,
+    slots: tuple[str, ...],
 ) -> tuple[tuple[Part, ...], Floats]:
     """The parts of a factor with the names of their axes, and twists aligned with these."""
     group, start = group.take(members), joints.start
     start = Pose(start.r[members], start.p[members])
     named, centres = (
-        [n for n in found if n.slot in constant_in]
+        [n for n in found if n.slot in slots]
         for found in (vectors(group, start), points(group, start))
     )
-    slots = {n.name: n.slot for n in (*named, *centres)}
+    constant_in = {n.name: n.slot for n in (*named, *centres)}
     names, screws = aligned(kinds, screws, named, centres, joints.rows.length)
-    slot = constant_in[-1]
-    parts = (Part(k, slots.get(n, slot), n) for k, n in zip(kinds, names, strict=True))
+    parts = (Part(k, constant_in.get(n, slots[-1]), n) for k, n in zip(kinds, names, strict=True))
     return tuple(parts), screws
 
 
@@ -207,7 +210,7 @@ def _motions(
 ) -> JointMotions:
     start = Pose(joints.start.r[members], joints.start.p[members])
     i, j = two_bodies(group)[members].T
-    return JointMotions(group.keyword, parts, members, i, j, start, screws)
+    return JointMotions(group.keyword, two_slots(group), parts, members, i, j, start, screws)
 
 
 def _fits(motion: JointMotions, joints: ClosedJoints, rng: np.random.Generator) -> Any:

@@ -19,7 +19,7 @@ class Part:
 
     Attributes:
         kind: ROTATION, TRANSLATION, SCREW or BALL.
-        constant_in: the slot of the body that its axis is fixed in.
+        constant_in: the slot of the body that its axis is fixed in, or "ground".
         name: the field, or name of ``prepare``, that is its axis or centre; "" where there is none.
     """
 
@@ -48,6 +48,7 @@ class JointMotions:
 
     Attributes:
         keyword: of the type.
+        slots: those of the type's two bodies, which are called i and j here; or i and "ground".
         parts: the elementary motions, from body j to body i; of a BALL q is a rotation vector.
         joints: (m,) places among the joints of the model.
         body_i, body_j: (m,) bodies, ground 0.
@@ -56,6 +57,7 @@ class JointMotions:
     """
 
     keyword: str
+    slots: tuple[str, str]
     parts: tuple[Part, ...]
     joints: Integers
     body_i: Integers
@@ -121,13 +123,19 @@ class JointMotions:
     def reversed(self) -> "JointMotions":
         """The motions of bodies j relative to bodies i, by the same coordinates, last part first.
 
-        T^-1 = T0^-1 ... exp(-Ad s_2 q_2) exp(-Ad s_1 q_1), with Ad that of T0; slots i and j keep
-        their names in ``parts``.
+        T^-1 = T0^-1 ... exp(-Ad s_2 q_2) exp(-Ad s_1 q_1), with Ad that of T0.
         """
         moved = -np.einsum("mab,mdb->mda", adjoint(self.start), self.screws)
         screws = np.concatenate([moved[:, c] for c in reversed(self.columns)], axis=1)
-        return attrs.evolve(self, parts=self.parts[::-1], body_i=self.body_j, body_j=self.body_i,
-                            start=inverse(self.start), screws=screws)  # fmt: skip
+        return attrs.evolve(
+            self,
+            slots=self.slots[::-1],
+            parts=self.parts[::-1],
+            body_i=self.body_j,
+            body_j=self.body_i,
+            start=inverse(self.start),
+            screws=screws,
+        )
 
 
 @attrs.frozen(eq=False)
@@ -155,7 +163,7 @@ def merged(motions: Sequence[JointMotions]) -> tuple[JointMotions, ...]:
     """The same motions, those of one type and the same parts side by side, in order of joints."""
     alike: dict[Any, list[JointMotions]] = {}
     for motion in motions:
-        alike.setdefault((motion.keyword, motion.parts), []).append(motion)
+        alike.setdefault((motion.keyword, motion.slots, motion.parts), []).append(motion)
     return tuple(_joined(some) for some in alike.values())
 
 

@@ -40,16 +40,24 @@ def refusal_of(type_info: TypeInfo) -> str:
 
 def refused_joints(group: Group) -> dict[int, str]:
     """Reasons for joints of a group by their places in the model; those that have one."""
+    reasons: dict[int, str] = {}
     if reason := refusal_of(group.type_info):
-        return dict.fromkeys(group.members.tolist(), reason)
+        reasons = dict.fromkeys(group.members.tolist(), reason)
     i, j = two_bodies(group).T
-    on_time = dict.fromkeys(group.members[_depends_on_time(group)].tolist(), ON_TIME)
-    return on_time | dict.fromkeys(group.members[i == j].tolist(), ON_ITSELF)
+    for reason, mask in ((ON_TIME, _depends_on_time(group)), (ON_ITSELF, i == j)):
+        reasons |= dict.fromkeys(group.members[mask].tolist(), reason)
+    return reasons
 
 
 def two_bodies(group: Group) -> Any:
     """(m, 2) the bodies of the two slots; ground where a type has one."""
     return np.pad(group.bodies, ((0, 0), (0, 2 - group.bodies.shape[1])))
+
+
+def two_slots(group: Group) -> tuple[str, str]:
+    """The slots of the two bodies; "ground" where a type has one."""
+    i, j = (*group.type_info.layout.slots, "ground")[:2]
+    return i, j
 
 
 def _depends_on_time(group: Group) -> Any:

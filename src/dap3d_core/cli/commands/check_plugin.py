@@ -159,6 +159,7 @@ def _show(console: "Terminal", report: "Report", *, quiet: bool) -> None:
         columns = ("", "check", "error", "by diff.", "what was compared; why it does not apply")
         console.table(columns, rows, fixed=(0, 2, 3))
         console.items(dict.fromkeys(f"{o.title}: {n}" for o in report.outcomes for n in o.notes))
+        console.items(map(str, report.motions))
     findings = (f"{f'with {f.variant}: ' if f.variant else ''}{f}" for f in report.findings)
     console.items(dict.fromkeys(findings), "red")
     if not quiet:

@@ -114,6 +114,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
             for conditions, e in type_info.variants
         ],
         "example": example_of(type_info, registry),
+        **({"motions": _motions(type_info)} if kind == "joint" else {}),
         **({"each_body": bool(type_.each_body)} if kind == "force" else {}),
     }
 
@@ -135,6 +136,15 @@ def _class_data(type_info: "TypeInfo") -> dict[str, Any]:
             "freedoms": 6 * max(len(type_info.layout.slots) - 1, 1) - type_.rows,
         }
     return data
+
+
+def _motions(type_info: "TypeInfo") -> list[dict[str, Any]]:
+    """The motions that a joint and its variants leave free."""
+    import attrs
+
+    from dap3d_core.testing.kit import type_motions
+
+    return [attrs.asdict(motion) for motion in type_motions(type_info)]
 
 
 def _source(kernel: Any) -> str:
@@ -180,6 +190,7 @@ def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
     pairs = [("acts on", bodies_text(data)), ("from", f"{origin}, {data['module']}")]
     if data["kind"] == "joint":
         pairs[:1] = [("rows", rows_text(data)), ("bodies", bodies_text(data))]
+        pairs[2:2] = [("motion", motion_text(motion)) for motion in data["motions"]]
     console.facts(pairs)
     console.title("fields")
     if data["fields"]:
@@ -207,6 +218,11 @@ def _show_source(console: "Terminal", data: dict[str, Any]) -> None:
             how = "derived" if name in each["derived"] else "as written"
             console.title(f"{name} of {each['class']}, {how}")
             console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def motion_text(motion: Mapping[str, Any]) -> str:
+    """A motion as ``_motions`` has it, with the variant if any."""
+    return f"with {motion['variant']}: {motion['words']}" if motion["variant"] else motion["words"]
 
 
 def bodies_text(data: dict[str, Any]) -> str:

@@ -5,6 +5,8 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.assembly.motion.joint_motion import Part
+
 OK, FAILED, LEFT_OUT = "ok", "failed", "not applicable"
 
 
@@ -80,6 +82,25 @@ class CheckOutcome:
 
 
 @attrs.frozen
+class TypeMotion:
+    """The motion that a joint type, or a variant of it, leaves free.
+
+    Attributes:
+        variant: values of fields of the variant; "" where there are none.
+        words: the motion; or "refused", with the reason why it is not about constant axes.
+        parts: its elementary motions; None where it is refused.
+    """
+
+    variant: str
+    words: str
+    parts: tuple[Part, ...] | None
+
+    def __str__(self) -> str:
+        title = f"motion [{self.variant}]" if self.variant else "motion"
+        return f"{title}: {self.words}"
+
+
+@attrs.frozen
 class Report:
     """The outcomes of all checks of a type.
 
@@ -90,6 +111,7 @@ class Report:
         seed: of the random poses.
         poses: number of random poses for each check.
         outcomes: one for each check of each variant.
+        motions: of a joint, the motion that each variant leaves free.
     """
 
     kind: str
@@ -98,6 +120,7 @@ class Report:
     seed: int
     poses: int
     outcomes: tuple[CheckOutcome, ...]
+    motions: tuple[TypeMotion, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -111,7 +134,7 @@ class Report:
 
     def __str__(self) -> str:
         head = f"{self.kind} {self.keyword} ({self.title}), seed {self.seed}"
-        return "\n".join([head, *map(str, self.outcomes)])
+        return "\n".join([head, *map(str, self.outcomes), *map(str, self.motions)])
 
 
 def _pose_text(pose: Mapping[str, Any]) -> str:

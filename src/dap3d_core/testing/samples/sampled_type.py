@@ -142,6 +142,14 @@ class SampledType:
                          for n, v in self.choices.items())  # fmt: skip
 
     @property
+    def drawn_choices(self) -> dict[str, Any]:
+        """Values of fields that its random elements have in common."""
+        specs = specs_of(self.type)
+        conditions = dict.fromkeys(self.type_info.argument_functions, True) | dict(self.choices)
+        return {n: "cubic" if specs[n].kind == "function" else v for n, v in conditions.items()
+                if v is not False or specs[n].kind == "choice"}  # fmt: skip
+
+    @property
     def kernels(self) -> Kernels:
         """Its kernels."""
         return self.cached("kernels", lambda: Kernels(self.type_info))
@@ -186,15 +194,11 @@ class SampledType:
         grounded = k == self.poses - 1 > 0 and layout.slots[1:2] == ("j",)
         given = [k % 2 == 0 or rng.random() < 0.5 for _ in layout.functions]
         given += [False] if self.type.kind == "function" else []  # the row that it fills itself
-        conditions = dict.fromkeys(self.type_info.argument_functions, True) | dict(self.choices)
-        choices = {n: "cubic" if specs_of(self.type)[n].kind == "function" else v
-                   for n, v in conditions.items() if v is not False or
-                   specs_of(self.type)[n].kind == "choice"}  # fmt: skip
         reason = "its kernels give no finite numbers"
         for _ in range(ATTEMPTS):
             state = random_state(rng, given, grounded=grounded)
             try:
-                element = draw(self.type_info, choices, rng, state)
+                element = draw(self.type_info, self.drawn_choices, rng, state)
                 state = random_state(rng, given, grounded=grounded)
                 sample = Sample(self.kernels, element, state, grounded,
                                 f"pose {k + 1} off the manifold", self.seed)  # fmt: skip
