@@ -3,6 +3,21 @@
 import numpy as np
 
 import dap3d_core as dap
+from dap3d_core.simulation import CompiledModel
+from dap3d_joints.universal import Universal
+from support.derived_types import from_C_alone
+from support.joint_types import (
+    OnGround,
+    Parabola,
+    PinInSlot,
+    Planar,
+    RepeatedRow,
+    Rising,
+    Shelf,
+    TwoHinges,
+    Upright,
+)
+from support.own_types import registry_of
 
 #: Fields of one joint of every standard type with three rows or more between two bodies.
 STANDARD = {
@@ -12,6 +27,9 @@ STANDARD = {
     "cyl": {"d": "d", "a_i": "a_i", "a_j": "a_j"},
     "tran": {"d": "d", "a_j": "a_j"},
 }
+
+
+BETWEEN = {"P_i": "P_i", "P_j": "P_j", "a_i": "a_i", "a_j": "a_j"}
 
 
 def unit(rng, size=3):
@@ -41,3 +59,14 @@ def pair(seed=1, *, on_ground=False):
         scene.add_point(f"P_{slot}", name, tuple(rng.normal(size=3)))
     scene.add_vector2("d", "P_i", "P_j")
     return scene
+
+
+OWN = (from_C_alone(Universal, "derived-univ"), Planar, PinInSlot, TwoHinges, Parabola, RepeatedRow,
+       Upright, Rising, OnGround, Shelf)  # fmt: skip
+
+
+def compiled_pair(keyword, fields, seed=3, *, on_ground=False):
+    """The model of one joint of a type between two bodies, or a body and ground."""
+    scene = pair(seed, on_ground=on_ground)
+    scene.add_joint(keyword, "J", **fields)
+    return CompiledModel(scene, registry=registry_of(*OWN))

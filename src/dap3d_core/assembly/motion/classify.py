@@ -19,7 +19,7 @@ from dap3d_core.assembly.motion.closed_joints import OPEN, ClosedJoints
 from dap3d_core.assembly.motion.elementary import elementary
 from dap3d_core.assembly.motion.joint_motion import JointMotions, ModelMotions, Part, merged
 from dap3d_core.assembly.motion.joint_rows import JointRows
-from dap3d_core.assembly.motion.named_axes import aligned, points, vectors
+from dap3d_core.assembly.motion.named_axes import NamedAxes
 from dap3d_core.assembly.motion.refusals import (
     DEPENDENT,
     NOT_CLOSED,
@@ -121,10 +121,10 @@ def _one_factor(
     group: Group, joints: ClosedJoints, members: Integers, rng: np.random.Generator
 ) -> Iterator[JointMotions]:
     """Motions of constant N, to be tried; their joints are places in the group."""
-    slots = two_slots(group)
+    slots, length = two_slots(group), joints.rows.length
     for part in elementary(joints.free[members]):
         here = members[part.members]
-        parts, screws = _aligned(group, joints, here, part.kinds, part.screws * joints.unit, slots)
+        parts, screws = _aligned(group, joints, here, part.kinds, part.in_metres(length), slots)
         yield _motions(group, joints, here, parts, screws)
 
 
@@ -143,7 +143,8 @@ def _two_factors(
     in_i, size_i = _common(joints.free[members], free[members])
     outer = (_seen_from_j(joints, joints.start, joints.free), _seen_from_j(joints, away, free))
     in_j, size_j = _common(*(N[members] for N in outer))
-    slots, back = two_slots(group), adjoint(inverse(joints.start))
+    slots, length = two_slots(group), joints.rows.length
+    back = adjoint(inverse(joints.start))
     for size in range(1, d):
         here = np.flatnonzero((size_i == size) & (size_j == d - size))
         for one, other in product(
@@ -153,11 +154,9 @@ def _two_factors(
             if not k.size:
                 continue
             both = members[here[one.members[k]]]
-            turned = np.einsum("mab,mdb->mda", back[both], one.screws[k] * joints.unit)
+            turned = np.einsum("mab,mdb->mda", back[both], one.in_metres(length)[k])
             first = _aligned(group, joints, both, one.kinds, turned, slots[1:])
-            last = _aligned(
-                group, joints, both, other.kinds, other.screws[n] * joints.unit, slots[:1]
-            )
+            last = _aligned(group, joints, both, other.kinds, other.in_metres(length)[n], slots[:1])
             screws = np.concatenate([first[1], last[1]], axis=1)
             yield _motions(group, joints, both, (*first[0], *last[0]), screws)
 
@@ -188,17 +187,10 @@ def _aligned(
     screws: Floats,
     slots: tuple[str, ...],
 ) -> tuple[tuple[Part, ...], Floats]:
-    """The parts of a factor with the names of their axes, and twists aligned with these."""
-    group, start = group.take(members), joints.start
-    start = Pose(start.r[members], start.p[members])
-    named, centres = (
-        [n for n in found if n.slot in slots]
-        for found in (vectors(group, start), points(group, start))
-    )
-    constant_in = {n.name: n.slot for n in (*named, *centres)}
-    names, screws = aligned(kinds, screws, named, centres, joints.rows.length)
-    parts = (Part(k, constant_in.get(n, slots[-1]), n) for k, n in zip(kinds, names, strict=True))
-    return tuple(parts), screws
+    """Parts that are constant in the bodies of slots, and their twists, by the type's names."""
+    start = Pose(joints.start.r[members], joints.start.p[members])
+    axes = NamedAxes(group.take(members), start, slots, joints.rows.length)
+    return axes.aligned(kinds, screws)
 
 
 def _motions(
@@ -215,11 +207,11 @@ def _motions(
 
 def _fits(motion: JointMotions, joints: ClosedJoints, rng: np.random.Generator) -> Any:
     """(m,) True where C = 0 at random coordinates, and no part is a combination of others."""
+    units = motion.units(joints.rows.length)
     fits = np.ones(len(motion.joints), dtype=bool)
     if motion.size:
-        sizes = np.linalg.svd(motion.screws / joints.unit, compute_uv=False)
+        sizes = np.linalg.svd(motion.screws * units[:, None] / joints.unit, compute_uv=False)
         fits = sizes[:, -1] > DISTINCT
-    units = motion.units(joints.rows.length)
     for _ in range(TRIALS):
         moved = motion.pose(units * rng.normal(size=(len(motion.joints), motion.size)))
         pose = Pose(joints.start.r.copy(), joints.start.p.copy())

@@ -18,12 +18,18 @@ class Elementary(NamedTuple):
     Attributes:
         members: (k,) their places among those given.
         kinds: of the elementary motions, translations first.
-        screws: (k, d, 6) their unit twists.
+        screws: (k, d, 6) their unit twists, in units of the scene's length.
     """
 
     members: Integers
     kinds: tuple[str, ...]
     screws: Floats
+
+    def in_metres(self, length: float) -> Floats:
+        """The unit twists in m and 1, of a scene's length in m; those of translations stay."""
+        screws = self.screws.copy()
+        screws[:, self.kinds.count(TRANSLATION) :, :3] *= length
+        return screws
 
 
 def elementary(spaces: Floats) -> Iterator[Elementary]:

@@ -8,7 +8,7 @@ from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P
 from dap3d_core.model.groups import Group
-from dap3d_core.model.rigid_motion import Pose, compose, identity, inverse
+from dap3d_core.model.rigid_motion import Pose, compose, identity
 from dap3d_core.model.rotations import rotation
 
 #: The loops in the list: C; J; the angles whose turns are counted.
@@ -19,7 +19,7 @@ _KINDS = ("position", "acceleration", "angle")
 class JointRows:
     """Evaluates the rows of the joints of a group, apart from the mechanism that they belong to.
 
-    Every joint has two bodies of its own. A body that is ground stays where ground is.
+    Every joint has two bodies of its own. Where body j is ground it stays there; body i never is.
 
     Attributes:
         count, row_count: joints, and rows of each.
@@ -37,8 +37,7 @@ class JointRows:
         self.row_count = int(group.type_info.type.rows)  # type: ignore[attr-defined]
         self._slots = len(group.type_info.layout.slots)
         m, bodies = self.count, group.bodies
-        self._ground_i = bodies[:, 0] == 0
-        self._ground_j = (bodies[:, 1] == 0) if self._slots == 2 else np.ones(m, dtype=bool)
+        self._on_ground = (bodies[:, 1] == 0) if self._slots == 2 else np.ones(m, dtype=bool)
         local = 1 + np.arange(m)[:, None] + m * np.arange(self._slots)
         local[bodies == 0] = 0
         self._body = np.zeros((1 + m * 2, BODY_WIDTH))
@@ -70,12 +69,10 @@ class JointRows:
     def place(self, pose: Pose, base: Pose | None = None) -> None:
         """Set the poses of bodies i relative to bodies j (m), of which ``base`` are the poses."""
         m = self.count
-        base = identity(m) if base is None else base
-        fixed = self._ground_j[:, None]
-        base = Pose(np.where(fixed, 0.0, base.r), np.where(fixed, [1.0, 0.0, 0.0, 0.0], base.p))
-        back = inverse(pose)
-        held = self._ground_i[:, None]
-        base = Pose(np.where(held, back.r, base.r), np.where(held, back.p, base.p))
+        ground = identity(m)
+        base = ground if base is None else base
+        held = self._on_ground[:, None]
+        base = Pose(np.where(held, ground.r, base.r), np.where(held, ground.p, base.p))
         for slot, at in enumerate((compose(base, pose), base)[: self._slots]):
             rows = self._body[1 + m * slot : 1 + m * (slot + 1)]
             rows[:, 0:3], rows[:, P : P + 4] = at.r, at.p
@@ -99,7 +96,6 @@ class JointRows:
         self._call(ACCELERATION)
         J = self._out[0].reshape(self.count, self._slots, self.row_count, 6)[:, 0]
         turn = self._body[1 : 1 + self.count, A : A + 9].reshape(-1, 3, 3)
-        turn = np.where(self._ground_i[:, None, None], np.eye(3), turn)
         return np.concatenate([self.length * (J[:, :, :3] @ turn), J[:, :, 3:] @ turn], axis=-1)
 
     def _call(self, loop: int) -> None:

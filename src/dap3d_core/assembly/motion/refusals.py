@@ -15,7 +15,6 @@ LEAST_ROWS = 3
 _ROWS = ("C", "C_dot", "J", "gamma", "nu")
 
 ON_TIME = "its rows depend on time"
-ON_ITSELF = "it joins a body to itself"
 NOT_CLOSED = "no pose with C = 0 was found from the one given"
 DEPENDENT = "its rows depend on each other where C = 0"
 NOT_CONSTANT = "the axes of its free motions are constant in neither body"
@@ -43,10 +42,7 @@ def refused_joints(group: Group) -> dict[int, str]:
     reasons: dict[int, str] = {}
     if reason := refusal_of(group.type_info):
         reasons = dict.fromkeys(group.members.tolist(), reason)
-    i, j = two_bodies(group).T
-    for reason, mask in ((ON_TIME, _depends_on_time(group)), (ON_ITSELF, i == j)):
-        reasons |= dict.fromkeys(group.members[mask].tolist(), reason)
-    return reasons
+    return reasons | dict.fromkeys(group.members[_depends_on_time(group)].tolist(), ON_TIME)
 
 
 def two_bodies(group: Group) -> Any:

@@ -2,20 +2,32 @@
 
 import numpy as np
 import pytest
-from support.joint_pairs import STANDARD, pair
+from support.joint_pairs import BETWEEN, STANDARD, compiled_pair, pair
 
 from dap3d_core.assembly.motion.classify import classify
+from dap3d_core.assembly.motion.joint_motion import Part
+from dap3d_core.assembly.motion.refusals import DEPENDENT, NOT_CONSTANT, NOT_INVARIANT, ON_TIME
+from dap3d_core.assembly.motion.wording import axis_words, motion_words
 from dap3d_core.model.rigid_motion import Pose, compose
 from dap3d_core.simulation import CompiledModel
 
 #: C of lengths of 1 m to 3 m: some hundred operations of relative error 1e-16.
 ROUNDING = 1e-13
-PARTS = {
-    "sph": [("ball", "j", "P_j")],
-    "rev": [("rotation", "j", "a_j")],
-    "univ": [("rotation", "j", "n_j"), ("rotation", "i", "a_i")],
-    "cyl": [("translation", "j", "a_j"), ("rotation", "j", "a_j")],
-    "tran": [("translation", "j", "a_j")],
+#: Keyword -> fields and the parts of the motion.
+JOINTS = {
+    "sph": (STANDARD["sph"], [("ball", "j", "P_j")]),
+    "rev": (STANDARD["rev"], [("rotation", "j", "a_j")]),
+    "univ": (STANDARD["univ"], [("rotation", "j", "n_j"), ("rotation", "i", "a_i")]),
+    "cyl": (STANDARD["cyl"], [("translation", "j", "a_j"), ("rotation", "j", "a_j")]),
+    "tran": (STANDARD["tran"], [("translation", "j", "a_j")]),
+    "screw": (BETWEEN | {"pitch": 0.3}, [("screw", "j", "a_j")]),
+    "derived-univ": (STANDARD["univ"], [("rotation", "j", "n_j"), ("rotation", "i", "a_i")]),
+    "planar": (
+        BETWEEN,
+        [("translation", "j", "n_j"), ("translation", "j", "m_j"), ("rotation", "j", "a_j")],
+    ),
+    "pin-in-slot": (BETWEEN, [("translation", "j", "a_j"), ("rotation", "i", "a_i")]),
+    "two-hinges": (BETWEEN, [("rotation", "j", "a_j"), ("rotation", "i", "a_i")]),
 }
 
 
@@ -31,17 +43,15 @@ def residual(compiled, motion, q, base):
 
 
 @pytest.mark.parametrize("on_ground", [False, True], ids=["between bodies", "on ground"])
-@pytest.mark.parametrize("keyword", STANDARD)
+@pytest.mark.parametrize("keyword", JOINTS)
 def test_motion_keeps_the_constraints(keyword, on_ground):
     """C = 0 at random coordinates of the motion found, wherever body j is; named axes are right."""
-    scene = pair(3, on_ground=on_ground)
-    scene.add_joint(keyword, "J", **STANDARD[keyword])
-    compiled = CompiledModel(scene)
+    fields, parts = JOINTS[keyword]
+    compiled = compiled_pair(keyword, fields, on_ground=on_ground)
     motions = classify(compiled.model)
     assert not motions.refused
     motion = motions.of(0)
-    found = [(part.kind, part.constant_in, part.name) for part in motion.parts]
-    assert found == PARTS[keyword]
+    assert [(part.kind, part.constant_in, part.name) for part in motion.parts] == parts
     assert motion.size == 6 - compiled.model.row_count
     rng = np.random.default_rng(5)
     for _ in range(5):
@@ -51,3 +61,87 @@ def test_motion_keeps_the_constraints(keyword, on_ground):
             base = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         q = rng.normal(size=motion.size) * 2.0
         assert residual(compiled, motion, q, base) < ROUNDING
+
+
+REFUSED = {
+    "sph-sph": ({"P_i": "P_i", "P_j": "P_j"}, "its 1 row costs less than 5 joint coordinates"),
+    "parabola": (BETWEEN | {"b_i": "b_i"}, NOT_CONSTANT),
+    "repeated-row": (BETWEEN, DEPENDENT),
+    "upright": (BETWEEN, NOT_INVARIANT),
+    "rising": (BETWEEN, ON_TIME),
+    "rel-rot": ({"body_i": "body", "body_j": "base", "a_j": "a_j"},
+                "it has rows of the velocity level"),
+    "gear": ({"a_i": "a_i", "a_j": "a_j", "teeth_i": 10, "teeth_j": 20}, "it joins three bodies"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("keyword", REFUSED)
+def test_joints_without_such_a_motion_are_refused_by_name(keyword):
+    fields, reason = REFUSED[keyword]
+    motions = classify(compiled_pair(keyword, fields).model)
+    assert motions.refused == {0: reason}
+    assert motions.of(0) is None
+
+
+def test_a_driver_is_refused_for_its_time_and_without_function_for_its_one_row():
+    scene = pair(3)
+    scene.add_function("a", "motor", coeff=[0.0, 1.0, 0.0])
+    for name, function in (("driven", "motor"), ("locked", None)):
+        fields = {"body_i": "body", "body_j": "base", "a_j": "a_j"}
+        scene.add_joint("drive-rot", name, function=function, **fields)
+    refused = classify(CompiledModel(scene).model).refused
+    assert refused == {0: ON_TIME, 1: REFUSED["sph-sph"][1]}
+
+
+def test_ground_axes_and_joints_of_one_body():
+    """Rows that name ground's axes are those of a motion where body j is ground."""
+    upright = classify(compiled_pair("upright", BETWEEN, on_ground=True).model).of(0)
+    assert [part.kind for part in upright.parts] == ["translation", "translation", "rotation"]
+    hinge = classify(compiled_pair("on-ground", {"P_i": "P_i", "a_i": "a_i"}).model).of(0)
+    assert hinge.parts == (Part("rotation", "i", "a_i"),)
+    assert hinge.body_j.tolist() == [0]
+    shelf = classify(compiled_pair("shelf", {"P_i": "P_i"}).model).of(0)
+    assert motion_words(shelf.parts, axis_words(shelf)) == (
+        "1 translation along (1, 0, 0), constant in ground"
+    )
+
+
+def test_many_joints_of_many_types_at_once():
+    """Every joint of a mixed scene has the motion that it has alone, under its own place."""
+    scene, alone = pair(3), {}
+    keywords = ["rev", "univ", "sph", "cyl", "sph-sph", "tran"]
+    for k, keyword in enumerate(keywords):
+        fields = STANDARD.get(keyword, {"P_i": "P_i", "P_j": "P_j"})
+        scene.add_joint(keyword, f"J{k}", **fields)
+        alone[k] = classify(compiled_pair(keyword, fields).model).of(0)
+    motions = classify(CompiledModel(scene).model)
+    assert list(motions.refused) == [4]
+    places = [k for group in motions.motions for k in group.joints.tolist()]
+    assert sorted(places) == [0, 1, 2, 3, 5]
+    for k in (0, 1, 2, 3, 5):
+        found = motions.of(k)
+        assert found.parts == alone[k].parts
+        np.testing.assert_allclose(found.screws, alone[k].screws, atol=1e-13)
+
+
+def test_classification_is_the_same_each_time():
+    first, second = (classify(compiled_pair("univ", STANDARD["univ"]).model) for _ in range(2))
+    np.testing.assert_array_equal(first.of(0).screws, second.of(0).screws)
+    np.testing.assert_array_equal(first.of(0).start.p, second.of(0).start.p)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e5])
+def test_scale_does_not_matter(scale):
+    """A scene of micrometres, or of a hundred kilometres, has the same motions in its units."""
+    scene = pair(3)
+    for body in scene.bodies.values():
+        body.r = tuple(scale * x for x in body.r)
+        body.Jp = tuple(scale**2 * x for x in (0.3, 0.4, 0.5))
+    for point in scene.points.values():
+        point.sPp = tuple(scale * x for x in point.sPp)
+    scene.add_joint("univ", "J", **STANDARD["univ"])
+    small, usual = classify(CompiledModel(scene).model).of(0), classify(
+        compiled_pair("univ", STANDARD["univ"]).model).of(0)  # fmt: skip
+    assert small.parts == usual.parts
+    units = np.repeat([scale, 1.0], 3)
+    np.testing.assert_allclose(small.screws / units, usual.screws, atol=1e-12)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.joint_pairs import STANDARD, pair
+from support.joint_pairs import BETWEEN, STANDARD, compiled_pair, pair
 
 from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.motion.coordinates import (
@@ -16,15 +16,17 @@ from dap3d_core.model.rigid_motion import Pose, compose, inverse, relative, rota
 from dap3d_core.model.rotations import to_body
 from dap3d_core.simulation import CompiledModel
 
+#: Joints with one factor and with two, axes parallel and not.
+JOINTS = STANDARD | dict.fromkeys(("planar", "pin-in-slot", "two-hinges"), BETWEEN)
+JOINTS["screw"] = BETWEEN | {"pitch": -0.4}
 
-def motion_of(keyword, seed=2, **fields):
-    scene = pair(seed)
-    scene.add_joint(keyword, "J", **(fields or STANDARD[keyword]))
-    return classify(CompiledModel(scene).model).of(0)
+
+def motion_of(keyword):
+    return classify(compiled_pair(keyword, JOINTS[keyword], 2).model).of(0)
 
 
 @pytest.mark.parametrize("reverse", [False, True], ids=["of body i", "of body j"])
-@pytest.mark.parametrize("keyword", STANDARD)
+@pytest.mark.parametrize("keyword", JOINTS)
 def test_coordinates_are_recovered(keyword, reverse):
     """Coordinates of the pose at random coordinates are these; turned round, the same ones."""
     motion = motion_of(keyword)
@@ -39,7 +41,7 @@ def test_coordinates_are_recovered(keyword, reverse):
     np.testing.assert_allclose(coordinates(motion, pose), q, atol=2e-14)
 
 
-@pytest.mark.parametrize("keyword", STANDARD)
+@pytest.mark.parametrize("keyword", JOINTS)
 def test_rates_are_those_of_the_coordinates(keyword):
     """Rates from relative twists, by differences of poses, are those of the coordinates."""
     motion = motion_of(keyword)
