@@ -37,7 +37,7 @@ COMMON, APART = 1e-9, 1e-5
 #: Singular value of unit twists below which one is a combination of others.
 DISTINCT = 1e-6
 #: Length of the way, in rad and lengths of the scene, to a second pose of a joint.
-AWAY = 0.8
+AWAY = 1.5
 #: Random coordinates that a motion is tried at.
 TRIALS = 2
 #: Seeds of random numbers, one for each attempt: a way may end where both spaces nearly agree.
@@ -50,23 +50,49 @@ def classify(model: Model) -> ModelMotions:
     Raises:
         PluginError: the kernels of a type cannot be compiled.
     """
+    mass = np.concatenate([[np.inf], model.mass])
+    Jp = np.concatenate([np.zeros((1, 3, 3)), model.Jp])
+    r = np.concatenate([np.zeros((1, 3)), model.r])
+    p = np.concatenate([[[1.0, 0.0, 0.0, 0.0]], model.p])
     motions: list[JointMotions] = []
     refused: dict[int, str] = {}
     for group in model.joints:
-        refused |= (reasons := refused_joints(group))
+        reasons = refused_joints(group)
+        refused |= reasons
         group = _without(group, reasons)
-        for seed in SEEDS:
-            if group.count:
-                found, reasons = classify_group(group, *_evaluated(group, model), seed)
-                motions += found
-                refused |= reasons
-                known = {k for motion in found for k in motion.joints.tolist()}
-                group = _without(
-                    group, known | {k for k, r in reasons.items() if r != NOT_CONSTANT}
-                )
+        if group.count:
+            i, j = two_bodies(group).T
+            pose = relative(Pose(r[j], p[j]), Pose(r[i], p[i]))
+            found, reasons = classify_group(group, mass, Jp, pose, model.part_size)
+            motions += found
+            refused |= reasons
+    return ModelMotions(merged(motions), dict(sorted(refused.items())))
+
+
+def classify_group(
+    group: Group, mass: Floats, Jp: Floats, pose: Pose, length: float = 1.0
+) -> tuple[list[JointMotions], dict[int, str]]:
+    """The motions of joints of one type, and reasons for those that have none.
+
+    Args:
+        group: joints that ``refused_joints`` leaves.
+        mass, Jp: (n + 1,) kg and (n + 1, 3, 3) kg m^2, of the bodies and, first, of ground.
+        pose: of bodies i relative to bodies j, as given.
+        length: m, of the scene.
+    """
+    motions: list[JointMotions] = []
+    refused: dict[int, str] = {}
+    for seed in SEEDS:
+        joints = ClosedJoints(JointRows(group, mass, Jp, length), pose)
+        found, reasons = _attempt(group, joints, np.random.default_rng(seed))
+        motions += found
+        refused |= reasons
+        again = np.flatnonzero([reasons.get(k) == NOT_CONSTANT for k in group.members.tolist()])
+        if not again.size or joints.free.shape[-1] < 2:
+            break
+        group, pose = group.take(again), Pose(pose.r[again], pose.p[again])
     known = {k for motion in motions for k in motion.joints.tolist()}
-    refused = {k: refused[k] for k in sorted(refused) if k not in known}
-    return ModelMotions(merged(motions), refused)
+    return motions, {k: reason for k, reason in refused.items() if k not in known}
 
 
 def _without(group: Group, members: Container[int]) -> Group:
@@ -74,30 +100,10 @@ def _without(group: Group, members: Container[int]) -> Group:
     return group.take(np.flatnonzero([k not in members for k in group.members.tolist()]))
 
 
-def _evaluated(group: Group, model: Model) -> tuple[JointRows, Pose]:
-    """The rows of a group, and the poses of bodies i relative to bodies j in the scene."""
-    mass = np.concatenate([[np.inf], model.mass])
-    Jp = np.concatenate([np.zeros((1, 3, 3)), model.Jp])
-    r = np.concatenate([np.zeros((1, 3)), model.r])
-    p = np.concatenate([[[1.0, 0.0, 0.0, 0.0]], model.p])
-    i, j = two_bodies(group).T
-    pose = relative(Pose(r[j], p[j]), Pose(r[i], p[i]))
-    return JointRows(group, mass, Jp, model.part_size), pose
-
-
-def classify_group(
-    group: Group, rows: JointRows, pose: Pose, seed: int
+def _attempt(
+    group: Group, joints: ClosedJoints, rng: np.random.Generator
 ) -> tuple[list[JointMotions], dict[int, str]]:
-    """The motions of the joints of a group, and the reasons for those that have none.
-
-    Args:
-        group: joints that ``refusals`` leaves.
-        rows: evaluates their C and J.
-        pose: of bodies i relative to bodies j, as given.
-        seed: of random numbers.
-    """
-    joints = ClosedJoints(rows, pose)
-    rng = np.random.default_rng(seed)
+    """The motions found on one way, and reasons for joints that have none."""
     varies = joints.residual(joints.start, _random_poses(rng, joints)) > OPEN
     usable = joints.is_closed & joints.is_regular & ~varies
     motions: list[JointMotions] = []

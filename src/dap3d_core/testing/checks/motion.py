@@ -6,7 +6,6 @@ import numpy as np
 
 from dap3d_core.assembly.motion.classify import classify_group
 from dap3d_core.assembly.motion.joint_motion import JointMotions
-from dap3d_core.assembly.motion.joint_rows import JointRows
 from dap3d_core.assembly.motion.refusals import (
     NOT_CLOSED,
     NOT_CONSTANT,
@@ -73,8 +72,7 @@ def _verdict(subject: SampledType, rng: random.Random) -> tuple[JointMotions | N
     pose = relative(*(_pose(state, b) for b in (2, 1)))
     if len(type_info.layout.slots) == 1:
         pose = _pose(state, 1)
-    rows = JointRows(group, state.mass, state.Jp.reshape(-1, 3, 3))
-    motions, reasons = classify_group(group, rows, pose, subject.seed)
+    motions, reasons = classify_group(group, state.mass, state.Jp.reshape(-1, 3, 3), pose)
     if not motions:
         return None if reasons[0] == NOT_CLOSED else (None, reasons[0])
     return motions[0], ""

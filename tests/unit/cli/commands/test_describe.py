@@ -131,3 +131,17 @@ def test_what_a_field_asks_for(keyword, field, allowed):
     (type_,) = json.loads(described(keyword, "--json"))["types"]
     fields = {f["name"]: f for f in type_["fields"]}
     assert fields[field]["allowed"] == allowed
+
+
+def test_the_motion_of_a_joint_is_described():
+    """In words, variant by variant, and as data for programs; other kinds have none."""
+    assert "motion  1 rotation about a_j, constant in body j" in described("rev")
+    assert "motion  with slip = z: refused: its 1 row costs" in described("disk", width=120)
+    (univ,) = json.loads(described("univ", "--json"))["types"]
+    (motion,) = univ["motions"]
+    assert motion["parts"] == [
+        {"kind": "rotation", "constant_in": "j", "name": "n_j"},
+        {"kind": "rotation", "constant_in": "i", "name": "a_i"},
+    ]
+    (weight,) = json.loads(described("weight", "--json"))["types"]
+    assert "motions" not in weight

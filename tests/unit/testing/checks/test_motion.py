@@ -1,0 +1,102 @@
+"""The motion of joint types in words, for every standard type and the reasons of refusals."""
+
+import pytest
+from support.joint_types import (
+    OnGround,
+    Parabola,
+    PinInSlot,
+    Planar,
+    RepeatedRow,
+    Rising,
+    Shelf,
+    TwoHinges,
+    Upright,
+)
+
+from dap3d_core.interface import Joint, Point, point
+from dap3d_core.interface.examine.examine import examine
+from dap3d_core.kernels import sub
+from dap3d_core.registry import load_registry
+from dap3d_core.testing import check_type
+from dap3d_core.testing.kit import type_motions
+from dap3d_forces.weight import Weight
+
+ON_TIME = "refused: its rows depend on time"
+ONE_ROW = "refused: its 1 row costs less than 5 joint coordinates"
+ON_VELOCITY = "refused: it has rows of the velocity level"
+INSTALLED = {
+    "rev": ["1 rotation about a_j, constant in body j"],
+    "sph": ["3 rotations about P_j, constant in body j"],
+    "cyl": ["1 translation along a_j and 1 rotation about a_j, constant in body j"],
+    "tran": ["1 translation along a_j, constant in body j"],
+    "univ": [
+        "1 rotation about n_j, constant in body j, and 1 rotation about a_i, constant in body i"
+    ],
+    "fix": ["none: the bodies move as one"],
+    "screw": ["1 screw about a_j, constant in body j"],
+    "sph-sph": [ONE_ROW],
+    "rP": [ONE_ROW],
+    "disk": [ON_VELOCITY, ONE_ROW, ON_VELOCITY, ON_VELOCITY],
+    "drive-rot": [ON_TIME],
+    "drive-tran": [ON_TIME],
+    "rel-rot": [ON_VELOCITY],
+    "rel-tran": [ON_VELOCITY],
+    "gear": ["refused: it joins three bodies"],
+    "point-on-plane": [ONE_ROW],
+    "point-on-surface": [ONE_ROW],
+}
+OWN = {
+    Planar: "2 translations along n_j and m_j and 1 rotation about a_j, constant in body j",
+    PinInSlot: (
+        "1 translation along a_j, constant in body j, and 1 rotation about a_i, constant in body i"
+    ),
+    TwoHinges: (
+        "1 rotation about a_j, constant in body j, and 1 rotation about a_i, constant in body i"
+    ),
+    OnGround: "1 rotation about a_i, constant in body i",
+    Shelf: "1 translation along (1, 0, 0), constant in ground",
+    Parabola: "refused: the axes of its free motions are constant in neither body",
+    RepeatedRow: "refused: its rows depend on each other where C = 0",
+    Upright: "refused: its rows depend on where ground is",
+    Rising: ON_TIME,
+}
+
+
+def test_every_installed_joint_is_in_the_list():
+    assert set(INSTALLED) == set(load_registry().keywords("joint"))
+
+
+@pytest.mark.parametrize("keyword", INSTALLED)
+def test_motion_of_installed_types(keyword):
+    motions = type_motions(load_registry().get("joint", keyword))
+    assert [motion.words for motion in motions] == INSTALLED[keyword]
+    assert [motion.parts is None for motion in motions] == [
+        words.startswith("refused") for words in INSTALLED[keyword]
+    ]
+
+
+@pytest.mark.parametrize("type_", OWN, ids=lambda type_: type_.keyword)
+def test_motion_of_types_of_authors(type_):
+    (motion,) = type_motions(examine(type_))
+    assert motion.words == OWN[type_]
+
+
+def test_the_report_has_the_motion_of_a_joint_alone():
+    assert "motion: 2 translations along n_j and m_j" in str(check_type(Planar, poses=1))
+    assert check_type(Weight, poses=1).motions == ()
+
+
+class Undefined(Joint):
+    """Its rows are not numbers where C would be zero."""
+
+    keyword, rows = "undefined", 3
+    P_i: Point = point()
+    P_j: Point = point()
+
+    def C(r_P_i, r_P_j):
+        return tuple(x / (x * x) for x in sub(r_P_i, r_P_j))
+
+
+def test_a_joint_that_cannot_be_closed_is_refused_and_reported():
+    (motion,) = type_motions(examine(Undefined))
+    assert motion.words == "refused: no pose with C = 0 was found from the one given"
