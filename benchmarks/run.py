@@ -23,6 +23,7 @@ import hard.chaos
 import hard.flips
 import hard.hinges
 import hard.long_time
+import joint_motions
 import kernels
 import llvmlite
 import numpy
@@ -97,6 +98,7 @@ def main():
         "streaming": streaming.measure,
         "study": study.measure,
         "points": points.measure,
+        "joint_motions": joint_motions.measure,
         "hard_cases": hard.measure,
         "long_time": hard.long_time.measure,
         "chaos": hard.chaos.measure,
