@@ -14,6 +14,8 @@ from support.joint_types import (
     RepeatedRow,
     Rising,
     Shelf,
+    Sleeve,
+    Trolley,
     TwoHinges,
     Upright,
 )
@@ -62,7 +64,7 @@ def pair(seed=1, *, on_ground=False):
 
 
 OWN = (from_C_alone(Universal, "derived-univ"), Planar, PinInSlot, TwoHinges, Parabola, RepeatedRow,
-       Upright, Rising, OnGround, Shelf)  # fmt: skip
+       Upright, Rising, OnGround, Shelf, Sleeve, Trolley)  # fmt: skip
 
 
 def compiled_pair(keyword, fields, seed=3, *, on_ground=False):

@@ -46,6 +46,26 @@ class TwoHinges(Between):
         return dot(d, a_j), 0.5 * (dot(d, d) - 0.49), dot(a_i, n_j), dot(a_i, m_j)
 
 
+class Sleeve(Between):
+    """A pin a_i of body i across a straight sleeve of body j, in which it slides and turns."""
+
+    keyword, rows = "sleeve", 3
+
+    def C(r_P_i, r_P_j, a_i, a_j, n_j, m_j):
+        d = sub(r_P_i, r_P_j)
+        return dot(d, n_j), dot(d, m_j), dot(a_i, a_j)
+
+
+class Trolley(Between):
+    """As a sleeve, but a_i across n_j: a pin between the two bodies turns, and slides along a_j."""
+
+    keyword, rows = "trolley", 3
+
+    def C(r_P_i, r_P_j, a_i, n_j, m_j):
+        d = sub(r_P_i, r_P_j)
+        return dot(d, n_j), dot(d, m_j), dot(a_i, n_j)
+
+
 class Parabola(Between):
     """P_i runs along a parabola of body j, b_i across its plane: no motion about constant axes."""
 

@@ -31,6 +31,7 @@ from dap3d_core.assembly.motion.refusals import (
 )
 from dap3d_core.model import Group, Model
 from dap3d_core.model.rigid_motion import Pose, adjoint, inverse, relative
+from dap3d_core.model.state_layout import split
 
 #: Eigenvalues of the sum of two projectors: a twist lies in both spaces, or clearly not.
 COMMON, APART = 1e-9, 1e-5
@@ -44,16 +45,22 @@ TRIALS = 2
 SEEDS = 1, 2, 3
 
 
-def classify(model: Model) -> ModelMotions:
-    """The motions of all joints of a model, from the poses of the scene.
+def classify(model: Model, u: Floats | None = None) -> ModelMotions:
+    """The motions of all joints of a model.
+
+    Args:
+        model: the model.
+        u: (13 n,) the state whose poses are the reference, moved onto C = 0 joint by joint; left
+            out, the poses of the scene.
 
     Raises:
         PluginError: the kernels of a type cannot be compiled.
     """
     mass = np.concatenate([[np.inf], model.mass])
     Jp = np.concatenate([np.zeros((1, 3, 3)), model.Jp])
-    r = np.concatenate([np.zeros((1, 3)), model.r])
-    p = np.concatenate([[[1.0, 0.0, 0.0, 0.0]], model.p])
+    r, p, _, _ = split(model.u0 if u is None else u)
+    r = np.concatenate([np.zeros((1, 3)), r])
+    p = np.concatenate([[[1.0, 0.0, 0.0, 0.0]], p])
     motions: list[JointMotions] = []
     refused: dict[int, str] = {}
     for group in model.joints:

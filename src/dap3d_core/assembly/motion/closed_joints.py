@@ -90,11 +90,10 @@ class ClosedJoints:
 
 def _shortest_steps(J: Floats, C: Floats, members: Integers) -> Floats:
     """(m, 6) the steps of Newton's method for some of the joints; zero for the others."""
-    step, J, C = np.zeros((len(J), 6)), J[members], C[members]
+    step, J, C = np.zeros((len(J), 6)), J[members], C[members, :, None]
     J_T = np.swapaxes(J, -1, -2)
-    step[members] = -(J_T @ np.linalg.solve(J @ J_T + REGULAR * np.eye(J.shape[1]), C[..., None]))[
-        ..., 0
-    ]
+    multipliers = np.linalg.solve(J @ J_T + REGULAR * np.eye(J.shape[1]), C)
+    step[members] = -(J_T @ multipliers)[..., 0]
     return step
 
 

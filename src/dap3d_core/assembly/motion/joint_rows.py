@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import Floats
+from dap3d_core.assembly.arrays import Floats, Integers
 from dap3d_core.interface.codegen.compile_loops import compiled_loop
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
-from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, R
 from dap3d_core.model.groups import Group
 from dap3d_core.model.rigid_motion import Pose, compose, identity
 from dap3d_core.model.rotations import rotation
 
 #: The loops in the list: C; J; the angles whose turns are counted.
-LOOPS = POSITION, ACCELERATION, ANGLE = range(3)
+POSITION, ACCELERATION, ANGLE = range(3)
 _KINDS = ("position", "acceleration", "angle")
 
 
@@ -38,33 +38,34 @@ class JointRows:
         self._slots = len(group.type_info.layout.slots)
         m, bodies = self.count, group.bodies
         self._on_ground = (bodies[:, 1] == 0) if self._slots == 2 else np.ones(m, dtype=bool)
-        local = 1 + np.arange(m)[:, None] + m * np.arange(self._slots)
-        local[bodies == 0] = 0
-        self._body = np.zeros((1 + m * 2, BODY_WIDTH))
+        rows = 1 + np.arange(m)[:, None] + m * np.arange(self._slots)  # in ``_body``, by slot
+        self._body = np.zeros((1 + rows.size, BODY_WIDTH))
         self._body[0, A : A + 9 : 4] = self._body[0, P] = 1.0
-        for slot in range(self._slots):
-            rows = slice(1 + m * slot, 1 + m * (slot + 1))
-            self._body[rows, MASS] = mass[bodies[:, slot]]
-            self._body[rows, JP : JP + 9] = Jp[bodies[:, slot]].reshape(m, 9)
-        # The longest row of F that an instance names, and as many rows of zeros: time stands still.
-        functions = len(group.type_info.layout.functions)
-        tables = np.zeros((1 + int(np.max(group.functions[:, :functions], initial=0)), 5))
-        integers = group.functions.copy()
-        for column in range(functions, integers.shape[1]):  # bodies of vectors of no slot
-            for slot in range(self._slots):
-                same = group.functions[:, column] == bodies[:, slot]
-                integers[same, column] = local[same, slot]
-        place = np.arange(m)[:, None]
-        blocks = 6 * self.row_count * (place * self._slots + np.arange(self._slots))
-        idx = np.hstack([local, integers, place * self.row_count, blocks])
-        assert idx.shape[1] == stride(group.type_info)
+        self._body[rows, MASS] = mass[bodies]
+        self._body[rows[..., None], np.arange(JP, JP + 9)] = Jp[bodies].reshape(*rows.shape, 9)
+        idx = self._integers(group, np.where(bodies == 0, 0, rows))
+        # no joint here has a function of time: all rows of F are that of none
+        functions = np.zeros((1 + int(np.max(group.functions, initial=0)), 5))
         par = group.packed_numbers(0)
-        self._arrays = LoopArrays(body=self._body, F=tables, idx=idx.ravel(), par=par)
+        self._arrays = LoopArrays(body=self._body, F=functions, idx=idx.ravel(), par=par)
         found = [compiled_loop(group.type_info, kind) for kind in _KINDS]
         self._has_angles = found[ANGLE] is not None
         self._loops = loop_list([loop for loop in found if loop is not None])
         self._group = np.array([0, 0, m], dtype=np.int64)
         self._out = [np.zeros(6 * self.row_count * self._slots * m) for _ in range(3)]
+
+    def _integers(self, group: Group, rows: Integers) -> Integers:
+        """The rows of ``idx`` (loop_source.py), with the bodies' rows in ``_body`` (m, slots)."""
+        others = group.functions.copy()
+        for column in range(len(group.type_info.layout.functions), others.shape[1]):
+            for slot in range(self._slots):  # bodies of vectors of no slot
+                same = group.functions[:, column] == group.bodies[:, slot]
+                others[same, column] = rows[same, slot]
+        place = np.arange(self.count)[:, None]
+        blocks = 6 * self.row_count * (place * self._slots + np.arange(self._slots))
+        idx: Integers = np.hstack([rows, others, place * self.row_count, blocks])
+        assert idx.shape[1] == stride(group.type_info)
+        return idx
 
     def place(self, pose: Pose, base: Pose | None = None) -> None:
         """Set the poses of bodies i relative to bodies j (m), of which ``base`` are the poses."""
@@ -75,7 +76,7 @@ class JointRows:
         base = Pose(np.where(held, ground.r, base.r), np.where(held, ground.p, base.p))
         for slot, at in enumerate((compose(base, pose), base)[: self._slots]):
             rows = self._body[1 + m * slot : 1 + m * (slot + 1)]
-            rows[:, 0:3], rows[:, P : P + 4] = at.r, at.p
+            rows[:, R : R + 3], rows[:, P : P + 4] = at.r, at.p
             rows[:, A : A + 9] = rotation(at.p).reshape(m, 9)
 
     def count_turns(self) -> None:
@@ -98,5 +99,6 @@ class JointRows:
         turn = self._body[1 : 1 + self.count, A : A + 9].reshape(-1, 3, 3)
         return np.concatenate([self.length * (J[:, :, :3] @ turn), J[:, :, 3:] @ turn], axis=-1)
 
+    @np.errstate(all="ignore")  # as compiled code: numbers are looked at afterwards
     def _call(self, loop: int) -> None:
         call_loop(self._loops, loop, 0.0, self._arrays, self._group, *self._out)

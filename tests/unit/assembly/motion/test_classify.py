@@ -27,6 +27,10 @@ JOINTS = {
         [("translation", "j", "n_j"), ("translation", "j", "m_j"), ("rotation", "j", "a_j")],
     ),
     "pin-in-slot": (BETWEEN, [("translation", "j", "a_j"), ("rotation", "i", "a_i")]),
+    "sleeve": (
+        BETWEEN,
+        [("translation", "j", "a_j"), ("rotation", "j", "a_j"), ("rotation", "i", "a_i")],
+    ),
     "two-hinges": (BETWEEN, [("rotation", "j", "a_j"), ("rotation", "i", "a_i")]),
 }
 
@@ -66,6 +70,7 @@ def test_motion_keeps_the_constraints(keyword, on_ground):
 REFUSED = {
     "sph-sph": ({"P_i": "P_i", "P_j": "P_j"}, "its 1 row costs less than 5 joint coordinates"),
     "parabola": (BETWEEN | {"b_i": "b_i"}, NOT_CONSTANT),
+    "trolley": (BETWEEN, NOT_CONSTANT),  # its pin is fixed in neither of the two bodies
     "repeated-row": (BETWEEN, DEPENDENT),
     "upright": (BETWEEN, NOT_INVARIANT),
     "rising": (BETWEEN, ON_TIME),

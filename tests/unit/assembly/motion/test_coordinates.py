@@ -14,11 +14,13 @@ from dap3d_core.assembly.motion.coordinates import (
 )
 from dap3d_core.model.rigid_motion import Pose, compose, inverse, relative, rotation_vector
 from dap3d_core.model.rotations import to_body
+from dap3d_core.model.state_layout import split
 from dap3d_core.simulation import CompiledModel
 
 #: Joints with one factor and with two, axes parallel and not.
 JOINTS = STANDARD | dict.fromkeys(("planar", "pin-in-slot", "two-hinges"), BETWEEN)
 JOINTS["screw"] = BETWEEN | {"pitch": -0.4}
+JOINTS["sleeve"] = BETWEEN
 
 
 def motion_of(keyword):
@@ -93,3 +95,24 @@ def test_turns_are_counted_between_instants_far_apart():
     q, q_dot = joint_coordinates(motion, 1.7 * t, r, p, v / 1.7, w / 1.7)
     np.testing.assert_allclose(q[:, 0, 0], angle, atol=1e-13)
     np.testing.assert_allclose(q_dot[:, 0, 0], rate / 1.7, atol=1e-13)
+
+
+def test_a_fixed_joint_has_no_coordinates():
+    compiled = compiled_pair("fix", {"body_i": "body"})
+    motion = classify(compiled.model).of(0)
+    r, p, v, w = (x[None] for x in split(compiled.model.u0))
+    q, q_dot = joint_coordinates(motion, [0.0], r, p, v, w)
+    assert (motion.size, q.shape, q_dot.shape) == (0, (1, 1, 0), (1, 1, 0))
+    np.testing.assert_allclose(motion.pose(np.zeros((1, 0))).r[0], r[0, 0], atol=1e-15)
+
+
+def test_coordinates_are_zero_in_the_reference_poses():
+    """Those of the scene, or of a state that is given: there they are those from the scene."""
+    compiled = compiled_pair("rev", STANDARD["rev"], on_ground=True)
+    scene = classify(compiled.model).of(0)
+    turned = scene.pose(np.array([[0.8]]))
+    u = np.concatenate([turned.r[0], turned.p[0], np.zeros(6)])
+    given = classify(compiled.model, u).of(0)
+    np.testing.assert_allclose(coordinates(scene, scene.start), [[0.0]], atol=1e-15)
+    np.testing.assert_allclose(coordinates(scene, given.start), [[0.8]], atol=1e-14)
+    np.testing.assert_allclose(coordinates(given, scene.start), [[-0.8]], atol=1e-14)
