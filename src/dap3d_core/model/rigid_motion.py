@@ -11,8 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.model.rotations import rotation, to_body, to_global
-
 Floats = NDArray[np.float64]
 
 
@@ -23,14 +21,43 @@ class Pose(NamedTuple):
     p: Floats
 
 
+def cross(a: Floats, b: Floats) -> Floats:
+    """Vector products (..., 3); of few vectors in half the time of numpy's."""
+    x = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    x[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    x[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    x[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return x
+
+
 def quaternion_product(a: Floats, b: Floats) -> Floats:
     """The quaternion products a o b of arrays (..., 4)."""
-    a, b = np.broadcast_arrays(a, b)
     u, v = a[..., 1:], b[..., 1:]
-    scalar = a[..., 0] * b[..., 0] - np.sum(u * v, axis=-1)
-    vector = a[..., :1] * v + b[..., :1] * u + np.cross(u, v)
-    product: Floats = np.concatenate([scalar[..., None], vector], axis=-1)
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    product[..., 0] = a[..., 0] * b[..., 0] - np.sum(u * v, axis=-1)
+    product[..., 1:] = a[..., :1] * v + b[..., :1] * u + cross(u, v)
     return product
+
+
+def turned(p: Floats, a: Floats) -> Floats:
+    """Vectors A a (..., 3) of unit Euler parameters p (..., 4)."""
+    e = p[..., 1:]
+    half = cross(e, a)
+    vectors: Floats = a + 2.0 * (p[..., :1] * half + cross(e, half))
+    return vectors
+
+
+def matrices(p: Floats) -> Floats:
+    """Rotation matrices (..., 3, 3) of unit Euler parameters (..., 4)."""
+    e0, e1, e2, e3 = p[..., 0], p[..., 1], p[..., 2], p[..., 3]
+    A = np.empty((*p.shape[:-1], 3, 3))
+    A[..., 0, 0] = 1.0 - 2.0 * (e2 * e2 + e3 * e3)
+    A[..., 1, 1] = 1.0 - 2.0 * (e1 * e1 + e3 * e3)
+    A[..., 2, 2] = 1.0 - 2.0 * (e1 * e1 + e2 * e2)
+    for r, c, product, other in ((0, 1, e1 * e2, e3), (1, 2, e2 * e3, e1), (2, 0, e1 * e3, e2)):
+        turn = e0 * other
+        A[..., r, c], A[..., c, r] = 2.0 * (product - turn), 2.0 * (product + turn)
+    return A
 
 
 def identity(count: int) -> Pose:
@@ -41,13 +68,13 @@ def identity(count: int) -> Pose:
 def compose(a: Pose, b: Pose) -> Pose:
     """The poses a b: b is given in the axes of a."""
     p = quaternion_product(a.p, b.p)
-    return Pose(a.r + to_global(a.p, b.r), p / np.linalg.norm(p, axis=-1, keepdims=True))
+    return Pose(a.r + turned(a.p, b.r), p / np.sqrt(np.sum(p * p, axis=-1, keepdims=True)))
 
 
 def inverse(a: Pose) -> Pose:
     """The poses of the outer frames in the inner ones."""
     p = a.p * np.array([1.0, -1.0, -1.0, -1.0])
-    return Pose(-to_body(a.p, a.r), p)
+    return Pose(-turned(p, a.r), p)
 
 
 def relative(a: Pose, b: Pose) -> Pose:
@@ -58,14 +85,14 @@ def relative(a: Pose, b: Pose) -> Pose:
 def exponential(twist: Floats) -> Pose:
     """The poses that constant twists (..., 6) lead to in a unit of time."""
     v, w = twist[..., :3], twist[..., 3:]
-    angle = np.linalg.norm(w, axis=-1, keepdims=True)
-    half = 0.5 * np.sinc(angle / (2.0 * np.pi))  # sin(angle / 2) / angle
+    angle = np.sqrt(np.sum(w * w, axis=-1, keepdims=True))
+    safe = np.where(angle > 0.0, angle, 1.0)
+    half = np.where(angle > 0.0, np.sin(0.5 * angle) / safe, 0.5)
     p = np.concatenate([np.cos(0.5 * angle), half * w], axis=-1)
     # (angle - sin angle) / angle^3: what it loses to rounding, its factor w x (w x v) makes small
-    sine = np.sinc(angle / np.pi)
-    third = (1.0 - sine) / np.where(angle > 0.0, angle, 1.0) ** 2
-    across = np.cross(w, v)
-    return Pose(v + 2.0 * half**2 * across + third * np.cross(w, across), p)
+    third = (1.0 - 2.0 * half * np.cos(0.5 * angle)) / safe**2
+    across = cross(w, v)
+    return Pose(v + 2.0 * half**2 * across + third * cross(w, across), p)
 
 
 def rotation_vector(p: Floats) -> Floats:
@@ -86,7 +113,7 @@ def skew(a: Floats) -> Floats:
 
 def adjoint(a: Pose) -> Floats:
     """(..., 6, 6) matrices from twists in the inner frames to the same in the outer ones."""
-    A = rotation(a.p)
+    A = matrices(a.p)
     matrix = np.zeros((*A.shape[:-2], 6, 6))
     matrix[..., :3, :3] = matrix[..., 3:, 3:] = A
     matrix[..., :3, 3:] = skew(a.r) @ A

@@ -8,13 +8,16 @@ from dap3d_core.model.rigid_motion import (
     Pose,
     adjoint,
     compose,
+    cross,
     exponential,
     inverse,
+    matrices,
     relative,
     rotation_vector,
     skew,
+    turned,
 )
-from dap3d_core.model.rotations import rotation
+from dap3d_core.model.rotations import rotation, to_global
 
 
 def matrix(pose):
@@ -41,6 +44,15 @@ def test_exponential_is_that_of_the_matrix(size):
         np.testing.assert_allclose(
             matrix(exponential(twist)), expm(twist_matrix(twist)), atol=1e-14 * (1.0 + size)
         )
+
+
+def test_products_of_vectors_and_matrices_of_quaternions():
+    """As numpy's, and as those of any Euler parameters; of one with many, too."""
+    a, b = np.random.default_rng(5).normal(size=(2, 4, 1, 3))
+    np.testing.assert_allclose(cross(a, b.reshape(1, 4, 3)), np.cross(a, b.reshape(1, 4, 3)))
+    p = exponential(np.random.default_rng(6).normal(size=(4, 6))).p
+    np.testing.assert_allclose(matrices(p), rotation(p), atol=1e-15)
+    np.testing.assert_allclose(turned(p, a[:, 0]), to_global(p, a[:, 0]), atol=1e-14)
 
 
 def test_adjoint_carries_twists():

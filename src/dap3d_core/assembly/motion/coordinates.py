@@ -18,6 +18,7 @@ from dap3d_core.model.rigid_motion import (
     Pose,
     adjoint,
     compose,
+    cross,
     exponential,
     identity,
     inverse,
@@ -81,7 +82,7 @@ def relative_motion(
     r_i, r_j, v_i, v_j, w_i, w_j = (_of(x, bodies) for x in (r, v, w) for bodies in (i, j))
     p_i, p_j = (_of(p, bodies, (1.0, 0.0, 0.0, 0.0)) for bodies in (i, j))
     arm = r_i - r_j
-    v_rel = to_body(p_i, v_i - v_j - np.cross(w_j, arm))
+    v_rel = to_body(p_i, v_i - v_j - cross(w_j, arm))
     return relative(Pose(r_j, p_j), Pose(r_i, p_i)), np.concatenate(
         [v_rel, to_body(p_i, w_i - w_j)], axis=-1
     )
@@ -134,7 +135,7 @@ def _principal(angle: Floats) -> Floats:
 def _angle_about(u: Floats, v: Floats, axis: Floats) -> Floats:
     """Angles in (-pi, pi] from u to v about axes, of vectors (..., m, 3)."""
     along_u, along_v = np.sum(u * axis, axis=-1), np.sum(v * axis, axis=-1)
-    sine = np.sum(axis * np.cross(u, v), axis=-1)
+    sine = np.sum(axis * cross(u, v), axis=-1)
     angle: Floats = np.arctan2(sine, np.sum(u * v, axis=-1) - along_u * along_v)
     return angle
 
@@ -143,9 +144,9 @@ def _two_angles(motion: JointMotions, gone: Pose, one: int, two: int) -> tuple[F
     """The angles about two axes, of which the second one goes along with the first."""
     first, second = motion.screws[:, one], motion.screws[:, two]
     w, u = first[:, 3:], second[:, 3:]
-    across = np.linalg.norm(np.cross(w, u), axis=-1)
+    across = np.linalg.norm(cross(w, u), axis=-1)
     angle: Floats = _angle_about(u, to_global(gone.p, u), w)
-    centre, moved = np.cross(w, first[:, :3]), np.cross(u, second[:, :3])
+    centre, moved = cross(w, first[:, :3]), cross(u, second[:, :3])
     carried = gone.r + to_global(gone.p, moved)  # no rotation about the second axis moves it
     about = _angle_about(moved - centre, carried - centre, w)
     angle = np.where(across > PARALLEL, angle, about)
@@ -186,8 +187,8 @@ def _vector_rate(vector: Floats, w: Floats) -> Floats:
     safe = np.where(half > 1e-4, half, 1.0)
     # (1 - half cot half) / (2 half)^2, which begins with 1/12
     factor = np.where(half > 1e-4, (1.0 - safe / np.tan(safe)) / (4.0 * safe**2), 1.0 / 12.0)
-    across = np.cross(vector, w)
-    rate: Floats = w + 0.5 * across + factor * np.cross(vector, across)
+    across = cross(vector, w)
+    rate: Floats = w + 0.5 * across + factor * cross(vector, across)
     return rate
 
 

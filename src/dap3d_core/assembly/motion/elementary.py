@@ -46,7 +46,6 @@ def elementary(spaces: Floats) -> Iterator[Elementary]:
         yield Elementary(every, (), np.zeros((m, 0, 6)))
         return
     _, size, directions = np.linalg.svd(spaces[:, 3:])
-    size = np.pad(size, ((0, 0), (0, max(3 - d, 0))))
     turning = np.sum(size > ZERO, axis=1)
     # columns in the order of their rotation: those behind ``turning`` are translations
     sorted_ = np.einsum("mab,mcb->mca", spaces, directions)

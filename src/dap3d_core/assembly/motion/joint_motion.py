@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
-from dap3d_core.model.rigid_motion import Pose, adjoint, compose, exponential, inverse
+from dap3d_core.model.rigid_motion import Pose, adjoint, compose, cross, exponential, inverse
 
 #: Kinds of the parts of a motion: about an axis, along one, both in a fixed ratio, about a point.
 ROTATION, TRANSLATION, SCREW, BALL = "rotation", "translation", "screw", "ball"
@@ -86,7 +86,7 @@ class JointMotions:
     def point(self, part: int) -> Floats:
         """(m, 3) the point of a part's axis next to the mass centre of body i, or its centre."""
         twist = self.screws[:, self.columns[part]]
-        arms: Floats = np.sum(np.cross(twist[..., 3:], twist[..., :3]), axis=1)
+        arms: Floats = np.sum(cross(twist[..., 3:], twist[..., :3]), axis=1)
         arms *= 0.5 if self.parts[part].kind == BALL else 1.0
         return arms
 

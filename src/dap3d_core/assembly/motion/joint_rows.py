@@ -8,8 +8,7 @@ from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, R
 from dap3d_core.model.groups import Group
-from dap3d_core.model.rigid_motion import Pose, compose, identity
-from dap3d_core.model.rotations import rotation
+from dap3d_core.model.rigid_motion import Pose, compose, identity, matrices
 
 #: The loops in the list: C; J; the angles whose turns are counted.
 POSITION, ACCELERATION, ANGLE = range(3)
@@ -77,7 +76,7 @@ class JointRows:
         for slot, at in enumerate((compose(base, pose), base)[: self._slots]):
             rows = self._body[1 + m * slot : 1 + m * (slot + 1)]
             rows[:, R : R + 3], rows[:, P : P + 4] = at.r, at.p
-            rows[:, A : A + 9] = rotation(at.p).reshape(m, 9)
+            rows[:, A : A + 9] = matrices(at.p).reshape(m, 9)
 
     def count_turns(self) -> None:
         """Count the turns of angles from the poses set last."""

@@ -9,7 +9,7 @@ from dap3d_core.assembly.arrays import Floats
 from dap3d_core.assembly.motion.joint_motion import BALL, ROTATION, TRANSLATION, Part
 from dap3d_core.interface.fields import slot_of, specs_of
 from dap3d_core.model import Group
-from dap3d_core.model.rigid_motion import Pose
+from dap3d_core.model.rigid_motion import Pose, cross
 from dap3d_core.model.rotations import to_body, to_global
 
 #: Sine of the angle of two directions, and distance in units of the scene's length, that are one.
@@ -84,7 +84,7 @@ class NamedAxes:
             names += self._turn_translations(screws[:, :shifts, :3])
         if kinds[shifts:] == (BALL,):
             name, centre = self._through(0.5 * _feet(screws).sum(axis=1), np.zeros((1, 3)))
-            screws[..., :3] = np.cross(centre[:, None], screws[..., 3:])
+            screws[..., :3] = cross(centre[:, None], screws[..., 3:])
             names.append(name)
         elif kinds[shifts:]:
             name, screws[:, shifts] = self._about(kinds[shifts], screws[:, shifts])
@@ -98,7 +98,7 @@ class NamedAxes:
         Their numbers are those of a vector of body i, which are constant there; where none is along
         them, the sense is that of the largest component.
         """
-        matches = [named for named in self.vectors if _are_small(np.cross(named.value, axis), SAME)]
+        matches = [named for named in self.vectors if _are_small(cross(named.value, axis), SAME)]
         if not matches:
             seen = to_global(self._seen, axis)
             largest = np.take_along_axis(seen, np.argmax(np.abs(seen), axis=-1)[:, None], axis=-1)
@@ -121,7 +121,7 @@ class NamedAxes:
         pitch = np.sum(screw[:, :3] * screw[:, 3:], axis=-1, keepdims=True)
         name, axis = self._along(screw[:, 3:])
         _, centre = self._through(_feet(screw), axis)
-        v = np.cross(centre, axis)
+        v = cross(centre, axis)
         if kind != ROTATION:
             v = v + pitch * axis
         return name, np.concatenate([v, axis], axis=-1)
@@ -166,7 +166,7 @@ def _fixed(group: Group, kind: str) -> Iterator[tuple[str, str, Floats]]:
 
 def _feet(screws: Floats) -> Floats:
     """Points (..., 3) on the axes of unit twists (..., 6), next to the origin."""
-    feet: Floats = np.cross(screws[..., 3:], screws[..., :3])
+    feet: Floats = cross(screws[..., 3:], screws[..., :3])
     return feet
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from dap3d_core.assembly.arrays import Integers
 from dap3d_core.interface.codegen.kernel_arguments import DERIVATIVES
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.model import Group
@@ -45,9 +46,11 @@ def refused_joints(group: Group) -> dict[int, str]:
     return reasons | dict.fromkeys(group.members[_depends_on_time(group)].tolist(), ON_TIME)
 
 
-def two_bodies(group: Group) -> Any:
+def two_bodies(group: Group) -> Integers:
     """(m, 2) the bodies of the two slots; ground where a type has one."""
-    return np.pad(group.bodies, ((0, 0), (0, 2 - group.bodies.shape[1])))
+    bodies = np.zeros((group.count, 2), dtype=np.int64)
+    bodies[:, : group.bodies.shape[1]] = group.bodies
+    return bodies
 
 
 def two_slots(group: Group) -> tuple[str, str]:
