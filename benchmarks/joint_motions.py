@@ -1,4 +1,4 @@
-"""How long it takes to find the motions of joints from their C and J: chains of 10 000 joints.
+"""Time to find the motions of joints from their C and J: chains of 10 000 joints.
 
 Points, axes and orientations are drawn at random; every joint is closed, as in an assembled scene.
 The mark is 50 us a joint, CPU time of the thread, least of some runs.

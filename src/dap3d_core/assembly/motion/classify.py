@@ -1,4 +1,4 @@
-"""Which joints of a model have a motion about constant axes, from their C and J alone.
+"""Motions of joints about constant axes, from their C and J alone.
 
 N, the null space of J for body i in the axes of that body, holds the twists that a joint leaves
 free. Where N is constant, T0 exp(N q) satisfies C = 0: revolute, translational, cylindrical, planar

@@ -1,6 +1,7 @@
 """The motion that a joint type leaves free, found for random joints of it."""
 
 import random
+from itertools import islice
 
 import numpy as np
 
@@ -8,7 +9,6 @@ from dap3d_core.assembly.motion.classify import classify_group
 from dap3d_core.assembly.motion.joint_motion import JointMotions
 from dap3d_core.assembly.motion.refusals import (
     NOT_CLOSED,
-    NOT_CONSTANT,
     ON_TIME,
     refusal_of,
     refused_joints,
@@ -25,6 +25,7 @@ from dap3d_core.testing.samples.sampled_type import UNDEFINED, SampledType
 
 #: Random joints that must agree, and the most that are drawn to find so many.
 JOINTS, DRAWN = 3, 24
+DIFFERENT = "its motion is another for other values of its fields"
 
 
 def motion_of_type(subject: SampledType) -> TypeMotion:
@@ -36,25 +37,26 @@ def motion_of_type(subject: SampledType) -> TypeMotion:
         PluginError: the kernels of the type cannot be compiled.
     """
     reason = refusal_of(subject.type_info)
-    if reason and subject.type.drives and not subject.type.velocity_rows():
-        reason = ON_TIME
-    found: list[tuple[JointMotions | None, str]] = []
+    if reason:
+        drives = subject.type.drives and not subject.type.velocity_rows()
+        return _refused(subject, ON_TIME if drives else reason)
     rng = random.Random(f"{subject.seed} {subject.type.__qualname__} motion")
-    for _ in range(DRAWN):
-        if reason or len(found) == JOINTS:
-            break
-        verdict = _verdict(subject, rng)
-        if verdict is not None:
-            found.append(verdict)
-    reasons = {why for _, why in found} or {reason or NOT_CLOSED}
+    drawn = (_verdict(subject, rng) for _ in range(DRAWN))
+    found = list(islice((verdict for verdict in drawn if verdict is not None), JOINTS))
     motions = [motion for motion, _ in found if motion is not None]
-    if len(motions) < len(found) or not found or len({motion.parts for motion in motions}) > 1:
-        why = next(iter(reasons)) if len(reasons) == 1 else NOT_CONSTANT
-        return TypeMotion(subject.variant, f"refused: {why}", None)
-    axes = [axis_words(motion) for motion in motions]
-    common = [of[0] if len(set(of)) == 1 else "" for of in zip(*axes, strict=True)]
+    reasons = {reason for _, reason in found}
+    if not motions:
+        return _refused(subject, reasons.pop() if len(reasons) == 1 else NOT_CLOSED)
     parts = motions[0].parts
+    if len(motions) < len(found) or any(motion.parts != parts for motion in motions):
+        return _refused(subject, DIFFERENT)
+    axes = zip(*map(axis_words, motions), strict=True)
+    common = [words[0] if len(set(words)) == 1 else "" for words in axes]
     return TypeMotion(subject.variant, motion_words(parts, common), parts)
+
+
+def _refused(subject: SampledType, reason: str) -> TypeMotion:
+    return TypeMotion(subject.variant, f"refused: {reason}", None)
 
 
 def _verdict(subject: SampledType, rng: random.Random) -> tuple[JointMotions | None, str] | None:

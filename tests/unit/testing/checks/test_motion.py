@@ -13,9 +13,9 @@ from support.joint_types import (
     Upright,
 )
 
-from dap3d_core.interface import Joint, Point, point
+from dap3d_core.interface import Joint, Point, choice, point
 from dap3d_core.interface.examine.examine import examine
-from dap3d_core.kernels import sub
+from dap3d_core.kernels import dot, sub
 from dap3d_core.registry import load_registry
 from dap3d_core.testing import check_type
 from dap3d_core.testing.kit import type_motions
@@ -100,3 +100,23 @@ class Undefined(Joint):
 def test_a_joint_that_cannot_be_closed_is_refused_and_reported():
     (motion,) = type_motions(examine(Undefined))
     assert motion.words == "refused: no pose with C = 0 was found from the one given"
+
+
+class Either(Planar):
+    """A ball on a plane, or in a socket: a field says which."""
+
+    keyword = "either"
+    held: str = choice(("plane", "socket"))
+
+    def prepare(self, bodies):
+        return super().prepare(bodies) | {"socket": float(self.held == "socket")}
+
+    def C(r_P_i, r_P_j, a_i, a_j, n_j, m_j, socket):
+        d = sub(r_P_i, r_P_j)
+        plane = (dot(a_j, d), dot(a_i, n_j), dot(a_i, m_j))
+        return tuple(socket * x + (1.0 - socket) * y for x, y in zip(d, plane, strict=True))
+
+
+def test_a_type_of_several_motions_is_refused():
+    (motion,) = type_motions(examine(Either))
+    assert motion.words == "refused: its motion is another for other values of its fields"
