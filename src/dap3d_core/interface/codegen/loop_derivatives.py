@@ -1,0 +1,235 @@
+"""Derivatives of what a group loop computes, by the bodies of each instance.
+
+The loop of a type runs once, as plain Python, with dual numbers (kernels/dual_numbers.py) in place
+of the numbers of all its instances at once. Nothing is compiled, and any type has derivatives, a
+third party's too, exact to rounding. Twelve directions for each body an instance reads: its
+displacement, its rotation vector (global axes), its velocity, its angular velocity (global axes).
+"""
+
+from types import SimpleNamespace
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.loop_source import stride, write
+from dap3d_core.kernels.dual_numbers import Dual, DualFunctions
+from dap3d_core.kernels.runtime import generated_modules
+from dap3d_core.kernels.runtime.loop_modules import Loop, source_of
+from dap3d_core.kernels.runtime.loop_support import A, P, R, V, W
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Directions of a body: r, rotation vector, r_dot, omega.
+DIRECTIONS = 12
+
+
+@attrs.frozen(eq=False)
+class LoopDerivatives:
+    """What the loop of a type computes for its m instances, and its derivatives.
+
+    Attributes:
+        bodies: (m, places) bodies that an instance reads; the first ones are its slots.
+        outputs: kernel -> its values (m, ...) and derivatives (m, ..., d), with
+            d = 12 places, then one for each multiplier of a joint with friction.
+    """
+
+    bodies: Integers
+    outputs: dict[str, tuple[Floats, Floats]]
+
+
+@attrs.frozen(eq=False)
+class _Column:
+    """A column of the integers of all instances, scaled and shifted: an index of a loop."""
+
+    column: int
+    factor: int = 1
+    shift: int = 0
+
+    def __add__(self, k: int) -> "_Column":
+        return attrs.evolve(self, shift=self.shift + k)
+
+    def __mul__(self, k: int) -> "_Column":
+        return _Column(self.column, self.factor * k, self.shift * k)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+class _Integers:
+    """The integers of an instance."""
+
+    def __getitem__(self, k: int) -> _Column:
+        return _Column(k)
+
+
+class _Numbers:
+    """The numbers of all instances; ``flat`` holds those of all groups, tables as well."""
+
+    tracer = DualFunctions()
+
+    def __init__(self, flat: Floats, p0: int, count: int, width: int) -> None:
+        self.flat, self.own = flat, flat[p0 : p0 + count * width].reshape(count, width)
+
+    def __getitem__(self, k: Any) -> Dual:
+        if isinstance(k, np.ndarray):
+            return Dual(self.flat[k][:, None])
+        return Dual(self.own[:, k : k + 1])
+
+
+class _Bodies:
+    """The rows of the bodies of all instances, with their derivatives by the bodies' motion."""
+
+    def __init__(self, body: Floats, idx: Integers, places: list[int], directions: int) -> None:
+        self.rows = {column: body[idx[:, column]] for column in places}
+        self.place = {column: n for n, column in enumerate(places)}
+        self.directions = directions
+
+    def __getitem__(self, key: tuple[_Column, int]) -> Dual:
+        column, k = key[0].column, key[1]
+        rows = self.rows[column]
+        mine = _by_motion(rows, k)
+        if mine is None:
+            return Dual(rows[:, k : k + 1])
+        slope = np.zeros((len(rows), self.directions))
+        first = DIRECTIONS * self.place[column]
+        slope[:, first : first + DIRECTIONS] = mine
+        return Dual(rows[:, k : k + 1], slope)
+
+
+def _by_motion(rows: Floats, k: int) -> Floats | None:
+    """(m, 12) derivatives of column k of body rows; None where it is constant."""
+    slope = np.zeros((len(rows), DIRECTIONS))
+    if R <= k < R + 3:
+        slope[:, k - R] = 1.0
+    elif A <= k < A + 9:  # e x a, with a a column of A
+        row, column = divmod(k - A, 3)
+        i, j = (row + 1) % 3, (row + 2) % 3
+        slope[:, 3 + i] = rows[:, A + 3 * j + column]
+        slope[:, 3 + j] = -rows[:, A + 3 * i + column]
+    elif V <= k < V + 3:
+        slope[:, 6 + k - V] = 1.0
+    elif W <= k < W + 3:
+        slope[:, 9 + k - W] = 1.0
+    elif k == P:  # half (0, e) times p
+        slope[:, 3:6] = -0.5 * rows[:, P + 1 : P + 4]
+    elif P < k < P + 4:
+        row = k - P - 1
+        i, j = (row + 1) % 3, (row + 2) % 3
+        slope[:, 3 + row] = 0.5 * rows[:, P]
+        slope[:, 3 + i] = 0.5 * rows[:, P + 1 + j]
+        slope[:, 3 + j] = -0.5 * rows[:, P + 1 + i]
+    else:
+        return None
+    return slope
+
+
+class _Functions:
+    """Functions of time, as they stand at the time of the evaluation."""
+
+    def __init__(self, F: Floats, idx: Integers) -> None:
+        self.F, self.idx = F, idx
+
+    def __getitem__(self, key: tuple[_Column, int]) -> Dual:
+        return Dual(self.F[self.idx[:, key[0].column], key[1]][:, None])
+
+
+class _Outputs:
+    """An array that a loop writes to, or from which friction reads -lambda."""
+
+    def __init__(self, read: Any = None) -> None:
+        self.values: dict[tuple[int, int], Any] = {}
+        self.read = read
+
+    def __getitem__(self, k: _Column) -> Any:
+        return self.read(k) if self.read is not None else self.values.get((k.column, k.shift), 0.0)
+
+    def __setitem__(self, k: _Column, x: Any) -> None:
+        self.values[k.column, k.shift] = x
+
+
+def differentiate_loop(
+    examined: Examined,
+    what: str,
+    t: float,
+    arrays: Any,
+    group: tuple[int, int, int],
+    multipliers: Floats | None = None,
+) -> LoopDerivatives:
+    """Values and derivatives of what a group loop computes.
+
+    Args:
+        examined: the type.
+        what: "wrench", "friction" or "acceleration" (J, gamma, nu).
+        t: time, s.
+        arrays: with ``body``, ``F``, ``idx`` and ``par``, as the compiled loops read them.
+        group: first integer in ``idx``, first number in ``par``, number of instances.
+        multipliers: (row_size,) -lambda, for friction.
+
+    Returns:
+        by kernel: "wrench" or "friction" (m, slots, 6), force and moment about the mass centre;
+        "J" (m, slots, rows, 6); "gamma", "nu" (m, rows).
+    """
+    loop = write(examined, what)
+    assert loop is not None
+    layout, (i0, p0, count), width = examined.layout, group, stride(examined)
+    idx = arrays.idx[i0 : i0 + count * width].reshape(count, width)
+    slots = len(layout.slots)
+    first = slots + len(layout.functions)
+    places = [*range(slots), *range(first, first + len(layout.others))]
+    rows = int(getattr(examined.type, "rows", 0))
+    directions = DIRECTIONS * len(places) + (rows if what == "friction" else 0)
+
+    def minus_lambda(k: _Column) -> Dual:
+        slope = np.zeros((count, directions))
+        slope[:, DIRECTIONS * len(places) + k.shift] = -1.0
+        assert multipliers is not None
+        return Dual(multipliers[idx[:, k.column] + k.shift][:, None], slope)
+
+    outputs = [_Outputs(), _Outputs(minus_lambda if what == "friction" else None), _Outputs()]
+    loop_arrays = SimpleNamespace(
+        body=_Bodies(arrays.body, idx, places, directions),
+        F=_Functions(arrays.F, idx),
+        idx=_Integers(),
+        par=_Numbers(arrays.par, p0, count, layout.par_width),
+    )
+    _run(loop, t, loop_arrays, outputs)
+    bodies = np.ascontiguousarray(idx[:, places])
+    if what != "acceleration":
+        wrench = _gathered(outputs[0], list(range(slots)), 6, count, directions)
+        return LoopDerivatives(bodies, {what: wrench})
+    row = layout.integers
+    blocks = list(range(row + 1, row + 1 + slots))
+    J, J_slope = _gathered(outputs[0], blocks, 6 * rows, count, directions)
+    shape = (count, slots, rows, 6)
+    results = {"J": (J.reshape(shape), J_slope.reshape(*shape, directions))}
+    for name, output in (("gamma", outputs[1]), ("nu", outputs[2])):
+        value, slope = _gathered(output, [row], rows, count, directions)
+        results[name] = value[:, 0], slope[:, 0]
+    return LoopDerivatives(bodies, results)
+
+
+def _run(loop: Loop, t: float, arrays: SimpleNamespace, outputs: list[_Outputs]) -> None:
+    """Run a loop once, as plain Python, for all instances at once."""
+    namespace = generated_modules.load(None, f"derivatives of {loop.name}", source_of(loop))
+    namespace |= loop.kernels | {"range": lambda count: [0]}
+    with np.errstate(all="ignore"):
+        namespace["loop"](t, arrays, 0, 0, 1, *outputs)
+
+
+def _gathered(
+    output: _Outputs, columns: list[int], size: int, count: int, directions: int
+) -> tuple[Floats, Floats]:
+    """Values (m, columns, size) and derivatives (..., d) that a loop wrote."""
+    value = np.zeros((count, len(columns), size))
+    slope = np.zeros((count, len(columns), size, directions))
+    for (column, shift), x in output.values.items():
+        n = columns.index(column)
+        if isinstance(x, Dual):
+            value[:, n, shift] = np.broadcast_to(x.value, (count, 1))[:, 0]
+            slope[:, n, shift] = 0.0 if x.slope is None else x.slope
+        else:
+            value[:, n, shift] = x
+    return value, slope

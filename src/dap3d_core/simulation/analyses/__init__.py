@@ -1,0 +1,1 @@
+"""Analyses of a scene other than its simulation, one file or folder each."""

@@ -1,0 +1,144 @@
+"""Derivatives of the equations of motion of every registered type against differences."""
+
+import numpy as np
+import pytest
+from support.motions import Motion
+from support.scenes import case_names, cases, scene_for
+
+from dap3d_core.assembly.arrays import FRICTION
+from dap3d_core.assembly.evaluate import call_kinds
+from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.model import build_model
+from dap3d_core.model.rotations import rotation
+from dap3d_core.model.state_layout import join, split
+from dap3d_core.registry import load_registry
+from dap3d_core.scene import check as checked
+from dap3d_core.simulation.analyses.tangent import tangent_matrices
+
+REGISTRY = load_registry()
+FORCES = [case for case in cases(REGISTRY, "force") if case[0] != "friction"]
+JOINTS = cases(REGISTRY, "joint")
+#: Sixth-order central differences: abscissae, weights.
+STENCIL = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))
+
+
+def residuals(machine, t, u, lam, a):
+    """R = f + D^T lambda - M a with friction, then D v - nu, then D a - gamma."""
+    model, system = machine.model, machine.system
+    force = machine.applied_forces(t, u)
+    rows = machine.rows(t, u)
+    system.multipliers[system.row] = -lam
+    system.force[:] = 0.0
+    call_kinds(FRICTION, FRICTION, t, system, machine.loops, system.force, system.multipliers,
+               system.multipliers)  # fmt: skip
+    force = force + system.force[6:].reshape(-1, 6)
+    _, p, v, w = split(u)
+    J = rotation(p) @ model.Jp @ np.swapaxes(rotation(p), -1, -2)
+    a = a.reshape(-1, 6)
+    force[:, :3] -= model.mass[:, None] * a[:, :3]
+    force[:, 3:] -= np.einsum("nij,nj->ni", J, a[:, 3:])
+    force[:, 3:] -= np.cross(w, np.einsum("nij,nj->ni", J, w))
+    D = rows.dense()
+    v = np.hstack([v, w]).ravel()
+    return np.concatenate([force.ravel() + D.T @ lam, D @ v - rows.nu, D @ a.ravel() - rows.gamma])
+
+
+def moved(u, body, direction, step):
+    """The state with one body moved along one of its twelve directions."""
+    r, p, v, w = (x.copy() for x in split(u))
+    part = (r, p, v, w)[direction // 3]
+    if direction // 3 == 1:  # exp(theta / 2) p
+        c, s = np.cos(step / 2), np.sin(step / 2) * np.eye(3)[direction % 3]
+        e0, e = p[body, 0], p[body, 1:].copy()
+        p[body, 0], p[body, 1:] = c * e0 - s @ e, c * e + e0 * s + np.cross(s, e)
+    else:
+        part[body, direction % 3] += step
+    return join(r, p, v, w)
+
+
+def by_differences(function, u, h):
+    """(outputs, 12 n) derivatives, the first six columns of each body by displacements."""
+    columns = []
+    for body in range(len(u) // 13):
+        for direction in range(12):
+            terms = (
+                weight * (function(moved(u, body, direction, k * h))
+                          - function(moved(u, body, direction, -k * h)))
+                for k, weight in STENCIL
+            )  # fmt: skip
+            columns.append(sum(terms) / h)
+    return np.array(columns).T
+
+
+def compare(scene, tolerance=1e-9):
+    """Compare all derivatives of a scene of three bodies at a random state off the constraints.
+
+    Truncation: h^6 / 140 of seventh derivatives up to some 1e5 of the terms, with h = 2e-3 5e-14;
+    rounding: eps / h = 1e-13.
+    """
+    machine = Machine(build_model(checked(scene, REGISTRY)), "lsq")
+    u, t, n = Motion(3, np.random.default_rng(100)).u(0.1), 0.1, 18
+    rng = np.random.default_rng(1)
+    rows = machine.model.row_count
+    lam, a = rng.normal(size=rows), rng.normal(size=n)
+    machine.start(t, u)
+    tangent = tangent_matrices(machine, t, u, lam, a)
+    slopes = by_differences(lambda x: residuals(machine, t, x, lam, a), u, 2e-3)
+    slopes = slopes.reshape(-1, 3, 2, 6)
+    by_x, by_v = (slopes[:, :, k].reshape(-1, n) for k in (0, 1))
+    pairs = [
+        (tangent.f + tangent.D.T @ lam - tangent.M @ a, residuals(machine, t, u, lam, a)[:n]),
+        (-tangent.stiffness.toarray(), by_x[:n]),
+        (-tangent.damping.toarray(), by_v[:n]),
+        (tangent.velocity_by_displacement.toarray(), by_x[n : n + rows]),
+        (tangent.D.toarray(), by_v[n : n + rows]),
+        (tangent.acceleration_by_displacement.toarray(), by_x[n + rows :]),
+        (tangent.acceleration_by_velocity.toarray(), by_v[n + rows :]),
+    ]
+    for exact, difference in pairs:
+        limit = tolerance * (1.0 + np.max(np.abs(difference), initial=0.0))
+        np.testing.assert_allclose(exact, difference, rtol=0.0, atol=limit)
+    return machine, tangent, (t, u, lam, a)
+
+
+@pytest.mark.parametrize("case", JOINTS, ids=case_names(JOINTS))
+@pytest.mark.parametrize("ground", [None, "j"], ids=["body-body", "body-ground"])
+def test_joint(case, ground):
+    """Rows and reactions of a joint have their derivatives, between bodies and to ground."""
+    keyword, values = case
+    examined = REGISTRY.get("joint", keyword)
+    compare(scene_for(examined, np.random.default_rng(0), ground=ground, values=values))
+
+
+@pytest.mark.parametrize("case", FORCES, ids=case_names(FORCES))
+def test_force(case):
+    """The wrenches of a force have their derivatives."""
+    keyword, values = case
+    compare(scene_for(REGISTRY.get("force", keyword), np.random.default_rng(0), values=values))
+
+
+WITH_FRICTION = [
+    (keyword, values)
+    for keyword, values in JOINTS
+    if "friction" in REGISTRY.get("joint", keyword).chosen(values).kernels
+    or any("friction" in v.kernels for c, v in REGISTRY.get("joint", keyword).variants
+           if c == values)
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WITH_FRICTION, ids=case_names(WITH_FRICTION))
+def test_friction(case):
+    """Friction of a joint has its derivatives, those by the multipliers as well."""
+    keyword, values = case
+    scene = scene_for(REGISTRY.get("joint", keyword), np.random.default_rng(0), values=values)
+    scene.add_force("friction", joint="element", mu=0.3, v_tol=2.0, radius=0.1)
+    machine, tangent, (t, u, lam, a) = compare(scene)
+    columns = []
+    for k in range(len(lam)):
+        terms = []
+        for step in (1e-3, -1e-3):
+            other = lam + step * np.eye(len(lam))[k]
+            terms.append(residuals(machine, t, u, other, a)[:18])
+        columns.append((terms[0] - terms[1]) / 2e-3)
+    exact = (tangent.D.T + tangent.friction_by_multipliers).toarray()
+    np.testing.assert_allclose(exact, np.array(columns).T, rtol=0.0, atol=1e-6)
