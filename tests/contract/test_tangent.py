@@ -7,7 +7,7 @@ from support.scenes import case_names, cases, scene_for
 
 from dap3d_core.assembly.arrays import FRICTION
 from dap3d_core.assembly.evaluate import call_kinds
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import rotation
 from dap3d_core.model.state_layout import join, split
@@ -22,14 +22,14 @@ JOINTS = cases(REGISTRY, "joint")
 STENCIL = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))
 
 
-def residuals(machine, t, u, lam, a):
+def residuals(evaluator, t, u, lam, a):
     """R = f + D^T lambda - M a with friction, then D v - nu, then D a - gamma."""
-    model, system = machine.model, machine.system
-    force = machine.applied_forces(t, u)
-    rows = machine.rows(t, u)
+    model, system = evaluator.model, evaluator.system
+    force = evaluator.applied_forces(t, u)
+    rows = evaluator.rows(t, u)
     system.multipliers[system.row] = -lam
     system.force[:] = 0.0
-    call_kinds(FRICTION, FRICTION, t, system, machine.loops, system.force, system.multipliers,
+    call_kinds(FRICTION, FRICTION, t, system, evaluator.loops, system.force, system.multipliers,
                system.multipliers)  # fmt: skip
     force = force + system.force[6:].reshape(-1, 6)
     _, p, v, w = split(u)
@@ -76,18 +76,18 @@ def compare(scene, tolerance=1e-9):
     Truncation: h^6 / 140 of seventh derivatives up to some 1e5 of the terms, with h = 2e-3 5e-14;
     rounding: eps / h = 1e-13.
     """
-    machine = Machine(build_model(checked(scene, REGISTRY)), "lsq")
+    evaluator = Evaluator(build_model(checked(scene, REGISTRY)), "lsq")
     u, t, n = Motion(3, np.random.default_rng(100)).u(0.1), 0.1, 18
     rng = np.random.default_rng(1)
-    rows = machine.model.row_count
+    rows = evaluator.model.row_count
     lam, a = rng.normal(size=rows), rng.normal(size=n)
-    machine.start(t, u)
-    tangent = tangent_matrices(machine, t, u, lam, a)
-    slopes = by_differences(lambda x: residuals(machine, t, x, lam, a), u, 2e-3)
+    evaluator.start(t, u)
+    tangent = tangent_matrices(evaluator, t, u, lam, a)
+    slopes = by_differences(lambda x: residuals(evaluator, t, x, lam, a), u, 2e-3)
     slopes = slopes.reshape(-1, 3, 2, 6)
     by_x, by_v = (slopes[:, :, k].reshape(-1, n) for k in (0, 1))
     pairs = [
-        (tangent.f + tangent.D.T @ lam - tangent.M @ a, residuals(machine, t, u, lam, a)[:n]),
+        (tangent.f + tangent.D.T @ lam - tangent.M @ a, residuals(evaluator, t, u, lam, a)[:n]),
         (-tangent.stiffness.toarray(), by_x[:n]),
         (-tangent.damping.toarray(), by_v[:n]),
         (tangent.velocity_by_displacement.toarray(), by_x[n : n + rows]),
@@ -98,7 +98,7 @@ def compare(scene, tolerance=1e-9):
     for exact, difference in pairs:
         limit = tolerance * (1.0 + np.max(np.abs(difference), initial=0.0))
         np.testing.assert_allclose(exact, difference, rtol=0.0, atol=limit)
-    return machine, tangent, (t, u, lam, a)
+    return evaluator, tangent, (t, u, lam, a)
 
 
 @pytest.mark.parametrize("case", JOINTS, ids=case_names(JOINTS))
@@ -132,13 +132,13 @@ def test_friction(case):
     keyword, values = case
     scene = scene_for(REGISTRY.get("joint", keyword), np.random.default_rng(0), values=values)
     scene.add_force("friction", joint="element", mu=0.3, v_tol=2.0, radius=0.1)
-    machine, tangent, (t, u, lam, a) = compare(scene)
+    evaluator, tangent, (t, u, lam, a) = compare(scene)
     columns = []
     for k in range(len(lam)):
         terms = []
         for step in (1e-3, -1e-3):
             other = lam + step * np.eye(len(lam))[k]
-            terms.append(residuals(machine, t, u, other, a)[:18])
+            terms.append(residuals(evaluator, t, u, other, a)[:18])
         columns.append((terms[0] - terms[1]) / 2e-3)
     exact = (tangent.D.T + tangent.friction_by_multipliers).toarray()
     np.testing.assert_allclose(exact, np.array(columns).T, rtol=0.0, atol=1e-6)

@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.interface.codegen.examined import Examined
+from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.loop_source import stride, write
 from dap3d_core.kernels.dual_numbers import Dual, DualFunctions
 from dap3d_core.kernels.runtime import generated_modules
@@ -151,7 +151,7 @@ class _Outputs:
 
 
 def differentiate_loop(
-    examined: Examined,
+    examined: TypeInfo,
     what: str,
     t: float,
     arrays: Any,

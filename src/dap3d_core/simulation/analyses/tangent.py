@@ -21,7 +21,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.evaluator import Machine
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.loop_derivatives import LoopDerivatives, differentiate_loop
 from dap3d_core.model import Group, Model
 from dap3d_core.model.rotations import rotation
@@ -77,7 +77,7 @@ class TangentMatrices:
 
 
 def tangent_matrices(
-    evaluator: Machine,
+    evaluator: Evaluator,
     t: float,
     u: Floats,
     multipliers: Floats | None = None,
@@ -148,7 +148,7 @@ class _Assembly:
     """Adds up the derivatives of all elements."""
 
     def __init__(
-        self, evaluator: Machine, t: float, multipliers: Floats, a: Floats, u: Floats
+        self, evaluator: Evaluator, t: float, multipliers: Floats, a: Floats, u: Floats
     ) -> None:
         model: Model = evaluator.model
         self.evaluator, self.t, self.model = evaluator, t, model
