@@ -103,7 +103,7 @@ def tangent_matrices(
     rows = evaluator.rows(t, u)
     evaluator.place(t, u)
     assembly = _Assembly(evaluator, t, np.asarray(multipliers, float), np.asarray(a, float), u)
-    for loop, (kind, group) in enumerate(evaluator.what):
+    for loop, (kind, group) in enumerate(evaluator.loop_groups):
         if kind in ("wrench", "friction", "acceleration"):
             assembly.add(loop, kind, group)
     M = assembly.add_inertia(u)
