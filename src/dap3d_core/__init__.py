@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     )
     from dap3d_core.simulation import compile_scene as compile
     from dap3d_core.simulation import open_result as open
+    from dap3d_core.simulation.linearization.linearization import Linearization, linearize
     from dap3d_core.simulation.rerun import rerun
     from dap3d_core.simulation.resume import resume
     from dap3d_core.study.fit.fit import fit
@@ -42,6 +43,7 @@ _HOMES = {
     "AssemblyError": ("simulation", "AssemblyError"),
     "Event": ("simulation", "Event"),
     "Fit": ("study.fit.fit_result", "Fit"),
+    "Linearization": ("simulation.linearization.linearization", "Linearization"),
     "Parameter": ("study.fit.fit_parameters", "Parameter"),
     "PluginError": ("interface", "PluginError"),
     "RedundantError": ("simulation", "RedundantError"),
@@ -54,6 +56,7 @@ _HOMES = {
     "export": ("exchange", "export"),
     "fit": ("study.fit.fit", "fit"),
     "import_matlab": ("matlab", "import_matlab"),
+    "linearize": ("simulation.linearization.linearization", "linearize"),
     "load": ("scene", "load"),
     "load_registry": ("registry", "load_registry"),
     "open": ("simulation", "open_result"),
@@ -72,6 +75,7 @@ __all__ = [
     "AssemblyError",
     "Event",
     "Fit",
+    "Linearization",
     "Parameter",
     "PluginError",
     "RedundantError",
@@ -84,6 +88,7 @@ __all__ = [
     "export",
     "fit",
     "import_matlab",
+    "linearize",
     "load",
     "load_registry",
     "open",

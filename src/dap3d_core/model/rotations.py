@@ -53,6 +53,16 @@ def euler_rates(p: Floats, w: Floats) -> Floats:
     return rates
 
 
+def skew(a: ArrayLike) -> Floats:
+    """Skew matrices (..., 3, 3) of vectors (..., 3): skew(a) b = a x b."""
+    a = np.asarray(a, dtype=float)
+    matrices = np.zeros((*a.shape, 3))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        matrices[..., j, i], matrices[..., i, j] = a[..., k], -a[..., k]
+    return matrices
+
+
 def read_only(array: AnyArray) -> AnyArray:
     """The same array, which nobody can write to by this name from here on."""
     array.flags.writeable = False

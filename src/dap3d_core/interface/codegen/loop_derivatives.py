@@ -6,6 +6,7 @@ third party's too, exact to rounding. Twelve directions for each body an instanc
 displacement, its rotation vector (global axes), its velocity, its angular velocity (global axes).
 """
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -34,7 +35,8 @@ class LoopDerivatives:
     Attributes:
         bodies: (m, places) bodies that an instance reads; the first ones are its slots.
         outputs: kernel -> its values (m, ...) and derivatives (m, ..., d), with
-            d = 12 places, then one for each multiplier of a joint with friction.
+            d = 12 places, then one for each multiplier of a joint with friction, then one for each
+            number.
     """
 
     bodies: Integers
@@ -70,13 +72,16 @@ class _Numbers:
 
     tracer = DualFunctions()
 
-    def __init__(self, flat: Floats, p0: int, count: int, width: int) -> None:
-        self.flat, self.own = flat, flat[p0 : p0 + count * width].reshape(count, width)
+    def __init__(
+        self, flat: Floats, p0: int, shape: tuple[int, int], slopes: dict[int, Floats]
+    ) -> None:
+        self.flat, self.own = flat, flat[p0 : p0 + shape[0] * shape[1]].reshape(shape)
+        self.slopes = slopes
 
     def __getitem__(self, k: Any) -> Dual:
         if isinstance(k, np.ndarray):
             return Dual(self.flat[k][:, None])
-        return Dual(self.own[:, k : k + 1])
+        return Dual(self.own[:, k : k + 1], self.slopes.get(k))
 
 
 class _Bodies:
@@ -157,6 +162,7 @@ def differentiate_loop(
     arrays: Any,
     group: tuple[int, int, int],
     multipliers: Floats | None = None,
+    numbers: Sequence[int] = (),
 ) -> LoopDerivatives:
     """Values and derivatives of what a group loop computes.
 
@@ -167,6 +173,7 @@ def differentiate_loop(
         arrays: with ``body``, ``F``, ``idx`` and ``par``, as the compiled loops read them.
         group: first integer in ``idx``, first number in ``par``, number of instances.
         multipliers: (row_size,) -lambda, for friction.
+        numbers: indices of an instance's own numbers by which to differentiate, too.
 
     Returns:
         by kernel: "wrench" or "friction" (m, slots, 6), force and moment about the mass centre;
@@ -180,12 +187,15 @@ def differentiate_loop(
     first = slots + len(layout.functions)
     places = [*range(slots), *range(first, first + len(layout.others))]
     rows = int(getattr(examined.type, "rows", 0))
-    directions = DIRECTIONS * len(places) + (rows if what == "friction" else 0)
+    of_bodies = DIRECTIONS * len(places)
+    by_numbers = of_bodies + (rows if what == "friction" else 0)
+    directions = by_numbers + len(numbers)
+    unit = np.eye(directions)
+    slopes = {k: unit[by_numbers + n : by_numbers + n + 1] for n, k in enumerate(numbers)}
 
     def minus_lambda(k: _Column) -> Dual:
-        slope = np.zeros((count, directions))
-        slope[:, DIRECTIONS * len(places) + k.shift] = -1.0
         assert multipliers is not None
+        slope = -unit[of_bodies + k.shift : of_bodies + k.shift + 1]
         return Dual(multipliers[idx[:, k.column] + k.shift][:, None], slope)
 
     outputs = [_Outputs(), _Outputs(minus_lambda if what == "friction" else None), _Outputs()]
@@ -193,22 +203,13 @@ def differentiate_loop(
         body=_Bodies(arrays.body, idx, places, directions),
         F=_Functions(arrays.F, idx),
         idx=_Integers(),
-        par=_Numbers(arrays.par, p0, count, layout.par_width),
+        par=_Numbers(arrays.par, p0, (count, layout.par_width), slopes),
     )
     _run(loop, t, loop_arrays, outputs)
-    bodies = np.ascontiguousarray(idx[:, places])
-    if what != "acceleration":
-        wrench = _gathered(outputs[0], list(range(slots)), 6, count, directions)
-        return LoopDerivatives(bodies, {what: wrench})
-    row = layout.integers
-    blocks = list(range(row + 1, row + 1 + slots))
-    J, J_slope = _gathered(outputs[0], blocks, 6 * rows, count, directions)
-    shape = (count, slots, rows, 6)
-    results = {"J": (J.reshape(shape), J_slope.reshape(*shape, directions))}
-    for name, output in (("gamma", outputs[1]), ("nu", outputs[2])):
-        value, slope = _gathered(output, [row], rows, count, directions)
-        results[name] = value[:, 0], slope[:, 0]
-    return LoopDerivatives(bodies, results)
+    bodies, size = np.ascontiguousarray(idx[:, places]), (count, directions)
+    if what == "acceleration":
+        return LoopDerivatives(bodies, _of_joint(outputs, slots, rows, layout.integers, size))
+    return LoopDerivatives(bodies, {what: _gathered(outputs[0], list(range(slots)), 6, size)})
 
 
 def _run(loop: Loop, t: float, arrays: SimpleNamespace, outputs: list[_Outputs]) -> None:
@@ -219,12 +220,26 @@ def _run(loop: Loop, t: float, arrays: SimpleNamespace, outputs: list[_Outputs])
         namespace["loop"](t, arrays, 0, 0, 1, *outputs)
 
 
+def _of_joint(
+    outputs: list[_Outputs], slots: int, rows: int, row: int, size: tuple[int, int]
+) -> dict[str, tuple[Floats, Floats]]:
+    """What the loop of a joint wrote: J, gamma, nu; row: the column of the first row's index."""
+    J, J_slope = _gathered(outputs[0], list(range(row + 1, row + 1 + slots)), 6 * rows, size)
+    shape = (size[0], slots, rows, 6)
+    results = {"J": (J.reshape(shape), J_slope.reshape(*shape, size[1]))}
+    for name, output in (("gamma", outputs[1]), ("nu", outputs[2])):
+        value, slope = _gathered(output, [row], rows, size)
+        results[name] = value[:, 0], slope[:, 0]
+    return results
+
+
 def _gathered(
-    output: _Outputs, columns: list[int], size: int, count: int, directions: int
+    output: _Outputs, columns: list[int], width: int, size: tuple[int, int]
 ) -> tuple[Floats, Floats]:
-    """Values (m, columns, size) and derivatives (..., d) that a loop wrote."""
-    value = np.zeros((count, len(columns), size))
-    slope = np.zeros((count, len(columns), size, directions))
+    """Values (m, columns, width) and derivatives (..., d) that a loop wrote; size: (m, d)."""
+    count, directions = size
+    value = np.zeros((count, len(columns), width))
+    slope = np.zeros((count, len(columns), width, directions))
     for (column, shift), x in output.values.items():
         n = columns.index(column)
         if isinstance(x, Dual):

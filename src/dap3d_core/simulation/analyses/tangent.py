@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.loop_derivatives import LoopDerivatives, differentiate_loop
 from dap3d_core.model import Group, Model
-from dap3d_core.model.rotations import rotation
+from dap3d_core.model.rotations import rotation, skew
 from dap3d_core.model.state_layout import split
 from dap3d_core.simulation.errors import SimulationError
 
@@ -245,11 +245,11 @@ class _Assembly:
         mass.add(place[:, :, None], place[:, None, :], blocks)
         h, alpha = _times(J, w), self.a.reshape(n, 6)[:, 3:]
         self.f[place[:, 3:]] -= np.cross(w, h)
-        w_skew, h_skew = _skew(w), _skew(h)
-        turning = w_skew @ (J @ w_skew - h_skew) + J @ _skew(alpha) - _skew(_times(J, alpha))
+        w_tilde, h_tilde = skew(w), skew(h)
+        turning = w_tilde @ (J @ w_tilde - h_tilde) + J @ skew(alpha) - skew(_times(J, alpha))
         where = place[:, 3:, None], place[:, None, 3:]
         self.entries["stiffness"].add(*where, turning)
-        self.entries["damping"].add(*where, w_skew @ J - h_skew)
+        self.entries["damping"].add(*where, w_tilde @ J - h_tilde)
         return mass.matrix()
 
     def _not_finite(self, kind: str, group: Group, own: LoopDerivatives) -> str:
@@ -280,12 +280,3 @@ def _times(J: Floats, w: Floats) -> Floats:
     """J w for each body."""
     product: Floats = np.einsum("nij,nj->ni", J, w)
     return product
-
-
-def _skew(a: Floats) -> Floats:
-    """(n, 3, 3) skew matrices of (n, 3) vectors."""
-    result = np.zeros((len(a), 3, 3))
-    for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        result[:, j, i], result[:, i, j] = a[:, k], -a[:, k]
-    return result

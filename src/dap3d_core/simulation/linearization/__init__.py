@@ -1,0 +1,1 @@
+"""Linearised equations of motion: state-space matrices, eigenvalues, modes."""

@@ -1,0 +1,73 @@
+"""Eigenvalues of state matrices whose zero eigenvalues come in chains.
+
+A motion that costs nothing, the position of a free body or the heading of a wheel, is a zero row or
+column. Its zero eigenvalue has a Jordan chain, which rounding would scatter over a circle of radius
+eps^(1/2) or wider. So zeros are split off first, as null spaces, one link of all chains after the
+other (Kublanovskaya, USSR Comput. Math. 6(4), 1966); what is left has eigenvalues that are known to
+rounding.
+"""
+
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: A singular value below this part of the matrix's terms is zero.
+ZERO = 1e-13
+
+
+@attrs.frozen(eq=False)
+class Eigenvalues:
+    """Eigenvalues and eigenvectors.
+
+    Attributes:
+        values: (k,) by magnitude, zeros first; of a conjugate pair that with Im > 0 first.
+        vectors: (states, k) unit eigenvectors; of zero as many as there are, then columns of zeros.
+    """
+
+    values: Complex
+    vectors: Complex
+
+
+def eigenvalues_of(A: Floats, size: float) -> Eigenvalues:
+    """All eigenvalues and eigenvectors of a real matrix A, its terms of magnitude ``size``."""
+    splits: list[tuple[Floats, Floats, Floats]] = []
+    rest, zeros, limit = A, 0, ZERO * max(size, 1e-300) * max(len(A), 1)
+    while len(rest):
+        _, values, right = np.linalg.svd(rest)
+        null = right[values <= limit].T
+        if not null.shape[1]:
+            break
+        other = right[values > limit].T
+        splits.append((null, other, null.T @ rest @ other))
+        rest, zeros = other.T @ rest @ other, zeros + null.shape[1]
+    values, vectors = np.linalg.eig(rest) if len(rest) else (np.zeros(0), np.zeros((0, 0)))
+    values, vectors = values.astype(complex), vectors.astype(complex)
+    for null, other, coupling in reversed(splits):
+        vectors = other @ vectors + null @ (coupling @ vectors / values)
+    vectors = vectors / np.linalg.norm(vectors, axis=0)
+    order = order_of(values)
+    of_zero = np.zeros((len(A), zeros), dtype=complex)
+    if splits:
+        of_zero[:, : splits[0][0].shape[1]] = splits[0][0]
+    return Eigenvalues(
+        np.concatenate([np.zeros(zeros, dtype=complex), values[order]]),
+        np.hstack([of_zero, vectors[:, order]]),
+    )
+
+
+def order_of(values: Any) -> Any:
+    """Indices of eigenvalues by magnitude, of a conjugate pair that with Im > 0 first."""
+    magnitude = np.abs(values)
+    rounded = np.zeros(len(values))
+    by_size = np.argsort(magnitude, kind="stable")
+    group, last = 0, -1.0
+    for k in by_size:  # magnitudes that agree but for rounding are of one group
+        if magnitude[k] > last * (1.0 + 1e-9):
+            group, last = group + 1, magnitude[k]
+        rounded[k] = group
+    return np.lexsort((-np.sign(values.imag), -np.abs(values.imag), values.real, rounded))

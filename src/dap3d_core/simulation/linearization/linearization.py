@@ -1,0 +1,284 @@
+"""Public function ``linearize``, and its result."""
+
+import os
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.scene import Scene
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.linearization.eigenvalues import Eigenvalues, eigenvalues_of
+from dap3d_core.simulation.linearization.inputs import input_forces
+from dap3d_core.simulation.linearization.operating_point import OperatingPoint, operating_point
+from dap3d_core.simulation.linearization.outputs import Outputs, output_derivatives
+from dap3d_core.simulation.linearization.sparse_modes import lowest_eigenvalues
+from dap3d_core.simulation.linearization.state_space import StateSpace, state_space
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Bodies beyond which only the lowest modes are computed unless more are requested.
+MANY_BODIES = 150
+#: Modes of such scenes by default.
+FEW_MODES = 10
+#: A real part below this part of the magnitude, or of the largest terms, is zero but for rounding.
+ROUNDING = 1e-9, 1e-12
+#: Eigenvalues within this part of i Omega are drifts of free bodies, seen from axes that turn.
+DRIFT = 1e-5
+
+
+class Linearization:
+    """Linearised equations of motion of a scene about a state.
+
+    States are displacements xi and velocities eta in independent coordinates: orthonormal bases of
+    what the constraint rows allow, scaled by masses and inertias. Everything is computed on first
+    use.
+
+    Attributes:
+        t: time, s.
+        u: (13 n,) the state.
+        body_names: of the n bodies.
+        inputs, outputs: names, in the order of the columns of B and the rows of C.
+        input_units: SI units of the inputs.
+        notes: choices and warnings.
+    """
+
+    def __init__(
+        self,
+        point: OperatingPoint,
+        inputs: Sequence[str] = (),
+        outputs: Sequence[str] = (),
+        modes: int | None = None,
+    ) -> None:
+        self._point = point
+        self.t, self.u, self.body_names = point.t, point.u, point.model.body_names
+        self._mode_count = modes
+        if modes is None and point.model.body_count > MANY_BODIES:
+            self._mode_count = FEW_MODES
+        forces = input_forces(point, inputs)
+        self.inputs, self.input_units = tuple(inputs), forces.units
+        self.outputs = tuple(outputs)
+        self._forces = forces
+        self.notes = [*point.notes, *forces.notes]
+        if self.outputs:
+            _ = self._outputs  # unknown names are errors here
+
+    # ------------------------------------------------------------------ state space
+
+    @cached_property
+    def _space(self) -> StateSpace:
+        point = self._point
+        return state_space(point.equations, point.redundancy.rank.rank, point.position_rank)
+
+    @cached_property
+    def _outputs(self) -> Outputs:
+        return output_derivatives(self._point, self._space, self._forces, self.outputs)
+
+    @property
+    def A(self) -> Floats:
+        """(states, states) state matrix: z_dot = A z + B inputs."""
+        return self._space.A
+
+    @property
+    def B(self) -> Floats:
+        """(states, inputs) input matrix."""
+        B: Floats = self._space.force_input @ self._forces.wrench
+        return B
+
+    @property
+    def C(self) -> Floats:
+        """(outputs, states) output matrix: change of outputs = C z + D inputs."""
+        return self._outputs.C if self.outputs else np.zeros((0, self.state_count))
+
+    @property
+    def D(self) -> Floats:
+        """(outputs, inputs) feedthrough matrix."""
+        return self._outputs.D if self.outputs else np.zeros((0, len(self.inputs)))
+
+    @property
+    def state_count(self) -> int:
+        """Number of states: displacements and velocities."""
+        return len(self._space.A)
+
+    @property
+    def coordinate_count(self) -> int:
+        """Number of displacements among the states; they come first."""
+        return self._space.coordinate_count
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom: independent velocities."""
+        return self._point.redundancy.rank.dof
+
+    @property
+    def basis(self) -> Floats:
+        """(12 n, states) displacements, then velocities, of all bodies for unit states.
+
+        Per body (delta r, rotation vector), then (delta r_dot, delta omega), global axes.
+        """
+        return np.vstack([self._space.displacement, self._space.velocity])
+
+    @property
+    def Omega(self) -> Floats:
+        """(n, 3) angular velocity of the axes in which the equations are written, rad/s."""
+        return self._point.frames.Omega
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether the state is an equilibrium or a steady motion."""
+        return self._point.frames.is_steady
+
+    def to_control(self) -> Any:
+        """The same as a ``control.StateSpace`` of python-control (extra ``control``).
+
+        Raises:
+            ImportError: python-control is not installed.
+        """
+        try:
+            import control
+        except ImportError as error:
+            raise ImportError(
+                "to_control needs python-control: pip install 'dap3d[control]'"
+            ) from error
+        states = [f"xi{k + 1}" for k in range(self.coordinate_count)]
+        states += [f"eta{k + 1}" for k in range(self.state_count - len(states))]
+        return control.ss(self.A, self.B, self.C, self.D, states=states,
+                          inputs=list(self.inputs) or 0,
+                          outputs=list(self.outputs) or 0)  # fmt: skip
+
+    # ------------------------------------------------------------------ modes
+
+    @cached_property
+    def _spectrum(self) -> Eigenvalues:
+        """Eigenvalues, and displacements (6 n, k) in place of eigenvectors."""
+        point = self._point
+        if self._mode_count is not None:
+            dependencies = point.redundancy.rank.dependencies
+            count = min(2 * self._mode_count, 12 * point.model.body_count - 2)
+            lowest = lowest_eigenvalues(point.equations, dependencies, count)
+            return Eigenvalues(lowest.values, point.equations.U @ lowest.vectors)
+        space = self._space
+        scale = np.ones(len(space.A))
+        scale[: space.coordinate_count] = space.size or 1.0
+        all_of_them = eigenvalues_of(scale[:, None] * space.A / scale, space.size)
+        vectors = all_of_them.vectors / scale[:, None]
+        return Eigenvalues(all_of_them.values, space.displacement @ vectors)
+
+    @property
+    def eigenvalues(self) -> Complex:
+        """(k,) eigenvalues, 1/s, by magnitude; of a conjugate pair that with Im > 0 first.
+
+        All of them, or where ``modes`` was given those of the lowest modes.
+        """
+        return self._spectrum.values
+
+    @cached_property
+    def _of_modes(self) -> Any:
+        """Indices of the eigenvalues that stand for modes."""
+        values, vectors = self._spectrum.values, self._spectrum.vectors
+        has_shape = np.linalg.norm(vectors, axis=0) > 0.0
+        chosen = np.flatnonzero((values.imag >= 0.0) & has_shape)
+        return chosen if self._mode_count is None else chosen[: self._mode_count]
+
+    @property
+    def mode_eigenvalues(self) -> Complex:
+        """(modes,) the eigenvalue of each mode: of a conjugate pair that with Im > 0."""
+        values: Complex = self._spectrum.values[self._of_modes]
+        return values
+
+    @property
+    def frequencies(self) -> Floats:
+        """(modes,) natural frequency of each mode, Hz: |lambda| / (2 pi)."""
+        frequencies: Floats = np.abs(self.mode_eigenvalues) / (2.0 * np.pi)
+        return frequencies
+
+    @property
+    def damping(self) -> Floats:
+        """(modes,) damping ratio of each mode: -Re lambda / |lambda|; 0 where lambda is zero."""
+        values = self.mode_eigenvalues
+        magnitude = np.abs(values)
+        ratio: Floats = -values.real / np.where(magnitude > 0.0, magnitude, 1.0)
+        return ratio + 0.0
+
+    @cached_property
+    def modes(self) -> Complex:
+        """(6 n, modes) mode shapes: (delta r, rotation vector) of each body, global axes.
+
+        A conjugate pair is one mode, so is a real eigenvalue. The largest component, rotations
+        times the size of the largest part, is one; displacements are Re(shape exp(lambda t)).
+        """
+        shapes = self._spectrum.vectors[:, self._of_modes]
+        length = self._point.model.part_size
+        weighted = shapes * np.tile(np.repeat([1.0, length], 3), len(self.body_names))[:, None]
+        largest = np.argmax(np.abs(weighted), axis=0)
+        peak: Complex = weighted[largest, np.arange(shapes.shape[1])]
+        return shapes / peak
+
+    @property
+    def stable(self) -> bool:
+        """False if a motion grows: an eigenvalue has a positive real part beyond rounding.
+
+        Undamped oscillations, and neutral motions with eigenvalue zero, count as stable. Where
+        only the lowest modes were computed, it is about these.
+        """
+        values = self.eigenvalues
+        for rate in self._point.frames.drift:  # a double eigenvalue, which rounding splits
+            values = values[np.abs(np.abs(values.imag) - rate) + np.abs(values.real) > DRIFT * rate]
+        own, all_of_them = ROUNDING
+        equations = self._point.equations
+        size = max(float(np.sqrt(abs(equations.K).max())), float(abs(equations.C).max()))
+        return bool(np.all(values.real <= own * np.abs(values) + all_of_them * size))
+
+    def __repr__(self) -> str:
+        return (
+            f"<Linearization at t = {self.t:g} s: {len(self.body_names)} bodies, {self.dof} "
+            f"degrees of freedom, {len(self.inputs)} inputs, {len(self.outputs)} outputs>"
+        )
+
+
+def linearize(
+    scene: Scene | str | os.PathLike[str] | CompiledModel,
+    at: Any = None,
+    t: float = 0.0,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    *,
+    modes: int | None = None,
+    allow_code: bool = False,
+) -> Linearization:
+    """Linearise the equations of motion of a scene about a state.
+
+    The stiffness of reactions, redundant rows, rolling (rows of the velocity level alone) and
+    drivers are included. About a steady motion (a spinning satellite, a rolling wheel) the
+    equations are written in axes that turn with it, so that their coefficients are constant.
+    Derivatives are exact to rounding (simulation/analyses/tangent.py).
+
+    Args:
+        scene: a Scene, what ``load`` takes, or a compiled model.
+        at: the state: None for the start of the scene, corrected as a run does; a ``Result``, at
+            its instant t; an equilibrium (``.r``, ``.p``), at rest; or u (13 n,).
+        t: time, s: of the functions of time and the drivers.
+        inputs: ``FORCE.FIELD`` for a number of a force element, ``FORCE.FIELD.x`` for a component
+            (``motor.n_a``, ``push.f.z``); ``FORCE`` for a factor on all of its force, 1 at the
+            state.
+        outputs: quantities by name as in results (``body.r.x``, ``P.v``, ``J1.force.z``, ...).
+        modes: number of lowest modes, from sparse matrices; None for all, or the 10 lowest of a
+            scene of more than 150 bodies.
+        allow_code: whether the model's own types may be loaded.
+
+    Raises:
+        SceneError, PluginError: as ``compile``.
+        SimulationError: a state off the constraints or at a switch; no derivative there; no bodies.
+        UnknownNameError: an input or output that there is not; names the nearest.
+    """
+    if modes is not None and (not isinstance(modes, int) or modes < 1):
+        raise ValueError(f"modes must be a whole number above zero, not {modes!r}")
+    point = operating_point(scene, at, t, allow_code)
+    return Linearization(point, _names(inputs), _names(outputs), modes)
+
+
+def _names(names: Sequence[str] | str) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names)

@@ -1,0 +1,196 @@
+"""The state about which a scene is linearised, checked for what linearisation needs."""
+
+import os
+from functools import cached_property
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations import FORMULATIONS, WATCH
+from dap3d_core.formulations.constraint_rows import scaled_rows
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.linear.rank.rank import dense_rank
+from dap3d_core.model import Model
+from dap3d_core.model.state_layout import join
+from dap3d_core.result import INFORMATION, Result
+from dap3d_core.scene import Scene
+from dap3d_core.simulation.analyses.tangent import TangentMatrices, tangent_matrices
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.initial.assemble import fit_of, violation
+from dap3d_core.simulation.initial.given_state import state_of, time_of
+from dap3d_core.simulation.initial_state import start_notes
+from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations, scaled_equations
+from dap3d_core.simulation.linearization.steady_motion import SteadyFrames, steady_frames
+from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
+
+Floats = NDArray[np.float64]
+
+#: Residuals of the constraints beyond this make a state unfit, in m and m/s.
+OFF_CONSTRAINTS = 1e-6
+#: A switch this close to zero is at its point of change.
+AT_SWITCH = 1e-9
+#: An instant of a result within this part of its time span of the requested one is that one.
+SAME_INSTANT = 1e-9
+
+
+@attrs.frozen(eq=False)
+class OperatingPoint:
+    """A state and the linearised equations there.
+
+    Attributes:
+        compiled: the scene.
+        t: time, s.
+        u: (13 n,) the state, on the constraints.
+        tangent: derivatives of the equations of motion.
+        frames: axes in which the equations are written.
+        redundancy: rank of the constraints.
+        notes: choices and warnings.
+    """
+
+    compiled: CompiledModel
+    t: float
+    u: Floats
+    tangent: TangentMatrices
+    frames: SteadyFrames
+    redundancy: Redundancy
+    notes: tuple[str, ...]
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return self.compiled.model
+
+    @property
+    def evaluator(self) -> Evaluator:
+        """The evaluator of the calling thread."""
+        return self.compiled.evaluator
+
+    @cached_property
+    def equations(self) -> ScaledEquations:
+        """The linearised equations, scaled."""
+        return scaled_equations(self.model, self.tangent, self.u, self.frames)
+
+    @cached_property
+    def position_rank(self) -> int:
+        """Number of independent rows with a position level."""
+        position = self.model.position_row
+        if np.all(position):
+            return self.redundancy.rank.rank
+        rows, _ = scaled_rows(self.evaluator.rows(self.t, self.u), self.model.length)
+        return dense_rank(rows.dense()[position], fit_of(self.model)).rank
+
+
+def operating_point(
+    scene: Scene | str | os.PathLike[str] | CompiledModel, at: Any, t: float, allow_code: bool
+) -> OperatingPoint:
+    """The state to linearise about; arguments and errors as of ``linearize``."""
+    t = time_of(t)
+    if isinstance(scene, CompiledModel) and FORMULATIONS[scene.method].is_exact:
+        compiled = scene
+    else:
+        scene = scene.scene if isinstance(scene, CompiledModel) else scene
+        compiled = CompiledModel(scene, method="auto", allow_code=allow_code)
+    model = compiled.model
+    if not model.body_count:
+        raise SimulationError("the scene has no bodies: there is nothing to linearise")
+    notes: list[str] = []
+    with compiled.borrow_evaluator() as evaluator:
+        u, turns = _state(compiled, at, t, notes)
+        evaluator.start(t, u)
+        if turns is not None:
+            _set_turns(evaluator, turns)
+        _check(evaluator, t, u)
+        redundancy = redundancy_of(evaluator, u, t)
+        if redundancy.singular is not None:
+            notes.append(
+                "the pose is singular: constraint rows lose rank here, and freedoms that exist at "
+                "this pose alone count as freedoms; linearise about a pose nearby"
+            )
+        tangent = tangent_matrices(evaluator, t, u)
+        frames = steady_frames(model, tangent, u)
+    if not frames.is_steady:
+        notes.append(
+            "the state is neither at rest nor in steady motion: the matrices hold at this instant "
+            "alone, and the eigenvalues say nothing about stability"
+        )
+    elif np.any(frames.Omega):
+        largest = frames.Omega[np.argmax(np.linalg.norm(frames.Omega, axis=1))]
+        words = ", ".join(f"{w:.6g}" for w in largest)
+        notes.append(
+            f"{INFORMATION}steady motion: the equations are written in axes that turn at "
+            f"({words}) rad/s, in which their coefficients are constant"
+        )
+    if model.friction:
+        notes.append(
+            "joints with friction: linearised with the smooth law of friction at this state, "
+            "which at rest is a strong damper and no stiction"
+        )
+    return OperatingPoint(compiled, t, u, tangent, frames, redundancy, tuple(notes))
+
+
+def _state(
+    compiled: CompiledModel, at: Any, t: float, notes: list[str]
+) -> tuple[Floats, Floats | None]:
+    """The state, and the angles with counted turns that a result has there."""
+    model = compiled.model
+    if at is None:
+        settings = compiled.scene.simulation
+        start = compiled.start(settings.correct, settings.hold, str(settings.correct_metric))
+        notes += start_notes(start, compiled.evaluator, compiled.scene)
+        return start.u.copy(), None
+    if isinstance(at, Result):
+        if at.subject.body_names != model.body_names:
+            raise SimulationError("the result is of another scene: its bodies differ")
+        span = max(float(np.ptp(at.t)), abs(t)) if len(at.t) else 0.0
+        k = int(np.argmin(np.abs(at.t - t))) if len(at.t) else -1
+        if k < 0 or abs(at.t[k] - t) > SAME_INSTANT * span:
+            near = f"; the nearest is t = {at.t[k]:.9g} s" if k >= 0 else ""
+            raise SimulationError(f"the result has no instant at t = {t:.9g} s{near}")
+        angles = at.arrays.angles[k] if at.subject.angle_count == model.angle_count else None
+        return at.u[k].copy(), angles
+    if hasattr(at, "r") and hasattr(at, "p"):
+        r, p = np.asarray(at.r, dtype=float), np.asarray(at.p, dtype=float)
+        if r.shape != (model.body_count, 3) or p.shape != (model.body_count, 4):
+            raise SimulationError("the equilibrium is of another scene: its bodies differ")
+        return join(r, p, np.zeros_like(r), np.zeros_like(r)), None
+    return state_of(at, model.body_names), None
+
+
+def _set_turns(evaluator: Evaluator, angles: Floats) -> None:
+    """Let angles count on from those of a result."""
+    model = evaluator.model
+    for q, (kind, group) in enumerate(evaluator.loop_groups):
+        if kind != "angle":
+            continue
+        p0, layout = int(evaluator.system.groups[q, 1]), group.examined.layout
+        places = model.angles_of(group, np.arange(group.count))
+        for column, offset in enumerate(layout.angles.values()):
+            first = p0 + offset
+            last = first + layout.par_width * group.count
+            evaluator.system.par[first : last : layout.par_width] = angles[places[:, column]]
+
+
+def _check(evaluator: Evaluator, t: float, u: Floats) -> None:
+    """Refuses a state off the constraints, or at a switch."""
+    position, velocity = violation(evaluator, u, t)
+    if max(position, velocity) > OFF_CONSTRAINTS:
+        raise SimulationError(
+            f"the state is off the constraints (position {position:.2g}, velocity {velocity:.2g}): "
+            "equations of motion cannot be linearised there; correct it, or take a state of a run"
+        )
+    if not evaluator.switches:
+        return
+    values = np.zeros(len(evaluator.switches))
+    watch = evaluator.functions[WATCH]
+    watch(t, evaluator.integrated(u), values, evaluator.system, evaluator.loops)
+    k = int(np.argmin(np.abs(values)))
+    if abs(values[k]) <= AT_SWITCH:
+        switch = evaluator.switches[k]
+        raise SimulationError(
+            f"the state is at a switch of {switch.name(evaluator.model)} (its value is "
+            f"{values[k]:.2g}), where the equations change their form and have no derivative; "
+            "move the state to one side of it"
+        )

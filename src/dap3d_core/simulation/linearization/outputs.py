@@ -1,0 +1,115 @@
+"""Outputs of linearised equations: any quantity of a result, by its name.
+
+A quantity is evaluated by the post-processor itself, at states displaced along each state of the
+linear system, and differentiated by central differences of sixth order. Accelerations and
+multipliers follow the linear equations there, so that what is differentiated is smooth.
+"""
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.model.state_layout import join, split, y_from_u
+from dap3d_core.result import Result, RunMetadata, UnknownNameError, find
+from dap3d_core.simulation.linearization.inputs import InputForces
+from dap3d_core.simulation.linearization.operating_point import OperatingPoint
+from dap3d_core.simulation.linearization.state_space import StateSpace
+
+Floats = NDArray[np.float64]
+
+#: Abscissae and weights of the sixth-order central difference.
+ABSCISSAE = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
+WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
+#: Largest displacement of a body, as a part of the model's size or in rad, and of a velocity.
+STEP = 2e-3
+
+
+@attrs.frozen(eq=False)
+class Outputs:
+    """Derivatives of outputs.
+
+    Attributes:
+        C: (outputs, states), D: (outputs, inputs).
+    """
+
+    C: Floats
+    D: Floats
+
+
+def output_derivatives(
+    point: OperatingPoint, space: StateSpace, forces: InputForces, names: Sequence[str]
+) -> Outputs:
+    """Derivatives of quantities by states and inputs.
+
+    Raises:
+        UnknownNameError: there is no such quantity, or it is a vector; names the nearest.
+    """
+    states = len(space.A)
+    directions = [
+        (space.displacement[:, k], space.velocity[:, k], space.acceleration[:, k],
+         space.multipliers[:, k]) for k in range(states)
+    ]  # fmt: skip
+    none = np.zeros(6 * point.model.body_count)
+    for k in range(len(forces.units)):
+        wrench = forces.wrench[:, k]
+        directions.append((none, none, space.acceleration_by_force @ wrench,
+                           space.multipliers_by_force @ wrench))  # fmt: skip
+    steps = [_step(point, *direction) for direction in directions]
+    rows = [
+        _row(point, x * h, direction)
+        for h, direction in zip(steps, directions, strict=True)
+        for x in ABSCISSAE
+    ]
+    rows.append(_row(point, 0.0, directions[0] if directions else (none, none, none, none)))
+    record = RunMetadata(scene_text=point.compiled.scene_text)
+    result = Result.of_run(point.model, np.array(rows), record, lambda: point.evaluator)
+    matrix = np.zeros((len(names), len(directions)))
+    for k, name in enumerate(names):
+        quantity = find(result, name)
+        if quantity.values.ndim > 1:
+            first = quantity.components[0] if quantity.components else "1"
+            raise UnknownNameError(f"output {name!r} has components: name one, as {name}.{first}")
+        if name.partition(".")[0] in forces.elements and quantity.owner == "force":
+            raise UnknownNameError(f"output {name!r} belongs to a force that is an input")
+        if not np.isfinite(quantity.values[-1]):
+            raise UnknownNameError(f"output {name!r} has no value at this state")
+        values = quantity.values[:-1].reshape(-1, len(ABSCISSAE))
+        matrix[k] = (values - quantity.values[-1]) @ WEIGHTS / steps
+    return Outputs(matrix[:, :states], matrix[:, states:])
+
+
+def _step(point: OperatingPoint, *direction: Floats) -> float:
+    """A step along a direction that moves everything by about STEP of its size."""
+    model = point.model
+    length = model.part_size
+    _, _, v, w = split(point.u)
+    weights = np.tile(np.repeat([1.0 / length, 1.0], 3), model.body_count)
+    speeds = np.abs(np.hstack([v, w]).ravel()) * weights
+    speed = max(float(np.max(speeds, initial=0.0)), 1.0)
+    largest = max(
+        float(np.max(np.abs(direction[0]) * weights)),
+        float(np.max(np.abs(direction[1]) * weights)) / speed,
+    )
+    return STEP / largest if largest > 0.0 else 1.0
+
+
+def _row(point: OperatingPoint, h: float, direction: tuple[Floats, ...]) -> Floats:
+    """A reported row of the state displaced by h along a direction."""
+    model, evaluator = point.model, point.evaluator
+    x, v_change, a_change, lam_change = direction
+    r, p, v, w = split(point.u)
+    x, v_change = (h * change.reshape(-1, 6) for change in (x, v_change))
+    half = 0.5 * x[:, 3:]
+    angle = np.linalg.norm(half, axis=1, keepdims=True)
+    e0, e = np.cos(angle), np.sinc(angle / np.pi) * half
+    scalar = e0 * p[:, :1] - np.sum(e * p[:, 1:], axis=1, keepdims=True)
+    vector = e0 * p[:, 1:] + e * p[:, :1] + np.cross(e, p[:, 1:])
+    turned = np.hstack([scalar, vector])
+    u = join(r + x[:, :3], turned, v + v_change[:, :3], w + v_change[:, 3:])
+    layout = model.report_layout
+    report = evaluator.report(point.t, u)
+    report[layout["v_dot"]] = point.tangent.a + h * a_change
+    report[layout["Lam"]] = point.tangent.multipliers + h * lam_change
+    return np.concatenate([[point.t], y_from_u(u), report])

@@ -1,0 +1,83 @@
+"""Lowest modes of large scenes, from the sparse equations without independent coordinates.
+
+With z = (x^, v^, lambda) the linearised equations are a pencil E z_dot = B z, E singular: position
+rows stand as D x^ = 0, rows of the velocity level alone as D v^ + G x^ = 0, redundant rows are left
+out. Arnoldi iterations with (B - sigma E)^-1 E (scipy.sparse.linalg.eigs, ARPACK) find the
+eigenvalues nearest to a small real sigma; those at infinity, which the constraints add, become zero
+and stay out of the way.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.linear.rank.rank import Dependency
+from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.linearization.eigenvalues import Eigenvalues, order_of
+from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
+
+Floats = NDArray[np.float64]
+
+#: sigma as a part of the frequency that the largest terms would give.
+SHIFT = 1e-4
+#: Eigenvalues below this part of sigma are zeros of rigid motions, which rounding has moved.
+ZERO = 1e-3
+
+
+def lowest_eigenvalues(
+    equations: ScaledEquations, dependencies: Sequence[Dependency], count: int
+) -> Eigenvalues:
+    """The ``count`` eigenvalues nearest to zero, and displacements x^ (6 n, count) of each.
+
+    Raises:
+        SimulationError: the iteration does not converge.
+    """
+    from scipy.sparse import block_array, csc_array, eye_array
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
+
+    six = equations.K.shape[0]
+    chosen = independent_rows(equations.D.shape[0], dependencies)
+    position = equations.position_row[chosen]
+    D, G, F = equations.D[chosen], equations.G[chosen], equations.F[:, chosen]
+    identity = eye_array(six)
+    on_x = D.multiply(position[:, None]) + G.multiply(~position[:, None])
+    on_v = D.multiply(~position[:, None])
+    B = block_array([[equations.S, identity, None],
+                     [-equations.K, -equations.C, D.T + F],
+                     [on_x, on_v, None]]).tocsc()  # fmt: skip
+    E = block_array([[identity, None, None], [None, identity, None],
+                     [None, None, csc_array((len(chosen), len(chosen)))]]).tocsc()  # fmt: skip
+    largest = max(np.sqrt(_norm(equations.K)), _norm(equations.C), _norm(equations.S))
+    sigma = SHIFT * largest if largest > 0.0 else 1.0
+    factors = splu(csc_array(B - sigma * E))
+    size = B.shape[0]
+    operator = LinearOperator((size, size), lambda z: factors.solve(E @ np.asarray(z).ravel()))
+    start = operator @ (operator @ np.random.default_rng(1).standard_normal(size))
+    try:
+        theta, vectors = eigs(operator, k=min(count, size - 2), v0=start, maxiter=100 * count,
+                              tol=1e-13)  # fmt: skip
+    except ArpackError as error:
+        raise SimulationError(f"the lowest modes were not found: {error}") from error
+    values = sigma + 1.0 / theta
+    values[np.abs(values) < ZERO * sigma] = 0.0
+    order = order_of(values)
+    return Eigenvalues(values[order], vectors[:six, order])
+
+
+def independent_rows(rows: int, dependencies: Sequence[Dependency]) -> Any:
+    """Rows without the redundant ones: of each dependency those that its others give."""
+    from scipy.linalg import qr
+
+    left_out: list[Any] = []
+    for dependency in dependencies:
+        _, _, pivots = qr(dependency.combinations, pivoting=True)
+        left_out.append(dependency.rows[pivots[: len(dependency.combinations)]])
+    return np.setdiff1d(np.arange(rows), np.concatenate([np.zeros(0, dtype=int), *left_out]))
+
+
+def _norm(matrix: Any) -> float:
+    """The largest sum of magnitudes in a row."""
+    sums = np.asarray(abs(matrix).sum(axis=1))
+    return float(np.max(sums, initial=0.0))

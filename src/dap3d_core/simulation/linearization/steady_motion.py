@@ -1,0 +1,128 @@
+"""Frames in which a steady motion stands still.
+
+The linearised equations of a steady motion (a relative equilibrium: a spinning satellite, a rolling
+wheel, a top that precesses) have constant coefficients in axes that turn with it. Of each set of
+connected bodies the angular velocity Omega of these axes solves, for every body, linear equations:
+
+    r_ddot = Omega x r_dot        omega_dot = Omega x omega
+    (omega - Omega)~ J = J (omega - Omega)~       the inertia tensor keeps its components
+
+by least squares, the shortest Omega where there are many: a body of revolution that spins about its
+axis, a rolling wheel or a sleeping top, is described in axes that do not spin. Where a common
+translation of the bodies changes no force and no row, as in space, a common acceleration is free:
+such axes may drift and fall.
+"""
+
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.model import Model
+from dap3d_core.model.rotations import rotation, skew
+from dap3d_core.model.state_layout import split
+from dap3d_core.simulation.analyses.tangent import TangentMatrices
+
+Floats = NDArray[np.float64]
+
+#: Accelerations beyond those of the steady motion, as a part of those that forces would give.
+STEADY = 1e-7
+#: Singular values below this part of the largest leave Omega undetermined.
+RCOND = 1e-9
+
+
+@attrs.frozen(eq=False)
+class SteadyFrames:
+    """Axes in which the motion is steady.
+
+    Attributes:
+        Omega: (n, 3) angular velocity of the axes of each body, global, rad/s.
+        of_translation: (n, 3) that of the axes of displacements r: zero for a body whose
+            translation changes nothing, so that its drift is no rotation.
+        drift: frequencies |Omega|, rad/s, at which a drift of free bodies appears in their axes.
+        is_steady: whether accelerations are those of a steady motion.
+    """
+
+    Omega: Floats
+    of_translation: Floats
+    drift: tuple[float, ...]
+    is_steady: bool
+
+
+def steady_frames(model: Model, tangent: TangentMatrices, u: Floats) -> SteadyFrames:
+    """Angular velocities of the axes in which the motion from a state u (13 n,) is steady."""
+    n = model.body_count
+    _, p, v, w = split(u)
+    A = rotation(p)
+    J = A @ model.Jp @ np.swapaxes(A, -1, -2)
+    J = J / np.linalg.norm(J, axis=(1, 2), keepdims=True)
+    a = tangent.a.reshape(n, 6)
+    length = model.part_size
+    matrix, side = np.zeros((n, 15, 3)), np.zeros((n, 15))  # one row each equation, r / length
+    matrix[:, :3], side[:, :3] = -skew(v) / length, a[:, :3] / length
+    matrix[:, 3:6], side[:, 3:6] = -skew(w), a[:, 3:]
+    for k in range(3):
+        e = skew(np.eye(3)[k])
+        matrix[:, 6:, k] = (e @ J - J @ e).reshape(n, 9)
+    side[:, 6:] = np.einsum("nrk,nk->nr", matrix[:, 6:], w)
+    matrix = np.concatenate([matrix, np.zeros((n, 15, 3))], axis=2)
+    matrix[:, :3, 3:] = np.eye(3)  # a common acceleration
+    unknowns, of_translation, drift = np.zeros((n, 6)), np.ones((n, 1)), set()
+    for members in _connected(tangent):
+        is_free = _is_free(tangent, members)
+        count = 6 if is_free else 3
+        equations = matrix[members, :, :count].reshape(-1, count)
+        solution = np.linalg.lstsq(equations, side[members].ravel(), rcond=RCOND)[0]
+        unknowns[members, :count] = solution
+        if is_free and len(members) == 1:
+            of_translation[members] = 0.0
+        elif is_free:
+            drift.add(float(np.linalg.norm(solution[:3])))
+    missed = side - np.einsum("nrk,nk->nr", matrix, unknowns)
+    Omega = unknowns[:, :3]
+    mass = np.hstack([np.repeat(model.mass[:, None], 3, 1), np.linalg.norm(model.Jp, ord=-2,
+                      axis=(1, 2))[:, None].repeat(3, 1)])  # fmt: skip
+    loads = np.abs(tangent.f) + np.abs(tangent.D.T) @ np.abs(tangent.multipliers)
+    size = loads.reshape(n, 6) / mass / np.repeat([length, 1.0], 3)
+    rate = max(_largest(w), _largest(v) / length)
+    is_steady = (
+        _largest(missed[:, :6]) <= STEADY * (_largest(size) + rate**2)
+        and _largest(missed[:, 6:]) <= STEADY * rate
+    )
+    if not is_steady:
+        Omega = np.zeros((n, 3))
+    return SteadyFrames(Omega, of_translation * Omega, tuple(drift - {0.0}), is_steady)
+
+
+def _largest(values: Floats) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
+
+
+def _is_free(tangent: TangentMatrices, members: Any) -> bool:
+    """True if a common translation of bodies changes no force and no row."""
+    columns = 6 * np.asarray(members)[:, None] + np.arange(3)
+    for matrix in (tangent.stiffness, tangent.damping, tangent.D):
+        for axis in range(3):
+            translation = np.zeros(len(tangent.f))
+            translation[columns[:, axis]] = 1.0
+            change, terms = matrix @ translation, abs(matrix) @ translation
+            if np.any(np.abs(change) > RCOND * terms):
+                return False
+    return True
+
+
+def _connected(tangent: TangentMatrices) -> list[Any]:
+    """Bodies that joints or forces connect, other than by ground."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(tangent.f) // 6
+    couplings = abs(tangent.stiffness) + abs(tangent.damping) + abs(tangent.D.T) @ abs(tangent.D)
+    entries = couplings.tocoo()
+    bodies = (entries.row // 6, entries.col // 6)
+    graph = csr_array((np.ones(len(entries.row)), bodies), shape=(n, n))
+    count, label = connected_components(graph, directed=False)
+    order = np.argsort(label, kind="stable")
+    ends = np.cumsum(np.bincount(label, minlength=count))[:-1]
+    return np.split(order, ends) if n else []
