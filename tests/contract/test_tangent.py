@@ -106,8 +106,8 @@ def compare(scene, tolerance=1e-9):
 def test_joint(case, ground):
     """Rows and reactions of a joint have their derivatives, between bodies and to ground."""
     keyword, values = case
-    examined = REGISTRY.get("joint", keyword)
-    compare(scene_for(examined, np.random.default_rng(0), ground=ground, values=values))
+    type_info = REGISTRY.get("joint", keyword)
+    compare(scene_for(type_info, np.random.default_rng(0), ground=ground, values=values))
 
 
 @pytest.mark.parametrize("case", FORCES, ids=case_names(FORCES))

@@ -20,8 +20,8 @@ from dap3d_core.cli.process.streams import leave_stdout, prepare_streams, reserv
 COMMANDS = {
     name: f"dap3d_core.cli.commands.{name.replace('-', '_')}"
     for name in (
-        "run", "resume", "rerun", "sweep", "check", "models", "plugins", "describe", "new-plugin",
-        "check-plugin", "info", "post", "export", "plot", "animate", "view", "report",
+        "run", "resume", "rerun", "sweep", "modes", "check", "models", "plugins", "describe",
+        "new-plugin", "check-plugin", "info", "post", "export", "plot", "animate", "view", "report",
         "import-matlab",
     )
 }  # fmt: skip

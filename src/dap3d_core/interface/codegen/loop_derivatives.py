@@ -14,8 +14,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.interface.codegen.examined import TypeInfo
 from dap3d_core.interface.codegen.loop_source import stride, write
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.kernels.dual_numbers import Dual, DualFunctions
 from dap3d_core.kernels.runtime import generated_modules
 from dap3d_core.kernels.runtime.loop_modules import Loop, source_of
@@ -156,7 +156,7 @@ class _Outputs:
 
 
 def differentiate_loop(
-    examined: TypeInfo,
+    type_info: TypeInfo,
     what: str,
     t: float,
     arrays: Any,
@@ -167,7 +167,7 @@ def differentiate_loop(
     """Values and derivatives of what a group loop computes.
 
     Args:
-        examined: the type.
+        type_info: the type.
         what: "wrench", "friction" or "acceleration" (J, gamma, nu).
         t: time, s.
         arrays: with ``body``, ``F``, ``idx`` and ``par``, as the compiled loops read them.
@@ -179,14 +179,14 @@ def differentiate_loop(
         by kernel: "wrench" or "friction" (m, slots, 6), force and moment about the mass centre;
         "J" (m, slots, rows, 6); "gamma", "nu" (m, rows).
     """
-    loop = write(examined, what)
+    loop = write(type_info, what)
     assert loop is not None
-    layout, (i0, p0, count), width = examined.layout, group, stride(examined)
+    layout, (i0, p0, count), width = type_info.layout, group, stride(type_info)
     idx = arrays.idx[i0 : i0 + count * width].reshape(count, width)
     slots = len(layout.slots)
     first = slots + len(layout.functions)
     places = [*range(slots), *range(first, first + len(layout.others))]
-    rows = int(getattr(examined.type, "rows", 0))
+    rows = int(getattr(type_info.type, "rows", 0))
     of_bodies = DIRECTIONS * len(places)
     by_numbers = of_bodies + (rows if what == "friction" else 0)
     directions = by_numbers + len(numbers)

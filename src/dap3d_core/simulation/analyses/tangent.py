@@ -180,7 +180,7 @@ class _Assembly:
         system = self.evaluator.system
         i0, p0, count = system.groups[loop].tolist()
         own = differentiate_loop(
-            group.examined, kind, self.t, system, (i0, p0, count), self.minus_lambda
+            group.type_info, kind, self.t, system, (i0, p0, count), self.minus_lambda
         )
         if not all(np.all(np.isfinite(x)) for pair in own.outputs.values() for x in pair):
             raise SimulationError(self._not_finite(kind, group, own))
@@ -259,7 +259,7 @@ class _Assembly:
             for x in pair:
                 wrong |= ~np.isfinite(x.reshape(group.count, -1)).all(axis=1)
         model = self.model
-        is_joint = group.examined.type.kind == "joint" and kind == "acceleration"
+        is_joint = group.type_info.type.kind == "joint" and kind == "acceleration"
         names = model.joint_names if is_joint else model.force_names
         words = list(dict.fromkeys(names[int(k)] for k in group.members[wrong]))
         more = f" and {len(words) - MOST_NAMES} more" if len(words) > MOST_NAMES else ""

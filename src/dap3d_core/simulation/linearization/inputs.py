@@ -66,7 +66,7 @@ def input_forces(point: OperatingPoint, names: Sequence[str]) -> InputForces:
 def _columns(group: Group, name: str, field: str) -> tuple[str, list[int]]:
     """Unit of an input, and the index of its number among those of an element."""
     field, _, axis = field.partition(".")
-    specs, layout = specs_of(group.examined.type), group.examined.layout
+    specs, layout = specs_of(group.type_info.type), group.type_info.layout
     known = [n for n, s in specs.items() if s.kind in NUMBERS and n in layout.numbers]
     if field not in known:
         if field in specs:
@@ -95,7 +95,7 @@ def _wrench(
     """(6 n,) force by one input."""
     system = evaluator.system  # type: ignore[attr-defined]
     i0, p0, count = system.groups[loop].tolist()
-    own = differentiate_loop(group.examined, "wrench", point.t, system, (i0, p0, count),
+    own = differentiate_loop(group.type_info, "wrench", point.t, system, (i0, p0, count),
                              numbers=columns)  # fmt: skip
     value, slope = own.outputs["wrench"]
     part = slope[..., -1] if columns else value  # (m, slots, 6)

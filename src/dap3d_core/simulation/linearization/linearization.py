@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.result import Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.linearization.eigenvalues import Eigenvalues, eigenvalues_of
 from dap3d_core.simulation.linearization.inputs import input_forces
+from dap3d_core.simulation.linearization.mode_motion import mode_motion
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint, operating_point
 from dap3d_core.simulation.linearization.outputs import Outputs, output_derivatives
 from dap3d_core.simulation.linearization.sparse_modes import lowest_eigenvalues
@@ -216,6 +218,31 @@ class Linearization:
         largest = np.argmax(np.abs(weighted), axis=0)
         peak: Complex = weighted[largest, np.arange(shapes.shape[1])]
         return shapes / peak
+
+    @cached_property
+    def participation(self) -> Floats:
+        """(modes, n) share of each body in the kinetic energy of each mode; each row sums to 1."""
+        x = self.modes
+        energy = np.real(np.conj(x) * (self._point.tangent.M @ x)).T
+        energy = energy.reshape(len(energy), len(self.body_names), 6).sum(axis=2)
+        shares: Floats = energy / energy.sum(axis=1, keepdims=True)
+        return shares
+
+    def motion(self, mode: int = 0, size: float = 0.1, instants: int = 60) -> Result:
+        """The motion of one mode, as a result of one period for ``view``, ``animate``, ``save``.
+
+        Displacements of the state, Re(shape exp(i phase)), without the decay or growth of the mode;
+        of a real eigenvalue, to and fro in one second.
+
+        Args:
+            mode: index of the mode, from 0.
+            size: largest displacement, as a part of the model's extent; rotations up to 0.5 rad.
+            instants: number of instants.
+
+        Raises:
+            IndexError: there is no such mode.
+        """
+        return mode_motion(self._point, self.modes, self.mode_eigenvalues, mode, size, instants)
 
     @property
     def stable(self) -> bool:

@@ -142,14 +142,14 @@ def _state(
         notes += start_notes(start, compiled.evaluator, compiled.scene)
         return start.u.copy(), None
     if isinstance(at, Result):
-        if at.subject.body_names != model.body_names:
+        if at.summary.body_names != model.body_names:
             raise SimulationError("the result is of another scene: its bodies differ")
         span = max(float(np.ptp(at.t)), abs(t)) if len(at.t) else 0.0
         k = int(np.argmin(np.abs(at.t - t))) if len(at.t) else -1
         if k < 0 or abs(at.t[k] - t) > SAME_INSTANT * span:
             near = f"; the nearest is t = {at.t[k]:.9g} s" if k >= 0 else ""
             raise SimulationError(f"the result has no instant at t = {t:.9g} s{near}")
-        angles = at.arrays.angles[k] if at.subject.angle_count == model.angle_count else None
+        angles = at.arrays.angles[k] if at.summary.angle_count == model.angle_count else None
         return at.u[k].copy(), angles
     if hasattr(at, "r") and hasattr(at, "p"):
         r, p = np.asarray(at.r, dtype=float), np.asarray(at.p, dtype=float)
@@ -165,7 +165,7 @@ def _set_turns(evaluator: Evaluator, angles: Floats) -> None:
     for q, (kind, group) in enumerate(evaluator.loop_groups):
         if kind != "angle":
             continue
-        p0, layout = int(evaluator.system.groups[q, 1]), group.examined.layout
+        p0, layout = int(evaluator.system.groups[q, 1]), group.type_info.layout
         places = model.angles_of(group, np.arange(group.count))
         for column, offset in enumerate(layout.angles.values()):
             first = p0 + offset

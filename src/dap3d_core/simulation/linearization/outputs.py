@@ -11,9 +11,10 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.model.state_layout import join, split, y_from_u
+from dap3d_core.model.state_layout import split, y_from_u
 from dap3d_core.result import Result, RunMetadata, UnknownNameError, find
 from dap3d_core.simulation.linearization.inputs import InputForces
+from dap3d_core.simulation.linearization.mode_motion import displaced_state
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
 from dap3d_core.simulation.linearization.state_space import StateSpace
 
@@ -99,15 +100,7 @@ def _row(point: OperatingPoint, h: float, direction: tuple[Floats, ...]) -> Floa
     """A reported row of the state displaced by h along a direction."""
     model, evaluator = point.model, point.evaluator
     x, v_change, a_change, lam_change = direction
-    r, p, v, w = split(point.u)
-    x, v_change = (h * change.reshape(-1, 6) for change in (x, v_change))
-    half = 0.5 * x[:, 3:]
-    angle = np.linalg.norm(half, axis=1, keepdims=True)
-    e0, e = np.cos(angle), np.sinc(angle / np.pi) * half
-    scalar = e0 * p[:, :1] - np.sum(e * p[:, 1:], axis=1, keepdims=True)
-    vector = e0 * p[:, 1:] + e * p[:, :1] + np.cross(e, p[:, 1:])
-    turned = np.hstack([scalar, vector])
-    u = join(r + x[:, :3], turned, v + v_change[:, :3], w + v_change[:, 3:])
+    u = displaced_state(point.u, h * x, h * v_change)
     layout = model.report_layout
     report = evaluator.report(point.t, u)
     report[layout["v_dot"]] = point.tangent.a + h * a_change

@@ -1,0 +1,198 @@
+"""``dap3d modes``: frequencies, damping, stability and mode shapes of a model about a state."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dap3d_core.cli.framework import options
+from dap3d_core.cli.framework.command import command
+from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
+
+if TYPE_CHECKING:
+    from dap3d_core.cli.console.console import Terminal
+    from dap3d_core.result import Result
+    from dap3d_core.simulation.linearization.linearization import Linearization
+
+#: Modes listed by default.
+LISTED = 20
+#: Bodies that are named of a mode, and the least share of its kinetic energy that they have.
+NAMED, LEAST_SHARE = 3, 0.05
+
+
+@command(
+    "Compute frequencies, damping, mode shapes.",
+    options.MODEL,
+    click.option("--from", "start", metavar="RESULT[@TIME]",
+                 help="Linearise about a state of a result, at an instant in s or its last one; by "
+                      "default about the start of the model."),
+    click.option("--t", "time", type=float, metavar="S",
+                 help="Time of drivers and functions; 0 by default. Not with --from."),
+    click.option("-n", "--number", type=click.IntRange(min=1), metavar="NUMBER",
+                 help="Number of modes, the lowest ones; 20 are listed by default, 10 of a model "
+                      "of more than 150 bodies."),
+    click.option("--plot", type=click.Path(), metavar="FILE",
+                 help="Draw the eigenvalues into a .png, .svg or .pdf file."),
+    click.option("--mode", type=click.IntRange(min=1), metavar="NUMBER",
+                 help="With -o: the mode whose motion is written; the first by default."),
+    options.output("Write the motion of a mode as a result, for `dap3d view` and `animate`."),
+    options.FORCE, options.ALLOW_CODE, options.JSON,
+)  # fmt: skip
+def modes(
+    model: str,
+    *,
+    start: str | None,
+    time: float | None,
+    number: int | None,
+    plot: str | None,
+    mode: int | None,
+    output: str | None,
+    force: bool,
+    allow_code: bool,
+    as_json: bool,
+) -> int:
+    """Linearise a MODEL about a state, and list its modes, the lowest first.
+
+    Of each mode: natural frequency, damping ratio, eigenvalue, and the bodies that have the largest
+    shares of its kinetic energy. A real eigenvalue is a motion that decays or, where it is
+    positive, one that grows. Zeros are motions that cost nothing.
+
+    \b
+    dap3d modes pen1
+    dap3d modes pen1 --from pen1.nc@1.5
+    dap3d modes pen1 --plot modes.png
+    dap3d modes pen1 --mode 1 -o mode.nc     then: dap3d view mode.nc
+    """
+    import dap3d_core as dap
+    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.framework.paths import refuse_all, writable
+    from dap3d_core.simulation.linearization.linearization import MANY_BODIES
+
+    if start is not None and time is not None:
+        raise Refused("--t does not go with --from: the time is that of the result, RESULT@TIME")
+    if mode is not None and output is None:
+        raise Refused("--mode chooses the motion that -o writes: name its file, -o FILE.nc")
+    targets = [Path(path) for path in (plot, output) if path is not None]
+    refuse_all(*((lambda path=path: writable(path, force=force)) for path in targets))
+    if plot is not None:
+        from dap3d_core.plot.figure_file import check_suffix
+
+        with refusing(ValueError):
+            check_suffix(Path(plot))
+    scene = dap.load(model)
+    at, t = _state_of(start, allow_code) if start else (None, time or 0.0)
+    is_large = len(scene.bodies) > MANY_BODIES
+    with refusing(dap.SimulationError, ValueError):
+        found = dap.linearize(scene, at=at, t=t, modes=number if is_large else None,
+                              allow_code=allow_code)  # fmt: skip
+        data = _data(scene.name, found, number or LISTED)
+    if plot is not None:
+        from dap3d_core.plot.eigenvalues import save_eigenvalues
+
+        with refusing(ValueError):
+            save_eigenvalues(found, plot, force=force)
+    if output is not None:
+        with refusing(IndexError):
+            found.motion((mode or 1) - 1).save(output, force=force)
+    if as_json:
+        print_json(data)
+    else:
+        _show(stdout(), data, len(found.mode_eigenvalues))
+        for target in targets:
+            stdout().say(f"{target} written", whole=True)
+    return DONE
+
+
+def _state_of(start: str, allow_code: bool) -> tuple["Result", float]:
+    """The result that --from names, and the instant.
+
+    Raises:
+        Refused: the instant is no number, or the file holds none.
+    """
+    from dap3d_core.cli.framework.paths import open_result
+
+    path, _, instant = start.rpartition("@")
+    if not path or Path(start).exists():
+        path, instant = start, ""
+    result = open_result(path, allow_code=allow_code)
+    if not len(result.t):
+        raise Refused(f"{path} holds no instants")
+    try:
+        t = float(instant) if instant else float(result.t[-1])
+    except ValueError:
+        t = math.nan
+    if not math.isfinite(t):
+        raise Refused(f"--from {start}: {instant!r} is no time in s; write RESULT@TIME")
+    return result, t
+
+
+def _data(name: str, found: "Linearization", number: int) -> dict[str, Any]:
+    """The modes as data."""
+    values = found.mode_eigenvalues
+    listed = [
+        {
+            "number": k + 1,
+            "frequency": found.frequencies[k],
+            "damping": found.damping[k],
+            "eigenvalue": [values[k].real, values[k].imag],
+            "bodies": _shares(found, k),
+        }
+        for k in range(min(number, len(values)))
+    ]
+    return {
+        "scene": name,
+        "t": found.t,
+        "dof": found.dof,
+        "eigenvalues": [[value.real, value.imag] for value in found.eigenvalues],
+        "frequencies": found.frequencies,
+        "damping": found.damping,
+        "stable": found.stable,
+        "steady": found.is_steady,
+        "modes": listed,
+        "notes": found.notes,
+    }
+
+
+def _shares(found: "Linearization", k: int) -> dict[str, float]:
+    """The largest shares of bodies in the kinetic energy of a mode, by name."""
+    shares = found.participation[k]
+    order = sorted(range(len(shares)), key=lambda b: -shares[b])[:NAMED]
+    return {found.body_names[b]: float(shares[b]) for b in order if shares[b] >= LEAST_SHARE}
+
+
+def _show(console: "Terminal", data: dict[str, Any], total: int) -> None:
+    from dap3d_core.cli.console.console import scene_name
+    from dap3d_core.cli.console.run_summary import degrees_of_freedom
+
+    console.title(scene_name(data["scene"]))
+    stability = "stable" if data["stable"] else "unstable: a motion grows"
+    if not data["steady"]:
+        stability = "no equilibrium, no steady motion"
+    console.facts([("freedoms", degrees_of_freedom(data["dof"])), ("stability", stability)])
+    rows = [
+        (
+            str(mode["number"]),
+            f"{mode['frequency']:.5g}",
+            f"{mode['damping']:.3g}" if abs(mode["damping"]) > 5e-10 else "0",
+            _complex(*mode["eigenvalue"]),
+            ", ".join(mode["bodies"]),
+        )
+        for mode in data["modes"]
+    ]
+    if rows:
+        console.table(("", "Hz", "damping", "eigenvalue", "moves most"), rows, right=(0, 1, 2, 3),
+                      fixed=(0, 1, 2, 3))  # fmt: skip
+    if total > len(rows):
+        console.say(f"and {total - len(rows)} more: -n {total} lists all")
+    console.section("notes", data["notes"])
+
+
+def _complex(real: float, imaginary: float) -> str:
+    """An eigenvalue for people: -0.5 ± 3.836i."""
+    size = math.hypot(real, imaginary)
+    shown = 0.0 if abs(real) <= 1e-9 * size else real
+    if imaginary == 0.0:
+        return f"{shown:.4g}"
+    lead = f"{shown:.3g} " if shown else ""
+    return f"{lead}± {imaginary:.4g}i"

@@ -1,0 +1,69 @@
+"""States displaced along directions; the motion of a mode as a result that can be looked at."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.model.state_layout import join, split, velocities_of, y_from_u
+from dap3d_core.result import INFORMATION, Result, RunMetadata
+from dap3d_core.simulation.linearization.operating_point import OperatingPoint
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Largest rotation of a body that is shown, rad.
+MOST_TURN = 0.5
+
+
+def displaced_state(u: Floats, x: Floats, velocity: Floats) -> Floats:
+    """The state u (13 n,) displaced by x (6 n,), its velocities changed (6 n,); global axes.
+
+    Rotation vectors may be large: p becomes exp(theta / 2) p.
+    """
+    r, p, v, w = split(u)
+    x, velocity = x.reshape(-1, 6), velocity.reshape(-1, 6)
+    half = 0.5 * x[:, 3:]
+    angle = np.linalg.norm(half, axis=1, keepdims=True)
+    e0, e = np.cos(angle), np.sinc(angle / np.pi) * half
+    scalar = e0 * p[:, :1] - np.sum(e * p[:, 1:], axis=1, keepdims=True)
+    vector = e0 * p[:, 1:] + e * p[:, :1] + np.cross(e, p[:, 1:])
+    turned = np.hstack([scalar, vector])
+    return join(r + x[:, :3], turned, v + velocity[:, :3], w + velocity[:, 3:])
+
+
+def mode_motion(
+    point: OperatingPoint,
+    shapes: Complex,
+    eigenvalues: Complex,
+    mode: int,
+    size: float,
+    instants: int,
+) -> Result:
+    """The motion of a mode over one period; arguments and errors as of ``Linearization.motion``."""
+    model = point.model
+    if not 0 <= mode < len(eigenvalues):
+        raise IndexError(f"there is no mode {mode + 1}: the modes are 1 to {len(eigenvalues)}")
+    if not (size > 0.0 and instants > 1):
+        raise ValueError("size is above zero, and instants are two or more")
+    shape, rate = shapes[:, mode], abs(eigenvalues[mode].imag)
+    period = 2.0 * np.pi / rate if rate > 0.0 else 1.0
+    parts = np.abs(shape).reshape(-1, 6)
+    shift, turn = float(np.max(parts[:, :3])), float(np.max(parts[:, 3:]))
+    factors = [size * model.extent / shift if shift > 0.0 else np.inf,
+               MOST_TURN / turn if turn > 0.0 else np.inf]  # fmt: skip
+    amplitude = min(factors)
+    rows = []
+    with point.compiled.borrow_evaluator() as evaluator:
+        for t in np.linspace(0.0, period, instants):
+            phase = np.exp(2j * np.pi * t / period)
+            velocity = amplitude * np.real(shape * phase * 2j * np.pi / period)
+            change = velocity - velocities_of(point.u)
+            u = displaced_state(point.u, amplitude * np.real(shape * phase), change)
+            report = evaluator.report(point.t, u)
+            rows.append(np.concatenate([[t], y_from_u(u), report]))
+    note = (
+        f"{INFORMATION}mode {mode + 1} of a linearisation, eigenvalue {eigenvalues[mode]:.6g}: "
+        "displacements along a mode shape, no simulation"
+    )
+    record = RunMetadata(scene_text=point.compiled.scene_text, method=point.compiled.method,
+                         integrator="none", notes=(note,))  # fmt: skip
+    return Result.of_run(model, np.array(rows), record, lambda: point.evaluator)
