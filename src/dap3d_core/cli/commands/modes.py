@@ -1,6 +1,8 @@
 """``dap3d modes``: frequencies, damping, stability and mode shapes of a model about a state."""
 
 import math
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,26 +68,16 @@ def modes(
     """
     import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json, stdout
-    from dap3d_core.cli.framework.paths import refuse_all, writable
-    from dap3d_core.simulation.linearization.linearization import MANY_BODIES
 
+    targets = _targets(plot, output, force)
     if start is not None and time is not None:
         raise Refused("--t does not go with --from: the time is that of the result, RESULT@TIME")
     if mode is not None and output is None:
         raise Refused("--mode chooses the motion that -o writes: name its file, -o FILE.nc")
-    targets = [Path(path) for path in (plot, output) if path is not None]
-    refuse_all(*((lambda path=path: writable(path, force=force)) for path in targets))
-    if plot is not None:
-        from dap3d_core.plot.figure_file import check_suffix
-
-        with refusing(ValueError):
-            check_suffix(Path(plot))
     scene = dap.load(model)
     at, t = _state_of(start, allow_code) if start else (None, time or 0.0)
-    is_large = len(scene.bodies) > MANY_BODIES
-    with refusing(dap.SimulationError, ValueError):
-        found = dap.linearize(scene, at=at, t=t, modes=number if is_large else None,
-                              allow_code=allow_code)  # fmt: skip
+    with refusing(dap.SimulationError):
+        found = dap.linearize(scene, at=at, t=t, modes=number, allow_code=allow_code)
         data = _data(scene.name, found, number or LISTED)
     if plot is not None:
         from dap3d_core.plot.eigenvalues import save_eigenvalues
@@ -102,6 +94,24 @@ def modes(
         for target in targets:
             stdout().say(f"{target} written", whole=True)
     return DONE
+
+
+def _targets(plot: str | None, output: str | None, force: bool) -> list[Path]:
+    """The files to write.
+
+    Raises:
+        Refused: one cannot be written, or is no picture.
+    """
+    from dap3d_core.cli.framework.paths import refuse_all, writable
+
+    checks: list[Callable[[], object]] = []
+    if plot is not None:
+        from dap3d_core.plot.figure_file import check_suffix
+
+        checks.append(partial(check_suffix, Path(plot)))
+    targets = [Path(path) for path in (plot, output) if path is not None]
+    refuse_all(*checks, *(partial(writable, path, force=force) for path in targets))
+    return targets
 
 
 def _state_of(start: str, allow_code: bool) -> tuple["Result", float]:

@@ -57,9 +57,8 @@ class Linearization:
     ) -> None:
         self._point = point
         self.t, self.u, self.body_names = point.t, point.u, point.model.body_names
-        self._mode_count = modes
-        if modes is None and point.model.body_count > MANY_BODIES:
-            self._mode_count = FEW_MODES
+        self._is_large = point.model.body_count > MANY_BODIES
+        self._mode_count = FEW_MODES if modes is None and self._is_large else modes
         forces = input_forces(point, inputs)
         self.inputs, self.input_units = tuple(inputs), forces.units
         self.outputs = tuple(outputs)
@@ -157,7 +156,7 @@ class Linearization:
     def _spectrum(self) -> Eigenvalues:
         """Eigenvalues, and displacements (6 n, k) in place of eigenvectors."""
         point = self._point
-        if self._mode_count is not None:
+        if self._is_large and self._mode_count is not None:
             dependencies = point.redundancy.rank.dependencies
             count = min(2 * self._mode_count, 12 * point.model.body_count - 2)
             lowest = lowest_eigenvalues(point.equations, dependencies, count)
@@ -173,7 +172,7 @@ class Linearization:
     def eigenvalues(self) -> Complex:
         """(k,) eigenvalues, 1/s, by magnitude; of a conjugate pair that with Im > 0 first.
 
-        All of them, or where ``modes`` was given those of the lowest modes.
+        All of them; of more than 150 bodies those of the lowest modes.
         """
         return self._spectrum.values
 
@@ -292,8 +291,8 @@ def linearize(
             (``motor.n_a``, ``push.f.z``); ``FORCE`` for a factor on all of its force, 1 at the
             state.
         outputs: quantities by name as in results (``body.r.x``, ``P.v``, ``J1.force.z``, ...).
-        modes: number of lowest modes, from sparse matrices; None for all, or the 10 lowest of a
-            scene of more than 150 bodies.
+        modes: number of lowest modes to report; by default all, or 10 of a scene of more than 150
+            bodies, whose modes come from sparse matrices.
         allow_code: whether the model's own types may be loaded.
 
     Raises:

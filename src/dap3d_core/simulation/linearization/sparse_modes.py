@@ -35,7 +35,7 @@ def lowest_eigenvalues(
         SimulationError: the iteration does not converge.
     """
     from scipy.sparse import block_array, csc_array, eye_array
-    from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
+    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
 
     six = equations.K.shape[0]
     chosen = independent_rows(equations.D.shape[0], dependencies)
@@ -55,11 +55,15 @@ def lowest_eigenvalues(
     size = B.shape[0]
     operator = LinearOperator((size, size), lambda z: factors.solve(E @ np.asarray(z).ravel()))
     start = operator @ (operator @ np.random.default_rng(1).standard_normal(size))
+    wanted = min(count, size - 2)
     try:
-        theta, vectors = eigs(operator, k=min(count, size - 2), v0=start, maxiter=100 * count,
-                              tol=1e-13)  # fmt: skip
-    except ArpackError as error:
-        raise SimulationError(f"the lowest modes were not found: {error}") from error
+        theta, vectors = eigs(operator, k=wanted, v0=start, maxiter=100 * count, tol=1e-13)
+    except ArpackNoConvergence as error:
+        theta, vectors = error.eigenvalues, error.eigenvectors
+        if len(theta) < wanted:
+            raise SimulationError(
+                f"of the lowest {wanted} eigenvalues {len(theta)} were found; take fewer modes"
+            ) from error
     values = sigma + 1.0 / theta
     values[np.abs(values) < ZERO * sigma] = 0.0
     order = order_of(values)
