@@ -80,8 +80,9 @@ def test_parallelogram():
     scene.add_point("bar-left", "bar", [-0.5, 0, 0])
     scene.add_point("bar-right", "bar", [0.5, 0, 0])
     scene.add_point("pivot", "ground", [1, 0, 0])
-    for name, P_i, P_j in (("A", "left-top", "ground.O"), ("B", "right-top", "pivot"),
-                           ("C", "left-end", "bar-left"), ("D", "right-end", "bar-right")):  # fmt: skip
+    pairs = {"A": ("left-top", "ground.O"), "B": ("right-top", "pivot"),
+             "C": ("left-end", "bar-left"), "D": ("right-end", "bar-right")}  # fmt: skip
+    for name, (P_i, P_j) in pairs.items():
         hinge(scene, name, P_i, P_j)
     scene.add_force("weight", "gravity")
     lin = dap.linearize(scene)
