@@ -57,6 +57,20 @@ def test_a_model_loads_only_its_own_types(model, present, absent):
         assert "dap3d_core.formulations.standard" not in found
 
 
+def test_a_run_imports_no_analysis(tmp_path):
+    """``dap3d run`` imports nothing of linearisation, of other analyses and of what they need."""
+    script = (
+        "from dap3d_core.cli import main\n"
+        f"main(['run', 'pen1', '--t-end', '0.1', '-o', {str(tmp_path / 'r.nc')!r}, '-q'])"
+    )
+    found = imported(script)
+    assert "dap3d_core.simulation.run" in found
+    analyses = ("dap3d_core.simulation.analyses", "dap3d_core.simulation.linearization",
+                "dap3d_core.kernels.dual_numbers",
+                "dap3d_core.interface.codegen.loop_derivatives", "scipy.sparse.linalg", "control")  # fmt: skip
+    assert not {m for m in found if m.startswith(analyses)}
+
+
 def test_a_page_needs_neither_matplotlib_nor_a_reader_of_meshes():
     """``dap.view`` of a scene without meshes imports nothing for plots in files, or for meshes."""
     script = (

@@ -135,6 +135,8 @@ class Linearization:
     def to_control(self) -> Any:
         """The same as a ``control.StateSpace`` of python-control (extra ``control``).
 
+        Its names take no dots: ``push.f.x`` is called ``push_f_x`` there.
+
         Raises:
             ImportError: python-control is not installed.
         """
@@ -146,9 +148,11 @@ class Linearization:
             ) from error
         states = [f"xi{k + 1}" for k in range(self.coordinate_count)]
         states += [f"eta{k + 1}" for k in range(self.state_count - len(states))]
-        return control.ss(self.A, self.B, self.C, self.D, states=states,
-                          inputs=list(self.inputs) or 0,
-                          outputs=list(self.outputs) or 0)  # fmt: skip
+        signals = {
+            "inputs": [name.replace(".", "_") for name in self.inputs],
+            "outputs": [name.replace(".", "_") for name in self.outputs],
+        }
+        return control.ss(self.A, self.B, self.C, self.D, states=states, **signals)
 
     # ------------------------------------------------------------------ modes
 
@@ -297,7 +301,7 @@ def linearize(
 
     Raises:
         SceneError, PluginError: as ``compile``.
-        SimulationError: a state off the constraints or at a switch; no derivative there; no bodies.
+        SimulationError: a state off the constraints or at a switch; no derivative there.
         UnknownNameError: an input or output that there is not; names the nearest.
     """
     if modes is not None and (not isinstance(modes, int) or modes < 1):

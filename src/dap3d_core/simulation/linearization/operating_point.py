@@ -94,8 +94,6 @@ def operating_point(
         scene = scene.scene if isinstance(scene, CompiledModel) else scene
         compiled = CompiledModel(scene, method="auto", allow_code=allow_code)
     model = compiled.model
-    if not model.body_count:
-        raise SimulationError("the scene has no bodies: there is nothing to linearise")
     notes: list[str] = []
     with compiled.borrow_evaluator() as evaluator:
         u, turns = _state(compiled, at, t, notes)

@@ -85,11 +85,11 @@ def steady_frames(model: Model, tangent: TangentMatrices, u: Floats) -> SteadyFr
                       axis=(1, 2))[:, None].repeat(3, 1)])  # fmt: skip
     loads = np.abs(tangent.f) + np.abs(tangent.D.T) @ np.abs(tangent.multipliers)
     size = loads.reshape(n, 6) / mass / np.repeat([length, 1.0], 3)
-    rate = max(_largest(w), _largest(v) / length)
+    rate = max(_largest(w), _largest(v) / length, float(np.sqrt(_largest(size))))
     is_steady = (
-        _largest(missed[:, :6]) <= STEADY * (_largest(size) + rate**2)
-        and _largest(missed[:, 6:]) <= STEADY * rate
+        _largest(missed[:, :6]) <= STEADY * rate**2 and _largest(missed[:, 6:]) <= STEADY * rate
     )
+    Omega[np.abs(Omega) <= RCOND * rate] = 0.0
     if not is_steady:
         Omega = np.zeros((n, 3))
     return SteadyFrames(Omega, of_translation * Omega, tuple(drift - {0.0}), is_steady)

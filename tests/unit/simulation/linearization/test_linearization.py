@@ -1,0 +1,232 @@
+"""Linearisation: state space, inputs, outputs, operating points, and what it refuses."""
+
+from types import SimpleNamespace
+
+import attrs
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+from dap3d_core.result import UnknownNameError
+from dap3d_core.scene import Scene
+
+
+def cart(**start):
+    """A cart of 2 kg on a rail with spring and damper, a pendulum of 1 kg below, three inputs."""
+    scene = Scene(name="cart")
+    scene.add_body("cart", mass=2.0, Jp=np.diag([0.1, 0.1, 0.1]), r=[0, 0, 0], **start)
+    scene.add_body("bob", mass=1.0, Jp=np.diag([0.02, 0.02, 0.01]), r=[0, 0, -0.5])
+    scene.add_point("pin", "bob", [0, 0, 0.5])
+    scene.add_point("wall", "ground", [-1.0, 0, 0])
+    scene.add_joint("tran", "rail", P_i="cart.O", P_j="ground.O", a_j="ground.x")
+    scene.add_joint("rev", "hinge", P_i="pin", P_j="cart.O", a_i="bob.y", a_j="cart.y")
+    scene.add_force("weight", "gravity")
+    scene.add_force("ptp", "spring", P_i="cart.O", P_j="wall", k=40.0, c=3.0, l0=1.0)
+    scene.add_force("f", "push", body_i="cart", f=[0, 0, 0])
+    scene.add_force("n", "motor", body_i="bob", n=[0, 0, 0])
+    return scene
+
+
+#: Of the cart: mass matrix, stiffness, damping of (x, angle about y); m l sits between them.
+MASS = np.array([[3.0, -0.5], [-0.5, 0.02 + 0.25]])
+STIFFNESS = np.diag([40.0, 1.0 * 9.81 * 0.5])
+DAMPING = np.diag([3.0, 0.0])
+
+
+def transfer(lin, s):
+    """C (s - A)^-1 B + D."""
+    return lin.C @ np.linalg.solve(s * np.eye(len(lin.A)) - lin.A, lin.B) + lin.D
+
+
+def test_transfer_functions():
+    """From force and moment to positions, velocities, accelerations and reactions.
+
+    By minimal coordinates: q = (M s^2 + C s + K)^-1 Q, and the force of the hinge on the bob along x
+    is its mass times its acceleration, x_ddot - l phi_ddot.
+    """
+    outputs = ("cart.r.x", "bob.w.y", "pin.v.x", "bob.rdd.x", "hinge.force.x", "cart.p.e0")
+    lin = dap.linearize(cart(), inputs=("push.f.x", "motor.n.y"), outputs=outputs)
+    for s in (0.3 + 1.1j, 2.0j):
+        q = np.linalg.inv(MASS * s**2 + DAMPING * s + STIFFNESS)
+        bob = (q[0] - 0.5 * q[1]) * s**2
+        expected = np.array([q[0], s * q[1], s * q[0], bob, bob, 0.0 * bob])
+        np.testing.assert_allclose(transfer(lin, s), expected, rtol=1e-11, atol=1e-12)
+
+
+def test_parameters_as_inputs():
+    """Any number of a force is an input: stiffness by stretch, a force component, all of a force.
+
+    With the spring stretched by 0.1 m, F = k (l - l0): dF/dk = 0.1, dF/dl0 = -k; a factor on the
+    spring is F itself.
+    """
+    scene = cart()
+    scene.forces["spring"].fields["l0"] = 0.9
+    names = ("spring.k", "spring.l0", "spring", "push.f.x")
+    lin = dap.linearize(scene, inputs=names)
+    push = lin.B[:, 3]
+    for column, force in enumerate((0.1, -40.0, 4.0)):
+        np.testing.assert_allclose(lin.B[:, column], -force * push, rtol=1e-12, atol=1e-14)
+    assert lin.input_units == ("N/m", "m", "1", "N")
+
+
+def test_state_space_follows_the_motion():
+    """After a small kick the simulated motion is that of z_dot = A z, to second order of the kick."""
+    kick = 1e-5
+    lin = dap.linearize(cart(), outputs=("cart.r.x",))
+    run = dap.simulate(cart(r_dot=[kick, 0, 0]), t_end=1.0, dt=1.0, rtol=1e-12, atol=1e-16)
+    start = np.linalg.lstsq(lin.basis, np.concatenate([np.zeros(12), run.u[0, -12:]]), rcond=None)
+    values, vectors = np.linalg.eig(lin.A)
+    z = vectors @ (np.exp(values) * np.linalg.solve(vectors, start[0]))
+    np.testing.assert_allclose(float(np.real(lin.C @ z)[0]), run.r[-1, 0, 0], atol=1e-3 * kick)
+
+
+def test_state_of_a_result():
+    """About an instant of a run the state is that of the run, and a state in motion gets a note."""
+    run = dap.simulate(cart(r_dot=[0.5, 0, 0]), t_end=1.0, dt=0.25)
+    lin = dap.linearize(cart(), at=run, t=0.5)
+    np.testing.assert_array_equal(lin.u, run.u[2])
+    assert not lin.is_steady
+    assert any("neither at rest nor in steady motion" in note for note in lin.notes)
+    with pytest.raises(
+        dap.SimulationError, match=r"no instant at t = 0\.6 s; the nearest is t = 0\.5"
+    ):
+        dap.linearize(cart(), at=run, t=0.6)
+    with pytest.raises(dap.SimulationError, match="of another scene"):
+        dap.linearize("pen1", at=run)
+
+
+def test_counted_turns_of_a_result():
+    """A spring that counts whole turns has the moment there that the run has there."""
+
+    def wound():
+        scene = Scene(name="wound")
+        scene.add_body("b", mass=1.0, Jp=np.eye(3), w=[0, 0, 10.0])
+        scene.add_joint("rev", "J", P_i="b.O", P_j="ground.O", a_i="b.z", a_j="ground.z")
+        scene.add_force("rot_sda", "S", v_i="b.x", v_j="ground.x", axis="b.z", k=0.1, turns=True)
+        return scene
+
+    run = dap.simulate(wound(), t_end=2.0, dt=0.5, rtol=1e-10)
+    lin = dap.linearize(wound(), at=run, t=2.0, inputs=("S",))
+    moment = np.abs(lin.B).max()  # on the only freedom, of inertia 1
+    np.testing.assert_allclose(moment, 0.1 * 100.0**0.5 / 0.1**0.5 * np.sin(2.0 * 0.1**0.5),
+                               rtol=1e-7)  # fmt: skip
+
+
+def test_equilibrium_is_at_rest():
+    """Of an equilibrium r and p are taken, the velocities are zero."""
+    model = dap.compile(cart(r_dot=[0.5, 0, 0])).model
+    lin = dap.linearize(cart(r_dot=[0.5, 0, 0]), at=SimpleNamespace(r=model.r, p=model.p))
+    assert not np.any(lin.u[-12:])
+    assert lin.is_steady
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"inputs": ("pusch.f.x",)}, r"no force 'pusch'.*did you mean 'push'"),
+        ({"inputs": ("push.g.x",)}, r"no number 'g'"),
+        ({"inputs": ("push.f",)}, r"name a component of f \(x, y or z\)"),
+        ({"inputs": ("spring.k.x",)}, r"name k alone"),
+        ({"inputs": ("spring.function",)}, r"is no number that its force depends on directly"),
+        ({"outputs": ("cart.r.y_",)}, r"did you mean 'cart\.r\.[xyz]'"),
+        ({"outputs": ("cart.r",)}, r"has components: name one, as cart\.r\.x"),
+        ({"inputs": ("spring.k",), "outputs": ("spring.tension",)}, "force that is an input"),
+    ],
+)
+def test_unknown_names(settings, words):
+    """Unknown inputs and outputs are refused with what there is, or the nearest name."""
+    with pytest.raises(UnknownNameError, match=words):
+        dap.linearize(cart(), **settings)
+
+
+def test_state_off_the_constraints():
+    """A state that breaks the constraints is refused, with how far off it is."""
+    scene = cart()
+    u = dap.compile(scene).model.u0.copy()
+    u[7] += 0.01
+    with pytest.raises(dap.SimulationError, match=r"off the constraints \(position 0\.01"):
+        dap.linearize(scene, at=u)
+
+
+def test_state_at_a_switch():
+    """Where a spring's table has a kink there is no derivative; beside it there is."""
+    scene = Scene(name="kink")
+    scene.add_body("b", mass=1.0, Jp=np.eye(3), r=[1.0, 0, 0])
+    scene.add_function("b", "curve", x_start=0.0, x_end=1.0, f_start=0.0, f_end=5.0)
+    scene.add_force("ptp", "S", P_i="b.O", P_j="ground.O", l0=1.0, function="curve")
+    with pytest.raises(dap.SimulationError, match="at a switch of S.*move the state"):
+        dap.linearize(scene)
+    scene.bodies["b"] = attrs.evolve(scene.bodies["b"], r=[1.25, 0, 0])
+    assert dap.linearize(scene).dof == 6
+
+
+def test_control():
+    """python-control gets the same matrices and names."""
+    lin = dap.linearize(cart(), inputs=("push.f.x",), outputs=("cart.r.x", "bob.r.x"))
+    system = lin.to_control()
+    assert (system.input_labels, system.output_labels) == (["push_f_x"], ["cart_r_x", "bob_r_x"])
+    for name in "ABCD":
+        np.testing.assert_array_equal(getattr(system, name), getattr(lin, name))
+    np.testing.assert_allclose(system(1j), transfer(lin, 1j), rtol=1e-12)
+
+
+def test_motion_of_a_mode():
+    """The motion of a mode is a result over one period that stays on the linearised constraints."""
+    lin = dap.linearize(cart())
+    run = lin.motion(0, size=1e-4, instants=9)
+    np.testing.assert_allclose(run.t[-1], 2 * np.pi / abs(lin.mode_eigenvalues[0].imag))
+    np.testing.assert_allclose(run.u[-1], run.u[0], atol=1e-15)
+    assert np.ptp(run.r[:, 0, 0]) > 1e-5
+    hinge = run.r[:, 1] + np.cross(run.w[:, 1], [0, 0, 0])  # heights change to second order alone
+    assert np.ptp(hinge[:, 2]) < 1e-7
+    with pytest.raises(IndexError, match="no mode 3: the modes are 1 to 2"):
+        lin.motion(2)
+
+
+def test_damped_modes():
+    """Real eigenvalues are modes of their own, with damping ratio one."""
+    scene = Scene(name="overdamped")
+    scene.add_body("b", mass=1.0, Jp=np.eye(3), r=[1.0, 0, 0])
+    scene.add_joint("tran", "rail", P_i="b.O", P_j="ground.O", a_j="ground.x")
+    scene.add_force("ptp", "S", P_i="b.O", P_j="ground.O", k=2.0, c=3.0, l0=1.0)
+    lin = dap.linearize(scene)
+    np.testing.assert_allclose(lin.eigenvalues, [-1.0, -2.0], rtol=1e-12)
+    np.testing.assert_array_equal(lin.damping, [1.0, 1.0])
+    assert lin.stable
+    assert lin.modes.shape == (6, 2)
+
+
+def test_friction_is_a_damper_at_rest():
+    """Smooth friction at rest damps with mu N / v_tol, and a note says what that means."""
+    scene = Scene(name="sledge")
+    scene.add_body("b", mass=2.0, Jp=np.eye(3))
+    scene.add_joint("tran", "rail", P_i="b.O", P_j="ground.O", a_j="ground.x")
+    scene.add_force("weight", "gravity")
+    scene.add_force("friction", "rub", joint="rail", mu=0.1, v_tol=0.01)
+    lin = dap.linearize(scene)
+    np.testing.assert_allclose(lin.eigenvalues, [0.0, -0.1 * 9.81 / 0.01], rtol=1e-9, atol=1e-12)
+    assert any("no stiction" in note for note in lin.notes)
+
+
+def test_friction_follows_the_load():
+    """Where the load changes with the motion, friction's derivative by the multipliers counts.
+
+    A mass on a rail is pressed by a spring across it, hung ahead of the mass by d: the load is
+    N = k (l - l0) h / l, its slope by x is exact by hand. With speed v far above v_tol friction is
+    -mu N: the linear equation is m x'' = Fx' x - mu N' x.
+    """
+    m, k, l0, mu, d, h, speed = 1.0, 50.0, 0.5, 0.2, 0.6, 0.8, 1.0
+    scene = Scene(name="pressed")
+    scene.add_body("b", mass=m, Jp=np.eye(3), r_dot=[speed, 0, 0])
+    scene.add_point("hook", "ground", [d, 0, h])
+    scene.add_joint("tran", "rail", P_i="b.O", P_j="ground.O", a_j="ground.x")
+    scene.add_force("ptp", "S", P_i="b.O", P_j="hook", k=k, l0=l0)
+    scene.add_force("friction", "rub", joint="rail", mu=mu, v_tol=1e-3)
+    lin = dap.linearize(scene)
+    length = np.hypot(d, h)
+    dl = -d / length
+    pull, slope = k * (length - l0), k * dl
+    along = slope * d / length - pull / length - pull * d * dl / length**2
+    load = slope * h / length - pull * h * dl / length**2
+    square = (along - mu * load) / m
+    np.testing.assert_allclose(np.sort(lin.eigenvalues**2), [square, square], rtol=1e-9)
