@@ -16,6 +16,7 @@ SECTIONS = {
         ("simulation.CompiledModel", "simulation.Instant", "simulation.RunProgress",
          "simulation.Reproduction"),
     ),
+    "Analyses": (("linearize", "Linearization"), ()),
     "Results": (
         ("Result", "open", "plot", "view", "animate", "export"),
         ("result.Reaction", "result.Energy", "result.Entry", "result.ErrorEstimate",

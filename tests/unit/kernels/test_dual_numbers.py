@@ -54,6 +54,6 @@ def test_derivative(name):
 
 
 def test_a_branch_on_a_number_is_refused():
-    """A kernel that branches by ``if`` has no derivative of many instances: it says what to write."""
+    """A kernel that branches by ``if`` is told what to write."""
     with pytest.raises(TypeError, match=r"use where\(condition, a, b\)"):
         FUNCTIONS["sum"](Dual(X)) and 1.0

@@ -39,10 +39,10 @@ def transfer(lin, s):
 
 
 def test_transfer_functions():
-    """From force and moment to positions, velocities, accelerations and reactions.
+    """From force and moment to positions, velocities, accelerations, reactions.
 
-    By minimal coordinates: q = (M s^2 + C s + K)^-1 Q, and the force of the hinge on the bob along x
-    is its mass times its acceleration, x_ddot - l phi_ddot.
+    By minimal coordinates: q = (M s^2 + C s + K)^-1 Q, and the force of the hinge on the bob along
+    x is its mass times its acceleration, x_ddot - l phi_ddot.
     """
     outputs = ("cart.r.x", "bob.w.y", "pin.v.x", "bob.rdd.x", "hinge.force.x", "cart.p.e0")
     lin = dap.linearize(cart(), inputs=("push.f.x", "motor.n.y"), outputs=outputs)
@@ -54,7 +54,7 @@ def test_transfer_functions():
 
 
 def test_parameters_as_inputs():
-    """Any number of a force is an input: stiffness by stretch, a force component, all of a force.
+    """Any number of a force is an input: a stiffness, a component, all of a force.
 
     With the spring stretched by 0.1 m, F = k (l - l0): dF/dk = 0.1, dF/dl0 = -k; a factor on the
     spring is F itself.
@@ -70,7 +70,7 @@ def test_parameters_as_inputs():
 
 
 def test_state_space_follows_the_motion():
-    """After a small kick the simulated motion is that of z_dot = A z, to second order of the kick."""
+    """After a small kick the simulated motion is that of z_dot = A z."""
     kick = 1e-5
     lin = dap.linearize(cart(), outputs=("cart.r.x",))
     run = dap.simulate(cart(r_dot=[kick, 0, 0]), t_end=1.0, dt=1.0, rtol=1e-12, atol=1e-16)
@@ -154,7 +154,7 @@ def test_state_at_a_switch():
     scene.add_body("b", mass=1.0, Jp=np.eye(3), r=[1.0, 0, 0])
     scene.add_function("b", "curve", x_start=0.0, x_end=1.0, f_start=0.0, f_end=5.0)
     scene.add_force("ptp", "S", P_i="b.O", P_j="ground.O", l0=1.0, function="curve")
-    with pytest.raises(dap.SimulationError, match="at a switch of S.*move the state"):
+    with pytest.raises(dap.SimulationError, match=r"at a switch of S.*move the state"):
         dap.linearize(scene)
     scene.bodies["b"] = attrs.evolve(scene.bodies["b"], r=[1.25, 0, 0])
     assert dap.linearize(scene).dof == 6
