@@ -315,3 +315,33 @@ def test_spinning_structure():
     assert lin.stable
     np.testing.assert_allclose(lin.Omega[:, 2], spin, rtol=1e-12)
     np.testing.assert_allclose(magnitudes(lin, 2), np.sqrt(2 * k / m + 3 * spin**2), rtol=RTOL)
+
+
+def test_governor():
+    """A rod on a hinge of a shaft that a driver turns: it swings about its angle in steady turn.
+
+    With I, I_3 across and along the rod, about its hinge, c = cos of the angle from the vertical:
+    (I - I_3) W^2 c = m g l, and I x^2 = -(I - I_3) W^2 (2 c^2 - 1) + m g l c.
+    """
+    turn, m, half = 6.0, 1.0, 0.5
+    across, along = 1 / 12 + m * half**2, 1e-3
+    c = m * G * half / ((across - along) * turn**2)
+    tilt = np.arccos(c)
+    p = np.array([np.cos(tilt / 2), 0, -np.sin(tilt / 2), 0])
+    r = rotation(p) @ [0, 0, -half]
+    scene = Scene(name="governor")
+    scene.add_body("shaft", mass=1.0, Jp=np.diag([0.1, 0.1, 0.2]), w=[0, 0, turn])
+    scene.add_body("rod", mass=m, Jp=np.diag(ROD), p=p, r=r, w=[0, 0, turn],
+                   r_dot=np.cross([0, 0, turn], r))  # fmt: skip
+    scene.add_point("top", "rod", [0, 0, half])
+    scene.add_joint("rev", "bearing", P_i="shaft.O", P_j="ground.O", a_i="shaft.z", a_j="ground.z")
+    scene.add_joint("rev", "hinge", P_i="top", P_j="shaft.O", a_i="rod.y", a_j="shaft.y")
+    scene.add_function("a", "speed", coeff=[0.0, -turn, 0.0])  # of ground
+    scene.add_force("weight", "gravity")
+    scene.add_joint("rel-rot", "motor", body_i="shaft", a_j="ground.z", function="speed")
+    lin = dap.linearize(scene)
+    assert lin.dof == 1
+    square = ((across - along) * turn**2 * (1 - 2 * c**2) + m * G * half * c) / across
+    assert lin.is_steady
+    assert lin.stable
+    np.testing.assert_allclose(magnitudes(lin, 2), np.sqrt(abs(square)), rtol=RTOL)

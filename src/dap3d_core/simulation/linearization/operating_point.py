@@ -108,7 +108,7 @@ def operating_point(
                 "this pose alone count as freedoms; linearise about a pose nearby"
             )
         tangent = tangent_matrices(evaluator, t, u)
-        frames = steady_frames(model, tangent, u)
+        frames = steady_frames(model, tangent, u, redundancy.rank.dependencies)
     if not frames.is_steady:
         notes.append(
             "the state is neither at rest nor in steady motion: the matrices hold at this instant "

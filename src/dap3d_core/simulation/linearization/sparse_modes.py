@@ -17,6 +17,7 @@ from dap3d_core.linear.rank.rank import Dependency
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.linearization.eigenvalues import Eigenvalues, order_of
 from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
+from dap3d_core.simulation.linearization.steady_motion import independent_rows
 
 Floats = NDArray[np.float64]
 
@@ -68,17 +69,6 @@ def lowest_eigenvalues(
     values[np.abs(values) < ZERO * sigma] = 0.0
     order = order_of(values)
     return Eigenvalues(values[order], vectors[:six, order])
-
-
-def independent_rows(rows: int, dependencies: Sequence[Dependency]) -> Any:
-    """Rows without the redundant ones: of each dependency those that its others give."""
-    from scipy.linalg import qr
-
-    left_out: list[Any] = []
-    for dependency in dependencies:
-        _, _, pivots = qr(dependency.combinations, pivoting=True)
-        left_out.append(dependency.rows[pivots[: len(dependency.combinations)]])
-    return np.setdiff1d(np.arange(rows), np.concatenate([np.zeros(0, dtype=int), *left_out]))
 
 
 def _norm(matrix: Any) -> float:

@@ -2,23 +2,28 @@
 
 The linearised equations of a steady motion (a relative equilibrium: a spinning satellite, a rolling
 wheel, a top that precesses) have constant coefficients in axes that turn with it. Of each set of
-connected bodies the angular velocity Omega of these axes solves, for every body, linear equations:
+connected bodies the angular velocity Omega of these axes fulfils, for every body,
 
     r_ddot = Omega x r_dot        omega_dot = Omega x omega
     (omega - Omega)~ J = J (omega - Omega)~       the inertia tensor keeps its components
 
-by least squares, the shortest Omega where there are many: a body of revolution that spins about its
-axis, a rolling wheel or a sleeping top, is described in axes that do not spin. Where a common
-translation of the bodies changes no force and no row, as in space, a common acceleration is free:
-such axes may drift and fall.
+It is found by least squares, the shortest where there are many: a body of revolution that spins
+about its axis, a rolling wheel or a sleeping top, is described in axes that do not spin. Where a
+common translation of the bodies changes no force and no row, as in space, a common acceleration is
+free: such axes may drift and fall.
+
+In a steady motion accelerations turn with the axes as well, which the linearised equations tell:
+their rates are Omega x r_ddot and Omega x omega_dot.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.linear.rank.rank import Dependency
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import rotation, skew
 from dap3d_core.model.state_layout import split
@@ -50,8 +55,17 @@ class SteadyFrames:
     is_steady: bool
 
 
-def steady_frames(model: Model, tangent: TangentMatrices, u: Floats) -> SteadyFrames:
-    """Angular velocities of the axes in which the motion from a state u (13 n,) is steady."""
+def steady_frames(
+    model: Model, tangent: TangentMatrices, u: Floats, dependencies: Sequence[Dependency] = ()
+) -> SteadyFrames:
+    """Angular velocities of the axes in which the motion from a state u (13 n,) is steady.
+
+    Args:
+        model: the model.
+        tangent: the equations of motion there.
+        u: the state.
+        dependencies: of redundant rows.
+    """
     n = model.body_count
     _, p, v, w = split(u)
     A = rotation(p)
@@ -90,9 +104,51 @@ def steady_frames(model: Model, tangent: TangentMatrices, u: Floats) -> SteadyFr
         _largest(missed[:, :6]) <= STEADY * rate**2 and _largest(missed[:, 6:]) <= STEADY * rate
     )
     Omega[np.abs(Omega) <= RCOND * rate] = 0.0
+    if is_steady and (np.any(v) or np.any(w)):
+        change = acceleration_rates(tangent, np.hstack([v, w]).ravel(), dependencies).reshape(n, 6)
+        change[:, :3] -= np.cross(Omega, a[:, :3])
+        change[:, 3:] -= np.cross(Omega, a[:, 3:])
+        is_steady = _largest(change / np.repeat([length, 1.0], 3)) <= STEADY * rate**3
     if not is_steady:
         Omega = np.zeros((n, 3))
     return SteadyFrames(Omega, of_translation * Omega, tuple(drift - {0.0}), is_steady)
+
+
+def independent_rows(rows: int, dependencies: Sequence[Dependency]) -> Any:
+    """Rows without the redundant ones: of each dependency those that its others give."""
+    from scipy.linalg import qr
+
+    left_out: list[Any] = []
+    for dependency in dependencies:
+        _, _, pivots = qr(dependency.combinations, pivoting=True)
+        left_out.append(dependency.rows[pivots[: len(dependency.combinations)]])
+    return np.setdiff1d(np.arange(rows), np.concatenate([np.zeros(0, dtype=int), *left_out]))
+
+
+def acceleration_rates(
+    tangent: TangentMatrices, v: Floats, dependencies: Sequence[Dependency]
+) -> Floats:
+    """(6 n,) rates of the accelerations along the motion, by the linearised equations.
+
+    Changes of functions of time beyond their second derivatives are left out. NaN at a singular
+    pose.
+    """
+    from scipy.sparse import block_array, csc_array
+    from scipy.sparse.linalg import splu
+
+    chosen = independent_rows(tangent.D.shape[0], dependencies)
+    D, a = tangent.D[chosen], tangent.a
+    reactions = D.T + tangent.friction_by_multipliers[:, chosen]
+    matrix = block_array([[tangent.M, -reactions], [D, None]]) if len(chosen) else tangent.M
+    by_motion = (tangent.acceleration_by_displacement @ v + tangent.acceleration_by_velocity @ a)[
+        chosen
+    ]
+    side = np.concatenate([-(tangent.stiffness @ v + tangent.damping @ a), -by_motion])
+    try:
+        rates: Floats = splu(csc_array(matrix)).solve(side)[: len(a)]
+    except RuntimeError:  # exactly singular
+        return np.full(len(a), np.nan)
+    return rates
 
 
 def _largest(values: Floats) -> float:
