@@ -1,15 +1,12 @@
 """Eigenvalues of a linearisation in the complex plane."""
 
-import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dap3d_core.plot.figure_file import save_figure
-from dap3d_core.plot.style import HEIGHT, LETTERS, PALETTE, WIDTH, style_axes
+from dap3d_core.plot.style import HEIGHT, LETTERS, PALETTE, Picture, style_axes
 
 if TYPE_CHECKING:
     from dap3d_core.simulation.linearization.linearization import Linearization
@@ -20,35 +17,27 @@ MOST_LABELS = 12
 ROUNDING = 1e-9
 
 
-def save_eigenvalues(
-    linearization: "Linearization",
-    path: str | os.PathLike[str],
-    *,
-    width: float = WIDTH,
-    height: float = HEIGHT,
-    dpi: float = 200.0,
-    force: bool = False,
-) -> Path:
-    """Draw the eigenvalues of a linearisation into a file; needs no display. Returns the path.
+class EigenvaluePicture(Picture):
+    """The eigenvalues of a linearisation.
 
     Modes have their numbers; those that grow are drawn as crosses, to the right of the axis.
-
-    Args:
-        linearization: the linearisation.
-        path: the file; its suffix gives the format, .png, .svg or .pdf.
-        width, height: size in inches.
-        dpi: dots an inch of a PNG.
-        force: overwrites an existing file.
-
-    Raises:
-        ValueError: an invalid suffix or size.
-        ResultError: the file cannot be written, or exists and ``force`` is off.
     """
 
-    def paint(figure: Figure) -> None:
-        draw_eigenvalues(figure.add_subplot(), linearization)
+    def __init__(self, linearization: "Linearization") -> None:
+        self.linearization = linearization
 
-    return save_figure(paint, Path(path), (width, height), dpi, force=force)
+    @property
+    def height(self) -> float:
+        """A suitable height of the figure, inches."""
+        return HEIGHT
+
+    def draw(self, figure: Figure) -> list[Axes]:
+        """Draw on an empty figure."""
+        return [self.draw_on(figure.add_subplot())]
+
+    def draw_on(self, ax: Axes) -> Axes:
+        """Draw on axes of the user."""
+        return draw_eigenvalues(ax, self.linearization)
 
 
 def draw_eigenvalues(ax: Axes, linearization: "Linearization") -> Axes:

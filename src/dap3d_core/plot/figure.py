@@ -1,4 +1,4 @@
-"""``plot``, ``save_plot`` and ``show_plot``: a result, several, a fit or a sweep as a figure."""
+"""``plot``, ``save_plot`` and ``show_plot``: results, fits, linearisations, sweeps as figures."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -16,9 +16,10 @@ from dap3d_core.result import Result, ResultError
 if TYPE_CHECKING:
     import xarray
 
+    from dap3d_core.simulation.linearization.linearization import Linearization
     from dap3d_core.study.fit.fit_result import Fit
 
-    Drawable = Result | Mapping[str, Result] | Fit | xarray.Dataset
+    Drawable = Result | Mapping[str, Result] | Fit | Linearization | xarray.Dataset
 
 #: Backends that matplotlib falls back on where it cannot open windows.
 FILE_BACKENDS = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
@@ -43,10 +44,16 @@ def picture_of(
         raise ValueError("at chooses points of a sweep; this is none")
     if isinstance(result, (Result, Mapping)):
         return curve_picture(cast("Result | Mapping[str, Result]", result), names, x)
+    if x is not None:
+        raise ValueError("a fit or a linearisation has an x axis of its own: leave x out")
+    if hasattr(result, "mode_eigenvalues"):
+        if names:
+            raise ValueError("of a linearisation the eigenvalues are drawn: leave names out")
+        from dap3d_core.plot.eigenvalues import EigenvaluePicture
+
+        return EigenvaluePicture(cast("Linearization", result))
     from dap3d_core.plot.fit import fit_picture
 
-    if x is not None:
-        raise ValueError("a fit is drawn over time, on a figure of its own: leave x, ax out")
     return fit_picture(result, names)
 
 
@@ -61,7 +68,8 @@ def plot(
 
     Args:
         result: a ``Result``; several as names and results, {"rtol 1e-6": result, ...}; a ``Fit``:
-            its data, its curves and its residuals; or the data set of a sweep.
+            its data, its curves and its residuals; a ``Linearization``: its eigenvalues; or the
+            data set of a sweep.
         quantities: names such as ``crank.r.z``, ``crank.w`` (all components), ``energy.total``;
             each unit has a panel of its own. Of a fit its outputs, by default all. Of a sweep as
             well: lines over one number, a map over two, parallel coordinates over more, curves

@@ -80,10 +80,10 @@ def modes(
         found = dap.linearize(scene, at=at, t=t, modes=number, allow_code=allow_code)
         data = _data(scene.name, found, number or LISTED)
     if plot is not None:
-        from dap3d_core.plot.eigenvalues import save_eigenvalues
+        from dap3d_core.plot import save_plot
 
         with refusing(ValueError):
-            save_eigenvalues(found, plot, force=force)
+            save_plot(found, [], plot, force=force)
     if output is not None:
         with refusing(IndexError):
             found.motion((mode or 1) - 1).save(output, force=force)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.result import Result
+from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.linearization.eigenvalues import Eigenvalues, eigenvalues_of
@@ -64,6 +64,11 @@ class Linearization:
         self.outputs = tuple(outputs)
         self._forces = forces
         self.notes = [*point.notes, *forces.notes]
+        if self._is_large:
+            self.notes.append(
+                f"{INFORMATION}{point.model.body_count} bodies: only the {self._mode_count} "
+                "lowest modes are computed, and stability is about them"
+            )
         if self.outputs:
             _ = self._outputs  # unknown names are errors here
 

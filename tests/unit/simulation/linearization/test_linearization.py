@@ -230,3 +230,16 @@ def test_friction_follows_the_load():
     load = slope * h / length - pull * h * dl / length**2
     square = (along - mu * load) / m
     np.testing.assert_allclose(np.sort(lin.eigenvalues**2), [square, square], rtol=1e-9)
+
+
+def test_picture_of_the_eigenvalues():
+    """``dap.plot`` draws the eigenvalues of a linearisation, and nothing else of it."""
+    from matplotlib.figure import Figure
+
+    lin = dap.linearize(cart())
+    ax = dap.plot(lin, ax=Figure().add_subplot())
+    x, y = np.concatenate([line.get_xydata() for line in ax.lines[1:]]).T
+    np.testing.assert_allclose(np.sort_complex(x + 1j * y), np.sort_complex(lin.eigenvalues))
+    assert [text.get_text() for text in ax.texts] == ["1", "2"]
+    with pytest.raises(ValueError, match="leave names out"):
+        dap.plot(lin, "cart.r.x", ax=ax)
