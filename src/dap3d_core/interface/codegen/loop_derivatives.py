@@ -36,7 +36,7 @@ class LoopDerivatives:
         bodies: (m, places) bodies that an instance reads; the first ones are its slots.
         outputs: kernel -> its values (m, ...) and derivatives (m, ..., d), with
             d = 12 places, then one for each multiplier of a joint with friction, then one for each
-            number.
+            number and each function.
     """
 
     bodies: Integers
@@ -134,11 +134,13 @@ def _by_motion(rows: Floats, k: int) -> Floats | None:
 class _Functions:
     """Functions of time, as they stand at the time of the evaluation."""
 
-    def __init__(self, F: Floats, idx: Integers) -> None:
-        self.F, self.idx = F, idx
+    def __init__(self, F: Floats, idx: Integers, slopes: dict[tuple[int, int], Floats]) -> None:
+        self.F, self.idx, self.slopes = F, idx, slopes
 
     def __getitem__(self, key: tuple[_Column, int]) -> Dual:
-        return Dual(self.F[self.idx[:, key[0].column], key[1]][:, None])
+        column, order = key[0].column, key[1]
+        value = self.F[self.idx[:, column], order][:, None]
+        return Dual(value, self.slopes.get((column, order)))
 
 
 class _Outputs:
@@ -163,6 +165,7 @@ def differentiate_loop(
     group: tuple[int, int, int],
     multipliers: Floats | None = None,
     numbers: Sequence[int] = (),
+    functions: Sequence[tuple[int, int]] = (),
 ) -> LoopDerivatives:
     """Values and derivatives of what a group loop computes.
 
@@ -174,6 +177,8 @@ def differentiate_loop(
         group: first integer in ``idx``, first number in ``par``, number of instances.
         multipliers: (row_size,) -lambda, for friction.
         numbers: indices of an instance's own numbers by which to differentiate, too.
+        functions: by which functions of time as well: index among the type's fields, and 0 for the
+            value, 1 and 2 for its rates.
 
     Returns:
         by kernel: "wrench" or "friction" (m, slots, 6), force and moment about the mass centre;
@@ -189,19 +194,21 @@ def differentiate_loop(
     rows = int(getattr(type_info.type, "rows", 0))
     of_bodies = DIRECTIONS * len(places)
     by_numbers = of_bodies + (rows if what == "friction" else 0)
-    directions = by_numbers + len(numbers)
-    unit = np.eye(directions)
-    slopes = {k: unit[by_numbers + n : by_numbers + n + 1] for n, k in enumerate(numbers)}
+    directions = by_numbers + len(numbers) + len(functions)
+    unit = np.eye(directions)[:, None]
+    slopes = dict(zip(numbers, unit[by_numbers:], strict=False))
+    columns = [(slots + field, order) for field, order in functions]
+    by_functions = dict(zip(columns, unit[by_numbers + len(numbers) :], strict=True))
 
     def minus_lambda(k: _Column) -> Dual:
         assert multipliers is not None
-        slope = -unit[of_bodies + k.shift : of_bodies + k.shift + 1]
-        return Dual(multipliers[idx[:, k.column] + k.shift][:, None], slope)
+        values = multipliers[idx[:, k.column] + k.shift][:, None]
+        return Dual(values, -unit[of_bodies + k.shift])
 
     outputs = [_Outputs(), _Outputs(minus_lambda if what == "friction" else None), _Outputs()]
     loop_arrays = SimpleNamespace(
         body=_Bodies(arrays.body, idx, places, directions),
-        F=_Functions(arrays.F, idx),
+        F=_Functions(arrays.F, idx, by_functions),
         idx=_Integers(),
         par=_Numbers(arrays.par, p0, (count, layout.par_width), slopes),
     )

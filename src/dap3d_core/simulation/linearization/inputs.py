@@ -1,4 +1,4 @@
-"""Inputs of linearised equations: numbers of force elements, and factors on them."""
+"""Inputs of linearised equations: numbers of force elements, factors on them, drivers."""
 
 from collections.abc import Sequence
 
@@ -6,12 +6,14 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.loop_derivatives import differentiate_loop
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.model import Group
 from dap3d_core.result.arrays import AXES
 from dap3d_core.result.errors import UnknownNameError, unknown
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
+from dap3d_core.simulation.linearization.state_space import DriverRows
 
 Floats = NDArray[np.float64]
 
@@ -20,36 +22,45 @@ NUMBERS = ("number", "vec3", "vector")
 
 
 @attrs.frozen(eq=False)
-class InputForces:
-    """Forces by unit inputs.
+class Inputs:
+    """The effects of unit inputs.
 
     Attributes:
         wrench: (6 n, inputs) force and moment on each body.
+        driver: (drivers, inputs) accelerations of drivers.
+        rows: of these drivers; None where there are none.
         units: SI units of the inputs.
         elements: names of the forces that inputs change.
         notes: of inputs that have no effect.
     """
 
     wrench: Floats
+    driver: Floats
+    rows: DriverRows | None
     units: tuple[str, ...]
     elements: frozenset[str]
     notes: tuple[str, ...]
 
 
-def input_forces(point: OperatingPoint, names: Sequence[str]) -> InputForces:
-    """Forces by inputs, by name.
+def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
+    """The effects of inputs, by name.
 
     Raises:
         UnknownNameError: there is no such force, field or component; names the nearest.
     """
     wrench = np.zeros((6 * point.model.body_count, len(names)))
     units, elements, notes = [], [], []
+    drivers: list[list[Floats]] = []
+    driver = np.zeros((len(names), len(names)))
     with point.compiled.borrow_evaluator() as evaluator:
         evaluator.place(point.t, point.u)
         for k, name in enumerate(names):
             element, _, field = name.partition(".")
             if element not in point.model.force_names:
-                raise unknown("force", element, point.model.force_names)
+                driver[len(drivers), k] = 1.0
+                drivers.append(_driver(point, evaluator, name))
+                units.append("SI")
+                continue
             number = point.model.force_names.index(element)
             for loop, (kind, group) in enumerate(evaluator.loop_groups):
                 if kind != "wrench" or number not in group.members:
@@ -60,7 +71,45 @@ def input_forces(point: OperatingPoint, names: Sequence[str]) -> InputForces:
             elements.append(element)
             if not np.any(wrench[:, k]):
                 notes.append(f"input {name} has no effect at this state")
-    return InputForces(wrench, tuple(units), frozenset(elements), tuple(notes))
+    rows = None
+    if drivers:
+        by = np.array(drivers).transpose(1, 2, 0)
+        rows = DriverRows(nu=(by[0], by[1]), gamma=(by[2], by[3], by[4]))
+    driver = driver[: len(drivers)]
+    return Inputs(wrench, driver, rows, tuple(units), frozenset(elements), tuple(notes))
+
+
+def _driver(point: OperatingPoint, evaluator: Evaluator, name: str) -> list[Floats]:
+    """(rows,) each: derivatives of nu by f, f_dot, of gamma by f, f_dot, f_ddot of a driver."""
+    model = point.model
+    for loop, (kind, group) in enumerate(evaluator.loop_groups):
+        names = [model.joint_names[k] for k in group.members] if kind == "acceleration" else []
+        layout = group.type_info.layout
+        if name not in names or len(layout.functions) != 1:
+            continue
+        i0, p0, count = evaluator.system.groups[loop].tolist()
+        orders = [(0, order) for order in range(3)]
+        own = differentiate_loop(group.type_info, kind, point.t, evaluator.system, (i0, p0, count),
+                                 functions=orders)  # fmt: skip
+        place = names.index(name)
+        start = int(model.joint_start[group.members[place]])
+        result = []
+        for level, order in (("nu", -3), ("nu", -2), ("gamma", -3), ("gamma", -2), ("gamma", -1)):
+            slope = own.outputs[level][1][place, :, order]
+            column = np.zeros(model.row_count)
+            column[start : start + len(slope)] = slope
+            result.append(column)
+        return result
+    raise unknown("force or driver", name.partition(".")[0], _inputs_known(point, evaluator))
+
+
+def _inputs_known(point: OperatingPoint, evaluator: Evaluator) -> list[str]:
+    """Names of forces, and of joints with one function of time."""
+    known = list(point.model.force_names)
+    for kind, group in evaluator.loop_groups:
+        if kind == "acceleration" and len(group.type_info.layout.functions) == 1:
+            known += [point.model.joint_names[k] for k in group.members]
+    return known
 
 
 def _columns(group: Group, name: str, field: str) -> tuple[str, list[int]]:
@@ -86,14 +135,14 @@ def _columns(group: Group, name: str, field: str) -> tuple[str, list[int]]:
 
 def _wrench(
     point: OperatingPoint,
-    evaluator: object,
+    evaluator: Evaluator,
     loop: int,
     group: Group,
     number: int,
     columns: list[int],
 ) -> Floats:
     """(6 n,) force by one input."""
-    system = evaluator.system  # type: ignore[attr-defined]
+    system = evaluator.system
     i0, p0, count = system.groups[loop].tolist()
     own = differentiate_loop(group.type_info, "wrench", point.t, system, (i0, p0, count),
                              numbers=columns)  # fmt: skip

@@ -12,12 +12,12 @@ from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.linearization.eigenvalues import Eigenvalues, eigenvalues_of
-from dap3d_core.simulation.linearization.inputs import input_forces
+from dap3d_core.simulation.linearization.inputs import inputs_of
 from dap3d_core.simulation.linearization.mode_motion import mode_motion
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint, operating_point
 from dap3d_core.simulation.linearization.outputs import Outputs, output_derivatives
 from dap3d_core.simulation.linearization.sparse_modes import lowest_eigenvalues
-from dap3d_core.simulation.linearization.state_space import StateSpace, state_space
+from dap3d_core.simulation.linearization.state_space import DriverRows, StateSpace, state_space
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -36,8 +36,8 @@ class Linearization:
     """Linearised equations of motion of a scene about a state.
 
     States are displacements xi and velocities eta in independent coordinates: orthonormal bases of
-    what the constraint rows allow, scaled by masses and inertias. Everything is computed on first
-    use.
+    what the constraint rows allow, scaled by masses and inertias; of drivers that are inputs a
+    displacement and a rate each. Everything is computed on first use.
 
     Attributes:
         t: time, s.
@@ -59,11 +59,10 @@ class Linearization:
         self.t, self.u, self.body_names = point.t, point.u, point.model.body_names
         self._is_large = point.model.body_count > MANY_BODIES
         self._mode_count = FEW_MODES if modes is None and self._is_large else modes
-        forces = input_forces(point, inputs)
-        self.inputs, self.input_units = tuple(inputs), forces.units
+        self._inputs = inputs_of(point, inputs)
+        self.inputs, self.input_units = tuple(inputs), self._inputs.units
         self.outputs = tuple(outputs)
-        self._forces = forces
-        self.notes = [*point.notes, *forces.notes]
+        self.notes = [*point.notes, *self._inputs.notes]
         if self._is_large:
             self.notes.append(
                 f"{INFORMATION}{point.model.body_count} bodies: only the {self._mode_count} "
@@ -76,12 +75,21 @@ class Linearization:
 
     @cached_property
     def _space(self) -> StateSpace:
+        return self._space_of(self._inputs.rows)
+
+    @cached_property
+    def _own_space(self) -> StateSpace:
+        """The same without the states of drivers that are inputs."""
+        return self._space if self._inputs.rows is None else self._space_of(None)
+
+    def _space_of(self, drivers: DriverRows | None) -> StateSpace:
         point = self._point
-        return state_space(point.equations, point.redundancy.rank.rank, point.position_rank)
+        rank = point.redundancy.rank.rank
+        return state_space(point.equations, rank, point.position_rank, drivers)
 
     @cached_property
     def _outputs(self) -> Outputs:
-        return output_derivatives(self._point, self._space, self._forces, self.outputs)
+        return output_derivatives(self._point, self._space, self._inputs, self.outputs)
 
     @property
     def A(self) -> Floats:
@@ -91,7 +99,8 @@ class Linearization:
     @property
     def B(self) -> Floats:
         """(states, inputs) input matrix."""
-        B: Floats = self._space.force_input @ self._forces.wrench
+        space, inputs = self._space, self._inputs
+        B: Floats = space.force_input @ inputs.wrench + space.driver_input @ inputs.driver
         return B
 
     @property
@@ -170,7 +179,7 @@ class Linearization:
             count = min(2 * self._mode_count, 12 * point.model.body_count - 2)
             lowest = lowest_eigenvalues(point.equations, dependencies, count)
             return Eigenvalues(lowest.values, point.equations.U @ lowest.vectors)
-        space = self._space
+        space = self._own_space
         scale = np.ones(len(space.A))
         scale[: space.coordinate_count] = space.size or 1.0
         all_of_them = eigenvalues_of(scale[:, None] * space.A / scale, space.size)
@@ -181,6 +190,7 @@ class Linearization:
     def eigenvalues(self) -> Complex:
         """(k,) eigenvalues, 1/s, by magnitude; of a conjugate pair that with Im > 0 first.
 
+        Those of the scene as it is: drivers that are inputs keep to their functions.
         All of them; of more than 150 bodies those of the lowest modes.
         """
         return self._spectrum.values
@@ -298,7 +308,8 @@ def linearize(
         t: time, s: of the functions of time and the drivers.
         inputs: ``FORCE.FIELD`` for a number of a force element, ``FORCE.FIELD.x`` for a component
             (``motor.n_a``, ``push.f.z``); ``FORCE`` for a factor on all of its force, 1 at the
-            state.
+            state. ``DRIVER``, a joint with a function of time: an acceleration, in m/s^2 or
+            rad/s^2, beside that of the function; the displacement and rate that it adds are states.
         outputs: quantities by name as in results (``body.r.x``, ``P.v``, ``J1.force.z``, ...).
         modes: number of lowest modes to report; by default all, or 10 of a scene of more than 150
             bodies, whose modes come from sparse matrices.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.model.state_layout import split, y_from_u
 from dap3d_core.result import Result, RunMetadata, UnknownNameError, find
-from dap3d_core.simulation.linearization.inputs import InputForces
+from dap3d_core.simulation.linearization.inputs import Inputs
 from dap3d_core.simulation.linearization.mode_motion import displaced_state
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
 from dap3d_core.simulation.linearization.state_space import StateSpace
@@ -40,7 +40,7 @@ class Outputs:
 
 
 def output_derivatives(
-    point: OperatingPoint, space: StateSpace, forces: InputForces, names: Sequence[str]
+    point: OperatingPoint, space: StateSpace, inputs: Inputs, names: Sequence[str]
 ) -> Outputs:
     """Derivatives of quantities by states and inputs.
 
@@ -53,10 +53,10 @@ def output_derivatives(
          space.multipliers[:, k]) for k in range(states)
     ]  # fmt: skip
     none = np.zeros(6 * point.model.body_count)
-    for k in range(len(forces.units)):
-        wrench = forces.wrench[:, k]
-        directions.append((none, none, space.acceleration_by_force @ wrench,
-                           space.multipliers_by_force @ wrench))  # fmt: skip
+    for wrench, driver in zip(inputs.wrench.T, inputs.driver.T, strict=True):
+        a_change = space.acceleration_by_force @ wrench + space.acceleration_by_driver @ driver
+        lam_change = space.multipliers_by_force @ wrench + space.multipliers_by_driver @ driver
+        directions.append((none, none, a_change, lam_change))
     steps = [_step(point, *direction) for direction in directions]
     rows = [
         _row(point, x * h, direction)
@@ -72,7 +72,7 @@ def output_derivatives(
         if quantity.values.ndim > 1:
             first = quantity.components[0] if quantity.components else "1"
             raise UnknownNameError(f"output {name!r} has components: name one, as {name}.{first}")
-        if name.partition(".")[0] in forces.elements and quantity.owner == "force":
+        if name.partition(".")[0] in inputs.elements and quantity.owner == "force":
             raise UnknownNameError(f"output {name!r} belongs to a force that is an input")
         if not np.isfinite(quantity.values[-1]):
             raise UnknownNameError(f"output {name!r} has no value at this state")

@@ -6,6 +6,13 @@ Coordinates xi of displacements that the position rows allow, eta of velocities 
 
 with orthonormal Q and N from singular values, so that redundant rows need nothing of their own.
 Reactions drop out of N^T v^_dot. Rows of the velocity level alone (rolling) make eta fewer than xi.
+
+A driver that is an input moves by w beside its function: its displacement w and rate w_dot are
+states, its acceleration the input. C, nu and gamma of its rows change by df = w, w_dot, w_ddot, and
+
+    x^ = Q xi + D_p^+ nu_1 w        v^ = N eta + P xi + D^+ ((nu_0 - G D_p^+ nu_1) w + nu_1 w_dot)
+
+with nu_k the derivative of nu by the k-th rate of the function.
 """
 
 import attrs
@@ -18,8 +25,20 @@ Floats = NDArray[np.float64]
 
 
 @attrs.frozen(eq=False, kw_only=True)
+class DriverRows:
+    """Derivatives of right-hand sides of rows by drivers, (rows, drivers) each.
+
+    Attributes:
+        nu: by displacement, rate; gamma: by displacement, rate, acceleration.
+    """
+
+    nu: tuple[Floats, Floats]
+    gamma: tuple[Floats, Floats, Floats]
+
+
+@attrs.frozen(eq=False, kw_only=True)
 class StateSpace:
-    """The state matrix in independent coordinates z = (xi, eta).
+    """The state matrix in independent coordinates z = (xi, w, eta, w_dot), w of drivers.
 
     Attributes:
         A: (states, states) z_dot = A z.
@@ -27,7 +46,9 @@ class StateSpace:
         acceleration: (6 n, states), multipliers: (rows, states): their changes.
         force_input: (states, 6 n) z_dot by forces on the bodies.
         acceleration_by_force: (6 n, 6 n), multipliers_by_force: (rows, 6 n).
-        coordinate_count: number of xi.
+        driver_input: (states, drivers), acceleration_by_driver: (6 n, drivers),
+            multipliers_by_driver: (rows, drivers): by accelerations of drivers.
+        coordinate_count: number of xi and w.
         size: magnitude of the terms that A is made of, 1/s: its rounding errors are eps of it.
     """
 
@@ -39,56 +60,79 @@ class StateSpace:
     force_input: Floats
     acceleration_by_force: Floats
     multipliers_by_force: Floats
+    driver_input: Floats
+    acceleration_by_driver: Floats
+    multipliers_by_driver: Floats
     coordinate_count: int
     size: float
 
 
-def state_space(equations: ScaledEquations, rank: int, position_rank: int) -> StateSpace:
+def state_space(
+    equations: ScaledEquations, rank: int, position_rank: int, drivers: DriverRows | None = None
+) -> StateSpace:
     """The state space of scaled equations.
 
     Args:
         equations: the equations.
         rank, position_rank: of all rows, and of those with a position level.
+        drivers: drivers that are inputs.
     """
     U, S, K, C, G = (getattr(equations, name).toarray() for name in "USKCG")
-    D = equations.D.toarray()
+    D, back = equations.D.toarray(), equations.gradient[:, None]
     position = equations.position_row
+    none = np.zeros((len(D), 0))
+    drivers = drivers or DriverRows(nu=(none, none), gamma=(none, none, none))
+    nu, gamma = ([part / back for part in level] for level in (drivers.nu, drivers.gamma))
+    count = nu[0].shape[1]
     rows = _Rows(D, rank)
     N = rows.null
-    Q = N
-    if not np.all(position):
-        wider = _Rows(D[position], position_rank).null
-        rest = wider - N @ (N.T @ wider)
-        left, values, _ = np.linalg.svd(rest, full_matrices=False)
-        Q = np.hstack([N, left[:, values > 0.5]])
-    P = -rows.pseudoinverse(G @ Q)
-    stiffness, damping = K @ Q + C @ P, C @ N
-    right = -np.hstack([stiffness, damping])  # K x^ + C v^ of the states
-    by_motion = np.hstack(
-        [
-            equations.acceleration_by_displacement @ Q + equations.acceleration_by_velocity @ P,
-            equations.acceleration_by_velocity @ N,
-        ]
-    )
+    holonomic = rows if np.all(position) else _Rows(D[position], position_rank)
+    Q = _extended(N, holonomic.null)
+    moved = holonomic.pseudoinverse(nu[1][position])
+    x = np.hstack([Q, moved, np.zeros((len(U), N.shape[1] + count))])
+    v = np.hstack([np.zeros((len(U), Q.shape[1] + count)), N, rows.pseudoinverse(nu[1])])
+    v += rows.pseudoinverse(_placed(nu[0], Q.shape[1], x.shape[1]) - G @ x)
+    by_motion = equations.acceleration_by_displacement @ x + equations.acceleration_by_velocity @ v
+    by_motion -= _placed(gamma[0], Q.shape[1], x.shape[1])
+    by_motion -= _placed(gamma[1], x.shape[1] - count, x.shape[1])
     solve = _Accelerations(equations, rows)
-    v_dot, lam = solve(right, -by_motion)
+    v_dot, lam = solve(-(K @ x + C @ v), -by_motion)
     by_force, lam_by_force = solve(U.T, np.zeros((len(D), len(U))))
-    above = np.hstack([Q.T @ (P + S @ Q), Q.T @ N])
-    frequency = max(np.sqrt(np.linalg.norm(K, 2)), np.linalg.norm(C, 2), np.linalg.norm(S, 2))
-    displacement = U @ np.hstack([Q, np.zeros_like(N)])
-    back = equations.gradient[:, None]
+    by_driver, lam_by_driver = solve(np.zeros((len(U), count)), gamma[2])
+    rate = np.zeros((count, x.shape[1]))
+    rate[:, x.shape[1] - count :] = np.eye(count)
+    above = np.zeros((Q.shape[1] + count, len(U)))
+    below = np.zeros((count, len(U)))
+    size = max(np.sqrt(np.linalg.norm(K, 2)), np.linalg.norm(C, 2), np.linalg.norm(S, 2))
     return StateSpace(
-        A=np.vstack([above, N.T @ v_dot]),
-        displacement=displacement,
-        velocity=U @ np.hstack([P, N]),
+        A=np.vstack([Q.T @ (v + S @ x), rate, N.T @ v_dot, 0.0 * rate]),
+        displacement=U @ x,
+        velocity=U @ v,
         acceleration=U @ v_dot,
         multipliers=lam / back,
-        force_input=np.vstack([np.zeros((Q.shape[1], len(U))), N.T @ by_force]),
+        force_input=np.vstack([above, N.T @ by_force, below]),
         acceleration_by_force=U @ by_force,
         multipliers_by_force=lam_by_force / back,
-        coordinate_count=Q.shape[1],
-        size=float(frequency),
+        driver_input=np.vstack([above @ by_driver, N.T @ by_driver, np.eye(count)]),
+        acceleration_by_driver=U @ by_driver,
+        multipliers_by_driver=lam_by_driver / back,
+        coordinate_count=Q.shape[1] + count,
+        size=float(size),
     )
+
+
+def _extended(basis: Floats, wider: Floats) -> Floats:
+    """An orthonormal basis of a wider space that begins with a basis of a part of it."""
+    rest = wider - basis @ (basis.T @ wider)
+    left, values, _ = np.linalg.svd(rest, full_matrices=False)
+    return np.hstack([basis, left[:, values > 0.5]])
+
+
+def _placed(columns: Floats, first: int, count: int) -> Floats:
+    """Columns from the ``first`` on in a matrix of ``count`` columns, zeros elsewhere."""
+    matrix = np.zeros((len(columns), count))
+    matrix[:, first : first + columns.shape[1]] = columns
+    return matrix
 
 
 class _Rows:

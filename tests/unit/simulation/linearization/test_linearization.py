@@ -123,7 +123,7 @@ def test_equilibrium_is_at_rest():
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"inputs": ("pusch.f.x",)}, r"no force 'pusch'.*did you mean 'push'"),
+        ({"inputs": ("pusch.f.x",)}, r"no force or driver 'pusch'.*did you mean 'push'"),
         ({"inputs": ("push.g.x",)}, r"no number 'g'"),
         ({"inputs": ("push.f",)}, r"name a component of f \(x, y or z\)"),
         ({"inputs": ("spring.k.x",)}, r"name k alone"),
@@ -243,3 +243,24 @@ def test_picture_of_the_eigenvalues():
     assert [text.get_text() for text in ax.texts] == ["1", "2"]
     with pytest.raises(ValueError, match="leave names out"):
         dap.plot(lin, "cart.r.x", ax=ax)
+
+
+@pytest.mark.parametrize("level", ["drive-tran", "rel-tran"])
+def test_driver_as_input(level):
+    """A cart that a driver moves: its acceleration swings the pendulum, and the driver's force.
+
+    (J + m l^2) phi'' + m g l phi = m l x'' about y. The driver moves ground beyond the cart, so
+    that x'' = -a, and pushes the cart with (M + m) x'' - m l phi''.
+    """
+    scene = cart()
+    for name in ("spring", "push"):
+        del scene.forces[name]
+    fields = {"function": scene.add_function("a", "rest", coeff=[0.0, 0.0, 0.0])}
+    scene.add_joint(level, "drive", body_i="cart", a_j="ground.x", **fields)
+    lin = dap.linearize(scene, inputs=("drive",), outputs=("bob.w.y", "cart.r.x", "drive.force.x"))
+    s = 0.4 + 1.7j
+    phi = -0.5 / (0.27 * s**2 + 0.5 * 9.81)
+    expected = [s * phi, -1 / s**2, -3.0 - 0.5 * phi * s**2]
+    np.testing.assert_allclose(transfer(lin, s)[:, 0], expected, rtol=1e-11)
+    # at the velocity level alone the place of the cart is free: an eigenvalue of zero besides
+    np.testing.assert_allclose(np.abs(lin.eigenvalues[-2:]), np.sqrt(0.5 * 9.81 / 0.27))
