@@ -143,15 +143,30 @@ class _Functions:
         return Dual(value, self.slopes.get((column, order)))
 
 
+@attrs.frozen(eq=False)
+class _Multipliers:
+    """-lambda of all rows, as friction reads it; slopes: by lambda of each row of a joint."""
+
+    values: Floats
+    idx: Integers
+    slopes: Floats
+
+    def at(self, k: _Column) -> Dual:
+        values = self.values[self.idx[:, k.column] + k.shift][:, None]
+        return Dual(values, -self.slopes[k.shift])
+
+
 class _Outputs:
     """An array that a loop writes to, or from which friction reads -lambda."""
 
-    def __init__(self, read: Any = None) -> None:
+    def __init__(self, multipliers: _Multipliers | None = None) -> None:
         self.values: dict[tuple[int, int], Any] = {}
-        self.read = read
+        self.multipliers = multipliers
 
     def __getitem__(self, k: _Column) -> Any:
-        return self.read(k) if self.read is not None else self.values.get((k.column, k.shift), 0.0)
+        if self.multipliers is not None:
+            return self.multipliers.at(k)
+        return self.values.get((k.column, k.shift), 0.0)
 
     def __setitem__(self, k: _Column, x: Any) -> None:
         self.values[k.column, k.shift] = x
@@ -200,12 +215,8 @@ def differentiate_loop(
     columns = [(slots + field, order) for field, order in functions]
     by_functions = dict(zip(columns, unit[by_numbers + len(numbers) :], strict=True))
 
-    def minus_lambda(k: _Column) -> Dual:
-        assert multipliers is not None
-        values = multipliers[idx[:, k.column] + k.shift][:, None]
-        return Dual(values, -unit[of_bodies + k.shift])
-
-    outputs = [_Outputs(), _Outputs(minus_lambda if what == "friction" else None), _Outputs()]
+    friction = _Multipliers(multipliers, idx, unit[of_bodies:]) if multipliers is not None else None
+    outputs = [_Outputs(), _Outputs(friction if what == "friction" else None), _Outputs()]
     loop_arrays = SimpleNamespace(
         body=_Bodies(arrays.body, idx, places, directions),
         F=_Functions(arrays.F, idx, by_functions),
