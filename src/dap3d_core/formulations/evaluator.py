@@ -119,6 +119,14 @@ class Evaluator:
         s.settings[[UNSETTLED, SINGULAR, DOUBTFUL]] = 0.0
         self._call(ANGLE, t, s.force, s.force, s.force)
 
+    @IGNORE_FLOAT_ERRORS
+    def count_turns(self, t: float, u: ArrayLike) -> None:
+        """Count turns of angles at a state u (13 n,) that is near the one counted last."""
+        if self.counts_turns:
+            self.place(t, u)
+            s = self.system
+            self._call(ANGLE, t, s.force, s.force, s.force)
+
     def turn_places(self) -> Iterator[slice]:
         """Slices of ``par`` that count the turns of angles."""
         for q, (kind, group) in enumerate(self.loop_groups):

@@ -1,0 +1,83 @@
+"""Freedoms that joints and drivers leave, in words: the bodies that move, and how."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.constraint_rows import scaled_rows
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.linear.rank.rank import DENSE_ROWS
+from dap3d_core.model import Model
+from dap3d_core.simulation.initial.assemble import finite_rows
+from dap3d_core.simulation.redundancy.redundancy import rank_of
+
+Floats = NDArray[np.float64]
+
+#: Parts of a motion smaller than this part of the largest are not named.
+NAMED = 1e-6
+#: Bodies and motions that a message gives.
+MOST_BODIES, MOST_MOTIONS = 6, 6
+
+
+def free_motions(evaluator: Evaluator, t: float, u: Floats) -> Floats:
+    """(6 n, dof) motions in m and rad that the rows allow at a state u (13 n,), each by itself.
+
+    Each has one coordinate of size one that the others lack, so that motions of different bodies
+    do not mix. None where the scene has more than DENSE_ROWS rows.
+    """
+    model = evaluator.model
+    columns = 6 * model.body_count
+    if not model.row_count:
+        return np.eye(columns)
+    if model.row_count > DENSE_ROWS:
+        return np.zeros((columns, 0))
+    from scipy.linalg import qr
+
+    rows = scaled_rows(finite_rows(evaluator, t, u), model.size)[0]
+    rank = rank_of(evaluator, rows).rank
+    free = np.linalg.svd(rows.dense())[2][rank:].T
+    if not free.shape[1]:
+        return free
+    chosen = qr(free.T, pivoting=True, mode="r")[1][: free.shape[1]]
+    apart = free @ np.linalg.inv(free[chosen])
+    return np.asarray(apart * np.tile(np.repeat([model.size, 1.0], 3), model.body_count)[:, None])
+
+
+def motion_words(model: Model, motion: Floats) -> str:
+    """A motion (6 n,) in m and rad in words: "coupler turns about [0, 0, 1]"."""
+    moves = motion.reshape(-1, 6)
+    sizes = [np.linalg.norm(moves[:, :3], axis=1) / model.size,
+             np.linalg.norm(moves[:, 3:], axis=1)]  # fmt: skip
+    largest = float(np.max(sizes, initial=0.0)) or 1.0
+    words = []
+    for name, move, shift, turn in zip(model.body_names, moves, *sizes, strict=True):
+        parts = []
+        if turn > NAMED * largest:
+            parts.append(f"turns about {_direction(move[3:])}")
+        if shift > NAMED * largest:
+            parts.append(f"moves along {_direction(move[:3])}")
+        if parts:
+            words.append((max(shift, turn), f"{name} {' and '.join(parts)}"))
+    words.sort(key=lambda pair: -pair[0])
+    more = len(words) - MOST_BODIES
+    return "; ".join(text for _, text in words[:MOST_BODIES]) + (
+        f"; and {more} bodies more" if more > 0 else ""
+    )
+
+
+def freedoms_left(evaluator: Evaluator, t: float, u: Floats, dof: int) -> str:
+    """The freedoms at a state as a paragraph, a line for each."""
+    model = evaluator.model
+    motions = free_motions(evaluator, t, u).T
+    count = f"{dof} degree{'s' if dof != 1 else ''} of freedom {'are' if dof != 1 else 'is'} left"
+    lines = [f"  ({k}) {motion_words(model, motion)}"
+             for k, motion in enumerate(motions[:MOST_MOTIONS], start=1)]  # fmt: skip
+    if len(motions) > MOST_MOTIONS:
+        lines.append(f"  and {len(motions) - MOST_MOTIONS} more")
+    return "\n".join([f"{count}:" if lines else count, *lines])
+
+
+def _direction(vector: Floats) -> str:
+    """A unit vector as text, its largest component positive or not as it is."""
+    unit = vector / np.linalg.norm(vector)
+    unit = np.where(np.abs(unit) > NAMED, unit, 0.0)
+    return "[" + ", ".join(f"{c + 0.0:.3g}" for c in unit) + "]"

@@ -1,0 +1,328 @@
+"""Kinematics: the motion that drivers prescribe, and the forces that it takes."""
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.model.state_layout import y_from_u
+from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
+from dap3d_core.result.arrays import arrays_of
+from dap3d_core.result.file.atomic_write import check_utf8
+from dap3d_core.result.model_summary import subject_of
+from dap3d_core.result.post.point_motion import kinetic_energy
+from dap3d_core.scene import Mistake, Scene, SceneError, Simulation
+from dap3d_core.simulation.analyses.driver_coordinate import (
+    DriverCoordinate,
+    driver_names,
+    read_coordinate,
+)
+from dap3d_core.simulation.analyses.freedoms import freedoms_left, motion_words
+from dap3d_core.simulation.analyses.inverse_dynamics import required_forces
+from dap3d_core.simulation.analyses.kinematic_path import KinematicPath, PathEnd, Pose
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.errors import RedundantError, SimulationError
+from dap3d_core.simulation.initial_state import InitialState, start_notes
+from dap3d_core.simulation.settings import report_times, settings_of
+
+Floats = NDArray[np.float64]
+Progress = Callable[[float, float], None]
+
+#: What the record of a result has for its integrator.
+NAME = "kinematics"
+#: A path that ends at a smaller singular value than this ends at a singular pose.
+SINGULAR_END = 0.02
+#: Rows with less than this part of the largest share have no part in what cannot be reached.
+SHARE = 0.01
+
+
+def kinematics(
+    scene: Scene | str | os.PathLike[str] | CompiledModel,
+    *,
+    t_end: float | None = None,
+    dt: float | None = None,
+    over: Any = None,
+    progress: Progress | None = None,
+    allow_code: bool = False,
+    announce: Callable[[str], None] | None = None,
+    output: str | os.PathLike[str] | None = None,
+    force: bool = False,
+) -> Result:
+    """The motion of a scene whose drivers fix every freedom, with reactions and driver forces.
+
+    Positions come from the constraints themselves, not from integration, so that they are at
+    rounding at any time; velocities and accelerations from the rows, reactions and the forces of
+    drivers by inverse dynamics. Rows that hold velocities alone (a rate driver, a rolling wheel)
+    are integrated, to 1e-12. ``work`` is the change of the kinetic energy.
+
+    Args:
+        scene: a Scene, what ``load`` takes, or a compiled model.
+        t_end, dt: final time and reporting step, s, by default those of the scene.
+        over: a driver's coordinate in place of time: "motor.q=0:6.28:200" (from:to:count) or
+            {"motor.q": values}, in rad or m from the poses as given. Its function is replaced by
+            f(x) = x: t of the result is the coordinate, its rate is 1 rad/s or 1 m/s. Functions of
+            other drivers take the coordinate for time.
+        progress: called as progress(t, t_end) between instants.
+        allow_code, announce: as of ``compile``.
+        output, force: file to write, and whether over an existing one.
+
+    Raises:
+        SceneError, PluginError, ResultError: as ``compile``; unusable settings or output.
+        SimulationError: freedoms are left that no driver fixes; drivers contradict each other; or
+            the motion ends at a singular pose or beyond the reach of a driver: what was found
+            before is its ``result``.
+
+    Source: Nikravesh, Computer-Aided Analysis of Mechanical Systems, 1988, chapters 3 to 5.
+    """
+    if output is not None:
+        check_utf8("write", output)
+    compiled = _compiled(scene, allow_code=allow_code, announce=announce)
+    coordinate = None
+    if over is not None:
+        if t_end is not None or dt is not None:
+            words = "over a driver's coordinate nothing depends on time: leave t_end and dt out"
+            raise SceneError([Mistake("over", over, words)])
+        coordinate = read_coordinate(over, compiled)
+        replaced = coordinate.replaced_in(compiled.scene)
+        compiled = _compiled(replaced, allow_code=allow_code, announce=announce)
+        settings = compiled.scene.simulation
+        times = np.sort(coordinate.values)
+    else:
+        settings = settings_of(compiled, t_end=t_end, dt=dt)
+        times = report_times(settings.t_end, settings.dt)
+    with compiled.borrow_evaluator() as evaluator:
+        run = _Kinematics(compiled, evaluator, settings, times, coordinate)
+        try:
+            run.go(progress)
+        except BaseException as error:
+            interrupted = isinstance(error, KeyboardInterrupt)
+            result = run.result("interrupted" if interrupted else "stopped", error)
+            if result is not None and output is not None:
+                result.save(output, force=force)
+            error.result = result  # type: ignore[attr-defined]
+            raise
+        result = run.result("done")
+    assert result is not None
+    if output is not None:
+        result.save(output, force=force)
+    return result
+
+
+def _compiled(
+    scene: Any, *, allow_code: bool, announce: Callable[[str], None] | None
+) -> CompiledModel:
+    """The compiled model of a scene, with a method whose accelerations fulfil the constraints."""
+    if isinstance(scene, CompiledModel):
+        if scene.evaluator.formulation.is_exact:
+            return scene
+        scene = scene.scene
+    return CompiledModel(scene, method="auto", allow_code=allow_code, announce=announce)
+
+
+class _Kinematics:
+    """One analysis: the rows of its instants, notes and counts."""
+
+    def __init__(
+        self,
+        compiled: CompiledModel,
+        evaluator: Evaluator,
+        settings: Simulation,
+        times: Floats,
+        coordinate: DriverCoordinate | None,
+    ) -> None:
+        self.compiled, self.evaluator, self.settings = compiled, evaluator, settings
+        self.times, self.coordinate = times, coordinate
+        self.notes = [*compiled.notes, f"method {compiled.method}: {compiled.reason}"]
+        self.rows: list[Floats] = []
+        self.paths: list[KinematicPath] = []
+        self.started = time.perf_counter()
+        self.rank = 0
+
+    def go(self, progress: Progress | None) -> None:
+        """All instants, in their order or, where a coordinate falls, in the opposite one."""
+        u = self._start().u
+        self.evaluator.start(0.0, u)
+        falling = self.coordinate is not None and self.coordinate.values[-1] < self.times[-1]
+        times = self.times[::-1] if falling else self.times
+        if times[0] != 0.0:  # a coordinate begins elsewhere: go there first
+            path = self._path(0.0, u, float(times[0]))
+            while not path.is_done:
+                self._advance(path)
+                self.evaluator.count_turns(path.pose.t, path.pose.u)
+            u = path.pose.u
+        path = self._path(float(times[0]), u, float(times[-1]))
+        direction = -1.0 if falling else 1.0
+        self._report(path.pose, is_singular=False)
+        done = 1
+        while done < len(times):
+            end: PathEnd | None = None
+            try:
+                self._advance(path)
+            except PathEnd as error:
+                end = error
+            while end is None and done < len(times):
+                if direction * (times[done] - path.pose.t) > 0.0:
+                    break
+                self._report(*path.at(float(times[done])))
+                done += 1
+            if end is not None:
+                raise SimulationError(self._ended(end))
+            self.evaluator.count_turns(path.pose.t, path.pose.u)
+            if progress is not None:
+                progress(abs(path.pose.t - times[0]), abs(times[-1] - times[0]))
+
+    def result(self, status: str, error: BaseException | None = None) -> Result | None:
+        """The result of the instants so far; None of none."""
+        if not self.rows:
+            return None
+        if isinstance(error, SimulationError):
+            self.notes.append(str(error))
+        compiled, model = self.compiled, self.evaluator.model
+        rows = np.array(self.rows)
+        rows = rows[np.argsort(rows[:, 0], kind="stable")]
+        subject = subject_of(model)
+        arrays = arrays_of(rows, subject)
+        kinetic = kinetic_energy(subject, arrays.u)
+        arrays = attrs.evolve(arrays, work=kinetic - kinetic[0])
+        about = RunMetadata(
+            scene_text=compiled.scene_text,
+            stats=RunStatistics(
+                steps=sum(path.steps for path in self.paths),
+                rejected=sum(path.rejected for path in self.paths),
+                rhs=sum(path.evaluations for path in self.paths),
+                wall_time_s=time.perf_counter() - self.started,
+                compile_time_s=compiled.compile_time,
+            ),
+            status=status,
+            method=compiled.method,
+            integrator=NAME,
+            notes=self.notes,
+            types=compiled.types,
+            settings={
+                "t_end": float(self.times[-1]),
+                "dt": self.settings.dt if self.coordinate is None else None,
+                "over": None if self.coordinate is None else f"{self.coordinate.driver}.q",
+                "length": model.length,
+                "project": True,
+                "correct": True,
+                "rank": self.rank,
+                "conservative": False,
+            },
+        )
+        return Result(subject, arrays, about, lambda: (model, lambda: compiled.evaluator))
+
+    # ------------------------------------------------------------------ the start
+
+    def _start(self) -> InitialState:
+        """The assembled start, where no freedom is left.
+
+        Raises:
+            SimulationError: freedoms are left, redundant rows contradict each other, or the pose is
+                singular.
+        """
+        settings, compiled = self.settings, self.compiled
+        start = compiled.start(True, settings.hold, str(settings.correct_metric))
+        self.notes += start_notes(start, self.evaluator, compiled.scene)
+        redundancy = start.redundancy
+        self.rank, words = redundancy.rank.rank, redundancy.describe()
+        if redundancy.contradictions:
+            raise RedundantError(f"{words}. No motion satisfies them all")
+        if redundancy.bindings:
+            raise RedundantError(words)
+        if redundancy.singular is not None:
+            raise SimulationError(
+                f"kinematics cannot start at a singular pose: {redundancy.singular.describe()}\n"
+                "Start at another pose; the analysis goes through this one"
+            )
+        if redundancy.rank.dof:
+            raise SimulationError(self._freedoms(start))
+        if redundancy.rank.redundant:
+            self.notes.append(
+                f"{words}. The motion is unique; reactions in these joints are not (reported are "
+                "those of least |lambda|)"
+            )
+            lines = redundancy.describe_reactions()
+            self.notes += [f"{INFORMATION}{line}" for line in lines]
+        return start
+
+    def _freedoms(self, start: InitialState) -> str:
+        """Why kinematics is not possible: the freedoms that no driver fixes."""
+        drivers = driver_names(self.compiled)
+        have = f"the drivers ({', '.join(drivers)}) leave" if drivers else "it has no driver:"
+        left = freedoms_left(self.evaluator, 0.0, start.u, start.redundancy.rank.dof)
+        head, _, rest = left.partition("\n")
+        if drivers:
+            head = head.replace(" are left", "").replace(" is left", "")
+        return "\n".join([
+            f"kinematics needs drivers that fix every freedom of the scene; {have} {head}",
+            *([rest] if rest else []),
+            "add a driver joint for each (dap3d plugins lists the types), or simulate the scene",
+        ])  # fmt: skip
+
+    # ------------------------------------------------------------------ instants
+
+    def _path(self, t: float, u: Floats, end: float) -> KinematicPath:
+        self.paths.append(KinematicPath(self.evaluator, t, u, end))
+        return self.paths[-1]
+
+    def _advance(self, path: KinematicPath) -> None:
+        """A step, with a note where it leads through a singular pose."""
+        path.advance()
+        instant = path.singular_instant()
+        if instant is not None:
+            pose, _ = path.at(instant)
+            _, _, motion = pose.rows.smallest()
+            self.notes.append(
+                f"branch point at {self._instant(instant)}: the pose is singular, and another "
+                f"motion begins there ({motion_words(self.evaluator.model, motion)}); the one that "
+                "goes on smoothly is taken. Reactions grow without a bound towards it, unless "
+                "they vanish"
+            )
+
+    def _report(self, pose: Pose, is_singular: bool) -> None:
+        """Keep a row of output."""
+        layout = self.evaluator.model.row_layout
+        self.evaluator.count_turns(pose.t, pose.u)
+        report = self.evaluator.report(pose.t, pose.u)
+        row = np.concatenate([[pose.t], y_from_u(pose.u), report])
+        if is_singular:  # accelerations on the path; of the reactions what it determines
+            needed = required_forces(self.evaluator, pose.t, pose.u, pose.v_dot)
+            row[layout["v_dot"]] = pose.v_dot
+            row[layout["Lam"]] = pose.rows.adjoint(needed)
+            row[layout["residuals"].stop - 1] = 0.0
+        if not np.all(np.isfinite(row)):
+            raise SimulationError(f"the forces are not finite at {self._instant(pose.t)}")
+        self.rows.append(row)
+
+    def _instant(self, t: float) -> str:
+        if self.coordinate is None:
+            return f"t = {t:.10g} s"
+        return f"{self.coordinate.driver}.q = {t:.10g}"
+
+    def _ended(self, end: PathEnd) -> str:
+        """Why the motion ends, in words."""
+        model, rows = self.evaluator.model, end.pose.rows
+        value, left, motion = rows.smallest()
+        if value > SINGULAR_END:
+            return (
+                f"no pose follows that at {self._instant(end.pose.t)}: what drivers prescribe jumps "
+                "there, or their rates are not those of their positions"
+            )
+        share = np.abs(rows.left_out(left))
+        moves = motion_words(model, motion)
+        owners = dict.fromkeys(
+            model.row_owner(int(k)) for k in np.flatnonzero(share > SHARE * np.max(share))
+        )
+        if not np.max(share) > 0.0:
+            owners = {}
+        return (
+            f"dead point at {self._instant(end.t)}: what {', '.join(owners) or 'the drivers'} "
+            f"prescribes from there on is beyond the reach of the joints. Towards it {moves}, "
+            "faster and faster: no driver fixes that motion there. Let the driver turn back before, "
+            "or drive another coordinate"
+        )
