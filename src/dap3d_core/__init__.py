@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from dap3d_core.simulation import compile_scene as compile
     from dap3d_core.simulation import open_result as open
     from dap3d_core.simulation.linearization.linearization import Linearization, linearize
+    from dap3d_core.simulation.analyses.inverse import inverse
+    from dap3d_core.simulation.analyses.kinematics import kinematics
     from dap3d_core.simulation.rerun import rerun
     from dap3d_core.simulation.resume import resume
     from dap3d_core.study.fit.fit import fit
@@ -57,6 +59,8 @@ _HOMES = {
     "fit": ("study.fit.fit", "fit"),
     "import_matlab": ("matlab", "import_matlab"),
     "linearize": ("simulation.linearization.linearization", "linearize"),
+    "inverse": ("simulation.analyses.inverse", "inverse"),
+    "kinematics": ("simulation.analyses.kinematics", "kinematics"),
     "load": ("scene", "load"),
     "load_registry": ("registry", "load_registry"),
     "open": ("simulation", "open_result"),
@@ -89,6 +93,8 @@ __all__ = [
     "fit",
     "import_matlab",
     "linearize",
+    "inverse",
+    "kinematics",
     "load",
     "load_registry",
     "open",

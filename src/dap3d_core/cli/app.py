@@ -22,6 +22,8 @@ COMMANDS = {
     for name in (
         "run", "resume", "rerun", "sweep", "modes", "check", "models", "plugins", "describe",
         "new-plugin", "check-plugin", "info", "post", "export", "plot", "animate", "view", "report",
+        "run", "resume", "rerun", "kinematics", "inverse", "sweep", "check", "models", "plugins", "describe", "new-plugin",
+        "check-plugin", "info", "post", "export", "plot", "animate", "view", "report",
         "import-matlab",
     )
 }  # fmt: skip

@@ -42,7 +42,11 @@ class DriverCoordinate:
             name += "_"
         kind, coefficients = IDENTITY
         scene.add_function(kind, name, coeff=coefficients)
-        scene.joints[self.driver].fields["function"] = name
+        fields = scene.joints[self.driver].fields
+        before, fields["function"] = fields.get("function"), name
+        users = (part.fields for part in (*scene.joints.values(), *scene.forces.values()))
+        if before is not None and all(before not in map(str, used.values()) for used in users):
+            del scene.functions[before]
         return scene
 
 

@@ -36,8 +36,10 @@ SHORTEST = 1e-10
 #: A pose with a smaller singular value of its scaled rows is no end of a step.
 NEAR_SINGULAR = 1e-7
 #: Closer to a singular pose, positions are interpolated between poses on both sides, this part of a
-#: step away: rounding would be multiplied by the inverse of the singular value.
-INTERPOLATED, ASIDE = 1e-4, 2e-3
+#: step away: rounding would be multiplied by the inverse of the singular value there.
+INTERPOLATED, ASIDE = 1e-4, 0.05
+#: A singular pose is located between poses so many steps aside, which a cubic goes through.
+LOCATED = 2e-3
 #: Tolerances of the integration of rows of the velocity level.
 RTOL, ATOL = 1e-12, 1e-13
 
@@ -149,7 +151,7 @@ class KinematicPath:
         if not pose.rows.turned_from(before.rows):
             return None
         low, high = before.t, pose.t
-        width = ASIDE * (high - low)
+        width = LOCATED * (high - low)
         while abs(high - low) > abs(0.5 * width):
             middle = 0.5 * (low + high)
             if self._between(middle).rows.turned_from(before.rows):

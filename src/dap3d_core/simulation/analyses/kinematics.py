@@ -39,6 +39,8 @@ NAME = "kinematics"
 SINGULAR_END = 0.02
 #: Rows with less than this part of the largest share have no part in what cannot be reached.
 SHARE = 0.01
+#: Branch points that notes describe.
+MOST_BRANCHES = 4
 
 
 def kinematics(
@@ -141,6 +143,7 @@ class _Kinematics:
         self.rows: list[Floats] = []
         self.paths: list[KinematicPath] = []
         self.started = time.perf_counter()
+        self.branches: list[tuple[float, Floats]] = []
         self.rank = 0
 
     def go(self, progress: Progress | None) -> None:
@@ -180,8 +183,9 @@ class _Kinematics:
         """The result of the instants so far; None of none."""
         if not self.rows:
             return None
+        notes = [*self.notes, *self._branch_notes()]
         if isinstance(error, SimulationError):
-            self.notes.append(str(error))
+            notes.append(str(error))
         compiled, model = self.compiled, self.evaluator.model
         rows = np.array(self.rows)
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
@@ -201,7 +205,7 @@ class _Kinematics:
             status=status,
             method=compiled.method,
             integrator=NAME,
-            notes=self.notes,
+            notes=notes,
             types=compiled.types,
             settings={
                 "t_end": float(self.times[-1]),
@@ -209,7 +213,7 @@ class _Kinematics:
                 "over": None if self.coordinate is None else f"{self.coordinate.driver}.q",
                 "length": model.length,
                 "project": True,
-                "correct": True,
+                "correct": self.times[0] == 0.0,
                 "rank": self.rank,
                 "conservative": False,
             },
@@ -276,13 +280,21 @@ class _Kinematics:
         instant = path.singular_instant()
         if instant is not None:
             pose, _ = path.at(instant)
-            _, _, motion = pose.rows.smallest()
-            self.notes.append(
+            self.branches.append((instant, pose.rows.smallest()[2]))
+
+    def _branch_notes(self) -> list[str]:
+        """Where the motion led through singular poses, in words."""
+        notes = []
+        for instant, motion in self.branches[:MOST_BRANCHES]:
+            notes.append(
                 f"branch point at {self._instant(instant)}: the pose is singular, and another "
                 f"motion begins there ({motion_words(self.evaluator.model, motion)}); the one that "
                 "goes on smoothly is taken. Reactions grow without a bound towards it, unless "
-                "they vanish"
+                "the forces vanish there"
             )
+        if len(self.branches) > MOST_BRANCHES:
+            notes.append(f"and {len(self.branches) - MOST_BRANCHES} branch points more")
+        return notes
 
     def _report(self, pose: Pose, is_singular: bool) -> None:
         """Keep a row of output."""

@@ -1,0 +1,85 @@
+"""``dap3d kinematics``: the motion that drivers prescribe, and the forces that it takes."""
+
+from typing import TYPE_CHECKING
+
+import click
+
+from dap3d_core.cli.framework import options
+from dap3d_core.cli.framework.command import command
+
+if TYPE_CHECKING:
+    from dap3d_core.cli.framework.execute import Announce, Watch
+    from dap3d_core.result import Result
+    from dap3d_core.simulation import CompiledModel
+
+
+@command(
+    "Find the motion that drivers prescribe.",
+    options.MODEL,
+    options.output("Result file; MODEL-kinematics.nc in the current folder by default."),
+    options.SETTING_OPTIONS["t_end"], options.SETTING_OPTIONS["dt"],
+    click.option("--over", metavar="DRIVER.q=FROM:TO:COUNT",
+                 help="A driver's coordinate in place of time: motor.q=0:6.28:200, in rad or m "
+                      "from the poses as given; t of the result is the coordinate."),
+    options.STRICT, options.FORCE, options.ALLOW_CODE, options.JSON, options.QUIET,
+    saves=True,
+)  # fmt: skip
+@click.pass_context
+def kinematics(
+    ctx: click.Context,
+    /,
+    model: str,
+    *,
+    output: str | None,
+    t_end: float | None,
+    dt: float | None,
+    over: str | None,
+    strict: bool,
+    force: bool,
+    allow_code: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Find the motion of a MODEL whose drivers fix every freedom, and write it as a result.
+
+    \b
+    dap3d kinematics fourbar2 --t-end 1 --dt 0.01
+    dap3d kinematics crank-press --over motor.q=0:6.283185:361
+
+    Positions come from the constraints, without an error of integration; with them come
+    velocities, accelerations, reactions and the forces of the drivers. Dead points and branch
+    points are located; what was found before a dead point is saved.
+    """
+    import dap3d_core as dap
+    from dap3d_core.cli.console.run_summary import report_run
+    from dap3d_core.cli.framework.execute import execute
+    from dap3d_core.cli.framework.paths import named_after, writable
+    from dap3d_core.simulation import RunProgress
+
+    scene = dap.load(model)
+    target = named_after(model, output, "-kinematics")
+    writable(target, force=force, sources=(scene.path,))
+    options.check_settings(scene, {**dict.fromkeys(options.SETTINGS), "t_end": t_end, "dt": dt})
+    compiled: list[CompiledModel] = []
+
+    def prepare(announce: "Announce") -> "CompiledModel":
+        compiled.append(
+            dap.compile(scene, method="auto", allow_code=allow_code, announce=announce)
+        )
+        return compiled[0]
+
+    def find(announce: "Announce", watch: "Watch") -> "Result":
+        def progress(t: float, t_end: float) -> None:
+            watch(RunProgress(t, t_end, 0, 0.0, 0.0))
+
+        try:
+            return dap.kinematics(
+                compiled[0], t_end=t_end, dt=dt, over=over, progress=progress,
+                allow_code=allow_code, announce=announce, output=target, force=force,
+            )  # fmt: skip
+        except dap.SceneError as error:
+            names = {"over": "--over", "t_end": "--t-end", "dt": "--dt"}
+            raise options.in_options(error, names) from error
+
+    outcome = execute(ctx, prepare, find, quiet=quiet)
+    return report_run(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
