@@ -13,6 +13,7 @@ class BodyForce(Force):
     """
 
     keyword = "fp"
+    actuates = "fp"
     body_i: Body = body(default=None, doc="the body it acts on")
     P_i: Point = point(default=None, doc="where it acts; the mass centre when left out")
     fp: tuple = vec3(unit="N", doc="components in body axes")

@@ -12,6 +12,7 @@ class BodyMoment(Force):
     """A moment A_i np on body i, constant in its axes (manual: ``np``; spec 6)."""
 
     keyword = "np"
+    actuates = "np"
     body_i: Body = body(doc="the body it acts on")
     np: tuple = vec3(unit="N m", doc="components in body axes")
 

@@ -13,6 +13,7 @@ class GlobalForce(Force):
     """
 
     keyword = "f"
+    actuates = "f"
     body_i: Body = body(default=None, doc="the body it acts on")
     P_i: Point = point(default=None, doc="where it acts; the mass centre when left out")
     f: tuple = vec3(unit="N", doc="components in ground axes")

@@ -11,6 +11,7 @@ class GlobalMoment(Force):
     """A moment n on body i, constant in ground axes (manual: ``n``; spec 6)."""
 
     keyword = "n"
+    actuates = "n"
     body_i: Body = body(doc="the body it acts on")
     n: tuple = vec3(unit="N m", doc="components in ground axes")
 

@@ -20,6 +20,7 @@ class PointToPoint(Force):
     """
 
     keyword = "ptp"
+    actuates = "f_a"
     d: Vector2 = vector2(direction=True, doc="from the end on body i to the end on body j")
     k: float = number(default=0.0, unit="N/m", usual=(0.0, None), doc="stiffness")
     c: float = number(default=0.0, unit="N s/m", usual=(0.0, None), doc="damping coefficient")

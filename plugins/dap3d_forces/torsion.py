@@ -34,6 +34,7 @@ class Torsion(Force):
     """
 
     keyword = "rot_sda"
+    actuates = "n_a"
     symbol = "ring"
     energy_where = "where the bodies turn about the common axis, and without n_a"
     v_i: Vector = vector(across="axis", doc="direction the angle is measured from, on body i")

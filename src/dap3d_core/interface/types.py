@@ -149,6 +149,8 @@ class Force(TypeBase):
             else drawn from the declared fields.
         energy_where: the condition, to follow "only", for the energy to be the potential of the
             wrench; "" for no condition.
+        actuates: field, a number or three, that an actuator sets: the wrench is linear in it. Of
+            three numbers the direction stays. Inverse dynamics finds it; "" for no such field.
     """
 
     kind = "force"
@@ -156,6 +158,7 @@ class Force(TypeBase):
     switch_words: ClassVar[str] = ""
     each_body: ClassVar[bool] = False
     energy_where: ClassVar[str] = ""
+    actuates: ClassVar[str] = ""
 
 
 class Function(TypeBase):

@@ -64,6 +64,10 @@ def _occurrences(found: Iterable[EventRecord]) -> tuple[EventRecord, ...]:
     return tuple(found)
 
 
+def _by_actuator(forces: Mapping[str, Iterable[float]]) -> dict[str, tuple[float, ...]]:
+    return {name: tuple(map(float, values)) for name, values in forces.items()}
+
+
 def _plain(value: Any) -> Any:
     """Settings as a file gives them back: lists for tuples, Python's numbers for numpy's."""
     return json.loads(to_json(value))
@@ -87,6 +91,8 @@ class RunMetadata:
         stats: what it cost.
         events: what happened at instants that were located, in their order.
         run: by which a checkpoint knows the rows that belong to it; "" where there is none.
+        actuation: name of an actuator -> (nt,) its force as inverse dynamics finds it, N or N m, which
+            takes the place of that in the scene.
         types: where the types of the scene come from (simulation/output/type_sources.py): "joint
         rev" ->
             ``digest``, ``distribution``, ``version``; None where it was not recorded.
@@ -102,6 +108,7 @@ class RunMetadata:
     stats: RunStatistics = attrs.Factory(RunStatistics)
     events: tuple[EventRecord, ...] = attrs.field(default=(), converter=_occurrences)
     run: str = attrs.field(default="", eq=False)
+    actuation: Mapping[str, tuple[float, ...]] = attrs.field(factory=dict, converter=_by_actuator)
     types: Mapping[str, Mapping[str, str]] | None = None
     known_versions: Mapping[str, str] | None = attrs.field(
         default=None, eq=lambda known: _installed() if known is None else dict(known)

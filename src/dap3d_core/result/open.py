@@ -20,7 +20,7 @@ from dap3d_core.result.metadata import RUNNING, RunMetadata
 from dap3d_core.result.model_summary import ModelSummary, is_summary_of
 from dap3d_core.result.result import Origin, Rebuild, Result
 
-_JSON = ("notes", "settings", "statistics", "versions", "events", "types")
+_JSON = ("notes", "settings", "statistics", "versions", "events", "types", "actuation")
 
 
 def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) -> Result:
@@ -85,7 +85,7 @@ def _check_format(file: Path, dataset: Any) -> None:
 
 
 def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, Arrays]:
-    older = {"events": "[]", "run": "", "types": "null"}  # absent in files of older programs
+    older = {"events": "[]", "run": "", "types": "null", "actuation": "{}"}  # absent in files of older programs
     values = older | {name: dataset.getncattr(name) for name in dataset.ncattrs()}
     for name in _JSON:
         values[name] = json.loads(values[name])

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import attrs
+import numpy as np
 
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats
@@ -315,9 +316,11 @@ class Result:
             )
         if name not in self._forces:
             index = self.model.force_names.index(name)
+            actuation = self.record.actuation.get(name)
             self._forces[name] = force_output(
-                self.evaluator, self.t, self.u, self.v_dot, name, index, self._angles()
-            )
+                self.evaluator, self.t, self.u, self.v_dot, name, index, self._angles(),
+                None if actuation is None else np.array(actuation),
+            )  # fmt: skip
         return self._forces[name]
 
     def _angles(self) -> Floats | None:

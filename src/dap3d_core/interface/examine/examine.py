@@ -54,6 +54,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
     _check_symbol(type_, layout)
+    _check_actuates(type_, layout)
     names = namespace(type_, layout)
     kernels, outputs = type_.kernels(), {}
 
@@ -176,6 +177,15 @@ def _check_symbol(type_: type[TypeBase], layout: InstanceLayout) -> None:
         raise PluginError(
             f"{who}: {symbol} is drawn from {', '.join(lacking)}, which the type does not have; "
             'name another symbol, or leave "" to draw what it declares'
+        )
+
+
+def _check_actuates(type_: type[TypeBase], layout: InstanceLayout) -> None:
+    field = getattr(type_, "actuates", "")
+    if field and layout.numbers.get(field, (0, None))[1] not in ((), (3,)):
+        raise PluginError(
+            f"{where_is(type_)}: actuates = {field!r} names no field of a number or of three; name "
+            "the one that an actuator sets"
         )
 
 

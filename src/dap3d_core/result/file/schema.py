@@ -54,7 +54,8 @@ def about(unit: str, meaning: str) -> dict[str, str]:
 def attributes(summary: ModelSummary, record: RunMetadata) -> dict[str, Any]:
     """Global attributes. Lists and tables are JSON."""
     types = {} if record.types is None else {"types": to_json(record.types)}
-    return types | {
+    actuation = {"actuation": to_json(record.actuation)} if record.actuation else {}
+    return types | actuation | {
         "Conventions": CONVENTIONS,
         "format": np.int32(FORMAT),
         "title": record.title.replace("\0", ""),
@@ -82,6 +83,7 @@ def record_of(values: dict[str, Any]) -> RunMetadata:
         types=values["types"],
         notes=values["notes"],
         settings=values["settings"],
+        actuation=values["actuation"],
         stats=RunStatistics(**values["statistics"]),
         events=[EventRecord(**event) for event in values["events"]],
         known_versions=values["versions"],

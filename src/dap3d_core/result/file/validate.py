@@ -167,10 +167,17 @@ def is_table_of_texts(value: Any) -> bool:
     return isinstance(value, dict) and all(isinstance(v, str) for v in value.values())
 
 
+def _are_series(value: Any) -> bool:
+    return isinstance(value, dict) and all(
+        isinstance(series, list) and all(map(is_number, series)) for series in value.values()
+    )
+
+
 #: Forms of the attributes of a result.
 FORMS: dict[str, Form] = {
     "types": (_are_sources, "a table of tables of texts"),
     "notes": (are_texts, "a list of texts"),
+    "actuation": (_are_series, "a table of lists of numbers"),
     "settings": (_are_settings, "a table of numbers, words and truth values"),
     "statistics": (_are_numbers, "a table of numbers"),
     "versions": (is_table_of_texts, "a table of texts"),

@@ -45,6 +45,7 @@ def force_output(
     name: str,
     element: int,
     angles: Floats | None,
+    actuation: Floats | None = None,
 ) -> ForceOutput:
     """Evaluates a force element.
 
@@ -56,12 +57,14 @@ def force_output(
         name: its name, for the error.
         element: its index among the forces of the model.
         angles: (nt, k) angles as in ``Arrays``; None to count them from one instant to the next.
+        actuation: (nt,) what takes the place of the field that its type ``actuates``; the element
+            has no potential then.
 
     Raises:
         UnknownNameError: the element acts on every body or in a joint.
     """
-    group, index = _group_of(evaluator, name, element)
-    loops, bodies = _ForceLoops(evaluator, group, index), group.bodies[index]
+    group, index = group_of(evaluator, name, element)
+    loops, bodies = ForceLoops(evaluator, group, index), group.bodies[index]
     force, energy = np.zeros_like(evaluator.system.force), np.zeros(1)
     out, potential = np.zeros((len(t), len(bodies), 6)), np.zeros(len(t))
     for k, time in place_at(evaluator, t, u):
@@ -69,19 +72,22 @@ def force_output(
             loops.call("angle", time, force)
         else:
             loops.parameters.set_angles(angles[k])
+        if actuation is not None:
+            loops.parameters.scale_field(group, group.type_info.type.actuates, actuation[k])
         force[:] = energy[:] = 0.0
         loops.call("wrench", time, force)
         loops.call("energy", time, energy)
         out[k], potential[k] = force.reshape(-1, 6)[bodies], energy[0]
     on = actions_of(evaluator.model, u, group, index, out)
-    output = ForceOutput(on, potential if loops.has("energy") else None)
+    has_potential = loops.has("energy") and actuation is None
+    output = ForceOutput(on, potential if has_potential else None)
     if any(spec.kind == "vector2" for spec in specs_of(group.type_info.type).values()):
         length, rate, tension = _along(group, index, u, v_dot, on["i"].force)
         return attrs.evolve(output, length=length, length_rate=rate, tension=tension)
     return output
 
 
-def _group_of(evaluator: "Evaluator", name: str, element: int) -> tuple[Group, int]:
+def group_of(evaluator: "Evaluator", name: str, element: int) -> tuple[Group, int]:
     """The group of a force element and its index there."""
     for group in evaluator.model.forces:
         indices = np.flatnonzero(group.members == element)
@@ -110,7 +116,7 @@ def _along(
     return length, along[0] / nonzero, along[1] / nonzero
 
 
-class _ForceLoops:
+class ForceLoops:
     """The loops over one force element, with a copy of its parameters."""
 
     def __init__(self, evaluator: "Evaluator", group: Group, index: int) -> None:

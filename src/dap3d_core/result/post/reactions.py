@@ -167,6 +167,17 @@ class InstanceParameters:
         self._copy = self.par[self.start :].reshape(len(indices), layout.par_width)
         self._columns = evaluator.model.angles_of(group, indices)
         self._offsets = list(layout.angles.values())
+        self._given: Floats | None = None
+
+    def scale_field(self, group: Group, field: str, factor: float) -> None:
+        """Sets a number; of three numbers the length, in their direction as given."""
+        offset, shape = group.examined.layout.numbers[field]
+        part = self._copy[:, offset : offset + (shape[0] if shape else 1)]
+        if self._given is None:
+            given = part.copy()
+            length = np.linalg.norm(given, axis=1, keepdims=True)
+            self._given = given / np.where(length > 0.0, length, 1.0) if shape else given**0
+        part[:] = factor * self._given
 
     def set_angles(self, angles: Floats) -> None:
         """Sets the angles from those of all the model at an instant."""

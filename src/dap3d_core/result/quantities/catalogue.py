@@ -7,6 +7,8 @@ listed in arrays.py, constants of the model in file/schema.py.
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.rotations import to_body
 from dap3d_core.model.state_layout import split
@@ -201,6 +203,16 @@ def _force_output(part: str) -> QuantityFunction:
     return values
 
 
+def _actuation(source: QuantitySource, owner: QuantityOwner) -> Floats:
+    """Force of an actuator, as inverse dynamics found it."""
+    if owner.name not in source.record.actuation:
+        raise UnknownNameError(
+            f"the {owner.kind} {owner.name!r} has no actuation: the result is none of inverse "
+            "dynamics in which it is an actuator"
+        )
+    return np.array(source.record.actuation[owner.name])
+
+
 def _multipliers(source: QuantitySource, owner: QuantityOwner) -> Floats:
     start = source.summary.joint_start
     return source.arrays.Lam[:, start[owner.place] : start[owner.place + 1]]
@@ -223,6 +235,7 @@ QUANTITIES: dict[str, dict[str, QuantityType]] = {
     "joint": {
         **{n: QuantityType(f"reaction {a}", u, AXES, _action(n)) for n, (a, u) in ACTIONS.items()},
         "lambda": QuantityType("Lagrange multipliers", "SI", (), _multipliers),
+        "actuation": QuantityType("actuation", "SI", (), _actuation),
     },
     "force": {
         **{n: QuantityType(label, u, AXES, _action(n)) for n, (label, u) in ACTIONS.items()},
@@ -230,6 +243,7 @@ QUANTITIES: dict[str, dict[str, QuantityType]] = {
         "length_rate": QuantityType("rate of the length", "m/s", (), _force_output("length_rate")),
         "tension": QuantityType("tension", "N", (), _force_output("tension")),
         "energy": QuantityType("potential energy", "J", (), _force_output("energy")),
+        "actuation": QuantityType("actuation", "SI", (), _actuation),
     },
 }
 

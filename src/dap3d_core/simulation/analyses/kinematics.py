@@ -83,7 +83,7 @@ def kinematics(
     """
     if output is not None:
         check_utf8("write", output)
-    compiled = _compiled(scene, allow_code=allow_code, announce=announce)
+    compiled = compiled_exactly(scene, allow_code=allow_code, announce=announce)
     coordinate = None
     if over is not None:
         if t_end is not None or dt is not None:
@@ -91,7 +91,7 @@ def kinematics(
             raise SceneError([Mistake("over", over, words)])
         coordinate = read_coordinate(over, compiled)
         replaced = coordinate.replaced_in(compiled.scene)
-        compiled = _compiled(replaced, allow_code=allow_code, announce=announce)
+        compiled = compiled_exactly(replaced, allow_code=allow_code, announce=announce)
         settings = compiled.scene.simulation
         times = np.sort(coordinate.values)
     else:
@@ -115,7 +115,7 @@ def kinematics(
     return result
 
 
-def _compiled(
+def compiled_exactly(
     scene: Any, *, allow_code: bool, announce: Callable[[str], None] | None
 ) -> CompiledModel:
     """The compiled model of a scene, with a method whose accelerations fulfil the constraints."""

@@ -23,7 +23,7 @@ from dap3d_core.study.fit.identifiability import (
 )
 from dap3d_core.study.fit.interpolation import MAX_INSTANTS, SeriesInterpolator, common_step
 from dap3d_core.study.fit.jacobian import Differences, Predictor
-from dap3d_core.study.fit.measured_data import MeasuredData, read_measured
+from dap3d_core.result.quantities.measured_data import MeasuredData, read_measured
 from dap3d_core.study.outputs import Output
 from dap3d_core.study.parameters import with_values
 from dap3d_core.study.study import Study

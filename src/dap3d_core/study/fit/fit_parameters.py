@@ -6,6 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.result.quantities.measured_data import is_number
 from dap3d_core.scene import Mistake, SceneError, ValidatedScene
 from dap3d_core.study.parameters import SceneParameter, parameters_named
 
@@ -99,8 +100,3 @@ def _parameter(
         mistakes.append(Mistake(key, float(scale), "a scale is above 0"))
         scale = None
     return Parameter(float(start), float(low), float(high), scale)
-
-
-def is_number(value: Any) -> bool:
-    """True for one number that is no truth value."""
-    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)

@@ -1,4 +1,4 @@
-"""Reads and checks measured data."""
+"""Reads and checks measured data: columns of times and of quantities."""
 
 import csv
 import io
@@ -14,7 +14,6 @@ from dap3d_core.model.groups import Floats
 from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import MISSING, Mistake
-from dap3d_core.study.fit.fit_parameters import is_number
 
 #: Names of the column of times, and entries of a CSV file where nothing was measured.
 TIMES = ("t", "time")
@@ -23,7 +22,7 @@ EMPTY = ("", "nan", "na", "n/a", "null", "none")
 
 @attrs.frozen(eq=False)
 class MeasuredData:
-    """Data that a fit compares with runs.
+    """Measured quantities, such as those that a fit compares with runs.
 
     Attributes:
         t: (nt,) times as given, s: in any order, also equal ones.
@@ -50,6 +49,11 @@ class MeasuredData:
             sigma = self.sigma[label][measured] if self.sigma else 1.0
             parts.append(values[label][..., measured] / sigma)
         return np.concatenate(parts, axis=-1)
+
+
+def is_number(value: Any) -> bool:
+    """True for one number that is no truth value."""
+    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
 
 
 def read_measured(

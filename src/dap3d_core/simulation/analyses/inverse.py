@@ -1,0 +1,243 @@
+"""Inverse dynamics: the forces of actuators that produce a motion."""
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
+from dap3d_core.result.arrays import Arrays
+from dap3d_core.result.file.atomic_write import check_utf8
+from dap3d_core.result.model_summary import subject_of
+from dap3d_core.result.post.point_motion import kinetic_energy
+from dap3d_core.scene import Scene
+from dap3d_core.simulation.analyses.actuators import Actuator, DriverActuator, actuators_of
+from dap3d_core.simulation.analyses.constrained_change import ChosenRows, Flags
+from dap3d_core.simulation.analyses.freedoms import motion_words
+from dap3d_core.simulation.analyses.inverse_dynamics import required_forces
+from dap3d_core.simulation.analyses.kinematics import compiled_exactly
+from dap3d_core.simulation.analyses.motion_data import (
+    Motion,
+    misfit_notes,
+    motion_on,
+    read_motion,
+)
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.errors import SimulationError
+
+Floats = NDArray[np.float64]
+Progress = Callable[[float, float], None]
+
+#: What the record of a result has for its integrator.
+NAME = "inverse dynamics"
+#: Singular values of the actuation below this part of the largest count as zero.
+RANK = 1e-9
+#: What actuators leave of the forces of a motion, as a part of these, is not worth a note below.
+PRODUCED = 1e-8
+
+
+def inverse(
+    scene: Scene | str | os.PathLike[str] | CompiledModel,
+    motion: Any,
+    actuators: Sequence[str] | str | None = None,
+    *,
+    progress: Progress | None = None,
+    allow_code: bool = False,
+    announce: Callable[[str], None] | None = None,
+    output: str | os.PathLike[str] | None = None,
+    force: bool = False,
+) -> Result:
+    """The forces of actuators that produce a motion of a scene.
+
+    M v_dot - g = D^T lambda + B tau is solved for the reactions of the joints and the forces tau
+    of the actuators: in the motions N that the joints leave, N^T B tau = N^T (M v_dot - g), tau of
+    least norm where it is not unique.
+
+    Args:
+        scene: a Scene, what ``load`` takes, or a compiled model.
+        motion: a ``Result`` with the same bodies, from which positions, velocities and
+            accelerations are taken; or positions over time: {"t": times, "platform.r.x": values},
+            a data frame, an xarray.Dataset or the path of a CSV file with a header, whose columns
+            are quantities that positions determine (body.r.x, body.p.e1, point.r.z, force.length).
+            The motion is the nearest to them, by least squares, that the joints allow; its rates
+            are those of splines of degree 5 through its positions.
+        actuators: names of drivers (which then prescribe nothing) and of force elements whose type
+            says what it ``actuates``; by default all drivers.
+        progress, allow_code, announce, output, force: as of ``kinematics``.
+
+    Returns:
+        A result with the motion, the reactions, and for each actuator the quantity
+        ``NAME.actuation``: the multiplier of a driver, the force f_a of a ``ptp``, N or N m.
+
+    Raises:
+        SceneError, PluginError, ResultError: as ``compile``; unusable motion, actuators or output.
+        SimulationError: the motion leaves freedoms open, or does not fit the joints.
+
+    Source: Nikravesh, Computer-Aided Analysis of Mechanical Systems, 1988, chapter 11.
+    """
+    if output is not None:
+        check_utf8("write", output)
+    given = read_motion(motion)
+    compiled = compiled_exactly(scene, allow_code=allow_code, announce=announce)
+    with compiled.borrow_evaluator() as evaluator:
+        result = _solved(compiled, evaluator, given, actuators, progress)
+    if output is not None:
+        result.save(output, force=force)
+    return result
+
+
+@attrs.define(eq=False)
+class _Forces:
+    """What is found at each instant, and what limits it.
+
+    Attributes:
+        tau: (nt, k) forces of the actuators.
+        Lam: (nt, m) multipliers.
+        potential, angles, residuals: (nt,), (nt, a), (nt, 3) of the result.
+        rank: the least of the actuation; freedoms: the most that the joints leave.
+        missing: largest part of the forces that no actuator produces, with its instant and motion.
+    """
+
+    tau: Floats
+    Lam: Floats
+    potential: Floats
+    angles: Floats
+    residuals: Floats
+    rank: int
+    freedoms: int = 0
+    missing: tuple[float, float, Floats] | None = None
+
+
+def _solved(
+    compiled: CompiledModel,
+    evaluator: Evaluator,
+    given: Any,
+    names: Sequence[str] | str | None,
+    progress: Progress | None,
+) -> Result:
+    started, model = time.perf_counter(), evaluator.model
+    chosen = actuators_of(compiled, evaluator, names)
+    if model.friction:
+        friction = [name for group in model.friction for name in
+                    (model.force_names[int(k)] for k in group.members)]  # fmt: skip
+        raise SimulationError(
+            "inverse dynamics does not know Coulomb friction in joints, which depends on their "
+            f"reactions: leave {', '.join(friction)} out of the scene"
+        )
+    held = np.ones(model.row_count, dtype=bool)
+    held[[a.row for a in chosen if isinstance(a, DriverActuator)]] = False
+    settings = compiled.scene.simulation
+    start = compiled.start(True, settings.hold, str(settings.correct_metric))
+    evaluator.start(0.0, start.u)
+    motion = motion_on(evaluator, given, start.u, held, compiled.scene_text)
+    evaluator.start(float(motion.t[0]), motion.u[0])
+    forces = _forces(evaluator, motion, chosen, held, progress)
+    subject = subject_of(model)
+    kinetic = kinetic_energy(subject, motion.u)
+    arrays = Arrays(motion.t, motion.u, motion.v_dot, forces.Lam, kinetic - kinetic[0],
+                    forces.potential, *forces.residuals.T, forces.angles)  # fmt: skip
+    about = RunMetadata(
+        scene_text=compiled.scene_text,
+        stats=RunStatistics(
+            wall_time_s=time.perf_counter() - started, compile_time_s=compiled.compile_time
+        ),
+        method=compiled.method,
+        integrator=NAME,
+        notes=[*compiled.notes, *misfit_notes(motion.misfit), *_notes(evaluator, chosen, forces)],
+        types=compiled.types,
+        settings={
+            "t_end": float(motion.t[-1]),
+            "actuators": ", ".join(actuator.name for actuator in chosen),
+            "length": model.length,
+            "project": True,
+            "correct": False,
+            "rank": 6 * model.body_count - forces.freedoms,
+            "conservative": False,
+        },
+        actuation={a.name: forces.tau[:, k] for k, a in enumerate(chosen)},
+    )
+    return Result(subject, arrays, about, lambda: (model, lambda: compiled.evaluator))
+
+
+def _forces(
+    evaluator: Evaluator,
+    motion: Motion,
+    actuators: list[Actuator],
+    held: Flags,
+    progress: Progress | None,
+) -> _Forces:
+    """Forces and reactions at all instants."""
+    model, count = evaluator.model, len(motion.t)
+    layout = model.report_layout
+    out = _Forces(np.zeros((count, len(actuators))), np.zeros((count, model.row_count)),
+                  np.zeros(count), np.zeros((count, model.angle_count)), np.zeros((count, 3)),
+                  rank=len(actuators))  # fmt: skip
+    for k, (t, u, v_dot) in enumerate(zip(motion.t.tolist(), motion.u, motion.v_dot, strict=True)):
+        evaluator.count_turns(t, u)
+        report = evaluator.report(t, u)
+        out.angles[k] = report[layout["angles"]]
+        needed = required_forces(evaluator, t, u, v_dot)
+        rows = ChosenRows(evaluator, t, u, held)
+        B = np.array([a.wrench(t, rows.all_rows) for a in actuators]).T
+        out.potential[k] = report[layout["potential_energy"]][0]
+        out.potential[k] -= sum(a.potential() for a in actuators)
+        needed = needed + B @ [a.given for a in actuators]  # tau takes the place of these
+        out.tau[k], rank, left = _actuation(rows.free.T @ B, rows.free.T @ needed)
+        out.Lam[k, held] = rows.multipliers(needed - B @ out.tau[k])
+        for place, actuator in enumerate(actuators):
+            if isinstance(actuator, DriverActuator):
+                out.Lam[k, actuator.row] = out.tau[k, place]
+        v = u[-6 * model.body_count :]
+        out.residuals[k] = (np.max(np.abs(rows.rows.C[held]), initial=0.0),
+                            rows.residual(v, rows.rows.nu),
+                            rows.residual(v_dot, rows.rows.gamma))  # fmt: skip
+        out.rank, out.freedoms = min(out.rank, rank), max(out.freedoms, rows.free.shape[1])
+        size = float(np.linalg.norm(left))
+        if size > PRODUCED * np.linalg.norm(needed) and (
+            out.missing is None or size > out.missing[0]
+        ):
+            out.missing = size, t, rows.free @ left
+        if not (np.all(np.isfinite(out.tau[k])) and np.all(np.isfinite(out.Lam[k]))):
+            raise SimulationError(f"the forces are not finite at t = {t:.6g} s")
+        if progress is not None:
+            progress(t, float(motion.t[-1]))
+    return out
+
+
+def _actuation(A: Floats, side: Floats) -> tuple[Floats, int, Floats]:
+    """tau of least norm with A tau nearest to side, the rank of A, and what is left of side."""
+    if not A.size:
+        return np.zeros(A.shape[1]), 0, side
+    tau, _, rank, _ = np.linalg.lstsq(A, side, rcond=RANK)
+    return tau, int(rank), side - A @ tau
+
+
+def _notes(evaluator: Evaluator, actuators: list[Actuator], forces: _Forces) -> list[str]:
+    """Redundant actuators, and forces that none produces, in words."""
+    notes, names = [], ", ".join(actuator.name for actuator in actuators)
+    surplus = len(actuators) - forces.rank
+    drivers = [a.name for a in actuators if isinstance(a, DriverActuator)]
+    if drivers:
+        notes.append(
+            f"{INFORMATION}{', '.join(drivers)} prescribe{'s' * (len(drivers) == 1)} nothing here: "
+            "the motion is the one given, and the driver's multiplier is the force that it takes"
+        )
+    if surplus:
+        notes.append(
+            f"the actuation is redundant: {len(actuators)} actuators ({names}) for "
+            f"{forces.rank} independent motions; reported are the forces of least norm, the square "
+            "root of the sum of their squares in N and N m"
+        )
+    if forces.missing is not None:
+        size, t, motion = forces.missing
+        notes.append(
+            f"the actuators ({names}) cannot produce the whole motion: at t = {t:.6g} s {size:.3g} "
+            f"(N, N m) is missing, where {motion_words(evaluator.model, motion)}; name actuators "
+            "that move this, too"
+        )
+    return notes
