@@ -14,8 +14,19 @@ def _turned(z):
     return p / np.linalg.norm(p)
 
 
-def stewart(platform, leg, push):
-    """Platform of ``platform`` kg on legs of two bodies of ``leg`` kg each, under ``push`` N."""
+def _axis(p, k):
+    """The k-th axis of a body with Euler parameters p."""
+    e0, e = p[0], p[1:]
+    axis = np.eye(3)[k]
+    return axis + 2.0 * np.cross(e, e0 * axis + np.cross(e, axis))
+
+
+def stewart(platform, leg, push, *, spins=True):
+    """Platform of ``platform`` kg on legs of two bodies of ``leg`` kg each, under ``push`` N.
+
+    Legs that do not spin about their own axes stand on universal joints, with the cross along y of
+    the leg and a ground vector ``cross0``, ... of its z at the start.
+    """
     scene = dap.Scene(name="stewart")
     J = 0.1 * platform
     scene.add_body("top", mass=platform, Jp=[J, J, 2.0 * J], r=[0.0, 0.0, 1.0])
@@ -38,7 +49,12 @@ def stewart(platform, leg, push):
         scene.add_function("harmonic", f"stroke{k}", amplitude=STROKE, frequency=3.0 + k,
                            offset=0.5 * length)  # fmt: skip
         slide = {"P_i": f"up{k}.O", "P_j": f"low{k}.O", "a_j": f"low{k}.x"}
-        scene.add_joint("sph", f"S{k}", P_i=f"low_end{k}", P_j=f"foot{k}")
+        if spins:
+            scene.add_joint("sph", f"S{k}", P_i=f"low_end{k}", P_j=f"foot{k}")
+        else:
+            scene.add_vector(f"cross{k}", body="ground", sp=_axis(p, 2))
+            scene.add_joint("univ", f"S{k}", P_i=f"low_end{k}", P_j=f"foot{k}", a_i=f"low{k}.y",
+                            n_j=f"cross{k}")  # fmt: skip
         scene.add_joint("tran", f"T{k}", **slide)
         scene.add_joint("sph", f"W{k}", P_i=f"up_end{k}", P_j=f"head{k}")
         scene.add_joint("drive-tran", f"D{k}", **slide, function=f"stroke{k}")

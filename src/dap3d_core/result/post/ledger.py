@@ -137,13 +137,16 @@ CONSERVATIVE = 1e-3
 def ledger_of(summary: ModelSummary, arrays: Arrays, record: RunMetadata) -> dict[str, Entry]:
     """All entries of a run, by name; none for a run without reported instants.
 
-    Names: energy; total energy (where potentials alone do work); momentum (where nothing
-    outside acts on the bodies); position, velocity, acceleration; quaternion.
+    Names: energy (unless the work is defined by it, as in kinematics); total energy (where
+    potentials alone do work); momentum (where nothing outside acts on the bodies); position,
+    velocity, acceleration; quaternion.
     """
     if not len(arrays):
         return {}
     course = LedgerSeries.of(summary, arrays, record.length)
-    entries = {"energy": _energy(summary, course, record)}
+    entries = {}
+    if not record.settings.get("work_from_energy"):  # by its definition it would agree
+        entries["energy"] = _energy(summary, course, record)
     if summary.has_potential and _is_conservative(summary, course, record):
         entries["total energy"] = _total_energy(summary, course, record)
     if summary.is_isolated:

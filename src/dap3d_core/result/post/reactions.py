@@ -171,7 +171,7 @@ class InstanceParameters:
 
     def scale_field(self, group: Group, field: str, factor: float) -> None:
         """Sets a number; of three numbers the length, in their direction as given."""
-        offset, shape = group.examined.layout.numbers[field]
+        offset, shape = group.type_info.layout.numbers[field]
         part = self._copy[:, offset : offset + (shape[0] if shape else 1)]
         if self._given is None:
             given = part.copy()

@@ -54,8 +54,8 @@ class ForceActuator:
     def __init__(self, evaluator: Evaluator, name: str, group: Group, index: int) -> None:
         self.name, self._group, self._evaluator = name, group, evaluator
         self._loops = ForceLoops(evaluator, group, index)
-        self._field = group.examined.type.actuates
-        offset, shape = group.examined.layout.numbers[self._field]
+        self._field = group.type_info.type.actuates
+        offset, shape = group.type_info.layout.numbers[self._field]
         numbers = group.numbers[index, offset : offset + (shape[0] if shape else 1)]
         self.given = float(np.linalg.norm(numbers)) if shape else float(numbers[0])
         self.has_direction = not shape or self.given > 0.0
@@ -96,7 +96,7 @@ def actuators_of(
         names = [names]
     if not names:
         words = "name the actuators whose forces produce the motion"
-        remedy = f"there are {', '.join([*drivers, *forces])}" if drivers or forces else (
+        remedy = f"there can be {', '.join([*drivers, *forces])}" if drivers or forces else (
             "add drivers, or force elements such as a point-to-point actuator, to the scene")  # fmt: skip
         raise SceneError([Mistake("actuators", [], words, remedy=remedy)])
     found: list[Actuator] = []
@@ -132,14 +132,14 @@ def _forces(evaluator: Evaluator) -> dict[str, tuple[Group, int]]:
             group, index = group_of(evaluator, name, k)
         except UnknownNameError:
             continue
-        if getattr(group.examined.type, "actuates", ""):
+        if getattr(group.type_info.type, "actuates", ""):
             found[name] = group, index
     return found
 
 
 def _unknown(compiled: CompiledModel, name: Any, known: list[str]) -> Mistake:
     near = nearest(name, known) if isinstance(name, str) else ""
-    remedy = "" if near else f"there are {', '.join(known)}" if known else ""
+    remedy = "" if near else f"actuators: {', '.join(known)}" if known else ""
     scene = compiled.scene
     if name in scene.joints:
         words = "this joint is no driver: what it bears is found as its reaction"

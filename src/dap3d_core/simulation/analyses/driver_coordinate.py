@@ -53,7 +53,7 @@ class DriverCoordinate:
 def driver_names(compiled: CompiledModel) -> list[str]:
     """Names of the drivers of a scene."""
     return [joint.name for joint in compiled.checked.joints
-            if getattr(joint.examined.type, "drives", False)]  # fmt: skip
+            if getattr(joint.type_info.type, "drives", False)]  # fmt: skip
 
 
 def read_coordinate(over: Any, compiled: CompiledModel) -> DriverCoordinate:

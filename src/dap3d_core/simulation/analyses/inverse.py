@@ -35,7 +35,7 @@ Progress = Callable[[float, float], None]
 
 #: What the record of a result has for its integrator.
 NAME = "inverse dynamics"
-#: Singular values of the actuation below this part of the largest count as zero.
+#: Singular values of the actuation below this part of the longest wrench count as zero.
 RANK = 1e-9
 #: What actuators leave of the forces of a motion, as a part of these, is not worth a note below.
 PRODUCED = 1e-8
@@ -158,6 +158,7 @@ def _solved(
             "correct": False,
             "rank": 6 * model.body_count - forces.freedoms,
             "conservative": False,
+            "work_from_energy": True,
         },
         actuation={a.name: forces.tau[:, k] for k, a in enumerate(chosen)},
     )
@@ -187,7 +188,7 @@ def _forces(
         out.potential[k] = report[layout["potential_energy"]][0]
         out.potential[k] -= sum(a.potential() for a in actuators)
         needed = needed + B @ [a.given for a in actuators]  # tau takes the place of these
-        out.tau[k], rank, left = _actuation(rows.free.T @ B, rows.free.T @ needed)
+        out.tau[k], rank, left = _actuation(rows.free, B, rows.free.T @ needed)
         out.Lam[k, held] = rows.multipliers(needed - B @ out.tau[k])
         for place, actuator in enumerate(actuators):
             if isinstance(actuator, DriverActuator):
@@ -209,12 +210,13 @@ def _forces(
     return out
 
 
-def _actuation(A: Floats, side: Floats) -> tuple[Floats, int, Floats]:
-    """tau of least norm with A tau nearest to side, the rank of A, and what is left of side."""
-    if not A.size:
-        return np.zeros(A.shape[1]), 0, side
-    tau, _, rank, _ = np.linalg.lstsq(A, side, rcond=RANK)
-    return tau, int(rank), side - A @ tau
+def _actuation(free: Floats, B: Floats, side: Floats) -> tuple[Floats, int, Floats]:
+    """tau of least norm with N^T B tau nearest to side, the rank, and what is left of side."""
+    A = free.T @ B
+    left, values, right = np.linalg.svd(A, full_matrices=False)
+    rank = int(np.sum(values > RANK * np.max(np.linalg.norm(B, axis=0))))
+    tau = right[:rank].T @ ((left[:, :rank].T @ side) / values[:rank])
+    return tau, rank, side - A @ tau
 
 
 def _notes(evaluator: Evaluator, actuators: list[Actuator], forces: _Forces) -> list[str]:
@@ -229,8 +231,8 @@ def _notes(evaluator: Evaluator, actuators: list[Actuator], forces: _Forces) -> 
         )
     if surplus:
         notes.append(
-            f"the actuation is redundant: {len(actuators)} actuators ({names}) for "
-            f"{forces.rank} independent motions; reported are the forces of least norm, the square "
+            f"the actuation is redundant: of {len(actuators)} actuators ({names}) "
+            f"{forces.rank} are independent; reported are the forces of least norm, the square "
             "root of the sum of their squares in N and N m"
         )
     if forces.missing is not None:

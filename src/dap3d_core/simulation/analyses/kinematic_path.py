@@ -53,12 +53,14 @@ class Pose:
         u: (13 n,) state.
         v_dot: (6 n,) accelerations.
         rows: the constraint rows there.
+        residual: largest |D v_dot - gamma|.
     """
 
     t: float
     u: Floats
     v_dot: Floats
     rows: LinearisedRows
+    residual: float = 0.0
 
 
 class PathEnd(Exception):
@@ -229,7 +231,8 @@ class KinematicPath:
         rows, u = self._rows(t, u), u.copy()
         velocities_of(u)[:] = rows.solve(rows.rows.nu)
         gamma = finite_rows(self.evaluator, t, u).gamma
-        return Pose(t, u, rows.solve(gamma), rows)
+        v_dot = rows.solve(gamma)
+        return Pose(t, u, v_dot, rows, float(np.max(np.abs(rows.product(v_dot) - gamma))))
 
     def _dead_point(self, pose: Pose, failed: float) -> float:
         """When the path ends, between the last pose and a step that failed.

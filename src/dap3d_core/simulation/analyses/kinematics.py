@@ -216,6 +216,7 @@ class _Kinematics:
                 "correct": self.times[0] == 0.0,
                 "rank": self.rank,
                 "conservative": False,
+                "work_from_energy": True,
             },
         )
         return Result(subject, arrays, about, lambda: (model, lambda: compiled.evaluator))
@@ -302,11 +303,11 @@ class _Kinematics:
         self.evaluator.count_turns(pose.t, pose.u)
         report = self.evaluator.report(pose.t, pose.u)
         row = np.concatenate([[pose.t], y_from_u(pose.u), report])
-        if is_singular:  # accelerations on the path; of the reactions what it determines
+        row[layout["v_dot"]] = pose.v_dot  # from the rows alone, nearer to rounding
+        row[layout["residuals"].stop - 1] = pose.residual
+        if is_singular:  # of the reactions what the motion determines
             needed = required_forces(self.evaluator, pose.t, pose.u, pose.v_dot)
-            row[layout["v_dot"]] = pose.v_dot
             row[layout["Lam"]] = pose.rows.adjoint(needed)
-            row[layout["residuals"].stop - 1] = 0.0
         if not np.all(np.isfinite(row)):
             raise SimulationError(f"the forces are not finite at {self._instant(pose.t)}")
         self.rows.append(row)

@@ -51,6 +51,10 @@ class LinearisedRows:
         solution: Floats = self._unit * x
         return solution
 
+    def product(self, x: Floats) -> Floats:
+        """(m,) D x in units of the rows."""
+        return self._gradient * (self.matrix @ (x / self._unit))
+
     def adjoint(self, force: Floats) -> Floats:
         """(m,) multipliers whose D^T lambda is nearest to a force (6 n,); of these the least."""
         scaled = np.linalg.lstsq(self.matrix.T, self._unit * force, rcond=SINGULAR)[0]

@@ -250,6 +250,8 @@ class _Cone:
 
     def words(self, branches: list[Floats]) -> list[str]:
         """A line for each branch: velocities along it that the others do not have."""
+        if not branches:  # a driver whose motion none of them has
+            return []
         f = len(self.z)
         outside = [np.eye(f) - T @ T.T for T in branches]
         _, values, right = np.linalg.svd(np.vstack(outside))

@@ -1,0 +1,84 @@
+"""``dap3d inverse``: the forces of actuators that produce a motion."""
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dap3d_core.cli.framework import options
+from dap3d_core.cli.framework.command import command
+
+if TYPE_CHECKING:
+    from dap3d_core.cli.framework.execute import Announce, Watch
+    from dap3d_core.result import Result
+    from dap3d_core.simulation import CompiledModel
+
+
+@command(
+    "Find the forces that produce a motion.",
+    options.MODEL,
+    click.argument("motion", type=click.Path()),
+    click.option("--actuators", metavar="NAME,...",
+                 help="Drivers, and force elements such as ptp, whose forces are found; all drivers "
+                      "by default."),
+    options.output("Result file; MODEL-inverse.nc in the current folder by default."),
+    options.STRICT, options.FORCE, options.ALLOW_CODE, options.JSON, options.QUIET,
+    saves=True,
+)  # fmt: skip
+@click.pass_context
+def inverse(
+    ctx: click.Context,
+    /,
+    model: str,
+    motion: str,
+    *,
+    actuators: str | None,
+    output: str | None,
+    strict: bool,
+    force: bool,
+    allow_code: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Find the forces of actuators that produce a MOTION of a MODEL, and write them as a result.
+
+    \b
+    dap3d inverse hexapod motion.csv --actuators leg1,leg2,leg3,leg4,leg5,leg6
+    dap3d inverse fourbar2 run.nc
+
+    MOTION is a result file, or a CSV file with a header: a column t in s, and columns of positions
+    under the names of their quantities, such as platform.r.x or tip.r.z. What is found for each
+    actuator is its quantity actuation: dap3d plot RESULT leg1.actuation.
+    """
+    import dap3d_core as dap
+    from dap3d_core.cli.console.run_summary import report_run
+    from dap3d_core.cli.framework.execute import execute
+    from dap3d_core.cli.framework.paths import named_after, writable
+    from dap3d_core.simulation import RunProgress
+
+    scene = dap.load(model)
+    target = named_after(model, output, "-inverse")
+    writable(target, force=force, sources=(scene.path,))
+    given: Any = dap.open(motion) if motion.endswith(".nc") else motion
+    names = None if actuators is None else [n.strip() for n in actuators.split(",") if n.strip()]
+    compiled: list[CompiledModel] = []
+
+    def prepare(announce: "Announce") -> "CompiledModel":
+        compiled.append(
+            dap.compile(scene, method="auto", allow_code=allow_code, announce=announce)
+        )
+        return compiled[0]
+
+    def find(announce: "Announce", watch: "Watch") -> "Result":
+        def progress(t: float, t_end: float) -> None:
+            watch(RunProgress(t, t_end, 0, 0.0, 0.0))
+
+        try:
+            return dap.inverse(
+                compiled[0], given, names, progress=progress, output=target, force=force
+            )
+        except dap.SceneError as error:
+            names_of = {"actuators": "--actuators", "motion": "MOTION"}
+            raise options.in_options(error, names_of) from error
+
+    outcome = execute(ctx, prepare, find, quiet=quiet)
+    return report_run(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
