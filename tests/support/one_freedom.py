@@ -133,7 +133,7 @@ SLIDER = ("crank", "rod", "slider")
 
 
 def slider_crank(a=0.1, b=0.35, offset=0.02):
-    """In the plane of x and z; the crank at the angle q above x; the slider at the height offset."""
+    """In the plane of x and z: the crank at the angle q above x, the slider at a height."""
     a, b, offset = mp.mpf(str(a)), mp.mpf(str(b)), mp.mpf(str(offset))
 
     def poses(q):
@@ -225,8 +225,8 @@ RACK, TIE_BALL = ("-0.12", "0.38", "0.27"), ("-0.14", "0.72", "0.25")
 
 def double_wishbone():
     """Lower arm turned by q; the upper arm and the upright follow, by circles and spheres."""
-    inner, outer = ([vector(*x) for x in group] for group in ((LOWER, UPPER),
-                                                              (LOWER_BALL, UPPER_BALL)))  # fmt: skip
+    inner = [vector(*x) for x in (LOWER, UPPER)]
+    outer = [vector(*x) for x in (LOWER_BALL, UPPER_BALL)]
     axes = [unit(vector(*x)) for x in (LOWER_AXIS, UPPER_AXIS)]
     rack, tie = vector(*RACK), vector(*TIE_BALL)
     arms = [o - i for o, i in zip(outer, inner, strict=True)]

@@ -1,4 +1,4 @@
-"""Forces of kinematics and inverse dynamics against Newton-Euler equations written here in numpy."""
+"""Forces of kinematics and inverse dynamics against Newton-Euler equations written in numpy."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ class Body:
     """Motion, and inertial force and moment, of a body of a result at an instant."""
 
     def __init__(self, result, name, k, mass, J):
-        b = result.subject.body_index[name]
+        b = result.summary.body_index[name]
         self.A = matrix(result.p[k, b])
         self.r, w = result.r[k, b], result.w[k, b]
         inertia = self.A @ np.diag(J) @ self.A.T

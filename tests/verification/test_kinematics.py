@@ -16,12 +16,12 @@ def case(name):
     """A mechanism, its scene, the angle at the start, and its motion q = q_0 + c2 t + c3 t^2."""
     if name == SLIDER:
         scene = one_freedom.slider_crank_scene(0.3, FORWARD)
-        return one_freedom.slider_crank(), scene, 0.3, FORWARD, "motor", 1.0
+        return one_freedom.slider_crank(), scene, 0.3, FORWARD, 1.0
     if name == FOURBAR:
         scene = one_freedom.four_bar_scene(0.7, FORWARD)
-        return one_freedom.four_bar(), scene, 0.7, FORWARD, "motor", 1.0
+        return one_freedom.four_bar(), scene, 0.7, FORWARD, 1.0
     scene = one_freedom.double_wishbone_scene(BACKWARD)
-    return one_freedom.double_wishbone(), scene, 0.0, tuple(-x for x in BACKWARD), "jack", -1.0
+    return one_freedom.double_wishbone(), scene, 0.0, tuple(-x for x in BACKWARD), -1.0
 
 
 @pytest.mark.slow
@@ -32,7 +32,7 @@ def test_motion_and_driving_moment_are_those_of_the_closed_form(name):
     Rounding alone is left: eps times the condition of the rows, of order ten here, and for
     accelerations and moments times the squared rate, below 50.
     """
-    mechanism, scene, q_0, (_, c2, c3), driver, sign = case(name)
+    mechanism, scene, q_0, (_, c2, c3), sign = case(name)
     t_end = 2.0 if name != WISHBONE else 0.5
     result = dap.kinematics(scene, t_end=t_end, dt=t_end / 8.0)
     assert max(result.arrays.position_residual) < 1e-14

@@ -25,6 +25,9 @@ COMMANDS = {
         "run", "resume", "rerun", "kinematics", "inverse", "sweep", "check", "models", "plugins", "describe", "new-plugin",
         "check-plugin", "info", "post", "export", "plot", "animate", "view", "report",
         "import-matlab",
+        "run", "resume", "rerun", "kinematics", "inverse", "sweep", "check", "models", "plugins",
+        "describe", "new-plugin", "check-plugin", "info", "post", "export", "plot", "animate",
+        "view", "report", "import-matlab",
     )
 }  # fmt: skip
 

@@ -91,8 +91,8 @@ class RunMetadata:
         stats: what it cost.
         events: what happened at instants that were located, in their order.
         run: by which a checkpoint knows the rows that belong to it; "" where there is none.
-        actuation: name of an actuator -> (nt,) its force as inverse dynamics finds it, N or N m, which
-            takes the place of that in the scene.
+        actuation: name of an actuator -> (nt,) its force as inverse dynamics finds it, N or N m,
+            which takes the place of that in the scene.
         types: where the types of the scene come from (simulation/output/type_sources.py): "joint
         rev" ->
             ``digest``, ``distribution``, ``version``; None where it was not recorded.

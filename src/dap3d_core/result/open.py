@@ -85,7 +85,8 @@ def _check_format(file: Path, dataset: Any) -> None:
 
 
 def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, Arrays]:
-    older = {"events": "[]", "run": "", "types": "null", "actuation": "{}"}  # absent in files of older programs
+    # absent in files of older programs, or where there is none
+    older = {"events": "[]", "run": "", "types": "null", "actuation": "{}"}
     values = older | {name: dataset.getncattr(name) for name in dataset.ncattrs()}
     for name in _JSON:
         values[name] = json.loads(values[name])

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     options.MODEL,
     click.argument("motion", type=click.Path()),
     click.option("--actuators", metavar="NAME,...",
-                 help="Drivers, and force elements such as ptp, whose forces are found; all drivers "
-                      "by default."),
+                 help="Drivers, and force elements such as ptp, whose forces are found; all "
+                      "drivers by default."),
     options.output("Result file; MODEL-inverse.nc in the current folder by default."),
     options.STRICT, options.FORCE, options.ALLOW_CODE, options.JSON, options.QUIET,
     saves=True,
@@ -63,9 +63,7 @@ def inverse(
     compiled: list[CompiledModel] = []
 
     def prepare(announce: "Announce") -> "CompiledModel":
-        compiled.append(
-            dap.compile(scene, method="auto", allow_code=allow_code, announce=announce)
-        )
+        compiled.append(dap.compile(scene, method="auto", allow_code=allow_code, announce=announce))
         return compiled[0]
 
     def find(announce: "Announce", watch: "Watch") -> "Result":

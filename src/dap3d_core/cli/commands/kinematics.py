@@ -63,9 +63,7 @@ def kinematics(
     compiled: list[CompiledModel] = []
 
     def prepare(announce: "Announce") -> "CompiledModel":
-        compiled.append(
-            dap.compile(scene, method="auto", allow_code=allow_code, announce=announce)
-        )
+        compiled.append(dap.compile(scene, method="auto", allow_code=allow_code, announce=announce))
         return compiled[0]
 
     def find(announce: "Announce", watch: "Watch") -> "Result":

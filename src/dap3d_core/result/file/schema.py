@@ -55,24 +55,28 @@ def attributes(summary: ModelSummary, record: RunMetadata) -> dict[str, Any]:
     """Global attributes. Lists and tables are JSON."""
     types = {} if record.types is None else {"types": to_json(record.types)}
     actuation = {"actuation": to_json(record.actuation)} if record.actuation else {}
-    return types | actuation | {
-        "Conventions": CONVENTIONS,
-        "format": np.int32(FORMAT),
-        "title": record.title.replace("\0", ""),
-        "source": f"dap3d {record.versions.get('dap3d', 'unknown')}",
-        "status": record.status,
-        "method": record.method,
-        "integrator": record.integrator,
-        "run": record.run,
-        "notes": to_json(record.notes),
-        "settings": to_json(record.settings),
-        "statistics": to_json(attrs.asdict(record.stats)),
-        "events": to_json([attrs.asdict(event) for event in record.events]),
-        "versions": to_json(record.versions),
-        "has_potential": np.int32(summary.has_potential),
-        "is_isolated": np.int32(summary.is_isolated),
-        "scene": record.scene_text,
-    }
+    return (
+        types
+        | actuation
+        | {
+            "Conventions": CONVENTIONS,
+            "format": np.int32(FORMAT),
+            "title": record.title.replace("\0", ""),
+            "source": f"dap3d {record.versions.get('dap3d', 'unknown')}",
+            "status": record.status,
+            "method": record.method,
+            "integrator": record.integrator,
+            "run": record.run,
+            "notes": to_json(record.notes),
+            "settings": to_json(record.settings),
+            "statistics": to_json(attrs.asdict(record.stats)),
+            "events": to_json([attrs.asdict(event) for event in record.events]),
+            "versions": to_json(record.versions),
+            "has_potential": np.int32(summary.has_potential),
+            "is_isolated": np.int32(summary.is_isolated),
+            "scene": record.scene_text,
+        }
+    )
 
 
 def record_of(values: dict[str, Any]) -> RunMetadata:

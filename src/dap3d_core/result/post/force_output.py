@@ -64,6 +64,7 @@ def force_output(
         UnknownNameError: the element acts on every body or in a joint.
     """
     group, index = group_of(evaluator, name, element)
+    field = getattr(group.type_info.type, "actuates", "")
     loops, bodies = ForceLoops(evaluator, group, index), group.bodies[index]
     force, energy = np.zeros_like(evaluator.system.force), np.zeros(1)
     out, potential = np.zeros((len(t), len(bodies), 6)), np.zeros(len(t))
@@ -73,7 +74,7 @@ def force_output(
         else:
             loops.parameters.set_angles(angles[k])
         if actuation is not None:
-            loops.parameters.scale_field(group, group.type_info.type.actuates, actuation[k])
+            loops.parameters.scale_field(group, field, actuation[k])
         force[:] = energy[:] = 0.0
         loops.call("wrench", time, force)
         loops.call("energy", time, energy)

@@ -54,7 +54,7 @@ class ForceActuator:
     def __init__(self, evaluator: Evaluator, name: str, group: Group, index: int) -> None:
         self.name, self._group, self._evaluator = name, group, evaluator
         self._loops = ForceLoops(evaluator, group, index)
-        self._field = group.type_info.type.actuates
+        self._field = field_of(group)
         offset, shape = group.type_info.layout.numbers[self._field]
         numbers = group.numbers[index, offset : offset + (shape[0] if shape else 1)]
         self.given = float(np.linalg.norm(numbers)) if shape else float(numbers[0])
@@ -96,8 +96,9 @@ def actuators_of(
         names = [names]
     if not names:
         words = "name the actuators whose forces produce the motion"
-        remedy = f"there can be {', '.join([*drivers, *forces])}" if drivers or forces else (
-            "add drivers, or force elements such as a point-to-point actuator, to the scene")  # fmt: skip
+        remedy = "add drivers, or force elements such as a point-to-point actuator, to the scene"
+        if drivers or forces:
+            remedy = f"there can be {', '.join([*drivers, *forces])}"
         raise SceneError([Mistake("actuators", [], words, remedy=remedy)])
     found: list[Actuator] = []
     mistakes: list[Mistake] = []
@@ -132,9 +133,14 @@ def _forces(evaluator: Evaluator) -> dict[str, tuple[Group, int]]:
             group, index = group_of(evaluator, name, k)
         except UnknownNameError:
             continue
-        if getattr(group.type_info.type, "actuates", ""):
+        if field_of(group):
             found[name] = group, index
     return found
+
+
+def field_of(group: Group) -> str:
+    """The field that the type of a group ``actuates``, or ""."""
+    return str(getattr(group.type_info.type, "actuates", ""))
 
 
 def _unknown(compiled: CompiledModel, name: Any, known: list[str]) -> Mistake:

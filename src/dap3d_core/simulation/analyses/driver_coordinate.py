@@ -77,8 +77,8 @@ def _no_driver(
     over: Any, name: str, what: str, drivers: list[str], compiled: CompiledModel
 ) -> Mistake:
     if not drivers:
-        return Mistake("over", over, "the scene has no driver",
-                       remedy="add a driver joint, whose function the coordinate replaces")  # fmt: skip
+        remedy = "add a driver joint, whose function the coordinate replaces"
+        return Mistake("over", over, "the scene has no driver", remedy=remedy)
     joints = {joint.name: frozenset(joint.bodies) for joint in compiled.checked.joints}
     if name in joints:
         same = [driver for driver in drivers if joints[driver] == joints[name]]

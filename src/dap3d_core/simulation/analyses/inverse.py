@@ -12,23 +12,21 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
 from dap3d_core.result.arrays import Arrays
-from dap3d_core.result.file.atomic_write import check_utf8
-from dap3d_core.result.model_summary import subject_of
+from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.analyses.actuators import Actuator, DriverActuator, actuators_of
-from dap3d_core.simulation.analyses.constrained_change import ChosenRows, Flags
-from dap3d_core.simulation.analyses.freedoms import motion_words
-from dap3d_core.simulation.analyses.inverse_dynamics import required_forces
-from dap3d_core.simulation.analyses.kinematics import compiled_exactly
+from dap3d_core.simulation.analyses.kinematics import check_output, compiled_exactly
 from dap3d_core.simulation.analyses.motion_data import (
     Motion,
     misfit_notes,
     motion_on,
     read_motion,
 )
+from dap3d_core.simulation.analyses.pose_equations import ChosenRows, Flags, required_forces
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.redundancy.freedoms import motion_words
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
@@ -80,8 +78,7 @@ def inverse(
 
     Source: Nikravesh, Computer-Aided Analysis of Mechanical Systems, 1988, chapter 11.
     """
-    if output is not None:
-        check_utf8("write", output)
+    check_output(output, force=force)
     given = read_motion(motion)
     compiled = compiled_exactly(scene, allow_code=allow_code, announce=announce)
     with compiled.borrow_evaluator() as evaluator:
@@ -137,10 +134,13 @@ def _solved(
     motion = motion_on(evaluator, given, start.u, held, compiled.scene_text)
     evaluator.start(float(motion.t[0]), motion.u[0])
     forces = _forces(evaluator, motion, chosen, held, progress)
-    subject = subject_of(model)
-    kinetic = kinetic_energy(subject, motion.u)
-    arrays = Arrays(motion.t, motion.u, motion.v_dot, forces.Lam, kinetic - kinetic[0],
-                    forces.potential, *forces.residuals.T, forces.angles)  # fmt: skip
+    summary = summary_of(model)
+    kinetic = kinetic_energy(summary, motion.u)
+    position, velocity, acceleration = forces.residuals.T
+    arrays = Arrays(
+        motion.t.copy(), motion.u, motion.v_dot, forces.Lam, kinetic - kinetic[0],
+        forces.potential, position, velocity, acceleration, forces.angles,
+    )  # fmt: skip
     about = RunMetadata(
         scene_text=compiled.scene_text,
         stats=RunStatistics(
@@ -162,7 +162,7 @@ def _solved(
         },
         actuation={a.name: forces.tau[:, k] for k, a in enumerate(chosen)},
     )
-    return Result(subject, arrays, about, lambda: (model, lambda: compiled.evaluator))
+    return Result(summary, arrays, about, lambda: (model, lambda: compiled.evaluator))
 
 
 def _forces(
@@ -184,12 +184,12 @@ def _forces(
         out.angles[k] = report[layout["angles"]]
         needed = required_forces(evaluator, t, u, v_dot)
         rows = ChosenRows(evaluator, t, u, held)
-        B = np.array([a.wrench(t, rows.all_rows) for a in actuators]).T
+        wrenches = np.array([a.wrench(t, rows.all_rows) for a in actuators]).T
         out.potential[k] = report[layout["potential_energy"]][0]
         out.potential[k] -= sum(a.potential() for a in actuators)
-        needed = needed + B @ [a.given for a in actuators]  # tau takes the place of these
-        out.tau[k], rank, left = _actuation(rows.free, B, rows.free.T @ needed)
-        out.Lam[k, held] = rows.multipliers(needed - B @ out.tau[k])
+        needed = needed + wrenches @ [a.given for a in actuators]  # tau takes the place of these
+        out.tau[k], rank, left = _actuation(rows.free, wrenches, rows.free.T @ needed)
+        out.Lam[k, held] = rows.multipliers(needed - wrenches @ out.tau[k])
         for place, actuator in enumerate(actuators):
             if isinstance(actuator, DriverActuator):
                 out.Lam[k, actuator.row] = out.tau[k, place]
@@ -210,11 +210,11 @@ def _forces(
     return out
 
 
-def _actuation(free: Floats, B: Floats, side: Floats) -> tuple[Floats, int, Floats]:
-    """tau of least norm with N^T B tau nearest to side, the rank, and what is left of side."""
-    A = free.T @ B
+def _actuation(free: Floats, wrenches: Floats, side: Floats) -> tuple[Floats, int, Floats]:
+    """Tau of least norm with N^T B tau nearest to side, the rank, and what is left of side."""
+    A = free.T @ wrenches
     left, values, right = np.linalg.svd(A, full_matrices=False)
-    rank = int(np.sum(values > RANK * np.max(np.linalg.norm(B, axis=0))))
+    rank = int(np.sum(values > RANK * np.max(np.linalg.norm(wrenches, axis=0))))
     tau = right[:rank].T @ ((left[:, :rank].T @ side) / values[:rank])
     return tau, rank, side - A @ tau
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model.state_layout import join, split, velocities_of
-from dap3d_core.simulation.analyses.linearised_rows import LinearisedRows
+from dap3d_core.simulation.analyses.pose_equations import LinearisedRows
 from dap3d_core.simulation.initial.assemble import displaced, extent, finite_rows
 
 Floats = NDArray[np.float64]
@@ -63,7 +63,7 @@ class Pose:
     residual: float = 0.0
 
 
-class PathEnd(Exception):
+class PathEndError(Exception):
     """The path does not go on.
 
     Attributes:
@@ -104,7 +104,7 @@ class KinematicPath:
         """Take a step.
 
         Raises:
-            PathEnd: no step goes on.
+            PathEndError: no step goes on.
         """
         if self._is_integrated:
             self._integrate()
@@ -125,7 +125,7 @@ class KinematicPath:
                 h *= 0.5
             self.rejected += 1
             if abs(h) < shortest:
-                raise PathEnd(self._dead_point(start, start.t + 2.0 * h), start)
+                raise PathEndError(self._dead_point(start, start.t + 2.0 * h), start)
         growth = (0.01 * MOST_CORRECTION / max(correction, 1e-12)) ** (1.0 / 3.0)
         self._h = h * float(np.clip(growth, 0.3, 3.0))
         self.before, self.pose = start, pose
@@ -140,8 +140,7 @@ class KinematicPath:
         if pose.rows.least > INTERPOLATED:
             return pose, False
         h = ASIDE * abs(self.pose.t - self.before.t)
-        near = [self._between(t + side * h) for side in (-1.0, 1.0)]
-        y, y_dot, y_ddot = _interpolated(*near, t)
+        y, y_dot, y_ddot = _interpolated(self._between(t - h), self._between(t + h), t)
         r, p = (part.reshape(-1, k) for part, k in zip(_parts(y), (3, 4), strict=True))
         v, a = _velocity(y, y_dot, y_ddot)
         u = join(r, p / np.linalg.norm(p, axis=1, keepdims=True), *_by_body(v))
@@ -173,8 +172,8 @@ class KinematicPath:
         """A step that moves nothing too far and ends at the end at most."""
         speed = extent(self.evaluator, velocities_of(self.pose.u))
         rise = extent(self.evaluator, self.pose.v_dot)
-        longest = 2.0 * MOST_TURN / max(
-            speed + (speed * speed + 2.0 * rise * MOST_TURN) ** 0.5, 1e-300
+        longest = (
+            2.0 * MOST_TURN / max(speed + (speed * speed + 2.0 * rise * MOST_TURN) ** 0.5, 1e-300)
         )
         left = self.end - self.pose.t
         return float(np.sign(left) * min(abs(h), longest, abs(left)))
@@ -202,7 +201,7 @@ class KinematicPath:
     def _closed(self, t: float, u: Floats) -> Floats:
         closed = self._newton(t, u)
         if closed is None:
-            raise PathEnd(t, self.pose)
+            raise PathEndError(t, self.pose)
         return closed[0]
 
     def _newton(self, t: float, u: Floats) -> tuple[Floats, float] | None:
@@ -260,7 +259,7 @@ class KinematicPath:
         with np.errstate(all="ignore"):
             message = run.step()
         if run.status == "failed":
-            raise PathEnd(float(run.t), start) from RuntimeError(message)
+            raise PathEndError(float(run.t), start) from RuntimeError(message)
         self._dense = run.dense_output()
         self.before, self.pose = start, self._between(float(run.t))
         self.steps += 1
@@ -292,7 +291,7 @@ def _by_body(v: Floats) -> tuple[Floats, Floats]:
 
 
 def _parts(y: Floats) -> tuple[Floats, Floats]:
-    """r and p of y = (r, p)."""
+    """R and p of y = (r, p)."""
     n = len(y) // 7
     return y[: 3 * n], y[3 * n :]
 
@@ -307,7 +306,7 @@ def _velocity(y: Floats, y_dot: Floats, y_ddot: Floats) -> tuple[Floats, Floats]
 
 
 def _interpolated(one: Pose, other: Pose, t: float) -> tuple[Floats, Floats, Floats]:
-    """y = (r, p) and its two derivatives at t: the polynomial of degree 5 through two poses."""
+    """Y = (r, p) and its two derivatives at t: the polynomial of degree 5 through two poses."""
     h = other.t - one.t
     ends = []
     for pose in (one, other):

@@ -13,8 +13,8 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model.state_layout import y_from_u
 from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
 from dap3d_core.result.arrays import arrays_of
-from dap3d_core.result.file.atomic_write import check_utf8
-from dap3d_core.result.model_summary import subject_of
+from dap3d_core.result.file.atomic_write import check_target, check_utf8
+from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Mistake, Scene, SceneError, Simulation
 from dap3d_core.simulation.analyses.driver_coordinate import (
@@ -22,12 +22,12 @@ from dap3d_core.simulation.analyses.driver_coordinate import (
     driver_names,
     read_coordinate,
 )
-from dap3d_core.simulation.analyses.freedoms import freedoms_left, motion_words
-from dap3d_core.simulation.analyses.inverse_dynamics import required_forces
-from dap3d_core.simulation.analyses.kinematic_path import KinematicPath, PathEnd, Pose
+from dap3d_core.simulation.analyses.kinematic_path import KinematicPath, PathEndError, Pose
+from dap3d_core.simulation.analyses.pose_equations import required_forces
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import RedundantError, SimulationError
 from dap3d_core.simulation.initial_state import InitialState, start_notes
+from dap3d_core.simulation.redundancy.freedoms import freedoms_left, motion_words
 from dap3d_core.simulation.settings import report_times, settings_of
 
 Floats = NDArray[np.float64]
@@ -81,38 +81,53 @@ def kinematics(
 
     Source: Nikravesh, Computer-Aided Analysis of Mechanical Systems, 1988, chapters 3 to 5.
     """
-    if output is not None:
-        check_utf8("write", output)
+    check_output(output, force=force)
     compiled = compiled_exactly(scene, allow_code=allow_code, announce=announce)
     coordinate = None
     if over is not None:
-        if t_end is not None or dt is not None:
-            words = "over a driver's coordinate nothing depends on time: leave t_end and dt out"
-            raise SceneError([Mistake("over", over, words)])
-        coordinate = read_coordinate(over, compiled)
+        coordinate = _coordinate(over, compiled, t_end, dt)
         replaced = coordinate.replaced_in(compiled.scene)
         compiled = compiled_exactly(replaced, allow_code=allow_code, announce=announce)
-        settings = compiled.scene.simulation
-        times = np.sort(coordinate.values)
-    else:
-        settings = settings_of(compiled, t_end=t_end, dt=dt)
+    settings = settings_of(compiled, t_end=t_end, dt=dt)
+    if coordinate is None:
         times = report_times(settings.t_end, settings.dt)
+    else:
+        times = np.sort(coordinate.values)
     with compiled.borrow_evaluator() as evaluator:
         run = _Kinematics(compiled, evaluator, settings, times, coordinate)
         try:
             run.go(progress)
         except BaseException as error:
-            interrupted = isinstance(error, KeyboardInterrupt)
-            result = run.result("interrupted" if interrupted else "stopped", error)
-            if result is not None and output is not None:
-                result.save(output, force=force)
-            error.result = result  # type: ignore[attr-defined]
+            status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
+            error.result = run.result(status, error)  # type: ignore[attr-defined]
+            if error.result is not None and output is not None:  # type: ignore[attr-defined]
+                error.result.save(output, force=force)  # type: ignore[attr-defined]
             raise
         result = run.result("done")
     assert result is not None
     if output is not None:
         result.save(output, force=force)
     return result
+
+
+def _coordinate(
+    over: Any, compiled: CompiledModel, t_end: float | None, dt: float | None
+) -> DriverCoordinate:
+    if t_end is not None or dt is not None:
+        words = "over a driver's coordinate nothing depends on time: leave t_end and dt out"
+        raise SceneError([Mistake("over", over, words)])
+    return read_coordinate(over, compiled)
+
+
+def check_output(output: str | os.PathLike[str] | None, *, force: bool) -> None:
+    """Refuse an output that cannot be written, before any work.
+
+    Raises:
+        ResultError: the reason, and what to do.
+    """
+    if output is not None:
+        check_utf8("write", output)
+        check_target(output, force)
 
 
 def compiled_exactly(
@@ -163,10 +178,10 @@ class _Kinematics:
         self._report(path.pose, is_singular=False)
         done = 1
         while done < len(times):
-            end: PathEnd | None = None
+            end: PathEndError | None = None
             try:
                 self._advance(path)
-            except PathEnd as error:
+            except PathEndError as error:
                 end = error
             while end is None and done < len(times):
                 if direction * (times[done] - path.pose.t) > 0.0:
@@ -189,9 +204,9 @@ class _Kinematics:
         compiled, model = self.compiled, self.evaluator.model
         rows = np.array(self.rows)
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
-        subject = subject_of(model)
-        arrays = arrays_of(rows, subject)
-        kinetic = kinetic_energy(subject, arrays.u)
+        summary = summary_of(model)
+        arrays = arrays_of(rows, summary)
+        kinetic = kinetic_energy(summary, arrays.u)
         arrays = attrs.evolve(arrays, work=kinetic - kinetic[0])
         about = RunMetadata(
             scene_text=compiled.scene_text,
@@ -219,7 +234,7 @@ class _Kinematics:
                 "work_from_energy": True,
             },
         )
-        return Result(subject, arrays, about, lambda: (model, lambda: compiled.evaluator))
+        return Result(summary, arrays, about, lambda: (model, lambda: compiled.evaluator))
 
     # ------------------------------------------------------------------ the start
 
@@ -235,15 +250,15 @@ class _Kinematics:
         self.notes += start_notes(start, self.evaluator, compiled.scene)
         redundancy = start.redundancy
         self.rank, words = redundancy.rank.rank, redundancy.describe()
-        if redundancy.contradictions:
-            raise RedundantError(f"{words}. No motion satisfies them all")
-        if redundancy.bindings:
-            raise RedundantError(words)
         if redundancy.singular is not None:
             raise SimulationError(
                 f"kinematics cannot start at a singular pose: {redundancy.singular.describe()}\n"
                 "Start at another pose; the analysis goes through this one"
             )
+        if redundancy.contradictions:
+            raise RedundantError(f"{words}. No motion satisfies them all")
+        if redundancy.bindings:
+            raise RedundantError(words)
         if redundancy.rank.dof:
             raise SimulationError(self._freedoms(start))
         if redundancy.rank.redundant:
@@ -317,14 +332,14 @@ class _Kinematics:
             return f"t = {t:.10g} s"
         return f"{self.coordinate.driver}.q = {t:.10g}"
 
-    def _ended(self, end: PathEnd) -> str:
+    def _ended(self, end: PathEndError) -> str:
         """Why the motion ends, in words."""
         model, rows = self.evaluator.model, end.pose.rows
         value, left, motion = rows.smallest()
         if value > SINGULAR_END:
             return (
-                f"no pose follows that at {self._instant(end.pose.t)}: what drivers prescribe jumps "
-                "there, or their rates are not those of their positions"
+                f"no pose follows that at {self._instant(end.pose.t)}: what drivers prescribe "
+                "jumps there, or their rates are not those of their positions"
             )
         share = np.abs(rows.left_out(left))
         moves = motion_words(model, motion)
@@ -336,6 +351,6 @@ class _Kinematics:
         return (
             f"dead point at {self._instant(end.t)}: what {', '.join(owners) or 'the drivers'} "
             f"prescribes from there on is beyond the reach of the joints. Towards it {moves}, "
-            "faster and faster: no driver fixes that motion there. Let the driver turn back before, "
-            "or drive another coordinate"
+            "faster and faster: no driver fixes that motion there. Let the driver turn back "
+            "before, or drive another coordinate"
         )

@@ -17,15 +17,15 @@ from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.result import Result, RunMetadata
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.errors import UnknownNameError
-from dap3d_core.result.model_summary import subject_of
+from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.quantities.lookup import find
 from dap3d_core.result.quantities.measured_data import MeasuredData, read_measured
 from dap3d_core.scene import MISSING, Mistake, SceneError
-from dap3d_core.simulation.analyses.constrained_change import ChosenRows, Flags
-from dap3d_core.simulation.analyses.freedoms import motion_words
 from dap3d_core.simulation.analyses.kinematic_path import spin
+from dap3d_core.simulation.analyses.pose_equations import ChosenRows, Flags
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import displaced, extent
+from dap3d_core.simulation.redundancy.freedoms import motion_words
 
 Floats = NDArray[np.float64]
 
@@ -164,7 +164,7 @@ def _on_rows(
 
 def _states_of(evaluator: Evaluator, result: Result) -> tuple[Floats, Floats]:
     """States and accelerations of the bodies of a scene in a result, by name."""
-    names, index = evaluator.model.body_names, result.subject.body_index
+    names, index = evaluator.model.body_names, result.summary.body_index
     lacking = [name for name in names if name not in index]
     if lacking:
         words = f"the result has no body {lacking[0]!r}; its bodies: {', '.join(index)}"
@@ -186,7 +186,7 @@ class _Fit:
         self._scene_text = scene_text  # for the names of forces
         self.evaluator, self.data, self.chosen = evaluator, data, chosen
         self.misfit = dict.fromkeys(data.values, 0.0)
-        self._subject = subject_of(evaluator.model)
+        self._summary = summary_of(evaluator.model)
         self._labels = list(data.values)
 
     def pose(self, k: int, start: Floats) -> Floats:
@@ -238,7 +238,7 @@ class _Fit:
                         np.zeros((count, model.row_count)), nothing, nothing, nothing, nothing,
                         nothing, np.zeros((count, model.angle_count)))  # fmt: skip
         record = RunMetadata(scene_text=self._scene_text)
-        result = Result(self._subject, arrays, record, lambda: (model, lambda: self.evaluator))
+        result = Result(self._summary, arrays, record, lambda: (model, lambda: self.evaluator))
         return np.array([self._found(result, label) for label in self._labels])
 
     def _found(self, result: Result, label: str) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.registry import load_registry
+from dap3d_core.result.quantities.measured_data import MeasuredData, read_measured
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, check, check_simulation, load
 from dap3d_core.simulation import SimulationError
 from dap3d_core.study.ensemble import Ensemble
@@ -23,7 +24,6 @@ from dap3d_core.study.fit.identifiability import (
 )
 from dap3d_core.study.fit.interpolation import MAX_INSTANTS, SeriesInterpolator, common_step
 from dap3d_core.study.fit.jacobian import Differences, Predictor
-from dap3d_core.result.quantities.measured_data import MeasuredData, read_measured
 from dap3d_core.study.outputs import Output
 from dap3d_core.study.parameters import with_values
 from dap3d_core.study.study import Study

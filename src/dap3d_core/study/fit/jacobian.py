@@ -6,11 +6,11 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.result.quantities.measured_data import MeasuredData
 from dap3d_core.simulation import SimulationError
 from dap3d_core.study.ensemble import Ensemble
 from dap3d_core.study.fit.fit_parameters import Parameter
 from dap3d_core.study.fit.interpolation import SeriesInterpolator
-from dap3d_core.result.quantities.measured_data import MeasuredData
 from dap3d_core.study.workers.threads import run_here
 
 Stencil = tuple[tuple[float, ...], tuple[float, ...]]
