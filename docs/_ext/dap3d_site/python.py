@@ -17,6 +17,7 @@ SECTIONS = {
          "simulation.Reproduction"),
     ),
     "Analyses": (("linearize", "Linearization"), ()),
+    "Analyses": (("kinematics", "inverse"), ()),
     "Results": (
         ("Result", "open", "plot", "view", "animate", "export"),
         ("result.Reaction", "result.Energy", "result.Entry", "result.ErrorEstimate",

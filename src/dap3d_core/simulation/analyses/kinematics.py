@@ -95,19 +95,7 @@ def kinematics(
         times = np.sort(coordinate.values)
     with compiled.borrow_evaluator() as evaluator:
         run = _Kinematics(compiled, evaluator, settings, times, coordinate)
-        try:
-            run.go(progress)
-        except BaseException as error:
-            status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
-            error.result = run.result(status, error)  # type: ignore[attr-defined]
-            if error.result is not None and output is not None:  # type: ignore[attr-defined]
-                error.result.save(output, force=force)  # type: ignore[attr-defined]
-            raise
-        result = run.result("done")
-    assert result is not None
-    if output is not None:
-        result.save(output, force=force)
-    return result
+        return run.saved(progress, output, force=force)
 
 
 def _coordinate(
@@ -160,6 +148,25 @@ class _Kinematics:
         self.started = time.perf_counter()
         self.branches: list[tuple[float, Floats]] = []
         self.rank = 0
+
+    def saved(
+        self, progress: Progress | None, output: str | os.PathLike[str] | None, *, force: bool
+    ) -> Result:
+        """The result of all instants; in the output, also where an exception ends the analysis."""
+        try:
+            self.go(progress)
+            result = self.result("done")
+        except BaseException as error:
+            status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
+            part = self.result(status, error)
+            if part is not None and output is not None:
+                part.save(output, force=force)
+            error.result = part  # type: ignore[attr-defined]
+            raise
+        assert result is not None
+        if output is not None:
+            result.save(output, force=force)
+        return result
 
     def go(self, progress: Progress | None) -> None:
         """All instants, in their order or, where a coordinate falls, in the opposite one."""
