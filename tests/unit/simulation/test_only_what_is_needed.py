@@ -81,10 +81,12 @@ def test_a_page_needs_neither_matplotlib_nor_a_reader_of_meshes():
     assert not imported(script) & {"matplotlib", "trimesh", "netCDF4", "xarray", "rich", "click"}
 
 
-def test_a_run_knows_nothing_of_studies():
-    """``dap.simulate`` imports nothing of sweeps, fits or clusters."""
+def test_a_run_knows_nothing_of_studies_and_analyses():
+    """``dap.simulate`` imports nothing of sweeps, fits, clusters, kinematics or inverse dynamics."""
     found = imported("import dap3d_core as dap\ndap.simulate('bodies2', t_end=0.04, dt=0.02)\n")
-    assert not any(name.startswith("dap3d_core.study") for name in found)
+    others = ("dap3d_core.study", "dap3d_core.simulation.analyses", "scipy.integrate")
+    assert not any(name.startswith(others) for name in found)
+    assert "dap3d_core.simulation.redundancy.freedoms" not in found
 
 
 def test_a_grid_in_memory_needs_no_samples_no_cluster_and_no_packs_of_its_own():
@@ -98,4 +100,5 @@ def test_a_grid_in_memory_needs_no_samples_no_cluster_and_no_packs_of_its_own():
     heavy = {"distributed", "scipy.stats", "scipy.optimize", "matplotlib"}
     assert not found & heavy
     ours = {name.rpartition(".")[2] for name in found if name.startswith("dap3d_core.study.")}
-    assert not ours & {"dask_cluster", "environment", "fit", "identifiability", "measured_data"}
+    assert not ours & {"dask_cluster", "environment", "fit", "identifiability"}
+    assert "dap3d_core.result.quantities.measured_data" not in found

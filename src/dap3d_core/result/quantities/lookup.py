@@ -72,6 +72,9 @@ def find(result: QuantitySource, name: str) -> Quantity:
         raise TypeError(f"a quantity is named by text such as 'crank.r.z', not by {name!r}")
     if name in SYSTEM:
         label, unit, values = SYSTEM[name]
+        if name == "t":  # of kinematics over a coordinate, which takes the place of time
+            settings = result.record.settings
+            label, unit = settings.get("over") or label, settings.get("over_unit") or unit
         return Quantity(name, values(result), label, label, unit, ())
     for kinds in (NAMED, ("force",)):
         for owner, attribute, component in _parsed(result, name, kinds):

@@ -232,7 +232,7 @@ class _Kinematics:
             settings={
                 "t_end": float(self.times[-1]),
                 "dt": self.settings.dt if self.coordinate is None else None,
-                "over": None if self.coordinate is None else f"{self.coordinate.driver}.q",
+                **self._over(),
                 "length": model.length,
                 "project": True,
                 "correct": self.times[0] == 0.0,
@@ -333,6 +333,15 @@ class _Kinematics:
         if not np.all(np.isfinite(row)):
             raise SimulationError(f"the forces are not finite at {self._instant(pose.t)}")
         self.rows.append(row)
+
+    def _over(self) -> dict[str, str]:
+        """Name and unit of the coordinate that stands for time, for the record."""
+        if self.coordinate is None:
+            return {}
+        model, rows = self.evaluator.model, self.paths[-1].pose.rows.rows
+        first = model.joint_start[model.joint_names.index(self.coordinate.driver)]
+        entries = rows.value[(rows.row == first) & (rows.column % 6 < 3)]
+        return {"over": f"{self.coordinate.driver}.q", "over_unit": "m" if entries.any() else "rad"}
 
     def _instant(self, t: float) -> str:
         if self.coordinate is None:

@@ -6,6 +6,7 @@ from support import one_freedom
 from support.mechanisms import planar_four_bar
 
 import dap3d_core as dap
+from dap3d_core.result.quantities.lookup import find
 
 A, B, HEIGHT = 0.1, 0.35, 0.02
 
@@ -91,6 +92,7 @@ def test_over_a_coordinate_time_is_the_coordinate():
     assert np.allclose(result.t, values[::-1], atol=0.0)
     assert np.max(np.abs(result.r[:, 2, 0] - x_of(0.3 + result.t))) < 1e-14
     assert np.allclose(result.w[:, 0, 1], -1.0, atol=1e-14)
+    assert (find(result, "t").label, find(result, "t").unit) == ("motor.q", "rad")
     other = dap.kinematics(scene, over="motor.q=-0.7:0.5:4")
     assert np.allclose(result.u, other.u, atol=1e-13)
 
