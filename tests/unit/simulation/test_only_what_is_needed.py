@@ -82,7 +82,7 @@ def test_a_page_needs_neither_matplotlib_nor_a_reader_of_meshes():
 
 
 def test_a_run_knows_nothing_of_studies_and_analyses():
-    """``dap.simulate`` imports nothing of sweeps, fits, clusters, kinematics or inverse dynamics."""
+    """``dap.simulate`` imports nothing of sweeps, fits, clusters, kinematics, inverse dynamics."""
     found = imported("import dap3d_core as dap\ndap.simulate('bodies2', t_end=0.04, dt=0.02)\n")
     others = ("dap3d_core.study", "dap3d_core.simulation.analyses", "scipy.integrate")
     assert not any(name.startswith(others) for name in found)
