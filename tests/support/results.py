@@ -59,9 +59,10 @@ def circling_scene():
     return scene
 
 
-def circling(nt=21, **more):
+def circling(nt=21, outputs=None, **more):
     """Its motion: uniform rotation about z through the pivot. The joint holds m RATE^2 ARM."""
     scene = circling_scene()
+    scene.outputs |= outputs or {}
     model = model_of(scene)
     t = np.linspace(0.0, 1.7, nt)
     out = np.stack([np.cos(RATE * t), np.sin(RATE * t), 0 * t], axis=1)  # from the pivot outwards

@@ -10,7 +10,8 @@ from dap3d_core.result.post.global_error import ErrorEstimate, estimated_error
 from dap3d_core.result.post.ledger import Entry
 from dap3d_core.result.post.point_motion import Energy
 from dap3d_core.result.post.reactions import Reaction
-from dap3d_core.result.quantities.lookup import Quantity, find, names_of
+from dap3d_core.result.quantities.catalogue import Quantity
+from dap3d_core.result.quantities.lookup import find, names_of
 from dap3d_core.result.result import Result
 
 __all__ = [

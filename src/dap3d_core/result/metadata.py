@@ -139,6 +139,17 @@ class RunMetadata:
             return ()
 
     @property
+    def outputs(self) -> dict[str, Any]:
+        """Expressions of the outputs of the scene by name, as written."""
+        if "[outputs]" not in self.scene_text:  # reading the text of a large scene takes time
+            return {}
+        try:
+            outputs = tables_of(self.scene_text).get("outputs", {})
+        except SceneError:
+            return {}
+        return outputs if isinstance(outputs, dict) else {}
+
+    @property
     def tolerances(self) -> tuple[float, dict[str, float]] | None:
         """rtol, and atol of r, p, v and w, that controlled the steps; None for fixed steps."""
         rtol, atol = self.settings.get("rtol"), self.settings.get("atol")

@@ -21,13 +21,15 @@ from dap3d_core.result.post.global_error import ErrorEstimate, estimate_of
 from dap3d_core.result.post.ledger import Entry, ledger_of
 from dap3d_core.result.post.point_motion import Energy, kinetic_energy
 from dap3d_core.result.post.reactions import Reaction, jacobians, reactions
-from dap3d_core.result.quantities.catalogue import MOTION
+from dap3d_core.result.quantities.catalogue import MOTION, Quantity
 from dap3d_core.result.quantities.lookup import find
+from dap3d_core.scene import SceneError
 
 if TYPE_CHECKING:
     import xarray
 
     from dap3d_core.formulations.evaluator import Evaluator
+    from dap3d_core.scene.expressions.expression import Expression
 
 #: A model, and a function that returns an evaluator of it.
 Origin = tuple[Model, "Callable[[], Evaluator]"]
@@ -66,6 +68,7 @@ class Result:
         summary: names and constants of bodies, joints and points.
         arrays: the stored arrays.
         record: metadata of the run.
+        output_cache: outputs of the scene that were evaluated, by name.
     """
 
     summary: ModelSummary
@@ -101,6 +104,7 @@ class Result:
         self._make_origin = origin
         self._reactions: dict[str, dict[str, Reaction]] = {}
         self._forces: dict[str, ForceOutput] = {}
+        self.output_cache: dict[str, Quantity] = {}
 
     @classmethod
     def of_run(
@@ -190,6 +194,11 @@ class Result:
     def notes(self) -> list[str]:
         """Choices, changes and warnings of the run, in order."""
         return list(self.record.notes)
+
+    def note(self, text: str) -> None:
+        """Append a note, once."""
+        if text not in self.record.notes:
+            self.record = attrs.evolve(self.record, notes=(*self.record.notes, text))
 
     @property
     def events(self) -> tuple[EventRecord, ...]:
@@ -332,11 +341,27 @@ class Result:
             "one reported instant to the next, and wrong where a body turns by more than half a "
             "turn between two; run the scene anew"
         )
-        if note not in self.record.notes:
-            self.record = attrs.evolve(self.record, notes=(*self.record.notes, note))
+        self.note(note)
         return None
 
     # ------------------------------------------------------------------ system
+
+    @cached_property
+    def outputs(self) -> "Mapping[str, Expression]":
+        """Outputs of the scene by name: expressions of quantities.
+
+        Raises:
+            ResultError: the scene in a file has some that are wrong.
+        """
+        table = self.record.outputs
+        if not table:
+            return {}
+        from dap3d_core.scene.expressions.outputs import outputs_of
+
+        try:
+            return outputs_of(table)
+        except SceneError as error:
+            raise ResultError(f"the outputs of the scene are wrong: {error}") from error
 
     @cached_property
     def energy(self) -> Energy:

@@ -159,7 +159,7 @@ NAMED: dict[str, type] = {
     "functions": Element,
     "shapes": Element,
 }
-TABLES = ("scene", *NAMED, "animation", "simulation")
+TABLES = ("scene", *NAMED, "outputs", "animation", "simulation")
 
 
 @attrs.define(repr=False)
@@ -171,6 +171,7 @@ class Scene(SceneDisplay):
         schema: version of the file format.
         bodies, points, vectors, vectors2, joints, forces, functions, shapes: by name, in file
             order.
+        outputs: expressions of quantities, by name.
         animation, simulation: points to draw; settings of a run.
         path: the file this was read from, or None.
         faults: mistakes found in reading (unknown keys, wrong tables); ``check`` reports them.
@@ -188,6 +189,7 @@ class Scene(SceneDisplay):
     forces: dict[str, Element] = attrs.Factory(dict)
     functions: dict[str, Element] = attrs.Factory(dict)
     shapes: dict[str, Element] = attrs.Factory(dict)
+    outputs: dict[str, Any] = attrs.Factory(dict)
     animation: Animation = attrs.Factory(Animation)
     simulation: Simulation = attrs.Factory(Simulation)
     path: Path | None = attrs.field(default=None, eq=False)
@@ -211,6 +213,7 @@ class Scene(SceneDisplay):
             self,
             animation=attrs.evolve(self.animation, points=points),
             simulation=_copied(self.simulation),
+            outputs=dict(self.outputs),
             faults=list(self.faults),
             notes=list(self.notes),
             **named,
@@ -289,6 +292,21 @@ class Scene(SceneDisplay):
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
         return self._add_element("shapes", type, name, fields)
+
+    def add_output(self, name: str, expression: str) -> str:
+        """Add an output, a quantity of results, and return its name.
+
+        Args:
+            name: a word, not used by another output.
+            expression: of quantities, such as ``"0.5 * (left.r.z + right.r.z)"``; it is parsed with
+                the check of the whole scene.
+
+        Raises:
+            SceneError: the name is taken or illegal.
+        """
+        self._check_name("outputs", self.outputs, name)
+        self.outputs[name] = plain(expression)
+        return name
 
     def add_animation_point(self, body: str, sPp: Any) -> None:
         """Add a point that is only drawn, at ``sPp`` (3 numbers in the axes of a body, m)."""

@@ -130,6 +130,10 @@ class CompiledModel:
             *(f"{INFORMATION}{note}" for note in cache_notes()),
         ]
         self._redundancy: Redundancy | None = None
+        if scene.outputs:
+            from dap3d_core.simulation.output.check_outputs import check_outputs
+
+            check_outputs(scene, self.evaluator)
         self.compile_time = time.perf_counter() - started
 
     @property

@@ -14,6 +14,7 @@ from dap3d_core.result import Quantity, Result, ResultError, RunMetadata, Unknow
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.scene.errors import shown
 from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation.output.check_outputs import probe_of
 from dap3d_core.study.parameters import SceneParameter
 
 
@@ -146,6 +147,16 @@ def _output(label: Any, of: Any) -> Output | Mistake:
     return Mistake("outputs", of, what, f"{quantity}:{near}" if near else "")
 
 
+def _sources(result: Result, quantity: Quantity) -> list[Quantity]:
+    """The quantity itself; of an output of the scene all others that it is computed from."""
+    sources, names = [quantity], set(quantity.operands)
+    for source in sources:
+        new = [name for name in source.operands if name not in names or source is quantity]
+        names.update(new)
+        sources += [find(result, name) for name in new]
+    return [source for source in sources if source.owner != "output"]
+
+
 class Reduction:
     """Computes the outputs of a study from the rows that its runs report.
 
@@ -202,11 +213,13 @@ class Reduction:
         if not all(self.of_rows.values()):
             return False
         layout = self.compiled.model.row_layout
-        rows = np.random.default_rng(0).random((1, 3, layout.size))
+        rows = np.random.default_rng(0).random((3, layout.size))
         for name in ("work", "potential_energy", "residuals"):
             rows[..., layout[name]] = np.nan
-        reduced = self.reduce(rows, np.arange(3.0))
-        return all(bool(np.all(np.isfinite(values))) for values in reduced.values())
+        probe = self.result(self.compiled.model, rows)
+        quantities = (find(probe, str(output.of)) for output in self.outputs)
+        sources = (source for one in quantities for source in _sources(probe, one))
+        return all(bool(np.all(np.isfinite(source.values))) for source in sources)
 
     def result(self, model: Model, rows: Floats, evaluator: Evaluator | None = None) -> Result:
         """A result in memory, of rows of a model that an evaluator evaluates."""
@@ -214,10 +227,7 @@ class Reduction:
         return Result.of_run(model, rows, record, lambda: evaluator or self.compiled.evaluator)
 
     def _look_up(self, outputs: Sequence[Output]) -> tuple[Output, ...]:
-        evaluator = self.compiled.evaluator
-        y = evaluator.integrated(evaluator.model.u0)
-        row = np.concatenate([[0.0], y, np.zeros(evaluator.report_size)])
-        probe = self.result(evaluator.model, row[None])
+        probe = probe_of(self.compiled.scene_text, self.compiled.evaluator)
         expanded: list[Output] = []
         mistakes: list[Mistake] = []
         for output in outputs:
@@ -231,7 +241,8 @@ class Reduction:
                     mistakes.append(Mistake("outputs", output.name, what, near))
                     continue
                 components = output.components(quantity.components)
-                label, unit, of_rows = quantity.label, quantity.unit, self._is_of_rows(quantity)
+                label, unit = quantity.label, quantity.unit
+                of_rows = all(map(self._is_of_rows, _sources(probe, quantity)))
             expanded += components
             for name in (component.name for component in components):
                 self.labels[name], self.units[name], self.of_rows[name] = label, unit, of_rows

@@ -60,10 +60,10 @@ def plot(
     POINT.r .v .a                       of a point
     JOINT.force .moment .lambda         reactions on body i
     JOINT.j.force                       on the body of slot j
-    JOINT.force_body .moment_body       in body axes
-    JOINT.moment_at_point               about its own point
+    JOINT.force_body .moment_body       in body axes; .moment_at_point about its own
+    JOINT.angle .length .q1 .q1_dot     its coordinates, rates; .angle_rate .length_rate
     FORCE.length .tension .energy       of a spring
-    energy.kinetic .potential .total    and work
+    energy.kinetic .potential .total    and work, t, [outputs] of the scene
     constraint.position .velocity .acceleration
 
     A component follows with another dot, crank.r.z; .norm is the length of a vector. Quantities of
@@ -89,13 +89,25 @@ def plot(
     target = None if show and output is None else Path(output or Path(result).stem + ".png")
     axes: dict[str, Any] = {"x": x, "at": cuts}
     size: dict[str, Any] = {"width": _inches(width), "height": _inches(height)}
+    earlier = _notes_of(data)
     _check(data, names, target, axes, size, files, force)
     _draw(data, names, target, show, force, **axes, **size)
     if target is not None:
-        drawn = axes if hasattr(data, "data_vars") else {"x": x or "t"}
-        about = {"results": files, "quantities": names} | drawn
-        show_written(target, ", ".join(names), about, as_json=as_json, quiet=quiet)
+        about = {"results": files, "quantities": names} | _drawn(data, axes)
+        notes = [note for note in _notes_of(data) if note not in earlier]
+        show_written(target, ", ".join(names), about, notes, as_json=as_json, quiet=quiet)
     return DONE
+
+
+def _drawn(data: Any, axes: dict[str, Any]) -> dict[str, Any]:
+    """The axes of a sweep, the abscissa of a result."""
+    return axes if hasattr(data, "data_vars") else {"x": axes["x"] or "t"}
+
+
+def _notes_of(data: Any) -> list[str]:
+    """The notes of the results that are drawn."""
+    runs = list(data.values()) if isinstance(data, Mapping) else [data]
+    return [note for run in runs for note in getattr(run, "notes", ())]
 
 
 def _open(

@@ -71,10 +71,12 @@ def post(
         partial(writable, target, force=force, sources=(Path(result),)),
         *(partial(opened.quantity, name) for name in names),
     )
+    earlier = len(opened.notes)
     left_out = "" if names else why_no_reactions(opened)
     notes = [f"reactions are left out: {left_out}"] if left_out else []
     write = _write_table if kind == "csv" else _write_arrays
     arrays = write(opened, target, names, not left_out, jacobian, force)
+    notes += opened.notes[earlier:]
     instants = len(opened.t)
     contents = f"{instants} instants, {len(arrays)} {'columns' if kind == 'csv' else 'arrays'}"
     data = {"format": kind, "instants": instants, "arrays": arrays}

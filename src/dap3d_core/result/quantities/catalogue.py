@@ -5,7 +5,7 @@ listed in arrays.py, constants of the model in file/schema.py.
 """
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -20,8 +20,37 @@ from dap3d_core.result.post.force_output import ForceOutput
 from dap3d_core.result.post.point_motion import Energy, accelerations, point_motion
 from dap3d_core.result.post.reactions import Reaction
 
+if TYPE_CHECKING:
+    from dap3d_core.scene.expressions.expression import Expression
+
 #: Slots of bodies that a joint or a force may have.
 SLOTS = ("i", "j", "k")
+
+
+class Quantity(NamedTuple):
+    """A quantity over the reported instants.
+
+    Attributes:
+        name: as requested.
+        values: (nt,), or (nt, components).
+        kind: what it is, without its owner: "velocity".
+        label: what it is in words: "velocity of crank, z".
+        unit: SI unit, "1" for none, "SI" where it depends on the row.
+        components: names of the columns; empty for (nt,).
+        owner: "body", "point", "joint", "force" or "output"; "" for one of the whole system.
+        rate: name of the quantity that is its time derivative, "" for none.
+        operands: names of the quantities that an output is computed from.
+    """
+
+    name: str
+    values: Floats
+    kind: str
+    label: str
+    unit: str
+    components: tuple[str, ...]
+    owner: str = ""
+    rate: str = ""
+    operands: tuple[str, ...] = ()
 
 
 class QuantitySource(Protocol):
@@ -38,6 +67,17 @@ class QuantitySource(Protocol):
     @property
     def force_names(self) -> tuple[str, ...]:
         """Names of the force elements."""
+
+    @property
+    def outputs(self) -> Mapping[str, "Expression"]:
+        """Outputs of the scene by name."""
+
+    @property
+    def output_cache(self) -> dict[str, "Quantity"]:
+        """Outputs that are already evaluated."""
+
+    def note(self, text: str, /) -> None:
+        """Append a note."""
 
     def reaction(self, joint: str, /) -> Mapping[str, Reaction]:
         """Reactions of a joint by slot."""

@@ -12,8 +12,8 @@ from dap3d_core.result.arrays import AXES
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.atomic_write import whole_file
 from dap3d_core.result.post.reactions import DENSE_ROWS, jacobians
-from dap3d_core.result.quantities.catalogue import ACTIONS, MOTION, SYSTEM
-from dap3d_core.result.quantities.lookup import find
+from dap3d_core.result.quantities.catalogue import ACTIONS, MOTION, SYSTEM, Quantity
+from dap3d_core.result.quantities.lookup import available_outputs, find
 
 if TYPE_CHECKING:
     from dap3d_core.result.result import Result
@@ -42,7 +42,7 @@ class TableColumn(NamedTuple):
 
 
 def columns_of(result: "Result", reactions: bool = True) -> list[TableColumn]:
-    """All columns: time, bodies, points, multipliers, reactions, energies, residuals.
+    """All columns: time, bodies, points, multipliers, reactions, outputs, energies, residuals.
 
     Named as in ``Result.quantity``. Where a body and a point share a name, the point's are called
     NAME.rP.x, NAME.rPd.x, NAME.rPdd.x.
@@ -60,6 +60,8 @@ def columns_of(result: "Result", reactions: bool = True) -> list[TableColumn]:
         columns.append(TableColumn(f"{joint}.lambda.{number}", "SI", result.Lam[:, row]))
     if reactions:
         columns.extend(_of_joints(result))
+    for output in available_outputs(result):
+        columns.extend(_of_quantity(output))
     return columns + others
 
 
@@ -72,12 +74,7 @@ def selected(result: "Result", names: Iterable[str]) -> list[TableColumn]:
     """
     columns = {"t": TableColumn("t", "s", result.t)}
     for name in names:
-        quantity = find(result, name)
-        if quantity.values.ndim == 1:
-            columns[name] = TableColumn(name, quantity.unit, quantity.values)
-        else:
-            of_vector = _components(name, quantity.unit, quantity.values, quantity.components)
-            columns |= {column.name: column for column in of_vector}
+        columns |= {column.name: column for column in _of_quantity(find(result, name))}
     return list(columns.values())
 
 
@@ -159,6 +156,13 @@ def _of_joints(result: "Result") -> Iterator[TableColumn]:
                 values = getattr(action, part)
                 if values is not None:
                     yield from _components(f"{joint}.{slot}.{part}", unit, values, AXES)
+
+
+def _of_quantity(quantity: Quantity) -> Iterator[TableColumn]:
+    name, values, unit = quantity.name, quantity.values, quantity.unit
+    if values.ndim == 1:
+        return iter([TableColumn(name, unit, values)])
+    return _components(name, unit, values, quantity.components)
 
 
 def _components(

@@ -1,20 +1,21 @@
 """Quantities of a result by name, such as ``crank.r.z``, as plots and tables name them."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import NamedTuple
+from contextlib import suppress
 
 import numpy as np
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result.arrays import AXES
-from dap3d_core.result.errors import LISTED, UnknownNameError
+from dap3d_core.result.errors import LISTED, ResultError, UnknownNameError
 from dap3d_core.result.quantities.catalogue import (
     ACTIONS,
     POINT_ARRAYS,
     QUANTITIES,
     SLOTS,
     SYSTEM,
+    Quantity,
     QuantityOwner,
     QuantitySource,
 )
@@ -22,30 +23,6 @@ from dap3d_core.result.quantities.catalogue import (
 NORM = "norm"
 #: Kinds with names that a result knows without its scene; forces are looked up after them.
 NAMED = ("body", "point", "joint")
-
-
-class Quantity(NamedTuple):
-    """A quantity over the reported instants.
-
-    Attributes:
-        name: as requested.
-        values: (nt,), or (nt, components).
-        kind: what it is, without its owner: "velocity".
-        label: what it is in words: "velocity of crank, z".
-        unit: SI unit, "1" for none, "SI" where it depends on the row.
-        components: names of the columns; empty for (nt,).
-        owner: "body", "point", "joint" or "force"; "" for a quantity of the whole system.
-        rate: name of the quantity that is its time derivative, "" for none.
-    """
-
-    name: str
-    values: Floats
-    kind: str
-    label: str
-    unit: str
-    components: tuple[str, ...]
-    owner: str = ""
-    rate: str = ""
 
 
 def find(result: QuantitySource, name: str) -> Quantity:
@@ -61,7 +38,8 @@ def find(result: QuantitySource, name: str) -> Quantity:
             ``JOINT.SLOT.`` force moment force_body moment_body moment_at_point, without a slot on
             the body of the first; ``JOINT.lambda`` (rows from 1); ``FORCE.`` or ``FORCE.SLOT.``
             the same but lambda, ``FORCE.`` length length_rate tension energy; energy.kinetic
-            .potential .total; work; constraint.position .velocity .acceleration; t.
+            .potential .total; work; constraint.position .velocity .acceleration; t; outputs of the
+            scene.
 
     Raises:
         UnknownNameError: there is no such quantity; names the nearest.
@@ -82,6 +60,8 @@ def find(result: QuantitySource, name: str) -> Quantity:
                 columns = _components(result, owner, attribute)
                 if not component or component in columns:
                     return _quantity(result, name, owner, attribute, component)
+    if output := _output(result, name):
+        return output
     raise _unknown(result, name)
 
 
@@ -92,13 +72,54 @@ def _quantity(
     label = f"{kind} of {owner.label}" + (f", {component}" if component else "")
     rate = f"{owner.label}.{rate}" if rate else ""
     values, columns = function(result, owner), _columns(result, owner, attribute)
-    if component == NORM:
-        values, rate = np.linalg.norm(values, axis=1), ""
-    elif component:
-        values = values[:, columns.index(component)]
-        rate = f"{rate}.{component}" if rate else ""
+    if component:
+        values = _component_of(values, columns, component)
+        rate = f"{rate}.{component}" if rate and component != NORM else ""
     components = () if component else columns
     return Quantity(name, values, kind, label, unit, components, owner.kind, rate)
+
+
+def _output(result: QuantitySource, name: str) -> Quantity | None:
+    """An output of the scene, or a component of it; None where there is none."""
+    head, _, component = name.partition(".")
+    if head not in result.outputs:
+        return None
+    output = result.output_cache.get(head)
+    if output is None:
+        from dap3d_core.result.quantities.outputs import note_of_undefined, output_quantity
+
+        expression = result.outputs[head]
+        operands = {operand: find(result, operand) for operand in expression.names}
+        output = output_quantity(head, expression, operands, result.arrays.t.shape)
+        if note := note_of_undefined(output, operands.values(), result.arrays.t):
+            result.note(note)
+        result.output_cache[head] = output
+    if not component:
+        return output
+    columns = output.components
+    if component not in _with_norm(columns):
+        return None
+    values = _component_of(output.values, columns, component)
+    label = f"{head}, {component}"
+    return output._replace(name=name, values=values, label=label, components=())
+
+
+def available_outputs(result: QuantitySource) -> Iterator[Quantity]:
+    """The outputs of the scene that can be computed: some need the model for that."""
+    for name in result.outputs:
+        with suppress(ResultError):
+            yield find(result, name)
+
+
+def _with_norm(columns: tuple[str, ...]) -> tuple[str, ...]:
+    """Names that may follow a quantity: those of its columns, and of the length of a vector."""
+    return (*columns, NORM) if columns == AXES else columns
+
+
+def _component_of(values: Floats, columns: tuple[str, ...], component: str) -> Floats:
+    if component == NORM:
+        return np.asarray(np.linalg.norm(values, axis=1))
+    return values[:, columns.index(component)]
 
 
 def _columns(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tuple[str, ...]:
@@ -109,9 +130,8 @@ def _columns(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tu
 
 
 def _components(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tuple[str, ...]:
-    """Names that may follow a quantity: those of its columns, and of the length of a vector."""
-    columns = _columns(result, owner, attribute)
-    return (*columns, NORM) if columns is AXES else columns
+    """Names that may follow a quantity."""
+    return _with_norm(_columns(result, owner, attribute))
 
 
 def _indices(
@@ -158,11 +178,16 @@ def _unknown(result: QuantitySource, name: str) -> UnknownNameError:
         for owner in _owners(result, ".".join(parts[:size])):
             fault = _fault(result, owner, parts[size:])
             return UnknownNameError(fault, _suggestion(result, owner.label, parts[size:]))
+    if parts[0] in result.outputs:
+        output = find(result, parts[0])
+        components = ", ".join(_with_norm(output.components)) or "no components"
+        return UnknownNameError(f"the output {parts[0]} has {components}, not {name!r}")
     heads = [n for n in SYSTEM if n.startswith(f"{parts[0]}.")]
     if heads or len(parts) == 1:
-        choices = heads or ["BODY.r", "BODY.w.z", "POINT.v", "JOINT.force.norm", *SYSTEM]
+        known = (*SYSTEM, *result.outputs)
+        choices = heads or ["BODY.r", "BODY.w.z", "POINT.v", "JOINT.force.norm", *known]
         fault = f"there is no quantity {name!r}; there are {', '.join(choices)}"
-        return UnknownNameError(fault, nearest(name, SYSTEM))
+        return UnknownNameError(fault, nearest(name, known))
     size = 2 if parts[0] == "animation" and len(parts) > 2 else 1
     given = ".".join(parts[:size])
     names = {kind: tuple(indices) for kind, indices in _indices(result).items()}
@@ -211,8 +236,10 @@ def names_of(result: QuantitySource, begin: str = "") -> list[str]:
         Whole names, and names of owners, which end in a dot.
     """
     owners = [name for indices in _indices(result).values() for name in indices]
-    names = [*(f"{name}." for name in owners), *SYSTEM]
+    names = [*(f"{name}." for name in owners), *SYSTEM, *result.outputs]
     head = begin.rpartition(".")[0]
+    if head in result.outputs:
+        names += [f"{head}.{one}" for one in _with_norm(find(result, head).components)]
     label, _, attribute = head.rpartition(".")
     for owner in _owners(result, head):
         names += [f"{head}.{one}" for one in _attributes(owner)]

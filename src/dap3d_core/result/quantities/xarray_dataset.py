@@ -7,6 +7,7 @@ import numpy as np
 from dap3d_core.result.arrays import AXES, COLUMNS, EULER, U_ERROR
 from dap3d_core.result.file.schema import CONSTANTS, NAMES, about, attributes
 from dap3d_core.result.quantities.catalogue import MOTION, SYSTEM, QuantitySource
+from dap3d_core.result.quantities.lookup import available_outputs
 
 if TYPE_CHECKING:
     import xarray
@@ -18,7 +19,8 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
     Returns:
         Dimensions time, body, point, axis, euler, state, velocity, row, joint; coordinates t (s)
         as ``time``, and names; each variable with ``units`` and ``long_name``; the attributes of
-        the file. Jacobian and reactions are left out: they need the model.
+        the file. Jacobian and reactions are left out: they need the model. Outputs of the scene
+        have their names, with ``_output`` behind those that an array has already.
     """
     import xarray
 
@@ -57,4 +59,11 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
         "time": ("time", arrays.t, about("s", "time")),
         "row_joint": ("row", joint_of_row, about("1", "joint of the constraint row")),
     }
+    for output in available_outputs(result):
+        name = f"{output.name}_output" if output.name in {*variables, *coordinates} else output.name
+        dimension = {AXES: ("axis",), EULER: ("euler",), (): ()}.get(
+            output.components, (f"{output.name}_row",)
+        )
+        text = f"output {output.name} = {result.outputs[output.name].text}"
+        variables[name] = (("time", *dimension), output.values, about(output.unit, text))
     return xarray.Dataset(variables, coordinates, attributes(summary, result.record))

@@ -32,6 +32,7 @@ def to_toml(scene: Scene) -> str:
     for table in NAMED:
         for name, entry in getattr(scene, table).items():
             lines += _table(f"{table}.{_key(name)}", _fields(entry))
+    lines += _table("outputs", scene.outputs.items(), needed=False)
     if scene.animation.points or scene.animation.limits is not None:
         lines += _animation(scene)
     lines += _table("simulation", _fields(scene.simulation), needed=False)

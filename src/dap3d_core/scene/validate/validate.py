@@ -48,6 +48,10 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
         from dap3d_core.scene.validate.shapes import read_shapes
 
         read_shapes(report, bodies.body_index)
+    if scene.outputs:
+        from dap3d_core.scene.expressions.outputs import read_outputs
+
+        read_outputs(report)
     check_header(report)
     check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
     report.raise_mistakes()

@@ -1,0 +1,1 @@
+"""Expressions in scenes, and what is written with them."""

@@ -1,0 +1,75 @@
+"""Check of [outputs]: names, expressions, and the order in which they are evaluated."""
+
+import keyword
+from collections.abc import Mapping
+from graphlib import CycleError, TopologicalSorter
+from typing import Any
+
+from dap3d_core.scene.expressions.expression import CONSTANTS, WORDS, Expression, read_expression
+from dap3d_core.scene.scene import Scene, fault_of_name
+from dap3d_core.scene.validate.coerce_values import Fault
+from dap3d_core.scene.validate.mistake_collector import Collector
+
+#: Tables whose parts have quantities: an output has another name.
+OWNERS = ("bodies", "points", "joints", "forces")
+#: Outputs that name outputs that name outputs ...: longest chain.
+LONGEST_CHAIN = 50
+
+
+def read_outputs(report: Collector) -> dict[str, Expression]:
+    """The outputs of a scene by name, those first that others name; mistakes are reported."""
+    expressions = {}
+    for name, value in report.scene.outputs.items():
+        key = ("outputs", str(name))
+        if fault := _fault_of_name(report.scene, name):
+            report.add(key, name, f"not a name for an output: {fault}")
+        expression = report.read(key, value, read_expression)
+        if not isinstance(expression, Fault):
+            expressions[name] = expression
+    return _in_order(report, expressions)
+
+
+def outputs_of(outputs: Mapping[str, Any]) -> dict[str, Expression]:
+    """The outputs of a table [outputs] alone, such as the one that a result carries.
+
+    Raises:
+        SceneError: all mistakes.
+    """
+    report = Collector(Scene(outputs=dict(outputs)))
+    expressions = read_outputs(report)
+    report.raise_mistakes()
+    return expressions
+
+
+def _fault_of_name(scene: Scene, name: Any) -> str:
+    """The reason why something cannot name an output; "" where it can."""
+    if fault := fault_of_name(name):
+        return fault
+    if not name.isidentifier() or keyword.iskeyword(name):
+        return "it is a word of letters, digits and _, which begins with a letter"
+    if name in WORDS or name in CONSTANTS:
+        return "expressions have a function or a constant of this name"
+    table = next((table for table in OWNERS if name in getattr(scene, table)), None)
+    return f"there is one of this name in {table} already" if table else ""
+
+
+def _in_order(report: Collector, expressions: Mapping[str, Expression]) -> dict[str, Expression]:
+    """The same outputs, each behind those that it names."""
+    uses = {
+        name: [head for head in (n.partition(".")[0] for n in e.names) if head in expressions]
+        for name, e in expressions.items()
+    }
+    try:
+        order = list(TopologicalSorter(uses).static_order())
+    except CycleError as error:
+        cycle = error.args[1][::-1]  # each names the next
+        what = f"outputs name one another in a circle: {' -> '.join(cycle)}"
+        report.add(("outputs", cycle[0]), expressions[cycle[0]].text, what)
+        return {}
+    depth: dict[str, int] = {}
+    for name in order:
+        depth[name] = 1 + max((depth[other] for other in uses[name]), default=0)
+        if depth[name] == LONGEST_CHAIN + 1:
+            what = f"outputs name one another in a chain of more than {LONGEST_CHAIN}"
+            report.add(("outputs", name), expressions[name].text, what)
+    return {name: expressions[name] for name in order}

@@ -1,0 +1,102 @@
+"""Outputs of scenes: what is refused says where, and scenes keep them."""
+
+import pytest
+
+import dap3d_core as dap
+from dap3d_core.scene import Scene, parse
+from dap3d_core.scene.expressions.outputs import LONGEST_CHAIN, outputs_of
+
+FALLING = """\
+[scene]
+name = "fall"
+
+[bodies.stone]
+mass = 2.0
+Jp = [0.1, 0.1, 0.1]
+
+[forces.gravity]
+type = "weight"
+
+[outputs]
+"""
+
+
+def mistake_of(tmp_path, outputs):
+    """What a scene file with these outputs is refused for: the only mistake."""
+    path = tmp_path / "scene.toml"
+    path.write_text(FALLING + outputs)
+    with pytest.raises(dap.SceneError) as refused:
+        dap.compile(path)
+    (mistake,) = refused.value.mistakes
+    assert mistake.file == str(path)
+    return mistake
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("a = 'stone.r.z +'", "is no expression"),
+        ("a = 'stine(t)'", "did you mean 'sin'"),
+        ("a = 3", "an expression in quotes"),
+        ("a = 'stone.q'", "the body 'stone' has r, p"),
+        ("a = 'stoen.r'", "did you mean 'stone.r'"),
+        ("a = 'enrgy.kinetic'", "there is no body, point, joint or force 'enrgy'"),
+        ("a = 'stone.r + stone.p'", "vectors of 3 and 4 components"),
+        ("a = 'a + 1'", "in a circle: a -> a"),
+        ("stone = 't'", "one of this name in bodies already"),
+        ("gravity = 't'", "one of this name in forces already"),
+        ("work = 't'", "every result has a quantity of this name"),
+        ("energy = 't'", "every result has a quantity of this name"),
+        ("sin = 't'", "a function or a constant of this name"),
+        ("pi = 't'", "a function or a constant of this name"),
+        ("'two words' = 't'", "a word of letters, digits and _"),
+        ("lambda = 't'", "a word of letters, digits and _"),
+    ],
+)
+def test_a_wrong_output_is_named_with_its_line(tmp_path, line, words):
+    mistake = mistake_of(tmp_path, f"good = 't'\n{line}\n")
+    assert words in str(mistake)
+    assert mistake.line == FALLING.count("\n") + 2
+    assert mistake.key.startswith("outputs.")
+
+
+def test_a_circle_of_several_is_told_in_its_order(tmp_path):
+    mistake = mistake_of(tmp_path, "a = 'b + 1'\nb = 'c.x'\nc = 'a * stone.r'\n")
+    assert any(circle in mistake.what for circle in ("a -> b -> c -> a", "b -> c -> a -> b",
+                                                     "c -> a -> b -> c"))  # fmt: skip
+
+
+def test_chains_are_bounded_and_evaluated_once():
+    """Two names in each of many would be 2**50 evaluations."""
+    scene = parse(FALLING)
+    scene.add_output("a0", "stone.r.z")
+    for k in range(1, LONGEST_CHAIN):
+        scene.add_output(f"a{k}", f"a{k - 1} - 0.5 * a{max(k - 2, 0)}")
+    result = dap.simulate(scene, t_end=0.1, dt=0.1)
+    assert result.quantity(f"a{LONGEST_CHAIN - 1}").unit == "m"
+    scene.add_output("last", f"a{LONGEST_CHAIN - 1}")
+    with pytest.raises(dap.SceneError, match="a chain of more than"):
+        dap.compile(scene)
+
+
+def test_outputs_survive_copies_and_files(tmp_path):
+    scene = parse(FALLING + "height = \"stone.r.z - 'gravity.odd name' # m\"\n")
+    assert scene.copy() == scene
+    scene.copy().add_output("other", "t")
+    assert list(scene.outputs) == ["height"]
+    scene.save(tmp_path)
+    assert dap.load(tmp_path).outputs == scene.outputs
+
+
+def test_add_output_refuses_a_name_twice():
+    scene = Scene()
+    assert scene.add_output("camber", "t") == "camber"
+    with pytest.raises(dap.SceneError, match="one of this name in outputs already"):
+        scene.add_output("camber", "t")
+    with pytest.raises(dap.SceneError, match="not a name"):
+        scene.add_output("", "t")
+
+
+def test_outputs_come_behind_those_that_they_name():
+    found = outputs_of({"c": "a + b.x", "b": "a * stone.r", "a": "t"})
+    assert list(found) == ["a", "b", "c"]
