@@ -12,7 +12,7 @@ from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.rotations import read_only
 from dap3d_core.result.arrays import Arrays, arrays_of
-from dap3d_core.result.errors import ResultError, unknown
+from dap3d_core.result.errors import ResultError, UnknownNameError, unknown
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.metadata import RunMetadata, RunStatistics
 from dap3d_core.result.model_summary import ModelSummary, summary_of
@@ -28,7 +28,9 @@ from dap3d_core.scene import SceneError
 if TYPE_CHECKING:
     import xarray
 
+    from dap3d_core.assembly.motion.joint_motion import ModelMotions
     from dap3d_core.formulations.evaluator import Evaluator
+    from dap3d_core.result.post.joint_coordinates import JointCoordinates
     from dap3d_core.scene.expressions.expression import Expression
 
 #: A model, and a function that returns an evaluator of it.
@@ -104,6 +106,7 @@ class Result:
         self._make_origin = origin
         self._reactions: dict[str, dict[str, Reaction]] = {}
         self._forces: dict[str, ForceOutput] = {}
+        self._coordinates: dict[str, JointCoordinates] = {}
         self.output_cache: dict[str, Quantity] = {}
 
     @classmethod
@@ -286,6 +289,40 @@ class Result:
         """Reactions of all joints by name, computed in one pass; otherwise as ``reaction``."""
         self._compute_reactions(self.summary.joint_names)
         return {name: dict(self._reactions[name]) for name in self.summary.joint_names}
+
+    def coordinates(self, joint: str) -> "JointCoordinates":
+        """Coordinates of a joint and their rates.
+
+        Args:
+            joint: name of the joint.
+
+        Returns:
+            ``.q`` (nt, d) and ``.q_dot`` of d coordinates in rad and m, zero in the pose that the
+            scene gives, turns counted; ``.units``; ``.aliases``, indices of angle and length.
+
+        Raises:
+            UnknownNameError: there is no such joint; its motion has no coordinates, says why.
+            ResultError: as ``model``.
+        """
+        if joint not in self.summary.joint_index:
+            raise unknown("joint", joint, self.summary.joint_names)
+        if joint not in self._coordinates:
+            from dap3d_core.result.post.joint_coordinates import coordinates_of
+
+            place = self.summary.joint_index[joint]
+            motion = self._motions.of(place)
+            if motion is None or not motion.size:
+                reason = self._motions.refused.get(place, "it leaves no freedom")
+                raise UnknownNameError(f"the joint {joint!r} has no coordinates: {reason}")
+            self._coordinates[joint] = coordinates_of(motion, self.t, self.u)
+        return self._coordinates[joint]
+
+    @cached_property
+    def _motions(self) -> "ModelMotions":
+        """The motions of the joints."""
+        from dap3d_core.assembly.motion.classify import classify
+
+        return classify(self.model)
 
     def _compute_reactions(self, names: Iterable[str]) -> None:
         index = self.summary.joint_index

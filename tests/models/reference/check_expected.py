@@ -20,7 +20,7 @@ import numpy as np
 from rigid import Array
 
 MODELS = Path(__file__).parents[3] / "models"
-NAMES = ("bodies2", "ball1", "pen1", "pen2", "fourbar3", "fourbar2", "fourbar4", "tri")
+NAMES = ("bodies2", "ball1", "pen1", "pen2", "fourbar3", "fourbar2", "fourbar4", "tri", "bicycle")
 #: The reference problems, and the script of each: one for all sizes of A02.
 BENCHMARKS = {
     "A02-1": "fourbar_row",

@@ -21,15 +21,24 @@ GROUND = -1
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body with its mass centre at its origin, and its state at the start."""
+    """A rigid body with its mass centre at its origin, and its state at the start.
+
+    `Jp` is the inertia matrix in the axes of the body, or its diagonal.
+    """
 
     name: str
     mass: float
-    Jp: tuple[float, float, float]
+    Jp: tuple[float, float, float] | tuple[tuple[float, float, float], ...]
     r: tuple[float, float, float]
     p: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     v: tuple[float, float, float] = (0.0, 0.0, 0.0)
     w: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+def inertia(body: Body) -> Array:
+    """Return the inertia matrix of a body in its axes."""
+    Jp = np.array(body.Jp)
+    return np.diag(Jp) if Jp.ndim == 1 else Jp
 
 
 class Fixed(NamedTuple):
@@ -217,7 +226,7 @@ class System:
         M = np.zeros((6 * self.n, 6 * self.n))
         for i, body in enumerate(self.bodies):
             M[6 * i : 6 * i + 3, 6 * i : 6 * i + 3] = body.mass * np.eye(3)
-            M[6 * i + 3 : 6 * i + 6, 6 * i + 3 : 6 * i + 6] = A[i] @ np.diag(body.Jp) @ A[i].T
+            M[6 * i + 3 : 6 * i + 6, 6 * i + 3 : 6 * i + 6] = A[i] @ inertia(body) @ A[i].T
         return M
 
     def loads(self, r: Array, A: Array, v: Array) -> tuple[Array, float]:
@@ -225,7 +234,7 @@ class System:
         g, potential = np.zeros(6 * self.n), 0.0
         for i, body in enumerate(self.bodies):
             w = v[6 * i + 3 : 6 * i + 6]
-            J = A[i] @ np.diag(body.Jp) @ A[i].T
+            J = A[i] @ inertia(body) @ A[i].T
             g[6 * i + 3 : 6 * i + 6] -= cross(w, J @ w)
             if self.weight:
                 g[6 * i : 6 * i + 3] -= body.mass * GRAVITY * np.array(self.up)

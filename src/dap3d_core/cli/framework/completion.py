@@ -47,7 +47,8 @@ def quantities(ctx: click.Context, param: click.Parameter, incomplete: str) -> l
     """Quantities of the result on the command line, part by part; outputs of a sweep; a path."""
     words: list[str] = []
     with suppress(Exception):
-        from dap3d_core.result import names_of, open_result
+        from dap3d_core.result import names_of
+        from dap3d_core.simulation.open_result import open_result
         from dap3d_core.study.sweep.dataset import is_sweep, open_sweep
 
         # After an option without its value click leaves all words in ctx.args.

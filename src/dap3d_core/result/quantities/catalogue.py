@@ -21,6 +21,7 @@ from dap3d_core.result.post.point_motion import Energy, accelerations, point_mot
 from dap3d_core.result.post.reactions import Reaction
 
 if TYPE_CHECKING:
+    from dap3d_core.result.post.joint_coordinates import JointCoordinates
     from dap3d_core.scene.expressions.expression import Expression
 
 #: Slots of bodies that a joint or a force may have.
@@ -81,6 +82,9 @@ class QuantitySource(Protocol):
 
     def reaction(self, joint: str, /) -> Mapping[str, Reaction]:
         """Reactions of a joint by slot."""
+
+    def coordinates(self, joint: str, /) -> "JointCoordinates":
+        """Coordinates of a joint."""
 
     def force(self, name: str, /) -> ForceOutput:
         """Output of a force element."""

@@ -1,5 +1,6 @@
 """Quantities of a result by name, such as ``crank.r.z``, as plots and tables name them."""
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 
@@ -21,6 +22,8 @@ from dap3d_core.result.quantities.catalogue import (
 )
 
 NORM = "norm"
+#: Names of joint coordinates, of which a joint has some.
+COORDINATE = re.compile(r"q[1-9]\d?(_dot)?|(angle|length)(_rate)?")
 #: Kinds with names that a result knows without its scene; forces are looked up after them.
 NAMED = ("body", "point", "joint")
 
@@ -36,10 +39,10 @@ def find(result: QuantitySource, name: str) -> Quantity:
         result: what the quantity is computed from.
         name: ``BODY.`` r p rd w wp rdd wd wpd; ``POINT.`` r v a (also rP rPd rPdd); ``JOINT.`` or
             ``JOINT.SLOT.`` force moment force_body moment_body moment_at_point, without a slot on
-            the body of the first; ``JOINT.lambda`` (rows from 1); ``FORCE.`` or ``FORCE.SLOT.``
-            the same but lambda, ``FORCE.`` length length_rate tension energy; energy.kinetic
-            .potential .total; work; constraint.position .velocity .acceleration; t; outputs of the
-            scene.
+            the body of the first; ``JOINT.lambda`` (rows from 1); ``JOINT.`` q1 q1_dot q2 q2_dot
+            ... angle length angle_rate length_rate; ``FORCE.`` or ``FORCE.SLOT.`` the actions as of
+            a joint; ``FORCE.`` length length_rate tension energy; energy.kinetic .potential .total; work;
+            constraint.position .velocity .acceleration; t; outputs of the scene.
 
     Raises:
         UnknownNameError: there is no such quantity; names the nearest.
@@ -56,7 +59,10 @@ def find(result: QuantitySource, name: str) -> Quantity:
         return Quantity(name, values(result), label, label, unit, ())
     for kinds in (NAMED, ("force",)):
         for owner, attribute, component in _parsed(result, name, kinds):
-            if attribute in QUANTITIES[owner.kind]:
+            if owner.kind == "joint" and not component and COORDINATE.fullmatch(attribute):
+                if coordinate := _coordinate(result, name, owner, attribute):
+                    return coordinate
+            elif attribute in QUANTITIES[owner.kind]:
                 columns = _components(result, owner, attribute)
                 if not component or component in columns:
                     return _quantity(result, name, owner, attribute, component)
@@ -104,6 +110,19 @@ def _output(result: QuantitySource, name: str) -> Quantity | None:
     return output._replace(name=name, values=values, label=label, components=())
 
 
+def joint_coordinates(result: QuantitySource) -> Iterator[Quantity]:
+    """The coordinates q1, q2, ... of all joints that have some, each followed by its rate.
+
+    Raises:
+        ResultError: the model is not available.
+    """
+    for joint in result.summary.joint_names:
+        with suppress(UnknownNameError):
+            for k in range(len(result.coordinates(joint).units)):
+                yield find(result, f"{joint}.q{k + 1}")
+                yield find(result, f"{joint}.q{k + 1}_dot")
+
+
 def available_outputs(result: QuantitySource) -> Iterator[Quantity]:
     """The outputs of the scene that can be computed: some need the model for that."""
     for name in result.outputs:
@@ -122,11 +141,39 @@ def _component_of(values: Floats, columns: tuple[str, ...], component: str) -> F
     return values[:, columns.index(component)]
 
 
+def _coordinate(
+    result: QuantitySource, name: str, owner: QuantityOwner, attribute: str
+) -> Quantity | None:
+    """A coordinate of a joint or its rate; None where it has none of this name."""
+    try:
+        coordinates = result.coordinates(owner.name)
+    except UnknownNameError:
+        return None
+    if attribute not in coordinates.names:
+        return None
+    k, is_rate = coordinates.names[attribute]
+    values, unit = (coordinates.q, coordinates.q_dot)[is_rate][:, k], coordinates.units[k]
+    alias = next((alias for alias, place in coordinates.aliases.items() if place == k), "")
+    kind = alias or f"coordinate q{k + 1}"
+    kind, unit = (f"{kind} rate", f"{unit}/s") if is_rate else (kind, unit)
+    rate = "" if is_rate else f"{owner.name}.q{k + 1}_dot"
+    return Quantity(name, values, kind, f"{kind} of {owner.name}", unit, (), "joint", rate)
+
+
+def _coordinate_names(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
+    """Names of the coordinates of a joint; none where the model for them is not available."""
+    if owner.kind == "joint" and not owner.slot:
+        with suppress(ResultError, UnknownNameError):
+            return tuple(result.coordinates(owner.name).names)
+    return ()
+
+
 def _columns(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tuple[str, ...]:
     """Names of the columns of a quantity."""
     if attribute == "lambda" and owner.kind == "joint":
         return tuple(str(k + 1) for k in range(result.summary.joint_rows[owner.place]))
-    return QUANTITIES[owner.kind][attribute].components
+    known = QUANTITIES[owner.kind].get(attribute)
+    return known.components if known else ()
 
 
 def _components(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tuple[str, ...]:
@@ -198,16 +245,22 @@ def _unknown(result: QuantitySource, name: str) -> UnknownNameError:
     return UnknownNameError(fault, _suggestion(result, near, parts[size:]))
 
 
-def _attributes(owner: QuantityOwner) -> tuple[str, ...]:
+def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
     """Names that may follow an owner."""
-    return tuple(ACTIONS if owner.slot else QUANTITIES[owner.kind])
+    known = ACTIONS if owner.slot else QUANTITIES[owner.kind]
+    return (*known, *_coordinate_names(result, owner))
 
 
 def _fault(result: QuantitySource, owner: QuantityOwner, rest: list[str]) -> str:
-    attributes = _attributes(owner)
+    attributes = _attributes(result, owner)
     if not rest:
         return f"which quantity of the {owner.kind} {owner.label!r}: {', '.join(attributes)}"
     if rest[0] not in attributes:
+        if owner.kind == "joint" and COORDINATE.fullmatch(rest[0]):
+            try:
+                result.coordinates(owner.name)
+            except UnknownNameError as error:
+                return str(error)
         return f"the {owner.kind} {owner.label!r} has {', '.join(attributes)}, not {rest[0]!r}"
     components = ", ".join(_components(result, owner, rest[0])) or "no components"
     return f"{owner.label}.{rest[0]} has {components}, not {'.'.join(rest[1:])!r}"
@@ -216,7 +269,7 @@ def _fault(result: QuantitySource, owner: QuantityOwner, rest: list[str]) -> str
 def _suggestion(result: QuantitySource, label: str, rest: list[str]) -> str:
     """The nearest valid name of a quantity of an owner, or ""."""
     for owner in _owners(result, label) if rest else ():
-        attribute = nearest(rest[0], _attributes(owner))
+        attribute = nearest(rest[0], _attributes(result, owner))
         if attribute:
             components = _components(result, owner, attribute)
             component = nearest(rest[1], components) if len(rest) > 1 else ""
@@ -242,9 +295,9 @@ def names_of(result: QuantitySource, begin: str = "") -> list[str]:
         names += [f"{head}.{one}" for one in _with_norm(find(result, head).components)]
     label, _, attribute = head.rpartition(".")
     for owner in _owners(result, head):
-        names += [f"{head}.{one}" for one in _attributes(owner)]
+        names += [f"{head}.{one}" for one in _attributes(result, owner)]
     for owner in _owners(result, label):
-        if attribute in _attributes(owner):
+        if attribute in _attributes(result, owner):
             names += [f"{head}.{one}" for one in _components(result, owner, attribute)]
     names = [name for name in dict.fromkeys(names) if name.startswith(begin) and name != begin]
     if len(names) == 1 and names[0].endswith("."):

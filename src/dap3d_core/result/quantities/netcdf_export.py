@@ -13,7 +13,7 @@ from dap3d_core.result.file.library import NETCDF
 from dap3d_core.result.file.schema import about, attributes, write_attributes
 from dap3d_core.result.post.reactions import DENSE_ROWS, rows_at
 from dap3d_core.result.quantities.catalogue import ACTIONS
-from dap3d_core.result.quantities.lookup import find
+from dap3d_core.result.quantities.lookup import find, joint_coordinates
 from dap3d_core.result.quantities.xarray_dataset import dataset_of
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def dataset_to_write(result: "Result", reactions: bool = True) -> "xarray.Dataset":
-    """All arrays of a result but the Jacobian; with reactions of joints unless that is off.
+    """All arrays of a result but the Jacobian; reactions and coordinates of joints can be left out.
 
     Raises:
         ResultError: the model for the reactions is not available.
@@ -31,6 +31,7 @@ def dataset_to_write(result: "Result", reactions: bool = True) -> "xarray.Datase
     dataset = dataset_of(result)
     if reactions and result.summary.joint_names:
         dataset = dataset.merge(reactions_of(result), combine_attrs="override")
+        dataset = dataset.merge(coordinates_of(result), combine_attrs="override")
     return dataset.drop_dims([name for name, count in dataset.sizes.items() if not count])
 
 
@@ -80,6 +81,40 @@ def reactions_of(result: "Result") -> "xarray.Dataset":
         "reaction_body": ("reaction", bodies, about("1", "body that it acts on")),
     }
     return xarray.Dataset(variables, coordinates)
+
+
+def coordinates_of(result: "Result") -> "xarray.Dataset":
+    """The coordinates of all joints that have some, and their rates.
+
+    Returns:
+        Dimensions time, coordinate; ``joint_q`` and ``joint_q_dot``; coordinate ``coordinate``
+        (JOINT.q1) with the unit of each, rad or m.
+
+    Raises:
+        ResultError: the model is not available.
+    """
+    import xarray
+
+    quantities = list(joint_coordinates(result))
+    coordinates, rates = quantities[::2], quantities[1::2]
+    if not coordinates:
+        return xarray.Dataset()
+    dimensions = ("time", "coordinate")
+    arrays = {
+        name: np.stack([one.values for one in some], axis=1)
+        for name, some in (("joint_q", coordinates), ("joint_q_dot", rates))
+    }
+    names, units = np.array([(one.name, one.unit) for one in coordinates], dtype=str).T
+    return xarray.Dataset(
+        {
+            "joint_q": (dimensions, arrays["joint_q"], about("SI", "joint coordinates")),
+            "joint_q_dot": (dimensions, arrays["joint_q_dot"], about("SI", "their rates")),
+        },
+        {
+            "coordinate": ("coordinate", names, about("1", "joint coordinate")),
+            "coordinate_unit": ("coordinate", units, about("1", "unit of the coordinate")),
+        },
+    )
 
 
 def selection_of(result: "Result", names: Iterable[str]) -> "xarray.Dataset":

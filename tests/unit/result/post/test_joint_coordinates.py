@@ -1,0 +1,139 @@
+"""Joint coordinates are quantities: of runs with known motions, of any type, from files too."""
+
+import numpy as np
+import pytest
+from support.process import REPOSITORY
+
+import dap3d_core as dap
+from dap3d_core.result import ResultError, UnknownNameError, names_of
+from dap3d_core.result.open import open_result
+from dap3d_core.result.quantities.csv_table import columns_of
+from dap3d_core.result.quantities.netcdf_export import dataset_to_write
+
+RATE, SPEED, TILT = 100.0, 0.7, 0.4
+#: Cosine and sine of half a turn by TILT about z.
+TURNED = (np.cos(TILT / 2), 0.0, 0.0, np.sin(TILT / 2))
+
+
+def spinning(kind):
+    """A body without loads on a joint along z to ground, that turns and advances uniformly."""
+    scene = dap.Scene(name="spinning")
+    along = SPEED if kind == "cyl" else 0.0
+    scene.add_body("disc", mass=2.0, Jp=[0.1, 0.1, 0.2], r=[0.3, -0.2, 0.5], p=TURNED,
+                   r_dot=[0, 0, along], w=[0, 0, RATE])  # fmt: skip
+    scene.add_point("centre", "ground", [0.3, -0.2, 0.5])
+    axes = dict(a_i="disc.z", a_j="ground.z")
+    scene.add_joint(kind, "hinge", P_i="disc.O", P_j="centre", **axes)
+    return scene
+
+
+@pytest.fixture(scope="module")
+def turning():
+    """Five radians from one reported instant to the next: more than half a turn."""
+    return dap.simulate(spinning("rev"), t_end=1.0, dt=0.05)
+
+
+def test_turns_are_counted_though_reports_are_far_apart(turning):
+    """Uniform rotation; the integration is exact but for rounding, 1e-12 of 100 rad."""
+    angle = turning.quantity("hinge.angle")
+    np.testing.assert_allclose(angle.values, RATE * turning.t, atol=1e-9)
+    np.testing.assert_allclose(turning.quantity("hinge.angle_rate").values, RATE, rtol=1e-12)
+    assert (angle.unit, angle.label) == ("rad", "angle of hinge")
+    assert turning.quantity("hinge.q1_dot")[1:] == ("angle rate of hinge", "rad/s")
+    for alias, name in {"angle": "q1", "angle_rate": "q1_dot"}.items():
+        one, other = (turning.quantity(f"hinge.{n}").values for n in (alias, name))
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_joint_with_an_angle_and_a_length():
+    result = dap.simulate(spinning("cyl"), t_end=0.5, dt=0.05)
+    value = {n: result.quantity(f"hinge.{n}").values
+             for n in ("angle", "length", "angle_rate", "length_rate")}  # fmt: skip
+    np.testing.assert_allclose(value["angle"], RATE * result.t, atol=1e-9)
+    np.testing.assert_allclose(value["length"], SPEED * result.t, atol=1e-12)
+    np.testing.assert_allclose(value["length_rate"], SPEED, rtol=1e-12)
+    assert result.quantity("hinge.length").unit == "m"
+    assert result.coordinates("hinge").q.shape == (len(result.t), 2)
+
+
+def test_a_type_of_others_has_coordinates():
+    """The screw of the example package: it turns by its advance over its pitch."""
+    result = dap.simulate(REPOSITORY / "plugins/dap3d-example/scenes/screw.toml", t_end=0.5)
+    angle, z = result.quantity("thread.angle").values, result.quantity("nut.r.z").values
+    pitch = 0.01 / (2 * np.pi)
+    np.testing.assert_allclose(pitch * angle, z, atol=1e-12)
+    assert np.ptp(z) > 0.0
+
+
+def test_a_file_gives_the_same(turning, tmp_path):
+    turning.save(tmp_path / "a.nc")
+    for name in ("hinge.angle", "hinge.q1_dot"):
+        found = dap.open(tmp_path / "a.nc").quantity(name)
+        np.testing.assert_array_equal(found.values, turning.quantity(name).values)
+    bare = open_result(tmp_path / "a.nc")
+    with pytest.raises(ResultError, match="the model of"):
+        bare.quantity("hinge.angle")
+    assert names_of(bare, "hinge.l") == ["hinge.lambda"]
+
+
+def test_names_that_a_joint_has_and_those_it_has_not(turning):
+    assert [n for n in names_of(turning, "hinge.") if n.startswith(("hinge.q", "hinge.a"))] == [
+        "hinge.q1", "hinge.angle", "hinge.q1_dot", "hinge.angle_rate",
+    ]  # fmt: skip
+    for name, words in {
+        "hinge.q2": "has force, .*, q1, angle, q1_dot, angle_rate, not 'q2'",
+        "hinge.length": "not 'length'",
+        "hinge.angel": "did you mean 'hinge.angle'",
+        "hinge.angle.z": "hinge.angle has no components",
+        "hinge.i.angle": "not 'angle'",
+    }.items():
+        with pytest.raises(UnknownNameError, match=words):
+            turning.quantity(name)
+
+
+def test_a_joint_without_coordinates_says_why():
+    result = dap.simulate("tri", t_end=0.0)
+    for name, words in {"J6.q1": "rows of the velocity level", "J8.angle": "1 row"}.items():
+        with pytest.raises(UnknownNameError, match=words):
+            result.quantity(name)
+    scene = dap.Scene(name="fixed")
+    scene.add_body("block")
+    scene.add_joint("fix", "weld", body_i="block")
+    with pytest.raises(UnknownNameError, match="it leaves no freedom"):
+        dap.simulate(scene, t_end=0.0).coordinates("weld")
+    with pytest.raises(UnknownNameError, match="there is no joint 'weld'"):
+        result.coordinates("weld")
+
+
+def test_a_force_keeps_its_length_beside_a_joint_of_its_name():
+    scene = spinning("rev")
+    scene.add_force("ptp", "hinge", P_i="disc.O", P_j="ground.O", k=0.0, l0=0.0)
+    result = dap.simulate(scene, t_end=0.0)
+    reach = np.linalg.norm([0.3, -0.2, 0.5])
+    np.testing.assert_allclose(result.quantity("hinge.length").values, reach, rtol=1e-15)
+    assert result.quantity("hinge.angle").unit == "rad"
+
+
+def test_tables_hold_coordinates(turning):
+    columns = {column.name: column for column in columns_of(turning)}
+    np.testing.assert_array_equal(
+        columns["hinge.q1"].values, turning.quantity("hinge.angle").values
+    )
+    dataset = dataset_to_write(turning)
+    np.testing.assert_array_equal(dataset["joint_q"].values[:, 0], columns["hinge.q1"].values)
+    assert dataset["coordinate"].values.tolist() == ["hinge.q1"]
+    assert dataset["coordinate_unit"].values.tolist() == ["rad"]
+
+
+@pytest.mark.parametrize("vary", [{"forces.gravity.gravity": [9.0, 10.0, 11.0]},
+                                  {"bodies.disc.mass": [1.0, 2.0]}])  # fmt: skip
+def test_sweeps_count_turns_in_each_run(vary):
+    """Of runs whose rows are reduced together, and of runs on their own."""
+    scene = spinning("rev")
+    scene.add_force("weight", "gravity")
+    sweep = dap.sweep(scene, vary=vary, outputs=["hinge.angle:end", "hinge.angle:series"],
+                      t_end=1.0, dt=0.05)  # fmt: skip
+    np.testing.assert_allclose(sweep["hinge.angle:end"], RATE, atol=1e-9)
+    np.testing.assert_allclose(
+        sweep["hinge.angle:series"][-1], RATE * np.arange(21) / 20, atol=1e-9
+    )
