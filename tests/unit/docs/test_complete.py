@@ -219,7 +219,7 @@ def test_what_public_names_hand_out_exists(site):
 
     for _, others in SECTIONS.values():
         for path in others:
-            floor, name = path.split(".")
+            floor, _, name = path.rpartition(".")
             assert inspect.getdoc(getattr(import_module(f"dap3d_core.{floor}"), name)), path
 
 
