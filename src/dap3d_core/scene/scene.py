@@ -159,7 +159,7 @@ NAMED: dict[str, type] = {
     "functions": Element,
     "shapes": Element,
 }
-TABLES = ("scene", *NAMED, "outputs", "animation", "simulation")
+TABLES = ("scene", "parameters", *NAMED, "outputs", "animation", "simulation")
 
 
 @attrs.define(repr=False)
@@ -171,6 +171,7 @@ class Scene(SceneDisplay):
         schema: version of the file format.
         bodies, points, vectors, vectors2, joints, forces, functions, shapes: by name, in file
             order.
+        parameters: numbers by name, for expressions in place of numbers (text that begins with =).
         outputs: expressions of quantities, by name.
         animation, simulation: points to draw; settings of a run.
         path: the file this was read from, or None.
@@ -189,6 +190,7 @@ class Scene(SceneDisplay):
     forces: dict[str, Element] = attrs.Factory(dict)
     functions: dict[str, Element] = attrs.Factory(dict)
     shapes: dict[str, Element] = attrs.Factory(dict)
+    parameters: dict[str, Any] = attrs.Factory(dict)
     outputs: dict[str, Any] = attrs.Factory(dict)
     animation: Animation = attrs.Factory(Animation)
     simulation: Simulation = attrs.Factory(Simulation)
@@ -213,6 +215,7 @@ class Scene(SceneDisplay):
             self,
             animation=attrs.evolve(self.animation, points=points),
             simulation=_copied(self.simulation),
+            parameters=dict(self.parameters),
             outputs=dict(self.outputs),
             faults=list(self.faults),
             notes=list(self.notes),
@@ -220,6 +223,18 @@ class Scene(SceneDisplay):
         )
         scene._counts = dict(self._counts)
         return scene
+
+    def resolved(self) -> "Scene":
+        """A copy with numbers in place of expressions of parameters; itself without parameters.
+
+        Raises:
+            SceneError: all mistakes in parameters and expressions.
+        """
+        if not self.parameters:
+            return self
+        from dap3d_core.scene.expressions.parameters import resolve
+
+        return resolve(self)
 
     def __deepcopy__(self, memo: Any) -> "Scene":
         """The same as ``copy``: values in a scene are plain and immutable."""
@@ -292,6 +307,20 @@ class Scene(SceneDisplay):
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
         return self._add_element("shapes", type, name, fields)
+
+    def add_parameter(self, name: str, value: float | str) -> str:
+        """Add a parameter, a number that expressions such as ``"= L / 2"`` name; returns its name.
+
+        Args:
+            name: a word, not used by another parameter.
+            value: a number, or an expression of other parameters: ``"= 2 * L"``.
+
+        Raises:
+            SceneError: the name is taken or illegal.
+        """
+        self._check_name("parameters", self.parameters, name)
+        self.parameters[name] = plain(value)
+        return name
 
     def add_output(self, name: str, expression: str) -> str:
         """Add an output, a quantity of results, and return its name.

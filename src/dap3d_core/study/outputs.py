@@ -15,7 +15,7 @@ from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.scene.errors import shown
 from dap3d_core.simulation import CompiledModel, SimulationError
 from dap3d_core.simulation.output.check_outputs import probe_of
-from dap3d_core.study.parameters import SceneParameter
+from dap3d_core.study.parameters import TABLES, SceneParameter
 
 
 def _mean(values: Floats, t: Floats) -> Any:
@@ -179,7 +179,8 @@ class Reduction:
             SceneError: an unknown quantity; or a series of a length that varies.
         """
         self.compiled, self.parameters = compiled, parameters
-        self._tables = {parameter.table for parameter in parameters}
+        tables = {parameter.table for parameter in parameters}
+        self._tables = set(TABLES) if "parameters" in tables else tables
         self.labels: dict[str, str] = {}
         self.units: dict[str, str] = {}
         self.of_rows: dict[str, bool] = {}

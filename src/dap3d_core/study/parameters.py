@@ -17,7 +17,13 @@ from dap3d_core.scene.validate.settings import OPEN
 AXES = ("x", "y", "z")
 EULER_PARAMETERS = ("e0", "e1", "e2", "e3")
 #: Tables with parameters; shapes are only drawn, a vector2 has points alone.
-TABLES = (*(table for table in NAMED if table not in ("shapes", "vectors2")), "simulation")
+TABLES = (
+    *(table for table in NAMED if table not in ("shapes", "vectors2")),
+    "parameters",
+    "simulation",
+)
+#: Those of them without parts that have names.
+FLAT = ("parameters", "simulation")
 #: Kinds of fields that are numeric also where the scene leaves them to their type.
 NUMERIC = ("number", "vec3", "matrix")
 #: Defaults of a body (scene/validate/bodies.py).
@@ -27,7 +33,7 @@ UNITS = {"mass": "kg", "Jp": "kg m^2", "r": "m", "r_dot": "m/s", "w": "rad/s", "
          "t_end": "s", "dt": "s", "step": "s", "Omega": "rad/s"}  # fmt: skip
 #: Largest number of names in a message.
 MAX_NAMES = 6
-FORM = "names are TABLE.NAME.FIELD, such as bodies.crank.mass, or simulation.FIELD"
+FORM = "names are TABLE.NAME.FIELD, such as bodies.crank.mass, simulation.FIELD, parameters.NAME"
 
 
 @attrs.frozen
@@ -36,7 +42,7 @@ class SceneParameter:
 
     Attributes:
         name: dotted, as the user gives it.
-        path: table, owner and field; ``simulation`` has no owner.
+        path: table, owner and field; ``simulation`` and ``parameters`` have no owner.
         index: of the number in the field's value, from 0; empty for a scalar field.
         value: in the scene; None where the scene leaves it to the type.
         unit: SI, "1" for a number without dimension.
@@ -76,6 +82,8 @@ class SceneParameter:
                 changed = _replaced(changed, index, value)
         if is_element:
             holder.fields[field] = changed
+        elif isinstance(holder, dict):
+            holder[field] = changed
         else:
             setattr(holder, field, changed)
 
@@ -95,8 +103,8 @@ def parameters_named(checked: ValidatedScene, names: Sequence[str]) -> tuple[Sce
 
     Args:
         checked: the scene.
-        names: ``TABLE.NAME.FIELD`` or ``simulation.FIELD``; a component follows after a further
-            dot: x, y, z, for Euler parameters e0 to e3, or its index in the list, from 1.
+        names: ``TABLE.NAME.FIELD``, ``simulation.FIELD``, ``parameters.NAME``; a component follows
+            after a further dot: x, y, z, for Euler parameters e0 to e3, or its index, from 1.
 
     Raises:
         SceneError: unknown names, with the nearest; a parameter that is named twice.
@@ -121,7 +129,7 @@ def parameters_named(checked: ValidatedScene, names: Sequence[str]) -> tuple[Sce
 def all_parameters(checked: ValidatedScene) -> Iterator[SceneParameter]:
     """Every parameter of a scene, those that it leaves to its types as well."""
     for table in TABLES:
-        for owner in ("",) if table == "simulation" else getattr(checked.scene, table):
+        for owner in ("",) if table in FLAT else getattr(checked.scene, table):
             for field in _fields(checked, (table, owner) if owner else (table,)):
                 yield from field.parameters()
 
@@ -130,8 +138,8 @@ def names_under(checked: ValidatedScene, begin: str = "") -> list[str]:
     """Names that extend a beginning by one part; those that are no parameter end in a dot."""
     *head, _ = begin.split(".")
     table = head[0] if head else ""
-    owners = getattr(checked.scene, table) if table in TABLES and table != "simulation" else ()
-    depth = 1 if table == "simulation" else 2
+    owners = getattr(checked.scene, table) if table in TABLES and table not in FLAT else ()
+    depth = 1 if table in FLAT else 2
     if not head:
         names = [f"{t}." for t in TABLES if t == "simulation" or getattr(checked.scene, t)]
     elif len(head) == 1 and owners:
@@ -217,7 +225,7 @@ def _resolve(checked: ValidatedScene, name: Any) -> SceneParameter | Mistake:
     if table not in TABLES:
         return _no_table(checked, name, table, rest)
     path: tuple[str, ...] = (table,)
-    if table != "simulation":
+    if table not in FLAT:
         owners = getattr(checked.scene, table)
         if not rest:
             return Mistake("vary", name, f"this is a table; {FORM}")
@@ -253,6 +261,10 @@ def _fields(checked: ValidatedScene, path: tuple[str, ...]) -> Iterator[_Field]:
         instance = next(instance for instance in instances if instance.name == path[1])
         yield from _element_fields(holder, path, instance)
         return
+    if isinstance(holder, dict):
+        for name, value in holder.items():
+            yield _Field((*path, name), value, "SI")
+        return
     for name in attrs.fields_dict(type(holder)):
         value = getattr(holder, name)
         is_given = value is not None
@@ -285,7 +297,8 @@ def _is_numeric(value: Any) -> bool:
 
 def _holder(scene: Scene, path: tuple[str, ...]) -> Any:
     """The object of a scene that has the field at the end of a path."""
-    return scene.simulation if path[0] == "simulation" else getattr(scene, path[0])[path[1]]
+    holder = getattr(scene, path[0])
+    return holder if path[0] in FLAT else holder[path[1]]
 
 
 def _replaced(value: Any, index: tuple[int, ...], number: float) -> Any:
@@ -297,7 +310,7 @@ def _replaced(value: Any, index: tuple[int, ...], number: float) -> Any:
 
 def _no_table(checked: ValidatedScene, name: str, table: str, rest: list[str]) -> Mistake:
     """The mistake of a name without a table, with the name that was probably meant."""
-    homes = [t for t in TABLES if t != "simulation" and table in getattr(checked.scene, t)]
+    homes = [t for t in TABLES if t not in FLAT and table in getattr(checked.scene, t)]
     near = ""
     if homes:
         near = f"{homes[0]}.{name}"

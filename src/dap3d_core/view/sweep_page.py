@@ -230,7 +230,7 @@ class _PointPages:
             page = None
             result, self.faults[values] = self._runs.result(values)
             if result is not None and len(result.t):
-                scene = parse(result.scene_text)
+                scene = parse(result.scene_text).resolved()
                 scene.path = self._runs.scene.path
                 names = self._quantities or _outputs_of(result, point)
                 page = page_data(result, scene, names, self._fps, share=MOST_POINTS)

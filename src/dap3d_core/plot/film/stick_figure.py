@@ -159,7 +159,7 @@ def sticks_of(result: Result, model: str | os.PathLike[str] | None = None) -> St
 def _scene(scene_text: str) -> Scene:
     """The scene, whatever is wrong in it; an empty one where a result has none that can be read."""
     try:
-        return parse(scene_text)
+        return parse(scene_text).resolved()
     except SceneError:
         return Scene()
 

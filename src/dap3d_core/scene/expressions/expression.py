@@ -7,6 +7,7 @@ syntax only numbers, names, arithmetic, comparisons and calls of ``WORDS`` are a
 """
 
 import ast
+import keyword
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -202,6 +203,15 @@ def read_expression(value: Any) -> Expression | Fault:
         return parse_expression(value)
     except ExpressionError as error:
         return error.fault
+
+
+def fault_of_word(name: str) -> str:
+    """The reason why expressions could not name something by this name; "" where they can."""
+    if not name.isidentifier() or keyword.iskeyword(name):
+        return "it is a word of letters, digits and _, which begins with a letter"
+    if name in WORDS or name in CONSTANTS:
+        return "expressions have a function or a constant of this name"
+    return ""
 
 
 def _apply(word: str, *arguments: Any) -> Any:

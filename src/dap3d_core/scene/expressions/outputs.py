@@ -1,11 +1,10 @@
 """Check of [outputs]: names, expressions, and the order in which they are evaluated."""
 
-import keyword
 from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
-from dap3d_core.scene.expressions.expression import CONSTANTS, WORDS, Expression, read_expression
+from dap3d_core.scene.expressions.expression import Expression, fault_of_word, read_expression
 from dap3d_core.scene.scene import Scene, fault_of_name
 from dap3d_core.scene.validate.coerce_values import Fault
 from dap3d_core.scene.validate.mistake_collector import Collector
@@ -43,12 +42,8 @@ def outputs_of(outputs: Mapping[str, Any]) -> dict[str, Expression]:
 
 def _fault_of_name(scene: Scene, name: Any) -> str:
     """The reason why something cannot name an output; "" where it can."""
-    if fault := fault_of_name(name):
+    if fault := fault_of_name(name) or fault_of_word(name):
         return fault
-    if not name.isidentifier() or keyword.iskeyword(name):
-        return "it is a word of letters, digits and _, which begins with a letter"
-    if name in WORDS or name in CONSTANTS:
-        return "expressions have a function or a constant of this name"
     table = next((table for table in OWNERS if name in getattr(scene, table)), None)
     return f"there is one of this name in {table} already" if table else ""
 

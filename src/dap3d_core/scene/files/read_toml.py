@@ -105,8 +105,9 @@ def scene_of(data: dict[str, Any]) -> Scene:
         named = getattr(scene, table)
         for name, content in _table(mistakes, (table,), data.get(table, {})).items():
             named[name] = _entry(mistakes, (table, name), content, class_)
-    outputs = _table(mistakes, ("outputs",), data.get("outputs", {}))
-    scene.outputs = {name: plain(value) for name, value in outputs.items()}
+    for table in ("parameters", "outputs"):
+        content = _table(mistakes, (table,), data.get(table, {}))
+        setattr(scene, table, {name: plain(value) for name, value in content.items()})
     scene.animation = _animation(mistakes, data.get("animation", {}))
     settings = data.get("simulation", {})
     scene.simulation = Simulation(

@@ -41,6 +41,8 @@ def _number_fault(value: Any) -> float | Fault:
     should = "should be a number"
     if type(value) is str:
         written = value.strip().replace(",", ".")
+        if written.startswith("="):
+            return Fault(should, "an expression needs [parameters], and is in no [simulation]")
         is_number = len(written) <= LONGEST_NUMBER and _NUMBER.fullmatch(written)
         return Fault(f"{should}, not text", f"write {written} without quotes" if is_number else "")
     if type(value) is bool:

@@ -34,6 +34,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     from dap3d_core.scene.validate.settings import check_header, check_settings, notes_of
     from dap3d_core.scene.validate.types import Types
 
+    scene = scene.resolved()
     report = Collector(scene)
     _check_names(report)
     bodies = read_bodies(report)
@@ -44,14 +45,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     forces = read_elements(report, geometry, "forces", types.of("forces"))
     report_twins(report, "joints", joints)
     report_twins(report, "forces", forces)
-    if scene.shapes:
-        from dap3d_core.scene.validate.shapes import read_shapes
-
-        read_shapes(report, bodies.body_index)
-    if scene.outputs:
-        from dap3d_core.scene.expressions.outputs import read_outputs
-
-        read_outputs(report)
+    _check_shapes_and_outputs(report, bodies)
     check_header(report)
     check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
     report.raise_mistakes()
@@ -84,6 +78,18 @@ def _check_names(report: Collector) -> None:
             if fault := fault_of_name(name):
                 key = (table, str(name))
                 report.add(key, name, f"not a name for one of the {table}: {fault}")
+
+
+def _check_shapes_and_outputs(report: Collector, bodies: "Bodies") -> None:
+    """Check what has no effect on the motion."""
+    if report.scene.shapes:
+        from dap3d_core.scene.validate.shapes import read_shapes
+
+        read_shapes(report, bodies.body_index)
+    if report.scene.outputs:
+        from dap3d_core.scene.expressions.outputs import read_outputs
+
+        read_outputs(report)
 
 
 def _note_loose_bodies(report: Collector, bodies: "Bodies", elements: list[Instance]) -> None:

@@ -47,7 +47,7 @@ class ValidatedScene:
     """A scene without mistakes, as arrays and instances.
 
     Attributes:
-        scene: the scene as described.
+        scene: the scene as described, with numbers for expressions of its parameters.
         registry: the source of its types (with those of the model's own file, where needed).
         body_names: n names without ground, in file order.
         body_index: name -> index; ground 0, bodies 1 to n.

@@ -26,7 +26,7 @@ GROUND = "#9aa3ad"
 def scene_of(result: Result, model: str | os.PathLike[str] | None = None) -> Scene:
     """The scene of a result; its folder is that of the model, where one is named."""
     try:
-        scene = parse(result.scene_text)
+        scene = parse(result.scene_text).resolved()
     except SceneError:  # a result made by a script, without the text of a scene
         scene = Scene()
     if model is not None:
