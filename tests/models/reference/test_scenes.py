@@ -9,6 +9,8 @@ import pytest
 from check_expected import ALL, folder_of, reference
 from rigid import rotation
 
+import dap3d_core as dap
+
 SYSTEMS = [name for name in ALL if name not in ("bodies2", "ball1")]
 SLOTS = {
     **dict.fromkeys(("P_i", "P_j"), "points"),
@@ -23,8 +25,8 @@ AXES = {axis: row.tolist() for axis, row in zip("xyz", np.eye(3), strict=True)}
 
 
 def load(model):
-    with (folder_of(model) / "scene.toml").open("rb") as file:
-        return tomllib.load(file)
+    """The tables of a scene, with numbers in place of expressions of its parameters."""
+    return tomllib.loads(dap.load(folder_of(model)).resolved().to_toml())
 
 
 def offered(scene):

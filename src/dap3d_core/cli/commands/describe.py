@@ -1,4 +1,4 @@
-"""``dap3d describe``: a type of joint, force or function, its fields and its equations."""
+"""``dap3d describe``: a type, its fields and its equations; a model, its parts and quantities."""
 
 import inspect
 import textwrap
@@ -18,21 +18,28 @@ if TYPE_CHECKING:
 
 
 @command(
-    "Explain a type: equations, fields, an example.",
-    click.argument("keyword"),
+    "Explain a type or a model: equations, fields, quantities.",
+    click.argument("keyword", metavar="KEYWORD | MODEL"),
     click.option("--names", is_flag=True, help="Also list the names that its kernels may use."),
     click.option("--source", is_flag=True, help="Also show its kernels, written or derived."),
+    options.ALLOW_CODE,
     options.JSON,
 )
-def describe(keyword: str, *, names: bool, source: bool, as_json: bool) -> int:
+def describe(keyword: str, *, names: bool, source: bool, allow_code: bool, as_json: bool) -> int:
     """Explain the type with a KEYWORD: equations, fields, units, defaults, an example.
 
-    A keyword may belong to a joint, a force and a function; all of them are shown.
+    A keyword may belong to a joint, a force and a function; all of them are shown. Of a MODEL, what
+    its results have: bodies, coordinates of its joints, outputs; and its parameters.
     """
     import dap3d_core as dap
+    from dap3d_core.cli.commands.describe_model import is_model, model_data, show_model
     from dap3d_core.cli.console.console import print_json, stdout
 
     registry = dap.load_registry()
+    if not _is_type(registry, keyword) and is_model(keyword):
+        model = model_data(keyword, allow_code=allow_code)
+        print_json({"model": model}) if as_json else show_model(stdout(), model)
+        return DONE
     types = [type_data(registry, kind, keyword) for kind in _kinds(registry, keyword)]
     if as_json:
         print_json({"types": types})
@@ -45,6 +52,12 @@ def describe(keyword: str, *, names: bool, source: bool, as_json: bool) -> int:
         if source:
             _show_source(console, data)
     return DONE
+
+
+def _is_type(registry: "Registry", keyword: str) -> bool:
+    from dap3d_core.interface.hooks import GROUPS
+
+    return any(keyword in registry.keywords(kind) for kind in GROUPS)
 
 
 def _kinds(registry: "Registry", keyword: str) -> list[str]:

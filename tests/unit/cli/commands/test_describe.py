@@ -145,3 +145,36 @@ def test_the_motion_of_a_joint_is_described():
     ]
     (weight,) = json.loads(described("weight", "--json"))["types"]
     assert "motions" not in weight
+
+
+def test_a_model_is_described_by_what_its_results_have(tmp_path):
+    """Coordinates of joints with their aliases, outputs with units, parameters with values."""
+    scene = dap.load("bicycle")
+    scene.add_parameter("m", "= 2 * 40")
+    scene.bodies["frame"].mass = "= m + 5"
+    scene.add_output("steer", "-steering.angle")
+    scene.add_output("base", "front_hub.r - rear_hub.r")
+    path = str(scene.save(tmp_path))
+    model = json.loads(described(path, "--json"))["model"]
+    joints = {joint["name"]: joint for joint in model["joints"]}
+    assert joints["steering"]["coordinates"] == [
+        {"name": "steering.q1", "alias": "angle", "unit": "rad"}
+    ]
+    assert joints["rear_contact"]["coordinates"] == []
+    assert "velocity level" in joints["rear_contact"]["reason"]
+    assert model["parameters"] == [{"name": "m", "value": 80.0, "given": "= 2 * 40"}]
+    assert model["outputs"] == [
+        {"name": "steer", "expression": "-steering.angle", "unit": "rad", "components": []},
+        {"name": "base", "expression": "front_hub.r - rear_hub.r", "unit": "m",
+         "components": ["x", "y", "z"]},
+    ]  # fmt: skip
+    text = described(path, width=200)
+    assert "steering.angle [rad]" in text
+    assert "-steering.angle" in text
+    assert "= 2 * 40" in text
+
+
+def test_a_type_goes_before_a_model_of_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rev").mkdir()
+    assert "types" in json.loads(described("rev", "--json"))
