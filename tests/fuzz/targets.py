@@ -8,6 +8,7 @@ from hypothesis.strategies import SearchStrategy
 
 from fuzz.acceptable import check_any_scene, check_good_scene
 from fuzz.damage import damaged_scenes
+from fuzz.expressions import check_expression, expressions
 from fuzz.matlab import check_model, damaged_models
 from fuzz.numbers import changes, check_change
 from fuzz.programs import check_program, sources
@@ -68,6 +69,7 @@ TARGETS = {
         Target("results", damaged_results(), check_result, ".nc"),
         Target("numbers", changes(), check_change, ".json"),
         Target("quantities", quantity_names(), check_quantity, ".txt"),
+        Target("expressions", expressions(), check_expression, ".txt"),
         Target("commands", command_lines(), check_command, ".json"),
         Target("programs", sources(), check_program, ".py"),
     )

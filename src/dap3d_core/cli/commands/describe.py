@@ -38,7 +38,10 @@ def describe(keyword: str, *, names: bool, source: bool, allow_code: bool, as_js
     registry = dap.load_registry()
     if not _is_type(registry, keyword) and is_model(keyword):
         model = model_data(keyword, allow_code=allow_code)
-        print_json({"model": model}) if as_json else show_model(stdout(), model)
+        if as_json:
+            print_json({"model": model})
+        else:
+            show_model(stdout(), model)
         return DONE
     types = [type_data(registry, kind, keyword) for kind in _kinds(registry, keyword)]
     if as_json:

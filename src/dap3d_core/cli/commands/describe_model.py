@@ -1,6 +1,6 @@
 """The part of ``dap3d describe`` that explains a model: what its results will have."""
 
-from pathlib import Path
+import os
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -13,7 +13,7 @@ def is_model(word: str) -> bool:
     """True for the name of a shipped model, a file or a folder."""
     from dap3d_core.scene import shipped_models
 
-    return word in shipped_models() or Path(word).exists()
+    return word in shipped_models() or os.path.exists(word)  # no error for impossible paths
 
 
 def model_data(model: str, *, allow_code: bool) -> dict[str, Any]:

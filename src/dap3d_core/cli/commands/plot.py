@@ -60,7 +60,7 @@ def plot(
     POINT.r .v .a                       of a point
     JOINT.force .moment .lambda         reactions on body i
     JOINT.j.force                       on the body of slot j
-    JOINT.force_body .moment_body       in body axes; .moment_at_point about its own
+    JOINT.force_body .moment_body       in body axes; .moment_at_point: its own point
     JOINT.angle .length .q1 .q1_dot     its coordinates, rates; .angle_rate .length_rate
     FORCE.length .tension .energy       of a spring
     energy.kinetic .potential .total    and work, t, [outputs] of the scene

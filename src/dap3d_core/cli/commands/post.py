@@ -49,7 +49,7 @@ def post(
 
     r, p, rd, w, wp, rdd, wd, wpd of the bodies, rP, rPd, rPdd of the points (animation points
     last), Lam, energies, residuals, the reaction of every joint on each of its bodies in global and
-    in body axes and, with --jacobian, Jac.
+    in body axes, coordinates of joints, outputs of the scene and, with --jacobian, Jac.
 
     A .csv file has the time and a column for each component with its unit, such as "crank.r.x [m]".
     A .nc file has the arrays with named dimensions and units.
