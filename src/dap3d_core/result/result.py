@@ -441,10 +441,10 @@ class Result:
         save(self.summary, self.record, self.arrays, path, force)
 
     def to_xarray(self) -> "xarray.Dataset":
-        """All arrays with named dimensions and units, as an xarray.Dataset."""
-        from dap3d_core.result.quantities.xarray_dataset import dataset_of
+        """All arrays and outputs with named dimensions and units, as an xarray.Dataset."""
+        from dap3d_core.result.quantities.xarray_dataset import add_outputs, dataset_of
 
-        return dataset_of(self)
+        return add_outputs(dataset_of(self), self)
 
 
 def _received(summary: ModelSummary, arrays: tuple[Any, ...], record: RunMetadata) -> Result:

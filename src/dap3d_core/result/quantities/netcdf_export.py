@@ -14,7 +14,7 @@ from dap3d_core.result.file.schema import about, attributes, write_attributes
 from dap3d_core.result.post.reactions import DENSE_ROWS, rows_at
 from dap3d_core.result.quantities.catalogue import ACTIONS
 from dap3d_core.result.quantities.lookup import find, joint_coordinates
-from dap3d_core.result.quantities.xarray_dataset import dataset_of
+from dap3d_core.result.quantities.xarray_dataset import add_outputs, dataset_of
 
 if TYPE_CHECKING:
     import xarray
@@ -32,6 +32,7 @@ def dataset_to_write(result: "Result", reactions: bool = True) -> "xarray.Datase
     if reactions and result.summary.joint_names:
         dataset = dataset.merge(reactions_of(result), combine_attrs="override")
         dataset = dataset.merge(coordinates_of(result), combine_attrs="override")
+    dataset = add_outputs(dataset, result)
     return dataset.drop_dims([name for name, count in dataset.sizes.items() if not count])
 
 

@@ -66,7 +66,8 @@ def note_of_undefined(output: Quantity, operands: Iterable[Quantity], t: Floats)
 
 def _is_nan(quantity: Quantity) -> Any:
     """(nt,) True where a component is NaN."""
-    return np.isnan(quantity.values.reshape(len(quantity.values), -1)).any(axis=1)
+    is_nan = np.isnan(quantity.values)
+    return is_nan.any(axis=1) if is_nan.ndim > 1 else is_nan
 
 
 def _components(operands: Mapping[str, Quantity], values: Any) -> tuple[str, ...]:

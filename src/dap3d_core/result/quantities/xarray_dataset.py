@@ -12,6 +12,9 @@ from dap3d_core.result.quantities.lookup import available_outputs
 if TYPE_CHECKING:
     import xarray
 
+#: Variables and dimensions that a Jacobian adds to a file (netcdf_export.py).
+JACOBIAN = ("Jac", "Jac_row", "Jac_column", "Jac_value", "entry", "velocity")
+
 
 def dataset_of(result: QuantitySource) -> "xarray.Dataset":
     """A result as an xarray.Dataset.
@@ -19,8 +22,7 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
     Returns:
         Dimensions time, body, point, axis, euler, state, velocity, row, joint; coordinates t (s)
         as ``time``, and names; each variable with ``units`` and ``long_name``; the attributes of
-        the file. Jacobian and reactions are left out: they need the model. Outputs of the scene
-        have their names, with ``_output`` behind those that an array has already.
+        the file. Jacobian and reactions are left out: they need the model.
     """
     import xarray
 
@@ -59,11 +61,20 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
         "time": ("time", arrays.t, about("s", "time")),
         "row_joint": ("row", joint_of_row, about("1", "joint of the constraint row")),
     }
+    return xarray.Dataset(variables, coordinates, attributes(summary, result.record))
+
+
+def add_outputs(dataset: "xarray.Dataset", result: QuantitySource) -> "xarray.Dataset":
+    """A data set with the outputs of the scene that can be computed.
+
+    They have their names, with ``_output`` behind those that an array or a dimension has already.
+    """
+    taken = {*dataset.variables, *dataset.dims, *JACOBIAN}
+    variables: dict[str, Any] = {}
     for output in available_outputs(result):
-        name = f"{output.name}_output" if output.name in {*variables, *coordinates} else output.name
-        dimension = {AXES: ("axis",), EULER: ("euler",), (): ()}.get(
-            output.components, (f"{output.name}_row",)
-        )
+        name = f"{output.name}_output" if output.name in taken else output.name
+        columns = {(): (), AXES: ("axis",), EULER: ("euler",)}
+        dimension = columns.get(output.components, (f"{output.name}_row",))
         text = f"output {output.name} = {result.outputs[output.name].text}"
         variables[name] = (("time", *dimension), output.values, about(output.unit, text))
-    return xarray.Dataset(variables, coordinates, attributes(summary, result.record))
+    return dataset.assign(variables)

@@ -11,6 +11,8 @@ from dap3d_core.scene.validate.mistake_collector import Collector
 
 #: Tables whose parts have quantities: an output has another name.
 OWNERS = ("bodies", "points", "joints", "forces")
+#: Names of dimensions and variables of every data set.
+DIMENSIONS = ("time", "point", "axis", "euler", "status", "note")
 #: Outputs that name outputs that name outputs ...: longest chain.
 LONGEST_CHAIN = 50
 
@@ -44,6 +46,8 @@ def _fault_of_name(scene: Scene, name: Any) -> str:
     """The reason why something cannot name an output; "" where it can."""
     if fault := fault_of_name(name) or fault_of_word(name):
         return fault
+    if name in DIMENSIONS:
+        return "data sets have a dimension or a variable of this name"
     table = next((table for table in OWNERS if name in getattr(scene, table)), None)
     return f"there is one of this name in {table} already" if table else ""
 

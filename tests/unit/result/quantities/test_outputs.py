@@ -9,9 +9,10 @@ from support.process import run
 from support.results import ARM, MASS, RATE, circling
 
 import dap3d_core as dap
-from dap3d_core.result import ResultError, UnknownNameError, find, names_of
+from dap3d_core.result import Result, ResultError, UnknownNameError, find, names_of
 from dap3d_core.result.open import open_result
 from dap3d_core.result.quantities.csv_table import columns_of, selected, write_csv
+from dap3d_core.result.quantities.netcdf_export import dataset_to_write
 
 OUTPUTS = {
     "angle": "atan2(arm.y, arm.x)",
@@ -107,11 +108,24 @@ def test_tables_and_data_sets_hold_outputs(result, tmp_path):
 
 
 def test_an_output_named_like_an_array_does_not_hide_it():
-    result, _, _ = circling(outputs={"r": "bob.r.x", "mass": "1"})
-    dataset = result.to_xarray()
+    names = ("r", "mass", "joint_q", "state", "Jac", "reaction_force")
+    result, _, _ = circling(outputs=dict.fromkeys(names, "bob.r.x"))
+    dataset = dataset_to_write(result)
     np.testing.assert_array_equal(dataset["r"], result.r)
     np.testing.assert_array_equal(dataset["r_output"], result.quantity("r").values)
     assert dataset["mass"].dims == ("body",)
+    assert dataset["reaction_force"].dims == ("time", "reaction", "axis")
+    assert {f"{name}_output" for name in names} <= {*dataset.variables}
+    assert "reaction_force" in result.to_xarray()  # which has no array of this name
+
+
+def test_outputs_of_a_result_without_instants():
+    whole, _, _ = circling(outputs={"late": "1 / t", "arm": "bob.r - Q.r"})
+    arrays = whole.arrays.part(slice(0, 0))
+    result = Result(whole.summary, arrays, whole.record, lambda: whole._origin)
+    assert result.quantity("late").values.shape == (0,)
+    assert result.quantity("arm").values.shape == (0, 3)
+    assert result.coordinates("J1").q.shape == (0, 3)
 
 
 def test_a_file_gives_the_same_and_reactions_only_with_a_model(result, tmp_path):

@@ -47,6 +47,7 @@ def mistake_of(tmp_path, outputs):
         ("gravity = 't'", "one of this name in forces already"),
         ("work = 't'", "every result has a quantity of this name"),
         ("energy = 't'", "every result has a quantity of this name"),
+        ("time = 't'", "a dimension or a variable of this name"),
         ("sin = 't'", "a function or a constant of this name"),
         ("pi = 't'", "a function or a constant of this name"),
         ("'two words' = 't'", "a word of letters, digits and _"),
