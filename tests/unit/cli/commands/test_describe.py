@@ -150,6 +150,7 @@ def test_the_motion_of_a_joint_is_described():
 def test_a_model_is_described_by_what_its_results_have(tmp_path):
     """Coordinates of joints with their aliases, outputs with units, parameters with values."""
     scene = dap.load("bicycle")
+    scene.parameters, scene.outputs = scene.resolved().parameters, {}
     scene.add_parameter("m", "= 2 * 40")
     scene.bodies["frame"].mass = "= m + 5"
     scene.add_output("steer", "-steering.angle")
@@ -162,7 +163,8 @@ def test_a_model_is_described_by_what_its_results_have(tmp_path):
     ]
     assert joints["rear_contact"]["coordinates"] == []
     assert "velocity level" in joints["rear_contact"]["reason"]
-    assert model["parameters"] == [{"name": "m", "value": 80.0, "given": "= 2 * 40"}]
+    assert model["parameters"][-1] == {"name": "m", "value": 80.0, "given": "= 2 * 40"}
+    assert model["parameters"][0] == {"name": "v", "value": 4.6, "given": 4.6}
     assert model["outputs"] == [
         {"name": "steer", "expression": "-steering.angle", "unit": "rad", "components": []},
         {"name": "base", "expression": "front_hub.r - rear_hub.r", "unit": "m",
