@@ -18,6 +18,7 @@ COUNTS = {
     "results": (5, 25),
     "numbers": (5, 50),
     "quantities": (20, 150),
+    "expressions": (30, 500),
     "commands": (5, 25),
     "programs": (6, 60),
 }
