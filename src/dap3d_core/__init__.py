@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     )
     from dap3d_core.simulation import compile_scene as compile
     from dap3d_core.simulation import open_result as open
+    from dap3d_core.simulation.analyses.equilibrium import Equilibrium, equilibrium
     from dap3d_core.simulation.linearization.linearization import Linearization, linearize
     from dap3d_core.simulation.analyses.inverse import inverse
     from dap3d_core.simulation.analyses.kinematics import kinematics
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "AssemblyError": ("simulation", "AssemblyError"),
+    "Equilibrium": ("simulation.analyses.equilibrium", "Equilibrium"),
     "Event": ("simulation", "Event"),
     "Fit": ("study.fit.fit_result", "Fit"),
     "Linearization": ("simulation.linearization.linearization", "Linearization"),
@@ -55,6 +57,7 @@ _HOMES = {
     "SimulationError": ("simulation", "SimulationError"),
     "animate": ("plot", "animate"),
     "compile": ("simulation", "compile_scene"),
+    "equilibrium": ("simulation.analyses.equilibrium", "equilibrium"),
     "export": ("exchange", "export"),
     "fit": ("study.fit.fit", "fit"),
     "import_matlab": ("matlab", "import_matlab"),
@@ -77,6 +80,7 @@ _HOMES = {
 
 __all__ = [
     "AssemblyError",
+    "Equilibrium",
     "Event",
     "Fit",
     "Linearization",
@@ -89,6 +93,7 @@ __all__ = [
     "SimulationError",
     "animate",
     "compile",
+    "equilibrium",
     "export",
     "fit",
     "import_matlab",

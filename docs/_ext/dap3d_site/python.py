@@ -18,6 +18,7 @@ SECTIONS = {
     ),
     "Analyses": (("linearize", "Linearization"), ()),
     "Analyses": (("kinematics", "inverse"), ()),
+    "Analyses": (("equilibrium", "Equilibrium", "linearize", "Linearization"), ()),
     "Results": (
         ("Result", "open", "plot", "view", "animate", "export"),
         ("result.Reaction", "result.Energy", "result.Entry", "result.ErrorEstimate",

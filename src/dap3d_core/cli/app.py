@@ -26,6 +26,7 @@ COMMANDS = {
         "check-plugin", "info", "post", "export", "plot", "animate", "view", "report",
         "import-matlab",
         "run", "resume", "rerun", "kinematics", "inverse", "sweep", "check", "models", "plugins",
+        "run", "resume", "rerun", "sweep", "equilibrium", "modes", "check", "models", "plugins",
         "describe", "new-plugin", "check-plugin", "info", "post", "export", "plot", "animate",
         "view", "report", "import-matlab",
     )

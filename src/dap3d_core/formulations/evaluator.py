@@ -16,6 +16,7 @@ from dap3d_core.assembly.arrays import (
     OMEGA,
     POSITION,
     SINGULAR,
+    TURNED,
     UNSETTLED,
     VALUE,
     WRENCH,
@@ -110,13 +111,34 @@ class Evaluator:
         self._weigh_rows()
 
     @IGNORE_FLOAT_ERRORS
-    def start(self, t: float, u: ArrayLike) -> None:
-        """Make ready for a run from a state u (13 n,): whole turns are counted from here."""
+    def start(self, t: float, u: ArrayLike, angles: Floats | None = None) -> None:
+        """Make ready for a run from a state u (13 n,): whole turns are counted from here.
+
+        angles: (angles,) those that the state's are within half a turn of, rad, in the order of
+            reports; zeros by default.
+        """
         for places in self.turn_places():
             self.system.par[places] = 0.0
-        self.place(t, u)
+        if angles is not None:
+            self._set_angles(angles)
+        self.count_turns(t, u)
+        self.system.settings[[UNSETTLED, SINGULAR, DOUBTFUL]] = 0.0
+
+    def _set_angles(self, angles: Floats) -> None:
         s = self.system
-        s.settings[[UNSETTLED, SINGULAR, DOUBTFUL]] = 0.0
+        for q, (kind, group) in enumerate(self.loop_groups):
+            if kind == "angle":
+                p0, layout = int(s.groups[q, 1]), group.type_info.layout
+                columns = self.model.angles_of(group, np.arange(group.count)).T
+                for offset, column in zip(layout.angles.values(), columns, strict=True):
+                    end = p0 + layout.par_width * group.count
+                    s.par[p0 + offset : end : layout.par_width] = angles[column]
+
+    @IGNORE_FLOAT_ERRORS
+    def count_turns(self, t: float, u: ArrayLike) -> None:
+        """Count whole turns of angles up to a state u (13 n,), less than half a turn further."""
+        s = self.system
+        self.place(t, u)
         self._call(ANGLE, t, s.force, s.force, s.force)
 
     @IGNORE_FLOAT_ERRORS
@@ -126,6 +148,14 @@ class Evaluator:
             self.place(t, u)
             s = self.system
             self._call(ANGLE, t, s.force, s.force, s.force)
+
+    @IGNORE_FLOAT_ERRORS
+    def counted_angles(self, t: float, u: ArrayLike) -> Floats:
+        """(angles,) angles whose turns are counted, rad, at a state u (13 n,)."""
+        angles, scratch = np.zeros(self.model.angle_count), np.zeros(1)
+        self.place(t, u)
+        self._call(TURNED, t, angles, scratch, scratch)
+        return angles
 
     def turn_places(self) -> Iterator[slice]:
         """Slices of ``par`` that count the turns of angles."""

@@ -102,6 +102,20 @@ class Model:
         found: Integers = first + width * np.asarray(places)[:, None] + np.arange(width)
         return found
 
+    @cached_property
+    def angle_names(self) -> tuple[str, ...]:
+        """Names of the angles whose turns are counted, in the order in which they are reported."""
+        return tuple(
+            f"{kind}s.{names[int(k)]}.{angle}"
+            for kind, names, groups in (
+                ("force", self.force_names, self.forces),
+                ("joint", self.joint_names, self.joints),
+            )
+            for group in groups
+            for k in group.members
+            for angle in group.type_info.layout.angles
+        )
+
     @property
     def acting(self) -> tuple[Group, ...]:
         """Groups of what may have angles, in the order of the loops (formulations/arrays.py)."""

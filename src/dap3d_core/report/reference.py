@@ -220,7 +220,7 @@ def _is_as_read(scene: Scene, path: Path) -> bool:
     except SceneError:
         return False
     settings = scene.simulation
-    names = ("correct", "project", "hold", "correct_metric")
+    names = ("correct", "project", "hold", "correct_metric", "start")
     same = all(getattr(read.simulation, name) == getattr(settings, name) for name in names)
     read.simulation = settings
     return same and read.to_toml() == scene.to_toml()

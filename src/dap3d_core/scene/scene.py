@@ -23,6 +23,8 @@ GROUND = "ground"
 #: Values of ``method`` and ``integrator``: "auto", and names of formulations and integrators.
 METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq")
 INTEGRATORS = ("auto", "dopri5", "dop853", "adams", "rk4", "radau")
+#: Values of ``start``: the initial conditions of the scene, or where it comes to rest.
+STARTS = ("scene", "equilibrium")
 #: Integrators without an error estimate, which need a step; integrators that take none.
 FIXED_STEP, NO_STEP = ("rk4",), ("adams",)
 
@@ -121,6 +123,7 @@ class Simulation:
         correct: initial positions and velocities are corrected to satisfy the constraints.
         project: states are projected on the constraints during the run.
         hold: names of bodies that the correction does not move.
+        start: "scene" or "equilibrium", where a run starts.
         correct_metric: "unit" or "mass", the norm of the least correction.
         alpha, Omega, mu: parameters of the penalty formulation.
     """
@@ -136,6 +139,7 @@ class Simulation:
     project: Any = attrs.field(default=True, converter=plain)
     hold: Any = attrs.field(default=(), converter=plain)
     correct_metric: Any = attrs.field(default="unit", converter=plain)
+    start: Any = attrs.field(default="scene", converter=plain)
     alpha: Any = attrs.field(default=1e7, converter=plain)
     Omega: Any = attrs.field(default=10.0, converter=plain)
     mu: Any = attrs.field(default=1.0, converter=plain)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, NoReturn, Self
+from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import attrs
 import numpy as np
@@ -42,6 +42,9 @@ from dap3d_core.simulation.initial.undefined_directions import undefined_directi
 from dap3d_core.simulation.initial_state import InitialState, find_start
 from dap3d_core.simulation.output.type_sources import types_of
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
+
+if TYPE_CHECKING:
+    from dap3d_core.simulation.initial.start_state import StartState
 
 Floats = NDArray[np.float64]
 Announce = Callable[[str], None]
@@ -252,16 +255,23 @@ class CompiledModel:
             self._breakpoints[t_end] = Breakpoints(self.checked, self.evaluator, t_end)
         return self._breakpoints[t_end]
 
-    def start(self, correct: bool, hold: tuple[str, ...], metric: str = "unit") -> InitialState:
-        """Initial state of a run, computed once; arguments and errors as of ``find_start``.
+    def start(
+        self,
+        correct: bool,
+        hold: tuple[str, ...],
+        metric: str = "unit",
+        state: "StartState | None" = None,
+    ) -> InitialState:
+        """Initial state of a run; that of the scene is computed once. As ``find_start``.
 
         Raises:
             SceneError: a direction that an element needs is undefined there.
+            AssemblyError: as ``find_start``.
         """
         key = correct, tuple(hold), metric
-        if key not in self._starts:
+        if state is not None or key not in self._starts:
             try:
-                start = find_start(self.evaluator, *key)
+                start = find_start(self.evaluator, *key, state)
             except AssemblyError as error:
                 raise self._located(error) from error
             mistakes = undefined_directions(
@@ -269,6 +279,8 @@ class CompiledModel:
             )
             if mistakes:
                 raise SceneError(mistakes)
+            if state is not None:
+                return start
             self._starts[key] = start
         return self._starts[key]
 

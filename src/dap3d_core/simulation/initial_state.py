@@ -1,5 +1,7 @@
 """The state that a run starts from: corrected if requested, with the rank of its constraints."""
 
+from typing import TYPE_CHECKING
+
 import attrs
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,9 @@ from dap3d_core.simulation.initial.assemble import (
     violation,
 )
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
+
+if TYPE_CHECKING:
+    from dap3d_core.simulation.initial.start_state import StartState
 
 Floats = NDArray[np.float64]
 
@@ -28,15 +33,26 @@ class InitialState:
         u: (13 n,) the state.
         initial: what its correction did; None where it was not corrected.
         redundancy: of the constraints there.
+        state: what was taken in place of the scene's initial conditions; None for these.
     """
 
     u: Floats
     initial: Initial | None
     redundancy: Redundancy
+    state: "StartState | None" = None
+
+    @property
+    def angles(self) -> Floats | None:
+        """(angles,) angles from which turns are counted on; None where they begin at zero."""
+        return None if self.state is None else self.state.angles
 
 
 def find_start(
-    evaluator: Evaluator, correct: bool, hold: tuple[str, ...], metric: str = "unit"
+    evaluator: Evaluator,
+    correct: bool,
+    hold: tuple[str, ...],
+    metric: str = "unit",
+    state: "StartState | None" = None,
 ) -> InitialState:
     """The start of a run.
 
@@ -45,26 +61,29 @@ def find_start(
         correct: whether its initial conditions are brought onto the constraints.
         hold: names of bodies that the correction of positions leaves where they are.
         metric: "unit" or "mass", of ``correct_initial``.
+        state: to start from in place of the scene's initial conditions.
 
     Raises:
         AssemblyError: the positions cannot be assembled, or a row is not finite.
     """
-    u, initial = evaluator.model.u0, None
-    if correct:
+    u, initial = evaluator.model.u0 if state is None else state.u, None
+    if correct or (state is not None and state.is_interpolated):
         held = [evaluator.model.body_names.index(name) + 1 for name in hold]
         initial = correct_initial(evaluator, u, hold=held, metric=metric)
         u = initial.u
-    return InitialState(u, initial, redundancy_of(evaluator, u))
+    return InitialState(u, initial, redundancy_of(evaluator, u), state)
 
 
 def start_notes(start: InitialState, evaluator: Evaluator, scene: Scene) -> list[str]:
     """Text on the correction of a start, or that it is off the constraints."""
+    notes = list(start.state.notes) if start.state is not None else []
     if start.initial is not None:
-        return correction_notes(start.initial, evaluator, scene)
+        return notes + correction_notes(start.initial, evaluator, scene)
     position, velocity = violation(evaluator, start.u)
     if max(position, velocity) <= OFF_CONSTRAINTS:
-        return []
+        return notes
     return [
+        *notes,
         f"the initial conditions violate the constraints (position {position:.2g}, "
-        f"velocity {velocity:.2g}) and were not corrected; switch correct on"
+        f"velocity {velocity:.2g}) and were not corrected; switch correct on",
     ]

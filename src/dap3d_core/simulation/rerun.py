@@ -17,6 +17,7 @@ from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.open_result import open_result, why_unmade
 from dap3d_core.simulation.output.monitor import RunProgress
 from dap3d_core.simulation.output.type_sources import changed_types
+from dap3d_core.simulation.run_state import GIVEN_START
 from dap3d_core.simulation.simulate import simulate
 
 #: Settings that a result holds and ``simulate`` takes.
@@ -121,7 +122,14 @@ def _settings(result: Result) -> dict[str, Any]:
             "the run cannot be made again: events of a script ended or changed it, which its "
             "result does not hold; run the script again"
         )
-    return {"integrator": result.integrator} | {n: result.settings[n] for n in SETTINGS}
+    start = result.settings.get("start", "scene")  # which older results lack
+    if start == GIVEN_START:
+        raise ResultError(
+            "the run cannot be made again: it started from a state that a script or --from gave, "
+            "which its result does not hold; start it from there again"
+        )
+    settings = {"integrator": result.integrator, "start": start}
+    return settings | {n: result.settings[n] for n in SETTINGS}
 
 
 def _compared(first: Result, again: Result) -> tuple[int, dict[str, float]]:

@@ -26,6 +26,7 @@ from dap3d_core.simulation.errors import CheckpointError
 from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.handover import begin_other
 from dap3d_core.simulation.initial.given_state import state_of
+from dap3d_core.simulation.initial.start_state import StartState
 from dap3d_core.simulation.open_result import why_unmade
 from dap3d_core.simulation.output.monitor import RunProgress
 from dap3d_core.simulation.output.type_sources import digests_of
@@ -145,7 +146,8 @@ class ResumedRun:
             run = Run(self.compiled, self._settings(),
                       Callbacks(announce=self._announce, progress=progress, watch=watch), events,
                       output=target, force=force or is_own, identity=header["run"],
-                      estimate_error=bool(header["estimate_error"]))  # fmt: skip
+                      estimate_error=bool(header["estimate_error"]),
+                      start=self._start_state())  # fmt: skip
             run.save_every(checkpoint, force=force or self._is_ours(target))
             try:
                 result = run.go(restore)
@@ -205,6 +207,24 @@ class ResumedRun:
         except SceneError as error:
             raise self._damaged(f"its settings make no sense: {error}") from error
         return settings
+
+    def _start_state(self) -> StartState | None:
+        """The state that the run was started from in place of its scene's; None without one."""
+        stored, model = self._found.arrays, self.compiled.model
+        if "start.u" not in stored:
+            return None
+        angles = stored.get("start.angles")
+        if (0 if angles is None else angles.size) != model.angle_count:
+            raise self._damaged("the turns of its start are of another model")
+        try:
+            u = state_of(stored["start.u"], model.body_names)
+        except ValueError as error:
+            raise self._damaged(f"its start: {error}") from error
+        if angles is not None and not np.isfinite(angles).all():
+            raise self._damaged("the turns of its start are not finite")
+        return StartState(
+            u, angles, is_interpolated=self._found.header.get("start_is_interpolated") is True
+        )
 
     def _restore(self, run: RunState) -> None:
         """Stand where the checkpoint was written."""

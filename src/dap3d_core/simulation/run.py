@@ -120,13 +120,20 @@ class Run(RunState):
     def _again(self, settings: Simulation, limits: StepLimits | None) -> Result:
         """The result of a second run with other settings and limits of its steps, in memory."""
         events = self.event_locator.events if self.event_locator else ()
-        return Run(self.compiled, settings, self.callbacks, events, limits=limits).go()
+        run = Run(self.compiled, settings, self.callbacks, events, limits=limits, start=self.start)
+        return run.go()
 
     def _start(self) -> InitialState:
         """The initial state, corrected where the settings say so; its rank must suit the method."""
         settings, scene = self.settings, self.compiled.scene
         metric = str(settings.correct_metric)
-        start = self.compiled.start(bool(settings.correct), settings.hold, metric)
+        how = bool(settings.correct), settings.hold, metric
+        state = self.start
+        if state is None and settings.start == "equilibrium":
+            from dap3d_core.simulation.analyses.rest import start_at_rest
+
+            state = start_at_rest(self.evaluator, self.compiled.start(*how).u)
+        start = self.compiled.start(*how, state)
         self.notes += start_notes(start, self.evaluator, scene)
         self.notes += self.compiled.breakpoints(self.t_end).notes(
             settings, settings.dt or self.t_end / 100.0
@@ -165,7 +172,7 @@ class Run(RunState):
     def _integration(self, start: InitialState) -> Integration:
         evaluator, settings, singular, u0 = self.evaluator, self.settings, self.singular, start.u
         store_reference_pivots(evaluator, 0.0, u0 if singular is None else singular.aside)
-        evaluator.start(0.0, u0)
+        evaluator.start(0.0, u0, start.angles)
         y0 = evaluator.integrated(u0)
         width = 1 + len(y0) + evaluator.report_size
         self.options = options = integration_options(evaluator, settings) | {

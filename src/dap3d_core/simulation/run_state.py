@@ -3,7 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -22,6 +22,11 @@ from dap3d_core.simulation.output.recorder import ResultRecorder
 from dap3d_core.simulation.output.termination import occurrences
 from dap3d_core.simulation.settings import report_times, settings_notes
 
+if TYPE_CHECKING:
+    from dap3d_core.simulation.initial.start_state import StartState
+
+#: The setting ``start`` in a result whose run was given another state.
+GIVEN_START = "given state"
 Progress = Callable[[float, float], None]
 
 
@@ -54,6 +59,7 @@ class RunState:
         is_whole: the run is between two chunks, its rows taken.
         estimate_error: a second run is to estimate the error of this one.
         limits: of the steps of such a second run.
+        start: a state in place of the scene's initial conditions; None for what the settings say.
         recorder, watcher: the rows reported so far; the events of a script.
         started, compile_time: clock at the start, compilation left out; seconds of compilation.
     """
@@ -70,12 +76,13 @@ class RunState:
         identity: str = "",
         estimate_error: bool = False,
         limits: StepLimits | None = None,
+        start: "StartState | None" = None,
     ) -> None:
         """Args:
             compiled, settings, callbacks, events: of the run.
             output, force: file of the result, and whether over an existing one.
             identity: of the run that this one continues.
-            estimate_error, limits: as the attributes.
+            estimate_error, limits, start: as the attributes.
 
         Raises:
             ResultError: the output cannot be written.
@@ -93,7 +100,7 @@ class RunState:
             ]
         self.started = self.compile_time = 0.0
         self.rank = 0
-        self.estimate_error, self.limits = estimate_error, limits
+        self.estimate_error, self.limits, self.start = estimate_error, limits, start
         self.is_whole = False
         self.integrations: list[Integration] = []
         self.crossed: list[float] = []
@@ -179,6 +186,7 @@ class RunState:
                 "rank": self.rank,
                 "conservative": self.compiled.is_conservative and not changes,
                 "correct_metric": str(self.settings.correct_metric),
+                "start": self.settings.start if self.start is None else GIVEN_START,
                 "method": self.compiled.requested_method,
             },
         )

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from dap3d_core.result import Result
 from dap3d_core.scene import Scene
@@ -11,6 +12,9 @@ from dap3d_core.simulation.output.monitor import RunProgress
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks, Progress
 from dap3d_core.simulation.settings import check_checkpoint, compiled_for, settings_of
+
+if TYPE_CHECKING:
+    from dap3d_core.simulation.initial.start_state import Start, StartState
 
 
 def simulate(
@@ -31,6 +35,7 @@ def simulate(
     output: str | os.PathLike[str] | None = None,
     force: bool = False,
     correct_metric: str | None = None,
+    start: "Start | None" = None,
     estimate_error: bool = False,
     checkpoint: float | None = None,
     events: Sequence[Event] = (),
@@ -46,29 +51,42 @@ def simulate(
         rtol, atol, step: tolerances of the step's error; a fixed step, s, without error control.
         correct, project: bring the start, and then every state, onto the constraints.
         correct_metric: "unit" or "mass": least correction in m and rad, or weighted by masses.
+        start: "scene", "equilibrium", a result (its end), (result, time) or an ``Equilibrium``.
         progress, watch: called between chunks of some 0.1 s, as progress(t, t_end) and with a
             ``RunProgress``. allow_code, announce: as of ``compile``. events: see ``Event``.
         output, force: file to write, and whether over an existing one. Rows of a run of more than
             a second are in ``OUTPUT.part`` meanwhile, readable also when the run is killed.
         estimate_error: estimate ``result.error`` by a second, finer run.
-        checkpoint: seconds between checkpoints in ``OUTPUT.checkpoint``, for ``resume``; inf: only
-            where an exception (Ctrl-C, one of ``progress``) ends the run. Needs ``output``.
-
-    An exception that ends the integration has what was computed as ``.result``.
+        checkpoint: seconds between checkpoints, for ``resume``; inf: one where the run is ended.
 
     Raises:
         SceneError, PluginError, ResultError: as ``compile``; unusable settings or output.
-        SimulationError (RedundantError, AssemblyError): the run stopped, or could not begin.
+        SimulationError (RedundantError, AssemblyError): the run stopped, or could not begin. What
+            ends it (Ctrl-C, say) has what was computed as ``.result``.
     """
     compiled = compiled_for(scene, method, allow_code, announce)
     settings = settings_of(compiled, t_end=t_end, dt=dt, method=method, integrator=integrator,
                          rtol=rtol, atol=atol, step=step, correct=correct, project=project,
-                         correct_metric=correct_metric)  # fmt: skip
+                         correct_metric=correct_metric, start=_word(start))  # fmt: skip
     check_checkpoint(checkpoint, output)
-    callbacks = Callbacks(announce=announce, progress=progress, watch=watch)
     with compiled.borrow_evaluator():
-        run = Run(compiled, settings, callbacks, events, output=output, force=force,
-                  estimate_error=estimate_error)  # fmt: skip
+        run = Run(compiled, settings, Callbacks(announce=announce, progress=progress, watch=watch),
+                  events, output=output, force=force, estimate_error=estimate_error,
+                  start=_given_state(start, compiled))  # fmt: skip
         if checkpoint is not None:
             run.save_every(checkpoint, force=force)
         return run.go()
+
+
+def _word(start: "Start | None") -> str | None:
+    """The setting ``start`` where that is given; None where a state is, or nothing."""
+    return start if isinstance(start, str) else None
+
+
+def _given_state(start: "Start | None", compiled: CompiledModel) -> "StartState | None":
+    """A state in place of the scene's; None where the settings say where a run starts."""
+    if start is None or isinstance(start, str):
+        return None
+    from dap3d_core.simulation.initial.start_state import start_state
+
+    return start_state(start, compiled.model, compiled.checked.registry)

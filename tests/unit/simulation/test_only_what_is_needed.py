@@ -89,6 +89,17 @@ def test_a_run_knows_nothing_of_studies_and_analyses():
     assert "dap3d_core.simulation.redundancy.freedoms" not in found
 
 
+def test_a_run_of_the_scene_as_given_knows_nothing_of_other_starts_and_analyses(tmp_path):
+    """``dap3d run`` imports neither the search for an equilibrium nor starts from results."""
+    found = imported(
+        "from dap3d_core.cli import main\n"
+        f"main(['run', 'bodies2', '--t-end', '0.04', '-q', '-o', {str(tmp_path / 'a.nc')!r}])\n"
+    )
+    assert "dap3d_core.simulation.run" in found
+    assert not any(name.startswith("dap3d_core.simulation.analyses") for name in found)
+    assert "dap3d_core.simulation.initial.start_state" not in found
+
+
 def test_a_grid_in_memory_needs_no_samples_no_cluster_and_no_packs_of_its_own():
     """What draws samples, fits, speaks to a cluster or draws pictures is left alone by a grid."""
     script = (

@@ -10,6 +10,8 @@ from dap3d_core.cli.framework import completion, options
 from dap3d_core.cli.framework.command import command
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from dap3d_core.cli.framework.execute import Announce, Watch
     from dap3d_core.result import Result
     from dap3d_core.scene import Scene
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
     click.argument("model", required=False, shell_complete=completion.models),
     options.output("Result file; MODEL.nc in the current folder by default."),
     *options.SETTING_OPTIONS.values(),
+    click.option("--from", "start_file", metavar="RESULT[@TIME]",
+                 help="Start from the state of a result, at its end or at a time in s; bodies are "
+                      "matched by their names."),
     click.option("--error", "estimate_error", is_flag=True,
                  help="Estimate the error of all positions and velocities by a second run at "
                       "tolerances ten times tighter, or half the step."),
@@ -37,6 +42,7 @@ def run(
     model: str | None,
     *,
     output: str | None,
+    start_file: str | None,
     strict: bool,
     force: bool,
     allow_code: bool,
@@ -60,8 +66,10 @@ def run(
         model, scene, force = _ask(ctx, given, output, force=force)
     else:
         scene = dap.load(model)
-    target = writable(named_after(model, output), force=force, sources=(scene.path,))
+    start, source = _start(ctx, start_file, given)
+    target = writable(named_after(model, output), force=force, sources=(scene.path, source))
     options.check_settings(scene, given)
+    given["start"] = start
     compiled: list[CompiledModel] = []
 
     def prepare(announce: "Announce") -> "CompiledModel":
@@ -80,10 +88,24 @@ def run(
                 **given,
             )
         except dap.SceneError as error:  # settings that only the integrator can check
-            raise options.in_options(error) from error
+            names = options.SETTINGS | ({"start": "--from"} if start_file else {})
+            raise options.in_options(error, names) from error
 
     outcome = execute(ctx, prepare, simulate, quiet=quiet)
     return report_run(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
+
+
+def _start(
+    ctx: click.Context, start_file: str | None, given: dict[str, Any]
+) -> tuple[Any, "Path | None"]:
+    """What the run starts from, as ``simulate`` takes it, and the result file that has it."""
+    if start_file is None:
+        return given["start"], None
+    if given["start"] is not None:
+        raise click.UsageError("--from and --start each say where the run starts: give one", ctx)
+    from dap3d_core.cli.framework.paths import open_state
+
+    return open_state(start_file)
 
 
 def _ask(

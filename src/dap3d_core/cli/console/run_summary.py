@@ -160,6 +160,8 @@ def _correction(outcome: RunOutcome) -> dict[str, Any] | None:
     result = outcome.result
     if not (result.settings.get("correct") and result.summary.row_count and len(result.t)):
         return None
+    if result.settings.get("start", "scene") != "scene":
+        return None
     first = result.arrays.part(slice(1)).u[0]
     return correction_data(result.summary.body_names, outcome.compiled.model.u0, first)
 

@@ -75,6 +75,9 @@ SETTING_OPTIONS = {
     "correct_metric": click.option(
         "--correct-metric", type=click.Choice(["unit", "mass"]), default=None,
         help="The smallest correction is that in m and rad, or weighted by masses."),
+    "start": click.option(
+        "--start", type=click.Choice(["scene", "equilibrium"]), default=None,
+        help="Start from the scene's initial conditions, or where they come to rest."),
     "project": click.option("--project/--no-project", default=None,
                             help="Project every step onto the constraints."),
 }  # fmt: skip

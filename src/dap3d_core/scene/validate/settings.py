@@ -12,6 +12,7 @@ from dap3d_core.scene.scene import (
     METHODS,
     NO_STEP,
     SCHEMA,
+    STARTS,
     Scene,
     Simulation,
 )
@@ -74,6 +75,7 @@ _READERS: dict[str, Callable[[Any], Any]] = {
     "step": _time,
     "correct": truth_of,
     "project": truth_of,
+    "start": lambda v: word_of(v, STARTS),
     "correct_metric": lambda v: word_of(v, CORRECT_METRICS),
     "alpha": _positive,
     "Omega": _positive,

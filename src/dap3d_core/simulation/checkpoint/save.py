@@ -135,6 +135,7 @@ def checkpoint_of(run: RunState) -> Checkpoint:
         "method": compiled.requested_method,
         "settings": attrs.asdict(run.settings),
         "estimate_error": run.estimate_error,
+        "start_is_interpolated": run.start is not None and run.start.is_interpolated,
         "notes": run.notes,
         "wall_time_s": time.perf_counter() - run.started,
         "compile_time_s": run.compile_time,
@@ -153,4 +154,8 @@ def arrays_of(run: RunState) -> dict[str, NDArray[Any]]:
         for k, integration in enumerate(run.integrations)
         for name, array in integration.all_arrays()
     }
+    if run.start is not None:
+        found["start.u"] = run.start.u
+        if run.start.angles is not None:
+            found["start.angles"] = run.start.angles
     return found | {f"system.{name}": getattr(run.evaluator.system, name) for name in CHECKPOINTED}

@@ -216,7 +216,7 @@ def least_change(
     With ``held`` (bodies, maybe none) on the position rows alone, and zero on these bodies.
     """
     if evaluator.model.row_count > DENSE_ROWS:
-        return _sparse_least_change(evaluator, residual, t, held, metric)
+        return sparse_least_change(evaluator, residual, t, held, metric)
     length = evaluator.model.length
     if length != 1.0:  # rows of very different units
         gradient = scaled_rows(rows, length)[1]
@@ -257,8 +257,12 @@ def unscaled(change: Floats, scale: Floats, frame: Floats) -> Floats:
     return np.hstack([scale * change[:, :3], np.einsum("brc,bc->br", frame, change[:, 3:])])
 
 
-def _sparse_least_change(
-    evaluator: Evaluator, residual: Floats, t: float, held: Integers | None, metric: str
+def sparse_least_change(
+    evaluator: Evaluator,
+    residual: Floats,
+    t: float,
+    held: Integers | None = None,
+    metric: str = "unit",
 ) -> Floats:
     """The same by the block factorisation, for many rows; metric "unit" sets every mass to one."""
     from dap3d_core.formulations.common.constraints import correct, linearise

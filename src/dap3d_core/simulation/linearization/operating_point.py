@@ -97,9 +97,7 @@ def operating_point(
     notes: list[str] = []
     with compiled.borrow_evaluator() as evaluator:
         u, turns = _state(compiled, at, t, notes)
-        evaluator.start(t, u)
-        if turns is not None:
-            _set_turns(evaluator, turns)
+        evaluator.start(t, u, turns)
         _check(evaluator, t, u)
         redundancy = redundancy_of(evaluator, u, t)
         if redundancy.singular is not None:
@@ -153,22 +151,8 @@ def _state(
         r, p = np.asarray(at.r, dtype=float), np.asarray(at.p, dtype=float)
         if r.shape != (model.body_count, 3) or p.shape != (model.body_count, 4):
             raise SimulationError("the equilibrium is of another scene: its bodies differ")
-        return join(r, p, np.zeros_like(r), np.zeros_like(r)), None
+        return join(r, p, np.zeros_like(r), np.zeros_like(r)), getattr(at, "angles", None)
     return state_of(at, model.body_names), None
-
-
-def _set_turns(evaluator: Evaluator, angles: Floats) -> None:
-    """Let angles count on from those of a result."""
-    model = evaluator.model
-    for q, (kind, group) in enumerate(evaluator.loop_groups):
-        if kind != "angle":
-            continue
-        p0, layout = int(evaluator.system.groups[q, 1]), group.type_info.layout
-        places = model.angles_of(group, np.arange(group.count))
-        for column, offset in enumerate(layout.angles.values()):
-            first = p0 + offset
-            last = first + layout.par_width * group.count
-            evaluator.system.par[first : last : layout.par_width] = angles[places[:, column]]
 
 
 def _check(evaluator: Evaluator, t: float, u: Floats) -> None:

@@ -21,12 +21,15 @@ from dap3d_core.study.study import Batch, PointStatus
 
 
 def batch_runner(reduction: Reduction, times: Floats, pack: int) -> "BatchRunner | None":
-    """A batch runner for this thread; None where the scene as given cannot start.
+    """A batch runner for this thread; None where the scene as given cannot start, or is to start at
+    rest.
 
-    Each point is then run individually, which reports what is wrong there.
+    Each point is then run individually, which searches its equilibrium, or reports what is wrong.
     """
     compiled = reduction.compiled
     settings = compiled.scene.simulation
+    if settings.start != "scene":
+        return None
     try:
         start = compiled.start(bool(settings.correct), settings.hold, str(settings.correct_metric))
     except (AssemblyError, SceneError):

@@ -46,6 +46,7 @@ def sweep(
     correct: bool | None = None,
     project: bool | None = None,
     correct_metric: str | None = None,
+    start: str | None = None,
     allow_code: bool = False,
     threads: int | None = None,
     client: Any = None,
@@ -65,11 +66,10 @@ def sweep(
         vary: name of a parameter (``bodies.crank.mass``) -> how it varies: a list or an array of
             numbers, "1:5:9" (from:to:count), "1:100:5:log"; for samples "1:5", "3~0.1" (normal).
         outputs: quantities ("crank.r.z:max"), functions of a ``Result``, or label -> one of these.
-        sample, design, seed: number of samples (without: a grid), "lhs", "random", "sobol" or
-            "halton", seed.
+        sample, design, seed: number (without: a grid), "lhs", "random", "sobol" or "halton", seed.
         t_end, dt, method, integrator, rtol, atol, step: as of ``simulate``; likewise correct,
-            project, correct_metric, allow_code; announce as of ``compile``.
-        threads, client: points at once, or a ``distributed.Client`` whose workers run them.
+            project, correct_metric, start (a word), allow_code; announce as of ``compile``.
+        threads, client: points at once; a ``distributed.Client`` whose workers run them.
         pack: points that take their steps together, for speed: equal within the tolerances only.
         output, force, resume: file to write; overwrite it; continue with ``OUTPUT.part``.
         progress: called as progress(done, total).
@@ -78,11 +78,11 @@ def sweep(
         the outputs over the parameters, or ``point``; NaN, ``status``, ``note`` where one failed.
 
     Raises:
-        SceneError, PluginError, SimulationError, ResultError: nothing can be run or stored. What
+        SceneError, PluginError, SimulationError, ResultError: nothing can be run or stored; what
             ends it later (Ctrl-C, say) has the points so far as ``.result``.
     """
     settings = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol,
-                    step=step, correct=correct, project=project,
+                    step=step, start=start, correct=correct, project=project,
                     correct_metric=correct_metric)  # fmt: skip
     study, plan = _read(scene, vary, outputs, (sample, design, seed), settings, allow_code, pack)
     runner = _Runner(threads, client, progress, announce, force=force, resume=resume)

@@ -1,0 +1,157 @@
+"""``dap3d equilibrium``: where a model comes to rest."""
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dap3d_core.cli.framework import options
+from dap3d_core.cli.framework.command import command
+from dap3d_core.cli.process.exit_codes import DONE
+
+if TYPE_CHECKING:
+    from dap3d_core.cli.console.console import Terminal
+    from dap3d_core.simulation.analyses.equilibrium import Equilibrium
+
+#: Bodies and joints that are printed.
+MOST_ROWS = 12
+#: Smaller numbers, as parts of the largest of a table, are printed as zero.
+ROUNDING = 1e-12
+
+
+@command(
+    "Find where a model comes to rest.",
+    options.MODEL,
+    options.output("Scene file to write, whose bodies start at rest there."),
+    click.option("--from", "start_file", metavar="RESULT[@TIME]",
+                 help="Search from the state of a result, at its end or at a time in s."),
+    options.FORCE, options.ALLOW_CODE, options.JSON, options.QUIET,
+)  # fmt: skip
+def equilibrium(
+    model: str,
+    *,
+    output: str | None,
+    start_file: str | None,
+    force: bool,
+    allow_code: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Find the static equilibrium in which a MODEL comes to rest, and say whether it is stable.
+
+    \b
+    dap3d equilibrium pen2
+    dap3d equilibrium car.toml -o rest.toml
+    dap3d run car.toml --start equilibrium
+
+    Of several equilibria it is the one that the start of the scene leads to. A start that is an
+    equilibrium is reported as it is, stable or not. Forces are those at rest and at t = 0, drivers
+    have their initial values, friction is left out. Exit code 1 where nothing holds a freedom: the
+    message says which bodies give way, and where to.
+    """
+    import dap3d_core as dap
+    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.progress import PreparationProgress
+    from dap3d_core.cli.framework.paths import open_state, writable, write_text
+    from dap3d_core.scene import SceneError
+
+    scene = dap.load(model)
+    target = None if output is None else writable(Path(output), force=force, sources=(scene.path,))
+    start = None if start_file is None else open_state(start_file)[0]
+    with PreparationProgress(quiet=quiet or as_json) as progress:
+        try:
+            found = dap.equilibrium(
+                scene, start=start, allow_code=allow_code, announce=progress.announce
+            )
+        except SceneError as error:
+            raise options.in_options(error, {"start": "--from"}) from error
+    rest = None
+    if target is not None:
+        rest = found.scene()
+        write_text(target, rest.to_toml())
+    data = _data(found, model, rest.notes if rest is not None else [])
+    if as_json:
+        print_json(data | {"file": None if target is None else str(target)})
+    elif not quiet:
+        _show(stdout(), data, target)
+    return DONE
+
+
+def _data(found: "Equilibrium", model: str, more_notes: list[str]) -> dict[str, Any]:
+    """An equilibrium as data."""
+    compiled, rank = found.compiled, found.redundancy.rank
+    names = compiled.model.body_names
+    partly = {r.joint: r.describe() for r in found.redundancy.reactions()}
+    stiffness = [float(x.real) for x in found.stiffness]
+    return {
+        "model": model,
+        "scene": compiled.scene.name,
+        "rows": rank.rows,
+        "redundant": rank.redundant,
+        "dof": rank.dof,
+        "stable": found.stable,
+        "indifferent": found.indifferent,
+        "stiffness": stiffness,
+        "residual": found.residual,
+        "violation": found.violation,
+        "steps": found.steps,
+        "bodies": {name: {"r": found.r[k], "p": found.p[k]} for k, name in enumerate(names)},
+        "reactions": {
+            joint: {
+                "unique": joint not in partly,
+                "about": partly.get(joint, "unique"),
+                "on": {
+                    slot: {"body": one.body, "force": one.force, "moment": one.moment}
+                    for slot, one in found.reaction(joint).items()
+                },
+            }
+            for joint in compiled.model.joint_names
+        },
+        "notes": [*found.notes, *more_notes],
+    }
+
+
+def _show(console: "Terminal", data: dict[str, Any], target: Path | None) -> None:
+    from dap3d_core.cli.console.console import count, scene_name
+    from dap3d_core.cli.console.run_summary import degrees_of_freedom
+
+    kind = "stable" if data["stable"] else "unstable"
+    console.title(f"{scene_name(data['scene'])}: {kind} equilibrium")
+    freedoms = degrees_of_freedom(data["dof"])
+    if data["indifferent"]:
+        freedoms += f", {data['indifferent']} indifferent"
+    console.facts([
+        ("freedoms", freedoms),
+        ("residual", f"{data['residual']:.1e} of the forces; joints closed to "
+                     f"{data['violation']:.1e}"),
+        ("found in", count(data["steps"], "step")),
+    ])  # fmt: skip
+    _show_vectors(console, "bodies", [(name, "r, m", b["r"]) for name, b in data["bodies"].items()])
+    _show_vectors(console, "reactions",
+                  [(name, f"on {one['body']}, N" + ("" if r["unique"] else " *"), one["force"])
+                   for name, r in data["reactions"].items()
+                   for one in list(r["on"].values())[:1]])  # fmt: skip
+    if data["redundant"]:
+        console.say("* not unique, or in parts: see the notes", indent=2)
+    console.section("notes", data["notes"])
+    if target is not None:
+        console.say(f"{target} written: the scene at rest. Next:", whole=True)
+        console.say(f"dap3d run {shlex.quote(str(target))}", "green", indent=2, whole=True)
+
+
+def _show_vectors(console: "Terminal", heading: str, rows: list[tuple[str, str, Any]]) -> None:
+    """Print vectors with their names; the first of many."""
+    import numpy as np
+
+    if not rows:
+        return
+    console.title(heading)
+    largest = max(float(np.max(np.abs(vector))) for *_, vector in rows)
+    cells = [
+        (name, what, *(f"{x:.6g}" if abs(x) > ROUNDING * largest else "0" for x in vector))
+        for name, what, vector in rows
+    ]
+    console.table(("", "", "x", "y", "z"), cells[:MOST_ROWS], right=(2, 3, 4))
+    if len(rows) > MOST_ROWS:
+        console.say(f"and {len(rows) - MOST_ROWS} more; --json prints all", indent=2)

@@ -1,0 +1,188 @@
+"""Public function ``equilibrium``: where a scene comes to rest."""
+
+import os
+from collections.abc import Callable, Mapping
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.model import build_model
+from dap3d_core.model.rotations import read_only
+from dap3d_core.model.state_layout import split
+from dap3d_core.result import INFORMATION
+from dap3d_core.result.errors import unknown
+from dap3d_core.result.post.reactions import Reaction, reactions
+from dap3d_core.scene import Scene, check
+from dap3d_core.simulation.analyses.rest import Rest, find_rest
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.initial.assemble import violation
+from dap3d_core.simulation.initial.start_state import NamedState, Start, start_state
+from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
+
+Floats = NDArray[np.float64]
+
+#: Constants that a type takes from the poses of the scene are the same to this part.
+SAME_CONSTANT = 1e-8
+
+
+class Equilibrium:
+    """A static equilibrium of n bodies with m constraint rows: forces and reactions balance.
+
+    Attributes:
+        compiled: the model.
+        u: (13 n,) the state: r, p, zero velocities.
+        r, p: (n, 3) positions, m; (n, 4) Euler parameters.
+        angles: (angles,) angles whose turns are counted, rad, in the order of the model.
+        Lam: (m,) Lagrange multipliers; those of least norm where they are not unique.
+        unbalanced: (n, 6) force, N, and moment about the mass centre, N m, left on each body.
+        residual: largest of these as a part of the largest force or moment on a body: rounding.
+        violation: largest |C| of the constraint rows.
+        stable: no freedom leads away from it; with ``indifferent`` freedoms, none of the others.
+        indifferent: number of freedoms that nothing drives or holds, at any small distance.
+        stiffness: (f,) eigenvalues of the stiffness of the f freedoms, N m, of displacements in
+            parts of a length of the scene and rotations in rad, ascending; complex without a
+            potential.
+        redundancy: of the constraints there.
+        steps: steps of the search.
+        notes: what was assumed, and what to know of it.
+    """
+
+    def __init__(self, compiled: CompiledModel, rest: Rest, notes: tuple[str, ...] = ()) -> None:
+        """Compose an equilibrium of a model and what was found."""
+        self.compiled, self._rest = compiled, rest
+        self.u, self.Lam = read_only(rest.u), read_only(rest.multipliers)
+        self.r, self.p, _, _ = split(self.u)
+        self.angles = read_only(rest.angles)
+        self.unbalanced = read_only(rest.unbalanced)
+        self.residual = rest.search.pose.residual
+        evaluator = compiled.evaluator
+        self.violation = violation(evaluator, rest.u)[0]
+        self.stable = rest.stability.stable
+        self.indifferent = len(rest.stability.indifferent)
+        self.stiffness = rest.stability.stiffness
+        self.redundancy: Redundancy = redundancy_of(evaluator, rest.u)
+        self.steps = rest.search.steps
+        self.notes = [*notes, *rest.notes]
+        if self.redundancy.rank.redundant:
+            self.notes.append(f"{self.redundancy.describe()}. Their reactions are not unique; "
+                              "those of least |lambda| are reported")  # fmt: skip
+
+    def __repr__(self) -> str:
+        kind = "stable" if self.stable else "unstable"
+        return f"<Equilibrium {self.compiled.scene.name!r}: {kind}, residual {self.residual:.2g}>"
+
+    @property
+    def state(self) -> NamedState:
+        """The state, for a run to start from."""
+        model = self.compiled.model
+        angles = dict(zip(model.angle_names, self.angles.tolist(), strict=True))
+        note = f"{INFORMATION}the start is an equilibrium"
+        return NamedState(str(self.compiled.scene.name) or "the equilibrium", model.body_names,
+                          self.u, angles, (note,))  # fmt: skip
+
+    def reaction(self, joint: str) -> Mapping[str, Reaction]:
+        """Reaction of a joint on each of its bodies, ground included: D^T lambda.
+
+        Args:
+            joint: name of the joint.
+
+        Returns:
+            By slot ("i", "j", "k") as of ``Result.reaction``, without its first dimension:
+            ``.force`` (3,) N, ``.moment`` (3,) N m about the body's mass centre, global axes.
+
+        Raises:
+            UnknownNameError: there is no such joint; names the nearest.
+        """
+        names = self.compiled.model.joint_names
+        if joint not in names:
+            raise unknown("joint", joint, names)
+        k = names.index(joint)
+        found = reactions(self.compiled.evaluator, np.zeros(1), self.u[None], self.Lam[None], [k],
+                          self.angles[None])[k]  # fmt: skip
+        return {
+            slot: attrs.evolve(r, force=r.force[0], moment=r.moment[0], p=r.p[0])
+            for slot, r in found.items()
+        }
+
+    def scene(self) -> Scene:
+        """A copy of the scene whose bodies start here, at rest; it can be saved.
+
+        Types that take a reference from the poses of the scene, such as the unloaded pose of a
+        bushing, take it from these, and angles whose turns are counted begin within half a
+        turn: ``scene.notes`` names such elements. ``simulate(scene, start=equilibrium)`` keeps
+        references and turns as they are.
+        """
+        scene = self.compiled.scene.copy()
+        for body, r, p in zip(scene.bodies.values(), self.r.tolist(), self.p.tolist(), strict=True):
+            body.r, body.p = tuple(r), tuple(p)
+            body.r_dot = body.w = (0.0, 0.0, 0.0)
+        scene.simulation.start = "scene"
+        changed = self._changed_references(scene)
+        if changed:
+            scene.notes.append(
+                "the reference that these take from the poses of the scene is another one at rest, "
+                f"and so may be their forces: {', '.join(changed)}"
+            )
+        wound = [name.rpartition(".")[0] for name, angle in self.state.angles.items()
+                 if abs(angle) > np.pi]  # fmt: skip
+        if wound:
+            scene.notes.append(
+                f"whole turns are no part of a scene, these begin without them: {', '.join(wound)}"
+            )
+        return scene
+
+    def _changed_references(self, scene: Scene) -> list[str]:
+        """Elements whose constants depend on the poses that the scene gives."""
+        checked = check(scene, self.compiled.checked.registry)
+        before, after = self.compiled.model, build_model(checked)
+        changed = []
+        for kind in ("joint", "force"):
+            names = getattr(before, f"{kind}_names")
+            groups = zip(getattr(before, f"{kind}s"), getattr(after, f"{kind}s"), strict=True)
+            for old, new in groups:
+                size = SAME_CONSTANT * (1.0 + np.abs(old.numbers))
+                differs = np.any(np.abs(old.numbers - new.numbers) > size, axis=1)
+                changed += [f"{kind}s.{names[int(k)]}" for k in old.members[differs]]
+        return changed
+
+
+def equilibrium(
+    scene: Scene | str | os.PathLike[str] | CompiledModel,
+    *,
+    start: Start | None = None,
+    allow_code: bool = False,
+    announce: Callable[[str], None] | None = None,
+) -> Equilibrium:
+    """Find the static equilibrium in which a scene comes to rest.
+
+    From its start the scene follows the forces as a motion without inertia would, and Newton's
+    method ends it: of several equilibria the one of the valley that the start lies in is found. A
+    start that is an equilibrium is returned, stable or not. Joints are closed to rounding;
+    redundant joints and singular poses are no obstacle. All forces are those at rest, at t = 0;
+    drivers have their initial values; friction is left out.
+
+    Args:
+        scene: a Scene, what ``load`` takes, or a compiled model.
+        start: a result (its end), a result and a time, or an equilibrium, to begin at in place of
+            the scene's initial conditions.
+        allow_code, announce: as of ``compile``.
+
+    Raises:
+        SceneError, PluginError: as ``compile``.
+        SimulationError: there is no equilibrium, because nothing holds a freedom, or none was
+            found; names what gives way. AssemblyError: the joints cannot be assembled.
+    """
+    compiled = scene
+    if not isinstance(compiled, CompiledModel):
+        compiled = CompiledModel(scene, allow_code=allow_code, announce=announce)  # type: ignore[arg-type]
+    settings = compiled.scene.simulation
+    first = compiled.start(
+        True,
+        settings.hold,
+        str(settings.correct_metric),
+        None if start is None else start_state(start, compiled.model, compiled.checked.registry),
+    )
+    with compiled.borrow_evaluator() as evaluator:
+        rest = find_rest(evaluator, first.u, first.angles)
+        return Equilibrium(compiled, rest, tuple(compiled.notes))

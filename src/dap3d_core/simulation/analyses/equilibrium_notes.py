@@ -1,0 +1,116 @@
+"""What there is to say about an equilibrium: stability, assumptions, why there is none."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.constraint_rows import ConstraintRows
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.interface.codegen.kernel_arguments import parameters
+from dap3d_core.model import Group, Model
+from dap3d_core.model.state_layout import velocities_of
+from dap3d_core.result import INFORMATION
+from dap3d_core.simulation.analyses.equilibrium_search import Outcome, Search
+from dap3d_core.simulation.analyses.motion_words import describe_motion
+from dap3d_core.simulation.analyses.stability import Stability
+
+Floats = NDArray[np.float64]
+
+#: Names that a note lists.
+MOST_NAMES = 6
+
+
+def findings(search: Search, stability: Stability, model: Model) -> Iterator[str]:
+    """Notes on the equilibrium itself."""
+    if not stability.stable:
+        moves = describe_motion(model, stability.escaping[0])
+        where = "the start is" if search.started_balanced else "it is"
+        yield (
+            f"{where} an unstable equilibrium: it leaves along a freedom of {moves}; "
+            "move a body off it to see where the scene comes to rest"
+        )
+    elif search.started_balanced:
+        yield f"{INFORMATION}the start is an equilibrium"
+    if search.left:
+        yield (
+            "an unstable equilibrium lay on the way and was left to one of two sides that are "
+            "alike; the pose on the other side may be another equilibrium"
+        )
+    count = len(stability.indifferent)
+    if count:
+        moves = describe_motion(model, stability.indifferent[0])
+        others = f" and {count - 1} more" if count > 1 else ""
+        yield (
+            f"{INFORMATION}indifferent: nothing drives or holds a freedom of {moves}{others}; "
+            "it is where the start has it"
+        )
+    if not stability.is_symmetric:
+        yield (
+            f"{INFORMATION}forces without a potential act: stability is that of small motions, "
+            "with masses and dampers"
+        )
+
+
+def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> Iterator[str]:
+    """Notes on what statics leaves out.
+
+    Args:
+        evaluator: the model.
+        start: (13 n,) the state that the search began at.
+        rows: of the constraints at the equilibrium.
+    """
+    model = evaluator.model
+    if np.any(velocities_of(start)):
+        yield f"{INFORMATION}velocities of the start are left out"
+    timed = [name for group in model.forces for name in _of_time(group, model)]
+    if timed:
+        yield f"{INFORMATION}forces that depend on time are those at t = 0: {_listed(timed)}"
+    driven = [model.row_owner(int(k)) for k in np.flatnonzero(rows.nu)]
+    if driven:
+        yield (
+            f"{INFORMATION}drivers are at rest at their initial values: "
+            f"{_listed(list(dict.fromkeys(driven)))}"
+        )
+    if model.friction:
+        yield (
+            "friction is left out: with it the scene can rest at other poses near this one as well"
+        )
+    rolling = [model.row_owner(int(k))
+               for k in np.flatnonzero(~model.position_row & (rows.nu == 0.0))]  # fmt: skip
+    if rolling:
+        yield (
+            f"{INFORMATION}rolling joints constrain displacements as they do velocities: "
+            f"{_listed(list(dict.fromkeys(rolling)))}; where they come to rest depends on the way"
+        )
+
+
+def _of_time(group: Group, model: Model) -> Iterator[str]:
+    """Names of the forces of a group that depend on time."""
+    always = "t" in parameters(group.type_info.kernels["wrench"])
+    functions = len(group.type_info.layout.functions)
+    for member, columns in zip(group.members, group.functions[:, :functions], strict=True):
+        if always or np.any(columns > 0):
+            yield model.force_names[int(member)]
+
+
+def failure(search: Search, model: Model) -> str:
+    """Why a search found no equilibrium."""
+    pose = search.pose
+    if search.outcome is Outcome.RUNAWAY:
+        return (
+            f"there is no equilibrium: nothing stops {describe_motion(model, search.motion)} "
+            "without end (free fall, or a drive without a load?); add a joint or a spring that "
+            "holds it"
+        )
+    moves = describe_motion(model, pose.free @ pose.unbalanced)
+    return (
+        f"no equilibrium was found in {search.steps} steps: {pose.residual:.2g} of the forces is "
+        f"not balanced along a freedom of {moves}. Start nearer to the equilibrium; the forces may "
+        "jump there, or have none"
+    )
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more

@@ -1,0 +1,92 @@
+"""Equilibria of a compiled model: search, stability, reactions, what is to be said of them."""
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.result import INFORMATION
+from dap3d_core.simulation.analyses.equilibrium_notes import assumptions, failure, findings
+from dap3d_core.simulation.analyses.equilibrium_search import (
+    Outcome,
+    Search,
+    search_equilibrium,
+)
+from dap3d_core.simulation.analyses.stability import Stability, stability_of
+from dap3d_core.simulation.analyses.statics import Statics
+from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.initial.start_state import StartState
+
+Floats = NDArray[np.float64]
+
+#: Singular values of the Jacobian below this part are left out of the least multipliers.
+RCOND = 1e-10
+
+
+@attrs.frozen(eq=False)
+class Rest:
+    """An equilibrium as it was found.
+
+    Attributes:
+        u: (13 n,) the state, without velocities.
+        angles: (angles,) angles whose turns are counted, rad.
+        multipliers: (rows,) lambda, those of least norm where they are not unique.
+        unbalanced: (n, 6) force, N, and moment about the mass centre, N m, of forces and reactions
+            together on each body.
+        search, stability: how it was found, whether it is stable.
+        notes: what to know of it.
+    """
+
+    u: Floats
+    angles: Floats
+    multipliers: Floats
+    unbalanced: Floats
+    search: Search
+    stability: Stability
+    notes: tuple[str, ...]
+
+
+def find_rest(evaluator: Evaluator, u: Floats, angles: Floats | None = None) -> Rest:
+    """The equilibrium that a model comes to from a state u (13 n,) on the constraints.
+
+    Args:
+        evaluator: the model.
+        u: the state; its velocities are left out.
+        angles: (angles,) from which turns are counted on; None where they begin at zero.
+
+    Raises:
+        SimulationError: there is none, or none was found; names what gives way.
+    """
+    evaluator.start(0.0, u, angles)
+    search = search_equilibrium(evaluator, u)
+    if search.outcome is not Outcome.BALANCED:
+        raise SimulationError(failure(search, evaluator.model))
+    statics, pose = Statics(evaluator), search.pose
+    stability = stability_of(statics, pose)
+    rows = evaluator.rows(0.0, pose.u)
+    force, D = evaluator.applied_forces(0.0, pose.u).ravel(), rows.dense()
+    multipliers = np.zeros(len(D))
+    if len(D):
+        multipliers = -np.linalg.lstsq(D.T * statics.scale[:, None], statics.scale * force,
+                                       rcond=RCOND)[0]  # fmt: skip
+    return Rest(
+        pose.u,
+        evaluator.counted_angles(0.0, pose.u),
+        multipliers,
+        (force + D.T @ multipliers).reshape(-1, 6),
+        search,
+        stability,
+        (*findings(search, stability, evaluator.model), *assumptions(evaluator, u, rows)),
+    )
+
+
+def start_at_rest(evaluator: Evaluator, u: Floats) -> StartState:
+    """The equilibrium that a model comes to from a state u (13 n,), for a run to start there.
+
+    Raises:
+        SimulationError: there is none.
+    """
+    rest = find_rest(evaluator, u)
+    steps = rest.search.steps
+    note = f"{INFORMATION}the run starts at an equilibrium, found in {steps} steps"
+    return StartState(rest.u, rest.angles, (note, *rest.notes))

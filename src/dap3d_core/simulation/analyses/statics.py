@@ -1,0 +1,220 @@
+"""Statics of a constrained system at one pose: balance of forces and stiffness of its freedoms.
+
+With forces F, rows D and multipliers lambda the residual of the balance is F + D^T lambda, force
+and moment about the mass centre of each body. Unknowns are displacements x = (dr / L, dtheta) of
+all bodies, with L a length of the scene; the null space Z of the scaled rows, by singular values,
+are the freedoms, so that redundant rows and singular poses need nothing of their own. Rows of the
+velocity level alone constrain displacements as they do velocities. All is at rest, at one time.
+"""
+
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.assembly.arrays import WRENCH
+from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.runtime.function_lists import call_loop
+from dap3d_core.linear.rank.rank import tolerance_of
+from dap3d_core.model.state_layout import join, split
+from dap3d_core.simulation.analyses.tangent import TangentMatrices, tangent_matrices
+from dap3d_core.simulation.errors import AssemblyError
+from dap3d_core.simulation.initial.assemble import (
+    displaced,
+    finite_rows,
+    fit_of,
+    sparse_least_change,
+    weights_of,
+)
+
+Floats = NDArray[np.float64]
+
+#: Displacements of bodies, rad or parts of the scene, that show how large forces are.
+NEARBY = 1e-3
+#: Passes that close the position rows.
+MOST_PASSES = 25
+
+
+@attrs.frozen(eq=False)
+class StaticPose:
+    """Balance of forces at a pose. Scaled: displacements (dr / L, dtheta), forces in N m.
+
+    Attributes:
+        u: (13 n,) the state, without velocities.
+        force: (6 n,) scaled applied forces.
+        rows: the constraint rows, scaled.
+        gradient: (rows,) from a scaled row to a row of the model.
+        free: (6 n, f) Z, an orthonormal basis of the freedoms.
+        multipliers: (rows,) of the scaled rows, of least norm.
+        unbalanced: (f,) Z^T F, what no reaction carries.
+        size: of forces and reactions, N m: what rounding errors are a part of.
+    """
+
+    u: Floats
+    force: Floats
+    rows: ConstraintRows
+    gradient: Floats
+    free: Floats
+    multipliers: Floats
+    unbalanced: Floats
+    size: float
+
+    @property
+    def residual(self) -> float:
+        """Length of what is unbalanced, as a part of ``size``."""
+        length = float(np.linalg.norm(self.unbalanced))
+        return length / self.size if length else 0.0
+
+
+class Statics:
+    """Evaluates the balance of forces of a model at rest.
+
+    Attributes:
+        evaluator: the evaluator. Angles count their turns from the pose that it saw last.
+        t: the time, s.
+        length: L, m.
+    """
+
+    def __init__(self, evaluator: Evaluator, t: float = 0.0) -> None:
+        """Args: the evaluator, the time."""
+        self.evaluator, self.t = evaluator, t
+        self._size_nearby = 0.0
+        self.length = evaluator.model.part_size
+        n = evaluator.model.body_count
+        self.scale = np.tile(np.repeat([self.length, 1.0], 3), n)
+
+    def at(self, u: Floats) -> StaticPose:
+        """Balance of forces at a state (13 n,).
+
+        Raises:
+            AssemblyError: a row is not finite there.
+        """
+        if not self._size_nearby:
+            self._size_nearby = self._largest_nearby(u)
+        rows, gradient = scaled_rows(finite_rows(self.evaluator, self.t, u), self.length)
+        force = self.force(u)
+        D = rows.dense()
+        left, values, right = np.linalg.svd(D, full_matrices=True)
+        rank = self._rank(values, D.shape)
+        free = right[rank:].T
+        multipliers = -left[:, :rank] @ ((right[:rank] @ force) / values[:rank])
+        reaction = np.bincount(
+            rows.column, np.abs(rows.value * multipliers[rows.row]), minlength=len(force)
+        )
+        size = float(np.max(self._force_parts(u) + reaction, initial=self._size_nearby))
+        return StaticPose(u, force, rows, gradient, free, multipliers, free.T @ force, size)
+
+    def force(self, u: Floats) -> Floats:
+        """(6 n,) scaled applied forces at a state."""
+        applied: Floats = self.scale * self.evaluator.applied_forces(self.t, u).ravel()
+        return applied
+
+    def _force_parts(self, u: Floats) -> Floats:
+        """(6 n,) scaled forces added up by their magnitudes, type by type."""
+        s, loops = self.evaluator.system, self.evaluator.loops
+        self.evaluator.place(self.t, u)
+        parts = np.zeros(len(self.scale) + 6)
+        for q in range(s.kinds[WRENCH], s.kinds[WRENCH + 1]):
+            of_type = np.zeros_like(parts)
+            call_loop(loops, q, self.t, s, s.groups[q], of_type, of_type, of_type)
+            parts += np.abs(of_type)
+        sizes: Floats = self.scale * parts[6:]
+        return sizes
+
+    def _largest_nearby(self, u: Floats) -> float:
+        """The largest force near a pose, N m: at the pose springs may hold each other."""
+        rng = np.random.default_rng(1)
+        largest = 0.0
+        for _ in range(3):
+            x = np.asarray(NEARBY * rng.standard_normal(len(self.scale)), dtype=np.float64)
+            largest = max(largest, float(np.max(self._force_parts(self.moved(u, x)))))
+        return largest
+
+    def balance(self, u: Floats, pose: StaticPose) -> Floats:
+        """(6 n,) scaled F + D^T lambda at a state, with the multipliers of a pose."""
+        rows = self.evaluator.rows(self.t, u)
+        share = rows.value * (pose.multipliers / pose.gradient)[rows.row]
+        reaction = np.bincount(rows.column, share, minlength=len(self.scale))
+        return self.force(u) + self.scale * reaction
+
+    def stiffness(self, pose: StaticPose) -> Floats:
+        """(f, f) Z^T K Z with K = -d(F + D^T lambda)/dx, the stiffness of reactions included.
+
+        Raises:
+            SimulationError: forces or rows have no derivative there.
+        """
+        return self.reduced(self.tangent(pose).stiffness, pose)
+
+    def tangent(self, pose: StaticPose) -> TangentMatrices:
+        """The equations of motion and their derivatives at a pose, at rest.
+
+        Raises:
+            SimulationError: forces or rows have no derivative there.
+        """
+        multipliers = pose.multipliers / pose.gradient
+        rest = np.zeros(len(self.scale))
+        return tangent_matrices(self.evaluator, self.t, pose.u, multipliers, rest)
+
+    def reduced(self, matrix: Any, pose: StaticPose) -> Floats:
+        """(f, f) Z^T A Z of a matrix A (6 n, 6 n), scaled."""
+        basis = self.scale[:, None] * pose.free
+        result: Floats = basis.T @ (matrix @ basis)
+        return result
+
+    def moved(self, u: Floats, x: Floats) -> Floats:
+        """The state after a displacement x (6 n,), not closed."""
+        change = (self.scale * x).reshape(-1, 6)
+        return displaced(u, change, len(change))
+
+    def closed(self, u: Floats) -> Floats:
+        """The state with its position rows closed to rounding, by least displacements.
+
+        Raises:
+            AssemblyError: they do not close.
+        """
+        if not self.evaluator.model.row_count:
+            return u
+        weight, before = weights_of(self.evaluator), np.inf
+        limit = fit_of(self.evaluator.model) * self.evaluator.model.length
+        best = u
+        for _ in range(MOST_PASSES):
+            C = finite_rows(self.evaluator, self.t, u).C
+            worst = float(np.max(np.abs(weight * C), initial=0.0))
+            if not worst < before:
+                break
+            best, before = u, worst
+            if worst == 0.0:
+                break
+            change = sparse_least_change(self.evaluator, C, self.t).reshape(-1, 6)
+            u = displaced(u, -change, len(change))
+        if not before <= limit:
+            raise AssemblyError(f"the positions do not close: |C| = {before:.2g}")
+        return best
+
+    def _rank(self, values: Floats, shape: tuple[int, int]) -> int:
+        if not len(values):
+            return 0
+        blur = fit_of(self.evaluator.model)
+        return int(np.sum(values > max(tolerance_of(*shape) * values[0], blur)))
+
+
+def at_rest(u: Floats) -> Floats:
+    """The state without velocities."""
+    r, p, v, w = split(u)
+    return join(r, p, np.zeros_like(v), np.zeros_like(w))
+
+
+def displacement(u: Floats, other: Floats) -> tuple[Floats, Floats]:
+    """Displacements, m, and rotation vectors, rad, global axes, (n, 3), from a state to another."""
+    r, p, _, _ = split(u)
+    s, q, _, _ = split(other)
+    e0, e = p[:, :1], p[:, 1:]
+    f0, f = q[:, :1], q[:, 1:]
+    cosine = e0 * f0 + np.sum(e * f, axis=1, keepdims=True)
+    sine = np.where(cosine < 0.0, -1.0, 1.0) * (e0 * f - f0 * e - np.cross(f, e))
+    length = np.linalg.norm(sine, axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(length, np.abs(cosine))
+    factor = np.where(length > 0.0, angle / np.where(length > 0.0, length, 1.0), 2.0)
+    return s - r, factor * sine

@@ -1,0 +1,237 @@
+"""States that a run starts from in place of the scene's: of a result at an instant, at rest."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.interface import PluginError
+from dap3d_core.model import Model, ModelError, build_model
+from dap3d_core.model.rotations import euler_rates
+from dap3d_core.model.state_layout import join, split
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.result import INFORMATION, Result
+from dap3d_core.scene import Mistake, SceneError, parse
+from dap3d_core.scene import check as validate
+
+if TYPE_CHECKING:
+    from dap3d_core.registry import Registry
+
+Floats = NDArray[np.float64]
+
+#: A time is a reported one if it differs from it by this part of the result's span.
+SAME_TIME = 1e-12
+#: Names that a message lists.
+MOST_NAMES = 6
+
+
+@attrs.frozen(eq=False)
+class StartState:
+    """A state of a model to start from.
+
+    Attributes:
+        u: (13 n,) the state.
+        angles: (angles,) angles whose turns are counted, in the order of the model; None where
+            turns begin at zero.
+        notes: where it comes from.
+        is_interpolated: it is near the constraints, and has to be brought onto them.
+    """
+
+    u: Floats
+    angles: Floats | None
+    notes: tuple[str, ...] = ()
+    is_interpolated: bool = False
+
+
+@attrs.frozen(eq=False)
+class NamedState:
+    """A state of bodies by name, of whatever scene.
+
+    Attributes:
+        title: its source, for messages.
+        body_names: (n,) in the order of the state.
+        u: (13 n,) the state.
+        angles: name (``Model.angle_names``) -> angle whose turns are counted, rad.
+        notes, is_interpolated: as of ``StartState``.
+    """
+
+    title: str
+    body_names: tuple[str, ...]
+    u: Floats
+    angles: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+    is_interpolated: bool = False
+
+
+class HasNamedState(Protocol):
+    """An equilibrium."""
+
+    @property
+    def state(self) -> NamedState:
+        """Its state."""
+
+
+#: What a run can start from: a word of the setting ``start``, a result, a result and a time (None
+#: for its end), an equilibrium.
+Start = str | Result | tuple[Result, float | None] | HasNamedState | StartState
+
+
+def start_state(start: Any, model: Model, registry: "Registry") -> StartState:
+    """The state that a start means for a model whose bodies have the same names.
+
+    Args:
+        start: a result, a result and a time, an equilibrium, or a state of the model.
+        model: what is to start.
+        registry: source of the types of a result's scene, for its turns of angles.
+
+    Raises:
+        SceneError: it is nothing of these, a body is missing in it, the result is empty, or has no
+            such time; its key is ``start``.
+    """
+    if isinstance(start, StartState):
+        return start
+    if isinstance(start, Result):
+        start = start, None
+    named: Any
+    if isinstance(start, tuple) and len(start) == 2 and isinstance(start[0], Result):
+        named = _state_of_result(*start, registry, with_angles=model.angle_count > 0)
+    else:
+        named = getattr(start, "state", None)
+    if not isinstance(named, NamedState):
+        raise _mistake(
+            type(start).__name__,
+            'should be a result, (result, time), an equilibrium, "scene" or "equilibrium"',
+        )
+    return _matched(named, model)
+
+
+def _mistake(value: Any, what: str) -> SceneError:
+    return SceneError([Mistake("start", value, what)])
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more
+
+
+def _matched(named: NamedState, model: Model) -> StartState:
+    """The state of the model's bodies."""
+    place = {body: k for k, body in enumerate(named.body_names)}
+    missing = [body for body in model.body_names if body not in place]
+    if missing:
+        near = [f"{body} (nearest: {near})" if (near := nearest(body, list(place))) else body
+                for body in missing]  # fmt: skip
+        noun = "body" if len(missing) == 1 else "bodies"
+        raise _mistake(
+            named.title,
+            f"it is of another scene: it has no {noun} {_listed(near)}; its bodies are "
+            f"{_listed(list(place))}",
+        )
+    notes = list(named.notes)
+    unused = [body for body in place if body not in model.body_names]
+    if unused:
+        notes.append(f"bodies of the start that the scene does not have: {_listed(unused)}")
+    index = [place[body] for body in model.body_names]
+    r, p, v, w = split(named.u)
+    u = join(r[index], p[index], v[index], w[index])
+    names = model.angle_names
+    uncounted = sorted({n.rpartition(".")[0] for n in names if n not in named.angles})
+    if uncounted:
+        notes.append(f"turns are counted from zero, for the start has none: {_listed(uncounted)}")
+    angles = np.array([named.angles.get(name, 0.0) for name in names]) if names else None
+    return StartState(u, angles, tuple(notes), named.is_interpolated)
+
+
+def _state_of_result(
+    result: Result, t: Any, registry: "Registry", *, with_angles: bool
+) -> NamedState:
+    """The state of a result at a time, s; None for its end.
+
+    Between two reported instants it is interpolated: r, p by polynomials of degree five through
+    positions, velocities and accelerations at both, the velocities by their derivatives.
+    """
+    title = result.record.title or "the result"
+    if not len(result.t):
+        raise _mistake(title, "the result holds no instant: nothing can start from it")
+    before, after, fraction = _interval(result, t)
+    time = float(result.t[before] + fraction * (result.t[after] - result.t[before]))
+    notes = [f"{INFORMATION}the start is the state of {title} at t = {time:.9g} s; the run begins "
+             "at t = 0, and so do functions of time"]  # fmt: skip
+    if before != after:
+        notes.append(
+            f"{INFORMATION}the start was interpolated between the reported instants "
+            f"{result.t[before]:.9g} s and {result.t[after]:.9g} s of the result"
+        )
+    angles: dict[str, float] = {}
+    if with_angles and result.summary.angle_count:
+        values = (1.0 - fraction) * result.arrays.angles[before]
+        values = values + fraction * result.arrays.angles[after]
+        names = _angle_names_of(result, registry)
+        angles = dict(zip(names, values.tolist(), strict=False))  # none where they are not known
+    u = _state_at(result, before, after, fraction)
+    return NamedState(title, result.summary.body_names, u, angles, tuple(notes),
+                      before != after)  # fmt: skip
+
+
+def _interval(result: Result, t: Any) -> tuple[int, int, float]:
+    """The reported instants before and after a time, and the fraction between them."""
+    times, last = result.t, len(result.t) - 1
+    if t is None:
+        return last, last, 0.0
+    if isinstance(t, bool) or not isinstance(t, (int, float)) or not np.isfinite(t):
+        raise _mistake(t, "the time of a start is a number of seconds")
+    first, end = float(times[0]), float(times[-1])
+    margin = SAME_TIME * max(abs(first), abs(end))
+    if not first - margin <= t <= end + margin:
+        raise _mistake(t, f"the result reaches from t = {first:.9g} s to {end:.9g} s")
+    k = int(np.argmin(np.abs(times - t)))
+    if abs(times[k] - t) <= margin:
+        return k, k, 0.0
+    k = int(np.searchsorted(times, t)) - 1
+    return k, k + 1, float((t - times[k]) / (times[k + 1] - times[k]))
+
+
+def _state_at(result: Result, before: int, after: int, fraction: float) -> Floats:
+    """The state (13 n,) of a result between two reported instants."""
+    if before == after:
+        return np.array(result.u[before])
+    h = float(result.t[after] - result.t[before])
+    ends = []
+    for k in (before, after):
+        r, p, v, w = split(result.u[k])
+        a = result.v_dot[k].reshape(-1, 6)
+        p_dot = euler_rates(p, w)
+        p_ddot = euler_rates(p, a[:, 3:]) + euler_rates(p_dot, w)
+        ends.append((np.hstack([r, p]), np.hstack([v, p_dot]), np.hstack([a[:, :3], p_ddot])))
+    q, q_dot = _quintic(ends[0], ends[1], h, fraction)
+    p, p_dot = q[:, 3:], q_dot[:, 3:]
+    length = np.linalg.norm(p, axis=1, keepdims=True)
+    w = 2.0 * (p[:, :1] * p_dot[:, 1:] - p_dot[:, :1] * p[:, 1:] - np.cross(p_dot[:, 1:], p[:, 1:]))
+    return join(q[:, :3], p / length, q_dot[:, :3], w / length**2)
+
+
+def _quintic(
+    start: tuple[Floats, Floats, Floats], end: tuple[Floats, Floats, Floats], h: float, s: float
+) -> tuple[Floats, Floats]:
+    """Value and derivative at fraction s of the polynomial with given derivatives at both ends."""
+    (x, v, a), (y, w, b) = start, end
+    d = y - x - h * v - 0.5 * h * h * a
+    e = h * (w - v - h * a)
+    f = h * h * (b - a)
+    c3, c4, c5 = 10 * d - 4 * e + 0.5 * f, -15 * d + 7 * e - f, 6 * d - 3 * e + 0.5 * f
+    value = x + s * (h * v + s * (0.5 * h * h * a + s * (c3 + s * (c4 + s * c5))))
+    slope = v + (s * h * h * a + s * s * (3 * c3 + s * (4 * c4 + s * 5 * c5))) / h
+    return value, slope
+
+
+def _angle_names_of(result: Result, registry: "Registry") -> tuple[str, ...]:
+    """Names of the angles of a result, from its scene: nothing is compiled. None if it has types
+    that are not installed.
+    """
+    try:
+        names = build_model(validate(parse(result.scene_text), registry)).angle_names
+    except (SceneError, PluginError, ModelError):
+        return ()
+    return names if len(names) == result.summary.angle_count else ()

@@ -1,0 +1,105 @@
+"""``dap.equilibrium``: what it returns, what it says, and what it refuses."""
+
+import math
+
+import numpy as np
+import pytest
+from support import at_rest
+from support.plain import long_in_plain_python
+
+import dap3d_core as dap
+from dap3d_core.result import UnknownNameError
+
+pytestmark = long_in_plain_python
+
+
+def test_free_fall_names_the_bodies_that_fall():
+    scene = at_rest.ball()
+    scene.add_body("moon", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(1.0, 0.0, 0.0))
+    scene.add_force("ptp", P_i="ball.O", P_j="moon.O", k=10.0, l0=1.0)
+    with pytest.raises(dap.SimulationError, match=r"bodies ball, moon, .* moves along -z") as error:
+        dap.equilibrium(scene)
+    assert "no equilibrium" in str(error.value)
+
+
+@pytest.mark.parametrize("moment", [-10.0, pytest.param(-30.0, marks=pytest.mark.slow)])
+def test_a_motor_holds_a_pendulum_or_turns_it_without_end(moment):
+    """m g l = 19.62 N m."""
+    scene = at_rest.pendulum(0.0)
+    scene.add_force("n", body_i="rod", n=(0.0, moment, 0.0))
+    if moment == -30.0:
+        with pytest.raises(dap.SimulationError, match="body rod, which turns about -y"):
+            dap.equilibrium(scene)
+    else:
+        angle = math.asin(10.0 / (2.0 * at_rest.G))
+        found = dap.equilibrium(scene)
+        assert found.r[0] == pytest.approx([math.sin(angle), 0, -math.cos(angle)], abs=1e-15)
+
+
+def test_the_scene_at_rest_can_be_saved_and_is_at_rest(tmp_path):
+    """The types of the toggle take no reference from poses."""
+    found = dap.equilibrium(at_rest.toggle(1.2))
+    scene = found.scene()
+    assert scene.notes == []
+    again = dap.equilibrium(scene.save(tmp_path / "rest.toml"))
+    assert again.steps == 0
+    assert again.r == pytest.approx(found.r, abs=1e-15)
+
+
+def test_references_that_the_scene_at_rest_changes_are_named():
+    """A bushing is unloaded in the poses of its scene."""
+    scene = at_rest.ball()
+    scene.add_force("bushing", "mount", P_i="ball.O", P_j="ground.O", k_t=(1e3, 1e3, 1e3),
+                    k_r=(10.0, 10.0, 10.0))  # fmt: skip
+    scene.add_force("n", body_i="ball", n=(1.0, 0.0, 0.0))
+    found = dap.equilibrium(scene)
+    assert found.r[0, 2] == pytest.approx(-at_rest.G / 1e3, rel=1e-12)
+    assert any("forces.mount" in note for note in found.scene().notes)
+
+
+def test_a_reaction_is_that_of_one_instant():
+    found = dap.equilibrium(at_rest.pendulum(0.5))
+    on_rod = found.reaction("J1")["i"]
+    assert on_rod.force.shape == on_rod.moment.shape == (3,)
+    assert on_rod.moment_at_point == pytest.approx([0, 0, 0], abs=1e-13)
+    assert found.reaction("J1")["j"].force == pytest.approx(-on_rod.force, abs=1e-13)
+    with pytest.raises(UnknownNameError, match="J1"):
+        found.reaction("J2")
+
+
+def test_it_searches_from_a_result_and_from_an_equilibrium():
+    """The other side of the toggle, reached by hand."""
+    other = dap.equilibrium(at_rest.toggle(-1.2))
+    found = dap.equilibrium(at_rest.toggle(1.2), start=other)
+    assert found.steps == 0
+    assert found.r[0, 2] < 0.0
+    result = dap.simulate(at_rest.toggle(-0.9), t_end=0.01, dt=0.01)
+    assert dap.equilibrium(at_rest.toggle(1.2), start=result).r == pytest.approx(other.r, abs=1e-14)
+
+
+def test_what_statics_leaves_out_is_noted():
+    scene = at_rest.pendulum(0.3)
+    scene.bodies["rod"].w = (0.0, 1.0, 0.0)
+    scene.add_function("a", "turning", coeff=(0.0, 0.1, 0.0))
+    scene.add_force("motor", "drive", body_i="rod", a_j="ground.y", gain=1.0, torque_max=5.0,
+                    function="turning")  # fmt: skip
+    notes = " ".join(dap.equilibrium(scene).notes)
+    assert "velocities of the start are left out" in notes
+    assert "depend on time are those at t = 0: drive" in notes
+
+
+def test_drivers_and_rolling_joints_are_held_where_they_are():
+    """The rates of both are rows of velocities alone; the crank of fourbar2 stays."""
+    found = dap.equilibrium("fourbar2")
+    start = dap.compile("fourbar2")
+    start = start.start(True, ()).u
+    assert np.max(np.abs(found.u[:14] - start[:14])) < 1e-12
+    assert any("drivers are at rest" in note for note in found.notes)
+
+
+def test_friction_is_noted():
+    scene = at_rest.pendulum(0.3)
+    scene.add_force("friction", joint="J1", mu=0.2, v_tol=1e-3, radius=0.05)
+    found = dap.equilibrium(scene)
+    assert any("friction is left out" in note for note in found.notes)
+    assert found.r[0] == pytest.approx([0, 0, -1], abs=1e-15)
