@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     )
     from dap3d_core.simulation import compile_scene as compile
     from dap3d_core.simulation import open_result as open
-    from dap3d_core.simulation.analyses.equilibrium import Equilibrium, equilibrium
+    from dap3d_core.simulation.equilibrium.equilibrium import Equilibrium, equilibrium
+    from dap3d_core.simulation.kinematics.inverse import inverse
+    from dap3d_core.simulation.kinematics.kinematics import kinematics
     from dap3d_core.simulation.linearization.linearization import Linearization, linearize
-    from dap3d_core.simulation.analyses.inverse import inverse
-    from dap3d_core.simulation.analyses.kinematics import kinematics
     from dap3d_core.simulation.rerun import rerun
     from dap3d_core.simulation.resume import resume
     from dap3d_core.study.fit.fit import fit
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "AssemblyError": ("simulation", "AssemblyError"),
-    "Equilibrium": ("simulation.analyses.equilibrium", "Equilibrium"),
+    "Equilibrium": ("simulation.equilibrium.equilibrium", "Equilibrium"),
     "Event": ("simulation", "Event"),
     "Fit": ("study.fit.fit_result", "Fit"),
     "Linearization": ("simulation.linearization.linearization", "Linearization"),
@@ -57,13 +57,13 @@ _HOMES = {
     "SimulationError": ("simulation", "SimulationError"),
     "animate": ("plot", "animate"),
     "compile": ("simulation", "compile_scene"),
-    "equilibrium": ("simulation.analyses.equilibrium", "equilibrium"),
+    "equilibrium": ("simulation.equilibrium.equilibrium", "equilibrium"),
     "export": ("exchange", "export"),
     "fit": ("study.fit.fit", "fit"),
     "import_matlab": ("matlab", "import_matlab"),
+    "inverse": ("simulation.kinematics.inverse", "inverse"),
+    "kinematics": ("simulation.kinematics.kinematics", "kinematics"),
     "linearize": ("simulation.linearization.linearization", "linearize"),
-    "inverse": ("simulation.analyses.inverse", "inverse"),
-    "kinematics": ("simulation.analyses.kinematics", "kinematics"),
     "load": ("scene", "load"),
     "load_registry": ("registry", "load_registry"),
     "open": ("simulation", "open_result"),
@@ -97,9 +97,9 @@ __all__ = [
     "export",
     "fit",
     "import_matlab",
-    "linearize",
     "inverse",
     "kinematics",
+    "linearize",
     "load",
     "load_registry",
     "open",

@@ -13,7 +13,7 @@ from dap3d_core.model.rotations import rotation
 from dap3d_core.model.state_layout import join, split
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check as checked
-from dap3d_core.simulation.analyses.tangent import tangent_matrices
+from dap3d_core.simulation.linearization.tangent import tangent_matrices
 
 REGISTRY = load_registry()
 FORCES = [case for case in cases(REGISTRY, "force") if case[0] != "friction"]

@@ -16,9 +16,10 @@ SECTIONS = {
         ("simulation.CompiledModel", "simulation.Instant", "simulation.RunProgress",
          "simulation.Reproduction"),
     ),
-    "Analyses": (("linearize", "Linearization"), ()),
-    "Analyses": (("kinematics", "inverse"), ()),
-    "Analyses": (("equilibrium", "Equilibrium", "linearize", "Linearization"), ()),
+    "Analyses": (
+        ("equilibrium", "kinematics", "inverse", "linearize", "Equilibrium", "Linearization"),
+        (),
+    ),
     "Results": (
         ("Result", "open", "plot", "view", "animate", "export"),
         ("result.Reaction", "result.Energy", "result.Entry", "result.ErrorEstimate",

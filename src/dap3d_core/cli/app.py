@@ -20,15 +20,9 @@ from dap3d_core.cli.process.streams import leave_stdout, prepare_streams, reserv
 COMMANDS = {
     name: f"dap3d_core.cli.commands.{name.replace('-', '_')}"
     for name in (
-        "run", "resume", "rerun", "sweep", "modes", "check", "models", "plugins", "describe",
-        "new-plugin", "check-plugin", "info", "post", "export", "plot", "animate", "view", "report",
-        "run", "resume", "rerun", "kinematics", "inverse", "sweep", "check", "models", "plugins", "describe", "new-plugin",
-        "check-plugin", "info", "post", "export", "plot", "animate", "view", "report",
-        "import-matlab",
-        "run", "resume", "rerun", "kinematics", "inverse", "sweep", "check", "models", "plugins",
-        "run", "resume", "rerun", "sweep", "equilibrium", "modes", "check", "models", "plugins",
-        "describe", "new-plugin", "check-plugin", "info", "post", "export", "plot", "animate",
-        "view", "report", "import-matlab",
+        "run", "resume", "rerun", "equilibrium", "kinematics", "inverse", "modes", "sweep", "check",
+        "models", "plugins", "describe", "new-plugin", "check-plugin", "info", "post", "export",
+        "plot", "animate", "view", "report", "import-matlab",
     )
 }  # fmt: skip
 

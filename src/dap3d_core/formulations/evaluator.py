@@ -142,14 +142,6 @@ class Evaluator:
         self._call(ANGLE, t, s.force, s.force, s.force)
 
     @IGNORE_FLOAT_ERRORS
-    def count_turns(self, t: float, u: ArrayLike) -> None:
-        """Count turns of angles at a state u (13 n,) that is near the one counted last."""
-        if self.counts_turns:
-            self.place(t, u)
-            s = self.system
-            self._call(ANGLE, t, s.force, s.force, s.force)
-
-    @IGNORE_FLOAT_ERRORS
     def counted_angles(self, t: float, u: ArrayLike) -> Floats:
         """(angles,) angles whose turns are counted, rad, at a state u (13 n,)."""
         angles, scratch = np.zeros(self.model.angle_count), np.zeros(1)

@@ -130,7 +130,7 @@ class Run(RunState):
         how = bool(settings.correct), settings.hold, metric
         state = self.start
         if state is None and settings.start == "equilibrium":
-            from dap3d_core.simulation.analyses.rest import start_at_rest
+            from dap3d_core.simulation.equilibrium.rest import start_at_rest
 
             state = start_at_rest(self.evaluator, self.compiled.start(*how).u)
         start = self.compiled.start(*how, state)

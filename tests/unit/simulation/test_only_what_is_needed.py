@@ -57,18 +57,18 @@ def test_a_model_loads_only_its_own_types(model, present, absent):
         assert "dap3d_core.formulations.standard" not in found
 
 
-def test_a_run_imports_no_analysis(tmp_path):
-    """``dap3d run`` imports nothing of linearisation, of other analyses and of what they need."""
-    script = (
+def test_a_run_needs_no_analysis_and_no_other_start(tmp_path):
+    """``dap3d run`` imports no other analysis, nothing that these need, no starts from results."""
+    found = imported(
         "from dap3d_core.cli import main\n"
         f"main(['run', 'pen1', '--t-end', '0.1', '-o', {str(tmp_path / 'r.nc')!r}, '-q'])"
     )
-    found = imported(script)
     assert "dap3d_core.simulation.run" in found
-    core = ("simulation.analyses", "simulation.linearization", "kernels.dual_numbers",
+    floors = ("equilibrium", "kinematics", "linearization", "initial.start_state")
+    core = (*(f"simulation.{name}" for name in floors), "kernels.dual_numbers",
             "interface.codegen.loop_derivatives")  # fmt: skip
-    analyses = (*(f"dap3d_core.{name}" for name in core), "scipy.sparse.linalg", "control")
-    assert not {m for m in found if m.startswith(analyses)}
+    others = (*(f"dap3d_core.{name}" for name in core), "scipy.sparse.linalg", "control")
+    assert not {m for m in found if m.startswith(others)}
 
 
 def test_a_page_needs_neither_matplotlib_nor_a_reader_of_meshes():
@@ -81,23 +81,12 @@ def test_a_page_needs_neither_matplotlib_nor_a_reader_of_meshes():
     assert not imported(script) & {"matplotlib", "trimesh", "netCDF4", "xarray", "rich", "click"}
 
 
-def test_a_run_knows_nothing_of_studies_and_analyses():
-    """``dap.simulate`` imports nothing of sweeps, fits, clusters, kinematics, inverse dynamics."""
+def test_a_run_knows_nothing_of_studies():
+    """``dap.simulate`` imports nothing of sweeps, fits, clusters."""
     found = imported("import dap3d_core as dap\ndap.simulate('bodies2', t_end=0.04, dt=0.02)\n")
-    others = ("dap3d_core.study", "dap3d_core.simulation.analyses", "scipy.integrate")
+    others = ("dap3d_core.study", "dap3d_core.simulation.kinematics", "scipy.integrate")
     assert not any(name.startswith(others) for name in found)
     assert "dap3d_core.simulation.redundancy.freedoms" not in found
-
-
-def test_a_run_of_the_scene_as_given_knows_nothing_of_other_starts_and_analyses(tmp_path):
-    """``dap3d run`` imports neither the search for an equilibrium nor starts from results."""
-    found = imported(
-        "from dap3d_core.cli import main\n"
-        f"main(['run', 'bodies2', '--t-end', '0.04', '-q', '-o', {str(tmp_path / 'a.nc')!r}])\n"
-    )
-    assert "dap3d_core.simulation.run" in found
-    assert not any(name.startswith("dap3d_core.simulation.analyses") for name in found)
-    assert "dap3d_core.simulation.initial.start_state" not in found
 
 
 def test_a_grid_in_memory_needs_no_samples_no_cluster_and_no_packs_of_its_own():

@@ -12,7 +12,7 @@ from dap3d_core.cli.process.exit_codes import DONE
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
-    from dap3d_core.simulation.analyses.equilibrium import Equilibrium
+    from dap3d_core.simulation.equilibrium.equilibrium import Equilibrium
 
 #: Bodies and joints that are printed.
 MOST_ROWS = 12

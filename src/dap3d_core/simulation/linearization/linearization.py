@@ -299,7 +299,7 @@ def linearize(
     The stiffness of reactions, redundant rows, rolling (rows of the velocity level alone) and
     drivers are included. About a steady motion (a spinning satellite, a rolling wheel) the
     equations are written in axes that turn with it, so that their coefficients are constant.
-    Derivatives are exact to rounding (simulation/analyses/tangent.py).
+    Derivatives are exact to rounding (simulation/linearization/tangent.py).
 
     Args:
         scene: a Scene, what ``load`` takes, or a compiled model.

@@ -16,7 +16,6 @@ from dap3d_core.model import Model
 from dap3d_core.model.state_layout import join
 from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Scene
-from dap3d_core.simulation.analyses.tangent import TangentMatrices, tangent_matrices
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import fit_of, violation
@@ -24,6 +23,7 @@ from dap3d_core.simulation.initial.given_state import state_of, time_of
 from dap3d_core.simulation.initial_state import start_notes
 from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations, scaled_equations
 from dap3d_core.simulation.linearization.steady_motion import SteadyFrames, steady_frames
+from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent_matrices
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
 
 Floats = NDArray[np.float64]

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import skew
 from dap3d_core.model.state_layout import split
-from dap3d_core.simulation.analyses.tangent import TangentMatrices
 from dap3d_core.simulation.linearization.steady_motion import SteadyFrames
+from dap3d_core.simulation.linearization.tangent import TangentMatrices
 
 Floats = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from dap3d_core.linear.rank.rank import Dependency
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import rotation, skew
 from dap3d_core.model.state_layout import split
-from dap3d_core.simulation.analyses.tangent import TangentMatrices
+from dap3d_core.simulation.linearization.tangent import TangentMatrices
 
 Floats = NDArray[np.float64]
 

@@ -21,10 +21,10 @@ from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.quantities.lookup import find
 from dap3d_core.result.quantities.measured_data import MeasuredData, read_measured
 from dap3d_core.scene import MISSING, Mistake, SceneError
-from dap3d_core.simulation.analyses.kinematic_path import spin
-from dap3d_core.simulation.analyses.pose_equations import ChosenRows, Flags
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import displaced, extent
+from dap3d_core.simulation.kinematics.path import spin
+from dap3d_core.simulation.kinematics.pose_equations import ChosenRows, Flags
 from dap3d_core.simulation.redundancy.freedoms import motion_words
 
 Floats = NDArray[np.float64]

@@ -19,7 +19,6 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.linear.rank.rank import tolerance_of
 from dap3d_core.model.state_layout import join, split
-from dap3d_core.simulation.analyses.tangent import TangentMatrices, tangent_matrices
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import (
     displaced,
@@ -28,6 +27,7 @@ from dap3d_core.simulation.initial.assemble import (
     sparse_least_change,
     weights_of,
 )
+from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent_matrices
 
 Floats = NDArray[np.float64]
 

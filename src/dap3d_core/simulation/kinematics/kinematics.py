@@ -17,16 +17,16 @@ from dap3d_core.result.file.atomic_write import check_target, check_utf8
 from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Mistake, Scene, SceneError, Simulation
-from dap3d_core.simulation.analyses.driver_coordinate import (
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.errors import RedundantError, SimulationError
+from dap3d_core.simulation.initial_state import InitialState, start_notes
+from dap3d_core.simulation.kinematics.driver_coordinate import (
     DriverCoordinate,
     driver_names,
     read_coordinate,
 )
-from dap3d_core.simulation.analyses.kinematic_path import KinematicPath, PathEndError, Pose
-from dap3d_core.simulation.analyses.pose_equations import required_forces
-from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.errors import RedundantError, SimulationError
-from dap3d_core.simulation.initial_state import InitialState, start_notes
+from dap3d_core.simulation.kinematics.path import KinematicPath, PathEndError, Pose
+from dap3d_core.simulation.kinematics.pose_equations import required_forces
 from dap3d_core.simulation.redundancy.freedoms import freedoms_left, motion_words
 from dap3d_core.simulation.settings import report_times, settings_of
 

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model.state_layout import join, split, velocities_of
-from dap3d_core.simulation.analyses.pose_equations import LinearisedRows
 from dap3d_core.simulation.initial.assemble import displaced, extent, finite_rows
+from dap3d_core.simulation.kinematics.pose_equations import LinearisedRows
 
 Floats = NDArray[np.float64]
 

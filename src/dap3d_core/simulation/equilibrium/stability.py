@@ -6,9 +6,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.simulation.analyses.equilibrium_search import Outcome, search_equilibrium
-from dap3d_core.simulation.analyses.statics import StaticPose, Statics, displacement
-from dap3d_core.simulation.analyses.trust_region import zero_stiffness
+from dap3d_core.simulation.equilibrium.search import Outcome, search_equilibrium
+from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics, displacement
+from dap3d_core.simulation.equilibrium.trust_region import zero_stiffness
 from dap3d_core.simulation.errors import AssemblyError
 
 Floats = NDArray[np.float64]

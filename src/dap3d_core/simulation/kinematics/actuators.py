@@ -13,8 +13,8 @@ from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.post.force_output import ForceLoops, group_of
 from dap3d_core.scene import Mistake, SceneError
-from dap3d_core.simulation.analyses.driver_coordinate import driver_names
 from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.kinematics.driver_coordinate import driver_names
 
 Floats = NDArray[np.float64]
 

@@ -6,14 +6,14 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.result import INFORMATION
-from dap3d_core.simulation.analyses.equilibrium_notes import assumptions, failure, findings
-from dap3d_core.simulation.analyses.equilibrium_search import (
+from dap3d_core.simulation.equilibrium.notes import assumptions, failure, findings
+from dap3d_core.simulation.equilibrium.search import (
     Outcome,
     Search,
     search_equilibrium,
 )
-from dap3d_core.simulation.analyses.stability import Stability, stability_of
-from dap3d_core.simulation.analyses.statics import Statics
+from dap3d_core.simulation.equilibrium.stability import Stability, stability_of
+from dap3d_core.simulation.equilibrium.statics import Statics
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.start_state import StartState
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.simulation.analyses.statics import StaticPose, Statics, at_rest, displacement
-from dap3d_core.simulation.analyses.trust_region import (
+from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics, at_rest, displacement
+from dap3d_core.simulation.equilibrium.trust_region import (
     BALANCED,
     Step,
     trust_region_step,

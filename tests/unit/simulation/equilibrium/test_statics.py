@@ -6,8 +6,8 @@ from support import at_rest
 from support.mechanisms import rough_four_bar
 
 import dap3d_core as dap
-from dap3d_core.simulation.analyses.statics import Statics, displacement
-from dap3d_core.simulation.analyses.statics import at_rest as without_velocities
+from dap3d_core.simulation.equilibrium.statics import Statics, displacement
+from dap3d_core.simulation.equilibrium.statics import at_rest as without_velocities
 
 
 def statics_of(scene):

@@ -15,17 +15,17 @@ from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Scene
-from dap3d_core.simulation.analyses.actuators import Actuator, DriverActuator, actuators_of
-from dap3d_core.simulation.analyses.kinematics import check_output, compiled_exactly
-from dap3d_core.simulation.analyses.motion_data import (
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.kinematics.actuators import Actuator, DriverActuator, actuators_of
+from dap3d_core.simulation.kinematics.kinematics import check_output, compiled_exactly
+from dap3d_core.simulation.kinematics.motion_data import (
     Motion,
     misfit_notes,
     motion_on,
     read_motion,
 )
-from dap3d_core.simulation.analyses.pose_equations import ChosenRows, Flags, required_forces
-from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.kinematics.pose_equations import ChosenRows, Flags, required_forces
 from dap3d_core.simulation.redundancy.freedoms import motion_words
 
 Floats = NDArray[np.float64]

@@ -11,9 +11,9 @@ from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.model import Group, Model
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.result import INFORMATION
-from dap3d_core.simulation.analyses.equilibrium_search import Outcome, Search
-from dap3d_core.simulation.analyses.motion_words import describe_motion
-from dap3d_core.simulation.analyses.stability import Stability
+from dap3d_core.simulation.equilibrium.motion_words import describe_motion
+from dap3d_core.simulation.equilibrium.search import Outcome, Search
+from dap3d_core.simulation.equilibrium.stability import Stability
 
 Floats = NDArray[np.float64]
 

@@ -1,1 +1,0 @@
-"""Analyses of a scene other than its simulation, one file or folder each."""

@@ -1,0 +1,1 @@
+"""Static equilibrium of a scene, and starts from rest."""

@@ -1,0 +1,1 @@
+"""Kinematics and inverse dynamics: motions that drivers or data prescribe."""
