@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: A singular value below this part of the matrix's terms is zero.
-ZERO = 1e-13
+#: A singular value below this part of the matrix's terms, times the root of their number, is zero.
+#: A slow motion beside a fast one is not, down to 1e-7 of its frequency.
+ZERO = 1e-14
 
 
 @attrs.frozen(eq=False)
@@ -36,7 +37,7 @@ class Eigenvalues:
 def eigenvalues_of(A: Floats, size: float) -> Eigenvalues:
     """All eigenvalues and eigenvectors of a real matrix A, its terms of magnitude ``size``."""
     splits: list[tuple[Floats, Floats, Floats]] = []
-    rest, zeros, limit = A, 0, ZERO * max(size, 1e-300) * max(len(A), 1)
+    rest, zeros, limit = A, 0, ZERO * max(size, 1e-300) * np.sqrt(len(A))
     while len(rest):
         _, values, right = np.linalg.svd(rest)
         null = right[values <= limit].T

@@ -18,7 +18,7 @@ from dap3d_core.simulation.linearization.state_space import DriverRows
 Floats = NDArray[np.float64]
 
 #: Kinds of fields that may be inputs.
-NUMBERS = ("number", "vec3", "vector")
+NUMBERS = ("number", "vec3")
 
 
 @attrs.frozen(eq=False)
@@ -100,7 +100,10 @@ def _driver(point: OperatingPoint, evaluator: Evaluator, name: str) -> list[Floa
             column[start : start + len(slope)] = slope
             result.append(column)
         return result
-    raise unknown("force or driver", name.partition(".")[0], _inputs_known(point, evaluator))
+    known, element = _inputs_known(point, evaluator), name.partition(".")[0]
+    if element in known:
+        raise UnknownNameError(f"input {name!r}: a driver is an input as a whole; name {element}")
+    raise unknown("force or driver", element, known)
 
 
 def _inputs_known(point: OperatingPoint, evaluator: Evaluator) -> list[str]:

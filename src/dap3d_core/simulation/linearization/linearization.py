@@ -249,8 +249,8 @@ class Linearization:
     def motion(self, mode: int = 0, size: float = 0.1, instants: int = 60) -> Result:
         """The motion of one mode, as a result of one period for ``view``, ``animate``, ``save``.
 
-        Displacements of the state, Re(shape exp(i phase)), without the decay or growth of the mode;
-        of a real eigenvalue, to and fro in one second.
+        Displacements of the state, Re(shape exp(i phase)), without the decay or growth of the mode,
+        brought onto the constraints; of a real eigenvalue, to and fro in one second.
 
         Args:
             mode: index of the mode, from 0.

@@ -1,10 +1,14 @@
 """States displaced along directions; the motion of a mode as a result that can be looked at."""
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.model.state_layout import join, split, velocities_of, y_from_u
 from dap3d_core.result import INFORMATION, Result, RunMetadata
+from dap3d_core.simulation.errors import AssemblyError
+from dap3d_core.simulation.initial.assemble import correct_initial
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
 
 Floats = NDArray[np.float64]
@@ -58,12 +62,14 @@ def mode_motion(
             velocity = amplitude * np.real(shape * phase * 2j * np.pi / period)
             change = velocity - velocities_of(point.u)
             u = displaced_state(point.u, amplitude * np.real(shape * phase), change)
+            with suppress(AssemblyError):  # a mode shape is straight, the joints are not
+                u = correct_initial(evaluator, u, point.t).u
             report = evaluator.report(point.t, u)
             rows.append(np.concatenate([[t], y_from_u(u), report]))
     note = (
         f"{INFORMATION}mode {mode + 1} of a linearisation, eigenvalue {eigenvalues[mode]:.6g}: "
-        "displacements along a mode shape, no simulation"
+        "displacements along a mode shape, joints closed; no simulation"
     )
     record = RunMetadata(scene_text=point.compiled.scene_text, method=point.compiled.method,
-                         integrator="none", notes=(note,))  # fmt: skip
+                         integrator="none", notes=(note,), types=point.compiled.types)  # fmt: skip
     return Result.of_run(model, np.array(rows), record, lambda: point.evaluator)

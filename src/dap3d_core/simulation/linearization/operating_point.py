@@ -18,7 +18,7 @@ from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.initial.assemble import fit_of, violation
+from dap3d_core.simulation.initial.assemble import correct_initial, fit_of, violation
 from dap3d_core.simulation.initial.given_state import state_of, time_of
 from dap3d_core.simulation.initial_state import start_notes
 from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations, scaled_equations
@@ -136,6 +136,8 @@ def _state(
         settings = compiled.scene.simulation
         start = compiled.start(settings.correct, settings.hold, str(settings.correct_metric))
         notes += start_notes(start, compiled.evaluator, compiled.scene)
+        if t != 0.0 and settings.correct:  # drivers have moved on
+            return correct_initial(compiled.evaluator, start.u, t).u.copy(), None
         return start.u.copy(), None
     if isinstance(at, Result):
         if at.summary.body_names != model.body_names:

@@ -103,7 +103,8 @@ def state_space(
     rate[:, x.shape[1] - count :] = np.eye(count)
     above = np.zeros((Q.shape[1] + count, len(U)))
     below = np.zeros((count, len(U)))
-    size = max(np.sqrt(np.linalg.norm(K, 2)), np.linalg.norm(C, 2), np.linalg.norm(S, 2))
+    largest = (np.linalg.norm(matrix, np.inf) for matrix in (K, C, S))
+    size = max(power**exponent for power, exponent in zip(largest, (0.5, 1.0, 1.0), strict=True))
     return StateSpace(
         A=np.vstack([Q.T @ (v + S @ x), rate, N.T @ v_dot, 0.0 * rate]),
         displacement=U @ x,

@@ -83,8 +83,8 @@ def steady_frames(
     matrix = np.concatenate([matrix, np.zeros((n, 15, 3))], axis=2)
     matrix[:, :3, 3:] = np.eye(3)  # a common acceleration
     unknowns, of_translation, drift = np.zeros((n, 6)), np.ones((n, 1)), set()
-    for members in _connected(tangent):
-        is_free = _is_free(tangent, members)
+    sets = _connected(tangent)
+    for members, is_free in zip(sets, _free(tangent, sets), strict=True):
         count = 6 if is_free else 3
         equations = matrix[members, :, :count].reshape(-1, count)
         solution = np.linalg.lstsq(equations, side[members].ravel(), rcond=RCOND)[0]
@@ -155,17 +155,24 @@ def _largest(values: Floats) -> float:
     return float(np.max(np.abs(values), initial=0.0))
 
 
-def _is_free(tangent: TangentMatrices, members: Any) -> bool:
-    """True if a common translation of bodies changes no force and no row."""
-    columns = 6 * np.asarray(members)[:, None] + np.arange(3)
+def _free(tangent: TangentMatrices, sets: Sequence[Any]) -> NDArray[np.bool_]:
+    """True for sets of bodies whose common translation changes no force and no row."""
+    from scipy.sparse import csr_array
+
+    label = np.zeros(len(tangent.f) // 6, dtype=np.int64)
+    for k, members in enumerate(sets):
+        label[members] = k
+    row = (6 * np.arange(len(label))[:, None] + np.arange(3)).ravel()
+    column = (3 * label[:, None] + np.arange(3)).ravel()
+    shape = (len(tangent.f), 3 * len(sets))
+    translations = csr_array((np.ones(len(row)), (row, column)), shape=shape)
+    free = np.ones(shape[1], dtype=bool)
     for matrix in (tangent.stiffness, tangent.damping, tangent.D):
-        for axis in range(3):
-            translation = np.zeros(len(tangent.f))
-            translation[columns[:, axis]] = 1.0
-            change, terms = matrix @ translation, abs(matrix) @ translation
-            if np.any(np.abs(change) > RCOND * terms):
-                return False
-    return True
+        change = abs(matrix @ translations) - RCOND * (abs(matrix) @ translations)
+        changed = change.tocoo()
+        free[changed.col[changed.data > 0.0]] = False
+    each: NDArray[np.bool_] = np.all(free.reshape(-1, 3), axis=1)
+    return each
 
 
 def _connected(tangent: TangentMatrices) -> list[Any]:
