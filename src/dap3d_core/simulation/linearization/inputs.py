@@ -1,12 +1,14 @@
 """Inputs of linearised equations: numbers of force elements, factors on them, drivers."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.loop_derivatives import differentiate_loop
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.model import Group
@@ -55,18 +57,13 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
     with point.compiled.borrow_evaluator() as evaluator:
         evaluator.place(point.t, point.u)
         for k, name in enumerate(names):
-            element, _, field = name.partition(".")
+            element = name.partition(".")[0]
             if element not in point.model.force_names:
                 driver[len(drivers), k] = 1.0
                 drivers.append(_driver(point, evaluator, name))
                 units.append("SI")
                 continue
-            number = point.model.force_names.index(element)
-            for loop, (kind, group) in enumerate(evaluator.loop_groups):
-                if kind != "wrench" or number not in group.members:
-                    continue
-                unit, columns = ("1", []) if not field else _columns(group, name, field)
-                wrench[:, k] += _wrench(point, evaluator, loop, group, number, columns)
+            wrench[:, k], unit = _force(point, evaluator, name)
             units.append(unit)
             elements.append(element)
             if not np.any(wrench[:, k]):
@@ -115,11 +112,30 @@ def _inputs_known(point: OperatingPoint, evaluator: Evaluator) -> list[str]:
     return known
 
 
+def _force(point: OperatingPoint, evaluator: Evaluator, name: str) -> tuple[Floats, str]:
+    """(6 n,) force by a unit input, and the unit of the input."""
+    element, _, field = name.partition(".")
+    number = point.model.force_names.index(element)
+    for loop, (kind, group) in enumerate(evaluator.loop_groups):
+        if kind == "wrench" and number in group.members:
+            unit, columns = _columns(group, name, field) if field else ("1", [])
+            return _wrench(point, evaluator, loop, group, number, columns), unit
+    raise UnknownNameError(f"input {name!r}: {element} acts by the friction of a joint alone")
+
+
 def _columns(group: Group, name: str, field: str) -> tuple[str, list[int]]:
     """Unit of an input, and the index of its number among those of an element."""
     field, _, axis = field.partition(".")
-    specs, layout = specs_of(group.type_info.type), group.type_info.layout
-    known = [n for n, s in specs.items() if s.kind in NUMBERS and n in layout.numbers]
+    type_info = group.type_info
+    specs, layout = specs_of(type_info.type), type_info.layout
+    read = parameters(type_info.kernels["wrench"])
+    prepared: Any = getattr(type_info.type.prepare, "__code__", None)
+    known = [
+        n
+        for n, spec in specs.items()
+        if spec.kind in NUMBERS and n in layout.numbers and n in read
+        and not (prepared and n in prepared.co_names)
+    ]  # fmt: skip
     if field not in known:
         if field in specs:
             raise UnknownNameError(

@@ -128,6 +128,12 @@ def test_equilibrium_is_at_rest():
         ({"inputs": ("push.f",)}, r"name a component of f \(x, y or z\)"),
         ({"inputs": ("spring.k.x",)}, r"name k alone"),
         ({"inputs": ("spring.function",)}, r"is no number that its force depends on directly"),
+        (
+            {"inputs": ("twist.theta_0",)},
+            r"theta_0 of force twist is no number.*numbers: k, c, n_a",
+        ),
+        ({"inputs": ("rub",)}, r"rub acts by the friction of a joint alone"),
+        ({"inputs": ("rail.k",)}, r"no force or driver 'rail'"),
         ({"outputs": ("cart.r.y_",)}, r"did you mean 'cart\.r\.[xyz]'"),
         ({"outputs": ("cart.r",)}, r"has components: name one, as cart\.r\.x"),
         ({"inputs": ("spring.k",), "outputs": ("spring.tension",)}, "force that is an input"),
@@ -135,8 +141,11 @@ def test_equilibrium_is_at_rest():
 )
 def test_unknown_names(settings, words):
     """Unknown inputs and outputs are refused with what there is, or the nearest name."""
+    scene = cart()
+    scene.add_force("rot_sda", "twist", v_i="bob.x", v_j="cart.x", axis="bob.y", k=1.0)
+    scene.add_force("friction", "rub", joint="rail", mu=0.1, v_tol=1.0)
     with pytest.raises(UnknownNameError, match=words):
-        dap.linearize(cart(), **settings)
+        dap.linearize(scene, **settings)
 
 
 def test_state_off_the_constraints():
