@@ -25,9 +25,11 @@ from dap3d_core.simulation.kinematics.pose_equations import LinearisedRows
 
 Floats = NDArray[np.float64]
 
-#: Newton stops behind a correction of this size (rad, or parts of the model): the next would be its
-#: square; or at rounding, where corrections no longer shrink.
-CLOSED, ROUNDING, MOST_PASSES = 1e-9, 1e-7, 12
+#: Newton stops behind a correction (rad, or parts of the model) whose product with the one behind
+#: which rows were factored is this: the size of the next; or where corrections no longer shrink.
+CLOSED, ROUNDING, MOST_PASSES = 1e-17, 1e-7, 16
+#: Rows are factored anew behind a larger correction.
+FACTORED_ANEW = 1e-3
 #: Corrections of an accepted step are at most this; a step aims at a hundredth of it, and moves
 #: nothing by more than MOST_TURN.
 MOST_CORRECTION, MOST_TURN = 0.02, 0.4
@@ -207,17 +209,23 @@ class KinematicPath:
     def _newton(self, t: float, u: Floats) -> tuple[Floats, float] | None:
         """A state whose positions are closed, and the size of the first correction; or None."""
         first, before, n = 0.0, np.inf, self.evaluator.model.body_count
+        rows = self._rows(t, u)
+        C = rows.rows.C
         for passes in range(MOST_PASSES):
-            rows = self._rows(t, u)
-            change = rows.solve(rows.rows.C)
+            change = rows.solve(C)
             size = extent(self.evaluator, change)
             if passes == 0:
-                first = size
+                first = factored_at = size
             if not np.isfinite(size) or size > max(MOST_TURN, 4.0 * before):
                 return None
             u = displaced(u, -change.reshape(n, 6), n)
-            if size <= CLOSED or (size <= ROUNDING and size > 0.5 * before):
+            if size * factored_at <= CLOSED or (size <= ROUNDING and size > 0.5 * before):
                 return u, first
+            if factored_at > FACTORED_ANEW:
+                rows, factored_at = self._rows(t, u), size
+                C = rows.rows.C
+            else:
+                C = finite_rows(self.evaluator, t, u).C
             before = size
         return None
 
