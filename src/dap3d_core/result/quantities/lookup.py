@@ -42,7 +42,8 @@ def find(result: QuantitySource, name: str) -> Quantity:
             the body of the first; ``JOINT.lambda`` (rows from 1); ``JOINT.`` q1 q1_dot q2 q2_dot
             ... angle length angle_rate length_rate; ``FORCE.`` or ``FORCE.SLOT.`` the actions as of
             a joint; ``FORCE.`` length length_rate tension energy; energy.kinetic .potential .total;
-            work; constraint.position .velocity .acceleration; t; outputs of the scene.
+            work; ``NAME.actuation`` of actuators of inverse dynamics; constraint.position
+            .velocity .acceleration; t; outputs of the scene.
 
     Raises:
         UnknownNameError: there is no such quantity; names the nearest.

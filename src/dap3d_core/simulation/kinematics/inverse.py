@@ -17,6 +17,7 @@ from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.failure.negative_reactions import Pulling
 from dap3d_core.simulation.kinematics.actuators import Actuator, DriverActuator, actuators_of
 from dap3d_core.simulation.kinematics.kinematics import check_output, compiled_exactly
 from dap3d_core.simulation.kinematics.motion_data import (
@@ -141,6 +142,9 @@ def _solved(
         motion.t.copy(), motion.u, motion.v_dot, forces.Lam, kinetic - kinetic[0],
         forces.potential, position, velocity, acceleration, forces.angles,
     )  # fmt: skip
+    pulling = Pulling(model)
+    pulling.look(arrays)
+    notes = [*compiled.notes, *misfit_notes(motion.misfit), *_notes(evaluator, chosen, forces)]
     about = RunMetadata(
         scene_text=compiled.scene_text,
         stats=RunStatistics(
@@ -148,7 +152,7 @@ def _solved(
         ),
         method=compiled.method,
         integrator=NAME,
-        notes=[*compiled.notes, *misfit_notes(motion.misfit), *_notes(evaluator, chosen, forces)],
+        notes=[*notes, *pulling.notes()],
         types=compiled.types,
         settings={
             "t_end": float(motion.t[-1]),

@@ -18,7 +18,8 @@ from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Mistake, Scene, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.errors import RedundantError, SimulationError
+from dap3d_core.simulation.errors import AssemblyError, RedundantError, SimulationError
+from dap3d_core.simulation.failure.negative_reactions import Pulling
 from dap3d_core.simulation.initial_state import InitialState, start_notes
 from dap3d_core.simulation.kinematics.driver_coordinate import (
     DriverCoordinate,
@@ -169,8 +170,23 @@ class _Kinematics:
         return result
 
     def go(self, progress: Progress | None) -> None:
-        """All instants, in their order or, where a coordinate falls, in the opposite one."""
+        """All instants, in their order or, where a coordinate falls, in the opposite one.
+
+        Raises:
+            SimulationError: the motion cannot start, or ends before.
+        """
         u = self._start().u
+        try:
+            self._follow(u, progress)
+        except PathEndError as end:
+            raise SimulationError(self._ended(end)) from end
+        except AssemblyError as error:  # rows that are not finite
+            where = self._instant(self.paths[-1].pose.t if self.paths else 0.0)
+            words = str(error).partition(": ")[2]
+            raise SimulationError(f"no pose follows that at {where}: {words}") from error
+
+    def _follow(self, u: Floats, progress: Progress | None) -> None:
+        """The path from the start u (13 n,), and its poses at the instants."""
         self.evaluator.start(0.0, u)
         falling = self.coordinate is not None and self.coordinate.values[-1] < self.times[-1]
         times = self.times[::-1] if falling else self.times
@@ -181,22 +197,13 @@ class _Kinematics:
                 self.evaluator.count_turns(path.pose.t, path.pose.u)
             u = path.pose.u
         path = self._path(float(times[0]), u, float(times[-1]))
-        direction = -1.0 if falling else 1.0
         self._report(path.pose, is_singular=False)
-        done = 1
+        done, direction = 1, -1.0 if falling else 1.0
         while done < len(times):
-            end: PathEndError | None = None
-            try:
-                self._advance(path)
-            except PathEndError as error:
-                end = error
-            while end is None and done < len(times):
-                if direction * (times[done] - path.pose.t) > 0.0:
-                    break
+            self._advance(path)
+            while done < len(times) and direction * (times[done] - path.pose.t) <= 0.0:
                 self._report(*path.at(float(times[done])))
                 done += 1
-            if end is not None:
-                raise SimulationError(self._ended(end))
             self.evaluator.count_turns(path.pose.t, path.pose.u)
             if progress is not None:
                 progress(abs(path.pose.t - times[0]), abs(times[-1] - times[0]))
@@ -206,8 +213,6 @@ class _Kinematics:
         if not self.rows:
             return None
         notes = [*self.notes, *self._branch_notes()]
-        if isinstance(error, SimulationError):
-            notes.append(str(error))
         compiled, model = self.compiled, self.evaluator.model
         rows = np.array(self.rows)
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
@@ -215,6 +220,11 @@ class _Kinematics:
         arrays = arrays_of(rows, summary)
         kinetic = kinetic_energy(summary, arrays.u)
         arrays = attrs.evolve(arrays, work=kinetic - kinetic[0])
+        pulling = Pulling(model)
+        pulling.look(arrays)
+        notes += pulling.notes()
+        if isinstance(error, SimulationError):
+            notes.append(str(error))
         about = RunMetadata(
             scene_text=compiled.scene_text,
             stats=RunStatistics(

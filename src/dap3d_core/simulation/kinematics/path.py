@@ -166,7 +166,7 @@ class KinematicPath:
         y = [self._between(middle + k * width).rows.signed(before.rows) for k in x]
         roots = np.roots(np.polyfit(x, y, 3))
         real = roots[np.abs(roots.imag) < 1e-6].real
-        return float(middle + width * real[np.argmin(np.abs(real))])
+        return float(middle + width * min(real, key=abs, default=0.0))
 
     # ------------------------------------------------------------------ steps
 

@@ -56,7 +56,7 @@ class LinearisedRows:
             x /= np.linalg.norm(x)
             x = solve_triangular(self._R, solve_triangular(self._R, x, trans="T"))
             growth = float(np.linalg.norm(x))
-        return growth**-0.5
+        return float(growth**-0.5)
 
     def solve(self, side: Floats) -> Floats:
         """(6 n,) x in m and rad with D x = side, side (m,) in units of the rows.

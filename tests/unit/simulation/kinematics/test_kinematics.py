@@ -113,6 +113,21 @@ def test_freedoms_left_are_named_by_their_motions():
         dap.kinematics("pen1")
 
 
+def test_a_coordinate_that_begins_beyond_reach_is_refused():
+    """Where the way from the pose as given to its first value ends, nothing is kept."""
+    with pytest.raises(dap.SimulationError, match=r"dead point at ram\.q = -0\.05145367") as caught:
+        dap.kinematics(pushed((0.0, 1.0, 0.0)), over="ram.q=-0.5:-0.4:3")
+    assert caught.value.result is None
+
+
+def test_a_scene_is_solved_once_where_it_ends_at_zero():
+    """As a run does with t_end = 0; without joints all freedoms are left."""
+    result = dap.kinematics(one_freedom.slider_crank_scene(0.3, (0.0, 5.0, 2.0)), t_end=0.0)
+    assert result.t.tolist() == [0.0]
+    with pytest.raises(dap.SimulationError, match="12 degrees of freedom are left"):
+        dap.kinematics("bodies2", t_end=1.0)
+
+
 def test_a_start_at_a_singular_pose_is_refused():
     """With what leads away from there."""
     scene = turning_parallelogram()
