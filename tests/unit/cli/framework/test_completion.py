@@ -17,7 +17,7 @@ from dap3d_core.result import UnknownNameError, find, names_of
 @pytest.fixture(scope="module")
 def result():
     """A cone on a ball joint, without its weight, which has no quantities."""
-    scene = attrs.evolve(dap.load("pen1"), forces={})
+    scene = attrs.evolve(dap.load("pen1"), forces={}, outputs={"tilt": "acos(cone.r.z)"})
     return dap.simulate(scene, t_end=0.02, dt=0.02)
 
 
@@ -39,6 +39,8 @@ def folder(result, tmp_path_factory):
         ("J1.mom", ["J1.moment", "J1.moment_body", "J1.moment_at_point"]),
         ("J1.j.f", ["J1.j.force", "J1.j.force_body"]),
         ("J1.lambda.", ["J1.lambda.1", "J1.lambda.2", "J1.lambda.3"]),
+        ("J1.q2", ["J1.q2_dot"]),
+        ("til", ["tilt"]),
         ("energy.", ["energy.kinetic", "energy.potential", "energy.total"]),
         ("cone", [f"cone.{a}" for a in ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd")]),
         ("nothing", []),
@@ -112,3 +114,10 @@ def test_outputs_of_a_sweep(tmp_path):
               output=file)  # fmt: skip
     assert completions("plot", str(file), "J1") == outputs
     assert "status" not in completions("plot", str(file), "")
+
+
+def test_coordinates_of_joints_are_offered_for_a_file(folder):
+    """They need the model, which is made from the scene in the file."""
+    assert completions("plot", str(folder / "a.nc"), "J1.q") == [
+        "J1.q1", "J1.q2", "J1.q3", "J1.q1_dot", "J1.q2_dot", "J1.q3_dot",
+    ]  # fmt: skip

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dap3d_core import kernels
 from dap3d_core.scene.expressions.expression import (
     DEEPEST,
     LONGEST,
@@ -156,3 +157,10 @@ def test_any_text_is_refused_in_words_or_evaluated(text):
     assert words
     assert "\n" not in words
     assert not np.isinf(found).any()
+
+
+def test_expressions_have_all_words_of_kernels_for_numbers():
+    scalar = [name for name in kernels.__all__
+              if getattr(kernels, name).__module__.endswith("scalar_math")]  # fmt: skip
+    assert set(scalar) <= set(WORDS)
+    assert len(scalar) > 10
