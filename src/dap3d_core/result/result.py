@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.model import Model
-from dap3d_core.model.groups import Floats
+from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import read_only
 from dap3d_core.result.arrays import Arrays, arrays_of
 from dap3d_core.result.errors import ResultError, UnknownNameError, unknown
@@ -107,6 +107,7 @@ class Result:
         self._reactions: dict[str, dict[str, Reaction]] = {}
         self._forces: dict[str, ForceOutput] = {}
         self._coordinates: dict[str, JointCoordinates] = {}
+        self._whole: tuple[Result, Integers] | None = None
         self.output_cache: dict[str, Quantity] = {}
 
     @classmethod
@@ -130,6 +131,12 @@ class Result:
         """
         summary = summary_of(model)
         return cls(summary, arrays_of(rows, summary), record, lambda: (model, evaluator_of))
+
+    def at(self, index: Integers) -> "Result":
+        """The result at some of its instants, (k,) rising indices; turns are those of the whole."""
+        part = Result(self.summary, self.arrays.at(index), self.record, lambda: self._origin)
+        part._whole = self, index
+        return part
 
     def __reduce__(self) -> Any:
         """For other processes: everything but the model and the evaluator."""
@@ -306,7 +313,10 @@ class Result:
         """
         if joint not in self.summary.joint_index:
             raise unknown("joint", joint, self.summary.joint_names)
-        if joint not in self._coordinates:
+        if joint not in self._coordinates and self._whole is not None:
+            whole, index = self._whole
+            self._coordinates[joint] = whole.coordinates(joint).at(index)
+        elif joint not in self._coordinates:
             from dap3d_core.result.post.joint_coordinates import coordinates_of
 
             place = self.summary.joint_index[joint]

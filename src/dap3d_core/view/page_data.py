@@ -7,6 +7,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.result import Result, find
+from dap3d_core.result.quantities.lookup import available_outputs
 from dap3d_core.scene.scene import Scene
 from dap3d_core.view.scene3d.arrows import arrows_of
 from dap3d_core.view.scene3d.elements import elements_of
@@ -51,13 +52,15 @@ def page_data(
     notes = [*geometry.pop("notes"), *arrows.pop("notes")]
     if len(index) < len(result.t):
         notes.append(f"{len(index)} of {len(result.t)} reported instants are on this page")
+    outputs = (output.name for output in available_outputs(shown))
+    names = dict.fromkeys((*USUAL, *outputs, *quantities))
     return {
         "instants": len(index),
         "t": pack(shown.t, "<f8"),
         "poses": pack(Motion(shown).poses),
         **geometry,
         **arrows,
-        "series": [_series(shown, name) for name in dict.fromkeys((*USUAL, *quantities))],
+        "series": [_series(shown, name) for name in names],
         "asked": list(dict.fromkeys(quantities)),
         "about": _about(result, scene, notes),
     }

@@ -44,6 +44,20 @@ def test_curves_are_quantities_of_the_result(four, page):
     assert series["J1.force.norm"]["unit"] == "N"
 
 
+def test_outputs_and_joint_coordinates_are_curves():
+    """At some of the instants, too, with turns and rates of all."""
+    scene = dap.load("fourbar3")
+    scene.add_output("lift", "crank.r.z - follower.r.z")
+    result = dap.simulate(scene, t_end=0.1, dt=0.01)
+    page = dap.view(result, "J1.angle", fps=50.0)
+    series = {s["name"]: s for s in page.data["series"]}
+    for name in ("lift", "J1.angle"):
+        values = numbers(series[name]["values"], "<f8")
+        np.testing.assert_array_equal(values, result.quantity(name).values[::2])
+    rates = numbers(series["J1.angle"]["rates"], "<f8")
+    np.testing.assert_array_equal(rates, result.quantity("J1.angle_rate").values[::2])
+
+
 def test_a_thinned_page_says_so_and_keeps_exact_poses(four):
     page = dap.view(four, fps=50.0)
     assert page.instants == 6

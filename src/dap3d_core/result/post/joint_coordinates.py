@@ -40,6 +40,10 @@ class JointCoordinates:
         rates |= {f"{name}_rate": (k, True) for name, k in self.aliases.items()}
         return names | rates
 
+    def at(self, index: Integers) -> "JointCoordinates":
+        """The coordinates at some of the instants."""
+        return attrs.evolve(self, q=self.q[index], q_dot=self.q_dot[index])
+
 
 def coordinates_of(motion: JointMotions, t: Floats, u: Floats) -> JointCoordinates:
     """Coordinates of a single joint.

@@ -48,12 +48,7 @@ def at_instants(result: Result, index: Integers) -> Result:
     """A result reduced to some of its instants, with the model of the whole."""
     if len(index) == len(result.t):
         return result
-    return Result(
-        result.summary,
-        result.arrays.at(index),
-        result.record,
-        lambda: (result.model, lambda: result.evaluator),
-    )
+    return result.at(index)
 
 
 class Extent(NamedTuple):

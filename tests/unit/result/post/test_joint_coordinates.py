@@ -76,6 +76,22 @@ def test_a_file_gives_the_same(turning, tmp_path):
     assert names_of(bare, "hinge.l") == ["hinge.lambda"]
 
 
+def test_a_few_of_the_instants_have_the_turns_of_all():
+    """A page shows some instants only: between these a body may turn several times."""
+    scene = spinning("rev")
+    scene.add_force("n", "brake", body_i="disc", n=[0.0, 0.0, -20.0])
+    result = dap.simulate(scene, t_end=2.0, dt=0.01)
+    index = np.array([0, 70, 200])
+    few = result.at(index)
+    np.testing.assert_array_equal(few.t, result.t[index])
+    for name in ("hinge.angle", "hinge.angle_rate"):
+        values = result.quantity(name).values
+        np.testing.assert_array_equal(few.quantity(name).values, values[index])
+    np.testing.assert_allclose(  # moment over inertia: -20 / 0.2 rad/s^2
+        few.quantity("hinge.angle").values, RATE * few.t - 50.0 * few.t**2, atol=1e-7
+    )
+
+
 def test_names_that_a_joint_has_and_those_it_has_not(turning):
     assert [n for n in names_of(turning, "hinge.") if n.startswith(("hinge.q", "hinge.a"))] == [
         "hinge.q1", "hinge.angle", "hinge.q1_dot", "hinge.angle_rate",
