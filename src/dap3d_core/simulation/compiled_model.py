@@ -136,7 +136,7 @@ class CompiledModel:
         if scene.outputs:
             from dap3d_core.simulation.output.check_outputs import check_outputs
 
-            check_outputs(scene, self.evaluator)
+            check_outputs(scene, self.scene_text, self.evaluator)
         self.compile_time = time.perf_counter() - started
 
     @property

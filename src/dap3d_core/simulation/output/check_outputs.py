@@ -10,14 +10,14 @@ from dap3d_core.scene.errors import Key
 from dap3d_core.scene.validate.mistake_collector import located
 
 
-def check_outputs(scene: Scene, evaluator: Evaluator) -> None:
+def check_outputs(scene: Scene, scene_text: str, evaluator: Evaluator) -> None:
     """Evaluates the outputs of a scene once, in its initial state.
 
     Raises:
         SceneError: an output names a quantity that a result will not have, or is named like one.
     """
     mistakes: list[tuple[Key, Mistake]] = []
-    probe = probe_of(scene.to_toml(), evaluator)
+    probe = probe_of(scene_text, evaluator)
     reserved = {name.partition(".")[0] for name in SYSTEM}
     for name, text in scene.outputs.items():
         key = f"outputs.{name}"
