@@ -147,6 +147,13 @@ def _output(label: Any, of: Any) -> Output | Mistake:
     return Mistake("outputs", of, what, f"{quantity}:{near}" if near else "")
 
 
+def _moves_joints(parameter: SceneParameter) -> bool:
+    """True if joints may have other axes, points or poses in the scene with another value."""
+    if parameter.table == "bodies":
+        return parameter.path[2] in ("r", "p")
+    return parameter.table not in ("forces", "simulation")
+
+
 def _sources(result: Result, quantity: Quantity) -> list[Quantity]:
     """The quantity itself; of an output of the scene all others that it is computed from."""
     sources, names = [quantity], set(quantity.operands)
@@ -180,6 +187,7 @@ class Reduction:
         """
         self.compiled, self.parameters = compiled, parameters
         tables = {parameter.table for parameter in parameters}
+        self._moves_joints = any(map(_moves_joints, parameters))
         self._tables = set(TABLES) if "parameters" in tables else tables
         self.labels: dict[str, str] = {}
         self.units: dict[str, str] = {}
@@ -268,6 +276,8 @@ class Reduction:
 
     def _is_of_rows(self, quantity: Quantity) -> bool:
         """True if a quantity is computed with nothing that varies from point to point."""
+        if quantity.owner == "coordinate":
+            return not self._moves_joints
         if quantity.owner == "joint" and quantity.kind != IN_ROWS:
             return self._tables <= {"forces"}
         if quantity.owner == "force":

@@ -158,7 +158,7 @@ def _coordinate(
     kind = alias or f"coordinate q{k + 1}"
     kind, unit = (f"{kind} rate", f"{unit}/s") if is_rate else (kind, unit)
     rate = "" if is_rate else f"{owner.name}.q{k + 1}_dot"
-    return Quantity(name, values, kind, f"{kind} of {owner.name}", unit, (), "joint", rate)
+    return Quantity(name, values, kind, f"{kind} of {owner.name}", unit, (), "coordinate", rate)
 
 
 def _coordinate_names(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
