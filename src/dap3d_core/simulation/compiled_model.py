@@ -119,6 +119,8 @@ class CompiledModel:
         self.requested_method = requested = method or str(scene.simulation.method)
         self._breakpoints: dict[float, Breakpoints] = {}
         self._starts: dict[tuple[bool, tuple[str, ...], str], InitialState] = {}
+        #: Equilibria that runs start at, by the options of ``start``; each is found once.
+        self.rest_states: dict[tuple[bool, tuple[str, ...], str], StartState] = {}
         self._own = _Evaluators()
         self._first_method = self.method = choose_method(self.model, requested)[0]
         self._own.stack.append(self.new_evaluator(announce))

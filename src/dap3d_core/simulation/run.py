@@ -127,12 +127,14 @@ class Run(RunState):
         """The initial state, corrected where the settings say so; its rank must suit the method."""
         settings, scene = self.settings, self.compiled.scene
         metric = str(settings.correct_metric)
-        how = bool(settings.correct), settings.hold, metric
-        state = self.start
+        how = bool(settings.correct), tuple(settings.hold), metric
+        state, found = self.start, self.compiled.rest_states
         if state is None and settings.start == "equilibrium":
-            from dap3d_core.simulation.equilibrium.rest import start_at_rest
+            if how not in found:
+                from dap3d_core.simulation.equilibrium.rest import start_at_rest
 
-            state = start_at_rest(self.evaluator, self.compiled.start(*how).u)
+                found[how] = start_at_rest(self.evaluator, self.compiled.start(*how).u)
+            state = found[how]
         start = self.compiled.start(*how, state)
         self.notes += start_notes(start, self.evaluator, scene)
         self.notes += self.compiled.breakpoints(self.t_end).notes(

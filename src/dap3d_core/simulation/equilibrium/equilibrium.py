@@ -177,12 +177,10 @@ def equilibrium(
     if not isinstance(compiled, CompiledModel):
         compiled = CompiledModel(scene, allow_code=allow_code, announce=announce)  # type: ignore[arg-type]
     settings = compiled.scene.simulation
-    first = compiled.start(
-        True,
-        settings.hold,
-        str(settings.correct_metric),
-        None if start is None else start_state(start, compiled.model, compiled.checked.registry),
-    )
+    state = None
+    if start is not None:
+        state = start_state(start, compiled.model, compiled.checked.registry)
     with compiled.borrow_evaluator() as evaluator:
+        first = compiled.start(True, settings.hold, str(settings.correct_metric), state)
         rest = find_rest(evaluator, first.u, first.angles)
         return Equilibrium(compiled, rest, tuple(compiled.notes))

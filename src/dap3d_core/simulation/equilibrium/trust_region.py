@@ -52,7 +52,7 @@ def trust_region_step(
     w, Q = np.linalg.eigh(symmetric)
     share, zero = Q.T @ g, zero_stiffness(w, size)
     held = np.abs(w) > zero if leaves else w > zero
-    idle = ~held & (np.abs(share) <= BALANCED * size)
+    idle = ~held & (np.abs(share) <= BALANCED * size / np.sqrt(max(len(share), 1)))
     w, Q, share = w[~idle], Q[:, ~idle], share[~idle]
     if not len(w):
         return Step(np.zeros_like(g), 0.0, True)
