@@ -14,7 +14,7 @@ from dap3d_core.formulations import PROJECT, RHS
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
-from dap3d_core.integrators.stepping.singular_poses import RATE
+from dap3d_core.integrators.stepping.singular_poses import NOW, RATE, forget_measures
 from dap3d_core.result import INFORMATION
 from dap3d_core.simulation.run_state import RunState
 
@@ -24,7 +24,7 @@ WHY_STIFF = "motions that have died away limit the steps, not the error of those
 #: A singular pose is met where it is less than this part of the run away.
 NEAR = 0.05
 #: Rates of lengths are taken over this part of the run.
-APART = 1e-6
+APART = 1e-5
 #: The implicit integrator takes over again behind this many times the way to the pose.
 BEHIND = 3.0
 #: A length that goes to zero with a higher power of the time left than this is not near zero.
@@ -84,7 +84,7 @@ def take_over(integration: Integration, before: Integration) -> None:
     work.near_singular_landings = work.stalled_steps = 0
     work.stiff_steps = work.nonstiff_steps = 0
     if not integration.implicit:
-        work.lengths[:] = np.nan
+        forget_measures(work)
     integration.restart()
 
 
@@ -118,15 +118,15 @@ def _aim_across(run: RunState, left: float) -> None:
     """Let the first step of the explicit integration be one across: a trial step goes closer."""
     present = run.present
     span = run.t_end
-    present.work.lengths[:] = lengths_at(run.evaluator, present.t, present.y, span)
+    present.work.lengths[[NOW, RATE]] = lengths_at(run.evaluator, present.t, present.y, span)
     present.work.h = left / present.work.widest_gap_abscissa
 
 
 @IGNORE_FLOAT_ERRORS
 def lengths_at(evaluator: Evaluator, t: float, y: Floats, span: float) -> Floats:
-    """(2, m) lengths that projection gives, and their rates, as crossing.py has them.
+    """(2, m) lengths that projection gives, and their rates, as singular_poses.py has them.
 
-    A length that goes to zero with a power of the time left is given the mean rate until then.
+    A length that falls ever slower is given the mean rate until it vanishes.
 
     Args:
         evaluator: the model.
@@ -136,18 +136,22 @@ def lengths_at(evaluator: Evaluator, t: float, y: Floats, span: float) -> Floats
     slope, h = np.zeros_like(y), APART * span
     evaluator.functions[RHS](t, y, slope, evaluator.system, evaluator.loops)
     now, before, earlier = (_lengths(evaluator, t - k * h, y - k * h * slope) for k in range(3))
-    rate = (now - before) / h
-    return np.array([now, rate / _orders(now, rate, (now - 2.0 * before + earlier) / h**2)])
+    rate, bend = (now - before) / h, (now - 2.0 * before + earlier) / h**2
+    return np.array([now, mean_rate(now, rate, bend)])
 
 
 @np.errstate(all="ignore")
-def _orders(now: Floats, rate: Floats, bend: Floats) -> Floats:
-    """(m,) powers of the time left with which lengths that fall go to zero: 1, or more.
+def mean_rate(now: Floats, rate: Floats, bend: Floats) -> Floats:
+    """(m,) mean rates of lengths that fall ever slower until they vanish; of others their rates.
 
-    As many as the freedoms that a pose opens at once, for c d^k: 1 - now bend / rate^2 = 1 / k.
+    By the parabola of these second derivatives; where it does not reach zero by a power of the time
+    left: the powers of c d^k are k, for 1 - now bend / rate^2 = 1 / k.
     """
-    orders = np.rint(1.0 / (1.0 - now * bend / rate**2))
-    return np.where((rate < 0.0) & (orders > 1.0) & (orders <= HIGHEST), orders, 1.0)
+    inside = rate**2 - 2.0 * bend * now
+    powers = np.rint(1.0 / (1.0 - now * bend / rate**2))
+    powers = np.where((powers > 1.0) & (powers <= HIGHEST), powers, 1.0)
+    mean = np.where(inside >= 0.0, 0.5 * (rate - np.sqrt(inside)), rate / powers)
+    return np.where((rate < 0.0) & (bend > 0.0), mean, rate)
 
 
 def time_left(lengths: Floats, span: float) -> float:

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dap3d_core.formulations.common.constraints import PART as REGULAR
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.stabilized_index2.jacobian_tables import coupled_bodies, make_tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
@@ -20,6 +19,12 @@ from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.restore import check_alike, check_pivots, restored
 from dap3d_core.integrators.stepping.rounding import SMALLEST_ATOL
 from dap3d_core.linear.lu.plan import LuPlan, make_lu_plan
+
+#: e_i of a tangent with dependent rows as part of the squared length of row i. Rows that depend on
+#: others on the constraints alone, as those of Bennett's linkage, are independent by d aside, where
+#: predicted stages are: below d^2 of this part the tangent takes them for rows that hold the motion
+#: (docs/decisions/0033). Above, rows that are as little independent converge slowly.
+REGULAR = 1e-6
 
 
 class Effort(NamedTuple):

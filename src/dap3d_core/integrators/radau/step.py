@@ -44,7 +44,7 @@ from dap3d_core.integrators.stepping.integration_state import (
 from dap3d_core.integrators.stepping.output import dense_state, may_step, project_state
 from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.step_control import (
-    ACROSS_A_SWITCH,
+    STEP_CUT,
     LARGEST,
     STEP_AFTER_FAILURE,
     STEP_AFTER_SINGULAR_END,
@@ -161,7 +161,7 @@ def step(
         if failure == RUNNING:
             find_slope(t, h, work, system, loops, tangent, matrix)
             failure = complete_step(work, t1, h, watch, system, loops)
-        if failure == ACROSS_A_SWITCH:
+        if failure == STEP_CUT:
             return
         if failure == RUNNING and adaptive and lands_near_singularity(work, t1):
             work.near_singular_landings += 1
@@ -263,7 +263,7 @@ def complete_step(
     if not all_finite(slope):
         return NOT_FINITE
     if work.switch_count != 0 and end_is_across(work, t1, slope, watch, system, loops):
-        return ACROSS_A_SWITCH
+        return STEP_CUT
     if work.has_dense_output != 0 and work.times[work.next_report] < t1:
         prepare_dense(h, work)
     return RUNNING

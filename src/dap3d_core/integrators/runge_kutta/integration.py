@@ -9,6 +9,7 @@ from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.step import advance
 from dap3d_core.integrators.runge_kutta.tableau import Tableau, combinations
 from dap3d_core.integrators.stepping.integration import Integration
+from dap3d_core.integrators.stepping.singular_poses import ROWS
 
 
 class RungeKutta(Integration):
@@ -43,7 +44,7 @@ class RungeKutta(Integration):
             "k": np.zeros((len(method.a), size)),
             "terms": np.zeros((4 + len(method.d), size)),
             "table": combinations(method),
-            "lengths": np.full((2, length_count), np.nan),
+            "lengths": np.full((ROWS, length_count), np.nan),
         }
 
     def _advance(self, budget: int) -> None:

@@ -20,4 +20,4 @@ class RungeKuttaState(IntegrationState):
     k: Floats  # (S, n) stages; k[0] is f(t, y)
     terms: Floats  # (4 + rows of d, n) of the dense output over the last step
     table: Floats  # tableau.combinations
-    lengths: Floats  # (2, m) singularity measures at t, their rates over the last step
+    lengths: Floats  # (ROWS, m) singularity measures (stepping/singular_poses.py)

@@ -6,8 +6,8 @@ It knows a vector y and first-class functions ``f(t, y, out, system, loops)``:
     project  moves y onto its constraints in place; on entry out[0] = 1 means that rhs was the last
              one called, at this very t and y. Then out[0] = 1 where y changed by more than the
              rounding of a normalisation, out[1] = 1 where that failed, 2 where the state is too
-             close to a singular one to continue; out[4:] = lengths that go linearly through zero
-             at a singular state
+             close to a singular one to continue; out[4:] = singularity measures, which go through
+             zero at a singular state (stepping/singular_poses.py)
     report   out = what else is reported at (t, y): accelerations, multipliers, ...
     accepted (only where something is watched) takes note of an accepted state
     watch    (only where there are switches) gives their values (stepping/event_location.py)
@@ -20,6 +20,7 @@ Wanner, Solving Ordinary Differential Equations I (HNW), II.4 to II.6.
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -50,17 +51,21 @@ from dap3d_core.integrators.stepping.output import (
 )
 from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.singular_poses import (
+    is_approaching,
     is_near_singularity,
     limit_step_at_singularity,
     predict_measures,
+    record_singularity,
     time_to_singularity,
     update_measures,
 )
 from dap3d_core.integrators.stepping.step_control import (
-    ACROSS_A_SWITCH,
     LARGEST,
+    SINGULAR_END_ATTEMPTS,
+    SINGULAR_END_REACH,
     STEP_AFTER_FAILURE,
     STEP_AFTER_SINGULAR_END,
+    STEP_CUT,
     accept,
     combined_error,
     end_of_step,
@@ -78,8 +83,8 @@ from dap3d_core.kernels.runtime.cache import compiled
 
 #: Near a singular state nothing is known better than to this part of the largest component.
 POSITION_NOISE = 1e-11
-#: Projection may move a result by this part of it, and no more: the error of what it takes away
-#: shows no other branch.
+#: Projection may move a result, or a stage, by this part of it, and no more: the error of what it
+#: takes away shows no other branch.
 MAX_PROJECTION = 1e-2
 #: An error up to this may be rounding.
 MAX_ROUNDING_ERROR = 100.0
@@ -141,13 +146,12 @@ def step(
         error = error_above_rounding(work, near, h, error)
     if error <= 1.0:
         failure = complete_step(work, t1, near, rhs, project, watch, system, loops)
-        if failure == ACROSS_A_SWITCH:
+        if failure == STEP_CUT:
             return
-        if failure == RUNNING and adaptive and not near and lands_near_singularity(work, t1):
+        if failure == RUNNING and adaptive and not near and should_land_elsewhere(work, t1):
             work.near_singular_landings += 1
             predict_measures(work, h)
-            is_ahead = limit_step_at_singularity(work, h) < h
-            reject(work, t1, h if is_ahead else h * STEP_AFTER_SINGULAR_END, STEP_FLOOR)
+            reject(work, t1, step_after_singular_end(work, h), STEP_FLOOR)
         elif failure == RUNNING:
             work.near_singular_landings = 0
             if time_to_singularity(work, h) < h:
@@ -162,6 +166,27 @@ def step(
         reject(work, t1, h * step_reduction(work, error), STEP_FLOOR)
     else:
         reject(work, t1, h * STEP_AFTER_FAILURE, NOT_FINITE)
+
+
+@compiled
+def should_land_elsewhere(work: RungeKuttaState, t1: float) -> bool:
+    """True if a step ends close to a singular state that lies ahead: behind it, it leaves that."""
+    return lands_near_singularity(work, t1) and is_approaching(work)
+
+
+@compiled
+def step_after_singular_end(work: RungeKuttaState, h: float) -> float:
+    """The step to be tried after one of length h that would end close to a singular state.
+
+    Stages on the constraints allow a step across that is several times as long: it is tried where
+    errors bring the motion close to the state in steps too short to be placed about it.
+    """
+    if limit_step_at_singularity(work, h) < h:
+        return h
+    left = time_to_singularity(work, 0.5 * SINGULAR_END_REACH * h)
+    if left < SINGULAR_END_REACH * h:
+        return left / work.widest_gap_abscissa
+    return h * STEP_AFTER_SINGULAR_END
 
 
 @compiled
@@ -200,7 +225,7 @@ def take_stages(
 ) -> bool:
     """Stages and trial state of a step to t1; each on the constraints if ``near``.
 
-    False where one of them lies beyond a switch.
+    False where one of them lies beyond a switch, or at a singular state: then the step is cut.
     """
     k, table = work.k, work.table
     stages, watched = work.stage_count, work.switch_count != 0
@@ -214,6 +239,8 @@ def take_stages(
             if near:
                 project_stage(work, t, x, project, system, loops)
                 x = work.state[SCRATCH]
+                if cut_at_stage(work, t, t1):
+                    return False
             if watched and is_sample_across(work, t, x, watch, system, loops):
                 return False
             work.rhs_count += 1
@@ -222,11 +249,45 @@ def take_stages(
 
 
 @compiled
+def cut_at_stage(work: RungeKuttaState, t: float, t1: float) -> bool:
+    """Cut a step to t1, near a singular state, whose projected stage at t is of no use; whether so.
+
+    Projection of what is far from the constraints may lead to any branch. A stage at the singular
+    state has rates that are not known, and tells where that is: the step is placed about it.
+    """
+    h, jump = t1 - work.t, projection_jump(work, work.state[OTHER], work.state[SCRATCH])
+    if not jump <= 1.0:
+        reject(work, t1, h * max(work.factor_min, work.safety / math.sqrt(jump)), STEP_FLOOR)
+        return True
+    has_choice = t1 + step_floor(work) < work.t_limit
+    if work.near_singular_landings >= SINGULAR_END_ATTEMPTS or not has_choice:
+        return False
+    if not record_singularity(work, t - work.t):
+        return False
+    work.near_singular_landings += 1
+    reject(work, t1, h, STEP_FLOOR)
+    return True
+
+
+@compiled
+def projection_jump(work: RungeKuttaState, before: Floats, after: Floats) -> float:
+    """The change of a state by projection, in parts of what it may be in a step."""
+    y, jump = work.state[Y], 0.0
+    for i in range(work.error_size):
+        largest = MAX_PROJECTION * (1.0 + max(abs(y[i]), abs(after[i])))
+        ratio = abs(after[i] - before[i]) / largest
+        if not ratio <= jump:
+            jump = ratio
+    return jump
+
+
+@compiled
 def project_stage(
     work: RungeKuttaState, t: float, x: Floats, project: Function, system: Any, loops: Any
 ) -> None:
-    """Project the state x of a stage into the scratch row (x may be that row)."""
+    """Project the state x of a stage into the scratch row (x may be that); as it was: OTHER."""
     argument = work.state[SCRATCH]
+    copy(work.state[OTHER], x)
     copy(argument, x)
     project_state(work, t, argument, project, system, loops)
 
@@ -244,12 +305,7 @@ def projected_error_norm(
     y, trial, result, other = (work.state[Y], work.state[TRIAL], work.state[SCRATCH],
                                work.state[OTHER])  # fmt: skip
     project_stage(work, t1, trial, project, system, loops)
-    jump = 0.0
-    for i in range(work.error_size):
-        largest = MAX_PROJECTION * (1.0 + max(abs(y[i]), abs(result[i])))
-        ratio = abs(result[i] - trial[i]) / largest
-        if not ratio <= jump:
-            jump = ratio
+    jump = projection_jump(work, trial, result)
     if not jump <= 1.0:
         return jump
     least, main = 0.0, 0.0
@@ -301,19 +357,12 @@ def complete_step(
     known, watched = work.error_uses_last_stage != 0, work.switch_count != 0
     here, controlled = known and not near, work.fixed_step == 0.0 and not near
     if work.has_dense_output != 0 and times[work.next_report] < t1:
-        t, argument, table = work.t, work.state[SCRATCH], work.table
         if not known:
             work.rhs_count += 1
             rhs(t1, trial, k[result], system, loops)
             known = True
-        for i in range(result + 1, k.shape[0]):
-            at = t + table[i, ABSCISSA] * (t1 - t)
-            combine(argument, 1.0, y, t1 - t, table, i, k)
-            if near:
-                project_stage(work, at, argument, project, system, loops)
-            if watched and is_sample_across(work, at, argument, watch, system, loops):
-                return ACROSS_A_SWITCH
-            rhs(at, argument, k[i], system, loops)
+        if not take_dense_stages(work, t1, near, rhs, project, watch, system, loops):
+            return STEP_CUT
         work.rhs_count += k.shape[0] - 1 - result
         here = here and k.shape[0] == result + 1
         prepare_dense(work, t1)
@@ -336,9 +385,36 @@ def complete_step(
     if known and not all_finite(k[result]):
         return NOT_FINITE
     if watched and end_is_across(work, t1, k[result], watch, system, loops):
-        return ACROSS_A_SWITCH
+        return STEP_CUT
     work.first_stage_valid = 1 if known else 0
     return RUNNING
+
+
+@compiled
+def take_dense_stages(
+    work: RungeKuttaState,
+    t1: float,
+    near: bool,
+    rhs: Function,
+    project: Function,
+    watch: Function,
+    system: Any,
+    loops: Any,
+) -> bool:
+    """The further stages that dense output needs; False as for ``take_stages``."""
+    t, argument, table, k = work.t, work.state[SCRATCH], work.table, work.k
+    watched = work.switch_count != 0
+    for i in range(work.stage_count + 1, k.shape[0]):
+        at = t + table[i, ABSCISSA] * (t1 - t)
+        combine(argument, 1.0, work.state[Y], t1 - t, table, i, k)
+        if near:
+            project_stage(work, at, argument, project, system, loops)
+            if cut_at_stage(work, at, t1):
+                return False
+        if watched and is_sample_across(work, at, argument, watch, system, loops):
+            return False
+        rhs(at, argument, k[i], system, loops)
+    return True
 
 
 @compiled

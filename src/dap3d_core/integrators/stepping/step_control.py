@@ -28,9 +28,11 @@ LARGEST = 1.7976931348623157e308
 #: Factor on a step that met a number that is not finite, or whose end could not be projected.
 STEP_AFTER_FAILURE = 0.1
 #: What completing a step gives besides a status: the step was cut.
-ACROSS_A_SWITCH = -1
+STEP_CUT = -1
 #: Factor on a step that ends near a singular state, and how often in a row that is tried.
 STEP_AFTER_SINGULAR_END, SINGULAR_END_ATTEMPTS = 0.6, 4
+#: A singular state this many such steps ahead is stepped across at once.
+SINGULAR_END_REACH = 5.0
 #: The last step is stretched by at most this factor, to end at t_end.
 STRETCH = 1.01
 

@@ -20,7 +20,7 @@ from dap3d_core.integrators.stepping.singular_poses import (
 def state_of(*pairs, gap=0.5):
     """State with (measure, rate) of each node, and the middle of the widest gap."""
     run = RungeKutta(TABLEAUS["dop853"], [], (), (), [0.0], [0.0, 1.0], length_count=len(pairs))
-    run.work.lengths[:] = np.transpose(pairs)
+    run.work.lengths[[NOW, RATE]] = np.transpose(pairs)
     run.work.widest_gap_abscissa = gap
     return run.work
 
