@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.integrators import Integration, StepCounts
+from dap3d_core.model.state_layout import integrated_layout
 from dap3d_core.result import INFORMATION, EventRecord, RunMetadata, RunStatistics
 from dap3d_core.scene import Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -180,6 +181,7 @@ class RunState:
                 "atol": self.settings.atol,
                 "length": self.evaluator.model.length,
                 "most_work": max((run.largest_work for run in self.integrations), default=0.0),
+                **self._rate_noise(),
                 "step": self.settings.step,
                 "project": bool(self.settings.project),
                 "correct": bool(self.settings.correct),
@@ -190,3 +192,15 @@ class RunState:
                 "method": self.compiled.requested_method,
             },
         )
+
+    def _rate_noise(self) -> dict[str, dict[str, float]]:
+        """Largest rounding of accelerations, m/s^2 and rad/s^2, where it limits the accuracy."""
+        part = integrated_layout(self.evaluator.model.body_count)["velocities"]
+        noise = np.zeros(6)
+        for integration in self.integrations:
+            rows = integration.rate_noise[part].reshape(-1, 6)
+            noise = np.maximum(noise, rows.max(axis=0, initial=0.0))
+        if not noise.any():
+            return {}
+        v, w = np.linalg.norm(noise.reshape(2, 3), axis=1).tolist()
+        return {"rate_noise": {"v": v, "w": w}}

@@ -44,10 +44,10 @@ from dap3d_core.integrators.stepping.integration_state import (
 from dap3d_core.integrators.stepping.output import dense_state, may_step, project_state
 from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.step_control import (
-    STEP_CUT,
     LARGEST,
     STEP_AFTER_FAILURE,
     STEP_AFTER_SINGULAR_END,
+    STEP_CUT,
     end_of_step,
     first_step,
     lands_near_singularity,

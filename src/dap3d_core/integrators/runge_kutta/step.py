@@ -255,6 +255,8 @@ def cut_at_stage(work: RungeKuttaState, t: float, t1: float) -> bool:
     Projection of what is far from the constraints may lead to any branch. A stage at the singular
     state has rates that are not known, and tells where that is: the step is placed about it.
     """
+    if work.fixed_step != 0.0:
+        return False
     h, jump = t1 - work.t, projection_jump(work, work.state[OTHER], work.state[SCRATCH])
     if not jump <= 1.0:
         reject(work, t1, h * max(work.factor_min, work.safety / math.sqrt(jump)), STEP_FLOOR)
@@ -353,7 +355,7 @@ def complete_step(
     no more than the step's error may be, the next step starts with the value all the same.
     """
     times, k = work.times, work.k
-    y, trial, result = work.state[Y], work.state[TRIAL], work.stage_count
+    trial, result = work.state[TRIAL], work.stage_count
     known, watched = work.error_uses_last_stage != 0, work.switch_count != 0
     here, controlled = known and not near, work.fixed_step == 0.0 and not near
     if work.has_dense_output != 0 and times[work.next_report] < t1:

@@ -306,6 +306,15 @@ class Integration(Restorable):
         return float(self.work.largest_work)
 
     @property
+    def rate_noise(self) -> Floats:
+        """(n,) change of dy/dt by the last digits of y, where that is more than errors of a step.
+
+        As measured last (stepping/rounding.py); zeros where it was not.
+        """
+        noise: Floats = self.work.tolerance[at.NOISE].copy()
+        return noise
+
+    @property
     def t_stiff(self) -> float | None:
         """Time since which the scene is stiff for this method, if noticed (stiffness.py)."""
         found = float(self.work.t_stiff)
