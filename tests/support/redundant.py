@@ -134,3 +134,47 @@ def error_of(found, reference):
     """The error e of benchmarks.md, section 0, with y_thr = 1e-3; both (nt, components)."""
     size = np.maximum(np.abs(reference), 1e-3)
     return float(np.sqrt(np.mean(((found - reference) / size) ** 2)))
+
+
+def driven_four_bar():
+    """One parallelogram of A02 without its freedom: the first crank is turned at -1 rad/s."""
+    scene = four_bars(1)
+    scene.add_function("a", "turn", coeff=(0.0, -1.0, 0.0))
+    scene.add_joint("drive-rot", "motor", body_i="crank0", body_j="ground", a_j="ground.z",
+                    function="turn")  # fmt: skip
+    return scene
+
+
+def dead_centre():
+    """A slider-crank of 1 m and 2 m, driven by its slider: x = 3 - (1 - t)^2 / 2.
+
+    At its dead centre, t = 1 s, the crank may swing to either side and the rod about its axis.
+    """
+    angle, other = (float(v) for v in dead_centre_angles(np.zeros(1))[:, 0])
+    scene = dap.Scene(name="dead centre")
+    for name, length, mass_moment, turn, first in (
+        ("crank", 1.0, 1 / 12, angle, (0.0, 0.0)),
+        ("rod", 2.0, 1 / 3, -other, (np.cos(angle), np.sin(angle))),
+    ):
+        along = 0.5 * length * np.array([np.cos(turn), np.sin(turn)])
+        scene.add_body(name, mass=1.0, Jp=(1e-3, mass_moment, mass_moment),
+                       r=(*(np.array(first) + along), 0.0),
+                       p=(np.cos(0.5 * turn), 0.0, 0.0, np.sin(0.5 * turn)))  # fmt: skip
+        scene.add_point(f"{name}_start", name, (-0.5 * length, 0.0, 0.0))
+        scene.add_point(f"{name}_end", name, (0.5 * length, 0.0, 0.0))
+    scene.add_body("slider", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(2.5, 0.0, 0.0), r_dot=(1.0, 0.0, 0.0))
+    scene.add_joint("rev", "A", P_i="crank_start", P_j="ground.O", a_i="crank.z", a_j="ground.z")
+    scene.add_joint("sph", "B", P_i="rod_start", P_j="crank_end")
+    scene.add_joint("univ", "C", P_i="rod_end", P_j="slider.O", a_i="rod.z", n_j="slider.x")
+    scene.add_joint("tran", "S", P_i="slider.O", P_j="ground.O", a_j="ground.x")
+    scene.add_function("a", "push", coeff=(0.0, -1.0, 0.5))
+    scene.add_joint("drive-tran", "drive", P_i="slider.O", P_j="ground.O", a_j="ground.x",
+                    function="push")  # fmt: skip
+    return scene
+
+
+def dead_centre_angles(t):
+    """(2, nt) angles of crank and rod to the line of the slider: the crank goes through."""
+    x = 3.0 - 0.5 * (1.0 - t) ** 2
+    angle = np.sign(1.0 - t) * np.arccos(np.clip((x**2 - 3.0) / (2.0 * x), -1.0, 1.0))
+    return np.array([angle, np.arcsin(0.5 * np.sin(angle))])

@@ -24,6 +24,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.stiffness import detect_stiffness
 from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA
@@ -148,10 +150,12 @@ def step(
         failure = complete_step(work, t1, near, rhs, project, watch, system, loops)
         if failure == STEP_CUT:
             return
-        if failure == RUNNING and adaptive and not near and should_land_elsewhere(work, t1):
+        other = 0.0
+        if failure == RUNNING and adaptive and not near:
+            other = step_elsewhere(work, t1, h)
+        if other > 0.0:
             work.near_singular_landings += 1
-            predict_measures(work, h)
-            reject(work, t1, step_after_singular_end(work, h), STEP_FLOOR)
+            reject(work, t1, other, STEP_FLOOR)
         elif failure == RUNNING:
             work.near_singular_landings = 0
             if time_to_singularity(work, h) < h:
@@ -169,24 +173,22 @@ def step(
 
 
 @compiled
-def should_land_elsewhere(work: RungeKuttaState, t1: float) -> bool:
-    """True if a step ends close to a singular state that lies ahead: behind it, it leaves that."""
-    return lands_near_singularity(work, t1) and is_approaching(work)
-
-
-@compiled
-def step_after_singular_end(work: RungeKuttaState, h: float) -> float:
-    """The step to be tried after one of length h that would end close to a singular state.
+def step_elsewhere(work: RungeKuttaState, t1: float, h: float) -> float:
+    """Length of a better step than that to t1, which ends close to a singular state; 0 if none is.
 
     Stages on the constraints allow a step across that is several times as long: it is tried where
-    errors bring the motion close to the state in steps too short to be placed about it.
+    errors bring the motion close to the state in steps too short to be placed about it. Behind the
+    state, or while it is out of reach, there is none.
     """
+    if not (lands_near_singularity(work, t1) and is_approaching(work)):
+        return 0.0
+    predict_measures(work, h)
     if limit_step_at_singularity(work, h) < h:
         return h
-    left = time_to_singularity(work, 0.5 * SINGULAR_END_REACH * h)
+    left = time_to_singularity(work, work.times[-1] - work.t)
     if left < SINGULAR_END_REACH * h:
         return left / work.widest_gap_abscissa
-    return h * STEP_AFTER_SINGULAR_END
+    return 0.0 if left < np.inf else h * STEP_AFTER_SINGULAR_END
 
 
 @compiled

@@ -11,8 +11,10 @@ from dap3d_core.integrators.stepping.integration_state import MEASURES
 from dap3d_core.integrators.stepping.singular_poses import (
     NOW,
     RATE,
+    SLOPE,
     is_near_singularity,
     limit_step_at_singularity,
+    record_singularity,
     update_measures,
 )
 
@@ -50,13 +52,45 @@ def test_nothing_ahead_leaves_the_step_alone():
 
 
 def test_lengths_count_from_the_far_side_after_a_crossing():
-    """They are square roots and turn round at zero: -0.2 -> 0.3 is a rate of 0.5, and of the row
+    """They turn round at zero: -0.2 -> 0.3 is a rate of 0.5, and of the row
     that did not cross -0.1."""
     state = state_of((0.2, -0.5), (1.0, -0.1))
     state.real[MEASURES:] = 0.3, 0.9
     update_measures(state, 1.0)
     assert state.lengths[NOW] == pytest.approx([0.3, 0.9])
     assert state.lengths[RATE] == pytest.approx([0.5, -0.1])
+
+
+@pytest.mark.parametrize(("linear", "square"), [(1.0, 0.0), (0.4, 1.3), (0.0, 2.0)])
+def test_a_measure_that_falls_ever_slower_is_prolonged_by_its_parabola(linear, square):
+    """a d + b d^2 at d = 3, 2.4, 1.5, at one unit of d in a second: 1.5 s are left."""
+    state = state_of((np.nan, np.nan))
+    for distance, h in ((3.0, 1.0), (2.4, 0.6), (1.5, 0.9)):
+        state.real[MEASURES:] = linear * distance + square * distance**2
+        update_measures(state, h)
+    left = -state.lengths[NOW, 0] / state.lengths[RATE, 0]
+    assert left == pytest.approx(1.5, rel=1e-7)  # a double root is known to the root of rounding
+
+
+def test_a_step_before_the_one_across_does_not_reach_the_singular_state():
+    """Where the measure is steeper than its mean rate says, the estimate is as likely too long."""
+    state = state_of((2.0, -1.0))
+    state.lengths[SLOPE] = -2.0
+    assert limit_step_at_singularity(state, 1.5) == pytest.approx(0.5)
+
+
+def test_a_stage_on_the_singular_state_tells_when_it_is():
+    """Seen from 1 unit away: at 0.01 it is there, at 0.1 it is not."""
+    state = state_of((1.0, -0.2))
+    state.lengths[SLOPE] = -0.2
+    state.real[MEASURES:] = 0.1
+    assert not record_singularity(state, 2.0)
+    state.real[MEASURES:] = 0.01
+    assert record_singularity(state, 2.0)
+    assert limit_step_at_singularity(state, 5.0) == pytest.approx(4.0)
+    state.real[MEASURES:] = 0.5
+    update_measures(state, 0.5)
+    assert state.lengths[RATE] == pytest.approx([-0.5 / 1.5])  # as the stage has told
 
 
 def test_the_middle_of_the_widest_gap():
