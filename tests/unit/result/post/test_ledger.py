@@ -92,6 +92,34 @@ def test_rounding_of_a_system_at_rest_is_no_imbalance():
     assert entry.ok is True, entry
 
 
+def test_energy_is_compared_with_the_work_of_each_kind_of_force():
+    """A weight gives 2 J, which friction takes away but for 1e-6 J that is missing: 5e-7 of 2 J,
+    whatever the zero of the potential."""
+    result, _, _ = circling()
+    model = result.model
+    work, potential = np.linspace(0.0, 1e-6, len(result.t)), np.linspace(7.0, 5.0, len(result.t))
+    still = np.tile(model.u0, (len(result.t), 1))
+    still[:, 7:] = 0.0
+    rows = rows_of(
+        model, result.t, still, np.zeros_like(result.v_dot), 0.0 * result.Lam, work, potential
+    )
+    entry = result_of(circling_scene(), rows, model).ledger["energy"]
+    assert entry.value == pytest.approx(5e-7)
+
+
+def test_rounding_of_the_rates_widens_the_limit_of_the_energy():
+    """Rates known to b = 1e-3 m/s^2 leave velocities known to b T, energies to m v b T."""
+    entries = []
+    for more in ({}, {"rate_noise": {"v": 1e-3, "w": 0.0}}):
+        result, _, _ = circling(settings=CONTROLLED | more)
+        entries.append(result.ledger["energy"])
+    speed = np.max(np.linalg.norm(result.rd, axis=2) @ result.subject.mass)
+    scale = np.max(result.energy.kinetic)
+    span = result.t[-1] - result.t[0]
+    wider = entries[1].limit - entries[0].limit
+    assert wider == pytest.approx(1e-3 * speed * span / scale, rel=0.02)  # slow: atol / rtol
+
+
 def test_momentum_is_in_the_ledger_where_nothing_acts_from_outside():
     """Free bodies, bodies joined to one another; not with ground in a joint."""
     for result in (drifting(), drifting(joint=True)):
