@@ -84,6 +84,9 @@ def test_what_is_no_start_is_refused(dap3d, folder, words, message):
 
 def test_a_result_of_another_scene_is_refused(dap3d, folder):
     dap3d("run", "toggle.toml", "--t-end", "0.1", "-o", "a.nc")
+    done = dap3d("equilibrium", "toggle.toml", "--from", "a.nc", "-o", "a.nc", "--force")
+    assert done.returncode == 2
+    assert "a.nc is the input file" in done.stderr
     for command in ("run", "equilibrium"):
         done = dap3d(command, "ball.toml", "--from", "a.nc")
         assert done.returncode == 2

@@ -57,8 +57,10 @@ def equilibrium(
     from dap3d_core.scene import SceneError
 
     scene = dap.load(model)
-    target = None if output is None else writable(Path(output), force=force, sources=(scene.path,))
-    start = None if start_file is None else open_state(start_file)[0]
+    start, source = (None, None) if start_file is None else open_state(start_file)
+    target = None
+    if output is not None:
+        target = writable(Path(output), force=force, sources=(scene.path, source))
     with PreparationProgress(quiet=quiet or as_json) as progress:
         try:
             found = dap.equilibrium(

@@ -59,7 +59,8 @@ class Search:
         steps: how many were taken.
         started_balanced: the start is an equilibrium.
         left: the motion came to an unstable equilibrium, and left it to an arbitrary side.
-        motion: (n, 6) the last displacement, m, and rotation vector, rad, of each body.
+        motion: (n, 6) the last displacement, in parts of the scene's length, and rotation vector,
+            rad, of each body.
     """
 
     outcome: Outcome
