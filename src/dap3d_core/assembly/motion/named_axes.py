@@ -108,13 +108,19 @@ class NamedAxes:
         return (first.name, first.slot), sense * exact.value
 
     def _through(self, centre: Floats, axis: Floats) -> tuple[tuple[str, str], Floats]:
-        """(name, slot) of the first point on lines through centres (m, 3), and that point."""
-        for point in self.points:
-            arm = point.value - centre
+        """(name, slot) of the first point on lines through centres (m, 3), and such a point.
+
+        Its numbers are those of a point of body i where one is there, as in ``_along``.
+        """
+        matches = []
+        for named in self.points:
+            arm = named.value - centre
             off = arm - axis * np.sum(arm * axis, axis=-1, keepdims=True)
             if _are_small(off, SAME * self._length):
-                return (point.name, point.slot), point.value
-        return ("", self.slots[-1]), centre
+                matches.append(named)
+        if not matches:
+            return ("", self.slots[-1]), centre
+        return (matches[0].name, matches[0].slot), matches[-1].value
 
     def _about(self, kind: str, screw: Floats) -> tuple[tuple[str, str], Floats]:
         """(name, slot) of the axis of a rotation or screw (m, 6), and the same about it exactly."""

@@ -150,3 +150,17 @@ def test_scale_does_not_matter(scale):
     assert small.parts == usual.parts
     units = np.repeat([scale, 1.0], 3)
     np.testing.assert_allclose(small.screws / units, usual.screws, atol=1e-12)
+
+
+def test_named_axes_have_the_numbers_of_the_scene():
+    """The twist of a revolute joint is a_i and P_i x a_i to the last digit, or minus these."""
+    scene = pair(3)
+    scene.add_joint("rev", "J", **STANDARD["rev"])
+    compiled = CompiledModel(scene)
+    (group,) = compiled.model.joints
+    at = group.type_info.layout.numbers
+    a_i, P_i = (group.numbers[0, at[name][0] : at[name][0] + 3] for name in ("a_i", "P_i"))
+    (screw,) = classify(compiled.model).of(0).screws[0]
+    sense = np.sign(screw[3:] @ a_i)
+    np.testing.assert_allclose(screw[3:], sense * a_i, atol=1e-16)
+    np.testing.assert_array_equal(screw[:3], np.cross(P_i, screw[3:]))
