@@ -34,6 +34,7 @@ import scale
 import start
 import streaming
 import study
+import trees
 import whole_runs
 from rich.console import Console
 from rich.table import Table
@@ -84,6 +85,7 @@ def main():
     arguments = parser.parse_args()
     benchmarks = {
         "right_hand_side": lambda: right_hand_side.measure(arguments.against),
+        "trees": trees.measure,
         "kernels": kernels.measure,
         "derived": derived.measure,
         "extension": extension.measure,

@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.assembly.tree_arrays import TreeArrays
 from dap3d_core.kernels.compiler.types import Table
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX
 from dap3d_core.kernels.runtime.cache import table_of
@@ -53,6 +54,7 @@ class System(LoopArrays):
             ("groups", "blocks", "targets", "contributions", "nodes", "columns", "updates", "hubs"),
             INTEGER_MATRIX,
         ),
+        "tree": TreeArrays.type_of(),
     }
 
     metric: Floats  # (n+1, 16): 1/sqrt(m); U = L^-T by rows, upper triangle; B = A U by rows
@@ -83,6 +85,7 @@ class System(LoopArrays):
     columns: Integers
     updates: Integers
     hubs: Integers
+    tree: Any = None  # TreeArrays, where the state is that of a tree in joint coordinates
 
 
 #: Part of the state of a run: ``par`` holds the turns of angles and the numbers that an

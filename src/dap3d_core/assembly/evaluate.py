@@ -45,10 +45,18 @@ def place_bodies(y: Floats, body: Floats, metric: Floats) -> None:
         s[16] = a10 * w0 + a11 * w1 + a12 * w2
         s[17] = a20 * w0 + a21 * w1 + a22 * w2
         s[18], s[19], s[20], s[21] = e0, e1, e2, e3
-        u00, u01, u02, u11, u12, u22 = k[1], k[2], k[3], k[4], k[5], k[6]
-        k[7], k[8], k[9] = a00 * u00, a00 * u01 + a01 * u11, a00 * u02 + a01 * u12 + a02 * u22
-        k[10], k[11], k[12] = a10 * u00, a10 * u01 + a11 * u11, a10 * u02 + a11 * u12 + a12 * u22
-        k[13], k[14], k[15] = a20 * u00, a20 * u01 + a21 * u11, a20 * u02 + a21 * u12 + a22 * u22
+        place_metric(s, k)
+
+
+@compiled_into
+def place_metric(s: Floats, k: Floats) -> None:
+    """B = A U of a body as placed; s: its row of body, k: its row of metric."""
+    a00, a01, a02, a10, a11, a12 = s[3], s[4], s[5], s[6], s[7], s[8]
+    a20, a21, a22 = s[9], s[10], s[11]
+    u00, u01, u02, u11, u12, u22 = k[1], k[2], k[3], k[4], k[5], k[6]
+    k[7], k[8], k[9] = a00 * u00, a00 * u01 + a01 * u11, a00 * u02 + a01 * u12 + a02 * u22
+    k[10], k[11], k[12] = a10 * u00, a10 * u01 + a11 * u11, a10 * u02 + a11 * u12 + a12 * u22
+    k[13], k[14], k[15] = a20 * u00, a20 * u01 + a21 * u11, a20 * u02 + a21 * u12 + a22 * u22
 
 
 @compiled_into

@@ -29,12 +29,15 @@ class Formulation:
         accepts_redundant: constraint rows may depend on each other.
         is_exact: its accelerations satisfy the constraints, as implicit and multistep integrators
             require.
+        has_own_coordinates: its state is not that of bodies, but of the class ``Coordinates`` of
+            its module coordinates.py; it has ``accepted`` and ``watch`` of its own, and no factors.
     """
 
     name: str
     needs_joints: bool = True
     accepts_redundant: bool = False
     is_exact: bool = True
+    has_own_coordinates: bool = False
 
     @property
     def loops(self) -> tuple[str, ...]:
@@ -49,10 +52,19 @@ class Formulation:
         module: Any = import_module(f"dap3d_core.formulations.{self.name}")
         functions = [module.rhs, module.project, module.report]
         if turns or switches:
-            from dap3d_core.formulations.common.switching_functions import accepted, watch
-
-            functions += [accepted, watch] if switches else [accepted]
+            if not self.has_own_coordinates:
+                module = import_module("dap3d_core.formulations.common.switching_functions")
+            functions += [module.accepted, module.watch] if switches else [module.accepted]
         return step_functions(*functions)
+
+    def coordinates(self, evaluator: Any) -> Any:
+        """The coordinates that it integrates, for an evaluator.
+
+        Raises:
+            UnsuitableError: the model does not suit it.
+        """
+        package = f"dap3d_core.formulations{f'.{self.name}' if self.has_own_coordinates else ''}"
+        return import_module(f"{package}.coordinates").Coordinates(evaluator)
 
 
 #: By name. Where a scene leaves the choice open, the first that fits it is taken.
@@ -63,5 +75,6 @@ FORMULATIONS = {
         Formulation("standard"),
         Formulation("penalty", accepts_redundant=True, is_exact=False),
         Formulation("lsq", accepts_redundant=True),
+        Formulation("joint", has_own_coordinates=True),
     )
 }

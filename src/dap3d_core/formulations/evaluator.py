@@ -32,8 +32,8 @@ from dap3d_core.formulations.switches import Switch, switches_of
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
 from dap3d_core.model import Model
-from dap3d_core.model.rotations import to_body, to_global
-from dap3d_core.model.state_layout import split, velocities_of, y_from_u
+from dap3d_core.model.rotations import euler_rates, to_body, to_global
+from dap3d_core.model.state_layout import join, split, velocities_of, y_from_u
 
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
 IGNORE_FLOAT_ERRORS = np.errstate(all="ignore")
@@ -46,7 +46,6 @@ class Evaluator:
         model, plan, system, loops: what it evaluates.
         formulation: its properties.
         report_size: numbers that ``report`` writes (formulations/standard.py).
-        length_count: lengths that ``project`` gives (formulations/common/constraints.py).
     """
 
     def __init__(
@@ -65,7 +64,18 @@ class Evaluator:
         self.store_initial_function_values()
         self._weigh_rows()
         self.report_size = model.report_layout.size
-        self.length_count = len(self.plan.nodes) - 1
+        if self.formulation.has_own_coordinates:
+            _ = self.coordinates  # its arrays take the place of those so far
+
+    @cached_property
+    def coordinates(self) -> Any:
+        """What the formulation integrates (formulations/coordinates.py)."""
+        return self.formulation.coordinates(self)
+
+    @property
+    def length_count(self) -> int:
+        """Lengths that ``project`` gives (formulations/common/constraints.py)."""
+        return int(self.coordinates.length_count)
 
     @property
     def method(self) -> str:
@@ -109,6 +119,8 @@ class Evaluator:
         self.__dict__.pop("switches", None)  # they name groups
         self.store_initial_function_values()
         self._weigh_rows()
+        if self.formulation.has_own_coordinates:
+            self.coordinates = self.formulation.coordinates(self)
 
     @IGNORE_FLOAT_ERRORS
     def start(self, t: float, u: ArrayLike, angles: Floats | None = None) -> None:
@@ -184,8 +196,21 @@ class Evaluator:
         return self.formulation.functions(turns=turns, switches=switches)
 
     def integrated(self, u: ArrayLike) -> Floats:
-        """The integrated state y (13 n + 1,) of a state u (13 n,)."""
+        """The integrated state y (13 n + 1,) of a state u (13 n,), in coordinates of bodies."""
         return y_from_u(np.asarray(u, dtype=float))
+
+    def body_state(self, y: Floats) -> Floats:
+        """The state y (13 n + 1,) in coordinates of bodies of one that is integrated."""
+        state: Floats = self.coordinates.body_states(y[None])[0]
+        return state
+
+    def body_rows(self, rows: Floats) -> Floats:
+        """Reported rows (k, 1 + y + report_size) with y in coordinates of bodies."""
+        if not self.formulation.has_own_coordinates:
+            return rows
+        end = rows.shape[1] - self.report_size
+        states = self.coordinates.body_states(np.ascontiguousarray(rows[:, 1:end]))
+        return np.hstack([rows[:, :1], states, rows[:, end:]])
 
     @IGNORE_FLOAT_ERRORS
     def rhs(self, t: float, u: ArrayLike) -> Floats:
@@ -193,6 +218,10 @@ class Evaluator:
 
         In the order of u: r_dot, p_dot of each body, then r_ddot, omega_dot of each.
         """
+        if self.formulation.has_own_coordinates:
+            _, p, v, w = split(u)
+            a, alpha = np.hsplit(self.report(t, u)[: w.size * 2].reshape(-1, 6), 2)
+            return join(v, euler_rates(p, w), a, alpha)
         y = self.integrated(u)
         out = np.zeros_like(y)
         self.functions[RHS](float(t), y, out, self.system, self.loops)
@@ -219,7 +248,8 @@ class Evaluator:
         the three levels.
         """
         out = np.zeros(self.report_size)
-        self.functions[REPORT](float(t), self.integrated(u), out, self.system, self.loops)
+        with self.coordinates.at(np.asarray(u, dtype=float)) as y:
+            self.functions[REPORT](float(t), y, out, self.system, self.loops)
         return out
 
     @IGNORE_FLOAT_ERRORS

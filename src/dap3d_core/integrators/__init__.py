@@ -58,6 +58,7 @@ class Integrator:
         one_step: explicit and of one step, so that runs may share one compiled call.
         leaves_singular: it can start at a singular pose.
         requires: why it needs a formulation that is exact; "" where it does not.
+        needs_body_coordinates: its equations are those of body coordinates.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Integrator:
     one_step: bool = False
     leaves_singular: bool = False
     requires: str = ""
+    needs_body_coordinates: bool = False
 
 
 #: By name.
@@ -76,7 +78,9 @@ INTEGRATORS = {
         Integrator("dop853", _explicit("dop853"), one_step=True, leaves_singular=True),
         Integrator("adams", _adams, requires="past accelerations on one smooth motion"),
         Integrator("rk4", _explicit("rk4"), adaptive=False, one_step=True),
-        Integrator("radau", _radau, requires="the constraints themselves"),
+        Integrator(
+            "radau", _radau, requires="the constraints themselves", needs_body_coordinates=True
+        ),
     )
 }
 

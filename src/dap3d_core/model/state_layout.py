@@ -56,6 +56,26 @@ def integrated_layout(n: int) -> Layout:
 
 
 @cache
+def tree_layout(angles: int, lengths: int, rotations: int, poses: int) -> Layout:
+    """Layout of the integrated state of trees in joint coordinates, and the work.
+
+    Of coordinates: angles, lengths, Euler parameters, (r, p); then their rates: of the latter two
+    omega' and (r_dot, omega').
+    """
+    return Layout(
+        angles=angles,
+        lengths=lengths,
+        rotations=4 * rotations,
+        poses=COORDINATES * poses,
+        angle_rates=angles,
+        length_rates=lengths,
+        rotation_rates=3 * rotations,
+        pose_rates=VELOCITIES * poses,
+        work=1,
+    )
+
+
+@cache
 def report_layout(n: int, rows: int, angles: int) -> Layout:
     """Layout of reports in addition to the state: n bodies, constraint rows, counted angles."""
     sizes = {"v_dot": VELOCITIES * n, "Lam": rows, "angles": angles}

@@ -21,7 +21,7 @@ SCENE_FILE, PLUGIN_FILE = "scene.toml", "plugin.py"
 GROUND = "ground"
 
 #: Values of ``method`` and ``integrator``: "auto", and names of formulations and integrators.
-METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq")
+METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq", "joint")
 INTEGRATORS = ("auto", "dopri5", "dop853", "adams", "rk4", "radau")
 #: Values of ``start``: the initial conditions of the scene, or where it comes to rest.
 STARTS = ("scene", "equilibrium")

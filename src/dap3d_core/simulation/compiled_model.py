@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dap3d_core.formulations import FORMULATIONS
+from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.runtime.cache import cache_notes
 from dap3d_core.model import Model, ModelError, build_model
@@ -168,7 +169,12 @@ class CompiledModel:
 
     def new_evaluator(self, announce: Announce | None = None) -> Evaluator:
         """An evaluator of the model with arrays of its own, for whoever changes its numbers."""
-        evaluator = Evaluator(self.model, self._first_method, announce)
+        try:
+            evaluator = Evaluator(self.model, self._first_method, announce)
+        except UnsuitableError as error:
+            raise SimulationError(
+                f"method {self._first_method} does not fit the scene: {error}"
+            ) from error
         evaluator.formulation = FORMULATIONS[self.method]
         settings = self.scene.simulation
         evaluator.set_penalty(settings.alpha, settings.Omega, settings.mu)

@@ -27,7 +27,7 @@ def explain(
     redundancy: Redundancy,
 ) -> str:
     """A text for people, one fact a line; u (13 n,) is where a run would start."""
-    n, ordering = model.body_count, evaluator.plan.ordering
+    n = model.body_count
     lines = [f"scene {checked.scene.name or '(no name)'}"]
     sizes = f"{STATE * n} states, {VELOCITIES * n} accelerations"
     lines.append(f"  bodies     {n}: {_some(model.body_names)}; {sizes}")
@@ -41,11 +41,8 @@ def explain(
             lines.append(f"  poses      {elsewhere.describe(redundancy)}")
             if redundancy.singular:
                 lines.append(f"  start      {redundancy.singular.describe()}")
-        lines.append(
-            f"  matrix     {len(ordering.early)} bodies eliminated first, then "
-            f"{len(ordering.nodes)} joint nodes and {len(ordering.hubs)} hubs; "
-            f"{evaluator.plan.fill} blocks of fill"
-        )
+        title, words = evaluator.coordinates.structure()
+        lines.append(f"  {title:10s} {words}")
     lines.append(f"  method     {method}, because {reason}")
     compiled = sorted({f"{group.keyword} ({kind})" for kind, group in evaluator.loop_groups})
     lines.append(f"  kernels    {', '.join(compiled) or 'none'}")

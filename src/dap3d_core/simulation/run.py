@@ -175,7 +175,7 @@ class Run(RunState):
         evaluator, settings, singular, u0 = self.evaluator, self.settings, self.singular, start.u
         store_reference_pivots(evaluator, 0.0, u0 if singular is None else singular.aside)
         evaluator.start(0.0, u0, start.angles)
-        y0 = evaluator.integrated(u0)
+        y0 = evaluator.coordinates.start(u0)
         width = 1 + len(y0) + evaluator.report_size
         self.options = options = integration_options(evaluator, settings) | {
             "first_step": None if self.limits is None else self.limits.first,
@@ -222,7 +222,7 @@ class Run(RunState):
         """Take what was reported since the last chunk; in a long run, also onto disk."""
         if not self.integrations:
             return
-        rows = self.present.rows()
+        rows = self.evaluator.body_rows(self.present.rows())
         if len(rows):
             if self.singular is not None and not self.recorder.count:
                 first = len(rows[0]) - self.evaluator.report_size
@@ -240,7 +240,7 @@ class Run(RunState):
         notes = doubts(self.evaluator, self.statistics().rhs)
         if self.settings.step is None and recorder.count:
             notes += motion_notes(recorder.low, recorder.high, self.settings)
-            notes += rounding_notes(self.integrations, self.evaluator.model.body_names)
+            notes += rounding_notes(self.integrations, self.evaluator)
         notes += recorder.pulling.notes()
         notes += event_locator.notes() if event_locator else []
         notes += event_notes(self.integrations, self.events())

@@ -109,7 +109,7 @@ class RunState:
         self.options: dict[str, Any] = {}
         self.event_locator = EventLocator(compiled, events) if events else None
         watch = callbacks.watch
-        self.observer = None if watch is None else Observer(self.evaluator.model, self.t_end, watch)
+        self.observer = None if watch is None else Observer(self.evaluator, self.t_end, watch)
         check_room(len(self.times), row_width(self.evaluator), self.settings.dt, output)
         most = len(self.times) + 1  # an event may end a run between two of them
         self.recorder = ResultRecorder(

@@ -12,7 +12,6 @@ from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators import EXPLICIT, INTEGRATORS, Integrator
-from dap3d_core.model.state_layout import state_layout
 from dap3d_core.scene import (
     METHODS,
     MISSING,
@@ -110,12 +109,10 @@ def integration_options(evaluator: Evaluator, settings: Simulation) -> dict[str,
     """Arguments common to all integrations, from an evaluator and the settings of a run."""
     return {
         "rtol": settings.rtol,
-        "atol": atol_vector(resolved_atol(settings.atol, evaluator), evaluator.model.body_count),
+        "atol": atol_vector(resolved_atol(settings.atol, evaluator), evaluator),
         "step": settings.step,
         "project_on": settings.project,
-        "error_size": state_layout(
-            evaluator.model.body_count
-        ).size,  # the work does not steer the step
+        "error_size": evaluator.coordinates.size,  # the work does not steer the step
         "report_size": evaluator.report_size,
         "ends": effects_of(evaluator.switches),
     }
@@ -123,6 +120,8 @@ def integration_options(evaluator: Evaluator, settings: Simulation) -> dict[str,
 
 def fits(integrator: Integrator, formulation: Formulation) -> bool:
     """Checks that an integrator can take the accelerations of a formulation."""
+    if formulation.has_own_coordinates and integrator.needs_body_coordinates:
+        return False
     return formulation.is_exact or not integrator.requires
 
 
@@ -132,6 +131,12 @@ def check_fit(integrator: Integrator, formulation: Formulation) -> None:
     Raises:
         SimulationError: it requires accelerations that satisfy the constraints.
     """
+    if formulation.has_own_coordinates and integrator.needs_body_coordinates:
+        raise SimulationError(
+            f"integrator {integrator.name} does not fit method {formulation.name}: its equations "
+            f"are those of body coordinates; use method standard or auto, or integrator "
+            f"{EXPLICIT.name}"
+        )
     if not fits(integrator, formulation):
         raise SimulationError(
             f"integrator {integrator.name} does not fit method {formulation.name}, whose "

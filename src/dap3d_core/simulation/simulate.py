@@ -46,7 +46,7 @@ def simulate(
     Args:
         scene: a Scene, what ``load`` takes, or a compiled model.
         t_end, dt: final time, s (0 solves once at t = 0); reporting step, by default t_end / 100.
-        method: "auto", "unconstrained", "standard", "penalty" or "lsq".
+        method: "auto", "unconstrained", "standard", "penalty", "lsq" or "joint".
         integrator: "dopri5", "dop853", "adams", "rk4" (needs ``step``), "radau" (implicit), "auto".
         rtol, atol, step: tolerances of the step's error; a fixed step, s, without error control.
         correct, project: bring the start, and then every state, onto the constraints.

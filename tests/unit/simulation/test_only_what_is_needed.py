@@ -29,6 +29,14 @@ def test_the_command_help_imports_nothing_heavy():
     assert not imported(script) & HEAVY
 
 
+def test_joint_coordinates_are_imported_where_a_scene_takes_them():
+    """Method standard brings in nothing of them."""
+    names = {"dap3d_core.formulations.joint", "dap3d_core.assembly.motion.classify"}
+    script = "import dap3d_core as dap\ndap.simulate('pen1', t_end=0.02, method='{}')"
+    assert not imported(script.format("standard")) & names
+    assert names <= imported(script.format("joint"))
+
+
 @pytest.mark.parametrize(
     ("model", "present", "absent"),
     [

@@ -6,7 +6,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from support import mechanisms, problems
+from support import mechanisms, problems, trees
 from support.ended import EndedError, ended_at, leave, shorten_chunks
 from support.on_axles import driven, stone, wheel
 from support.results import same_bits
@@ -49,6 +49,12 @@ CASES = {
     "radau across singular poses": (lambda: dap.load("A02-1"), RADAU, 1.0),
     "within a crossing of radau": (lambda: dap.load("A02-1"), RADAU, 0.7),
     "turns and friction": (wheel, {"t_end": 1.5, "dt": 0.05}, 0.7),
+    "joint": (wheel, {"t_end": 1.5, "dt": 0.05, "method": "joint"}, 0.7),
+    "joint, adams": (
+        lambda: trees.random_tree(4, 1),
+        {"method": "joint", "integrator": "adams"},
+        0.5,
+    ),
     "stiff": (lambda: dap.load("A05"), {"integrator": "auto", "t_end": 0.3, "dt": 0.01}, 0.02),
     "a function's breaks": (driven, {}, 0.4),
     "events": (stone, {"t_end": 2.0, "dt": 0.05, "events": stiffer}, 0.35),

@@ -59,7 +59,7 @@ SETTING_OPTIONS = {
                           help="Final time in s; 0 solves once at t = 0."),
     "dt": click.option("--dt", type=float, metavar="S", help="Reporting step in s."),
     "method": click.option("--method", metavar="NAME",
-                           help="Formulation: auto, unconstrained, standard, penalty, lsq."),
+                           help="Formulation: auto, unconstrained, standard, penalty, lsq, joint."),
     "integrator": click.option(
         "--integrator", metavar="NAME",
         help="dop853, dopri5, adams, radau for stiff scenes, or rk4 with --step."),

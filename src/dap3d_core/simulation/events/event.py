@@ -143,10 +143,11 @@ class Instant:
     """
 
     def __init__(self, compiled: CompiledModel, t: float, y: Floats, numbers: "Numbers") -> None:
-        """Args: the model, time, the integrated state (13 n + 1,), numbers that may be changed."""
+        """Args: the model, time, the integrated state, numbers that may be changed."""
         self._compiled, self._y, self._numbers = compiled, y, numbers
         self.t = t
-        u = u_from_y(y[None])[0]
+        self._body_state = compiled.evaluator.body_state(y)
+        u = u_from_y(self._body_state[None])[0]
         u.flags.writeable = False
         self.u: Floats = u
         self.changes: dict[str, dict[str, Any]] = {}
@@ -176,10 +177,10 @@ class Instant:
     @cached_property
     def _result(self) -> Result:
         evaluator, y = self._compiled.evaluator, self._y
-        row = np.concatenate([[self.t], y, np.zeros(evaluator.report_size)])
+        row = np.concatenate([[self.t], self._body_state, np.zeros(evaluator.report_size)])
         with np.errstate(all="ignore"):  # as compiled code does
             evaluator.functions[REPORT](
-                self.t, y, row[1 + len(y) :], evaluator.system, evaluator.loops
+                self.t, y, row[-evaluator.report_size :], evaluator.system, evaluator.loops
             )
         record = RunMetadata(scene_text=self._compiled.scene_text)
         return Result.of_run(evaluator.model, row[None], record, lambda: evaluator)

@@ -158,7 +158,9 @@ class EventLocator:
         self, integration: Integration, here: Instant, t: float, y: Floats, slope: Floats
     ) -> list[Iterator[tuple[float, float]]]:
         """For each event instants within the step from t, and its values there, in order."""
-        end, last, h = integration.y, self._slope(integration), here.t - t
+        last, h = self._slope(integration), here.t - t
+        expected = y + 0.5 * h * (slope + last)
+        end = self.compiled.evaluator.coordinates.continued(expected, integration.y)
         known: dict[float, Instant] = {here.t: here}
 
         def instant(time: float) -> Instant:

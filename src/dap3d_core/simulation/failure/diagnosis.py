@@ -5,7 +5,6 @@ from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import KINDS
 from dap3d_core.assembly.evaluate import place_bodies
-from dap3d_core.formulations import RHS
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.pivots import near_singular_rows
 from dap3d_core.interface.codegen.loop_source import stride
@@ -124,9 +123,7 @@ def _accelerated(evaluator: Evaluator, t: float, y: Floats) -> str:
 
 def _rates(evaluator: Evaluator, t: float, y: Floats) -> Floats:
     """(n, 13) dy/dt of each body."""
-    out = np.zeros_like(y)
-    evaluator.functions[RHS](float(t), y, out, evaluator.system, evaluator.loops)
-    return by_body(out)
+    return by_body(evaluator.rhs(t, u_from_y(y)))
 
 
 def _fault_of(evaluator: Evaluator, q: int, k: int, kind: str, group: Group, t: float) -> str:

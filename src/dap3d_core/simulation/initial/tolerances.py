@@ -95,16 +95,15 @@ def motion_notes(low: Floats, high: Floats, settings: Simulation) -> list[str]:
     ]
 
 
-def rounding_notes(runs: Sequence[Integration], names: Sequence[str]) -> list[str]:
+def rounding_notes(runs: Sequence[Integration], evaluator: Evaluator) -> list[str]:
     """That rounding, and not the tolerances, limits the accuracy of some bodies, in words."""
     work = runs[-1].work
     if not work.rounding_state > 1:
         return []
-    n = len(names)
+    names = evaluator.model.body_names
     noise = work.h * work.tolerance[NOISE, :-1]
     above = noise > work.tolerance[ABSOLUTE, :-1] + work.rtol * np.abs(work.state[Y, :-1])
-    worst = [bool(np.any(np.concatenate([part[k] for part in split(above)]))) for k in range(n)]
-    bodies = [name for name, is_worst in zip(names, worst, strict=True) if is_worst]
+    bodies = [names[k] for k in np.unique(evaluator.coordinates.bodies[above]).tolist()]
     if not bodies:
         return []
     words = ", ".join(bodies[:MOST_NAMES]) + (", ..." if len(bodies) > MOST_NAMES else "")
@@ -118,13 +117,11 @@ def _largest(vectors: Floats) -> float:
     return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
 
 
-def atol_vector(atol: float | Mapping[str, float], n: int) -> float | Floats:
-    """Absolute tolerances of the components of y (13 n + 1,), in its order; a number stays one."""
+def atol_vector(atol: float | Mapping[str, float], evaluator: Evaluator) -> float | Floats:
+    """Absolute tolerances of the components of y, in its order; a number stays one."""
     if not isinstance(atol, Mapping):
         return atol
-    coordinates = np.repeat([atol["r"], atol["p"]], [3, 4])
-    velocities = np.repeat([atol["v"], atol["w"]], 3)
-    return np.concatenate([np.tile(coordinates, n), np.tile(velocities, n), [USUAL_ATOL]])
+    return np.array([*(atol[name] for name in evaluator.coordinates.quantities), USUAL_ATOL])
 
 
 def tighter(atol: float | Mapping[str, float], factor: float) -> float | dict[str, float]:

@@ -6,8 +6,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import Integration
-from dap3d_core.model import Model
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.post.point_motion import kinetic_energy
@@ -35,12 +35,15 @@ class RunProgress:
 class Observer:
     """Reports the progress of the integrations of a run between their chunks to a callback."""
 
-    def __init__(self, model: Model, t_end: float, watch: Callable[[RunProgress], None]) -> None:
+    def __init__(
+        self, evaluator: Evaluator, t_end: float, watch: Callable[[RunProgress], None]
+    ) -> None:
         if not callable(watch):
             raise TypeError(
                 f"watch is a function that is called with how the run stands, not {watch!r}"
             )
-        self._subject, self._t_end, self._watch = summary_of(model), t_end, watch
+        self._subject = summary_of(evaluator.model)
+        self._evaluator, self._t_end, self._watch = evaluator, t_end, watch
         self._of: Integration | None = None
         self._t = self._step = self._largest = 0.0
         self._steps = self._earlier = 0
@@ -70,5 +73,5 @@ class Observer:
 
     def _energies(self, y: NDArray[np.float64]) -> tuple[float, float]:
         """Kinetic energy and the work done so far, J."""
-        u = u_from_y(y)
+        u = u_from_y(self._evaluator.body_state(y))
         return float(kinetic_energy(self._subject, u[None])[0]), float(y[-1])

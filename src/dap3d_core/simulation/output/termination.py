@@ -43,7 +43,7 @@ def doubts(evaluator: Evaluator, rhs: int) -> list[str]:
 
 def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> str:
     """Reason why an integration ended early, with the element to blame; rank: that of the start."""
-    t = integration.t
+    t, y = integration.t, evaluator.body_state(integration.y)
     head = f"the run stopped at t = {t:.9g} s"
     if integration.status is Status.SWITCHED:
         switch = evaluator.switches[integration.terminal_switch]
@@ -53,12 +53,12 @@ def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> st
     t_stop = integration.t_stop if integration.t_stop is not None else t
     message = f"{head}: {REASONS[integration.status]}"
     if integration.status is not Status.NOT_FINITE:
-        culprit = find_contradiction(evaluator, t, integration.y, rank)
+        culprit = find_contradiction(evaluator, t, y, rank)
         if culprit:
             return f"{head}: {culprit}"
-    culprit = find_offender(evaluator, t, integration.y, t_stop)
+    culprit = find_offender(evaluator, t, y, t_stop)
     if not culprit and integration.status is Status.NOT_FINITE:
-        culprit = fastest_body(evaluator, integration.y)
+        culprit = fastest_body(evaluator, y)
     return f"{message}: {culprit}" if culprit else message
 
 

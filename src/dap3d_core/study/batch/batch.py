@@ -28,7 +28,7 @@ def batch_runner(reduction: Reduction, times: Floats, pack: int) -> "BatchRunner
     """
     compiled = reduction.compiled
     settings = compiled.scene.simulation
-    if settings.start != "scene":
+    if settings.start != "scene" or compiled.evaluator.formulation.has_own_coordinates:
         return None
     try:
         start = compiled.start(bool(settings.correct), settings.hold, str(settings.correct_metric))

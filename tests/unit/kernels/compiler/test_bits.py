@@ -32,6 +32,7 @@ CASES = [
     ("fourbar3", SHORT | {"method": "penalty"}),
     ("fourbar3", SHORT | {"method": "lsq"}),
     ("pen2", SHORT | {"integrator": "adams"}),
+    ("pen2", SHORT | {"method": "joint"}),
     ("pen2", SHORT | {"integrator": "radau"}),
     ("fourbar2", SHORT | {"integrator": "dopri5"}),
     ("pen1", SHORT | {"integrator": "rk4", "step": 0.005}),

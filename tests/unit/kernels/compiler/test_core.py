@@ -33,6 +33,7 @@ RUNS = [
     ("fourbar3", SHORT | {"method": "penalty"}),
     ("fourbar3", SHORT | {"method": "lsq"}),
     ("pen2", SHORT | {"integrator": "adams"}),
+    ("pen2", SHORT | {"method": "joint"}),
     ("pen2", SHORT | {"integrator": "radau"}),
     ("fourbar2", SHORT | {"integrator": "dopri5"}),
     ("pen1", SHORT | {"integrator": "rk4", "step": 0.0005}),
@@ -44,6 +45,7 @@ RUNS = [
 MORE = """
 from support.problems import everything
 from support.on_axles import wheel
+from support import trees
 from unit.study.batch.test_batch import ensemble, pendulum
 from unit.study.batch.test_packs import CASES, in_packs
 
@@ -54,6 +56,10 @@ def pack(make, vary, output, t_end=0.02, **settings):
 
 for integrator in ("dop853", "adams", "radau"):
     recorder.record(dap.simulate, wheel(), t_end=0.2, dt=0.1, integrator=integrator)
+recorder.record(dap.simulate, wheel(), t_end=0.2, dt=0.1, method="joint")
+from unit.formulations.joint.test_equations import hinged_spring
+for scene in (trees.random_tree(8, 5, free=0.2), trees.mixed_chain(2), hinged_spring()):
+    recorder.record(dap.simulate, scene, t_end=0.01, dt=0.01, method="joint")
 for case in CASES.values():
     recorder.record(pack, *case)
 recorder.record(pack, *CASES["functions and their breaks"], t_end=0.6)

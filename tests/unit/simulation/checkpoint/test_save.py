@@ -1,10 +1,11 @@
 """What a checkpoint holds matters: runs that are ended where the next step reads it."""
 
+import itertools
 from importlib import import_module
 
 import numpy as np
 import pytest
-from support import mechanisms, problems
+from support import mechanisms, problems, trees
 from support.ended import leave, shorten_chunks
 from support.results import same_bits
 
@@ -91,15 +92,23 @@ def test_what_was_counted_before_is_told_at_the_end(tmp_path):
 
 
 @pytest.mark.skipif(not jit_is_on(), reason="takes long in plain Python")
-@pytest.mark.parametrize("method", ["auto", "lsq", "penalty"])
-@pytest.mark.parametrize("make", [problems.four_bar, mechanisms.door, lambda: dap.load("A02-1")])
+@pytest.mark.parametrize(
+    ("make", "method"),
+    [
+        *itertools.product(
+            [problems.four_bar, mechanisms.door, lambda: dap.load("A02-1")],
+            ["auto", "lsq", "penalty"],
+        ),
+        (lambda: trees.random_tree(6, 2, free=0.2), "joint"),
+    ],
+)
 def test_no_function_reads_what_another_has_left(make, method):
     """Of the model's arrays a checkpoint holds those alone that functions do not write anew."""
     compiled = dap.compile(make(), method=method)
     evaluator, u = compiled.evaluator, compiled.model.u0
     store_reference_pivots(evaluator, 0.0, u)
     evaluator.start(0.0, u)
-    y, rng = evaluator.integrated(u), np.random.default_rng(1)
+    y, rng = evaluator.coordinates.start(u), np.random.default_rng(1)
     sizes = (y.size, 4 + evaluator.length_count, evaluator.report_size)  # of rhs, project, report
 
     def call(k, state, t):

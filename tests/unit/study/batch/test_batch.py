@@ -262,3 +262,14 @@ def test_a_function_of_the_user_that_raises_fails_its_point():
     assert "output 'of_small_masses' raises ZeroDivisionError" in batch.notes[1]
     assert np.isnan(batch.values["bob.r.x"]).tolist() == [False, True, False]
     assert batch.values["of_small_masses"][[0, 2]].tolist() == [-1.0, 1.0]
+
+
+def test_points_in_joint_coordinates_are_run_one_by_one():
+    """A mass and a length of the joint change: each point is the run of its own scene."""
+    names = ["bodies.bob.mass", "points.A.sPp.y"]
+    of = ensemble(pendulum(), names, ["bob.r.z"], method="joint")
+    assert path_of(of) == "alone"
+    points = np.array([[2.0, 1.0], [3.0, 1.2]])
+    batch, alone = of.run(points), singly(of, points)
+    assert (batch.status == DONE).all()
+    assert np.array_equal(batch.values["bob.r.z"], alone["bob.r.z"])

@@ -1,0 +1,70 @@
+"""The coordinates that a formulation integrates: those of bodies, or of its own."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dap3d_core.assembly.arrays import Floats, Integers
+from dap3d_core.model.state_layout import COORDINATES, VELOCITIES, y_from_u
+
+if TYPE_CHECKING:
+    from dap3d_core.formulations.evaluator import Evaluator
+
+
+class UnsuitableError(ValueError):
+    """A model does not suit a formulation; says why and what does."""
+
+
+class Coordinates:
+    """The integrated state y (13 n + 1,) of bodies, as in model/state_layout.py.
+
+    Attributes:
+        size: components of y that steer the step: all but the work.
+        length_count: lengths that ``project`` gives (formulations/common/constraints.py).
+    """
+
+    def __init__(self, evaluator: "Evaluator") -> None:
+        """Args: the evaluator whose states they are."""
+        self.evaluator = evaluator
+        self.size = evaluator.model.u0.size
+        self.length_count = len(evaluator.plan.nodes) - 1
+
+    @property
+    def quantities(self) -> list[str]:
+        """Quantity of each component, as in tolerances: "r", "p", "v" or "w"."""
+        n = self.evaluator.model.body_count
+        return [*"rrrpppp"] * n + [*"vvvwww"] * n
+
+    @property
+    def bodies(self) -> Integers:
+        """(size,) body of each component, from 0."""
+        each = np.arange(self.evaluator.model.body_count)
+        return np.concatenate([np.repeat(each, COORDINATES), np.repeat(each, VELOCITIES)])
+
+    def structure(self) -> tuple[str, str]:
+        """What the equations are solved by, and its size in words."""
+        plan = self.evaluator.plan
+        ordering = plan.ordering
+        return "matrix", (
+            f"{len(ordering.early)} bodies eliminated first, then {len(ordering.nodes)} joint "
+            f"nodes and {len(ordering.hubs)} hubs; {plan.fill} blocks of fill"
+        )
+
+    def start(self, u: Floats) -> Floats:
+        """The state y that a run from a state u (13 n,) begins with."""
+        return y_from_u(u)
+
+    def body_states(self, y: Floats) -> Floats:
+        """The same states (k, 13 n + 1) in coordinates of bodies."""
+        return y
+
+    def continued(self, expected: Floats, y: Floats) -> Floats:
+        """The state y as the motion led to it, near the one expected; ``project`` may shift it."""
+        return y
+
+    @contextmanager
+    def at(self, u: Floats) -> Iterator[Floats]:
+        """The state y of a state u, for evaluations beside a run."""
+        yield y_from_u(u)

@@ -1,0 +1,204 @@
+"""Joint coordinates as the state of an evaluator: from body coordinates and back."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import attrs
+import numpy as np
+
+from dap3d_core.assembly.arrays import Floats, Integers, System
+from dap3d_core.assembly.motion.classify import classify
+from dap3d_core.assembly.tree_arrays import TreeArrays
+from dap3d_core.formulations.coordinates import UnsuitableError
+from dap3d_core.formulations.joint.equations import TWO_TURNS, body_state
+from dap3d_core.formulations.joint.node_layout import (
+    CHILD,
+    CHILD_BLOCK,
+    CONSTANT_WIDTH,
+    COORDINATE,
+    FIRST_ROW,
+    FREE,
+    JOINT_PARENT,
+    JOINT_WIDTH,
+    MOTION,
+    PARENT_BLOCK,
+    PRISMATIC,
+    RATE,
+    REVOLUTE,
+    ROW_COUNT,
+    SPHERICAL,
+    WORK_WIDTH,
+)
+from dap3d_core.formulations.joint.reference import Reference
+from dap3d_core.formulations.joint.spanning_tree import SpanningTree, spanning_tree
+from dap3d_core.formulations.joint.tree_nodes import (
+    SEGMENTS,
+    TreeNodes,
+    tree_nodes,
+    unsuitable_motion,
+)
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
+from dap3d_core.linear.ldlt.plan import Plan
+from dap3d_core.model import Model
+
+if TYPE_CHECKING:
+    from dap3d_core.formulations.evaluator import Evaluator
+
+#: Joints that a message names.
+MOST_NAMES = 5
+#: Quantities of the segments of a state, as in tolerances.
+QUANTITIES = {
+    "angles": "p", "lengths": "r", "rotations": "pppp", "poses": "rrrpppp",
+    "angle_rates": "w", "length_rates": "v", "rotation_rates": "www", "pose_rates": "vvvwww",
+}  # fmt: skip
+
+
+class Coordinates:
+    """Joint coordinates of a model that is a tree, with their rates.
+
+    Attributes:
+        size, length_count: as of ``formulations.coordinates.Coordinates``; no pose is singular.
+        nodes: of the tree.
+    """
+
+    length_count = 0
+
+    def __init__(self, evaluator: "Evaluator") -> None:
+        """Give an evaluator the arrays of a tree.
+
+        Raises:
+            UnsuitableError: the joints make no tree, or the motion of one is not known.
+            PluginError: the kernels of a type cannot be compiled.
+        """
+        model = evaluator.model
+        motions = classify(model)
+        ends: dict[int, tuple[int, int]] = {}
+        reasons = dict(motions.refused)
+        for group in motions.motions:
+            joints = group.joints.tolist()
+            if reason := unsuitable_motion(group):
+                reasons |= dict.fromkeys(joints, reason)
+            else:
+                bodies = zip(group.body_i.tolist(), group.body_j.tolist(), strict=True)
+                ends |= zip(joints, bodies, strict=True)
+        tree = spanning_tree(model, ends)
+        if tree.kept:
+            raise UnsuitableError(_why_kept(model, tree.kept, reasons))
+        self.evaluator = evaluator
+        self.nodes: TreeNodes = tree_nodes(tree, motions, model.body_count)
+        self.size = self.nodes.layout.size - 1
+        evaluator.system = _with_tree(
+            evaluator.system, self.nodes, tree, evaluator.plan, model.joint_rows
+        )
+
+    @property
+    def quantities(self) -> list[str]:
+        """As of ``formulations.coordinates.Coordinates``."""
+        found: list[str] = []
+        for name, letters in QUANTITIES.items():
+            found += letters * (self.nodes.layout.length(name) // len(letters))
+        return found
+
+    @property
+    def bodies(self) -> Integers:
+        """(size,) body that each component moves, from 0."""
+        table, found = self.nodes.table, np.zeros(self.size, dtype=np.int64)
+        for motion, (_, _, size, rate_size) in SEGMENTS.items():
+            nodes = 1 + np.flatnonzero(table[1:, MOTION] == motion)
+            for column, count in ((COORDINATE, size), (RATE, rate_size)):
+                places = table[nodes, column][:, None] + np.arange(count)
+                found[places] = self.nodes.frame[nodes][:, None] - 1
+        return found
+
+    def structure(self) -> tuple[str, str]:
+        """As of ``formulations.coordinates.Coordinates``."""
+        table = self.nodes.table[1:, MOTION]
+        names = {REVOLUTE: "angles", PRISMATIC: "lengths", SPHERICAL: "balls", FREE: "free bodies"}
+        counts = {name: int(np.count_nonzero(table == motion)) for motion, name in names.items()}
+        parts = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+        return "tree", f"{len(table)} nodes: {parts or 'nothing moves'}"
+
+    def start(self, u: Floats) -> Floats:
+        """The state y of a run from a state u (13 n,), whose poses become the reference."""
+        reference = Reference(self.nodes, self.evaluator.model, u)
+        self._tree.constants[:] = reference.constants()
+        return reference.state()
+
+    def body_states(self, y: Floats) -> Floats:
+        """States (k, 13 n + 1) of bodies of states (k, size + 1)."""
+        out = np.empty((len(y), self.evaluator.model.u0.size + 1))
+        for state, row in zip(y, out, strict=True):
+            body_state(state, row, self.evaluator.system)
+        return out
+
+    def continued(self, expected: Floats, y: Floats) -> Floats:
+        """The state y with angles that ``project`` has not brought back, near those expected."""
+        angles, continued = self.nodes.layout["angles"], y.copy()
+        turns = np.rint((expected[angles] - y[angles]) / TWO_TURNS)
+        continued[angles] += TWO_TURNS * turns
+        return continued
+
+    @contextmanager
+    def at(self, u: Floats) -> Iterator[Floats]:
+        """The state y of a state u; the reference of a run is put back in the end."""
+        before = self._tree.constants.copy()
+        try:
+            yield self.start(u)
+        finally:
+            self._tree.constants[:] = before
+
+    @property
+    def _tree(self) -> TreeArrays:
+        tree: TreeArrays = self.evaluator.system.tree
+        return tree
+
+
+def _with_tree(
+    system: System, nodes: TreeNodes, tree: SpanningTree, plan: Plan, joint_rows: Integers
+) -> System:
+    """The system with arrays of a tree; ``body`` is then the first rows of its places."""
+    bodies, count = len(system.body), len(nodes.table)
+    places = np.zeros((nodes.row_count, BODY_WIDTH))
+    places[:bodies] = system.body
+    revolutes = int(np.count_nonzero(nodes.table[1:, MOTION] == REVOLUTE))
+    arrays = TreeArrays(
+        nodes=nodes.table,
+        joints=_joints(tree, plan, joint_rows),
+        places=places,
+        constants=np.zeros(count * CONSTANT_WIDTH),
+        work=np.zeros(count * WORK_WIDTH),
+        half_angles=np.zeros((2, revolutes)),
+        scratch=np.zeros(48),
+        force=np.zeros_like(system.force),
+        slope=np.zeros(nodes.layout.size),
+    )
+    return attrs.evolve(system, body=places[:bodies], tree=arrays)
+
+
+def _joints(tree: SpanningTree, plan: Plan, joint_rows: Integers) -> Integers:
+    """``TreeArrays.joints``."""
+    rows = []
+    for k, parent, child, (at_parent, at_child) in zip(
+        tree.joint[::-1].tolist(), tree.parent[::-1].tolist(), tree.child[::-1].tolist(),
+        tree.slot[::-1].tolist(), strict=True,
+    ):  # fmt: skip
+        if k >= 0:
+            row = [0] * JOINT_WIDTH
+            blocks = plan.joint_block[k]
+            row[CHILD_BLOCK], row[CHILD] = blocks[at_child], 6 * child
+            if parent:
+                row[PARENT_BLOCK], row[JOINT_PARENT] = blocks[at_parent], 6 * parent
+            row[ROW_COUNT], row[FIRST_ROW] = joint_rows[k], plan.joint_row[k]
+            rows.append(row)
+    return np.array(rows, dtype=np.int64).reshape(-1, JOINT_WIDTH)
+
+
+def _why_kept(model: Model, kept: tuple[int, ...], refused: Mapping[int, str]) -> str:
+    """Why joints cannot be in the tree, and what to do."""
+    words = [
+        f"joint {model.joint_names[k]}: {refused.get(k, 'it closes a loop')}"
+        for k in kept[:MOST_NAMES]
+    ]
+    more = f"; and {len(kept) - MOST_NAMES} more" if len(kept) > MOST_NAMES else ""
+    return f"{'; '.join(words)}{more}. Use method standard or auto"

@@ -1,0 +1,173 @@
+"""The joint formulation: accelerations and multipliers of trees in joint coordinates.
+
+    place    joint coordinates -> poses, velocities, accelerations without q_ddot, of all bodies
+    forces   through their loops, as in any formulation
+    reduce   articulated inertias, from the leaves to ground
+    spread   q_ddot, from ground to the leaves
+
+Multipliers are found where they are reported, or friction asks for them.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.assembly.arrays import (
+    ANGLE,
+    DOUBTFUL,
+    KNOT,
+    SCRATCH,
+    SWITCH,
+    VALUE,
+    WRENCH,
+    Floats,
+    System,
+)
+from dap3d_core.assembly.evaluate import call_kinds, place_metric, scale_forces, zero
+from dap3d_core.assembly.metric import in_body_axes
+from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset, work_offset
+from dap3d_core.formulations.common.constraints import (
+    linearise,
+    report_levels,
+    report_multipliers,
+)
+from dap3d_core.formulations.common.friction import has_friction, solve_with_friction
+from dap3d_core.formulations.joint.multipliers import joint_multipliers, scale_accelerations
+from dap3d_core.formulations.joint.node_layout import (
+    COORDINATE,
+    FREE,
+    MOTION,
+    REVOLUTE,
+    SPHERICAL,
+)
+from dap3d_core.formulations.joint.place import place_tree
+from dap3d_core.formulations.joint.reduce import reduce_tree
+from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
+from dap3d_core.kernels.runtime.cache import compiled
+
+#: Two turns, after which Euler parameters are the same again; angles are kept within them, so that
+#: the tolerance of an angle does not grow with its turns.
+TWO_TURNS = 12.566370614359172
+
+
+@compiled
+def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """dy/dt of a state, the power of forces last."""
+    place_tree(y, system)
+    apply_forces(t, system, loops)
+    power = reduce_tree(system, system.force)
+    if has_friction(system):
+        power = accelerate(t, system, loops)
+    spread_tree(y, out, system)
+    out[out.shape[0] - 1] = power
+
+
+@compiled
+def apply_forces(t: float, system: System, loops: Any) -> None:
+    """Applied forces and moments into ``force``, at the bodies as placed."""
+    force = system.force
+    zero(force)
+    call_kinds(VALUE, WRENCH, t, system, loops, force, force, force)
+
+
+@compiled
+def accelerate(t: float, system: System, loops: Any) -> float:
+    """Scaled ``acceleration`` and ``multipliers``, with friction; returns the power of all forces.
+
+    The bodies are placed, and ``force`` is known.
+    """
+    body, metric, size = system.body, system.metric, system.force.shape[0]
+    for b in range(1, body.shape[0]):
+        place_metric(body[b], metric[b])
+    power = scale_forces(body, metric, system.force, system.acceleration)
+    linearise(t, system, loops)
+    if has_friction(system):
+        zero(system.friction[size : 2 * size])
+    return power + solve_with_friction(t, system, loops, solve)
+
+
+@compiled
+def solve(system: System) -> None:
+    """``acceleration`` and ``multipliers`` from the scaled forces in ``acceleration``."""
+    total, left, v_dot = system.tree.force, system.change, system.velocity
+    size = total.shape[0]
+    for k in range(size):
+        total[k] = system.force[k]
+    if has_friction(system):
+        for k in range(size):
+            total[k] += system.friction[size + k]
+    reduce_tree(system, total)
+    spread_tree(system.tree.slope, system.tree.slope, system)
+    body_accelerations(system, v_dot)
+    for k in range(size):
+        left[k] = system.acceleration[k]
+    scale_accelerations(system, v_dot, system.acceleration)
+    for k in range(size):
+        left[k] = system.acceleration[k] - left[k]
+    joint_multipliers(system, left)
+
+
+@compiled
+def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """Bring Euler parameters to unit length, and angles within two turns: there are no rows."""
+    out[0] = out[1] = out[2] = out[3] = 0.0
+    nodes = system.tree.nodes
+    for n in range(1, nodes.shape[0]):
+        motion, i = nodes[n, MOTION], nodes[n, COORDINATE]
+        if motion == REVOLUTE:
+            if abs(y[i]) > TWO_TURNS:
+                y[i] -= TWO_TURNS * np.rint(y[i] / TWO_TURNS)
+        elif motion >= SPHERICAL:
+            i += 3 if motion == FREE else 0
+            e0, e1, e2, e3 = y[i], y[i + 1], y[i + 2], y[i + 3]
+            h = 1.0 / np.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
+            y[i], y[i + 1], y[i + 2], y[i + 3] = e0 * h, e1 * h, e2 * h, e3 * h
+
+
+@compiled
+def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
+    place_tree(y, system)
+    apply_forces(t, system, loops)
+    accelerate(t, system, loops)
+    body_accelerations(system, out)
+    report_multipliers(system, out)
+    report_levels(t, out, system, loops)
+
+
+@compiled
+def accepted(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """Count the turns of angles at an accepted state; ``out`` is left as it is."""
+    doubtful = system.settings[DOUBTFUL : DOUBTFUL + 1]
+    place_tree(y, system)
+    call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
+    call_kinds(ANGLE, ANGLE, t, system, loops, doubtful, doubtful, doubtful)
+
+
+@compiled
+def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """Switches at a state into ``out``, as in common/switching_functions.py."""
+    place_of_next = system.settings[SCRATCH : SCRATCH + 1]
+    place_tree(y, system)
+    call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
+    place_of_next[0] = 0.0
+    call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, place_of_next)
+
+
+@compiled
+def body_state(y: Floats, out: Floats, system: System) -> None:
+    """The integrated state in body coordinates (13 n + 1,) of one in joint coordinates."""
+    body = system.body
+    n = body.shape[0] - 1
+    place_tree(y, system)
+    for b in range(1, n + 1):
+        s, c, f = body[b], coordinate_offset(b), velocity_offset(b, n)
+        for k in range(3):
+            out[c + k], out[f + k] = s[k], s[12 + k]
+        for k in range(4):
+            out[c + 3 + k] = s[18 + k]
+        out[f + 3], out[f + 4], out[f + 5] = in_body_axes(s, s[15], s[16], s[17])
+    out[work_offset(n)] = y[y.shape[0] - 1]

@@ -1,0 +1,209 @@
+"""From joint coordinates to poses and velocities: ground first, every node from its parent.
+
+What the accelerations are without q_ddot comes with it. Featherstone, Rigid Body Dynamics
+Algorithms (2008), 7.3, here about the joint's point and along the global axes.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.formulations.joint.half_angles import half_angles
+from dap3d_core.formulations.joint.node_layout import (
+    ACCELERATION,
+    ALPHA,
+    AXIS,
+    AXIS_NOW,
+    CENTRE,
+    CENTRE_NOW,
+    CONSTANT_WIDTH,
+    COORDINATE,
+    FLAGS,
+    FREE,
+    HAS_MASS,
+    LINK,
+    LINK_NOW,
+    MOTION,
+    PARENT,
+    PARENT_ROW,
+    POINT,
+    PRISMATIC,
+    RATE,
+    REVOLUTE,
+    ROW,
+    SPHERICAL,
+    SPIN,
+    TREE_WIDTH,
+    TURN,
+    TURN_SIN,
+    VELOCITY,
+    WORK_WIDTH,
+)
+from dap3d_core.kernels.runtime.array_struct import pointer
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, P, R, V, W
+from dap3d_core.kernels.vectors import add, cross, scale
+
+Vector = Any
+
+
+@compiled_into
+def vector_of(x: Floats, k: int) -> Vector:
+    """The 3-vector at k."""
+    return x[k], x[k + 1], x[k + 2]
+
+
+@compiled_into
+def put(x: Floats, k: int, a: Vector) -> None:
+    """Store a 3-vector at k."""
+    x[k], x[k + 1], x[k + 2] = a
+
+
+@compiled_into
+def times(x: Floats, k: int, a: Vector) -> Vector:
+    """The 3x3 matrix at k, by rows, times a 3-vector."""
+    return (
+        x[k] * a[0] + x[k + 1] * a[1] + x[k + 2] * a[2],
+        x[k + 3] * a[0] + x[k + 4] * a[1] + x[k + 5] * a[2],
+        x[k + 6] * a[0] + x[k + 7] * a[1] + x[k + 8] * a[2],
+    )
+
+
+@compiled
+def place_tree(y: Floats, system: System) -> None:
+    """Place all nodes for a state: rows r, A, v, w, p of ``tree.places``, and ``tree.work``."""
+    tree, b = pointer(system.tree.nodes), pointer(system.tree.places)
+    K, C = pointer(system.tree.work), pointer(system.tree.constants)
+    sines, cosines = system.tree.half_angles[0], system.tree.half_angles[1]
+    half_angles(y, sines, cosines)
+    for n in range(1, system.tree.nodes.shape[0]):
+        t = TREE_WIDTH * n
+        o, up, motion = (
+            BODY_WIDTH * tree[t + ROW],
+            BODY_WIDTH * tree[t + PARENT_ROW],
+            tree[t + MOTION],
+        )
+        k, m, c = WORK_WIDTH * n, WORK_WIDTH * tree[t + PARENT], CONSTANT_WIDTH * n
+        i, j = tree[t + COORDINATE], tree[t + RATE]
+        if motion == REVOLUTE:
+            orient(b, o, relative(b, up, turn(C, c, sines[i], cosines[i])), False)
+            w, alpha = revolve(y[j], b, o, up, K, k, m, C, c)
+            link(b, up, K, k, m, C, c)
+        elif motion == SPHERICAL:
+            orient(b, o, (y[i], y[i + 1], y[i + 2], y[i + 3]), True)
+            w, alpha = times(b, o + A, vector_of(y, j)), (0.0, 0.0, 0.0)
+            link(b, up, K, k, m, C, c)
+        elif motion == FREE:
+            orient(b, o, (y[i + 3], y[i + 4], y[i + 5], y[i + 6]), True)
+            w, alpha = times(b, o + A, vector_of(y, j + 3)), (0.0, 0.0, 0.0)
+            put(K, k + POINT, vector_of(y, i))
+            put(K, k + VELOCITY, vector_of(y, j))
+            put(K, k + ACCELERATION, alpha)
+        else:
+            orient(b, o, relative(b, up, (C[c], C[c + 1], C[c + 2], C[c + 3])), False)
+            w, alpha = vector_of(b, up + W), vector_of(K, m + ALPHA)
+            link(b, up, K, k, m, C, c)
+            if motion == PRISMATIC:
+                slide(y[i], y[j], b, up, K, k, m, C, c)
+        put(K, k + ALPHA, alpha)
+        spin(K, k + SPIN, w, alpha)
+        put(b, o + W, w)
+        if tree[t + FLAGS] & HAS_MASS != 0:
+            s = times(b, o + A, vector_of(C, c + CENTRE))
+            put(K, k + CENTRE_NOW, s)
+            put(b, o + R, add(vector_of(K, k + POINT), s))
+            put(b, o + V, add(vector_of(K, k + VELOCITY), cross(w, s)))
+
+
+@compiled_into
+def turn(C: Floats, c: int, s: float, h: float) -> Any:
+    """Euler parameters of a revolute motion relative to the parent; s, h: sine, cosine of q/2."""
+    c, d = c + TURN, c + TURN_SIN
+    return (
+        C[c] * h + C[d] * s,
+        C[c + 1] * h + C[d + 1] * s,
+        C[c + 2] * h + C[d + 2] * s,
+        C[c + 3] * h + C[d + 3] * s,
+    )
+
+
+@compiled_into
+def relative(b: Floats, up: int, a: Any) -> Any:
+    """Euler parameters of the parent times those of a relative to it."""
+    p0, p1, p2, p3 = b[up + P], b[up + P + 1], b[up + P + 2], b[up + P + 3]
+    return (
+        p0 * a[0] - p1 * a[1] - p2 * a[2] - p3 * a[3],
+        p0 * a[1] + p1 * a[0] + p2 * a[3] - p3 * a[2],
+        p0 * a[2] - p1 * a[3] + p2 * a[0] + p3 * a[1],
+        p0 * a[3] + p1 * a[2] - p2 * a[1] + p3 * a[0],
+    )
+
+
+@compiled_into
+def orient(b: Floats, o: int, e: Any, is_of_state: bool) -> None:
+    """Set p and A of a node from Euler parameters: of the state, of any length, or of length 1."""
+    e0, e1, e2, e3 = e
+    square = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
+    h = 1.0 / np.sqrt(square) if is_of_state else 1.5 - 0.5 * square
+    e0, e1, e2, e3 = e0 * h, e1 * h, e2 * h, e3 * h
+    b[o + P], b[o + P + 1], b[o + P + 2], b[o + P + 3] = e0, e1, e2, e3
+    b[o + A] = 1.0 - 2.0 * (e2 * e2 + e3 * e3)
+    b[o + A + 1] = 2.0 * (e1 * e2 - e0 * e3)
+    b[o + A + 2] = 2.0 * (e1 * e3 + e0 * e2)
+    b[o + A + 3] = 2.0 * (e1 * e2 + e0 * e3)
+    b[o + A + 4] = 1.0 - 2.0 * (e1 * e1 + e3 * e3)
+    b[o + A + 5] = 2.0 * (e2 * e3 - e0 * e1)
+    b[o + A + 6] = 2.0 * (e1 * e3 - e0 * e2)
+    b[o + A + 7] = 2.0 * (e2 * e3 + e0 * e1)
+    b[o + A + 8] = 1.0 - 2.0 * (e1 * e1 + e2 * e2)
+
+
+@compiled_into
+def revolve(
+    rate: float, b: Floats, o: int, up: int, K: Floats, k: int, m: int, C: Floats, c: int
+) -> Any:
+    """Angular velocity and, without q_ddot, acceleration of a revolute node; sets its axis."""
+    axis = times(b, o + A, vector_of(C, c + AXIS))
+    put(K, k + AXIS_NOW, axis)
+    w, relative_w = vector_of(b, up + W), scale(rate, axis)
+    return add(w, relative_w), add(vector_of(K, m + ALPHA), cross(w, relative_w))
+
+
+@compiled_into
+def link(b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int) -> None:
+    """P of a node, its velocity and acceleration as a point of the parent."""
+    arm = times(b, up + A, vector_of(C, c + LINK))
+    put(K, k + LINK_NOW, arm)
+    put(K, k + POINT, add(vector_of(K, m + POINT), arm))
+    put(K, k + VELOCITY, add(vector_of(K, m + VELOCITY), cross(vector_of(b, up + W), arm)))
+    put(K, k + ACCELERATION, add(vector_of(K, m + ACCELERATION), times(K, m + SPIN, arm)))
+
+
+@compiled_into
+def slide(
+    q: float, rate: float, b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int
+) -> None:
+    """Move P of a prismatic node along the parent's axis."""
+    axis, w = times(b, up + A, vector_of(C, c + AXIS)), vector_of(b, up + W)
+    way, turned = scale(q, axis), cross(w, axis)
+    put(K, k + AXIS_NOW, axis)
+    put(K, k + LINK_NOW, add(vector_of(K, k + LINK_NOW), way))
+    put(K, k + POINT, add(vector_of(K, k + POINT), way))
+    change = add(scale(q, turned), scale(rate, axis))
+    put(K, k + VELOCITY, add(vector_of(K, k + VELOCITY), change))
+    change = add(times(K, m + SPIN, way), scale(2.0 * rate, turned))
+    put(K, k + ACCELERATION, add(vector_of(K, k + ACCELERATION), change))
+
+
+@compiled_into
+def spin(K: Floats, k: int, w: Vector, alpha: Vector) -> None:
+    """Set the matrix alpha~ + omega~ omega~ at k."""
+    w0, w1, w2 = w
+    x0, x1, x2 = alpha
+    K[k], K[k + 1], K[k + 2] = -w1 * w1 - w2 * w2, w0 * w1 - x2, w0 * w2 + x1
+    K[k + 3], K[k + 4], K[k + 5] = w0 * w1 + x2, -w0 * w0 - w2 * w2, w1 * w2 - x0
+    K[k + 6], K[k + 7], K[k + 8] = w0 * w2 - x1, w1 * w2 + x0, -w0 * w0 - w1 * w1

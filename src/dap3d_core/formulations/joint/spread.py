@@ -1,0 +1,125 @@
+"""Accelerations from ground to the leaves, once all inertias are known: rates of the state.
+
+Featherstone, Rigid Body Dynamics Algorithms (2008), 7.3.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.formulations.joint.node_layout import (
+    ACCELERATION,
+    ACCELERATION_Q,
+    ALPHA,
+    ALPHA_Q,
+    AXIS_NOW,
+    CENTRE_NOW,
+    COORDINATE,
+    FIXED,
+    FLAGS,
+    FORCE,
+    FREE,
+    FREE_RATE,
+    GAIN,
+    HAS_MASS,
+    LINK_NOW,
+    MATRIX_H,
+    MATRIX_M,
+    MOMENT,
+    MOTION,
+    PARENT,
+    RATE,
+    REVOLUTE,
+    ROW,
+    SPHERICAL,
+    SPIN,
+    TREE_WIDTH,
+    WORK_WIDTH,
+)
+from dap3d_core.formulations.joint.place import Vector, put, times, vector_of
+from dap3d_core.formulations.joint.reduce import six_of
+from dap3d_core.kernels.runtime.array_struct import pointer
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A
+from dap3d_core.kernels.vectors import add, cross, dot, scale, sub
+
+
+@compiled
+def spread_tree(y: Floats, out: Floats, system: System) -> None:
+    """dy/dt but for the work; the part of all accelerations by q_ddot into ``tree.work``."""
+    tree, b, K = pointer(system.tree.nodes), pointer(system.tree.places), pointer(system.tree.work)
+    for n in range(1, system.tree.nodes.shape[0]):
+        t, k = TREE_WIDTH * n, WORK_WIDTH * n
+        m, motion, o = WORK_WIDTH * tree[t + PARENT], tree[t + MOTION], BODY_WIDTH * tree[t + ROW]
+        i, j = tree[t + COORDINATE], tree[t + RATE]
+        alpha = vector_of(K, m + ALPHA_Q)
+        a = add(vector_of(K, m + ACCELERATION_Q), cross(alpha, vector_of(K, k + LINK_NOW)))
+        if motion == FREE:
+            a = solve_symmetric(six_of(K, k + MATRIX_M), vector_of(K, k + FORCE))
+            put(out, i, vector_of(y, j))
+            put(out, j, a)
+            i, j = i + 3, j + 3
+        if motion >= SPHERICAL:
+            alpha = sub(vector_of(K, k + MOMENT), times(K, k + MATRIX_H, a))
+            turn_parameters(y, i, vector_of(y, j), out)
+            put(out, j, in_node_axes(b, o + A, alpha))
+        elif motion != FIXED:
+            rate = K[k + FREE_RATE] - dot(vector_of(K, k + GAIN), alpha)
+            rate -= dot(vector_of(K, k + GAIN + 3), a)
+            change = scale(rate, vector_of(K, k + AXIS_NOW))
+            if motion == REVOLUTE:
+                alpha = add(alpha, change)
+            else:
+                a = add(a, change)
+            out[i], out[j] = y[j], rate
+        put(K, k + ALPHA_Q, alpha)
+        put(K, k + ACCELERATION_Q, a)
+
+
+@compiled_into
+def turn_parameters(y: Floats, i: int, w: Vector, out: Floats) -> None:
+    """Rates of the Euler parameters at i, for the angular velocity w in the node's axes."""
+    e0, e1, e2, e3 = y[i], y[i + 1], y[i + 2], y[i + 3]
+    w0, w1, w2 = 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]
+    out[i] = -e1 * w0 - e2 * w1 - e3 * w2
+    out[i + 1] = e0 * w0 - e3 * w1 + e2 * w2
+    out[i + 2] = e3 * w0 + e0 * w1 - e1 * w2
+    out[i + 3] = -e2 * w0 + e1 * w1 + e0 * w2
+
+
+@compiled_into
+def in_node_axes(b: Floats, k: int, a: Vector) -> Vector:
+    """A^T a, A at k."""
+    return (
+        b[k] * a[0] + b[k + 3] * a[1] + b[k + 6] * a[2],
+        b[k + 1] * a[0] + b[k + 4] * a[1] + b[k + 7] * a[2],
+        b[k + 2] * a[0] + b[k + 5] * a[1] + b[k + 8] * a[2],
+    )
+
+
+@compiled_into
+def solve_symmetric(S: Any, b: Vector) -> Vector:
+    """Solution of S x = b, by S = L D L^T; S positive definite, by rows of its upper triangle."""
+    l1, l2 = S[1] / S[0], S[2] / S[0]
+    d1 = S[3] - l1 * S[1]
+    l3 = (S[4] - l1 * S[2]) / d1
+    x1 = b[1] - l1 * b[0]
+    x2 = (b[2] - l2 * b[0] - l3 * x1) / (S[5] - l2 * S[2] - l3 * l3 * d1)
+    x1 = x1 / d1 - l3 * x2
+    return b[0] / S[0] - l1 * x1 - l2 * x2, x1, x2
+
+
+@compiled
+def body_accelerations(system: System, out: Floats) -> None:
+    """Accelerations (6 n,) of the bodies: r_ddot and omega_dot, global axes."""
+    tree, K = pointer(system.tree.nodes), pointer(system.tree.work)
+    for n in range(1, system.tree.nodes.shape[0]):
+        t, k = TREE_WIDTH * n, WORK_WIDTH * n
+        if tree[t + FLAGS] & HAS_MASS != 0:
+            o, s = 6 * (tree[t + ROW] - 1), vector_of(K, k + CENTRE_NOW)
+            alpha, a = vector_of(K, k + ALPHA_Q), vector_of(K, k + ACCELERATION_Q)
+            own = add(vector_of(K, k + ACCELERATION), times(K, k + SPIN, s))
+            put(out, o, add(own, add(a, cross(alpha, s))))
+            put(out, o + 3, add(vector_of(K, k + ALPHA), alpha))

@@ -1,0 +1,203 @@
+"""The joint formulation against method standard, which solves the saddle-point equations."""
+
+import attrs
+import numpy as np
+import pytest
+from support import trees
+
+import dap3d_core as dap
+from dap3d_core.assembly.arrays import TOLERANCE_C, TOLERANCE_V
+from dap3d_core.formulations import PROJECT
+from dap3d_core.model.state_layout import u_from_y
+from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation.initial.assemble import correct_initial
+
+#: Accelerations and multipliers of two factorisations of equations with condition numbers up to
+#: some 1e3 differ by rounding times that.
+ACCELERATIONS, MULTIPLIERS = 1e-12, 1e-11
+
+
+def closed(evaluator):
+    """The start of a scene, on its constraints to rounding: a correction leaves 1e-10 of them."""
+    y = evaluator.integrated(correct_initial(evaluator, evaluator.model.u0).u)
+    evaluator.system.settings[[TOLERANCE_C, TOLERANCE_V]] = 0.0
+    out = np.zeros(4 + evaluator.length_count)
+    evaluator.functions[PROJECT](0.0, y, out, evaluator.system, evaluator.loops)
+    return u_from_y(y)
+
+
+def both_reports(scene):
+    """What methods standard and joint report at the start of a scene, and its numbers of v_dot."""
+    standard, joint = (CompiledModel(scene, method=m) for m in ("standard", "joint"))
+    u = closed(standard.evaluator)
+    split = 6 * standard.model.body_count
+    return standard.evaluator.report(0.0, u), joint.evaluator.report(0.0, u), split
+
+
+def differences(scene):
+    """Relative differences of accelerations and of multipliers."""
+    right, found, split = both_reports(scene)
+    difference = np.abs(found - right)
+    sizes = np.max(np.abs(right[:split])), np.max(np.abs(right[split:-4]), initial=1e-300)
+    rest = np.max(difference[split:-4], initial=0.0)
+    return np.max(difference[:split]) / sizes[0], rest / sizes[1]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_accelerations_and_multipliers_are_those_of_standard(seed):
+    """Random trees of revolute, spherical, cylindrical, translational, universal joints, free."""
+    a, multipliers = differences(trees.random_tree(2 + seed, seed, free=0.1))
+    assert a < ACCELERATIONS
+    assert multipliers < MULTIPLIERS
+
+
+@pytest.mark.parametrize("name", ["pen1", "pen2", "A05"])
+def test_shipped_trees_have_the_accelerations_of_standard(name):
+    """All shipped models without loops or rows of velocities; A05 has masses that differ by 1e3."""
+    a, multipliers = differences(dap.load(name))
+    assert a < ACCELERATIONS
+    assert multipliers < MULTIPLIERS
+
+
+def test_friction_changes_the_multipliers_as_it_does_in_standard():
+    """Cylindrical, revolute and translational joints rub; multipliers settle to 1e-10 of them."""
+    scene = trees.random_tree(5, 3, joints=("rev", "cyl", "tran"))
+    for name in scene.joints:
+        scene.add_force("friction", joint=name, mu=0.1, radius=0.05, v_tol=0.1)
+    right, found, split = both_reports(scene)
+    assert np.max(np.abs(found - right)[:-4]) < 1e-8 * np.max(np.abs(right[:-4]))
+    still = attrs.evolve(scene, forces={k: f for k, f in scene.forces.items() if k == "weight"})
+    assert np.max(np.abs(both_reports(still)[0] - right)[:split]) > 1e-3  # it does something
+
+
+def test_a_run_is_that_of_standard():
+    """Motion, multipliers, energy and work of a tree with springs, to ten times the tolerance."""
+    scene = trees.random_tree(4, 8)
+    scene.add_force("ptp", "spring", P_i="b3.O", P_j="ground.O", k=20.0, c=0.5, l0=1.0)
+    settings = {"t_end": 1.0, "dt": 0.25, "rtol": 1e-9, "atol": 1e-11}
+    right = dap.simulate(scene, method="standard", **settings)
+    found = dap.simulate(scene, method="joint", **settings)
+    assert found.u == pytest.approx(right.u, abs=1e-8 * np.max(np.abs(right.u)))
+    assert found.Lam == pytest.approx(right.Lam, abs=1e-7 * np.max(np.abs(right.Lam)))
+    assert found.energy.total == pytest.approx(right.energy.total, rel=1e-7)
+    assert all(entry.ok for entry in found.ledger.values())
+    assert found.method == "joint"
+
+
+def spinning_wheel(speed):
+    scene = dap.Scene(name="wheel")
+    scene.add_body("wheel", mass=1.0, Jp=(0.1, 0.2, 0.1), w=(0.0, speed, 0.0))
+    scene.add_joint("rev", "pin", P_i="wheel.O", P_j="ground.O", a_i="wheel.y", a_j="ground.y")
+    return scene
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "dopri5", "adams"])
+def test_an_angle_keeps_its_digits_over_many_turns(integrator):
+    """After 300 turns Euler parameters are those of the closed form, with their sign."""
+    speed, t = 20.0, 100.0
+    found = dap.simulate(spinning_wheel(speed), t_end=t, dt=t / 8, method="joint", rtol=1e-10,
+                         integrator=integrator)  # fmt: skip
+    half = 0.5 * speed * found.t
+    assert found.p[:, 0, 0] == pytest.approx(np.cos(half), abs=1e-9)
+    assert found.p[:, 0, 2] == pytest.approx(np.sin(half), abs=1e-9)
+
+
+def test_the_first_step_from_rest_is_no_shorter_than_that_of_standard():
+    """Angles do not begin at zero, where they would have no size to choose a step by."""
+    scene = trees.mixed_chain(1)
+    settings = {"t_end": 10.0, "dt": 10.0, "rtol": 1e-3, "atol": 1e-3}
+    steps = {
+        method: dap.simulate(scene, method=method, **settings).stats
+        for method in ("standard", "joint")
+    }
+    assert steps["joint"].rhs <= 1.05 * steps["standard"].rhs
+
+
+def test_events_are_found_in_steps_that_bring_an_angle_back():
+    """Ten turns: each step in which an angle is shifted by two turns is interpolated unshifted."""
+    speed = 7.0
+    event = dap.Event("wheel.p.e0", below=0.0)
+    found = dap.simulate(spinning_wheel(speed), t_end=9.0, dt=9.0, method="joint", events=[event])
+    expected = np.arange(np.pi, 9.0 * speed, 4.0 * np.pi) / speed
+    assert [one.t for one in found.events] == pytest.approx(expected, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("fourbar3", ["J4: it closes a loop", "J5: its rows depend on time"]),
+        ("fourbar2", ["J2: its 1 row costs less than 5 joint coordinates"]),
+    ],
+)
+def test_what_is_no_tree_of_known_motions_is_refused_by_name(name, words):
+    """One error names joints and reasons, and what to use instead."""
+    with pytest.raises(SimulationError, match="Use method standard or auto") as error:
+        dap.compile(name, method="joint")
+    assert all(f"joint {word}" in str(error.value) for word in words)
+
+
+def test_a_screw_is_refused_by_name():
+    """A motion that is known, of a kind that the recursion does not have."""
+    scene = dap.Scene(name="screw")
+    scene.add_body("nut", mass=1.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_joint("screw", "thread", P_i="nut.O", P_j="ground.O", a_i="nut.z", a_j="ground.z",
+                    pitch=0.1)  # fmt: skip
+    with pytest.raises(SimulationError, match="joint thread: its motion is a screw"):
+        dap.compile(scene, method="joint")
+
+
+def test_what_hangs_on_a_fixed_body_moves_as_on_ground():
+    """A joint that leaves nothing free is a node of the tree, with the multipliers of standard."""
+    scene = trees.mixed_chain(2)
+    scene.add_body("post", mass=1.0, Jp=(1.0, 1.0, 1.0), r=(0.0, 0.0, -1.0))
+    scene.add_joint("fix", "foot", body_i="post")
+    scene.add_body("arm", mass=1.0, Jp=(0.1, 0.2, 0.2), r=(0.5, 0.0, -1.0), w=(0.0, 1.0, 0.0),
+                   r_dot=(0.0, 0.0, -0.5))  # fmt: skip
+    scene.add_point("end", "arm", (-0.5, 0.0, 0.0))
+    scene.add_joint("rev", "hinge", P_i="end", P_j="post.O", a_i="arm.y", a_j="post.y")
+    a, multipliers = differences(scene)
+    assert a < ACCELERATIONS
+    assert multipliers < MULTIPLIERS
+
+
+def test_the_explanation_has_the_tree():
+    """Nodes and coordinates by their sort, in place of the matrix."""
+    text = dap.compile("pen2", method="joint").explain()
+    assert "tree       2 nodes: 1 angles, 1 balls" in text
+    assert "matrix" not in text
+
+
+def test_radau_says_that_it_keeps_body_coordinates():
+    """It is refused, with what fits."""
+    with pytest.raises(SimulationError, match="body coordinates; use method standard"):
+        dap.simulate("pen1", t_end=0.1, method="joint", integrator="radau")
+
+
+def hinged_spring():
+    """A rod on a hinge; the moment of its torsion spring has a knot that it passes, with turns."""
+    scene = dap.Scene(name="hinged spring")
+    scene.add_body("rod", mass=1.0, Jp=(0.1, 0.1, 0.01), r=(0.5, 0.0, 0.0), w=(0.0, 0.0, 9.0),
+                   r_dot=(0.0, 4.5, 0.0))  # fmt: skip
+    scene.add_point("A", "rod", (-0.5, 0.0, 0.0))
+    scene.add_joint("rev", "hinge", P_i="A", P_j="ground.O", a_i="rod.z", a_j="ground.z")
+    scene.add_function("spline", "curve", x=(-9.0, 1.0, 9.0), y=(0.0, 1.0, 0.0))
+    scene.add_force("rot_sda", "spring", v_i="rod.x", v_j="ground.x", axis="ground.z", k=1.0,
+                    theta_0=0.0, function="curve")  # fmt: skip
+    return scene
+
+
+def test_turns_knots_and_events_are_those_of_standard():
+    """A spring over more than a turn, a knot of its law, a quantity that passes a level."""
+    settings = {"t_end": 2.0, "dt": 0.25, "rtol": 1e-10, "atol": 1e-12}
+    results = [
+        dap.simulate(hinged_spring(), method=method, events=[dap.Event("rod.r.x", below=-0.2)],
+                     **settings)
+        for method in ("standard", "joint")
+    ]  # fmt: skip
+    right, found = results
+    assert found.u == pytest.approx(right.u, abs=1e-8)
+    assert np.count_nonzero(np.diff(np.sign(found.p[:, 0, 0]))) > 1  # more than a turn and a half
+    assert len(found.events) == len(right.events) > 1
+    for one, other in zip(found.events, right.events, strict=True):
+        assert one.t == pytest.approx(other.t, abs=1e-8)
+        assert np.asarray(one.u) == pytest.approx(np.asarray(other.u), abs=1e-7)
