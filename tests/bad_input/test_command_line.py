@@ -5,9 +5,7 @@ What a process of its own is not needed for runs in this one, with the streams o
 
 import json
 import os
-import resource
 import shutil
-import signal
 import subprocess
 import sys
 import threading
@@ -260,51 +258,6 @@ def test_a_missing_package_is_told_with_its_extra(call, folder, monkeypatch, pac
 # ------------------------------------------------------------------ disks and races
 
 
-def _limited(size):
-    """For a child process: no file may be larger than this."""
-
-    def limit():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
-
-    return limit
-
-
-def _process(folder, *words, **options):
-    env = environment(PYTHONDONTWRITEBYTECODE=1)  # on a small disk it would be cut off, and kept
-    return subprocess.Popen(
-        [*COMMAND, *words], cwd=folder, env=env, stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options,
-    )  # fmt: skip
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("t_end", "left"), [("0.1", []), ("1e5", ["out.nc.part"])], ids=["short", "streaming"]
-)
-def test_a_disk_that_is_full_ends_a_run_in_a_sentence(folder, t_end, left):
-    """A short run leaves nothing; of a long one the rows that reached the disk are readable."""
-    limit = _limited(60_000 if t_end == "1e5" else 9_000)
-    words = ("run", "fall.toml", "-o", "out.nc", "--t-end", t_end, "--dt", "0.01", "--json")
-    process = _process(folder, *words, preexec_fn=limit)
-    out, err = process.communicate(timeout=300)
-    assert process.returncode == 1, err
-    assert "Traceback" not in err
-    assert "cannot write" in json.loads(out)["error"]
-    found = [path.name for path in folder.iterdir() if path.name.startswith("out")]
-    assert found in ([], left)
-    for name in found:
-        if (folder / name).stat().st_size:
-            code, _, told = _finish(_process(folder, "info", name))
-            assert code in (0, 2), told
-            assert "Traceback" not in told
-
-
-def _finish(process):
-    out, err = process.communicate(timeout=300)
-    return process.returncode, out, err
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(not (shutil.which("setpriv") or os.getuid()), reason="root may write all")
 def test_a_folder_that_is_read_only_is_refused(folder):
@@ -369,18 +322,6 @@ def test_of_several_that_overwrite_one_file_at_once_none_disturbs_another(tmp_pa
         thread.join()
     assert not errors
     assert list(tmp_path.iterdir()) == [target]
-
-
-@pytest.mark.slow
-def test_of_two_runs_that_write_one_file_one_wins_whole(folder):
-    words = ("run", "fall.toml", "-o", "both.nc", "--t-end", "200", "--dt", "0.01", "--json")
-    both = [_finish(process) for process in [_process(folder, *words) for _ in range(2)]]
-    assert sorted(code for code, _, _ in both) in ([0, 1], [0, 2]), both
-    assert all("Traceback" not in err for _, _, err in both)
-    result = dap.open(folder / "both.nc")
-    assert result.status == "done"
-    assert np.array_equal(result.t, 0.01 * np.arange(20001))
-    assert not list(folder.glob("both.nc.part*"))
 
 
 @pytest.mark.slow

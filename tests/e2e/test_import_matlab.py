@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 import pytest
-from support.matlab import MODELS, write
+from support.matlab import MODELS
 from support.process import REPOSITORY
 
 import dap3d_core as dap
@@ -96,39 +96,10 @@ def test_files_are_not_overwritten_unasked(dap3d, refuse):
     assert source.read_text() == before
 
 
-@pytest.mark.parametrize("target", ["nowhere/scene.toml", "/dev/full"])
-def test_targets_that_cannot_be_written(refuse, target):
-    refuse("import-matlab", MODELS / "pen1", "-o", target)
-
-
 def test_a_folder_takes_a_scene_toml(dap3d):
     (dap3d.folder / "mine").mkdir()
     assert dap3d("import-matlab", MODELS / "pen1", "-o", "mine").returncode == 0
     assert (dap3d.folder / "mine" / "scene.toml").exists()
-
-
-def test_mistakes_are_told_at_once_and_nothing_is_written(dap3d, refuse):
-    write(
-        dap3d.folder / "bad",
-        inBodies="B1 = Body_struct; system('ls');\nB1.m = 2;\nBodies = [B1];\n",
-        inForces="Forces = [S1];\n",
-    )
-    told = refuse("import-matlab", "bad")
-    for words in (
-        "bad/inBodies.m:1: system('ls'): the function system is outside the language",
-        "bad/inBodies.m:2: B1.m: a Body_struct has no field m; did you mean 'mass'?",
-        "bad/inForces.m:1: S1: S1 is not defined",
-        "bad/inPoints.m:3: P3.Bindex = 2: there is no body 2; Bodies has 1",
-    ):
-        assert words in told
-    assert not (dap3d.folder / "scene.toml").exists()
-    done = dap3d("import-matlab", "bad", "--json")
-    assert done.returncode == 2
-    mistakes = json.loads(done.stdout)["mistakes"]
-    assert ("bad/inBodies.m", 2) in [(m["file"], m["line"]) for m in mistakes]
-    refuse("import-matlab", "nowhere")
-    refuse("import-matlab", "bad/inBodies.m")
-    refuse("import-matlab")
 
 
 @pytest.mark.slow

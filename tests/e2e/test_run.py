@@ -3,7 +3,6 @@
 import json
 import re
 
-import numpy as np
 import pytest
 from support.mechanisms import rough_four_bar
 
@@ -70,26 +69,6 @@ def test_strict_makes_changes_a_failure_and_saves_all_the_same(dap3d):
     assert noted.returncode == 1
     assert "--strict" in noted.stderr
     assert dap.open(dap3d.folder / "rough.nc").status == "done"
-
-
-@pytest.mark.slow
-def test_the_metric_of_the_correction_can_be_chosen(dap3d):
-    """The crank of the rough four-bar leaves the vertical by another angle where masses count; the
-    choice stands in the result."""
-    rough_four_bar().save(dap3d.folder / "rough.toml")
-    start = {}
-    for metric in ("unit", "mass"):
-        done = dap3d("run", "rough.toml", "--t-end", "0", "--correct-metric", metric, "--json",
-                     "-o", f"{metric}.nc")  # fmt: skip
-        found = json.loads(done.stdout)
-        assert found["settings"]["correct_metric"] == metric
-        assert found["initial"]["changed_bodies"] == ["crank", "coupler", "follower"]
-        start[metric] = np.array(found["initial"]["bodies"]["crank"]["p"])
-        checked = dap3d("check", "rough.toml", "--correct-metric", metric, "--json")
-        same = json.loads(checked.stdout)["initial"]["bodies"]["crank"]["p"]
-        assert start[metric] == pytest.approx(same, abs=1e-12)  # but for the projection's rounding
-    assert np.max(np.abs(start["unit"] - start["mass"])) > 1e-5
-    assert dap3d("run", "rough.toml", "--correct-metric", "energy").returncode == 2
 
 
 def test_without_a_model_and_without_a_terminal_it_is_a_usage_error(dap3d):

@@ -76,20 +76,6 @@ def test_the_command_writes_a_page(dap3d, refuse, pen1):
     assert (found["instants"], len(found["notes"])) == (3, 1)
 
 
-def test_what_cannot_be_shown_is_refused(refuse, dap3d, pen1):
-    near = refuse("view", "pen1.nc", "--quantity", "cone.rr.z", "-o", "b.html")
-    assert "did you mean 'cone.r.z'" in near
-    assert "fps = 0" in refuse("view", "pen1.nc", "--fps", "0", "-o", "b.html")
-    assert "is a .html file" in refuse("view", "pen1.nc", "-o", "pen1.nc")
-    assert "cannot read" in refuse("view", "gone.nc", "-o", "b.html")
-    assert "no folder" in refuse("view", "pen1.nc", "-o", "no/b.html")
-    assert "shipped model" in refuse("view", "pen1.nc", "-o", "b.html", "--model", "nothing")
-    (dap3d.folder / "there.html").write_text("mine")
-    assert "--force overwrites" in refuse("view", "pen1.nc", "-o", "there.html")
-    assert (dap3d.folder / "there.html").read_text() == "mine"
-    assert sorted(p.name for p in dap3d.folder.iterdir()) == ["pen1.nc", "there.html"]
-
-
 # ---------------------------------------------------------------- the browser
 
 

@@ -10,8 +10,6 @@ import pytest
 import dap3d_core as dap
 from dap3d_core.scene import SceneError, check
 from dap3d_core.scene.files.read_toml import LARGEST_FILE
-from dap3d_core.scene.validate.coerce_values import Fault
-from dap3d_core.scene.validate.shapes import mesh_file
 
 BODY = "[bodies.b]\nmass = 1.0\nJp = [1.0, 1.0, 1.0]\n"
 
@@ -47,33 +45,6 @@ def test_what_is_no_file_is_not_opened(tmp_path):
     for name in ("https://example.org/scene.toml", "file:///etc/passwd", "a\0b"):
         with pytest.raises(SceneError):
             dap.load(name)
-
-
-PATHS = ("../x.stl", "/etc/x.stl", "a/../../x.stl", "http://x/x.stl", "file:x.stl", "C:\\x.stl",
-         "\\\\host\\x.stl", "x\0.stl", "x\n.stl", "x.stl/../../y.stl", "~/x.gltf", "x.stl.gz",
-         "/dev/stdin", "x.zip", "", ".", "link.stl", "down/secret.stl", "pipe.stl", "folder.stl",
-         "zero.stl", "\u202elts.x", "x.STL\u0000.png")  # fmt: skip
-
-
-@pytest.mark.skipif(os.name != "posix", reason="no such files")
-@pytest.mark.parametrize("name", PATHS)
-def test_a_mesh_lies_in_the_folder_of_its_scene(tmp_path, name):
-    """No other file becomes part of a page, also not by a link."""
-    folder = tmp_path / "model"
-    (folder / "folder.stl").mkdir(parents=True)
-    (tmp_path / "secret.stl").write_text("solid x")
-    (tmp_path / "x.stl").write_text("solid x")
-    (folder / "link.stl").symlink_to(tmp_path / "secret.stl")
-    (folder / "down").symlink_to(tmp_path)
-    (folder / "zero.stl").symlink_to("/dev/zero")
-    os.mkfifo(folder / "pipe.stl")
-    assert isinstance(mesh_file(folder, name), Fault)
-
-
-def test_a_link_inside_the_folder_is_followed(tmp_path):
-    (tmp_path / "a.stl").write_text("solid x")
-    (tmp_path / "b.stl").symlink_to("a.stl")
-    assert mesh_file(tmp_path, "b.stl") == tmp_path / "b.stl"
 
 
 @pytest.mark.slow
