@@ -22,7 +22,7 @@ SHORT = {"t_end": 0.6, "dt": 0.02}
         {},
         pytest.param({"method": "lsq", "rtol": 1e-6}, marks=long_in_plain_python),
         {"integrator": "rk4", "step": 0.01, "project": False},
-        {"integrator": "adams", "correct_metric": "mass"},
+        pytest.param({"integrator": "adams", "correct_metric": "mass"}, marks=long_in_plain_python),
         {"correct": False, "t_end": 0.1, "dt": None},
     ],
 )

@@ -160,6 +160,7 @@ def test_the_method_and_its_reason_are_noted():
 # ------------------------------------------------------------------ equal runs
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("model", ["pen2", "bodies2"])
 def test_equal_runs_give_equal_arrays(model):
     """Bit for bit: compiled once, compiled anew, with and without progress."""

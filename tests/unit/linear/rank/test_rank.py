@@ -12,8 +12,8 @@ from support.graphs import (
     two_wheels,
     wheel,
 )
+from support.plain import long_in_plain_python
 
-from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.linear.rank import rank
 from dap3d_core.linear.rank.rank import dense_rank, sparse_rank
 
@@ -60,6 +60,7 @@ def projector(found):
     return P
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("sparse", WAYS, indirect=True)
 @pytest.mark.parametrize("name", REDUNDANT)
 def test_both_ranks_agree(name, sparse):
@@ -69,7 +70,7 @@ def test_both_ranks_agree(name, sparse):
     Combinations are as good as rounding over the smallest singular value that is not zero, squared
     at worst before refinement: 1e-16 / 1e-4^2.
     """
-    for seed in range(2 if jit_is_on() else 1):
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         case = Case(REDUNDANT[name](rng), rng)
         dense = dense_rank(case.dense)

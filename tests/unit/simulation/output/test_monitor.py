@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 from support import problems
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("options", [{}, {"integrator": "rk4", "step": 0.002}])
 def test_the_last_word_is_that_of_the_result(options):
     """Steps and drift at the end are those of statistics and ledger.

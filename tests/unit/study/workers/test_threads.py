@@ -9,6 +9,7 @@ import time
 import attrs
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 from support.studies import POINTS, bob, collected, same
 
 import dap3d_core as dap
@@ -30,6 +31,7 @@ def ours():
     return [t for t in threading.enumerate() if t.name == "dap3d-study"]
 
 
+@long_in_plain_python
 def test_numbers_depend_neither_on_threads_nor_on_portions(ensemble):
     """Bit for bit: one thread, more threads than cores, all points at once, each by itself."""
     points, places = POINTS[:POINTS_COUNT], np.arange(POINTS_COUNT)
