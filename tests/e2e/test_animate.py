@@ -53,6 +53,7 @@ def test_ctrl_c_leaves_no_file(dap3d, runs):
     end = time.monotonic() + 60
     while not list(dap3d.folder.glob("a.gif*")) and time.monotonic() < end:
         time.sleep(0.02)
+    time.sleep(1.0)  # among its frames, not while the file is made
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
