@@ -89,6 +89,11 @@ REFUSED = [
     (("resume", "fall.toml"), "it is no checkpoint of dap3d"),
     (("rerun",), "Missing argument 'RESULT'"),
     (("rerun", "fall.toml"), "it is not a NetCDF-4 file"),
+    # analyses
+    (("equilibrium", "pne1"), "did you mean 'pen1'"),
+    (("kinematics", "pne1"), "did you mean 'pen1'"),
+    (("inverse", "pne1"), "Missing argument 'MOTION'"),
+    (("modes", "fall.toml", "-n", "0"), "is not in the range x>=1"),
     # sweeps
     (("sweep",), "Missing argument 'MODEL'"),
     (("sweep", "pne1", *VARY, *KEEP), "did you mean 'pen1'"),
