@@ -113,7 +113,7 @@ def test_rounding_of_the_rates_widens_the_limit_of_the_energy():
     for more in ({}, {"rate_noise": {"v": 1e-3, "w": 0.0}}):
         result, _, _ = circling(settings=CONTROLLED | more)
         entries.append(result.ledger["energy"])
-    speed = np.max(np.linalg.norm(result.rd, axis=2) @ result.subject.mass)
+    speed = np.max(np.linalg.norm(result.rd, axis=2) @ result.summary.mass)
     scale = np.max(result.energy.kinetic)
     span = result.t[-1] - result.t[0]
     wider = entries[1].limit - entries[0].limit
