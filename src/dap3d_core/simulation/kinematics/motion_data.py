@@ -35,6 +35,8 @@ DEGREE, FEWEST = 5, 4
 SPAN, NOTHING = 1e-5, 1e-7
 #: Passes of the Gauss-Newton iteration, and the change (rad, parts of the model) that ends it.
 MOST_PASSES, SETTLED = 50, 1e-12
+#: Slopes of quantities are computed anew behind a larger change.
+SLOPES_ANEW = 1e-2
 #: Changes no longer shrink below this: rounding.
 ROUNDING = 1e-8
 #: No pass turns a body by more, or moves it by more of the model.
@@ -188,6 +190,7 @@ class _Fit:
         self.misfit = dict.fromkeys(data.values, 0.0)
         self._summary = summary_of(evaluator.model)
         self._labels = list(data.values)
+        self._angles: set[str] = set()
 
     def pose(self, k: int, start: Floats) -> Floats:
         """The state (13 n,), without velocities, at instant k from one near it."""
@@ -197,11 +200,14 @@ class _Fit:
         u, before = start, np.inf
         for _ in range(MOST_PASSES):
             rows = ChosenRows(self.evaluator, t, u, self.chosen)
-            values, slopes = self._quantities(t, u)
+            if before > SLOPES_ANEW:
+                values, slopes = self._quantities(t, u)
+            else:
+                values = self._values(np.array([t]), u[None])[:, 0]
             if k == 0 and before == np.inf:
                 self._check_columns(slopes)
             change = -rows.least(rows.rows.C)
-            error = (target - values - slopes @ change)[measured]
+            error = (self._gap(target, values) - slopes @ change)[measured]
             seen = slopes[measured] @ rows.free
             self._check_seen(rows, seen, t)
             change = change + rows.free @ np.linalg.lstsq(seen, error, rcond=None)[0]
@@ -210,7 +216,7 @@ class _Fit:
                 break
             u = displaced(u, (min(1.0, MOST_CHANGE / max(size, 1e-300)) * change).reshape(n, 6), n)
             if size <= SETTLED or (size <= ROUNDING and size > 0.5 * before):
-                found = np.abs(target - self._quantities(t, u)[0])
+                found = np.abs(self._gap(target, self._values(np.array([t]), u[None])[:, 0]))
                 for label, gap in zip(self._labels, found, strict=True):
                     if np.isfinite(gap):
                         self.misfit[label] = max(self.misfit[label], float(gap))
@@ -249,7 +255,15 @@ class _Fit:
         if quantity.values.ndim > 1:
             words = f"name one of its components: {', '.join(quantity.components)}"
             raise SceneError([Mistake(f"motion.{label}", MISSING, words)])
+        if quantity.unit == "rad":
+            self._angles.add(label)
         return quantity.values
+
+    def _gap(self, target: Floats, values: Floats) -> Floats:
+        """What is missing to the data, (labels,): of angles the least, whatever their turns."""
+        gap = target - values
+        turns = [label in self._angles for label in self._labels]
+        return np.where(turns, gap - 2.0 * np.pi * np.round(gap / (2.0 * np.pi)), gap)
 
     def _check_columns(self, slopes: Floats) -> None:
         """Refuse quantities that positions do not change: velocities, forces."""

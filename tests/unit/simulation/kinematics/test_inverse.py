@@ -78,6 +78,15 @@ def test_positions_as_data_are_differentiated_by_splines(scene, motion, tmp_path
     assert errors[1] > 8.0 * errors[0]
 
 
+def test_angles_of_joints_are_data_over_many_turns(scene):
+    """One column for one freedom; the angle of the crank counts its turns, poses do not."""
+    turning = dap.kinematics(scene, t_end=1.0, dt=0.125)
+    angle = find(turning, "bearing.angle").values
+    assert np.ptp(angle) > 2.0 * np.pi
+    result = dap.inverse(scene, {"t": turning.t, "bearing.angle": angle}, "motor")
+    assert np.max(np.abs(result.r - turning.r)) < 1e-12
+
+
 def test_data_that_contradict_the_joints_are_met_halfway(scene, motion):
     """The crank's place is too far out by 1 mm: the note says by how much it is missed."""
     data = crank_places(motion)
