@@ -24,6 +24,8 @@ from dap3d_core.result.quantities.catalogue import (
 NORM = "norm"
 #: Names of joint coordinates, of which a joint has some.
 COORDINATE = re.compile(r"q[1-9]\d?(_dot)?|(angle|length)(_rate)?")
+#: A quantity of the actuators of inverse dynamics alone.
+ACTUATION = "actuation"
 #: Kinds with names that a result knows without its scene; forces are looked up after them.
 NAMED = ("body", "point", "joint")
 
@@ -248,7 +250,9 @@ def _unknown(result: QuantitySource, name: str) -> UnknownNameError:
 
 def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
     """Names that may follow an owner."""
-    known = ACTIONS if owner.slot else QUANTITIES[owner.kind]
+    names = ACTIONS if owner.slot else QUANTITIES[owner.kind]
+    is_actuator = owner.name in result.record.actuation
+    known = (name for name in names if name != ACTUATION or is_actuator)
     return (*known, *_coordinate_names(result, owner))
 
 
