@@ -110,7 +110,7 @@ def test_what_dap3d_writes_is_accepted(good):
     with netCDF4.Dataset(good) as dataset:
         found = {n: dataset.getncattr(n) for n in dataset.ncattrs()}
     names = ("notes", "settings", "statistics", "versions", "events")
-    check_attributes({n: json.loads(found[n]) for n in names})
+    check_attributes({"actuation": {}} | {n: json.loads(found[n]) for n in names})
 
 
 #: Texts of a scene; none of them is one, or not of this result.

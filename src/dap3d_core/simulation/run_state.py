@@ -194,7 +194,12 @@ class RunState:
         )
 
     def _rate_noise(self) -> dict[str, dict[str, float]]:
-        """Largest rounding of accelerations, m/s^2 and rad/s^2, where it limits the accuracy."""
+        """Largest rounding of accelerations, m/s^2 and rad/s^2, where it limits the accuracy.
+
+        In coordinates of a formulation it is that of other rates, and not recorded.
+        """
+        if self.evaluator.formulation.has_own_coordinates:
+            return {}
         part = integrated_layout(self.evaluator.model.body_count)["velocities"]
         noise = np.zeros(6)
         for integration in self.integrations:

@@ -54,6 +54,7 @@ from dap3d_core.integrators.stepping.output import (
 from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.singular_poses import (
     is_approaching,
+    is_at_singularity,
     is_near_singularity,
     limit_step_at_singularity,
     predict_measures,
@@ -255,8 +256,11 @@ def cut_at_stage(work: RungeKuttaState, t: float, t1: float) -> bool:
     """Cut a step to t1, near a singular state, whose projected stage at t is of no use; whether so.
 
     Projection of what is far from the constraints may lead to any branch. A stage at the singular
-    state has rates that are not known, and tells where that is: the step is placed about it.
+    state has rates that are not known, and tells where that is: the step is placed about it. The
+    first step of a run from a singular state is not cut: longer ones are the better ones there.
     """
+    if is_at_singularity(work):
+        return False
     if work.fixed_step != 0.0:
         return False
     h, jump = t1 - work.t, projection_jump(work, work.state[OTHER], work.state[SCRATCH])

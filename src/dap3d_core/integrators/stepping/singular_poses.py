@@ -137,9 +137,23 @@ def predict_measures(work: Any, h: float) -> None:
 
 
 @compiled
+def is_at_singularity(work: Any) -> bool:
+    """True at a singular state from which a run starts (``begin_singular``)."""
+    lengths, count = work.lengths, 0
+    for k in range(lengths.shape[1]):
+        count |= lengths[NOW, k] == 0.0
+    return count != 0
+
+
+@compiled
 def is_approaching(work: Any) -> bool:
-    """True if a measure that is close to zero at the state projected last was not less at t."""
+    """True if a measure that is close to zero at the state projected last was not less at t.
+
+    Also at the start of a run from a singular state, whose first step shall lead away from it.
+    """
     lengths, found, count = work.lengths, work.real[MEASURES:], 0
+    if is_at_singularity(work):
+        return True
     for k in range(lengths.shape[1]):
         count |= found[k] < CLOSE and not found[k] >= lengths[NOW, k]
     return count != 0

@@ -160,6 +160,15 @@ def test_what_hangs_on_a_fixed_body_moves_as_on_ground():
     assert multipliers < MULTIPLIERS
 
 
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_a_state_at_a_knot_is_refused_by_linearisation(method):
+    """It looks at switches through the state of the formulation, also after a run."""
+    compiled = dap.compile(hinged_spring(theta_0=-1.0), method=method)
+    dap.simulate(compiled, t_end=0.1, dt=0.1)
+    with pytest.raises(SimulationError, match="at a switch of spring"):
+        dap.linearize(compiled)
+
+
 def test_the_explanation_has_the_tree():
     """Nodes and coordinates by their sort, in place of the matrix."""
     text = dap.compile("pen2", method="joint").explain()
@@ -173,7 +182,7 @@ def test_radau_says_that_it_keeps_body_coordinates():
         dap.simulate("pen1", t_end=0.1, method="joint", integrator="radau")
 
 
-def hinged_spring():
+def hinged_spring(theta_0=0.0):
     """A rod on a hinge; the moment of its torsion spring has a knot that it passes, with turns."""
     scene = dap.Scene(name="hinged spring")
     scene.add_body("rod", mass=1.0, Jp=(0.1, 0.1, 0.01), r=(0.5, 0.0, 0.0), w=(0.0, 0.0, 9.0),
@@ -182,7 +191,7 @@ def hinged_spring():
     scene.add_joint("rev", "hinge", P_i="A", P_j="ground.O", a_i="rod.z", a_j="ground.z")
     scene.add_function("spline", "curve", x=(-9.0, 1.0, 9.0), y=(0.0, 1.0, 0.0))
     scene.add_force("rot_sda", "spring", v_i="rod.x", v_j="ground.x", axis="ground.z", k=1.0,
-                    theta_0=0.0, function="curve")  # fmt: skip
+                    theta_0=theta_0, function="curve")  # fmt: skip
     return scene
 
 

@@ -392,5 +392,5 @@ def test_a_fit_is_drawn(tmp_path):
     assert save_plot(fit, [], tmp_path / "fit.png").stat().st_size > 5000
     with pytest.raises(KeyError, match=r"mass\.r\.x"):
         dap.plot(fit, "mass.r.z")
-    with pytest.raises(ValueError, match="over time"):
+    with pytest.raises(ValueError, match="x axis of its own"):
         dap.plot(fit, x="t")
