@@ -169,7 +169,8 @@ def _check(evaluator: Evaluator, t: float, u: Floats) -> None:
         return
     values = np.zeros(len(evaluator.switches))
     watch = evaluator.functions[WATCH]
-    watch(t, evaluator.integrated(u), values, evaluator.system, evaluator.loops)
+    with evaluator.coordinates.at(u) as y:
+        watch(t, y, values, evaluator.system, evaluator.loops)
     k = int(np.argmin(np.abs(values)))
     if abs(values[k]) <= AT_SWITCH:
         switch = evaluator.switches[k]
