@@ -75,7 +75,8 @@ def test_the_readme(tmp_path):
     (scene,) = blocks(text, "toml")
     (tmp_path / "cone.toml").write_text(scene)
     found = commands(text, ".venv/bin/dap3d")
-    assert [words[0] for words in found] == ["check", "run", "plot", "sweep", "plot"]
+    names = ["check", "run", "plot", "sweep", "plot", "equilibrium", "modes"]
+    assert [words[0] for words in found] == names
     for words in found:
         done = dap3d(words, tmp_path)
         assert done.returncode == 0, done.stderr
