@@ -116,8 +116,8 @@ def test_killed_at_any_moment_a_run_leaves_what_it_had(tmp_path):
 @pytest.mark.slow
 def test_a_run_is_terminated_resumed_and_made_again(dap3d):
     """By the command line: the file is that of a run that was not ended, but for its notes."""
-    settings = ("pen1", "--t-end", "8000", "--dt", "1")
-    process = dap3d.start("run", *settings, "--checkpoint", "0.2s")
+    settings = ("pen1", "--t-end", "16000", "--dt", "1")
+    process = dap3d.start("run", *settings, "--checkpoint", "1s")
     for line in process.stderr:
         if "left" in line:
             break
@@ -136,7 +136,7 @@ def test_a_run_is_terminated_resumed_and_made_again(dap3d):
     assert one.u.tobytes() == other.u.tobytes()
     again = dap3d("rerun", "pen1.nc")
     assert again.returncode == 0
-    assert "equal bit for bit; 8,001 instants compared" in again.stdout
+    assert "equal bit for bit; 16,001 instants compared" in again.stdout
 
 
 def test_rerun_says_what_differs(dap3d, monkeypatch, capfd):

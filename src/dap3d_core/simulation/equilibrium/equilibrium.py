@@ -37,7 +37,7 @@ class Equilibrium:
         Lam: (m,) Lagrange multipliers; those of least norm where they are not unique.
         unbalanced: (n, 6) force, N, and moment about the mass centre, N m, left on each body.
         residual: largest of these as a part of the largest force or moment on a body: rounding.
-        violation: largest |C| of the constraint rows.
+        violation: largest ``|C|`` of the constraint rows.
         stable: no freedom leads away from it; with ``indifferent`` freedoms, none of the others.
         indifferent: number of freedoms that nothing drives or holds, at any small distance.
         stiffness: (f,) eigenvalues of the stiffness of the f freedoms, N m, of displacements in

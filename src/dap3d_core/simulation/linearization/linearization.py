@@ -211,13 +211,13 @@ class Linearization:
 
     @property
     def frequencies(self) -> Floats:
-        """(modes,) natural frequency of each mode, Hz: |lambda| / (2 pi)."""
+        """(modes,) natural frequency of each mode, Hz: ``|lambda|`` / (2 pi)."""
         frequencies: Floats = np.abs(self.mode_eigenvalues) / (2.0 * np.pi)
         return frequencies
 
     @property
     def damping(self) -> Floats:
-        """(modes,) damping ratio of each mode: -Re lambda / |lambda|; 0 where lambda is zero."""
+        """(modes,) damping ratio of each mode: ``-Re lambda / |lambda|``; 0 for lambda = 0."""
         values = self.mode_eigenvalues
         magnitude = np.abs(values)
         ratio: Floats = -values.real / np.where(magnitude > 0.0, magnitude, 1.0)
