@@ -3,7 +3,7 @@
 A dual number holds a value v of each of m instances and its derivatives g in d directions; every
 operation carries both on (forward-mode differentiation; Griewank and Walther, Evaluating
 Derivatives, 2008, ch. 3). Derivatives are exact to rounding, branches those of the values. The
-functions of scalar_math.py take dual numbers by the same door as the symbols of a trace: an
+functions of scalar_math.py take dual numbers through the entry point of traced symbols: an
 attribute ``tracer`` that has their functions.
 """
 

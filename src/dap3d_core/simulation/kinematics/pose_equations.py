@@ -45,7 +45,7 @@ class LinearisedRows:
     def least(self) -> float:
         """The least singular value of the scaled rows: zero at a singular pose.
 
-        Of many columns by inverse iteration, which is good where it is small beside the others.
+        Of many columns by inverse iteration, accurate where it is small compared with the others.
         """
         if len(self._R) <= FEW_COLUMNS or not np.all(np.diag(self._R)):
             return float(np.linalg.svd(self._R, compute_uv=False)[-1])
