@@ -39,7 +39,7 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq")
+METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq", "joint")
 INTEGRATORS = ("dopri5", "dop853", "adams", "rk4", "radau", "auto")
 #: Arrays of a run, and those that the post-processor computes from them.
 STORED = ("t", "u", "v_dot", "Lam")

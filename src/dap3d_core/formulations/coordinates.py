@@ -44,7 +44,7 @@ class Coordinates:
         return np.concatenate([np.repeat(each, COORDINATES), np.repeat(each, VELOCITIES)])
 
     def structure(self) -> tuple[str, str]:
-        """What the equations are solved by, and its size in words."""
+        """Return the structure that solves the equations, and a description of its size."""
         plan = self.evaluator.plan
         ordering = plan.ordering
         return "matrix", (
@@ -66,5 +66,5 @@ class Coordinates:
 
     @contextmanager
     def at(self, u: Floats) -> Iterator[Floats]:
-        """The state y of a state u, for evaluations beside a run."""
+        """The state y of a state u, for evaluations outside a run."""
         yield y_from_u(u)

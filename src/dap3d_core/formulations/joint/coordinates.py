@@ -141,7 +141,7 @@ class Coordinates:
 
     @contextmanager
     def at(self, u: Floats) -> Iterator[Floats]:
-        """The state y of a state u; the reference of a run is put back in the end."""
+        """The state y of a state u; the reference of a run is restored afterwards."""
         before = self._tree.constants.copy()
         try:
             yield self.start(u)
@@ -195,7 +195,7 @@ def _joints(tree: SpanningTree, plan: Plan, joint_rows: Integers) -> Integers:
 
 
 def _why_kept(model: Model, kept: tuple[int, ...], refused: Mapping[int, str]) -> str:
-    """Why joints cannot be in the tree, and what to do."""
+    """Message: why joints cannot be in the tree, and what to do."""
     words = [
         f"joint {model.joint_names[k]}: {refused.get(k, 'it closes a loop')}"
         for k in kept[:MOST_NAMES]

@@ -5,7 +5,7 @@
     reduce   articulated inertias, from the leaves to ground
     spread   q_ddot, from ground to the leaves
 
-Multipliers are found where they are reported, or friction asks for them.
+Multipliers are computed only where they are reported or friction needs them.
 """
 
 # What a compiled function returns is Any to mypy.
