@@ -166,8 +166,12 @@ class Dual:
     def __pow__(self, n):
         v, g = _parts(n)
         value = self.value**v
-        own = _scaled(v * self.value ** (v - 1.0), self.slope)
-        return Dual(value, own if g is None else _sum(own, value * np.log(self.value) * g))
+        base = np.where(v == 0.0, 1.0, self.value)  # the slope of x^0 is 0, also at 0
+        own = _scaled(v * base ** (v - 1.0), self.slope)
+        if g is None:
+            return Dual(value, own)
+        logarithm = np.log(np.where(g == 0.0, 1.0, self.value))
+        return Dual(value, _sum(own, value * logarithm * g))
 
     def __rpow__(self, x):
         return Dual(np.asarray(float(x))) ** self

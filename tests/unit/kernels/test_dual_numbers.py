@@ -53,6 +53,15 @@ def test_derivative(name):
     np.testing.assert_allclose(own, both, rtol=1e-10, atol=1e-11)
 
 
+def test_powers_of_zero():
+    """Their slopes are those of polynomials: 0 of x^0 and x^2, 1 of x; also of dual exponents."""
+    zero, still = Dual(np.zeros((1, 1)), np.ones((1, 1))), np.zeros((1, 1))
+    for n, slope in ((0, 0.0), (1, 1.0), (2, 0.0)):
+        assert (zero**n).slope == slope
+        with np.errstate(divide="ignore", invalid="ignore"):
+            assert (zero ** Dual(np.full((1, 1), float(n)), still)).slope == slope
+
+
 def test_a_branch_on_a_number_is_refused():
     """A kernel that branches by ``if`` is told what to write."""
     with pytest.raises(TypeError, match=r"use where\(condition, a, b\)"):

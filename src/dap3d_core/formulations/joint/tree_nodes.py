@@ -51,7 +51,11 @@ def unsuitable_motion(motions: JointMotions) -> str:
     for kind in kinds:
         if kind not in MOTIONS:
             return f"its motion is a {kind}"
-    return "it turns about a point and moves besides" if BALL in kinds and kinds != [BALL] else ""
+    return (
+        "its motion is a rotation about a point and more"
+        if BALL in kinds and kinds != [BALL]
+        else ""
+    )
 
 
 @attrs.frozen(eq=False)
@@ -137,12 +141,12 @@ def _chains(
     for group in motions.motions:
         entries = np.array([entry_of.get(k, -1) for k in group.joints.tolist()])
         of_i = (entries >= 0) & (tree.child[entries] == group.body_i)
-        for mask, slot in ((of_i, "i"), ((entries >= 0) & ~of_i, "j")):
+        for mask, is_reversed in ((of_i, False), ((entries >= 0) & ~of_i, True)):
             here = np.flatnonzero(mask)
             if here.size:
-                moves = group.take(here) if slot == "i" else group.take(here).reversed()
+                moves = group.take(here).reversed() if is_reversed else group.take(here)
                 kinds = tuple(MOTIONS[part.kind] for part in moves.parts) or (FIXED,)
-                yield entries[here], moves, kinds, slot
+                yield entries[here], moves, kinds, moves.slots[0]
 
 
 def _table(motion: Integers, parent: Integers, body: Integers, body_count: int) -> Integers:

@@ -319,6 +319,8 @@ def _comparison(terms: list[ast.expr], ops: list[ast.cmpop], depth: int) -> Node
 
 
 def _joined(word: str, nodes: list[Node]) -> Node:
+    if len(nodes) > DEEPEST:  # one level for each
+        raise _too_deep()
     node = nodes[0]
     for other in nodes[1:]:
         node = _call(word, node, other)

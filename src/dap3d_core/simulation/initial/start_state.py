@@ -1,6 +1,7 @@
 """States that a run starts from in place of the scene's: of a result at an instant, at rest."""
 
 from collections.abc import Mapping
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Protocol
 
 import attrs
@@ -180,8 +181,9 @@ def _interval(result: Result, t: Any) -> tuple[int, int, float]:
     times, last = result.t, len(result.t) - 1
     if t is None:
         return last, last, 0.0
-    if isinstance(t, bool) or not isinstance(t, (int, float)) or not np.isfinite(t):
+    if isinstance(t, (bool, np.bool_)) or not isinstance(t, Real) or not np.isfinite(float(t)):
         raise _mistake(t, "the time of a start is a number of seconds")
+    t = float(t)
     first, end = float(times[0]), float(times[-1])
     margin = SAME_TIME * max(abs(first), abs(end))
     if not first - margin <= t <= end + margin:

@@ -119,6 +119,7 @@ def test_a_comparison_with_nan_is_nan_and_a_branch_that_is_not_taken_is_not():
         ("(" * 900 + "t" + ")" * 900, "is no expression"),
         ("-" * 1900 + "t", "nested too deeply"),
         ("+".join("t" * (DEEPEST + 2)), "nested too deeply"),
+        ("<".join("t" * (DEEPEST + 2)), "nested too deeply"),
     ],
 )  # fmt: skip
 def test_what_is_refused(text, words):
