@@ -66,7 +66,7 @@ class JointRows:
                 others[same, column] = rows[same, slot]
         place = np.arange(self.count)[:, None]
         blocks = 6 * self.row_count * (place * self._slots + np.arange(self._slots))
-        first = np.zeros((self.count, bool(group.type_info.layout.states)), dtype=np.int64)
+        first = np.zeros((self.count, int(bool(group.type_info.layout.states))), np.int64)
         idx: Integers = np.hstack([rows, others, first, place * self.row_count, blocks])
         assert idx.shape[1] == stride(group.type_info)
         return idx
