@@ -1,4 +1,4 @@
-"""A state added to an element: a right-hand side against that without it, CPU time of the thread."""
+"""A state added to an element: a right-hand side against one without it, by CPU time."""
 
 import statistics
 import time
