@@ -108,7 +108,7 @@ def stated():
     scene.add_force("maxwell", "spring", P_i="cart.O", P_j="rod.O", k=50.0, c=3.0, k_p=5.0,
                     l0=1.0, z_0=0.1)  # fmt: skip
     scene.add_force("bouc-wen", "loop", P_i="cart.O", P_j="ground.O", k=20.0, beta=2.0, gamma=0.5,
-                    n=1.5, l0=1.0)  # fmt: skip
+                    n=1.5, l0=1.0, z_0=0.05)  # fmt: skip
     scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
     return scene
 

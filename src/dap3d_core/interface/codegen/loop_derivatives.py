@@ -228,7 +228,6 @@ def differentiate_loop(
     slopes = dict(zip(numbers, unit[by_numbers:], strict=False))
     columns = [(slots + field, order) for field, order in functions]
     by_functions = dict(zip(columns, unit[by_numbers + len(numbers) : by_states], strict=True))
-
     friction = _Multipliers(multipliers, idx, unit[of_bodies:]) if multipliers is not None else None
     outputs = [_Outputs(), _Outputs(friction if what == "friction" else None), _Outputs()]
     outputs.append(_Outputs())  # of rates
