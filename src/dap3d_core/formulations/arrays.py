@@ -12,7 +12,6 @@ from dap3d_core.kernels.runtime.function_lists import loop_list
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.model import Group, Model
-from dap3d_core.model.element_states import first_states
 
 #: Usual alpha, Omega (1/s), mu of the penalty formulation (spec 9).
 PENALTY = (1e7, 10.0, 1.0)
@@ -212,6 +211,8 @@ def _integers_of(group: Group, plan: Plan, model: Model) -> Integers:
     kind = group.type_info.type.kind
     parts = [group.bodies, group.functions]
     if group.type_info.layout.states:
+        from dap3d_core.model.element_states import first_states
+
         parts.append(first_states(model.acting, group)[:, None])
     if kind == "joint":
         joints = group.members if group.joints is None else group.joints

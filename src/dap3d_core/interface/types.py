@@ -102,6 +102,7 @@ class Joint(TypeBase):
     * ``switch``    a number, or a tuple of numbers, smooth in time. With ``switch_words`` the run
       ends with this message where one becomes negative; without, the integration restarts where
       one changes its sign: there the element's law takes another branch (docs/events.md).
+    * ``rate``      the derivatives in time of its ``states``: a number, or a tuple in their order.
 
     ``prepare(self, bodies)`` may return constants of the poses in the scene. A subclass that names
     values of fields, ``class NoSlip(Disk, slip="xyz")``, is a variant of the type: it replaces it,
@@ -117,6 +118,8 @@ class Joint(TypeBase):
         unilateral: rows, from 0, with multipliers that are not negative in a valid motion: ground
             carries and does not pull. A run where one is gets a note with the instant.
         unilateral_words: the meaning of a negative multiplier, for that note.
+        states: names of states of its own, or name -> length; with them come the fields ``NAME_0``,
+            initial values, and ``NAME_atol``, absolute tolerances.
         symbol: symbol in pictures, one of SYMBOLS; "": drawn from the declared fields.
     """
 
@@ -148,9 +151,9 @@ class Force(TypeBase):
 
     Subclasses define ``wrench``, which returns for each body slot a pair (force, moment about the
     mass centre) in global axes, and for conservative forces ``energy``, the potential in J. Of
-    ``energy`` alone the ``wrench`` is derived (derive/derive.py). Variants and ``switch`` are as
-    for joints. A force that defines neither and names one joint, by a ``joint`` field, switches on
-    the friction of that joint; one with a ``wrench`` does not.
+    ``energy`` alone the ``wrench`` is derived (derive/derive.py). Variants, ``switch``, ``states``
+    and ``rate`` are as for joints. A force that defines neither and names one joint, by a ``joint``
+    field, switches on the friction of that joint; one with a ``wrench`` does not.
 
     Attributes:
         keyword: the name of the type in a scene.

@@ -39,7 +39,6 @@ from dap3d_core.interface.codegen.return_shapes import (
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
-from dap3d_core.interface.examine.check_states import check_state_names, check_states
 from dap3d_core.interface.examine.random_values import (
     numbers,
     random_field,
@@ -64,12 +63,17 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         _check_conditions(type_, conditions, class_)
     variants = tuple((conditions, examine(class_, seed)) for conditions, class_ in own_variants)
     _check_class(type_, is_abstract=bool(variants))
-    check_states(type_, is_abstract=bool(variants))
+    if type_.states or "rate" in type_.kernels():
+        from dap3d_core.interface.examine.check_states import check_states
+
+        check_states(type_, is_abstract=bool(variants))
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
     _check_symbol(type_, layout)
     _check_actuates(type_, layout)
     if layout.states:
+        from dap3d_core.interface.examine.check_states import check_state_names
+
         check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
     names = namespace(type_, layout)
     kernels, outputs = type_.kernels(), {}

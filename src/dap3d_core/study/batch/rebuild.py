@@ -8,7 +8,6 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.model import Model, ModelError, build_model
-from dap3d_core.model.element_states import tolerances
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import SceneError, ValidatedScene, check
@@ -78,7 +77,7 @@ class ModelRebuilder:
             return None
         if start.redundancy.rank.rank != self._rank or not start.redundancy.is_plain:
             return None
-        if not np.array_equal(tolerances(model.acting), tolerances(self._compiled.model.acting)):
+        if model.state_count and not self._has_same_tolerances(model):
             return None
         if stops_of(checked, model, self._t_end) != self._stops:
             return None
@@ -89,6 +88,13 @@ class ModelRebuilder:
         notes = start_notes(start, evaluator, checked.scene)
         warnings = tuple(note for note in notes if not note.startswith(INFORMATION))
         return RebuiltPoint(_table_of(evaluator), evaluator.integrated(start.u), warnings)
+
+    def _has_same_tolerances(self, model: Model) -> bool:
+        """True if the states of elements have the tolerances of the integration."""
+        from dap3d_core.model.element_states import tolerances
+
+        given = tolerances(self._compiled.model.acting)
+        return np.array_equal(tolerances(model.acting), given)
 
 
 def _table_of(evaluator: Evaluator) -> Floats:
