@@ -58,6 +58,7 @@ COLUMNS = (
     Column("velocity_residual", "", "SI", "largest |D v - nu| of the constraint rows"),
     Column("acceleration_residual", "", "SI", "largest |D v_dot - gamma| of the constraint rows"),
     Column("angles", "angle", "rad", "angles of forces and joints that count whole turns"),
+    Column("inputs", "input", "1", "inputs of the scene, as they acted at that instant"),
 )
 #: Present only where a run estimated its error (post/global_error.py).
 U_ERROR = Column(
@@ -78,6 +79,7 @@ class Arrays:
         potential_energy: (nt,) J.
         position_residual, velocity_residual, acceleration_residual: (nt,) largest magnitude.
         angles: (nt, k) of k angles whose turns are counted, rad, as in ``Model.angles_of``.
+        inputs: (nt, k) of k inputs of the scene.
         u_error: (nt, 13 n) estimated error of u; None where the run made no estimate.
     """
 
@@ -91,6 +93,7 @@ class Arrays:
     velocity_residual: Floats
     acceleration_residual: Floats
     angles: Floats
+    inputs: Floats
     u_error: Floats | None = None
 
     def __attrs_post_init__(self) -> None:
@@ -109,8 +112,8 @@ class Arrays:
 
     @property
     def width(self) -> int:
-        """Numbers of u, v_dot, Lam and angles at an instant."""
-        return sum(a.shape[1] for a in (self.u, self.v_dot, self.Lam, self.angles))
+        """Numbers of u, v_dot, Lam, angles and inputs at an instant."""
+        return sum(a.shape[1] for a in (self.u, self.v_dot, self.Lam, self.angles, self.inputs))
 
     def columns(self) -> Iterator[Floats]:
         """The arrays of ``COLUMNS``, in their order."""
@@ -148,7 +151,8 @@ def column_sizes(summary: ModelSummary) -> dict[str, int]:
     row = _layout(summary)
     sizes = {"velocity": "v_dot", "row": "Lam", "angle": "angles"}
     state = state_layout(summary.body_count).size
-    return {"state": state} | {k: row.length(name) for k, name in sizes.items()}
+    inputs = len(summary.input_names)
+    return {"state": state} | {k: row.length(name) for k, name in sizes.items()} | {"input": inputs}
 
 
 def row_width(summary: ModelSummary) -> int:
@@ -157,7 +161,8 @@ def row_width(summary: ModelSummary) -> int:
 
 
 def _layout(summary: ModelSummary) -> Layout:
-    return row_layout(summary.body_count, summary.row_count, summary.angle_count)
+    inputs = len(summary.input_names)
+    return row_layout(summary.body_count, summary.row_count, summary.angle_count, inputs)
 
 
 def _states(y: Floats) -> Floats:
@@ -175,7 +180,7 @@ def arrays_of(rows: Floats, summary: ModelSummary) -> Arrays:
 
     Args:
         rows: (nt, row_width): t; the integrated state (angular velocity in body axes, work last);
-            v_dot; lambda; angles; potential energy; largest residuals of the three levels.
+            v_dot; lambda; angles; potential energy; largest residuals of the three levels; inputs.
         summary: the model of the rows.
 
     Raises:
@@ -186,7 +191,9 @@ def arrays_of(rows: Floats, summary: ModelSummary) -> Arrays:
     if rows.ndim != 2 or rows.shape[1] != width:
         raise ValueError(f"rows should have the shape (nt, {width}), not {rows.shape}")
     layout = _layout(summary)
-    t, *_, work, v_dot, Lam, angles, energy, residuals = (rows[:, layout[n]] for n in layout.names)
+    t, *_, work, v_dot, Lam, angles, energy, residuals, inputs = (
+        rows[:, layout[n]] for n in layout.names
+    )
     u = _states(rows[:, layout["coordinates"].start : layout["work"].stop])
-    columns = (t[:, 0], u, v_dot, Lam, work[:, 0], energy[:, 0], *residuals.T, angles)
+    columns = (t[:, 0], u, v_dot, Lam, work[:, 0], energy[:, 0], *residuals.T, angles, inputs)
     return Arrays(*map(np.array, columns))

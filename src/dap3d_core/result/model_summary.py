@@ -25,6 +25,7 @@ class ModelSummary:
         is_isolated: True if momentum is conserved: no force, and no joint with ground or with a
             single body.
         angle_count: number of angles of forces and joints with counted turns.
+        input_names: of the inputs, in file order.
     """
 
     body_names: tuple[str, ...]
@@ -38,6 +39,7 @@ class ModelSummary:
     has_potential: bool
     is_isolated: bool
     angle_count: int = 0
+    input_names: tuple[str, ...] = ()
 
     @property
     def body_count(self) -> int:
@@ -98,4 +100,5 @@ def summary_of(model: Model) -> ModelSummary:
         is_isolated=not model.forces
         and all(len(slots) > 1 and 0 not in slots for slots in model.joint_slots),
         angle_count=model.angle_count,
+        input_names=model.input_names,
     )

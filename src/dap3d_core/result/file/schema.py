@@ -41,6 +41,7 @@ NAMES = {
     "body": "names of the bodies",
     "joint": "names of the joints",
     "point": "names of the points; animation points come last",
+    "input": "names of the inputs",
     "axis": "axes of a vector",
     "euler": "Euler parameters, body to global",
 }
@@ -122,8 +123,7 @@ def define(
         "axis_2": AXES,
         "euler": EULER,
         **{name: range(size) for name, size in column_sizes(summary).items()},
-        "joint": summary.joint_names,
-        "point": summary.point_names,
+        **{kind: getattr(summary, f"{kind}_names") for kind in ("joint", "point", "input")},
     }
     dataset.createDimension("time", nt or None)
     for name, values in entries.items():

@@ -46,6 +46,7 @@ def force_output(
     element: int,
     angles: Floats | None,
     actuation: Floats | None = None,
+    inputs: Floats | None = None,
 ) -> ForceOutput:
     """Evaluates a force element.
 
@@ -59,6 +60,7 @@ def force_output(
         angles: (nt, k) angles as in ``Arrays``; None to count them from one instant to the next.
         actuation: (nt,) what takes the place of the field that its type ``actuates``; the element
             has no potential then.
+        inputs: (nt, k) inputs; None for those that the evaluator has.
 
     Raises:
         UnknownNameError: the element acts on every body or in a joint.
@@ -68,7 +70,7 @@ def force_output(
     loops, bodies = ForceLoops(evaluator, group, index), group.bodies[index]
     force, energy = np.zeros_like(evaluator.system.force), np.zeros(1)
     out, potential = np.zeros((len(t), len(bodies), 6)), np.zeros(len(t))
-    for k, time in place_at(evaluator, t, u):
+    for k, time in place_at(evaluator, t, u, inputs):
         if angles is None:
             loops.call("angle", time, force)
         else:

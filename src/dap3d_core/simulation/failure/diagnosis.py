@@ -55,7 +55,9 @@ def _at(evaluator: Evaluator, t: float, y: Floats) -> str:
             return f"the state of body {name} is {fault}"
     s = evaluator.system
     place_bodies(y, s.body, s.metric)
+    inputs = evaluator.inputs
     s.F[:, :4] = 0.0  # filled again one by one: the present values may not be finite
+    evaluator.set_inputs(inputs)
     for q, (kind, group) in enumerate(evaluator.loop_groups):
         for k in range(group.count):
             if fault := _fault_of(evaluator, q, k, kind, group, t):
