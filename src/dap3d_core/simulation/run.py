@@ -228,7 +228,7 @@ class Run(RunState):
                 first = len(rows[0]) - self.evaluator.report_size
                 accelerations = self.singular.acceleration
                 rows[0, first : first + len(accelerations)] = accelerations
-            self.recorder.take(rows, lambda: self.record("done"))
+            self.recorder.take(self.evaluator.with_inputs(rows), lambda: self.record("done"))
 
     def _result(self, status: str) -> Result | None:
         """The result of what was computed, whole on disk if it has an output; None of nothing."""
