@@ -39,7 +39,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     _check_names(report)
     bodies = read_bodies(report)
     geometry = read_geometry(report, bodies)
-    types = Types(report, registry, allow_code=allow_code)
+    types = Types(report, registry, allow_code=allow_code, to_install=_check_requires(report))
     functions = read_elements(report, geometry, "functions", types.of("functions"))
     joints = read_elements(report, geometry, "joints", types.of("joints"))
     forces = read_elements(report, geometry, "forces", types.of("forces"))
@@ -78,6 +78,15 @@ def _check_names(report: Collector) -> None:
             if fault := fault_of_name(name):
                 key = (table, str(name))
                 report.add(key, name, f"not a name for one of the {table}: {fault}")
+
+
+def _check_requires(report: Collector) -> str:
+    """Check the distributions that the scene requires; the command that installs what lacks."""
+    if not report.scene.requires:
+        return ""
+    from dap3d_core.scene.requirements import read_requirements
+
+    return read_requirements(report)
 
 
 def _check_shapes_and_outputs(report: Collector, bodies: "Bodies") -> None:
