@@ -174,7 +174,7 @@ class Run(RunState):
     def _integration(self, start: InitialState) -> Integration:
         evaluator, settings, singular, u0 = self.evaluator, self.settings, self.singular, start.u
         store_reference_pivots(evaluator, 0.0, u0 if singular is None else singular.aside)
-        evaluator.start(0.0, u0, start.angles)
+        evaluator.start(0.0, u0, start.angles, start.states)
         y0 = evaluator.coordinates.start(u0)
         width = 1 + len(y0) + evaluator.report_size
         self.options = options = integration_options(evaluator, settings) | {
