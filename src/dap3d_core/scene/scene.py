@@ -172,7 +172,7 @@ NAMED: dict[str, type] = {
     "inputs": Input,
     "shapes": Element,
 }
-TABLES = ("scene", "parameters", *NAMED, "outputs", "animation", "simulation")
+TABLES = ("scene", "requires", "parameters", *NAMED, "outputs", "animation", "simulation")
 
 
 @attrs.define(repr=False)
@@ -184,6 +184,7 @@ class Scene(SceneDisplay):
         schema: version of the file format.
         bodies, points, vectors, vectors2, joints, forces, functions, inputs, shapes: by name, in
             file order.
+        requires: ranges of versions of the distributions that bring its types, by name.
         parameters: numbers by name, for expressions in place of numbers (text that begins with =).
         outputs: expressions of quantities, by name.
         animation, simulation: points to draw; settings of a run.
@@ -204,6 +205,7 @@ class Scene(SceneDisplay):
     functions: dict[str, Element] = attrs.Factory(dict)
     inputs: dict[str, Input] = attrs.Factory(dict)
     shapes: dict[str, Element] = attrs.Factory(dict)
+    requires: dict[str, Any] = attrs.Factory(dict)
     parameters: dict[str, Any] = attrs.Factory(dict)
     outputs: dict[str, Any] = attrs.Factory(dict)
     animation: Animation = attrs.Factory(Animation)
@@ -229,6 +231,7 @@ class Scene(SceneDisplay):
             self,
             animation=attrs.evolve(self.animation, points=points),
             simulation=_copied(self.simulation),
+            requires=dict(self.requires),
             parameters=dict(self.parameters),
             outputs=dict(self.outputs),
             faults=list(self.faults),
@@ -333,6 +336,17 @@ class Scene(SceneDisplay):
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
         return self._add_element("shapes", type, name, fields)
+
+    def add_requirement(self, name: str, versions: str = "*") -> str:
+        """Add a distribution that brings types of the scene, and return its name.
+
+        Args:
+            name: what pip installs, such as ``dap3d-example``.
+            versions: a range of versions, such as ``">=0.2, <1"``; ``"*"`` is any. It is checked
+                with the whole scene.
+        """
+        self.requires[plain(name)] = plain(versions)
+        return name
 
     def add_parameter(self, name: str, value: float | str) -> str:
         """Add a parameter, a number that expressions such as ``"= L / 2"`` name; returns its name.

@@ -41,7 +41,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     _check_names(report)
     bodies = read_bodies(report)
     geometry = read_geometry(report, bodies)
-    types = Types(report, registry, allow_code=allow_code)
+    types = Types(report, registry, allow_code=allow_code, to_install=_check_requires(report))
     inputs, functions = _read_signals(report, geometry, types)
     joints = read_elements(report, geometry, "joints", types.of("joints"))
     forces = read_elements(report, geometry, "forces", types.of("forces"))
@@ -100,6 +100,15 @@ def _read_signals(
 
         functions = combine_functions(report, functions)
     return inputs, functions
+
+
+def _check_requires(report: Collector) -> str:
+    """Check the distributions that the scene requires; the command that installs what lacks."""
+    if not report.scene.requires:
+        return ""
+    from dap3d_core.scene.requirements import read_requirements
+
+    return read_requirements(report)
 
 
 def _check_shapes_and_outputs(report: Collector, bodies: "Bodies") -> None:
