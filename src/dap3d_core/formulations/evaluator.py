@@ -121,6 +121,7 @@ class Evaluator:
         self._weigh_rows()
         if self.formulation.has_own_coordinates:
             self.coordinates = self.formulation.coordinates(self)
+            self.__dict__.pop("functions", None)  # other joints may be in the tree
 
     @IGNORE_FLOAT_ERRORS
     def start(self, t: float, u: ArrayLike, angles: Floats | None = None) -> None:
@@ -193,7 +194,8 @@ class Evaluator:
     def functions(self) -> Any:
         """The compiled functions (rhs, project, report, ...) that an integrator takes."""
         turns, switches = self.counts_turns, bool(self.switches)
-        return self.formulation.functions(turns=turns, switches=switches)
+        equations = self.coordinates.equations if self.formulation.has_own_coordinates else ""
+        return self.formulation.functions(turns=turns, switches=switches, equations=equations)
 
     def integrated(self, u: ArrayLike) -> Floats:
         """The integrated state y (13 n + 1,) of a state u (13 n,), in coordinates of bodies."""

@@ -31,7 +31,7 @@ from dap3d_core.formulations.joint.node_layout import (
     SPHERICAL,
     TREE_WIDTH,
 )
-from dap3d_core.formulations.joint.spanning_tree import SpanningTree
+from dap3d_core.linear.ordering.spanning_forest import SpanningForest
 from dap3d_core.model.state_layout import Layout, tree_layout
 
 #: Motions of nodes by the kinds of elementary motions.
@@ -101,7 +101,7 @@ class TreeNodes:
     frame: Integers
 
 
-def tree_nodes(tree: SpanningTree, motions: ModelMotions, body_count: int) -> TreeNodes:
+def tree_nodes(tree: SpanningForest, motions: ModelMotions, body_count: int) -> TreeNodes:
     """Lay out the nodes of a tree."""
     chains = list(_chains(tree, motions))
     parts = np.ones(len(tree.joint), dtype=np.int64)
@@ -131,7 +131,7 @@ def tree_nodes(tree: SpanningTree, motions: ModelMotions, body_count: int) -> Tr
 
 
 def _chains(
-    tree: SpanningTree, motions: ModelMotions
+    tree: SpanningForest, motions: ModelMotions
 ) -> Iterator[tuple[Integers, JointMotions | None, tuple[int, ...], str]]:
     """(entries, motions from parent to child, motions of the nodes, child's slot) of joints."""
     free = np.flatnonzero(tree.joint < 0)
