@@ -85,13 +85,13 @@ def _verdict(subject: SampledType, rng: random.Random) -> tuple[JointMotions | N
 def _group_of(type_info: TypeInfo, element: RandomElement) -> Group:
     """A group of one random joint."""
     layout, par = type_info.layout, np.array(element.par)
-    slots = len(layout.slots)
+    slots, others = len(layout.slots), len(layout.functions) + len(layout.others)
     tables = []
     for offset, columns in layout.tables.values():
         start, count = int(par[offset]), int(par[offset + 1])
         tables.append((0, offset, par[start : start + count * columns].reshape(count, columns)))
     idx = np.array([element.idx], dtype=np.int64)
-    return Group(type_info, np.array([0]), idx[:, :slots], idx[:, slots : layout.integers],
+    return Group(type_info, np.array([0]), idx[:, :slots], idx[:, slots : slots + others],
                  par[None, : layout.par_width], tuple(tables))  # fmt: skip
 
 

@@ -50,11 +50,15 @@ class HeldInput:
 
 @attrs.frozen(eq=False)
 class Direction:
-    """A direction: rates of position (m/s), rotation (rad/s, global) and time; row 0 is ground."""
+    """A direction: rates of position (m/s), rotation (rad/s, global) and time; row 0 is ground.
+
+    In time the states of an element move at their rates; ``own`` (s,) are further rates of them.
+    """
 
     move: Floats
     turn: Floats
     time: float = 0.0
+    own: Floats = attrs.field(factory=lambda: np.zeros(0))
 
     @classmethod
     def of(cls, slot: int, component: int) -> "Direction":
@@ -62,6 +66,11 @@ class Direction:
         both = np.zeros((2, BODIES, 3))
         both[component // 3, slot + 1, component % 3] = 1.0
         return cls(both[0], both[1])
+
+    @classmethod
+    def of_state(cls, k: int, count: int) -> "Direction":
+        """State k of so many."""
+        return cls(np.zeros((BODIES, 3)), np.zeros((BODIES, 3)), 0.0, np.eye(count)[k])
 
     @classmethod
     def in_time(cls) -> "Direction":
@@ -74,7 +83,7 @@ class State:
     """Time, and for ground and each slot r (4, 3), p (4, 4), velocity, angular velocity (4, 3).
 
     ``mass`` (4,) and ``Jp`` (4, 9) are the bodies' inertia, ``functions`` those of time; None
-    for an absent one.
+    for an absent one. ``own`` (s,) are the states of the element.
     """
 
     t: float
@@ -85,6 +94,7 @@ class State:
     mass: Floats
     Jp: Floats
     functions: tuple[TimeFunction | HeldInput | None, ...]
+    own: Floats = attrs.field(factory=lambda: np.zeros(0))
 
     def body(self) -> Floats:
         """(4, BODY_WIDTH) columns of the bodies, as a group loop reads them."""

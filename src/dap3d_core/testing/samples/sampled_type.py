@@ -14,6 +14,7 @@ from dap3d_core.interface.codegen.terms import bind_terms
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, examine
+from dap3d_core.interface.examine.random_values import numbers
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.testing.samples.cubic import Cubic
 from dap3d_core.testing.samples.random_element import Kernels, RandomElement, RefusalError, draw
@@ -88,14 +89,20 @@ class Sample:
     ) -> tuple[Floats, Floats]:
         h, here = 1e-3, value(self.state)
         odd, even = {}, {}
+        own = self.kernels.state_rate(self.element, self.state, along)
         for k in (1, 2, 3, 4, 6):
-            ahead, back = (value(self.state.moved(along, s * k * h)) for s in (1, -1))
+            ahead, back = (value(self._moved(along, own, s * k * h)) for s in (1, -1))
             odd[k], even[k] = ahead - back, np.abs(ahead - 2.0 * here + back) / (k * h)
         one, two = (
             (45.0 * odd[k] - 9.0 * odd[2 * k] + odd[3 * k]) / (60.0 * k * h) for k in (1, 2)
         )
         corner = np.maximum(even[1] - 0.5 * even[4], 0.0)
         return two, 10.0 * (np.abs(one - two) + corner)
+
+    def _moved(self, along: Direction, own: Floats, h: float) -> State:
+        """The state after a step along a direction, in which its own states have the rates own."""
+        moved = self.state.moved(along, h)
+        return attrs.evolve(moved, own=moved.own + h * own) if len(own) else moved
 
     @property
     def is_good(self) -> bool:
@@ -203,6 +210,8 @@ class SampledType:
             try:
                 element = draw(self.type_info, self.drawn_choices, rng, state)
                 state = random_state(rng, given, grounded=grounded)
+                if layout.states:
+                    state = attrs.evolve(state, own=np.array(numbers(rng, layout.state_width)))
                 sample = Sample(self.kernels, element, state, grounded,
                                 f"pose {k + 1} off the manifold", self.seed)  # fmt: skip
                 if sample.is_good:
