@@ -103,6 +103,10 @@ class EventLocator:
                 break
         return integration.status
 
+    def look_again(self, integration: Integration) -> None:
+        """Act on the events whose numbers passed their levels in a jump of velocities."""
+        self._take_notice(integration, self._instant(integration))
+
     def _step(self, integration: Integration) -> None:
         arrays = self._arrays(integration)
         saved = [array.copy() for array in arrays]
