@@ -112,6 +112,8 @@ class RunState:
         self.options: dict[str, Any] = {}
         self.event_locator = EventLocator(compiled, events) if events else None
         self.jumps = _jumps_of(self.evaluator)
+        if self.event_locator is not None:
+            self.event_locator.jumps = self.jumps
         watch = callbacks.watch
         self.observer = None if watch is None else Observer(self.evaluator, self.t_end, watch)
         check_room(len(self.times), row_width(self.evaluator), self.settings.dt, output)

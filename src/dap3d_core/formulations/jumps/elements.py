@@ -29,6 +29,10 @@ class JumpRows:
     element: Integers
     row: Integers
 
+    def __add__(self, other: "JumpRows") -> "JumpRows":
+        columns = zip(*(attrs.astuple(rows, recurse=False) for rows in (self, other)), strict=True)
+        return JumpRows(*map(np.concatenate, columns))
+
 
 @attrs.frozen(eq=False)
 class _JumpGroup:
@@ -87,7 +91,8 @@ class JumpElements:
             names = model.joint_names if type_kind == "joint" else model.force_names
             self.names += [f"{type_kind} {names[int(m)]}" for m in group.members]
         self._size = sum(g.group.count * g.width for g in self._groups)
-        self._order = np.concatenate([g.switches.ravel() for g in self._groups])
+        order = [g.switches.ravel() for g in self._groups]
+        self._order = np.concatenate([np.zeros(0, np.int64), *order])
 
     @IGNORE_FLOAT_ERRORS
     def switch_values(self, t: float, u: Floats) -> Floats:

@@ -29,7 +29,7 @@ ROUNDING = 1e-13
 
 
 class ImpossibleJumpError(ValueError):
-    """Joints hold what an element wants to change; names the element."""
+    """Joints hold what a row is to change; names its element, "" for a row of none."""
 
 
 @attrs.frozen(eq=False)
@@ -64,7 +64,13 @@ class JumpLaw:
         self._held = HeldJoints(in_bodies)
 
     def jump(
-        self, t: float, u: Floats, sides: Floats | None, crossing: Floats, soon: float
+        self,
+        t: float,
+        u: Floats,
+        sides: Floats | None,
+        crossing: Floats,
+        soon: float,
+        given: JumpRows | None = None,
     ) -> Jump:
         """The jump at time t and state u (13 n,).
 
@@ -74,9 +80,10 @@ class JumpLaw:
                 they are those of the state.
             crossing: (switches,) the same of those that have just come there, else 0.
             soon: s, what closes within it is closed.
+            given: rows of the first round besides those of elements, of no element (-1).
 
         Raises:
-            ImpossibleJumpError: joints hold what an element wants to change.
+            ImpossibleJumpError: joints hold what a row is to change.
         """
         elements = self.elements
         one = _Rounds(self._held, t, u, velocities_of(u).copy())
@@ -86,6 +93,8 @@ class JumpLaw:
             closed = (values <= 0.0) | (sides == 0.0)
             P, acting, rows = elements.impulses(t, one.state, values, crossing, closed, soon)
             rows = one.beyond_rounding(rows)
+            if given is not None and one.count == 0:
+                rows += given
             if not (len(acting) or len(rows.change)):
                 break
             one.acting.update(acting.tolist())
@@ -96,7 +105,7 @@ class JumpLaw:
             sides = np.where(crossing != 0.0, crossing, sides)
         else:
             one.stop(elements.names)
-        names = tuple(elements.names[k] for k in sorted(one.acting))
+        names = tuple(elements.names[k] for k in sorted(one.acting - {-1}))
         dv = one.v - velocities_of(u)
         return Jump(dv, one.work, one.exchanged, names, sides, one.count)
 
@@ -138,7 +147,8 @@ class _Rounds:
             Lam = row_impulses(A, b, rows.pushes)
             missed = missed_rows(A, b, Lam, rows.pushes)
             if len(missed):
-                raise ImpossibleJumpError(names[int(rows.element[missed[0]])])
+                element = int(rows.element[missed[0]])
+                raise ImpossibleJumpError(names[element] if element >= 0 else "")
             dv = base + Lam @ x
             of_held = of_held + Lam @ np.array([of_row for _, of_row in unit])
         self.v = before + held.unscaled(dv)[6:]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations import ACCEPTED, RHS, WATCH
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
+from dap3d_core.formulations.jumps.elements import JumpRows
 from dap3d_core.formulations.jumps.law import ImpossibleJumpError, Jump, JumpLaw
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
@@ -102,11 +103,45 @@ class Jumps:
             for k in np.flatnonzero(passed).tolist()
         ]
 
-    def _jump(self, integration: Integration, crossing: Floats, sides: Floats | None) -> None:
-        evaluator, t, y = self._evaluator, integration.t, integration.y
-        u = u_from_y(evaluator.body_state(y)[None])[0]
+    def set_velocities(
+        self, integration: Integration, bodies: Mapping[int, Floats], title: str
+    ) -> tuple[Floats, float]:
+        """Let an event set velocities; the state u (13 n,) after it, and the work of that, J.
+
+        Args:
+            integration: of the run, whose state they change.
+            bodies: number of a body, from 0 -> (6,) its r_dot and omega, global axes; NaN leaves a
+                component to the joints.
+            title: of the event.
+
+        Raises:
+            SimulationError: the joints do not allow such velocities.
+        """
+        t, u = integration.t, self._state_of(integration)
+        sides = integration.work.switches[at.SIDE]
         try:
-            jump = self._law.jump(t, u, sides, crossing, SOON * float(integration.work.times[-1]))
+            jump = self._law.jump(
+                t, u, sides, np.zeros_like(sides), self._soon(integration), _rows_to(u, bodies)
+            )
+        except ImpossibleJumpError as error:
+            names = ", ".join(self._evaluator.model.body_names[k] for k in bodies)
+            raise SimulationError(
+                f"the run stopped at t = {t:.9g} s: event {title} sets a velocity of {names} that "
+                "the joints do not allow; set fewer components (None leaves one to the joints)"
+            ) from error
+        return self._take(integration, u, jump), jump.work
+
+    def _state_of(self, integration: Integration) -> Floats:
+        u: Floats = u_from_y(self._evaluator.body_state(integration.y)[None])[0]
+        return u
+
+    def _soon(self, integration: Integration) -> float:
+        return SOON * float(integration.work.times[-1])
+
+    def _jump(self, integration: Integration, crossing: Floats, sides: Floats | None) -> None:
+        t, u = integration.t, self._state_of(integration)
+        try:
+            jump = self._law.jump(t, u, sides, crossing, self._soon(integration))
         except ImpossibleJumpError as error:
             raise SimulationError(
                 f"the run stopped at t = {t:.9g} s: {error} cannot change the velocity as its "
@@ -117,16 +152,23 @@ class Jumps:
             self._record_crossings(t, crossing)
             return
         self.lose |= abs(jump.work) > LOSSLESS * jump.exchanged
-        integration.work.state[at.Y] = evaluator.coordinates.with_jump(y, jump.dv, jump.work)
-        integration.restart()
-        self._set_sides(integration, jump)
-        self._refuse_what_nothing_carries(integration)
-        after = u.copy()
-        velocities_of(after)[:] += jump.dv
+        after = self._take(integration, u, jump)
         direction = next((int(x) for x in crossing if x != 0.0), 0)
         name = ", ".join(jump.elements)
         self._record(EventRecord(name=name, t=t, direction=direction, kind="jump", u=u,
                                  u_after=after, work=jump.work))  # fmt: skip
+
+    def _take(self, integration: Integration, u: Floats, jump: Jump) -> Floats:
+        """Make the velocities of an integration those after a jump; its state u (13 n,) then."""
+        coordinates = self._evaluator.coordinates
+        integration.work.state[at.Y] = coordinates.with_jump(integration.y, jump.dv, jump.work)
+        integration.restart()
+        if len(jump.sides):
+            self._set_sides(integration, jump)
+            self._refuse_what_nothing_carries(integration)
+        after = u.copy()
+        velocities_of(after)[:] += jump.dv
+        return after
 
     def _refuse_what_nothing_carries(self, integration: Integration) -> None:
         """SimulationError for contact that stays, of a type without a force that could hold it."""
@@ -186,3 +228,16 @@ class Jumps:
         work.switches[at.SIDE] = np.where(self._law.elements.is_jump, sides, 0.0)
         if work.calls_accepted:  # angles are extrapolated by their rates
             functions[ACCEPTED](t, y, np.zeros(1), *arrays)
+
+
+def _rows_to(u: Floats, bodies: Mapping[int, Floats]) -> JumpRows:
+    """Rows that bring velocities of bodies to the values given."""
+    v = velocities_of(u)
+    numbers, targets = np.array(list(bodies)), np.array(list(bodies.values()))
+    places = (6 * numbers[:, None] + np.arange(6))[np.isfinite(targets)]
+    change = targets[np.isfinite(targets)] - v[places]
+    count = len(places)
+    G = np.zeros((count, 6 + v.size))
+    G[np.arange(count), 6 + places] = 1.0
+    none = np.full(count, -1)
+    return JumpRows(G, change, np.zeros(count, dtype=bool), none, np.arange(count))

@@ -185,3 +185,73 @@ def test_an_event_may_watch_what_jumps():
     found = [(x.t, x.direction) for x in result.events if x.name == "turns"]
     assert [x[1] for x in found] == [1, -1]
     assert [x[0] for x in found] == pytest.approx([t0, t0 + v0 / G], abs=1e-11)
+
+
+def pendulums(method="auto"):
+    """Two bars, hinged to ground and to each other, in line along x and at rest."""
+    scene = dap.Scene(name="bars")
+    for k, name in enumerate(("first", "second")):
+        scene.add_body(name, mass=2.0 - k, Jp=(0.2, 0.2, 0.3), r=(0.5 + k, 0.0, 0.0))
+        scene.add_point(f"near_{name}", body=name, sPp=(-0.5, 0.0, 0.0))
+        scene.add_point(f"far_{name}", body=name, sPp=(0.5, 0.0, 0.0))
+    axes = {"a_i": "second.z", "a_j": "first.z"}
+    scene.add_joint("rev", "elbow", P_i="near_second", P_j="far_first", **axes)
+    axes = {"a_i": "first.z", "a_j": "ground.z"}
+    scene.add_joint("rev", "shoulder", P_i="near_first", P_j="ground.O", **axes)
+    return dap.compile(scene, registry=JUMPING, method=method)
+
+
+def bars_mass_matrix():
+    """Of the angles of both bars against x, in line: T = q_dot M q_dot / 2."""
+    m1, m2, J = 2.0, 1.0, 0.3
+    return np.array([[J + m1 * 0.25 + m2, m2 * 0.5], [m2 * 0.5, J + m2 * 0.25]])
+
+
+@pytest.mark.parametrize("method", ["standard", "lsq", "penalty", "joint"])
+def test_an_event_sets_velocities_and_the_joints_hold(method):
+    """The tip of the second bar gets 3 m/s across by an impulse at its centre and a moment there.
+
+    Both are of the least energy: of M q_dot+ = A^T P, A q_dot+ = given, with the lines A of the
+    velocity across and the angular velocity of the second bar.
+    """
+    given = np.array([1.0, 4.0])  # of the centre across, m/s, and rad/s
+
+    def strike(state):
+        state.set("second", r_dot=(None, given[0], None), w=(None, None, given[1]))
+
+    event = dap.Event("t", above=0.25, action=strike, name="strike")
+    result = dap.simulate(pendulums(method), t_end=0.5, dt=0.25, events=[event], **TIGHT)
+    (found,) = result.events
+    A = np.array([[1.0, 0.5], [0.0, 1.0]])
+    rates = np.linalg.solve(A, given)
+    assert (found.kind, found.u_after[-1]) == ("change", pytest.approx(given[1], abs=1e-12))
+    w = np.array(found.u_after)[[14 + 5, 14 + 11]]
+    np.testing.assert_allclose(w, rates, rtol=0.0, atol=1e-12)
+    assert found.work == pytest.approx(0.5 * rates @ bars_mass_matrix() @ rates, rel=1e-12)
+    assert result.ledger["energy"].value < (1e-8 if method == "penalty" else 1e-11)  # its springs
+    assert result.ledger["velocity"].ok
+
+
+def test_a_moment_alone_turns_both_bars_as_the_mass_matrix_says():
+    """The shoulder's bar is set to 2 rad/s: no impulse acts on the other, M_21 w1 + M_22 w2 = 0."""
+    event = dap.Event("t", above=0.1, action=lambda s: s.set("first", w=(None, None, 2.0)))
+    result = dap.simulate(pendulums(), t_end=0.2, events=[event], **TIGHT)
+    M = bars_mass_matrix()
+    w = np.array(result.events[0].u_after)[[19, 25]]
+    np.testing.assert_allclose(w, [2.0, -2.0 * M[1, 0] / M[1, 1]], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "fields", "words"),
+    [
+        ("first", {"r_dot": (1.0, 0.0, 0.0)}, "the joints do not allow"),
+        ("first", {"w": (1.0, 2.0)}, "three finite numbers"),
+        ("first", {"w": (1.0, np.inf, 0.0)}, "three finite numbers"),
+        ("first", {"mass": 2.0}, "an event sets r_dot and w of a body"),
+        ("frist", {"w": (1.0, 0.0, 0.0)}, "did you mean 'first'"),
+    ],
+)
+def test_velocities_that_cannot_be_set_are_refused(name, fields, words):
+    event = dap.Event("t", above=0.1, action=lambda state: state.set(name, **fields))
+    with pytest.raises((dap.SimulationError, ValueError), match=words):
+        dap.simulate(pendulums(), t_end=0.2, events=[event])
