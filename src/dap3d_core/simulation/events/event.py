@@ -174,7 +174,7 @@ class Instant:
         Args:
             name: of the force or body.
             fields: of a force field -> new value, a number, three numbers or a matrix; of a body
-                ``r_dot`` and ``w``, three numbers in global axes, None for one that the joints give.
+                ``r_dot``, ``w``: three numbers in global axes, None for one that the joints give.
 
         Raises:
             ValueError: there is no such force, body or field, or the value is not allowed.
