@@ -17,7 +17,8 @@ def jump_times(result: Result) -> Floats:
 def smooth_parts(result: Result) -> list[Result]:
     """A result cut at its jumps; itself alone where there are none.
 
-    A part ends with the state before a jump, and the next begins with that after it. Of these two
+    A part ends with the state before a jump, and the next begins with that after it: a report at
+    the very instant has been taken after it, and is left out. Of these two
     the states are known; accelerations and what else was evaluated at reports are NaN.
     """
     jumps = [event for event in result.events if event.u_after is not None]
