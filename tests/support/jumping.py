@@ -1,6 +1,6 @@
 """Force types whose elements let velocities jump."""
 
-from dap3d_core.interface import Body, Force, Point, Vector, body, number, point, vector
+from dap3d_core.interface import Body, Force, Joint, Point, Vector, body, number, point, vector
 from dap3d_core.kernels import cross, dot, neg, scale, sub, where
 from support.own_types import registry_of
 
@@ -63,4 +63,54 @@ class Stage(Force):
         return ((P, cross(s_P_i, P)),)
 
 
-JUMPING = registry_of(Bounce, Clutch, Stage)
+class Counter(Force):
+    """Counts how often a point passes z = 0 downwards; z_sum gathers its speeds then."""
+
+    keyword = "test-counter"
+    states = ("count", "z_sum")
+    P_i: Point = point()
+
+    def switch(r_P_i):
+        return r_P_i[2]
+
+    def rate():
+        return 0.0, 0.0
+
+    def reset(count, z_sum, v_P_i, crossing):
+        down = crossing < 0.0
+        return where(down, count + 1.0, count), where(down, z_sum + v_P_i[2], z_sum)
+
+    def wrench():
+        return ((ZERO, ZERO),)
+
+
+class SpeedDrive(Joint):
+    """Drives the angular velocity of a body about a_j to the state w, which becomes w_1 at t_1."""
+
+    keyword, rows, holonomic, drives = "test-speed-drive", 1, False, True
+    states = ("w",)
+    body_i: Body = body()
+    a_j: Vector = vector(ground=True)
+    t_1: float = number()
+    w_1: float = number()
+
+    def J(a_j):
+        return ((*ZERO, *a_j),)
+
+    def nu(w):
+        return w
+
+    def gamma():
+        return 0.0
+
+    def rate():
+        return 0.0
+
+    def switch(t, t_1):
+        return t - t_1
+
+    def reset(w_1):
+        return w_1
+
+
+JUMPING = registry_of(Bounce, Clutch, Stage, Counter, SpeedDrive)

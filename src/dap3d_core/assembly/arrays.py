@@ -22,10 +22,11 @@ Integers = NDArray[np.int64]
 #: The order of the group loops in the list: all loops of one kind stand together.
 KINDS = (
     "value", "wrench", "energy", "acceleration", "position", "friction", "angle", "turned",
-    "switch", "knot", "impulse"
+    "switch", "knot", "rate", "impulse", "reset"
 )  # fmt: skip
 (
-    VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, TURNED, SWITCH, KNOT, IMPULSE
+    VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, TURNED, SWITCH, KNOT, RATE,
+    IMPULSE, RESET
 ) = range(len(KINDS))  # fmt: skip
 
 # What a switch does where it becomes negative, or changes its sign: the run ends; the integration

@@ -11,6 +11,8 @@ from dap3d_core.interface.codegen.specialise import is_knots
 from dap3d_core.model import Group, Model
 from dap3d_core.model.knots import narrowest
 
+#: Kernels by which velocities and states jump.
+JUMPING = frozenset(("impulse", "reset"))
 #: The part of the narrowest range between two knots that counts as at the knot.
 NEAR_KNOT = 1e-6
 
@@ -40,8 +42,8 @@ class Switch:
 
     @property
     def jumps(self) -> bool:
-        """True if velocities may jump where it changes its sign."""
-        return self.kind == "switch" and "impulse" in self.group.type_info.kernels
+        """True if velocities or states may jump where it changes its sign."""
+        return self.kind == "switch" and not JUMPING.isdisjoint(self.group.type_info.kernels)
 
     @property
     def effect(self) -> int:

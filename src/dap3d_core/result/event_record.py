@@ -29,6 +29,7 @@ class EventRecord:
         changes: force -> field -> new value of changed parameters.
         u_after: (13 n) the state after a jump of velocities; None for all else.
         work: of the impulses of a jump, J.
+        states: element -> state -> value of states of elements that a jump has changed.
     """
 
     name: str
@@ -39,6 +40,7 @@ class EventRecord:
     changes: Mapping[str, Mapping[str, Any]] = attrs.Factory(dict)
     u_after: tuple[float, ...] | None = attrs.field(default=None, converter=_state)
     work: float = 0.0
+    states: Mapping[str, Mapping[str, Any]] = attrs.Factory(dict)
 
     @property
     def words(self) -> str:
@@ -49,7 +51,9 @@ class EventRecord:
                   for n, x in new.items()]  # fmt: skip
             what = f": {', '.join(of)}" if of else ""
         if self.kind == "jump":
-            return f"t = {self.t:.9g} s: jump by {self.name}: work {self.work:.6g} J"
+            of = [f", {element}.{n} = {_short(x)}" for element, new in self.states.items()
+                  for n, x in new.items()]  # fmt: skip
+            return f"t = {self.t:.9g} s: jump by {self.name}: work {self.work:.6g} J{''.join(of)}"
         if self.kind in ("switch", "end"):
             way = f": its switch became {'positive' if self.direction > 0 else 'negative'}"
         else:

@@ -1,12 +1,13 @@
-"""Impulses that the elements of a model ask for at a state, by their kernels ``impulse``."""
+"""Impulses that the elements of a model ask for at a state, and states that they reset."""
 
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import IMPULSE, KNOT, SWITCH, Floats, Integers
+from dap3d_core.assembly.arrays import IMPULSE, KNOT, RESET, SWITCH, Floats, Integers
 from dap3d_core.assembly.evaluate import call_kinds
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
-from dap3d_core.interface.codegen.impulse_source import row_count
+from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, row_count
+from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.model import Group
 from dap3d_core.model.state_layout import velocities_of
 
@@ -34,6 +35,12 @@ class JumpRows:
         return JumpRows(*map(np.concatenate, columns))
 
 
+def no_rows(size: int) -> JumpRows:
+    """No rows, of so many columns."""
+    none = np.zeros(0, dtype=np.int64)
+    return JumpRows(np.zeros((0, size)), np.zeros(0), none.astype(bool), none, none)
+
+
 @attrs.frozen(eq=False)
 class _JumpGroup:
     """A group of elements with impulses.
@@ -43,13 +50,15 @@ class _JumpGroup:
         first: index of its first element.
         switches: (count, m) index of each switch among those of the model.
         impulse_count: numbers that ``impulse`` returns; rows: of ``J``, 0 without.
+        places: (count, m) places of its states among those of the model.
     """
 
     group: Group
     first: int
     switches: Integers
-    impulse_count: int
-    rows: int
+    impulse_count: int = 0
+    rows: int = 0
+    places: Integers = attrs.field(factory=lambda: np.zeros((0, 0), dtype=np.int64))
 
     @property
     def slots(self) -> int:
@@ -61,7 +70,7 @@ class _JumpGroup:
 
 
 class JumpElements:
-    """The elements of a model whose velocities jump.
+    """The elements of a model by which velocities jump, or whose states do.
 
     Attributes:
         names: of each, "force NAME" or "joint NAME".
@@ -75,24 +84,31 @@ class JumpElements:
         self.is_jump: Mask = np.array([s.jumps for s in switches], dtype=bool)
         self.names: list[str] = []
         self._groups: list[_JumpGroup] = []
+        self._resets: list[_JumpGroup] = []
         of_group: dict[int, list[int]] = {}
         for k, switch in enumerate(switches):
             if switch.jumps:
                 of_group.setdefault(id(switch.group), []).append(k)
-        for kind, group in evaluator.loop_groups:
-            if kind != "impulse":
+        for q, (kind, group) in enumerate(evaluator.loop_groups):
+            if kind not in JUMP_KINDS:
                 continue
             info, type_kind = group.type_info, group.type_info.type.kind
             indices = np.array(of_group[id(group)], dtype=np.int64).reshape(group.count, -1)
-            slots = len(info.layout.slots)
-            rows = row_count(info.outputs, slots) if type_kind == "force" else 0
-            count = len(info.outputs["impulse"])
-            self._groups.append(_JumpGroup(group, len(self.names), indices, count, rows))
+            slots, first = len(info.layout.slots), len(self.names)
             names = model.joint_names if type_kind == "joint" else model.force_names
             self.names += [f"{type_kind} {names[int(m)]}" for m in group.members]
+            if kind == "reset":
+                places = _state_places(evaluator, q, group)
+                self._resets.append(_JumpGroup(group, first, indices, places=places))
+                continue
+            rows = row_count(info.outputs, slots) if type_kind == "force" else 0
+            count = len(info.outputs["impulse"])
+            self._groups.append(_JumpGroup(group, first, indices, count, rows))
         self._size = sum(g.group.count * g.width for g in self._groups)
-        order = [g.switches.ravel() for g in self._groups]
-        self._order = np.concatenate([np.zeros(0, np.int64), *order])
+        self._order, self._reset_order = (
+            np.concatenate([np.zeros(0, np.int64), *(g.switches.ravel() for g in groups)])
+            for groups in (self._groups, self._resets)
+        )
 
     @IGNORE_FLOAT_ERRORS
     def switch_values(self, t: float, u: Floats) -> Floats:
@@ -121,7 +137,7 @@ class JumpElements:
         of_elements = crossing[self._order]
         call_kinds(IMPULSE, IMPULSE, t, evaluator.system, evaluator.loops, out, counts, of_elements)
         body_size = 6 * (evaluator.model.body_count + 1)
-        P, acting, parts, first = np.zeros(body_size), [], [], 0
+        P, acting, rows, first = np.zeros(body_size), [], no_rows(body_size), 0
         v = np.concatenate([np.zeros(6), velocities_of(u)]).reshape(-1, 6)
         takes_part = (crossing != 0.0) | closed
         for g in self._groups:
@@ -129,24 +145,49 @@ class JumpElements:
             first += numbers.size
             if g.rows:
                 near = takes_part[g.switches], values[g.switches]
-                parts.append(_rows_of(g, numbers, *near, v, soon))
+                rows += _rows_of(g, numbers, *near, v, soon)
                 continue
             acts = (crossing[g.switches] != 0.0).any(axis=1) & numbers.any(axis=1)
             pairs = numbers[acts].reshape(-1, g.slots, 6)
             np.add.at(P.reshape(-1, 6), g.group.bodies[acts], pairs)
             acting.append(g.first + np.flatnonzero(acts))
         P[:6] = 0.0
-        rows = [np.concatenate(column) for column in zip(*parts, strict=True)] if parts else [
-            np.zeros((0, body_size)), np.zeros(0), np.zeros(0, bool),
-            *np.zeros((2, 0), np.int64),
-        ]  # fmt: skip
-        return P, np.concatenate([np.zeros(0, np.int64), *acting]), JumpRows(*rows)
+        return P, np.concatenate([np.zeros(0, np.int64), *acting]), rows
+
+    @IGNORE_FLOAT_ERRORS
+    def resets(self, t: float, u: Floats, crossing: Floats) -> tuple[Floats, Integers]:
+        """(states,) states of elements with those of elements that cross as they reset them.
+
+        And these elements. Arguments as of ``impulses``.
+        """
+        evaluator, states = self._evaluator, self._evaluator.states
+        crosses = [(crossing[g.switches] != 0.0).any(axis=1) for g in self._resets]
+        if not any(c.any() for c in crosses):
+            return states, np.zeros(0, dtype=np.int64)
+        out, counts, of_elements = states.copy(), np.zeros(2), crossing[self._reset_order]
+        evaluator.place(t, u)
+        call_kinds(RESET, RESET, t, evaluator.system, evaluator.loops, out, counts, of_elements)
+        new = states.copy()
+        for g, which in zip(self._resets, crosses, strict=True):
+            places = g.places[which].ravel()
+            new[places] = out[places]
+        elements = [g.first + np.flatnonzero(c) for g, c in zip(self._resets, crosses, strict=True)]
+        return new, np.concatenate(elements)
+
+
+def _state_places(evaluator: Evaluator, q: int, group: Group) -> Integers:
+    """(count, m) places of the states of the elements of loop q."""
+    layout, system = group.type_info.layout, evaluator.system
+    width = stride(group.type_info)
+    first = system.idx[system.groups[q, 0] + layout.integers - 1 :: width][: group.count]
+    places: Integers = first[:, None] + np.arange(layout.state_width)
+    return places
 
 
 def _rows_of(
     g: _JumpGroup, numbers: Floats, takes_part: Mask, values: Floats, v: Floats, soon: float
-) -> tuple[Floats, Floats, Mask, Integers, Integers]:
-    """Columns of ``JumpRows`` of a group: rows that take part, and are asked to change."""
+) -> JumpRows:
+    """Rows of a group that take part, and are asked to change."""
     count, rows = g.group.count, g.rows
     change = numbers[:, :rows]
     blocks = numbers[:, rows:].reshape(count, g.slots, rows, 6)
@@ -163,4 +204,5 @@ def _rows_of(
         np.add.at(G, (np.arange(len(which)), bodies), blocks[which, slot, row])
     G[:, 0] = 0.0
     pushes = np.isin(row, g.group.type_info.type.unilateral)  # type: ignore[attr-defined]
-    return G.reshape(len(which), v.size), change[which, row], pushes, g.first + which, row
+    G = G.reshape(len(which), v.size)
+    return JumpRows(G, change[which, row], pushes, g.first + which, row)

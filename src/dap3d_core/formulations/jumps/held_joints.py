@@ -78,6 +78,7 @@ class HeldJoints:
     def __init__(self, evaluator: Evaluator) -> None:
         """Args: an evaluator in coordinates of bodies; its arrays are worked on."""
         self._evaluator = evaluator
+        self.size = 6 * (evaluator.model.body_count + 1)
         self._has_rows = evaluator.model.row_count > 0
         if self._has_rows:
             regular = evaluator.formulation.accepts_redundant
@@ -85,9 +86,10 @@ class HeldJoints:
             self._functions = step_functions(factor, solve_held)
 
     @IGNORE_FLOAT_ERRORS
-    def set_state(self, t: float, u: Floats) -> None:
-        """Factors at a state u (13 n,)."""
+    def set_state(self, t: float, u: Floats, states: Floats) -> None:
+        """Factors at a state u (13 n,) and states of elements (states,)."""
         evaluator = self._evaluator
+        evaluator.states = states
         system = evaluator.system
         if self._has_rows:
             y = evaluator.integrated(u)

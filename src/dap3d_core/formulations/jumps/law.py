@@ -1,13 +1,15 @@
-"""The law of jumps: impulses of all elements at one instant, in rounds, with the joints held.
+"""The law of jumps: all elements at one instant, in rounds, with the joints held.
 
 In a round all elements give the change of their rows' rates, or their impulses, for the velocities
 that the round begins with, and all are met at once:
 
     M dv - D^T Lambda_D - G^T Lambda = P,    D dv = nu - D v,    G dv = change,    Lambda >= 0
 
-where they push (docs/jumps.md). What touches and approaches after that answers in the next round,
-until nothing does: so impacts travel through bodies that touch, as through Newton's cradle. Rounds
-without end become smaller and smaller; after ROUNDS what still approaches is stopped.
+where they push (docs/jumps.md). Then elements reset their states, and where that moves the
+right-hand side nu of a joint, velocities follow. What touches and approaches after that answers in
+the next round, until nothing does: so impacts travel through bodies that touch, as through Newton's
+cradle. Rounds without end become smaller and smaller; after ROUNDS what still approaches is
+stopped.
 """
 
 from typing import Any
@@ -17,7 +19,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.formulations.jumps.elements import JumpElements, JumpRows
+from dap3d_core.formulations.jumps.elements import JumpElements, JumpRows, no_rows
 from dap3d_core.formulations.jumps.held_joints import HeldJoints
 from dap3d_core.formulations.jumps.multipliers import missed_rows, row_impulses
 from dap3d_core.model.state_layout import velocities_of
@@ -40,6 +42,7 @@ class Jump:
         dv: (6 n,) change of r_dot and omega of each body, global axes.
         work: done by all impulses, J; exchanged: sum of the magnitudes of its parts, J.
         elements: names of those whose impulses are not zero, in the order of the model.
+        states: (states,) of elements then.
         sides: (switches,) on which side each switch is then.
         rounds: how many it took.
     """
@@ -47,6 +50,7 @@ class Jump:
     dv: Floats
     work: float
     exchanged: float
+    states: Floats
     elements: tuple[str, ...]
     sides: Floats
     rounds: int
@@ -57,8 +61,8 @@ class JumpLaw:
 
     def __init__(self, evaluator: Evaluator) -> None:
         """Args: the evaluator of the model."""
+        self._evaluator = in_bodies = evaluator
         self.elements = JumpElements(evaluator)
-        in_bodies = evaluator
         if evaluator.formulation.has_own_coordinates:  # it has no factors
             in_bodies = Evaluator(evaluator.model, "lsq")
         self._held = HeldJoints(in_bodies)
@@ -72,7 +76,7 @@ class JumpLaw:
         soon: float,
         given: JumpRows | None = None,
     ) -> Jump:
-        """The jump at time t and state u (13 n,).
+        """The jump at time t and state u (13 n,), which the evaluator holds with its states.
 
         Args:
             t, u: time and state before it.
@@ -85,8 +89,8 @@ class JumpLaw:
         Raises:
             ImpossibleJumpError: joints hold what a row is to change.
         """
-        elements = self.elements
-        one = _Rounds(self._held, t, u, velocities_of(u).copy())
+        elements, evaluator = self.elements, self._evaluator
+        one = _Rounds(self._held, t, u, evaluator.states)
         values = elements.switch_values(t, u)
         sides = np.sign(values) if sides is None else sides.copy()
         while one.count < ROUNDS:
@@ -95,31 +99,36 @@ class JumpLaw:
             rows = one.beyond_rounding(rows)
             if given is not None and one.count == 0:
                 rows += given
-            if not (len(acting) or len(rows.change)):
-                break
+            moves = bool(len(acting) or len(rows.change)) and one.meet(P, rows, elements.names)
             one.acting.update(acting.tolist())
-            if not one.meet(P, rows, elements.names):
-                break
+            states, resetting = elements.resets(t, one.state, crossing)
+            if len(resetting):
+                one.acting.update(resetting.tolist())
+                evaluator.states = states
+                moves |= one.reset(states, elements.names)
             values = elements.switch_values(t, one.state)
             crossing = np.where(elements.is_jump & (values * sides < 0.0), np.sign(values), 0.0)
             sides = np.where(crossing != 0.0, crossing, sides)
+            if not (moves or crossing.any()):
+                break
         else:
             one.stop(elements.names)
-        names = tuple(elements.names[k] for k in sorted(one.acting - {-1}))
+        names = tuple(dict.fromkeys(elements.names[k] for k in sorted(one.acting - {-1})))
         dv = one.v - velocities_of(u)
-        return Jump(dv, one.work, one.exchanged, names, sides, one.count)
+        return Jump(dv, one.work, one.exchanged, evaluator.states, names, sides, one.count)
 
 
 class _Rounds:
     """Velocities in the course of one jump."""
 
-    def __init__(self, held: HeldJoints, t: float, u: Floats, v: Floats) -> None:
-        self.held, self.v, self.state = held, v, u.copy()
-        self.fastest = np.abs(v)
+    def __init__(self, held: HeldJoints, t: float, u: Floats, states: Floats) -> None:
+        self.held, self.state, self._t = held, u.copy(), t
+        self.v = velocities_of(u).copy()
+        self.fastest = np.abs(self.v)
         self.work, self.exchanged, self.count = 0.0, 0.0, 0
         self.acting: set[int] = set()
         self._touched: dict[tuple[int, int], Floats] = {}  # rows that push, by element and row
-        held.set_state(t, u)
+        held.set_state(t, u, states)
         self._residual = held.residual  # of the joints: the first round takes it away
 
     def beyond_rounding(self, rows: JumpRows) -> JumpRows:
@@ -166,6 +175,12 @@ class _Rounds:
             self._touched[int(rows.element[k]), int(rows.row[k])] = rows.G[k]
         self.count += 1
         return bool(dv.any())
+
+    def reset(self, states: Floats, names: list[str]) -> bool:
+        """Let velocities follow the joints with other states of elements; whether they do."""
+        self.held.set_state(self._t, self.state, states)
+        self._residual = self.held.residual
+        return self.meet(np.zeros(self.held.size), no_rows(self.held.size), names)
 
     def stop(self, names: list[str]) -> None:
         """Stop what still approaches, of all rows that push and have answered."""

@@ -15,8 +15,14 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.body_pose import BodyPose
-from dap3d_core.interface.codegen.impulse_source import impulse_names, row_count
-from dap3d_core.interface.codegen.instance_layout import InstanceLayout, body_slots, layout_of, size
+from dap3d_core.interface.codegen.instance_layout import (
+    InstanceLayout,
+    body_slots,
+    layout_of,
+    size,
+    state_places,
+)
+from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, jump_names, row_count
 from dap3d_core.interface.codegen.kernel_arguments import (
     VELOCITY_KERNELS,
     KernelArgument,
@@ -24,10 +30,17 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     namespace,
     parameters,
 )
-from dap3d_core.interface.codegen.return_shapes import ShapeError, checked_shape, entries, value_at
+from dap3d_core.interface.codegen.return_shapes import (
+    ShapeError,
+    checked_shape,
+    entries,
+    state_entries,
+    value_at,
+)
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
+from dap3d_core.interface.examine.check_states import check_state_names, check_states
 from dap3d_core.interface.examine.random_values import (
     numbers,
     random_field,
@@ -52,10 +65,13 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         _check_conditions(type_, conditions, class_)
     variants = tuple((conditions, examine(class_, seed)) for conditions, class_ in own_variants)
     _check_class(type_, is_abstract=bool(variants))
+    check_states(type_, is_abstract=bool(variants))
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
     _check_symbol(type_, layout)
     _check_actuates(type_, layout)
+    if layout.states:
+        check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
     names = namespace(type_, layout)
     kernels: dict[str, Callable[..., Any]] = type_.kernels()
     outputs: dict[str, tuple[str, ...]] = {}
@@ -64,8 +80,8 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         kernel, offered = kernels[kernel_name], names
         if kernel_name == "friction" and issubclass(type_, Joint):
             offered = friction_names(type_.rows) | names
-        if kernel_name == "impulse":
-            offered = impulse_names(type_.kind, outputs, len(layout.slots)) | names
+        if kernel_name in JUMP_KINDS:
+            offered = jump_names(type_.kind, kernel_name, outputs, len(layout.slots)) | names
         _check_names(type_, kernel_name, parameters(kernel), offered)
         quantities = [offered[n] for n in parameters(kernel)]
         is_of_rows = kernel_name == "impulse" and type_.kind == "force"
@@ -73,7 +89,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         outputs[kernel_name] = _output(type_, kernel_name, kernel, quantities, rng, rows)
 
     for kernel_name in kernels:
-        if kernel_name != "impulse":  # it takes rows that may be derived
+        if kernel_name not in JUMP_KINDS:  # they take rows that may be derived
             call(kernel_name)
     lacking = missing(type_, outputs.get("value") == ("out",))
     if lacking:
@@ -82,7 +98,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         except CannotDeriveError as error:
             raise PluginError(f"{where_is(type_)}: {error}") from error
     derived = tuple(n for n in lacking if n in kernels)  # nu is left out where it is zero
-    for kernel_name in (*derived, *(["impulse"] if "impulse" in kernels else ())):
+    for kernel_name in (*derived, *(name for name in JUMP_KINDS if name in kernels)):
         call(kernel_name)
     _check_jumps(type_, outputs, len(layout.slots))
     functions = tuple(n for n, s in specs_of(type_).items() if s.kind == "function" and s.argument)
@@ -112,7 +128,10 @@ def _output(
     for _ in range(ATTEMPTS):
         try:
             value = kernel(*(random_quantity(q, rng) for q in quantities))
-            paths = entries(value, *_expected(type_, kernel_name, value, rows))
+            if kernel_name in ("rate", "reset"):
+                paths = state_entries(value, [s for _, s in state_places(type_).values()])
+            else:
+                paths = entries(value, *_expected(type_, kernel_name, value, rows))
         except ShapeError as error:
             raise PluginError(f"{who}: {error}") from None
         except Exception as error:
@@ -354,11 +373,14 @@ def _check_names(
 def _check_jumps(type_: type[TypeBase], outputs: Mapping[str, Sequence[str]], slots: int) -> None:
     """Check what a type says of its jumps besides the kernels themselves."""
     who, rows = where_is(type_), row_count(outputs, slots) if type_.kind == "force" else 0
-    if "impulse" in outputs and "switch" not in outputs:
+    jumps = [name for name in JUMP_KINDS if name in outputs]
+    if jumps and "switch" not in outputs:
         raise PluginError(
-            f"{who} defines impulse, but no switch: velocities jump where a switch changes its "
-            "sign; define switch, a number that does so there"
+            f"{who} defines {jumps[0]}, but no switch: velocities and states jump where a switch "
+            "changes its sign; define switch, a number that does so there"
         )
+    if "reset" in outputs and not type_.states:
+        raise PluginError(f'{who} defines reset, but no states; add e.g. states = ("z",) and rate')
     if rows and "impulse" not in outputs:
         raise PluginError(f"{who} defines J without impulse, which nothing calls; define impulse")
     if not issubclass(type_, Force):

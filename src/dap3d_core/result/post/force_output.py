@@ -46,6 +46,7 @@ def force_output(
     element: int,
     angles: Floats | None,
     actuation: Floats | None = None,
+    states: Floats | None = None,
 ) -> ForceOutput:
     """Evaluates a force element.
 
@@ -57,6 +58,7 @@ def force_output(
         name: its name, for the error.
         element: its index among the forces of the model.
         angles: (nt, k) angles as in ``Arrays``; None to count them from one instant to the next.
+        states: (nt, s) states of elements; None for their initial values.
         actuation: (nt,) what takes the place of the field that its type ``actuates``; the element
             has no potential then.
 
@@ -68,7 +70,7 @@ def force_output(
     loops, bodies = ForceLoops(evaluator, group, index), group.bodies[index]
     force, energy = np.zeros_like(evaluator.system.force), np.zeros(1)
     out, potential = np.zeros((len(t), len(bodies), 6)), np.zeros(len(t))
-    for k, time in place_at(evaluator, t, u):
+    for k, time in place_at(evaluator, t, u, states):
         if angles is None:
             loops.call("angle", time, force)
         else:
@@ -143,6 +145,7 @@ class ForceLoops:
 
         if self.has(kind):
             s = self._evaluator.system
-            arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=self.parameters.par)
+            par = self.parameters.par
+            arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=par, states=s.states)
             q, loops = self._loops[kind], self._evaluator.loops
             call_loop(loops, q, time, arrays, self._groups[q], out, out, out)

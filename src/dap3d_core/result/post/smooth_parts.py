@@ -31,10 +31,8 @@ def smooth_parts(result: Result) -> list[Result]:
     ends = [-np.inf, *(event.t for event in jumps), np.inf]
     parts = []
     for (begin, end), first, last in zip(pairwise(ends), rows[::2], rows[1::2], strict=True):
-        side = "right" if first is not None else "left"  # the first row is that at its instant
-        inner = slice(
-            np.searchsorted(result.t, begin, side), np.searchsorted(result.t, end, "left")
-        )
+        start = 0 if first is None else int(np.searchsorted(result.t, begin, side="right"))
+        inner = slice(start, int(np.searchsorted(result.t, end)))
         pieces = [piece for piece in (first, result.arrays.part(inner), last) if piece is not None]
         part = Result(result.summary, joined(pieces), result.record, lambda: result._origin)
         parts.append(part)

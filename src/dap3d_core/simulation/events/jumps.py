@@ -14,7 +14,7 @@ from dap3d_core.formulations.jumps.elements import JumpRows
 from dap3d_core.formulations.jumps.law import ImpossibleJumpError, Jump, JumpLaw
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
-from dap3d_core.model.state_layout import u_from_y, velocities_of
+from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.result import INFORMATION, EventRecord
 from dap3d_core.result.file.validate import are_events, is_number
 from dap3d_core.simulation.errors import SimulationError
@@ -132,7 +132,7 @@ class Jumps:
         return self._take(integration, u, jump), jump.work
 
     def _state_of(self, integration: Integration) -> Floats:
-        u: Floats = u_from_y(self._evaluator.body_state(integration.y)[None])[0]
+        u: Floats = self._evaluator.hold(self._evaluator.body_state(integration.y))
         return u
 
     def _soon(self, integration: Integration) -> float:
@@ -140,6 +140,7 @@ class Jumps:
 
     def _jump(self, integration: Integration, crossing: Floats, sides: Floats | None) -> None:
         t, u = integration.t, self._state_of(integration)
+        states_before = self._evaluator.states
         try:
             jump = self._law.jump(t, u, sides, crossing, self._soon(integration))
         except ImpossibleJumpError as error:
@@ -155,13 +156,27 @@ class Jumps:
         after = self._take(integration, u, jump)
         direction = next((int(x) for x in crossing if x != 0.0), 0)
         name = ", ".join(jump.elements)
+        states = self._changed_states(states_before, jump.states)
+        self.lose |= bool(states)  # what they store is not followed
         self._record(EventRecord(name=name, t=t, direction=direction, kind="jump", u=u,
-                                 u_after=after, work=jump.work))  # fmt: skip
+                                 u_after=after, work=jump.work, states=states))  # fmt: skip
+
+    def _changed_states(self, before: Floats, after: Floats) -> dict[str, dict[str, Any]]:
+        """States of elements that a jump has changed: element -> state -> value."""
+        changed: dict[str, dict[str, Any]] = {}
+        for state in self._evaluator.model.element_states:
+            place = slice(state.first, state.first + state.length)
+            if not np.array_equal(before[place], after[place]):
+                value = after[place].tolist()
+                value = value[0] if state.length == 1 else value
+                changed.setdefault(state.element, {})[state.name] = value
+        return changed
 
     def _take(self, integration: Integration, u: Floats, jump: Jump) -> Floats:
         """Make the velocities of an integration those after a jump; its state u (13 n,) then."""
         coordinates = self._evaluator.coordinates
-        integration.work.state[at.Y] = coordinates.with_jump(integration.y, jump.dv, jump.work)
+        y = coordinates.with_jump(integration.y, jump.dv, jump.states, jump.work)
+        integration.work.state[at.Y] = y
         integration.restart()
         if len(jump.sides):
             self._set_sides(integration, jump)

@@ -187,6 +187,42 @@ def test_an_event_may_watch_what_jumps():
     assert [x[0] for x in found] == pytest.approx([t0, t0 + v0 / G], abs=1e-11)
 
 
+@pytest.mark.parametrize("integrator", ["dop853", "adams", "radau"])
+def test_elements_reset_their_states(integrator):
+    """A counter of the passages downwards; both switches cross at one instant."""
+    scene = dap.Scene(name="counted")
+    scene.add_body("ball", mass=2.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1.0))
+    scene.add_force("weight", "gravity", gravity=G)
+    scene.add_force("test-bounce", "floor", P_i="ball.O", e=E)
+    scene.add_force("test-counter", "counter", P_i="ball.O", count_0=2.0)
+    compiled = dap.compile(scene, registry=JUMPING)
+    result = dap.simulate(compiled, t_end=2.0, integrator=integrator, **TIGHT)
+    table = impacts(3)
+    passed = np.searchsorted(table[:, 0], result.t, side="right")
+    np.testing.assert_array_equal(result.quantity("counter.count").values, 2.0 + passed)
+    sums = np.concatenate([[0.0], np.cumsum(E * table[:, 1])])  # after the impulse of the round
+    np.testing.assert_allclose(result.quantity("counter.z_sum").values, sums[passed], atol=1e-11)
+    assert [j.name for j in jumps_of(result)] == ["force floor, force counter"] * 3
+    assert jumps_of(result)[1].states["counter"]["count"] == 4.0
+
+
+@pytest.mark.parametrize("method", ["standard", "lsq"])
+def test_velocities_follow_a_driver_whose_state_is_reset(method):
+    """The row stays met: w = w_0 until t_1, w_1 from then on; the drive does the work."""
+    scene = dap.Scene(name="driven")
+    scene.add_body("disc", mass=1.0, Jp=(1.0, 1.0, 2.0), w=(0.0, 0.0, 1.0))
+    scene.add_joint("test-speed-drive", "drive", body_i="disc", a_j="ground.z", w_0=1.0, t_1=0.3,
+                    w_1=4.0)  # fmt: skip
+    compiled = dap.compile(scene, registry=JUMPING, method=method)
+    result = dap.simulate(compiled, t_end=1.0, dt=0.2, **TIGHT)
+    np.testing.assert_allclose(result.w[:, 0, 2], [1.0, 1.0, 4.0, 4.0, 4.0, 4.0], atol=1e-12)
+    (jump,) = jumps_of(result)
+    assert jump.work == pytest.approx(0.5 * 2.0 * (16.0 - 1.0), rel=1e-12)
+    assert jump.states == {"drive": {"w": 4.0}}
+    assert result.ledger["energy"].value < 1e-12
+    assert result.ledger["velocity"].ok
+
+
 def pendulums(method="auto"):
     """Two bars, hinged to ground and to each other, in line along x and at rest."""
     scene = dap.Scene(name="bars")

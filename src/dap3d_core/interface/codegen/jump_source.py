@@ -1,8 +1,9 @@
-"""Group loop of jumps: rows of an element, their rates before, and the impulses it asks for.
+"""Group loops of jumps: impulses that elements ask for, with rows and rates; states after them.
 
-An instance appends, behind those of other instances and groups: the numbers that ``impulse``
-returns, then the rows of ``J`` by body slots. out1 takes them; out2 counts numbers and switches;
-out3 has, for each switch, +1 or -1 where it has just changed its sign to that side, else 0.
+An instance of the loop "impulse" appends, behind those of other instances and groups: the numbers
+that ``impulse`` returns, then the rows of ``J`` by body slots. out1 takes them; out2 counts numbers
+and switches. Of the loop "reset" out1 takes the new states at their places. out3 has, for each
+switch of the elements of a loop, +1 or -1 where it has just changed its sign to that side, else 0.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -11,18 +12,19 @@ from typing import Any
 from dap3d_core.interface.codegen.kernel_arguments import KernelArgument, parameters
 from dap3d_core.interface.codegen.type_info import TypeInfo
 
-#: Further names of the kernel ``impulse``.
-IMPULSE_NAMES = ("Jv", "crossing")
+#: The loops, and further names of their kernels.
+JUMP_KINDS = ("impulse", "reset")
+JUMP_NAMES = ("Jv", "crossing")
 
 
-def impulse_names(
-    kind: str, outputs: Mapping[str, Sequence[str]], slots: int
+def jump_names(
+    kind: str, kernel: str, outputs: Mapping[str, Sequence[str]], slots: int
 ) -> dict[str, KernelArgument]:
-    """Further names of the kernel ``impulse`` of a type with these kernels.
+    """Further names of a kernel of jumps, of a type with these kernels.
 
-    kind: of the type; forces with rows of their own have Jv.
+    kind: of the type; ``impulse`` of forces with rows of their own has Jv.
     """
-    rows = row_count(outputs, slots) if kind == "force" else 0
+    rows = row_count(outputs, slots) if (kind, kernel) == ("force", "impulse") else 0
     switches = len(outputs.get("switch", ()))
     doc = "1 or -1 where a switch has just changed its sign to that side, else 0"
     names = {"crossing": KernelArgument("crossing", _shape(switches), True, "", doc=doc)}
@@ -41,12 +43,25 @@ def _shape(count: int) -> tuple[int, ...]:
     return () if count == 1 else (count,)
 
 
-def impulse_lines(type_info: TypeInfo, kernels: Mapping[str, Callable[..., Any]]) -> Sequence[str]:
-    """Lines of the loop for an instance, its quantities being known."""
-    outputs, slots = type_info.outputs, type_info.layout.slots
-    impulses, switches = outputs["impulse"], len(outputs["switch"])
-    lines = ["place = whole(out2[0])", "seen = whole(out2[1])"]
+def jump_lines(
+    type_info: TypeInfo, what: str, kernels: Mapping[str, Callable[..., Any]]
+) -> Sequence[str]:
+    """Lines of a loop for an instance, its quantities being known."""
+    switches = len(type_info.outputs["switch"])
+    lines = ["seen = whole(out2[1])"]
     lines.append(f"x_crossing = {_tuple([f'out3[seen + {k}]' for k in range(switches)])}")
+    if what == "impulse":
+        lines += _impulse_lines(type_info, kernels)
+    else:
+        lines.append(_call("reset", kernels["reset"]))
+        states = type_info.outputs["reset"]
+        lines += [f"out1[z0 + {k}] = {path}" for k, path in enumerate(states)]
+    return [*lines, f"out2[1] += {switches}.0"]
+
+
+def _impulse_lines(type_info: TypeInfo, kernels: Mapping[str, Callable[..., Any]]) -> Sequence[str]:
+    outputs, slots = type_info.outputs, type_info.layout.slots
+    impulses, lines = outputs["impulse"], ["place = whole(out2[0])"]
     entries: Sequence[str] = ()
     if "J" in kernels:
         entries = outputs["J"]
@@ -66,8 +81,7 @@ def impulse_lines(type_info: TypeInfo, kernels: Mapping[str, Callable[..., Any]]
         lines.append(f"x_Jv = {_tuple(rates)}")
     lines.append(_call("impulse", kernels["impulse"]))
     lines += [f"out1[place + {k}] = {path}" for k, path in enumerate(impulses)]
-    lines += [f"out2[0] += {len(impulses) + len(entries)}.0", f"out2[1] += {switches}.0"]
-    return lines
+    return [*lines, f"out2[0] += {len(impulses) + len(entries)}.0"]
 
 
 def _call(name: str, kernel: Callable[..., Any]) -> str:
