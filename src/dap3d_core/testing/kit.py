@@ -199,6 +199,8 @@ def _of_force(subject: SampledType) -> list[Check]:
     energy = "" if "energy" in subject.kernels.names() else "it has no energy"
     if not energy and subject.type.energy_where:
         energy = f"its energy is declared to be that of the wrench only {subject.type.energy_where}"
+    if "wrench" not in subject.kernels.names():
+        ground = "it has no wrench, and acts by its jumps alone"
     return [
         Check("energy", subject, energy, forces.potential),
         Check("frame", subject, ground, forces.frame),

@@ -394,6 +394,30 @@ def derive_wrench(energy: Callable[..., Any], symbols: Symbols) -> tuple[dict[st
     return {"wrench": pairs}, program.steps
 
 
+def derive_rows(switch: Callable[..., Any], symbols: Symbols) -> tuple[dict[str, Any], Steps]:
+    """Rows J of a force, whose rates J v are those of its switches as far as its bodies move.
+
+    Raises:
+        DerivationError: a switch depends on velocities, or cannot be differentiated.
+    """
+    velocity = [n for n in parameters(switch) if symbols.names[n].velocity]
+    if velocity:
+        raise DerivationError(
+            f"switch names {velocity[0]}, a quantity of the velocity level, so that its rate is no "
+            "J v; write J by hand"
+        )
+    program = Program.of(traced(switch, symbols, "switch"), symbols.fresh)
+    J: list[Any] = [[] for _ in range(len(symbols.basic) // 6)]
+    steps: Steps = dict(program.steps)
+    for k in range(len(program.results)):
+        with_gradient, gradient = program.gradient(k)
+        steps |= with_gradient.steps
+        coefficients = _coefficients(gradient, symbols, of_rates=False)
+        for n, block in enumerate(J):
+            block.append(coefficients[6 * n : 6 * n + 6])
+    return {"J": J}, steps
+
+
 def derive_value(value: Callable[..., Any], symbols: Symbols) -> tuple[dict[str, Any], Steps]:
     """(f, f', f'', f''') of a function that gives f alone."""
     found = traced(value, symbols, "value")[:1]
