@@ -32,6 +32,7 @@ import projection
 import right_hand_side
 import scale
 import start
+import states
 import streaming
 import study
 import trees
@@ -89,6 +90,7 @@ def main():
         "kernels": kernels.measure,
         "derived": derived.measure,
         "extension": extension.measure,
+        "states": states.measure,
         "call": calls.call,
         "projection": projection.measure,
         "dop853_on_a_chain": whole_runs.dop853_on_a_chain,

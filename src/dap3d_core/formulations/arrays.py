@@ -7,7 +7,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import EVEN, KINDS, LENGTH, Floats, Integers, System
 from dap3d_core.interface.codegen.compile_loops import compiled_loop
-from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.interface.codegen.loop_source import computes_rate, stride
 from dap3d_core.kernels.runtime.function_lists import loop_list
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P
 from dap3d_core.linear.ldlt.plan import Plan
@@ -44,6 +44,8 @@ def build_loops(
         if kind not in kinds:
             continue
         for group in _groups_for(model, kind):
+            if kind == "rate" and computes_rate(group.type_info):
+                continue
             loop = compiled_loop(group.type_info, kind, announce)
             if loop is not None:
                 loops.append(loop)

@@ -56,7 +56,6 @@ class StateTangent(Arrays):
     record: Integers  # (states,) of the element whose first state it is
     values: Floats
     size: Floats  # (states,) least size of a state, of which steps are parts
-    rates: Floats  # (states,) scratch
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)

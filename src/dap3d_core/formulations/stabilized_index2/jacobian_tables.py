@@ -17,7 +17,7 @@ from dap3d_core.formulations.stabilized_index2.jacobian import (
     Tangent,
 )
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
-from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.interface.codegen.loop_source import computes_rate, stride
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.model import Group, Model
 
@@ -42,11 +42,14 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         kinds = _KINDS | _WITH_STATES if layout.states else _KINDS
         if kind not in kinds:
             continue
+        codes = [kinds[kind]]
+        if kind == "wrench" and computes_rate(group.type_info):
+            codes.append(RATE_ELEMENT)
         slots = len(group.type_info.layout.slots)
         rows = int(getattr(group.type_info.type, "rows", 0))
-        elements.append((loop, kinds[kind], stride(group.type_info), layout.par_width, slots,
-                         layout.integers, rows, count, int(_sees_velocity(kind, group)),
-                         layout.integers - 1 if layout.states else -1))  # fmt: skip
+        elements += [(loop, code, stride(group.type_info), layout.par_width, slots,
+                      layout.integers, rows, count, int(_sees_velocity(kind, group)),
+                      layout.integers - 1 if layout.states else -1) for code in codes]  # fmt: skip
         pairs.append(_pairs(group.bodies, place))
         count += pairs[-1].size
         widest = max(widest, 6 * slots + rows, layout.state_width)
@@ -87,7 +90,6 @@ def _state_tangent(model: Model) -> StateTangent:
         record=record,
         values=np.zeros(size),
         size=np.zeros(model.state_count),
-        rates=np.zeros(model.state_count),
     )
 
 
@@ -118,5 +120,8 @@ def _sees_velocity(kind: str, group: Group) -> bool:
     """
     if kind in ("acceleration", "position"):
         return False
-    wanted: Sequence[Any] = parameters(group.type_info.kernels[kind])
+    kernels = group.type_info.kernels
+    wanted: Sequence[Any] = parameters(kernels[kind])
+    if kind == "wrench" and "rate" in kernels:
+        wanted = [*wanted, *parameters(kernels["rate"])]
     return any(q.velocity for q in in_order(group.type_info.names, wanted))

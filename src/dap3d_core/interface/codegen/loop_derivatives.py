@@ -230,6 +230,7 @@ def differentiate_loop(
     by_functions = dict(zip(columns, unit[by_numbers + len(numbers) : by_states], strict=True))
 
     friction = _Multipliers(multipliers, idx, unit[of_bodies:]) if multipliers is not None else None
+    rates = _Outputs()
     outputs = [_Outputs(), _Outputs(friction if what == "friction" else None), _Outputs()]
     loop_arrays = SimpleNamespace(
         body=_Bodies(arrays.body, idx, places, directions),
@@ -237,6 +238,7 @@ def differentiate_loop(
         idx=_Integers(),
         par=_Numbers(arrays.par, p0, (count, layout.par_width), slopes),
         states=_States(arrays.states, idx, unit[by_states:] if states else None),
+        rates=rates,
     )
     _run(loop, t, loop_arrays, outputs)
     bodies, size = np.ascontiguousarray(idx[:, places]), (count, directions)
@@ -246,7 +248,7 @@ def differentiate_loop(
         column, width, name = layout.integers, rows, "C"
         if what == "rate":
             column, width, name = layout.integers - 1, layout.state_width, what
-        value, slope = _gathered(outputs[0], [column], width, size)
+        value, slope = _gathered(rates if what == "rate" else outputs[0], [column], width, size)
         return LoopDerivatives(bodies, {name: (value[:, 0], slope[:, 0])})
     return LoopDerivatives(bodies, {what: _gathered(outputs[0], list(range(slots)), 6, size)})
 

@@ -128,7 +128,7 @@ def _force(
             unit, columns = _columns(group, name, field) if field else ("1", [])
             wrench[:] = _wrench(point, evaluator, loop, group, number, columns)
             if columns and group.type_info.layout.states:
-                _rate(point, evaluator, group, number, columns, rate)
+                _rate(point, evaluator, loop, group, number, columns, rate)
             return unit
     raise UnknownNameError(f"input {name!r}: {element} acts by the friction of a joint alone")
 
@@ -166,6 +166,7 @@ def _columns(group: Group, name: str, field: str) -> tuple[str, list[int]]:
 def _rate(
     point: OperatingPoint,
     evaluator: Evaluator,
+    loop: int,
     group: Group,
     number: int,
     columns: list[int],
@@ -173,7 +174,6 @@ def _rate(
 ) -> None:
     """Rates (s,) of the states of a force by one of its numbers."""
     system = evaluator.system
-    loop = evaluator.loop_groups.index(("rate", group))
     i0, p0, count = system.groups[loop].tolist()
     own = differentiate_loop(group.type_info, "rate", point.t, system, (i0, p0, count),
                              numbers=columns)  # fmt: skip
