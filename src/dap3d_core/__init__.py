@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from dap3d_core.exchange import export
-    from dap3d_core.formats import import_model
+    from dap3d_core.formats import export_model, import_model
     from dap3d_core.interface import PluginError
     from dap3d_core.matlab import import_matlab
     from dap3d_core.plot import animate, plot
@@ -63,6 +63,7 @@ _HOMES = {
     "compile": ("simulation", "compile_scene"),
     "equilibrium": ("simulation.equilibrium.equilibrium", "equilibrium"),
     "export": ("exchange", "export"),
+    "export_model": ("formats", "export_model"),
     "fit": ("study.fit.fit", "fit"),
     "import_matlab": ("matlab", "import_matlab"),
     "import_model": ("formats", "import_model"),
@@ -102,6 +103,7 @@ __all__ = [
     "compile",
     "equilibrium",
     "export",
+    "export_model",
     "fit",
     "import_matlab",
     "import_model",

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 import attrs
-from dap3d_formats.mjcf.document import ACTUATORS
 
 from dap3d_core.interface.formats import (
     WORLD,
@@ -17,6 +16,7 @@ from dap3d_core.interface.formats import (
     axis_angle,
     from_quaternion,
 )
+from dap3d_formats.mjcf.document import ACTUATORS
 
 if TYPE_CHECKING:
     from dap3d_formats.mjcf.importer import MjcfReader

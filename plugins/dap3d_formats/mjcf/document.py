@@ -4,7 +4,6 @@ from math import atan2, pi
 from typing import Any
 
 import attrs
-from dap3d_formats.axes import unit
 
 from dap3d_core.interface.formats import (
     FormatError,
@@ -15,6 +14,7 @@ from dap3d_core.interface.formats import (
     euler_angles,
     from_quaternion,
 )
+from dap3d_formats.axes import unit
 
 #: Elements that share the defaults of actuators.
 ACTUATORS = (

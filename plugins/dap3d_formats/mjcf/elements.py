@@ -15,15 +15,13 @@ _ACTUATOR = (
     | noted("tendon site refsite cranksite slidersite cranklength body slidersite", _LAW)
     | noted(
         "ctrllimited forcelimited actlimited ctrlrange forcerange actrange lengthrange actdim "
-        "dyntype gaintype biastype dynprm gainprm biasprm actearly plugin kp kv dampratio timeconst "
-        "inheritrange kd gain bias area diameter scale range force vmax fpmax fvmax lmin lmax vmin "
-        "tausmooth input nsample interp delay armature damping",
+        "dyntype gaintype biastype dynprm gainprm biasprm actearly plugin kp kv dampratio "
+        "timeconst inheritrange kd gain bias area diameter scale range force vmax fpmax fvmax "
+        "lmin lmax vmin tausmooth input nsample interp delay armature damping",
         _LAW,
     )
 )
-_EQUALITY = (
-    taken("name class active") | translated("solref solimp", "the equality holds exactly")
-)
+_EQUALITY = taken("name class active") | translated("solref solimp", "the equality holds exactly")
 
 MJCF: Table = {
     "mujoco": taken() | taken("model"),

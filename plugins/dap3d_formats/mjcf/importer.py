@@ -5,12 +5,6 @@ from typing import Any
 
 import attrs
 import numpy as np
-from dap3d_formats.axes import unit
-from dap3d_formats.element_table import note_elements
-from dap3d_formats.mjcf.constraints import read_actuators, read_equalities
-from dap3d_formats.mjcf.document import Document
-from dap3d_formats.mjcf.elements import MJCF
-from dap3d_formats.mjcf.geoms import Geoms
 
 from dap3d_core.interface.formats import (
     WORLD,
@@ -27,6 +21,12 @@ from dap3d_core.interface.formats import (
     quaternion,
     total_inertia,
 )
+from dap3d_formats.axes import unit
+from dap3d_formats.element_table import note_elements
+from dap3d_formats.mjcf.constraints import read_actuators, read_equalities
+from dap3d_formats.mjcf.document import Document
+from dap3d_formats.mjcf.elements import MJCF
+from dap3d_formats.mjcf.geoms import Geoms
 
 #: Type -> kind of a joint.
 KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "free"}
@@ -239,6 +239,7 @@ class MjcfReader:
 
     def _dynamics(self, joint: Joint, element: XmlElement) -> None:
         """Limits, damping, springs and armature of a joint."""
+
         def turned(value: float) -> float:
             return self.document.angle(value) if joint.kind == "revolute" else value
 

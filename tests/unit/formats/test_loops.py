@@ -25,7 +25,8 @@ def test_a_closed_loop_moves_as_its_minimal_coordinate(suffix):
     """Over 1 s from 0.8 rad; both integrations hold 1e-10, summed errors stay below 1e-7."""
     start = {"left": 0.8, "right": 0.8, "pin": -0.8}
     scene, report = dap.import_model(DATA / f"parallelogram.{suffix}", positions=start)
-    assert len(scene.joints) == 4 and not report.left_out
+    assert len(scene.joints) == 4
+    assert not report.left_out
     result = dap.simulate(scene, t_end=1.0, dt=0.1, rtol=1e-10, atol=1e-12)
     theta = np.arctan2(-result.r[:, 0, 0], 2.0 - result.r[:, 0, 2])
     np.testing.assert_allclose(theta, reference(result.t, 0.8, 0.0), rtol=0, atol=1e-7)

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dap3d_core.formats.add_joints import JointEnds, from_ground
+from dap3d_core.formats.import_scene.joints import JointEnds, from_ground
 from dap3d_core.interface.formats.articulation import Articulation, Joint, Limits
 from dap3d_core.interface.formats.frames import Floats
 
 if TYPE_CHECKING:
-    from dap3d_core.formats.to_scene import SceneBuilder
+    from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 
 #: Stiffness of stops where the format says none, N m/rad and N/m.
 STOP_STIFFNESS = {"revolute": 1e4, "prismatic": 1e6}

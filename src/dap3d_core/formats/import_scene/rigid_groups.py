@@ -3,7 +3,7 @@
 import attrs
 import numpy as np
 
-from dap3d_core.formats.spanning_tree import SpanningTree
+from dap3d_core.formats.import_scene.spanning_tree import SpanningTree
 from dap3d_core.interface.formats.articulation import WORLD, Inertial, Link
 from dap3d_core.interface.formats.frames import IDENTITY, Frame
 from dap3d_core.interface.formats.remarks import FormatError, Remarks

@@ -6,12 +6,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.formats.add_joints import add_joint
-from dap3d_core.formats.add_shapes import MeshFiles, add_shapes
-from dap3d_core.formats.joint_forces import add_couplings, add_inputs, add_joint_forces
-from dap3d_core.formats.names import Names
-from dap3d_core.formats.rigid_groups import RigidGroup, rigid_groups
-from dap3d_core.formats.spanning_tree import Placed, SpanningTree
+from dap3d_core.formats.import_scene.joint_forces import add_couplings, add_inputs, add_joint_forces
+from dap3d_core.formats.import_scene.joints import add_joint
+from dap3d_core.formats.import_scene.names import Names
+from dap3d_core.formats.import_scene.rigid_groups import RigidGroup, rigid_groups
+from dap3d_core.formats.import_scene.shapes import MeshFiles, add_shapes
+from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Link
 from dap3d_core.interface.formats.frames import Floats, Frame, quaternion
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
