@@ -55,6 +55,11 @@ class Coordinates:
             f"nodes and {len(ordering.hubs)} hubs; {plan.fill} blocks of fill"
         )
 
+    @property
+    def notes(self) -> list[str]:
+        """Return notes on the choice of coordinates, for the results of runs."""
+        return []
+
     def start(self, u: Floats) -> Floats:
         """The state y that a run from a state u (13 n,) begins with."""
         return self.evaluator.integrated(u)

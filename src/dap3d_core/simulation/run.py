@@ -177,7 +177,7 @@ class Run(RunState):
     def _integration(self, start: InitialState) -> Integration:
         evaluator, settings, singular, u0 = self.evaluator, self.settings, self.singular, start.u
         store_reference_pivots(evaluator, 0.0, u0 if singular is None else singular.aside)
-        evaluator.start(0.0, u0, start.angles)
+        evaluator.start(0.0, u0, start.angles, start.states)
         y0 = evaluator.coordinates.start(u0)
         width = 1 + len(y0) + evaluator.report_size
         self.options = options = integration_options(evaluator, settings) | {
@@ -241,7 +241,7 @@ class Run(RunState):
                 first = len(rows[0]) - self.evaluator.report_size
                 accelerations = self.singular.acceleration
                 rows[0, first : first + len(accelerations)] = accelerations
-            self.recorder.take(rows, lambda: self.record("done"))
+            self.recorder.take(self.evaluator.with_inputs(rows), lambda: self.record("done"))
 
     def _result(self, status: str) -> Result | None:
         """The result of what was computed, whole on disk if it has an output; None of nothing."""

@@ -16,7 +16,7 @@ import attrs
 import sympy
 from sympy.logic.boolalg import Boolean
 
-from dap3d_core.interface.codegen.kernel_arguments import KernelArgument, parameters
+from dap3d_core.interface.codegen.kernel_arguments import SEVERAL, KernelArgument, parameters
 from dap3d_core.interface.errors import line_of, plain_words
 from dap3d_core.kernels import add, cross, dot, sub
 
@@ -188,6 +188,10 @@ class Symbols(Mapping[str, Any]):
         """The argument of a kernel for a name: symbols in tuples, or a function to be called."""
         if name not in self._values:
             quantity = self.names[name]
+            if quantity.derivative == SEVERAL:
+                raise DerivationError(
+                    f"{name} are several functions; return (f, f', f'', f''') of their combination"
+                )
             if quantity.derivative >= 0:
                 self._values[name] = self._function(name)
             elif quantity.columns:

@@ -272,10 +272,11 @@ def _check_conditions(type_: type[TypeBase], conditions: Mapping[str, Any], vari
     for name, wanted in conditions.items():
         spec = specs.get(name)
         allowed = spec.choices if spec is not None and spec.kind == "choice" else (True, False)
-        if spec is None or spec.kind not in ("choice", "function") or wanted not in allowed:
+        kinds = ("choice", "function", "input")
+        if spec is None or spec.kind not in kinds or wanted not in allowed:
             raise PluginError(
                 f"{where_is(variant)} is the variant for {name} = {wanted!r}, "
-                f"which no choice or function of {type_.__name__} can be"
+                f"which no choice, function or input of {type_.__name__} can be"
             )
 
 

@@ -160,4 +160,6 @@ def arrays_of(run: RunState) -> dict[str, NDArray[Any]]:
         found["start.u"] = run.start.u
         if run.start.angles is not None:
             found["start.angles"] = run.start.angles
+        if run.start.states is not None:
+            found["start.states"] = run.start.states
     return found | {f"system.{name}": getattr(run.evaluator.system, name) for name in CHECKPOINTED}

@@ -210,8 +210,9 @@ class Instant:
             evaluator.functions[REPORT](
                 self.t, y, row[-evaluator.report_size :], evaluator.system, evaluator.loops
             )
+        row = evaluator.with_inputs(row[None])
         record = RunMetadata(scene_text=self._compiled.scene_text)
-        return Result.of_run(evaluator.model, row[None], record, lambda: evaluator)
+        return Result.of_run(evaluator.model, row, record, lambda: evaluator)
 
 
 class Numbers:
