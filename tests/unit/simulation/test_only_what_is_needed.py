@@ -88,6 +88,26 @@ def test_a_run_needs_no_analysis_and_no_other_start(tmp_path):
     assert not {m for m in found if m.startswith(others)}
 
 
+def test_a_run_without_jumps_knows_nothing_of_them():
+    """Neither modules nor loops, nor functions of the formulation; with jumps they are there."""
+    script = (
+        "import dap3d_core as dap\n"
+        "scene = dap.load('bodies2')\n"
+        "{}"
+        "compiled = dap.compile(scene)\n"
+        "dap.simulate(compiled, t_end=0.1)\n"
+        "print('loops', ' '.join(kind for kind, group in compiled.evaluator.loop_groups))\n"
+    )
+    names = {"dap3d_core.formulations.jumps.law", "dap3d_core.simulation.events.jumps"}
+    stop = "scene.add_force('plane_stop', P_i='upper.O', a_j='ground.z', k=1e4)\n"
+    for more, has_jumps in (("", False), (stop, True)):
+        lines = run(f"{script.format(more)}\n{MODULES}").splitlines()
+        assert ("impulse" in lines[-2].split()) == has_jumps
+        assert (set(lines[-1].split()) & names == names) == has_jumps
+        assert bool(set(lines[-1].split()) & names) == has_jumps
+        assert "scipy.optimize" not in lines[-1].split()
+
+
 def test_a_page_needs_neither_matplotlib_nor_a_reader_of_meshes():
     """``dap.view`` of a scene without meshes imports nothing for plots in files, or for meshes."""
     script = (

@@ -84,7 +84,8 @@ class JumpLaw:
                 they are those of the state.
             crossing: (switches,) the same of those that have just come there, else 0.
             soon: s, what closes within it is closed.
-            given: rows of the first round besides those of elements, of no element (-1).
+            given: rows of the first round besides those of elements, of no element (-1); where it
+                is not None velocities follow the joints with states that have been set.
 
         Raises:
             ImpossibleJumpError: joints hold what a row is to change.
@@ -97,9 +98,10 @@ class JumpLaw:
             closed = (values <= 0.0) | (sides == 0.0)
             P, acting, rows = elements.impulses(t, one.state, values, crossing, closed, soon)
             rows = one.beyond_rounding(rows)
+            asks = bool(len(acting) or len(rows.change))
             if given is not None and one.count == 0:
-                rows += given
-            moves = bool(len(acting) or len(rows.change)) and one.meet(P, rows, elements.names)
+                rows, asks = rows + given, True
+            moves = asks and one.meet(P, rows, elements.names)
             one.acting.update(acting.tolist())
             states, resetting = elements.resets(t, one.state, crossing)
             if len(resetting):

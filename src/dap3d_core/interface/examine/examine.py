@@ -70,6 +70,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     layout = layout_of(type_, _random_constants(type_, rng))
     _check_symbol(type_, layout)
     _check_actuates(type_, layout)
+    _check_reset(type_, layout)
     if layout.states:
         check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
     names = namespace(type_, layout)
@@ -84,8 +85,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
             offered = jump_names(type_.kind, kernel_name, outputs, len(layout.slots)) | names
         _check_names(type_, kernel_name, parameters(kernel), offered)
         quantities = [offered[n] for n in parameters(kernel)]
-        is_of_rows = kernel_name == "impulse" and type_.kind == "force"
-        rows = row_count(outputs, len(layout.slots)) if is_of_rows else 0
+        rows = row_count(outputs, len(layout.slots)) if kernel_name == "impulse" else 0
         outputs[kernel_name] = _output(type_, kernel_name, kernel, quantities, rng, rows)
 
     for kernel_name in kernels:
@@ -371,6 +371,12 @@ def _check_names(
             )
 
 
+def _check_reset(type_: type[TypeBase], layout: InstanceLayout) -> None:
+    if "reset" in type_.kernels() and not layout.states:
+        who = where_is(type_)
+        raise PluginError(f'{who} defines reset, but no states; add e.g. states = ("z",) and rate')
+
+
 def _check_jumps(type_: type[TypeBase], outputs: Mapping[str, Sequence[str]], slots: int) -> None:
     """Check what a type says of its jumps besides the kernels themselves."""
     who, rows = where_is(type_), row_count(outputs, slots) if type_.kind == "force" else 0
@@ -380,8 +386,6 @@ def _check_jumps(type_: type[TypeBase], outputs: Mapping[str, Sequence[str]], sl
             f"{who} defines {jumps[0]}, but no switch: velocities and states jump where a switch "
             "changes its sign; define switch, a number that does so there"
         )
-    if "reset" in outputs and not type_.states:
-        raise PluginError(f'{who} defines reset, but no states; add e.g. states = ("z",) and rate')
     if rows and "impulse" not in outputs:
         raise PluginError(f"{who} defines J without impulse, which nothing calls; define impulse")
     if not issubclass(type_, Force):
@@ -406,7 +410,7 @@ def _expected(
     """
     slots = len(body_slots(type_))
     if kernel == "impulse":
-        if rows:
+        if rows and type_.kind == "force":
             return (rows,), f"{rows} numbers, the change of J v, one for each row of J"
         return (slots, 2, 3), f"(impulse, moment of impulse) for each of {slots} bodies"
     if kernel == "J" and type_.kind == "force":

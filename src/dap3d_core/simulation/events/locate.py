@@ -250,7 +250,7 @@ class EventLocator:
             self.begin_anew(integration)
 
     def _act(self, integration: Integration, event: Event, direction: int) -> bool:
-        """Do what an event asks for; whether it changed numbers of forces or velocities."""
+        """Do what an event asks for; whether it changed numbers of forces, velocities, states."""
         here, kind = self._instant(integration), "change"
         if callable(event.action):
             event.action(here)
@@ -261,23 +261,23 @@ class EventLocator:
         if here.changes:
             integration.restart()
         after, work = None, 0.0
-        if here.velocities:
-            after, work = self._set_velocities(integration, event, here)
+        if here.velocities or here.states:
+            after, work = self._set_state(integration, event, here)
         self.occurrences.append(
             EventRecord(name=event.title, t=here.t, direction=direction, kind=kind, u=here.u,
                        changes=here.changes, u_after=after, work=work)
         )  # fmt: skip
         return bool(here.changes)
 
-    def _set_velocities(
+    def _set_state(
         self, integration: Integration, event: Event, here: Instant
     ) -> tuple[Floats, float]:
-        """Set the velocities that an action asks for; the state after it, and the work, J."""
+        """Set velocities and states as an action asks for; u after it, and the work, J."""
         if self.jumps is None:
             from dap3d_core.simulation.events.jumps import Jumps
 
             self.jumps = Jumps(self.compiled.evaluator)
-        return self.jumps.set_velocities(integration, here.velocities, event.title)
+        return self.jumps.set_state(integration, here.velocities, here.states, event.title)
 
 
 def hermite(

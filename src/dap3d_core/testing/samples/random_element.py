@@ -28,8 +28,9 @@ from dap3d_core.testing.samples.random_state import BODIES, Floats, State
 #: The loop of each kernel; J of a force is computed with its impulse.
 LOOP_OF = {kernel: kind for kind, kernels in LOOP_KINDS.items() for kernel in kernels}
 LOOP_OF["J"] = "acceleration"
-#: Kernels of the jumps of a force.
+#: Kernels of the jumps of a force; those of jumps that take which switches have crossed.
 OF_JUMPS = ("J", "impulse")
+JUMPING = frozenset(("impulse", "reset"))
 #: Probability that an optional number, point or function is left out.
 LEFT_OUT = 0.3
 
@@ -62,9 +63,11 @@ class Kernels:
 
     Attributes:
         examined: the type, with known functions of an argument.
+        crossing: of all switches, for jumps: +1 or -1 where they have crossed to that side, or 0.
     """
 
     type_info: TypeInfo
+    crossing: float = 1.0
     _plain: dict[str, Any] = attrs.field(factory=dict)
     _compiled: dict[str, Any] = attrs.field(factory=dict)
 
@@ -77,8 +80,8 @@ class Kernels:
         """The value of a kernel, as an array of its rows.
 
         C (position rows,), C_dot (velocity rows,), J (slots, rows, 6), gamma and nu (rows,), wrench
-        and friction (slots, 2, 3), energy (1,), switch (n,), value (4,), rate (states,), impulse
-        (rows,) or (slots, 2, 3), all switches having crossed upwards.
+        and friction (slots, 2, 3), energy (1,), switch (n,), value (4,), rate and reset (states,),
+        impulse (rows,) or (slots, 2, 3).
         """
         body, table = state.body().astype(object), state.table().astype(object)
         own = state.own.astype(object)
@@ -151,8 +154,8 @@ class Kernels:
         rows = getattr(self.type_info.type, "rows", 0)
         counts = [len(self.type_info.outputs.get(n, ())) for n in ("switch", *OF_JUMPS)]
         outs = tuple(np.zeros(6 * BODIES * max(rows, 1) + sum(counts)) for _ in range(3))
-        if "impulse" in self.names():
-            outs[2][: counts[0]] = 1.0
+        if not JUMPING.isdisjoint(self.names()):
+            outs[2][: counts[0]] = self.crossing
         if "friction" in self.names():
             outs[1][:rows] = -np.array(element.lam)  # the solution is minus lambda
         return tuple(out.astype(dtype) for out in outs)
