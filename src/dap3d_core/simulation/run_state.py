@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import Integration, StepCounts
 from dap3d_core.result import INFORMATION, EventRecord, RunMetadata, RunStatistics
-from dap3d_core.scene import Simulation
+from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.events.locate import EventLocator
@@ -23,6 +24,9 @@ from dap3d_core.simulation.output.termination import occurrences
 from dap3d_core.simulation.settings import report_times, settings_notes
 
 if TYPE_CHECKING:
+    from dap3d_core.simulation.events.jumps import Jumps
+    from dap3d_core.simulation.control.controller import Controller
+    from dap3d_core.simulation.control.sampled import SampledControl
     from dap3d_core.simulation.initial.start_state import StartState
 
 #: The setting ``start`` in a result whose run was given another state.
@@ -60,7 +64,9 @@ class RunState:
         estimate_error: a second run is to estimate the error of this one.
         limits: of the steps of such a second run.
         start: a state in place of the scene's initial conditions; None for what the settings say.
+        jumps: changes of velocities by elements; None where no type of the scene has any.
         recorder, watcher: the rows reported so far; the events of a script.
+        control: the controllers of a script, None for none.
         started, compile_time: clock at the start, compilation left out; seconds of compilation.
     """
 
@@ -77,9 +83,10 @@ class RunState:
         estimate_error: bool = False,
         limits: StepLimits | None = None,
         start: "StartState | None" = None,
+        controllers: "Sequence[Controller]" = (),
     ) -> None:
         """Args:
-            compiled, settings, callbacks, events: of the run.
+            compiled, settings, callbacks, events, controllers: of the run.
             output, force: file of the result, and whether over an existing one.
             identity: of the run that this one continues.
             estimate_error, limits, start: as the attributes.
@@ -107,6 +114,12 @@ class RunState:
         self.until = np.inf
         self.options: dict[str, Any] = {}
         self.event_locator = EventLocator(compiled, events) if events else None
+        self.jumps = _jumps_of(self.evaluator)
+        if self.event_locator is not None:
+            self.event_locator.jumps = self.jumps
+        self.control: SampledControl | None = None
+        if controllers:
+            self._take(controllers)
         watch = callbacks.watch
         self.observer = None if watch is None else Observer(self.evaluator, self.t_end, watch)
         check_room(len(self.times), row_width(self.evaluator), self.settings.dt, output)
@@ -114,6 +127,17 @@ class RunState:
         self.recorder = ResultRecorder(
             compiled.model, lambda: compiled.evaluator, output, most, force=force, run=identity
         )
+
+    def _take(self, controllers: "Sequence[Controller]") -> None:
+        """Let controllers set the inputs of the run."""
+        from dap3d_core.simulation.control.sampled import SampledControl
+
+        if self.estimate_error:
+            what = "cannot be estimated in a run with controllers: they may remember its first run"
+            remedy = "compare with a run of smaller rtol and atol"
+            raise SceneError([Mistake("estimate_error", True, what, remedy=remedy)])
+        self.control = SampledControl(self.compiled, self.evaluator, controllers, self.t_end)
+        self.notes += self.control.notes(self.settings.dt or self.t_end / 100.0)
 
     @property
     def t_end(self) -> float:
@@ -150,13 +174,16 @@ class RunState:
 
     def events(self) -> list[EventRecord]:
         """Crossings of switches and events of the script so far, by time."""
-        of_script = self.event_locator.occurrences if self.event_locator else []
-        return occurrences(self.evaluator, self.integrations, of_script)
+        others = self.event_locator.occurrences if self.event_locator else []
+        if self.jumps is not None:
+            others = [*others, *self.jumps.records]
+        return occurrences(self.evaluator, self.integrations, others)
 
     def record(self, status: str, more_notes: Sequence[str] = ()) -> RunMetadata:
         """The metadata of the result so far."""
         counts, events = self.statistics(), self.events()
         changes = any(event.changes for event in events)
+        changes |= self.jumps is not None and self.jumps.lose
         return RunMetadata(
             scene_text=self.compiled.scene_text,
             stats=RunStatistics(
@@ -208,3 +235,12 @@ class RunState:
             return {}
         v, w = np.linalg.norm(noise.reshape(2, 3), axis=1).tolist()
         return {"rate_noise": {"v": v, "w": w}}
+
+
+def _jumps_of(evaluator: Evaluator) -> "Jumps | None":
+    """What changes velocities in a run of a model; None where none of its types does."""
+    if not any(switch.jumps for switch in evaluator.switches):
+        return None
+    from dap3d_core.simulation.events.jumps import Jumps
+
+    return Jumps(evaluator)

@@ -29,6 +29,15 @@ def test_the_command_help_imports_nothing_heavy():
     assert not imported(script) & HEAVY
 
 
+def test_requirements_are_read_where_a_scene_has_them():
+    """The check of another scene brings in no comparison of versions."""
+    names = {"packaging", "dap3d_core.scene.requirements"}
+    script = "import dap3d_core as dap\nscene = dap.load('pen1')\n{}\n"
+    script += "from dap3d_core.scene import check\ncheck(scene, dap.load_registry())"
+    assert not imported(script.format("")) & names
+    assert names <= imported(script.format("scene.add_requirement('dap3d')"))
+
+
 def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     """Method standard brings in nothing of them."""
     names = {"dap3d_core.formulations.joint", "dap3d_core.assembly.motion.classify"}
@@ -99,6 +108,26 @@ def test_a_run_needs_no_analysis_and_no_other_start(tmp_path):
             "interface.codegen.loop_derivatives")  # fmt: skip
     others = (*(f"dap3d_core.{name}" for name in core), "scipy.sparse.linalg", "control")
     assert not {m for m in found if m.startswith(others)}
+
+
+def test_a_run_without_jumps_knows_nothing_of_them():
+    """Neither modules nor loops, nor functions of the formulation; with jumps they are there."""
+    script = (
+        "import dap3d_core as dap\n"
+        "scene = dap.load('bodies2')\n"
+        "{}"
+        "compiled = dap.compile(scene)\n"
+        "dap.simulate(compiled, t_end=0.1)\n"
+        "print('loops', ' '.join(kind for kind, group in compiled.evaluator.loop_groups))\n"
+    )
+    names = {"dap3d_core.formulations.jumps.law", "dap3d_core.simulation.events.jumps"}
+    stop = "scene.add_force('plane_stop', P_i='upper.O', a_j='ground.z', k=1e4)\n"
+    for more, has_jumps in (("", False), (stop, True)):
+        lines = run(f"{script.format(more)}\n{MODULES}").splitlines()
+        assert ("impulse" in lines[-2].split()) == has_jumps
+        assert (set(lines[-1].split()) & names == names) == has_jumps
+        assert bool(set(lines[-1].split()) & names) == has_jumps
+        assert "scipy.optimize" not in lines[-1].split()
 
 
 def test_a_page_needs_neither_matplotlib_nor_a_reader_of_meshes():

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import Integers
+from dap3d_core.interface.codegen.instance_layout import prefix_of
 from dap3d_core.interface.codegen.kernel_arguments import DERIVATIVES
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.model import Group
@@ -67,8 +68,8 @@ def _depends_on_time(group: Group) -> Any:
     names = _names_in_rows(group.type_info)
     depends = np.zeros(group.count, dtype=bool)
     for column, field in enumerate(group.type_info.layout.functions):
-        f = "f" if field == "function" else field
-        if names & {f"{f}{suffix}" for suffix in (*DERIVATIVES, "_0")}:
+        f = prefix_of(group.type_info.type, field)
+        if names & {field, *(f"{f}{suffix}" for suffix in (*DERIVATIVES, "_0"))}:
             depends |= group.functions[:, column] > 0
     return depends
 

@@ -30,7 +30,7 @@ class PackedBatch:
         self._lanes = LaneLayout(one, many, count)
         stops = compiled.breakpoints(float(times[-1])).stops
         self._batch = CompiledBatch(many, compiled.scene.simulation, times, stops)
-        self._shape = len(times), one.model.row_layout.size
+        self._shape = len(times), one.model.row_layout["inputs"].start
         self.count = count
 
     def run(self, table: Floats, places: Integers, y0: Floats) -> BatchRows:
@@ -74,6 +74,8 @@ def packed(model: Model, count: int) -> Model:
             for slots in model.joint_slots
         ),
         function_count=count * model.function_count,
+        input_rows=(model.input_rows + model.function_count * np.arange(count)[:, None]).ravel(),
+        input_values=tiled(model.input_values),
         point_names=(),
         point_body=model.point_body[:0],
         point_local=model.point_local[:0],
@@ -162,7 +164,7 @@ class LaneLayout:
         """
         k, nt, _ = rows.shape
         count, one, many = self.count, self._row, self._row_of_many
-        out = np.full((k, count, nt, one.size), np.nan)
+        out = np.full((k, count, nt, one["inputs"].start), np.nan)
         out[..., one["t"]] = rows[:, None, :, many["t"]]
         for name in ("coordinates", "velocities", "v_dot", "Lam"):
             part = rows[..., many[name]].reshape(k, nt, count, one.length(name))

@@ -21,7 +21,7 @@ from dap3d_core.model.rigid_motion import Pose, relative
 from dap3d_core.testing.checks.findings import TypeMotion
 from dap3d_core.testing.samples.random_element import RandomElement, RefusalError, draw
 from dap3d_core.testing.samples.random_state import State, random_state
-from dap3d_core.testing.samples.sampled_type import UNDEFINED, SampledType
+from dap3d_core.testing.samples.sampled_type import UNDEFINED, SampledType, given_rows
 
 #: Random joints that must agree, and the most that are drawn to find so many.
 JOINTS, DRAWN = 3, 24
@@ -63,7 +63,9 @@ def _verdict(subject: SampledType, rng: random.Random) -> tuple[JointMotions | N
     """The motion of a random joint, or the reason why it has none; None if there is no joint."""
     type_info = subject.type_info
     specs = specs_of(subject.type)
-    given = [specs[name].required for name in type_info.layout.functions]
+    given = given_rows(type_info, lambda: False)
+    names = type_info.layout.functions
+    given = [specs[n].required or one for n, one in zip(names, given, strict=True)]
     state = random_state(rng, given, grounded=False)
     try:
         group = _group_of(type_info, draw(type_info, subject.drawn_choices, rng, state))

@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
+from dap3d_core.interface.codegen.terms import bind_terms
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, examine
@@ -17,7 +18,7 @@ from dap3d_core.interface.examine.random_values import numbers
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.testing.samples.cubic import Cubic
 from dap3d_core.testing.samples.random_element import Kernels, RandomElement, RefusalError, draw
-from dap3d_core.testing.samples.random_state import Direction, Floats, State, random_state
+from dap3d_core.testing.samples.random_state import HELD, Direction, Floats, State, random_state
 
 Cached = TypeVar("Cached")
 #: |C| of an assembled pose; maximal numbers of Newton steps and of starts.
@@ -26,6 +27,8 @@ ASSEMBLED, NEWTON_STEPS, STARTS = 1e-11, 40, 12
 STALLED = 8
 #: Smallest singular value of J, relative to the largest, of an acceptable pose.
 SINGULAR = 1e-3
+#: Functions that a type which combines functions is given.
+TERMS = 3
 #: Errors of kernels at poses where they are undefined.
 UNDEFINED = (ZeroDivisionError, OverflowError, FloatingPointError)
 
@@ -199,7 +202,7 @@ class SampledType:
         rng = random.Random(title)
         layout = self.type_info.layout
         grounded = k == self.poses - 1 > 0 and layout.slots[1:2] == ("j",)
-        given = [k % 2 == 0 or rng.random() < 0.5 for _ in layout.functions]
+        given = given_rows(self.type_info, lambda: k % 2 == 0 or rng.random() < 0.5)
         given += [False] if self.type.kind == "function" else []  # the row that it fills itself
         reason = "its kernels give no finite numbers"
         for _ in range(ATTEMPTS):
@@ -244,8 +247,18 @@ def sampled_types(type_info: TypeInfo, seed: int, poses: int) -> list[SampledTyp
 
 def _given(type_info: TypeInfo, values: Mapping[str, Any]) -> TypeInfo:
     """The type with a cubic for each function of an argument, unless the variant has none."""
+    if any(spec.kind == "functions" for spec in specs_of(type_info.type).values()):
+        return bind_terms(type_info, [examine(Cubic)] * TERMS)
     given = {f: examine(Cubic) for f in type_info.argument_functions if values.get(f, True)}
     return bind_functions(type_info, given, dict.fromkeys(given, 0)) if given else type_info
+
+
+def given_rows(type_info: TypeInfo, is_given: Callable[[], bool]) -> list[bool | str]:
+    """For each function of time of a type whether it is given; HELD for an input."""
+    specs = specs_of(type_info.type)
+    return [
+        HELD if specs[name].kind == "input" else is_given() for name in type_info.layout.functions
+    ]
 
 
 def own_values(type_info: TypeInfo) -> dict[str, Any] | None:
@@ -255,7 +268,8 @@ def own_values(type_info: TypeInfo) -> dict[str, Any] | None:
     without = [(False,) * (not specs[n].required) for n in names]
     ways = [specs[n].choices or way for n, way in zip(names, without, strict=True)]
     for values in (dict(zip(names, way, strict=True)) for way in product(*ways)):
-        given = {n: v or None if specs[n].kind == "function" else v for n, v in values.items()}
+        references = ("function", "input")
+        given = {n: v or None if specs[n].kind in references else v for n, v in values.items()}
         if type_info.chosen(given) is type_info:
             return values
     return None

@@ -1,0 +1,161 @@
+"""Links that move as one: merged along fixed joints, with their mass and inertia together."""
+
+import attrs
+import numpy as np
+
+from dap3d_core.formats.import_scene.spanning_tree import SpanningTree
+from dap3d_core.interface.formats.articulation import WORLD, Inertial, Link
+from dap3d_core.interface.formats.frames import IDENTITY, Frame
+from dap3d_core.interface.formats.remarks import FormatError, Remarks
+from dap3d_core.interface.formats.solids import inertia_moved, total_inertia
+
+#: Mass and inertia of a link without any that moves, as a part of what it carries.
+STAND_IN = 1e-8
+#: Principal moments below this part of the largest count as zero.
+SMALLEST = 1e-12
+#: Departure from symmetry up to which an inertia matrix counts as symmetric, relative.
+ASYMMETRY = 1e-6
+
+
+@attrs.define(eq=False)
+class RigidGroup:
+    """Links that move as one.
+
+    Attributes:
+        name: of the link that the others are fixed to; WORLD for what does not move.
+        links: the links, with their frames in that one.
+        inertial: mass and inertia together, in the axes of that link.
+        has_mass: False where the mass is a stand-in.
+    """
+
+    name: str
+    links: list[tuple[Link, Frame]]
+    inertial: Inertial = attrs.Factory(lambda: Inertial(0.0))
+    has_mass: bool = True
+
+
+def rigid_groups(
+    tree: SpanningTree,
+    remarks: Remarks,
+    *,
+    fixed_base: bool,
+    keep_fixed: bool,
+    balance_inertia: bool = False,
+) -> tuple[dict[str, RigidGroup], dict[str, tuple[str, Frame]]]:
+    """The groups of a model, and of each link its group and its frame in it.
+
+    Args:
+        tree: the tree of the model.
+        remarks: takes what is merged.
+        fixed_base: links without a joint to a parent belong to the world.
+        keep_fixed: fixed joints between moving links stay joints.
+        balance_inertia: principal moments that no body has are replaced by their mean.
+
+    Raises:
+        FormatError: a mass or an inertia is impossible.
+    """
+    model = tree.model
+    member: dict[str, tuple[str, Frame]] = {WORLD: (WORLD, IDENTITY)}
+    groups = {WORLD: RigidGroup(WORLD, [])}
+    for name in tree.order:
+        joint, link = tree.placing.get(name), model.links[name]
+        if joint is None and fixed_base:
+            member[name] = (WORLD, model.base_poses.get(name, IDENTITY))
+            text = "fixed to ground, and its mass without effect; --free-base frees it"
+            remarks.translate(link.place, f"{name} has no joint to a parent: {text}")
+        elif joint is not None and joint.kind == "fixed":
+            group, frame = member[joint.parent]
+            if group == WORLD or not keep_fixed:
+                here = joint.in_parent @ joint.in_child.inverse()
+                member[name] = (group, frame @ here)
+                if group != WORLD:
+                    remarks.translate(joint.place, "links of fixed joints are merged into one body")
+        if name not in member:
+            member[name] = (name, IDENTITY)
+            groups[name] = RigidGroup(name, [])
+        group, frame = member[name]
+        groups[group].links.append((link, frame))
+    for group_ in groups.values():
+        if group_.name != WORLD:
+            parts = [
+                inertia_moved(_checked(link, remarks, balance_inertia), frame)
+                for link, frame in group_.links
+                if link.inertial
+            ]
+            group_.inertial = total_inertia(parts) if parts else Inertial(0.0)
+    _stand_in(tree, groups, member, remarks)
+    return groups, member
+
+
+def _checked(link: Link, remarks: Remarks, balance_inertia: bool) -> Inertial:
+    """The inertial of a link.
+
+    Raises:
+        FormatError: it is impossible.
+    """
+    inertial = link.inertial or Inertial(0.0)
+    scale = float(np.abs(inertial.inertia).max(initial=0.0))
+    finite = np.isfinite([inertial.mass, *inertial.com, *inertial.inertia.ravel()]).all()
+    if not finite or inertial.mass < 0.0:
+        raise FormatError(f"link {link.name}: mass and inertia should be numbers, not negative",
+                          link.place)  # fmt: skip
+    if np.abs(inertial.inertia - inertial.inertia.T).max(initial=0.0) > ASYMMETRY * scale:
+        raise FormatError(f"link {link.name}: the inertia matrix is not symmetric", link.place)
+    least, middle, most = np.linalg.eigvalsh(inertial.inertia).tolist()
+    if least < -ASYMMETRY * scale or least + middle < most * (1.0 - ASYMMETRY):
+        if balance_inertia:
+            text = "principal moments of inertia that no body has are replaced by their mean"
+            remarks.translate(link.place, text)
+            mean = (least + middle + most) / 3.0
+            return Inertial(inertial.mass, inertial.com, mean * np.eye(3))
+        what = f"link {link.name}: no body has the principal moments of inertia {least:.4g}, "
+        what += f"{middle:.4g}, {most:.4g}: the largest is at most the sum of the others"
+        raise FormatError(what, link.place, "correct the file, or take their mean with "
+                          "--balance-inertia (balance_inertia=True)")  # fmt: skip
+    return inertial
+
+
+def _stand_in(
+    tree: SpanningTree,
+    groups: dict[str, RigidGroup],
+    member: dict[str, tuple[str, Frame]],
+    remarks: Remarks,
+) -> None:
+    """Give groups that move without mass, or without inertia, the least that can be computed.
+
+    It is a part of what the group carries: much less would be lost to rounding in the equations of
+    motion, much more would be seen in accelerations.
+    """
+    moving = [g for g in groups.values() if g.name != WORLD]
+    masses = [g.inertial.mass for g in moving if g.inertial.mass > 0.0]
+    moments = [m for g in moving for m in np.linalg.eigvalsh(g.inertial.inertia) if m > 0.0]
+    usual = min(masses, default=1.0), min(moments, default=1.0)
+    carried: dict[str, tuple[float, float]] = {}
+    for name in reversed(tree.order):
+        if name not in groups:
+            continue
+        group = groups[name]
+        _complete(group, carried.get(name, usual), remarks)
+        joint = tree.placing.get(name)
+        if joint is not None:
+            mean = float(np.trace(group.inertial.inertia)) / 3.0
+            own = (group.inertial.mass, mean) if group.has_mass else carried.get(name, usual)
+            carried.setdefault(member[joint.parent][0], own)
+
+
+def _complete(group: RigidGroup, scale: tuple[float, float], remarks: Remarks) -> None:
+    """Complete mass and inertia of a group by parts of a mass and a moment of inertia."""
+    place, old = group.links[0][0].place, group.inertial
+    mass, moment = (STAND_IN * x for x in scale)
+    group.has_mass = old.mass > 0.0
+    inertia = old.inertia
+    least = float(np.linalg.eigvalsh(inertia)[0])
+    if least <= SMALLEST * float(np.abs(inertia).max(initial=0.0)):
+        inertia = inertia + (moment - min(least, 0.0)) * np.eye(3)
+    if not old.mass:
+        text = f"a link without mass that moves has {STAND_IN:g} of the mass that it carries"
+        remarks.translate(place, text)
+    elif inertia is not old.inertia:
+        text = f"a moment of inertia of 0 is {STAND_IN:g} of the least of the others"
+        remarks.translate(place, text)
+    group.inertial = Inertial(old.mass or mass, old.com, inertia)
