@@ -72,6 +72,8 @@ class Run(RunState):
     def initialise(self) -> None:
         """Correct the initial state, and compile and begin the first integration."""
         self.started = time.perf_counter()
+        if self.event_locator:
+            self.event_locator.take_rows = self._take_rows
         self.begin(self._integration(self._start()))
 
     def finish(self) -> Result:

@@ -295,6 +295,33 @@ def test_an_event_sets_states_and_velocities_follow():
     assert result.ledger["energy"].value < 1e-12
 
 
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_an_event_sets_inputs_and_velocities_follow(method):
+    """A driven speed, which jumps with its input, and a force; results have the inputs as set."""
+    scene = dap.Scene(name="driven")
+    for name in ("speed", "thrust"):
+        scene.add_input(name, value=1.0)
+    scene.add_body("disc", mass=1.0, Jp=(1.0, 1.0, 2.0), w=(0.0, 0.0, -1.0))
+    scene.add_joint("rev", "axle", P_i="disc.O", P_j="ground.O", a_i="disc.z", a_j="ground.z")
+    scene.add_joint("rel-rot", "drive", body_i="disc", a_j="ground.z", input="speed")
+    scene.add_body("sledge", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(5.0, 0.0, 0.0))
+    scene.add_force("f", "engine", body_i="sledge", f=(1.0, 0.0, 0.0), input="thrust")
+
+    def act(state):
+        state.set("speed", value=3.0)
+        state.set("thrust", value=4.0)
+
+    event = dap.Event("t", above=0.5, action=act)
+    result = dap.simulate(scene, method=method, t_end=1.0, dt=0.2, events=[event], **TIGHT)
+    np.testing.assert_array_equal(result.quantity("thrust").values, [1.0] * 3 + [4.0] * 3)
+    sense = np.sign(result.w[0, 0, 2])
+    w = sense * result.w[:, 0, 2]
+    np.testing.assert_allclose(w, [1.0, 1.0, 1.0, 3.0, 3.0, 3.0], atol=1e-12)
+    assert result.rd[-1, 1, 0] == pytest.approx(0.5 * 0.5 + 2.0 * 0.5, abs=1e-12)
+    assert result.events[0].work == pytest.approx(0.5 * 2.0 * (9.0 - 1.0), rel=1e-12)
+    assert result.ledger["energy"].value < 1e-12
+
+
 def test_a_state_of_another_length_is_refused():
     scene = dap.Scene(name="counted")
     scene.add_body("ball", mass=2.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1.0))
