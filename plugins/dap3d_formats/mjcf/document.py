@@ -100,6 +100,20 @@ class Document:
         """A setting of the compiler that is true or false."""
         return self.compiler.get(key, "true" if default else "false") == "true"
 
+    def setting(self, key: str, default: float) -> float:
+        """A setting of the compiler that is a number.
+
+        Raises:
+            FormatError: it is none.
+        """
+        return self.settings.number(key, default)
+
+    @property
+    def settings(self) -> XmlElement:
+        """The compiler's settings as one element, at the place of the last."""
+        place = next((e.place for e in reversed(self.root.all("compiler"))), self.root.place)
+        return XmlElement("compiler", self.compiler, place)
+
     def angle(self, value: float) -> float:
         """An angle in rad, as the compiler reads it."""
         return value if self.compiler.get("angle", "degree") == "radian" else value * pi / 180.0
@@ -125,7 +139,11 @@ class Document:
             return axis_angle(unit((x, y, z), element), self.angle(angle))
         if "euler" in given:
             angles = [self.angle(a) for a in element.numbers("euler", 3)]
-            return euler_angles(angles, self.compiler.get("eulerseq", "xyz"))
+            sequence = self.compiler.get("eulerseq", "xyz")
+            if len(sequence) != 3 or set(sequence) - set("xyzXYZ"):
+                what = f"eulerseq = {sequence!r} should be three of x, y, z, X, Y, Z"
+                raise FormatError(what, element.place)
+            return euler_angles(angles, sequence)
         if "xyaxes" in given:
             return _xyaxes(element)
         if "zaxis" in given:

@@ -149,13 +149,11 @@ class MjcfReader:
         elif rule == "false":
             inertial = None
         else:
-            low, high = 0.0, 5.0
-            if "inertiagrouprange" in document.compiler:
-                low, high = map(float, document.compiler["inertiagrouprange"].split())
+            low, high = document.settings.numbers("inertiagrouprange", 2, (0.0, 5.0))
             counted = [(g, f) for g, f in geoms if low <= g.number("group", 0.0) <= high]
             parts = [part for g, f in counted if (part := self.geoms.inertial(g, f)) is not None]
             inertial = total_inertia(parts) if parts else None
-        return self._bounded(inertial, body) if moves else inertial
+        return self._bounded(inertial) if moves else inertial
 
     def _given(self, element: XmlElement) -> Inertial:
         frame = self.document.frame(element)
@@ -166,11 +164,10 @@ class MjcfReader:
             J = np.diag(element.numbers("diaginertia", 3, (0.0, 0.0, 0.0)))
         return Inertial(element.number("mass"), frame.r, frame.A @ J @ frame.A.T)
 
-    def _bounded(self, inertial: Inertial | None, body: XmlElement) -> Inertial | None:
+    def _bounded(self, inertial: Inertial | None) -> Inertial | None:
         """The inertial, not below the least that the compiler allows; balanced where it says so."""
-        compiler = self.document.compiler
-        mass = float(compiler.get("boundmass", "0"))
-        moment = float(compiler.get("boundinertia", "0"))
+        mass = self.document.setting("boundmass", 0.0)
+        moment = self.document.setting("boundinertia", 0.0)
         if inertial is None and not (mass and moment):
             return None
         inertial = inertial or Inertial(0.0)
@@ -270,7 +267,7 @@ class MjcfReader:
 
     def _scale_masses(self) -> None:
         """Scale all masses to the total that the compiler says."""
-        wanted = float(self.document.compiler.get("settotalmass", "-1"))
+        wanted = self.document.setting("settotalmass", -1.0)
         inertials = [link.inertial for link in self.model.links.values() if link.inertial]
         found = sum(one.mass for one in inertials)
         if wanted > 0.0 and found > 0.0:

@@ -62,7 +62,7 @@ class SdfReader:
             x, y, z = gravity.content(3)
             self.model.gravity = (x, y, z)
         models, includes = holder.all("model"), holder.all("include")
-        alone = world is None and len(models) + len(includes) == 1
+        alone = len(models) + len(includes) == 1
         if alone and models:
             self.model.name = models[0].get("name") or self.model.name
         for element in models:

@@ -1,6 +1,7 @@
 """The evaluator of a model: plan, arrays, group loops and formulation, called from Python."""
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
@@ -72,7 +73,7 @@ class Evaluator:
         self.system: System = build_system(model, self.plan, self.loop_groups)
         self.store_initial_function_values()
         self._weigh_rows()
-        self.report_size = model.report_layout.size
+        self.report_size = model.report_layout["inputs"].start
         if self.formulation.has_own_coordinates:
             _ = self.coordinates  # its arrays take the place of those so far
 
@@ -188,10 +189,30 @@ class Evaluator:
                     for k in range(offset, offset + ANGLE_WIDTH):
                         yield slice(p0 + k, p0 + width * group.count, width)
 
+    @property
+    def inputs(self) -> Floats:
+        """(inputs,) the values that elements read, a copy."""
+        values: Floats = self.system.F[self.model.input_rows, 0]
+        return values
+
+    def set_inputs(self, values: ArrayLike) -> None:
+        """Set the values that elements read, (inputs,); they hold until they are set again."""
+        self.system.F[self.model.input_rows, 0] = values
+
+    @contextmanager
+    def held_inputs(self) -> Iterator[None]:
+        """Put the values of inputs back at the end."""
+        values = self.inputs
+        try:
+            yield
+        finally:
+            self.set_inputs(values)
+
     @IGNORE_FLOAT_ERRORS
     def store_initial_function_values(self, t: float = 0.0) -> None:
         """Keep each function's value at the start, for drivers that count from it."""
         s = self.system
+        self.set_inputs(self.model.input_values)
         self._call(VALUE, t, s.force, s.force, s.force)
         s.F[:, 4] = s.F[:, 0]
 
@@ -244,6 +265,16 @@ class Evaluator:
         states = self.coordinates.body_states(np.ascontiguousarray(rows[:, 1:end]))
         return np.hstack([rows[:, :1], states, rows[:, end:]])
 
+    def with_inputs(self, rows: Floats, values: Floats | None = None) -> Floats:
+        """Reported rows with inputs, (inputs,) or (k, inputs), behind them; by default the present.
+
+        The last numbers of a row of results, which compiled code does not write.
+        """
+        if not self.model.input_names:
+            return rows
+        values = self.inputs if values is None else values
+        return np.hstack([rows, np.broadcast_to(values, (len(rows), values.shape[-1]))])
+
     @IGNORE_FLOAT_ERRORS
     def rhs(self, t: float, u: ArrayLike) -> Floats:
         """du/dt (13 n,) at time t in s and state u (13 n,).
@@ -286,15 +317,16 @@ class Evaluator:
 
     @IGNORE_FLOAT_ERRORS
     def report(self, t: float, u: ArrayLike) -> Floats:
-        """Report of a run at a state, (report_size,).
+        """Report of a run at a state, of the size of the model's report layout.
 
-        v_dot, lambda, angles whose turns are counted, potential energy and the largest residuals of
-        the three levels.
+        v_dot, lambda, angles whose turns are counted, potential energy, the largest residuals of
+        the three levels, and inputs.
         """
         out = np.zeros(self.report_size)
         with self.coordinates.at(np.asarray(u, dtype=float)) as y:
             self.functions[REPORT](float(t), y, out, self.system, self.loops)
-        return out
+        whole: Floats = self.with_inputs(out[None])[0]
+        return whole
 
     @IGNORE_FLOAT_ERRORS
     def applied_forces(self, t: float, u: ArrayLike) -> Floats:

@@ -94,6 +94,14 @@ class Element:
 
 
 @attrs.define
+class Input:
+    """A number that is set from outside: its name, its value at the start of a run."""
+
+    name: str
+    value: Any = attrs.field(default=0.0, converter=plain)
+
+
+@attrs.define
 class AnimationPoint:
     """A point that is only drawn: name of its body, its coordinates there (3 numbers, m)."""
 
@@ -161,6 +169,7 @@ NAMED: dict[str, type] = {
     "joints": Element,
     "forces": Element,
     "functions": Element,
+    "inputs": Input,
     "shapes": Element,
 }
 TABLES = ("scene", "requires", "parameters", *NAMED, "outputs", "animation", "simulation")
@@ -173,8 +182,8 @@ class Scene(SceneDisplay):
     Attributes:
         name, description: for people.
         schema: version of the file format.
-        bodies, points, vectors, vectors2, joints, forces, functions, shapes: by name, in file
-            order.
+        bodies, points, vectors, vectors2, joints, forces, functions, inputs, shapes: by name, in
+            file order.
         requires: ranges of versions of the distributions that bring its types, by name.
         parameters: numbers by name, for expressions in place of numbers (text that begins with =).
         outputs: expressions of quantities, by name.
@@ -194,6 +203,7 @@ class Scene(SceneDisplay):
     joints: dict[str, Element] = attrs.Factory(dict)
     forces: dict[str, Element] = attrs.Factory(dict)
     functions: dict[str, Element] = attrs.Factory(dict)
+    inputs: dict[str, Input] = attrs.Factory(dict)
     shapes: dict[str, Element] = attrs.Factory(dict)
     requires: dict[str, Any] = attrs.Factory(dict)
     parameters: dict[str, Any] = attrs.Factory(dict)
@@ -306,6 +316,18 @@ class Scene(SceneDisplay):
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
         return self._add_element("functions", type, name, fields)
+
+    def add_input(self, name: str, value: Any = 0.0, **unknown: Any) -> str:
+        """Add an input, a number that a controller or a script sets, and return its name.
+
+        Args:
+            name: a word, also the name of the quantity in results.
+            value: at the start of a run.
+
+        Raises:
+            SceneError: the name is taken or illegal, or a key is unknown.
+        """
+        return self._add("inputs", name, {"value": value} | unknown)
 
     def add_shape(self, type: str, name: str | None = None, **fields: Any) -> str:
         """Add a shape that is drawn (box, sphere, cylinder, cone, disk, line, mesh); its name.

@@ -253,6 +253,8 @@ class ResumedRun:
             run.crossed, until = header["crossed"], header["until"]
             run.until = math.inf if until is None else until
             restore_system(run, stored)
+            if run.jumps is not None:
+                run.jumps.restore(header.get("jumps"))
             check_position(run, header["rows"])
         except ValueError as error:
             raise self._damaged(str(error)) from error

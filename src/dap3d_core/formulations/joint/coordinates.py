@@ -40,6 +40,7 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.linear.ordering.spanning_forest import SpanningForest, spanning_forest
 from dap3d_core.model import Model
+from dap3d_core.model.state_layout import u_from_y, velocities_of
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
@@ -52,6 +53,8 @@ QUANTITIES = {
     "angle_rates": "w", "length_rates": "v", "rotation_rates": "www", "pose_rates": "vvvwww",
     "states": "z",
 }  # fmt: skip
+#: Segments of rates.
+RATES = ("angle_rates", "length_rates", "rotation_rates", "pose_rates")
 
 
 class Coordinates:
@@ -158,6 +161,19 @@ class Coordinates:
         turns = np.rint((expected[angles] - y[angles]) / TWO_TURNS)
         continued[angles] += TWO_TURNS * turns
         return continued
+
+    def with_jump(self, y: Floats, dv: Floats, states: Floats, work: float) -> Floats:
+        """As of ``formulations.coordinates.Coordinates``."""
+        u = u_from_y(self.body_states(y[None]), len(states))[0]
+        velocities_of(u)[:] += dv
+        moved = Reference(self.nodes, self.evaluator.model, u).state()
+        after = y.copy()
+        for name in RATES:
+            place = self.nodes.layout[name]
+            after[place] = moved[place]
+        after[self.nodes.layout["states"]] = states
+        after[-1] += work
+        return after
 
     @contextmanager
     def at(self, u: Floats) -> Iterator[Floats]:

@@ -8,6 +8,7 @@ the row vectors and for each slot that of its block in D; its numbers are in ``p
 
 from collections.abc import Iterable, Sequence
 
+from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, JUMP_NAMES, jump_lines
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.types import Joint
@@ -23,9 +24,11 @@ LOOP_KINDS = {
     "value": ("value",),
     "friction": ("friction",),
     "switch": ("switch",),
+    "impulse": ("J", "impulse"),
     "angle": (),  # the angles of the type's fields, at an accepted step
     "turned": (),  # the same angles, for reports
     "rate": ("rate",),
+    "reset": ("reset",),
     "knot": ("knot",),  # as switches; of functions of an argument (specialise.py)
 }
 
@@ -38,9 +41,18 @@ def stride(type_info: TypeInfo) -> int:
     return n + 1 if type_info.type.kind == "function" else n
 
 
+def kernels_of(kind: str, what: str) -> tuple[str, ...]:
+    """The kernels that a loop (a key of LOOP_KINDS) of a type calls; kind: of the type."""
+    has_rows = (kind == "force") == (what == "impulse")  # those of a force are for its jumps
+    return tuple(name for name in LOOP_KINDS[what] if has_rows or name != "J")
+
+
 def write(type_info: TypeInfo, what: str) -> Loop | None:
     """The loop that computes ``what`` (a key of LOOP_KINDS); None where there is no such kernel."""
-    kernels = {n: k for n, k in type_info.kernels.items() if n in LOOP_KINDS[what]}
+    of_loop = kernels_of(type_info.type.kind, what)
+    kernels = {n: k for n, k in type_info.kernels.items() if n in of_loop}
+    if what == "impulse" and "impulse" not in kernels:
+        return None
     layout = type_info.layout
     wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
     if what in ("angle", "turned"):
@@ -56,13 +68,17 @@ def write(type_info: TypeInfo, what: str) -> Loop | None:
         lines += [f"z0 = idx[b0 + {layout.integers - 1}]", "states = arrays.states"]
     if type_info.type.kind == "joint":
         lines.append(f"row = idx[b0 + {layout.integers}]")
+    if what in JUMP_KINDS:
+        wanted = [n for n in wanted if n not in JUMP_NAMES]
     lines += [f"x_{q.name} = {q.code}" for q in in_order(type_info.names, wanted) if q.code]
     if what == "angle":
         for name, at in layout.angles.items():
             lines += _store_angle(name, at)
     elif what == "turned":
         lines += _append([f"x_{name}" for name in layout.angles])
-    for name, kernel in kernels.items():
+    if what in JUMP_KINDS:
+        lines += jump_lines(type_info, what, kernels)
+    for name, kernel in kernels.items() if what not in JUMP_KINDS else ():
         arguments = ", ".join(f"x_{n}" for n in parameters(kernel))
         lines.append(f"out = kernel_{name}({arguments})")
         lines += _store(type_info, name)

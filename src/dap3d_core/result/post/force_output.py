@@ -47,6 +47,7 @@ def force_output(
     angles: Floats | None,
     actuation: Floats | None = None,
     states: Floats | None = None,
+    inputs: Floats | None = None,
 ) -> ForceOutput:
     """Evaluates a force element.
 
@@ -61,6 +62,7 @@ def force_output(
         states: (nt, s) states of elements; None for their initial values.
         actuation: (nt,) what takes the place of the field that its type ``actuates``; the element
             has no potential then.
+        inputs: (nt, k) inputs; None for those that the evaluator has.
 
     Raises:
         UnknownNameError: the element acts on every body or in a joint.
@@ -70,7 +72,7 @@ def force_output(
     loops, bodies = ForceLoops(evaluator, group, index), group.bodies[index]
     force, energy = np.zeros_like(evaluator.system.force), np.zeros(1)
     out, potential = np.zeros((len(t), len(bodies), 6)), np.zeros(len(t))
-    for k, time in place_at(evaluator, t, u, states):
+    for k, time in place_at(evaluator, t, u, states, inputs):
         if angles is None:
             loops.call("angle", time, force)
         else:

@@ -144,6 +144,8 @@ def checkpoint_of(run: RunState) -> Checkpoint:
     }
     if run.event_locator is not None:
         header["events"] = run.event_locator.state()
+    if run.jumps is not None:
+        header["jumps"] = run.jumps.state()
     return Checkpoint(json.loads(to_json(header)), arrays_of(run))
 
 

@@ -171,6 +171,7 @@ def _state_of_result(
     notes = [f"{INFORMATION}the start is the state of {title} at t = {time:.9g} s; the run begins "
              "at t = 0, and so do functions of time"]  # fmt: skip
     if before != after:
+        _refuse_jumps(result, before, after)
         notes.append(
             f"{INFORMATION}the start was interpolated between the reported instants "
             f"{result.t[before]:.9g} s and {result.t[after]:.9g} s of the result"
@@ -199,6 +200,18 @@ def _states_at(result: Result, before: int, after: int, fraction: float) -> dict
     weights = [np.prod([(time - s) / (x - s) for s in t if s != x]) for x in t]
     values = np.array(weights) @ result.arrays.states[near]
     return dict(zip(names, values.tolist(), strict=True))
+
+
+def _refuse_jumps(result: Result, before: int, after: int) -> None:
+    """SceneError where velocities jumped between two reported instants: nothing leads across."""
+    first, last = float(result.t[before]), float(result.t[after])
+    for jump in result.events:
+        if jump.u_after is not None and first < jump.t <= last:
+            raise _mistake(
+                result.record.title or "the result",
+                f"velocities jumped at t = {jump.t:.9g} s, between the reported instants "
+                f"{first:.9g} s and {last:.9g} s; give one of these as the time of the start",
+            )
 
 
 def _interval(result: Result, t: Any) -> tuple[int, int, float]:
