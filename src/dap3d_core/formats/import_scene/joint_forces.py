@@ -59,7 +59,8 @@ class JointCoordinate:
         self.ends = _SameEnds(builder, joint)
         self.turns = joint.kind == "revolute"
         finite = [abs(x) for one in joint.limits for x in (one.lower, one.upper) if isfinite(x)]
-        self.back = 0.0 if self.turns else 1.0 + 2.0 * max([*finite, abs(joint.rest[0])])
+        rest = abs(joint.rest[0]) if joint.stiffness[0] else 0.0
+        self.back = 0.0 if self.turns else 1.0 + 2.0 * max([*finite, rest])
         if not self.turns and not all(map(isfinite, (joint.limits[0].lower,))):
             self.back = FAR
 
@@ -82,7 +83,7 @@ class JointCoordinate:
         if self.turns:
             fields |= {"theta_0": rest or None, "turns": True if k else None}
         else:
-            fields |= {"l0": self.back + rest}
+            fields |= {"l0": self.back + rest} if k else {}
         name = self.builder.names.free("forces", f"{self.ends.name}_spring" if k else
                                        f"{self.ends.name}_damper")  # fmt: skip
         self.builder.scene.add_force(keyword, name, k=k or None, c=c or None, **fields)
