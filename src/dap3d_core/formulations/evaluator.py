@@ -1,6 +1,7 @@
 """The evaluator of a model: plan, arrays, group loops and formulation, called from Python."""
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
@@ -24,7 +25,7 @@ from dap3d_core.assembly.arrays import (
     Integers,
     System,
 )
-from dap3d_core.assembly.evaluate import call_kinds, place_bodies
+from dap3d_core.assembly.evaluate import call_kinds, place_state
 from dap3d_core.formulations import FORMULATIONS, REPORT, RHS
 from dap3d_core.formulations.arrays import build_loops, build_system, load_numbers
 from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pattern, scaled_rows
@@ -33,7 +34,14 @@ from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import euler_rates, to_body, to_global
-from dap3d_core.model.state_layout import join, split, velocities_of, y_from_u
+from dap3d_core.model.state_layout import (
+    bodies_of,
+    join,
+    split,
+    u_from_y,
+    velocities_of,
+    y_from_u,
+)
 
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
 IGNORE_FLOAT_ERRORS = np.errstate(all="ignore")
@@ -46,6 +54,7 @@ class Evaluator:
         model, plan, system, loops: what it evaluates.
         formulation: its properties.
         report_size: numbers that ``report`` writes (formulations/standard.py).
+        states: (states,) of elements, in evaluations at a state u of the bodies alone.
     """
 
     def __init__(
@@ -57,13 +66,14 @@ class Evaluator:
         announce: called with the name of each group loop that has to be compiled.
         """
         self.model = model
+        self.states: Floats = model.initial_states
         self.formulation = FORMULATIONS[method]
         self.plan: Plan = make_plan(model.body_count, model.joint_slots, model.joint_rows.tolist())
         self.loops, self.loop_groups = build_loops(model, self.formulation.loops, announce)
         self.system: System = build_system(model, self.plan, self.loop_groups)
         self.store_initial_function_values()
         self._weigh_rows()
-        self.report_size = model.report_layout.size
+        self.report_size = model.report_layout["inputs"].start
         if self.formulation.has_own_coordinates:
             _ = self.coordinates  # its arrays take the place of those so far
 
@@ -115,20 +125,29 @@ class Evaluator:
             ValueError: the structure is another.
         """
         self.loop_groups = load_numbers(self.system, self.model, model, self.loop_groups)
-        self.model = model
+        self.model, self.states = model, model.initial_states
         self.__dict__.pop("switches", None)  # they name groups
         self.store_initial_function_values()
         self._weigh_rows()
         if self.formulation.has_own_coordinates:
             self.coordinates = self.formulation.coordinates(self)
+            self.__dict__.pop("functions", None)  # other joints may be in the tree
 
     @IGNORE_FLOAT_ERRORS
-    def start(self, t: float, u: ArrayLike, angles: Floats | None = None) -> None:
+    def start(
+        self,
+        t: float,
+        u: ArrayLike,
+        angles: Floats | None = None,
+        states: Floats | None = None,
+    ) -> None:
         """Make ready for a run from a state u (13 n,): whole turns are counted from here.
 
         angles: (angles,) those that the state's are within half a turn of, rad, in the order of
             reports; zeros by default.
+        states: (states,) of elements; their initial values by default.
         """
+        self.states = self.model.initial_states if states is None else states
         for places in self.turn_places():
             self.system.par[places] = 0.0
         if angles is not None:
@@ -170,10 +189,30 @@ class Evaluator:
                     for k in range(offset, offset + ANGLE_WIDTH):
                         yield slice(p0 + k, p0 + width * group.count, width)
 
+    @property
+    def inputs(self) -> Floats:
+        """(inputs,) the values that elements read, a copy."""
+        values: Floats = self.system.F[self.model.input_rows, 0]
+        return values
+
+    def set_inputs(self, values: ArrayLike) -> None:
+        """Set the values that elements read, (inputs,); they hold until they are set again."""
+        self.system.F[self.model.input_rows, 0] = values
+
+    @contextmanager
+    def held_inputs(self) -> Iterator[None]:
+        """Put the values of inputs back at the end."""
+        values = self.inputs
+        try:
+            yield
+        finally:
+            self.set_inputs(values)
+
     @IGNORE_FLOAT_ERRORS
     def store_initial_function_values(self, t: float = 0.0) -> None:
         """Keep each function's value at the start, for drivers that count from it."""
         s = self.system
+        self.set_inputs(self.model.input_values)
         self._call(VALUE, t, s.force, s.force, s.force)
         s.F[:, 4] = s.F[:, 0]
 
@@ -193,16 +232,30 @@ class Evaluator:
     def functions(self) -> Any:
         """The compiled functions (rhs, project, report, ...) that an integrator takes."""
         turns, switches = self.counts_turns, bool(self.switches)
-        return self.formulation.functions(turns=turns, switches=switches)
+        equations = self.coordinates.equations if self.formulation.has_own_coordinates else ""
+        return self.formulation.functions(turns=turns, switches=switches, equations=equations)
 
     def integrated(self, u: ArrayLike) -> Floats:
-        """The integrated state y (13 n + 1,) of a state u (13 n,), in coordinates of bodies."""
-        return y_from_u(np.asarray(u, dtype=float))
+        """The integrated state y of a state u (13 n,) and ``states``, in coordinates of bodies."""
+        return y_from_u(np.asarray(u, dtype=float), states=self.states)
 
     def body_state(self, y: Floats) -> Floats:
-        """The state y (13 n + 1,) in coordinates of bodies of one that is integrated."""
+        """The state y in coordinates of bodies of one that is integrated."""
         state: Floats = self.coordinates.body_states(y[None])[0]
         return state
+
+    def bodies_of(self, y: Floats) -> Floats:
+        """View of the bodies' part (13 n,) of a state y in coordinates of bodies."""
+        return bodies_of(y, len(self.states))
+
+    def hold(self, y: Floats) -> Floats:
+        """Keep the states of elements of a state y for evaluations; its state u (13 n,).
+
+        y: in coordinates of bodies.
+        """
+        self.states = y[self.model.integrated_layout["states"]].copy()
+        u: Floats = u_from_y(y[None], len(self.states))[0]
+        return u
 
     def body_rows(self, rows: Floats) -> Floats:
         """Reported rows (k, 1 + y + report_size) with y in coordinates of bodies."""
@@ -211,6 +264,16 @@ class Evaluator:
         end = rows.shape[1] - self.report_size
         states = self.coordinates.body_states(np.ascontiguousarray(rows[:, 1:end]))
         return np.hstack([rows[:, :1], states, rows[:, end:]])
+
+    def with_inputs(self, rows: Floats, values: Floats | None = None) -> Floats:
+        """Reported rows with inputs, (inputs,) or (k, inputs), behind them; by default the present.
+
+        The last numbers of a row of results, which compiled code does not write.
+        """
+        if not self.model.input_names:
+            return rows
+        values = self.inputs if values is None else values
+        return np.hstack([rows, np.broadcast_to(values, (len(rows), values.shape[-1]))])
 
     @IGNORE_FLOAT_ERRORS
     def rhs(self, t: float, u: ArrayLike) -> Floats:
@@ -225,32 +288,45 @@ class Evaluator:
         y = self.integrated(u)
         out = np.zeros_like(y)
         self.functions[RHS](float(t), y, out, self.system, self.loops)
-        w_dot = split(out)[3]
-        w_dot[:] = to_global(split(y)[1], w_dot)  # omega_dot = A omega'_dot, no extra term
-        return out[:-1]
+        u_dot = self.bodies_of(out)
+        w_dot = split(u_dot)[3]
+        p = split(self.bodies_of(y))[1]
+        w_dot[:] = to_global(p, w_dot)  # omega_dot = A omega'_dot, no extra term
+        return u_dot
+
+    @IGNORE_FLOAT_ERRORS
+    def state_rates(self, t: float, u: ArrayLike) -> Floats:
+        """(states,) derivatives of the states of elements at time t, a state u and ``states``."""
+        with self.coordinates.at(np.asarray(u, dtype=float)) as y:
+            out = np.zeros_like(y)
+            self.functions[RHS](float(t), y, out, self.system, self.loops)
+        rates: Floats = out[len(out) - 1 - len(self.states) : -1].copy()
+        return rates
 
     @IGNORE_FLOAT_ERRORS
     def rates(self, t: float, u: ArrayLike, v_dot: Floats) -> Floats:
-        """dy/dt (13 n + 1,) with given accelerations (6 n,): r_ddot, omega_dot of each body."""
+        """dy/dt with given accelerations (6 n,): r_ddot, omega_dot of each body."""
         y = self.integrated(u)
         out = np.zeros_like(y)
         self.functions[RHS](float(t), y, out, self.system, self.loops)
-        velocities_of(out)[:] = v_dot
-        w_dot = split(out)[3]
-        w_dot[:] = to_body(split(y)[1], w_dot)
+        u_dot = self.bodies_of(out)
+        velocities_of(u_dot)[:] = v_dot
+        w_dot = split(u_dot)[3]
+        w_dot[:] = to_body(split(self.bodies_of(y))[1], w_dot)
         return out
 
     @IGNORE_FLOAT_ERRORS
     def report(self, t: float, u: ArrayLike) -> Floats:
-        """Report of a run at a state, (report_size,).
+        """Report of a run at a state, of the size of the model's report layout.
 
-        v_dot, lambda, angles whose turns are counted, potential energy and the largest residuals of
-        the three levels.
+        v_dot, lambda, angles whose turns are counted, potential energy, the largest residuals of
+        the three levels, and inputs.
         """
         out = np.zeros(self.report_size)
         with self.coordinates.at(np.asarray(u, dtype=float)) as y:
             self.functions[REPORT](float(t), y, out, self.system, self.loops)
-        return out
+        whole: Floats = self.with_inputs(out[None])[0]
+        return whole
 
     @IGNORE_FLOAT_ERRORS
     def applied_forces(self, t: float, u: ArrayLike) -> Floats:
@@ -293,7 +369,7 @@ class Evaluator:
     def place(self, t: float, u: ArrayLike) -> None:
         """Place the bodies of a state u (13 n,) and evaluate the functions of time."""
         s = self.system
-        place_bodies(self.integrated(u), s.body, s.metric)
+        place_state(self.integrated(u), s)
         self._call(VALUE, t, s.force, s.force, s.force)
 
     def _call(self, kind: int, t: float, out1: Floats, out2: Floats, out3: Floats) -> None:

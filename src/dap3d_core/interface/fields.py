@@ -24,8 +24,8 @@ class FieldSpec:
     """Properties of a field, for validation, documentation and the generation of loops.
 
     Attributes:
-        kind: body, point, vector, vector2, number, vec3, matrix, table, function, choice, joint or
-            angle.
+        kind: body, point, vector, vector2, number, numbers, vec3, matrix, table, function,
+            functions, input, choice, joint or angle.
         default: value where the scene gives none; REQUIRED where it must.
         unit: SI unit of a number, "" for none.
         doc: its meaning, one short sentence.
@@ -40,9 +40,10 @@ class FieldSpec:
         unit_length: a vector is normalised (with a warning where its length is not 1).
         ground: a vector must be fixed in ground.
         argument: the argument of a function; "" for time.
-        columns: numbers in a row of a table.
+        columns: numbers in a row of a table; count of ``numbers``.
         given: a table is given in the scene; False: ``prepare`` returns it.
         axes: the fields an angle is measured between: two vectors, and the axis.
+        instead_of: field that an input takes the place of; "" for none.
     """
 
     kind: str
@@ -64,6 +65,7 @@ class FieldSpec:
     columns: int = 1
     given: bool = True
     axes: tuple[str, str, str] = ("", "", "")
+    instead_of: str = ""
 
     @property
     def required(self) -> bool:
@@ -133,6 +135,11 @@ def vec3(default: Any = REQUIRED, *, unit: str = "", direction: bool = False, do
     return _field(FieldSpec("vec3", default, unit, doc, direction=direction))
 
 
+def numbers(count: int, default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
+    """As many finite numbers as ``count``."""
+    return _field(FieldSpec("numbers", default, unit, doc, columns=count))
+
+
 def matrix(default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
     """A 3x3 matrix of finite numbers, by rows."""
     return _field(FieldSpec("matrix", default, unit, doc))
@@ -153,11 +160,31 @@ def function(default: Any = None, *, argument: str = "", doc: str = "") -> Any:
     """A function by name; absent, it is zero. With ``REQUIRED`` the scene must give it.
 
     Of time it offers its value and derivatives ``f``, ``f_dot``, ``f_ddot``, and ``f_0``, its value
-    at t = 0. With ``argument`` (the name of its argument) kernels call ``f(x)``, ``f_dot(x)``,
-    ``f_ddot(x)``: value, first and second derivative; where it may be omitted, such kernels belong
-    to a variant of the type for ``function=True``.
+    at t = 0; next to a field of the name ``f`` they begin with its own name. With ``argument`` (the
+    name of its argument) kernels call ``f(x)``, ``f_dot(x)``, ``f_ddot(x)``: value, first and
+    second derivative; where it may be omitted, such kernels belong to a variant of the type for
+    ``function=True``.
     """
     return _field(FieldSpec("function", default, doc=doc, argument=argument))
+
+
+def functions(*, doc: str = "") -> Any:
+    """Several functions by name, for a function type that combines them.
+
+    The field offers its kernel a tuple of functions of one argument, each of which returns
+    (f, f', f'', f''') there. A function that names itself, directly or through others, is refused.
+    """
+    return _field(FieldSpec("functions", REQUIRED, doc=doc))
+
+
+def input_(default: Any = None, *, instead_of: str = "", unit: str = "", doc: str = "") -> Any:
+    """An input of the scene by name: a number that is set from outside, and held until then.
+
+    It offers its value under the name of the field. Where it may be omitted, kernels that name it
+    belong to a variant of the type for ``input=True`` (the name of the field). A scene gives it or
+    the field ``instead_of``, not both.
+    """
+    return _field(FieldSpec("input", default, unit, doc, instead_of=instead_of))
 
 
 def choice(

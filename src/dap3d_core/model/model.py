@@ -11,12 +11,14 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.body_pose import BodyPose, pose
+from dap3d_core.model.element_states import ElementState, initial_values, states_of, width_of
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.rotations import read_only, to_global
 from dap3d_core.model.state_layout import (
     COORDINATES,
     VELOCITIES,
     Layout,
+    integrated_layout,
     report_layout,
     row_layout,
     state_layout,
@@ -48,7 +50,9 @@ class Model:
         joints, forces, functions: groups of instances of one type; of the functions those of time
             that an element uses.
         friction: groups of joints' own friction, switched on by forces.
-        function_count: number of functions; F has one row more, for the absent one.
+        function_count: number of functions and inputs; F has one row more, for the absent one.
+        input_names: in file order.
+        input_rows, input_values: (inputs,) their rows of F, and their values at the start of a run.
         point_names, point_body (points,), point_local (points, 3): for rP; animation points last.
         notes: what types warned about.
     """
@@ -76,6 +80,9 @@ class Model:
     point_body: Integers
     point_local: Floats
     notes: tuple[str, ...] = ()
+    input_names: tuple[str, ...] = ()
+    input_rows: Integers = attrs.field(factory=lambda: np.zeros(0, dtype=np.int64))
+    input_values: Floats = attrs.field(factory=lambda: np.zeros(0))
 
     @property
     def body_count(self) -> int:
@@ -116,20 +123,50 @@ class Model:
             for angle in group.type_info.layout.angles
         )
 
+    @cached_property
+    def state_count(self) -> int:
+        """Numbers of the states of their own that forces and joints have."""
+        return sum(width_of(g) * g.count for g in self.acting)
+
+    @cached_property
+    def element_states(self) -> tuple[ElementState, ...]:
+        """The states of forces, then of joints, in the order in which they are integrated."""
+        found: list[ElementState] = []
+        start = 0
+        for group in self.acting:
+            if width_of(group):
+                is_joint = group.type_info.type.kind == "joint"
+                names = self.joint_names if is_joint else self.force_names
+                found += states_of(group, start, names)
+                start += width_of(group) * group.count
+        return tuple(found)
+
+    @cached_property
+    def initial_states(self) -> Floats:
+        """(states,) initial values of the states of elements."""
+        return read_only(initial_values(self.acting))
+
     @property
     def acting(self) -> tuple[Group, ...]:
-        """Groups of what may have angles, in the order of the loops (formulations/arrays.py)."""
+        """Groups of what may have angles or states, in the order of the loops."""
         return (*self.forces, *self.joints)
+
+    @property
+    def integrated_layout(self) -> Layout:
+        """Layout of the integrated state y, in coordinates of bodies."""
+        return integrated_layout(self.body_count, self.state_count)
 
     @property
     def report_layout(self) -> Layout:
         """Layout of what is reported in addition to the state."""
-        return report_layout(self.body_count, self.row_count, self.angle_count)
+        inputs = len(self.input_names)
+        return report_layout(self.body_count, self.row_count, self.angle_count, inputs)
 
     @property
     def row_layout(self) -> Layout:
         """Layout of a reported row."""
-        return row_layout(self.body_count, self.row_count, self.angle_count)
+        states, inputs = self.state_count, len(self.input_names)
+        return row_layout(self.body_count, self.row_count, self.angle_count, states, inputs)
 
     @cached_property
     def irc(self) -> Integers:
@@ -245,11 +282,14 @@ def build_model(checked: ValidatedScene) -> Model:
         forces=groups.forces,
         functions=groups.functions,
         friction=groups.friction,
-        function_count=len(checked.functions),
+        function_count=len(checked.functions) + len(checked.inputs),
         point_names=tuple(checked.point_names),
         point_body=checked.point_body,
         point_local=checked.point_local,
         notes=tuple(groups.notes),
+        input_names=tuple(checked.inputs),
+        input_rows=1 + len(checked.functions) + np.arange(len(checked.inputs)),
+        input_values=np.array(list(checked.inputs.values()), dtype=float),
     )
     for value in attrs.astuple(model, recurse=False):
         if isinstance(value, np.ndarray):

@@ -1,12 +1,14 @@
 """Source of the group loops of a type: compute quantities, call the kernels, store numbers.
 
 The integers of an instance are in ``idx`` from ``b0``: the bodies of its slots, the rows of F of
-its functions, the bodies of its vectors of no slot, then for a joint the index of its first row in
+its functions, the bodies of its vectors of no slot, the index of its first state where it has
+states of its own, then for a joint the index of its first row in
 the row vectors and for each slot that of its block in D; its numbers are in ``par`` from ``p1``.
 """
 
 from collections.abc import Iterable, Sequence
 
+from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, JUMP_NAMES, jump_lines
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.types import Joint
@@ -22,8 +24,11 @@ LOOP_KINDS = {
     "value": ("value",),
     "friction": ("friction",),
     "switch": ("switch",),
+    "impulse": ("J", "impulse"),
     "angle": (),  # the angles of the type's fields, at an accepted step
     "turned": (),  # the same angles, for reports
+    "rate": ("rate",),
+    "reset": ("reset",),
     "knot": ("knot",),  # as switches; of functions of an argument (specialise.py)
 }
 
@@ -36,9 +41,18 @@ def stride(type_info: TypeInfo) -> int:
     return n + 1 if type_info.type.kind == "function" else n
 
 
+def kernels_of(kind: str, what: str) -> tuple[str, ...]:
+    """The kernels that a loop (a key of LOOP_KINDS) of a type calls; kind: of the type."""
+    has_rows = (kind == "force") == (what == "impulse")  # those of a force are for its jumps
+    return tuple(name for name in LOOP_KINDS[what] if has_rows or name != "J")
+
+
 def write(type_info: TypeInfo, what: str) -> Loop | None:
     """The loop that computes ``what`` (a key of LOOP_KINDS); None where there is no such kernel."""
-    kernels = {n: k for n, k in type_info.kernels.items() if n in LOOP_KINDS[what]}
+    of_loop = kernels_of(type_info.type.kind, what)
+    kernels = {n: k for n, k in type_info.kernels.items() if n in of_loop}
+    if what == "impulse" and "impulse" not in kernels:
+        return None
     layout = type_info.layout
     wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
     if what in ("angle", "turned"):
@@ -50,15 +64,21 @@ def write(type_info: TypeInfo, what: str) -> Loop | None:
     lines += [f"b_{s} = idx[b0 + {n}]" for n, s in enumerate(layout.slots)]
     first = len(layout.slots) + len(layout.functions)
     lines += [f"b_{name} = idx[b0 + {first + n}]" for n, name in enumerate(layout.others)]
+    if layout.states:
+        lines += [f"z0 = idx[b0 + {layout.integers - 1}]", "states = arrays.states"]
     if type_info.type.kind == "joint":
         lines.append(f"row = idx[b0 + {layout.integers}]")
+    if what in JUMP_KINDS:
+        wanted = [n for n in wanted if n not in JUMP_NAMES]
     lines += [f"x_{q.name} = {q.code}" for q in in_order(type_info.names, wanted) if q.code]
     if what == "angle":
         for name, at in layout.angles.items():
             lines += _store_angle(name, at)
     elif what == "turned":
         lines += _append([f"x_{name}" for name in layout.angles])
-    for name, kernel in kernels.items():
+    if what in JUMP_KINDS:
+        lines += jump_lines(type_info, what, kernels)
+    for name, kernel in kernels.items() if what not in JUMP_KINDS else ():
         arguments = ", ".join(f"x_{n}" for n in parameters(kernel))
         lines.append(f"out = kernel_{name}({arguments})")
         lines += _store(type_info, name)
@@ -92,6 +112,8 @@ def _store(type_info: TypeInfo, kernel: str) -> Iterable[str]:
         yield from (f"F[row, {k}] = {path}" for k, path in enumerate(paths))
     elif kernel in ("switch", "knot"):
         yield from _append(paths)
+    elif kernel == "rate":
+        yield from (f"out1[z0 + {k}] = {path}" for k, path in enumerate(paths))
     elif kernel in ("wrench", "friction"):
         for n, s in enumerate(layout.slots):
             yield f"d = 6 * b_{s}"

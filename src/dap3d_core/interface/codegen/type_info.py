@@ -27,6 +27,7 @@ class TypeInfo:
             joint; "" for all others.
         given: the types of its functions of an argument, for titles.
         derived: kernels derived from others.
+        terms: of a function that combines functions, the types of those.
     """
 
     type: type[TypeBase]
@@ -39,6 +40,7 @@ class TypeInfo:
     friction_joint: str = ""
     given: str = ""
     derived: tuple[str, ...] = ()
+    terms: tuple["TypeInfo", ...] = ()
 
     def chosen(self, values: Mapping[str, Any]) -> "TypeInfo":
         """The variant for the values of an instance's fields; itself where none fits."""
@@ -46,8 +48,8 @@ class TypeInfo:
 
         def holds(name: str, wanted: Any) -> bool:
             value = values[name]
-            is_function = specs[name].kind == "function"
-            return (value is not None) == wanted if is_function else bool(value == wanted)
+            is_reference = specs[name].kind in ("function", "input")
+            return (value is not None) == wanted if is_reference else bool(value == wanted)
 
         for conditions, type_info in self.variants:
             if all(holds(name, wanted) for name, wanted in conditions.items()):

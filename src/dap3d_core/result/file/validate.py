@@ -83,6 +83,9 @@ def check_subject(summary: ModelSummary) -> None:
         for name in getattr(summary, f"{kind}_names"):
             if not name or not name.isprintable():
                 raise ValueError(f"{name!r} is no name of a {kind}")
+    for name in summary.state_names:
+        if not name.isprintable() or name.count(".") not in (2, 3):
+            raise ValueError(f"{name!r} is no name of a state")
     for constant in ("mass", "Jp", "point_local"):
         if not (np.abs(getattr(summary, constant)) <= MOST).all():
             raise ValueError(f"{constant} holds a number that no scene may have")
@@ -131,7 +134,11 @@ def _is_length(value: Any) -> bool:
 
 def _is_tolerance(value: Any) -> bool:
     """True for one number, one for each quantity, or none."""
-    return value is None or is_number(value) or (_are_numbers(value) and set(value) == set("rpvw"))
+    return (
+        value is None
+        or is_number(value)
+        or (_are_numbers(value) and set("rpvw") <= set(value) <= set("rpvwz"))
+    )
 
 
 def _are_numbers(value: Any) -> bool:
@@ -144,16 +151,26 @@ def are_events(value: Any) -> bool:
 
 
 def _is_event(value: Mapping[str, Any]) -> bool:
-    changes, u = value.get("changes", {}), value.get("u")
+    changes = value.get("changes", {})
     return (
         isinstance(value.get("name"), str)
         and is_number(value.get("t"))
-        and value.get("direction") in (-1, 1)
+        and value.get("direction") in ((-1, 0, 1) if value.get("kind") == "jump" else (-1, 1))
         and value.get("kind") in KINDS
-        and (u is None or (isinstance(u, list) and all(map(is_number, u))))
-        and isinstance(changes, dict)
-        and all(isinstance(v, dict) and _is_plain(v) for v in changes.values())
+        and all(_is_state(value.get(name)) for name in ("u", "u_after"))
+        and is_number(value.get("work", 0.0))
+        and all(_are_values(values) for values in (changes, value.get("states", {})))
     )
+
+
+def _are_values(values: Any) -> bool:
+    return isinstance(values, dict) and all(
+        isinstance(v, dict) and _is_plain(v) for v in values.values()
+    )
+
+
+def _is_state(u: Any) -> bool:
+    return u is None or (isinstance(u, list) and all(map(is_number, u)))
 
 
 def _are_sources(value: Any) -> bool:

@@ -46,6 +46,8 @@ def force_output(
     element: int,
     angles: Floats | None,
     actuation: Floats | None = None,
+    states: Floats | None = None,
+    inputs: Floats | None = None,
 ) -> ForceOutput:
     """Evaluates a force element.
 
@@ -57,8 +59,10 @@ def force_output(
         name: its name, for the error.
         element: its index among the forces of the model.
         angles: (nt, k) angles as in ``Arrays``; None to count them from one instant to the next.
+        states: (nt, s) states of elements; None for their initial values.
         actuation: (nt,) what takes the place of the field that its type ``actuates``; the element
             has no potential then.
+        inputs: (nt, k) inputs; None for those that the evaluator has.
 
     Raises:
         UnknownNameError: the element acts on every body or in a joint.
@@ -68,7 +72,7 @@ def force_output(
     loops, bodies = ForceLoops(evaluator, group, index), group.bodies[index]
     force, energy = np.zeros_like(evaluator.system.force), np.zeros(1)
     out, potential = np.zeros((len(t), len(bodies), 6)), np.zeros(len(t))
-    for k, time in place_at(evaluator, t, u):
+    for k, time in place_at(evaluator, t, u, states, inputs):
         if angles is None:
             loops.call("angle", time, force)
         else:
@@ -143,6 +147,7 @@ class ForceLoops:
 
         if self.has(kind):
             s = self._evaluator.system
-            arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=self.parameters.par)
+            par = self.parameters.par
+            arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=par, states=s.states)
             q, loops = self._loops[kind], self._evaluator.loops
             call_loop(loops, q, time, arrays, self._groups[q], out, out, out)

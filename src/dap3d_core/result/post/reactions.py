@@ -60,28 +60,33 @@ class Reaction:
         return self.moment - np.cross(to_global(self.p, self.local), self.force)
 
 
-def rows_at(evaluator: "Evaluator", t: Floats, u: Floats) -> Iterator["ConstraintRows"]:
-    """Yields the constraint rows at each instant."""
-    for time, state in zip(t, u, strict=True):
-        yield evaluator.rows(time, state)
+def rows_at(
+    evaluator: "Evaluator", t: Floats, u: Floats, inputs: Floats
+) -> Iterator["ConstraintRows"]:
+    """Yields the constraint rows at each instant, with inputs (nt, k)."""
+    with evaluator.held_inputs():
+        for time, state, values in zip(t, u, inputs, strict=True):
+            evaluator.set_inputs(values)
+            yield evaluator.rows(time, state)
 
 
-def jacobians(evaluator: "Evaluator", t: Floats, u: Floats) -> Any:
+def jacobians(evaluator: "Evaluator", t: Floats, u: Floats, inputs: Floats) -> Any:
     """The constraint Jacobian D of C(q, t) at each reported instant, D v = nu (spec 2).
 
     Args:
         evaluator: evaluates the model.
         t: (nt,) s.
         u: (nt, 13 n) states.
+        inputs: (nt, k).
 
     Returns:
         (nt, m, 6 n) array; beyond 1000 rows a list of nt scipy CSR arrays (m, 6 n).
     """
     model = evaluator.model
     if model.row_count > DENSE_ROWS:
-        return [rows.sparse() for rows in rows_at(evaluator, t, u)]
+        return [rows.sparse() for rows in rows_at(evaluator, t, u, inputs)]
     D = np.zeros((len(t), model.row_count, 6 * model.body_count))
-    for k, rows in enumerate(rows_at(evaluator, t, u)):
+    for k, rows in enumerate(rows_at(evaluator, t, u, inputs)):
         D[k] = rows.dense()
     return read_only(D)
 
@@ -94,6 +99,8 @@ def reactions(
     Lam: Floats,
     joints: Collection[int],
     angles: Floats | None = None,
+    states: Floats | None = None,
+    inputs: Floats | None = None,
 ) -> dict[int, dict[str, Reaction]]:
     """Reactions of joints on each of their bodies: D_slot^T lambda (spec 2).
 
@@ -104,13 +111,15 @@ def reactions(
         Lam: (nt, m) multipliers, m rows in the order of the model.
         joints: indices of the joints in the model.
         angles: (nt, k) angles as in ``Arrays``; None if unknown.
+        states: (nt, s) states of elements; None for their initial values.
+        inputs: (nt, k) inputs; None for those that the evaluator has.
 
     Returns:
         For each joint a reaction for each slot, by its letter.
     """
     loops = _joint_loops(evaluator, np.array(list(joints), dtype=np.int64))
     wrenches = [np.empty((len(t), *loop.shape)) for loop in loops]
-    for k, time in place_at(evaluator, t, u):
+    for k, time in place_at(evaluator, t, u, states, inputs):
         for loop, out in zip(loops, wrenches, strict=True):
             if angles is not None:
                 loop.parameters.set_angles(angles[k])
@@ -122,17 +131,27 @@ def reactions(
     }
 
 
-def place_at(evaluator: "Evaluator", t: Floats, u: Floats) -> Iterator[tuple[int, float]]:
-    """Sets bodies and functions to each instant in turn; yields its index and time."""
+def place_at(
+    evaluator: "Evaluator",
+    t: Floats,
+    u: Floats,
+    states: Floats | None = None,
+    inputs: Floats | None = None,
+) -> Iterator[tuple[int, float]]:
+    """Sets bodies, states, functions and inputs to each instant; yields its index and time."""
     from dap3d_core.assembly.arrays import VALUE
     from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 
     s = evaluator.system
-    for k, y in enumerate(evaluator.integrated(u) if len(t) else ()):
-        time = float(t[k])
-        place_bodies(y, s.body, s.metric)
-        call_kinds(VALUE, VALUE, time, s, evaluator.loops, s.force, s.force, s.force)
-        yield k, time
+    with evaluator.held_inputs():
+        for k, y in enumerate(evaluator.integrated(u) if len(t) else ()):
+            time = float(t[k])
+            if inputs is not None:
+                evaluator.set_inputs(inputs[k])
+            place_bodies(y, s.body, s.metric)
+            s.states[:] = evaluator.states if states is None else states[k]
+            call_kinds(VALUE, VALUE, time, s, evaluator.loops, s.force, s.force, s.force)
+            yield k, time
 
 
 def actions_of(
@@ -229,6 +248,7 @@ class _JointLoop:
         from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop
 
         s, D = self.evaluator.system, self._D.reshape(-1)
-        arrays = LoopArrays(body=s.body, F=s.F, idx=self._idx, par=self.parameters.par)
+        par = self.parameters.par
+        arrays = LoopArrays(body=s.body, F=s.F, idx=self._idx, par=par, states=s.states)
         call_loop(self.evaluator.loops, self.q, time, arrays, self._group, D, self._gamma, self._nu)
         return np.asarray(np.einsum("msrv,mr->msv", self._D, Lam[self._rows]))

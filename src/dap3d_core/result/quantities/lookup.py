@@ -20,6 +20,7 @@ from dap3d_core.result.quantities.catalogue import (
     QuantityOwner,
     QuantitySource,
 )
+from dap3d_core.result.quantities.element_states import components_of, state_quantity, states_of
 
 NORM = "norm"
 #: Names of joint coordinates, of which a joint has some.
@@ -42,10 +43,11 @@ def find(result: QuantitySource, name: str) -> Quantity:
         name: ``BODY.`` r p rd w wp rdd wd wpd; ``POINT.`` r v a (also rP rPd rPdd); ``JOINT.`` or
             ``JOINT.SLOT.`` force moment force_body moment_body moment_at_point, without a slot on
             the body of the first; ``JOINT.lambda`` (rows from 1); ``JOINT.`` q1 q1_dot q2 q2_dot
-            ... angle length angle_rate length_rate; ``FORCE.`` or ``FORCE.SLOT.`` the actions as of
+            ... angle length angle_rate length_rate; ``JOINT.`` and ``FORCE.`` states of their own,
+            their numbers from 1; ``FORCE.`` or ``FORCE.SLOT.`` the actions as of
             a joint; ``FORCE.`` length length_rate tension energy; energy.kinetic .potential .total;
             work; ``NAME.actuation`` of actuators of inverse dynamics; constraint.position
-            .velocity .acceleration; t; outputs of the scene.
+            .velocity .acceleration; t; inputs and outputs of the scene.
 
     Raises:
         UnknownNameError: there is no such quantity; names the nearest.
@@ -60,6 +62,9 @@ def find(result: QuantitySource, name: str) -> Quantity:
             settings = result.record.settings
             label, unit = settings.get("over") or label, settings.get("over_unit") or unit
         return Quantity(name, values(result), label, label, unit, ())
+    if name in result.summary.input_names:
+        column = result.arrays.inputs[:, result.summary.input_names.index(name)]
+        return Quantity(name, column, "input", f"input {name}", "1", (), "input")
     for kinds in (NAMED, ("force",)):
         for owner, attribute, component in _parsed(result, name, kinds):
             if owner.kind == "joint" and not component and COORDINATE.fullmatch(attribute):
@@ -69,6 +74,8 @@ def find(result: QuantitySource, name: str) -> Quantity:
                 columns = _components(result, owner, attribute)
                 if not component or component in columns:
                     return _quantity(result, name, owner, attribute, component)
+            elif state := state_quantity(result, name, owner, attribute, component):
+                return state
     if output := _output(result, name):
         return output
     raise _unknown(result, name)
@@ -176,7 +183,7 @@ def _columns(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tu
     if attribute == "lambda" and owner.kind == "joint":
         return tuple(str(k + 1) for k in range(result.summary.joint_rows[owner.place]))
     known = QUANTITIES[owner.kind].get(attribute)
-    return known.components if known else ()
+    return known.components if known else components_of(result.summary, owner, attribute)
 
 
 def _components(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tuple[str, ...]:
@@ -234,7 +241,7 @@ def _unknown(result: QuantitySource, name: str) -> UnknownNameError:
         return UnknownNameError(f"the output {parts[0]} has {components}, not {name!r}")
     heads = [n for n in SYSTEM if n.startswith(f"{parts[0]}.")]
     if heads or len(parts) == 1:
-        known = (*SYSTEM, *result.outputs)
+        known = (*SYSTEM, *result.summary.input_names, *result.outputs)
         choices = heads or ["BODY.r", "BODY.w.z", "POINT.v", "JOINT.force.norm", *known]
         fault = f"there is no quantity {name!r}; there are {', '.join(choices)}"
         return UnknownNameError(fault, nearest(name, known))
@@ -253,7 +260,8 @@ def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]
     names = ACTIONS if owner.slot else QUANTITIES[owner.kind]
     is_actuator = owner.name in result.record.actuation
     known = (name for name in names if name != ACTUATION or is_actuator)
-    return (*known, *_coordinate_names(result, owner))
+    states = states_of(result.summary, owner)
+    return (*known, *states, *_coordinate_names(result, owner))
 
 
 def _fault(result: QuantitySource, owner: QuantityOwner, rest: list[str]) -> str:
@@ -294,7 +302,8 @@ def names_of(result: QuantitySource, begin: str = "") -> list[str]:
         Whole names, and names of owners, which end in a dot.
     """
     owners = [name for indices in _indices(result).values() for name in indices]
-    names = [*(f"{name}." for name in owners), *SYSTEM, *result.outputs]
+    known = (*SYSTEM, *result.summary.input_names, *result.outputs)
+    names = [*(f"{name}." for name in owners), *known]
     head = begin.rpartition(".")[0]
     if head in result.outputs:
         names += [f"{head}.{one}" for one in _with_norm(find(result, head).components)]

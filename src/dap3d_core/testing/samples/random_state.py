@@ -13,6 +13,8 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, 
 
 Floats = NDArray[np.float64]
 
+#: In place of a function of time: an input, whose value stays.
+HELD = "held"
 #: Ground, and a body for each of the slots i, j, k.
 BODIES = 4
 
@@ -35,13 +37,28 @@ class TimeFunction:
         )
 
 
+@attrs.frozen
+class HeldInput:
+    """An input: a number without derivatives."""
+
+    value: float
+
+    def at(self, t: float) -> tuple[float, ...]:
+        """(value, 0, 0, 0) at every time."""
+        return self.value, 0.0, 0.0, 0.0
+
+
 @attrs.frozen(eq=False)
 class Direction:
-    """A direction: rates of position (m/s), rotation (rad/s, global) and time; row 0 is ground."""
+    """A direction: rates of position (m/s), rotation (rad/s, global) and time; row 0 is ground.
+
+    In time the states of an element move at their rates; ``own`` (s,) are further rates of them.
+    """
 
     move: Floats
     turn: Floats
     time: float = 0.0
+    own: Floats = attrs.field(factory=lambda: np.zeros(0))
 
     @classmethod
     def of(cls, slot: int, component: int) -> "Direction":
@@ -49,6 +66,11 @@ class Direction:
         both = np.zeros((2, BODIES, 3))
         both[component // 3, slot + 1, component % 3] = 1.0
         return cls(both[0], both[1])
+
+    @classmethod
+    def of_state(cls, k: int, count: int) -> "Direction":
+        """State k of so many."""
+        return cls(np.zeros((BODIES, 3)), np.zeros((BODIES, 3)), 0.0, np.eye(count)[k])
 
     @classmethod
     def in_time(cls) -> "Direction":
@@ -61,7 +83,7 @@ class State:
     """Time, and for ground and each slot r (4, 3), p (4, 4), velocity, angular velocity (4, 3).
 
     ``mass`` (4,) and ``Jp`` (4, 9) are the bodies' inertia, ``functions`` those of time; None
-    for an absent one.
+    for an absent one. ``own`` (s,) are the states of the element.
     """
 
     t: float
@@ -71,7 +93,8 @@ class State:
     w: Floats
     mass: Floats
     Jp: Floats
-    functions: tuple[TimeFunction | None, ...]
+    functions: tuple[TimeFunction | HeldInput | None, ...]
+    own: Floats = attrs.field(factory=lambda: np.zeros(0))
 
     def body(self) -> Floats:
         """(4, BODY_WIDTH) columns of the bodies, as a group loop reads them."""
@@ -140,12 +163,12 @@ class State:
         return Direction(self.v, self.w, 1.0)
 
 
-def random_state(rng: random.Random, functions: Sequence[bool], *, grounded: bool) -> State:
+def random_state(rng: random.Random, functions: Sequence[bool | str], *, grounded: bool) -> State:
     """A random state.
 
     Args:
         rng: random numbers.
-        functions: True for each function of time that is present.
+        functions: True for each function of time that is present, HELD for an input.
         grounded: slot j is on ground.
     """
     poses = [random_pose(rng) for _ in range(BODIES)]
@@ -156,8 +179,12 @@ def random_state(rng: random.Random, functions: Sequence[bool], *, grounded: boo
     mass = np.array([rng.uniform(0.5, 2.0) for _ in range(BODIES)])
     for b in (0, 2) if grounded else (0,):
         r[b], p[b], v[b], w[b], mass[b], Jp[b] = 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0
-    present = (TimeFunction(numbers(rng, 5)) if is_present else None for is_present in functions)
+    present = (_row_of_time(rng, one) if one else None for one in functions)
     return State(rng.uniform(0.1, 1.0), r, p, v, w, mass, Jp, tuple(present))
+
+
+def _row_of_time(rng: random.Random, which: bool | str) -> TimeFunction | HeldInput:
+    return HeldInput(*numbers(rng, 1)) if which == HELD else TimeFunction(numbers(rng, 5))
 
 
 def quaternion_product(a: Floats, b: Floats) -> Floats:
