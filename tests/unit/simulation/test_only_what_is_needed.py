@@ -2,7 +2,7 @@
 
 import pytest
 from support.plain import in_another_process
-from support.process import run
+from support.process import REPOSITORY, run
 
 pytestmark = in_another_process
 
@@ -66,6 +66,17 @@ def test_a_scene_without_states_has_nothing_of_them():
         found = set(lines[-1].split())
         assert names <= found if has else not names & found
         assert not any("state_derivatives" in m or "states_at_rest" in m for m in found)
+
+
+def test_formats_are_imported_by_their_commands_alone():
+    """A run needs neither importers nor what they are made with; an import needs one of them."""
+    found = imported("import dap3d_core as dap\ndap.simulate('pen1', t_end=0.02)")
+    ours = ("dap3d_formats", "dap3d_core.formats", "dap3d_core.interface.formats", "xml", "pyexpat")
+    assert not [m for m in found if m.startswith(ours)]
+    file = REPOSITORY / "tests" / "data" / "formats" / "arm.urdf"
+    found = imported(f"import dap3d_core as dap\ndap.import_model({str(file)!r})")
+    assert "dap3d_formats.urdf" in found
+    assert not found & {"trimesh", "xacrodoc", "lxml", "mujoco", "llvmlite"}
 
 
 @pytest.mark.parametrize(
