@@ -13,6 +13,7 @@ from dap3d_core.assembly.tree_arrays import TreeArrays
 from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.formulations.joint.equations import TWO_TURNS, body_state
 from dap3d_core.formulations.joint.node_layout import (
+    CENTRE,
     CHILD,
     CHILD_BLOCK,
     CONSTANT_WIDTH,
@@ -21,6 +22,7 @@ from dap3d_core.formulations.joint.node_layout import (
     FREE,
     JOINT_PARENT,
     JOINT_WIDTH,
+    MASS,
     MOTION,
     PARENT_BLOCK,
     PRISMATIC,
@@ -30,7 +32,7 @@ from dap3d_core.formulations.joint.node_layout import (
     SPHERICAL,
     WORK_WIDTH,
 )
-from dap3d_core.formulations.joint.reference import Reference
+from dap3d_core.formulations.joint.reference import Reference, inertias_about
 from dap3d_core.formulations.joint.spanning_tree import SpanningTree, spanning_tree
 from dap3d_core.formulations.joint.tree_nodes import (
     SEGMENTS,
@@ -41,6 +43,7 @@ from dap3d_core.formulations.joint.tree_nodes import (
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.model import Model
+from dap3d_core.model.state_layout import split
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
@@ -125,6 +128,29 @@ class Coordinates:
         self._tree.constants[:] = reference.constants()
         return reference.state()
 
+    def starts(self, u: Floats, others: Floats) -> Floats:
+        """States (k, size + 1) of runs whose poses at the start are those of u (13 n,).
+
+        others: (k, 13 n) states whose velocities are taken.
+        """
+        reference = Reference(self.nodes, self.evaluator.model, u)
+        ground = np.zeros((len(others), 1, 3))
+        _, _, v, w = split(others)
+        reference.v, reference.w = (np.concatenate([ground, x], axis=1) for x in (v, w))
+        return reference.state()
+
+    def inertia_places(self, bodies: Integers) -> Integers:
+        """(7 b,) indices in the tree's constants of the mass and inertia of bodies, from 1."""
+        first = CONSTANT_WIDTH * self._node_of[bodies] + MASS
+        places: Integers = (first[:, None] + np.arange(7)).ravel()
+        return places
+
+    def inertias(self, bodies: Integers, mass: Floats, Jp: Floats) -> Floats:
+        """(k, 7 b) numbers for ``inertia_places`` of masses (k, b) and inertias (k, b, 3, 3)."""
+        constants = self._tree.constants.reshape(-1, CONSTANT_WIDTH)
+        centre = constants[self._node_of[bodies], CENTRE : CENTRE + 3]
+        return inertias_about(centre, mass, Jp).reshape(len(mass), -1)
+
     def body_states(self, y: Floats) -> Floats:
         """States (k, 13 n + 1) of bodies of states (k, size + 1)."""
         out = np.empty((len(y), self.evaluator.model.u0.size + 1))
@@ -147,6 +173,14 @@ class Coordinates:
             yield self.start(u)
         finally:
             self._tree.constants[:] = before
+
+    @property
+    def _node_of(self) -> Integers:
+        """(n + 1,) the node that each body is."""
+        body = self.nodes.body
+        has_mass = np.flatnonzero(body >= 0)
+        nodes: Integers = has_mass[np.argsort(body[has_mass])]
+        return nodes
 
     @property
     def _tree(self) -> TreeArrays:
