@@ -10,9 +10,9 @@ from mechanisms import GROUND, rotation_of
 
 import dap3d_core as dap
 from dap3d_core.formulations.pivots import store_reference_pivots
-from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
+from dap3d_core.integrators import TABLEAUS, RungeKutta
 from dap3d_core.integrators.adams.integration import AdamsIntegration
-from dap3d_core.integrators.stepping.integration_state import Y
+from dap3d_core.integrators.prepared import PreparedRun
 from dap3d_core.simulation import CompiledModel
 
 VERSION = importlib.metadata.version("dap3d")
@@ -58,26 +58,6 @@ def scene_of(mechanism, loops="spherical"):
     return scene
 
 
-class Prepared:
-    """An integration whose arrays are put back to the start, as the points of a sweep are run."""
-
-    def __init__(self, integration):
-        self.integration, work = integration, integration.work
-        arrays = [work.real, work.integer, work.switches, work.tolerance, work.state[Y]]
-        if isinstance(integration, RungeKutta):
-            arrays.append(work.lengths)  # the rest is written before it is read
-        else:
-            arrays = integration.state_arrays()
-        self.arrays = [(array, array.copy()) for array in arrays if array.size]
-
-    def run(self):
-        """Run from the start to the end."""
-        for array, before in self.arrays:
-            array[...] = before
-        if self.integration.advance(10**12) is not Status.FINISHED:
-            raise RuntimeError(f"the run stopped: {self.integration.status.name}")
-
-
 class Model:
     """A compiled model, and how its runs start."""
 
@@ -100,8 +80,8 @@ class Model:
         """An integration that can be run again and again."""
         options = self.options | control | {"project_on": project}
         if method == "adams":
-            return Prepared(AdamsIntegration(*self.problem, **options))
-        return Prepared(RungeKutta(TABLEAUS[method], *self.problem, **options))
+            return PreparedRun(AdamsIntegration(*self.problem, **options))
+        return PreparedRun(RungeKutta(TABLEAUS[method], *self.problem, **options))
 
     def trial(self, method, *, project=False, fixed=False):
         """What starts a trial, by a tolerance or by a number of steps."""
@@ -114,8 +94,10 @@ class Model:
 
             def run():
                 before = time.thread_time()
-                prepared.run()
+                finished = prepared.run()
                 seconds = time.thread_time() - before
+                if not finished:
+                    raise RuntimeError(f"the run stopped: {prepared.integration.status.name}")
                 return seconds, prepared.integration.statistics.steps
 
             def end():

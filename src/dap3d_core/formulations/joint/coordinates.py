@@ -91,6 +91,8 @@ class Coordinates:
         self.evaluator = evaluator
         self.nodes: TreeNodes = tree_nodes(tree, motions, model.body_count)
         self.size = self.nodes.layout.size - 1
+        #: The last start of a run: u, the constants of the tree, y.
+        self._last: tuple[Floats, Floats, Floats] | None = None
         evaluator.system = _with_tree(
             evaluator.system, self.nodes, tree, evaluator.plan, model.joint_rows
         )
@@ -123,10 +125,19 @@ class Coordinates:
         return "tree", f"{len(table)} nodes: {parts or 'nothing moves'}"
 
     def start(self, u: Floats) -> Floats:
-        """The state y of a run from a state u (13 n,), whose poses become the reference."""
+        """The state y of a run from a state u (13 n,), whose poses become the reference.
+
+        Runs from the same state, one after another, find what the first of them computed.
+        """
+        if self._last is None or not np.array_equal(self._last[0], u):
+            self._last = u.copy(), *self._constants_and_state(u)
+        _, self._tree.constants[:], y = self._last
+        return y.copy()
+
+    def _constants_and_state(self, u: Floats) -> tuple[Floats, Floats]:
+        """``TreeArrays.constants`` with the reference u (13 n,), and its state."""
         reference = Reference(self.nodes, self.evaluator.model, u)
-        self._tree.constants[:] = reference.constants()
-        return reference.state()
+        return reference.constants(), reference.state()
 
     def starts(self, u: Floats, others: Floats) -> Floats:
         """States (k, size + 1) of runs whose poses at the start are those of u (13 n,).
@@ -170,7 +181,8 @@ class Coordinates:
         """The state y of a state u; the reference of a run is restored afterwards."""
         before = self._tree.constants.copy()
         try:
-            yield self.start(u)
+            self._tree.constants[:], y = self._constants_and_state(u)
+            yield y
         finally:
             self._tree.constants[:] = before
 
