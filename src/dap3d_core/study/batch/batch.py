@@ -215,4 +215,6 @@ class BatchRunner:
         if not model.row_count or not settings.correct:
             return not model.row_count
         is_unit = str(settings.correct_metric) == "unit" and not settings.hold
-        return is_unit and not self._compiled.evaluator.formulation.accepts_redundant
+        formulation = self._compiled.evaluator.formulation
+        # the rows of a tree are independent, and none but they are run in batches
+        return is_unit and (formulation.has_own_coordinates or not formulation.accepts_redundant)
