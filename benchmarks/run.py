@@ -34,6 +34,7 @@ import scale
 import start
 import streaming
 import study
+import tree_loops
 import trees
 import whole_runs
 from rich.console import Console
@@ -86,6 +87,7 @@ def main():
     benchmarks = {
         "right_hand_side": lambda: right_hand_side.measure(arguments.against),
         "trees": trees.measure,
+        "tree_loops": tree_loops.measure,
         "kernels": kernels.measure,
         "derived": derived.measure,
         "extension": extension.measure,
