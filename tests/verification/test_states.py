@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from support.problems import four_bar
 from support.state_types import REGISTRY, pulled, pulled_exactly, steered
 
 import dap3d_core as dap
@@ -138,3 +139,20 @@ def test_stiff_bristles_cost_radau_few_steps():
         steps.append(result.stats.steps)
         assert result.stats.rhs < 20 * result.stats.steps
     assert steps[1] < 2 * steps[0]
+
+
+@pytest.mark.parametrize("method", ["joint", "lsq", "penalty"])
+def test_a_closed_loop_with_states_by_every_formulation(method):
+    """A four-bar with a late spring: the state is that of method standard, by some tolerances."""
+
+    def run(method):
+        scene = four_bar()
+        first, *_, last = scene.bodies
+        scene.add_force("maxwell", "late", P_i=f"{first}.O", P_j=f"{last}.O", k=30.0, c=2.0)
+        return dap.simulate(scene, method=method, t_end=1.0, dt=0.1, rtol=1e-10, atol=1e-12)
+
+    want, got = run("standard"), run(method)
+    assert got.method == method
+    z = want.quantity("late.z").values
+    assert np.ptp(z) > 0.1
+    assert got.quantity("late.z").values == pytest.approx(z, abs=1e-8)

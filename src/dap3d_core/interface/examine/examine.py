@@ -64,19 +64,14 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         _check_conditions(type_, conditions, class_)
     variants = tuple((conditions, examine(class_, seed)) for conditions, class_ in own_variants)
     _check_class(type_, is_abstract=bool(variants))
-    if type_.states or "rate" in type_.kernels():
-        from dap3d_core.interface.examine.check_states import check_states
-
-        check_states(type_, is_abstract=bool(variants))
+    has_states = _declares_states(type_, is_abstract=bool(variants))
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
     _check_symbol(type_, layout)
     _check_actuates(type_, layout)
     _check_reset(type_, layout)
-    if layout.states:
-        from dap3d_core.interface.examine.check_states import check_state_names
-
-        check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
+    if has_states:
+        _check_state_names(type_, layout)
     names = namespace(type_, layout)
     kernels: dict[str, Callable[..., Any]] = type_.kernels()
     outputs: dict[str, tuple[str, ...]] = {}
@@ -117,6 +112,22 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         friction_joint=_joint_of_friction(type_),
         derived=derived,
     )
+
+
+def _declares_states(type_: type[TypeBase], *, is_abstract: bool) -> bool:
+    """True for a type with states of its own, which are checked."""
+    if not type_.states and "rate" not in type_.kernels():
+        return False
+    from dap3d_core.interface.examine.check_states import check_states
+
+    check_states(type_, is_abstract=is_abstract)
+    return True
+
+
+def _check_state_names(type_: type[TypeBase], layout: InstanceLayout) -> None:
+    from dap3d_core.interface.examine.check_states import check_state_names
+
+    check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
 
 
 def _output(
