@@ -21,9 +21,7 @@ _ACTUATOR = (
         _LAW,
     )
 )
-_EQUALITY = (
-    taken("name class active") | translated("solref solimp", "the equality holds exactly")
-)
+_EQUALITY = taken("name class active") | translated("solref solimp", "the equality holds exactly")
 
 MJCF: Table = {
     "mujoco": taken() | taken("model"),

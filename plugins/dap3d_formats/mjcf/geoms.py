@@ -79,7 +79,9 @@ class Geoms:
     def _mesh_shape(self, geom: XmlElement, frame: Frame, common: Any) -> Geometry | None:
         asset = self._asset(geom)
         if "file" not in asset.attributes:
-            self.document.source.remarks.leave_out(geom.place, "meshes without a file are not drawn")
+            self.document.source.remarks.leave_out(
+                geom.place, "meshes without a file are not drawn"
+            )
             return None
         path = self.document.source.locate(self._file(asset), asset.place)
         if path is None:

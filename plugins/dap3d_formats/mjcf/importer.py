@@ -239,6 +239,7 @@ class MjcfReader:
 
     def _dynamics(self, joint: Joint, element: XmlElement) -> None:
         """Limits, damping, springs and armature of a joint."""
+
         def turned(value: float) -> float:
             return self.document.angle(value) if joint.kind == "revolute" else value
 
