@@ -4,6 +4,7 @@ import pytest
 
 from dap3d_core.testing import checks_for
 from dap3d_example.bushing import Bushing
+from dap3d_example.cycloid import Cycloid
 from dap3d_example.cylinder import Cylinder
 from dap3d_example.gear import Gear
 from dap3d_example.motor import Motor
@@ -13,7 +14,7 @@ from dap3d_example.screw import Screw
 from dap3d_example.servo import Servo
 from dap3d_example.tyre import Tyre
 
-TYPES = (Screw, Gear, PointOnPlane, PointOnSurface, Bushing, Motor, Cylinder, Servo, Tyre)
+TYPES = (Screw, Gear, PointOnPlane, PointOnSurface, Bushing, Motor, Cylinder, Servo, Tyre, Cycloid)
 CHECKS = [(type_, check) for type_ in TYPES for check in checks_for(type_)]
 
 
