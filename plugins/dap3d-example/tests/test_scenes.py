@@ -205,7 +205,7 @@ def test_a_tyre_builds_up_its_side_force():
 
 
 def test_a_slider_is_lifted_by_a_cycloidal_cam():
-    """f = rise (u - sin(2 pi u) / (2 pi)), its derivatives, and the work of the driver, m g rise."""
+    """f = rise (u - sin(2 pi u) / (2 pi)), its derivatives; the driver does m g rise."""
     result = run("cycloid")
     u = np.clip((result.t - 0.5) / 0.5, 0.0, 1.0)
     a = 2.0 * np.pi * u
