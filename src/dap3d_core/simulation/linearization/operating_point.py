@@ -148,6 +148,8 @@ def _state(
             near = f"; the nearest is t = {at.t[k]:.9g} s" if k >= 0 else ""
             raise SimulationError(f"the result has no instant at t = {t:.9g} s{near}")
         angles = at.arrays.angles[k] if at.summary.angle_count == model.angle_count else None
+        if at.summary.input_names == model.input_names:
+            compiled.evaluator.set_inputs(at.inputs[k])
         return at.u[k].copy(), angles
     if hasattr(at, "r") and hasattr(at, "p"):
         r, p = np.asarray(at.r, dtype=float), np.asarray(at.p, dtype=float)
