@@ -16,6 +16,8 @@ from dap3d_core.integrators.stepping.integration_state import RUNNING, Integrati
 
 #: Right-hand sides of bodies in one compiled call, for which Ctrl-C waits.
 WORK_OF_A_CALL = 100_000
+#: The least number of right-hand sides in one.
+LEAST_WORK = 100
 
 _REAL, _INTEGER = IntegrationState.indices("real"), IntegrationState.indices("integer")
 T, H, LIMIT, LAST_ERROR = (_REAL[n] for n in ("t", "h", "t_limit", "last_error"))
@@ -45,7 +47,7 @@ class Hold:
         self._real, self._integer = quick_view(work.real), quick_view(work.integer)
         self._rows = work.rows
         self._advance = integration.prepared()
-        self._budget = max(100, WORK_OF_A_CALL // max(1, bodies))
+        self._budget = max(LEAST_WORK, WORK_OF_A_CALL // max(1, bodies))
         self._is_simple = not work.switch_count and work.fixed_step == 0.0
         #: The step that a hold began with, and the steps rejected until then; -1.0: none has begun.
         self._first: tuple[float, int] = (-1.0, 0)

@@ -171,6 +171,7 @@ class BatchRunner:
                 which.append(k)
                 points.append(point)
                 notes[first + k] = "; ".join(point.notes)
+        self.compiled_batch.evaluator.set_inputs(self._compiled.model.input_values)
         places = self._rebuilder.places
         table = np.array([point.table for point in points]).reshape(-1, len(places))
         y0 = np.array([point.y0 for point in points])

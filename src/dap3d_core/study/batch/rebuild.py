@@ -83,6 +83,8 @@ class ModelRebuilder:
             return None
         if stops_of(checked, model, self._t_end) != self._stops:
             return None
+        if not np.array_equal(model.input_values, self._compiled.model.input_values):
+            return None  # a batch shares the functions of time, and inputs stand with them
         if not np.array_equal(effects_of(evaluator.switches), self._terminal):
             return None
         if undefined_directions(checked.scene, model, start.u, model_size(evaluator)):
