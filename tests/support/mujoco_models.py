@@ -15,6 +15,8 @@ class Oracle:
         m.opt.disableflags |= off.mjDSBL_CONTACT | off.mjDSBL_LIMIT | off.mjDSBL_EQUALITY
         m.dof_frictionloss[:] = 0.0
         self.data = mujoco.MjData(m)
+        #: names of all joints in their order, for files that leave some out
+        self.unnamed = []
 
     def name(self, kind, k):
         return self.mujoco.mj_id2name(self.model, getattr(self.mujoco.mjtObj, kind), k)
@@ -23,7 +25,8 @@ class Oracle:
         """A random state; coordinates and rates of the joints by name, as an import takes them."""
         m, d, q, rates = self.model, self.data, {}, {}
         for j in range(m.njnt):
-            a, v, name = m.jnt_qposadr[j], m.jnt_dofadr[j], self.name("mjOBJ_JOINT", j)
+            a, v = m.jnt_qposadr[j], m.jnt_dofadr[j]
+            name = self.name("mjOBJ_JOINT", j) or (self.unnamed[j] if self.unnamed else None)
             size = {0: 6, 1: 3}.get(int(m.jnt_type[j]), 1)
             d.qvel[v : v + size] = rng.uniform(-1.0, 1.0, size)
             if size == 1:

@@ -6,16 +6,16 @@ _SOLVER = "settings of a solver"
 _CONTACT = "contact properties; bodies do not touch each other"
 _DRAWING = "drawing"
 _SOFT = "softness of limits and equalities"
-_LAW = "the law of an actuator; its force is an input"
+_LAW = "the law of an actuator; one that is linear is an input, a spring and a damper"
 _FRAME = taken("pos quat axisangle xyaxes zaxis euler")
 _CLASS = taken("class")
 _ACTUATOR = (
-    taken("name class joint jointinparent gear")
+    taken("name class joint jointinparent gear kp kv gaintype gainprm biastype biasprm dyntype")
     | noted("group user", _DRAWING)
     | noted("tendon site refsite cranksite slidersite cranklength body slidersite", _LAW)
     | noted(
         "ctrllimited forcelimited actlimited ctrlrange forcerange actrange lengthrange actdim "
-        "dyntype gaintype biastype dynprm gainprm biasprm actearly plugin kp kv dampratio "
+        "dynprm actearly plugin dampratio "
         "timeconst inheritrange kd gain bias area diameter scale range force vmax fpmax fvmax "
         "lmin lmax vmin tausmooth input nsample interp delay armature damping ffrange velrange "
         "cogging controller inductance lugre motorconst nominal resistance saturation thermal imax "
@@ -135,11 +135,11 @@ MJCF: Table = {
     "fixed/joint": taken() | taken("joint coef"),
     "spatial": noted("", "tendons over sites and pulleys"),
     "actuator": taken(),
-    **dict.fromkeys(("motor", "general"), taken() | _ACTUATOR),
+    **dict.fromkeys(("motor", "general", "position", "velocity"), taken() | _ACTUATOR),
     **dict.fromkeys(
-        ("position", "velocity", "intvelocity", "damper", "cylinder", "muscle", "adhesion",
+        ("intvelocity", "damper", "cylinder", "muscle", "adhesion",
          "dcmotor", "orientation", "pid"),
-        translated("", _LAW) | _ACTUATOR,
+        noted("", _LAW) | _ACTUATOR,
     ),
     "actuator/plugin": noted("", "plugins of a simulator are not run"),
     "sensor": noted("", "sensors"),

@@ -1,5 +1,6 @@
 """What acts on the coordinates of joints: springs, dampers, stops, rotors, couplings, inputs."""
 
+import re
 from math import isfinite, pi
 from typing import TYPE_CHECKING, Any
 
@@ -214,7 +215,7 @@ def add_inputs(builder: "SceneBuilder", model: Articulation) -> None:
             continue
         others = (scene.bodies, scene.points, scene.joints, scene.forces)
         clash = any(actuator.name in table for table in others)
-        wanted = f"{actuator.name}_input" if clash else actuator.name
+        wanted = re.sub(r"\W", "_", f"{actuator.name}_input" if clash else actuator.name)
         name = names.of("inputs", wanted, actuator.place, builder.remarks)
         scene.add_input(name, 0.0)
         ends = _SameEnds(builder, joint)
