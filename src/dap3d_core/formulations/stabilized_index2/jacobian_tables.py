@@ -35,6 +35,7 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
     system, plan, n = evaluator.system, evaluator.plan, evaluator.model.body_count
     place = {(b, b): _BLOCK * (b - 1) for b in range(1, n + 1)}
     elements: list[tuple[int, ...]] = []
+    at: list[int] = []
     pairs: list[Integers] = []
     count = widest = 0
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
@@ -48,14 +49,15 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         slots = len(group.type_info.layout.slots)
         rows = int(getattr(group.type_info.type, "rows", 0))
         elements += [(loop, code, stride(group.type_info), layout.par_width, slots,
-                      layout.integers, rows, count, int(_sees_velocity(kind, group)),
-                      layout.integers - 1 if layout.states else -1) for code in codes]  # fmt: skip
+                      layout.integers, rows, count, int(_sees_velocity(kind, group)))
+                     for code in codes]  # fmt: skip
+        at += [layout.integers - 1 if layout.states else -1 for _ in codes]
         pairs.append(_pairs(group.bodies, place))
         count += pairs[-1].size
         widest = max(widest, 6 * slots + rows, layout.state_width)
     blocks = [(where, a, b) for (a, b), where in place.items()]
     return Tangent(
-        elements=np.array(elements, dtype=np.int64).reshape(-1, 10),
+        elements=np.array(elements, dtype=np.int64).reshape(-1, 9),
         pairs=np.concatenate([np.zeros(0, dtype=np.int64), *pairs]),
         blocks=np.array(blocks, dtype=np.int64).reshape(-1, 3),
         coupling=np.zeros(_BLOCK * len(place)),
@@ -68,12 +70,12 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         saved=np.zeros(BODY_WIDTH),
         ahead=np.zeros(widest),
         behind=np.zeros(widest),
-        states=_state_tangent(evaluator.model),
+        states=_state_tangent(evaluator.model, at),
     )
 
 
-def _state_tangent(model: Model) -> StateTangent:
-    """Tables and arrays of the derivatives by and of states, element by element."""
+def _state_tangent(model: Model, at: Sequence[int]) -> StateTangent:
+    """Tables and arrays of the derivatives by and of states; at: as of ``StateTangent``."""
     records: list[tuple[int, ...]] = []
     record = np.zeros(model.state_count, dtype=np.int64)
     start = size = 0
@@ -86,6 +88,7 @@ def _state_tangent(model: Model) -> StateTangent:
             records.append((m, *places[:-1].tolist(), slots, rows))
             start, size = start + m, int(places[-1])
     return StateTangent(
+        at=np.array(at, dtype=np.int64),
         records=np.array(records, dtype=np.int64).reshape(-1, 8),
         record=record,
         values=np.zeros(size),

@@ -259,6 +259,6 @@ def jump(evaluator: Evaluator, hold: Hold, *, drives: bool) -> None:
 def kinetic_energy(evaluator: Evaluator, y: Floats) -> float:
     """Kinetic energy, J, of an integrated state."""
     model = evaluator.model
-    state = by_body(evaluator.body_state(y))
+    state = by_body(evaluator.bodies_of(evaluator.body_state(y)))
     v, w = state[:, 7:10], state[:, 10:13]
     return 0.5 * float(model.mass @ np.sum(v * v, axis=1) + np.einsum("ba,bac,bc", w, model.Jp, w))
