@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
-from dap3d_core.integrators import EXPLICIT, INTEGRATORS, Integrator
+from dap3d_core.integrators import EXPLICIT, Integrator
+from dap3d_core.integrators.added import integrator_named
 from dap3d_core.scene import (
     METHODS,
     MISSING,
@@ -160,7 +161,7 @@ def refuse_singular_start(settings: Simulation, first_step: float) -> None:
             f"the run starts at a singular pose, which one step has to leave behind: give t_end of "
             f"{first_step:.3g} s or more ({t_end:g} is given)"
         )
-    integrator = INTEGRATORS.get(settings.integrator, EXPLICIT)
+    integrator = integrator_named(settings.integrator)
     if not integrator.leaves_singular or settings.step is not None or not settings.project:
         raise SimulationError(
             f"the run starts at a singular pose, from which integrator {EXPLICIT.name} alone (or "
