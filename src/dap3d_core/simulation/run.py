@@ -174,7 +174,7 @@ class Run(RunState):
         if redundancy.bindings:
             raise RedundantError(words)
         if singular is not None:
-            refuse_singular_start(self.settings, singular.first_step)
+            refuse_singular_start(self.settings, singular.first_step, formulation)
         least = " (reported are those of least |lambda|)" if formulation.is_exact else ""
         self.notes.append(
             f"{words}. Accelerations are unique; reactions in these joints are not{least}"
