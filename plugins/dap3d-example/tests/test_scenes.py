@@ -233,3 +233,17 @@ def test_a_charge_parts_a_rocket_from_its_tank():
     np.testing.assert_allclose(v[:, 1, 1], [-0.1 * 12.0 / 1.0, 0.1 * 12.0 / 2.0], atol=1e-12)
     momentum = np.einsum("b,tbk->tk", [2.0, 6.0], result.rd)
     np.testing.assert_allclose(momentum, np.tile([0.0, 0.0, 400.0], (len(result.t), 1)), atol=1e-9)
+
+
+def test_a_slider_is_lifted_by_a_cycloidal_cam():
+    """f = rise (u - sin(2 pi u) / (2 pi)), its derivatives; the driver does m g rise."""
+    result = run("cycloid")
+    u = np.clip((result.t - 0.5) / 0.5, 0.0, 1.0)
+    a = 2.0 * np.pi * u
+    np.testing.assert_allclose(result.r[:, 0, 2], 0.1 * (u - np.sin(a) / (2 * np.pi)), atol=1e-12)
+    np.testing.assert_allclose(result.rd[:, 0, 2], 0.2 * (1.0 - np.cos(a)), atol=1e-11)
+    np.testing.assert_allclose(result.rdd[:, 0, 2], 0.8 * np.pi * np.sin(a), atol=1e-10)
+    force = result.reaction("lift")["i"].force[:, 2]
+    np.testing.assert_allclose(force, 2.0 * (9.81 + 0.8 * np.pi * np.sin(a)), atol=1e-9)
+    potential = result.energy.potential[-1] - result.energy.potential[0]
+    assert potential == pytest.approx(2.0 * 9.81 * 0.1, rel=1e-10)

@@ -5,7 +5,6 @@ from typing import Any
 
 import attrs
 import numpy as np
-from dap3d_formats.mjcf.document import Document, along
 
 from dap3d_core.interface.formats import (
     FormatError,
@@ -19,6 +18,7 @@ from dap3d_core.interface.formats import (
     inertia_of_solid,
     total_inertia,
 )
+from dap3d_formats.mjcf.document import Document, along
 
 #: Geoms without a volume.
 FLAT = ("plane", "hfield", "sdf")

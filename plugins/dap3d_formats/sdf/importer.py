@@ -3,11 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-from dap3d_formats.element_table import note_elements
-from dap3d_formats.sdf.elements import SDF
-from dap3d_formats.sdf.frames import FrameGraph
-from dap3d_formats.sdf.joints import read_gearbox, read_joint
-
 from dap3d_core.interface.formats import (
     WORLD,
     Articulation,
@@ -24,6 +19,10 @@ from dap3d_core.interface.formats import (
     from_quaternion,
     rpy,
 )
+from dap3d_formats.element_table import note_elements
+from dap3d_formats.sdf.elements import SDF
+from dap3d_formats.sdf.frames import FrameGraph
+from dap3d_formats.sdf.joints import read_gearbox, read_joint
 
 
 class SdfImporter(Importer):

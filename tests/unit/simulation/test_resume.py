@@ -11,6 +11,7 @@ from support.bouncing import bouncing, swinging
 from support.ended import EndedError, ended_at, leave, shorten_chunks
 from support.on_axles import driven, stone, wheel
 from support.results import same_bits
+from support.state_types import stated
 
 import dap3d_core as dap
 from dap3d_core.kernels.runtime.cache import jit_is_on
@@ -64,6 +65,9 @@ CASES = {
     ),
     "stiff": (lambda: dap.load("A05"), {"integrator": "auto", "t_end": 0.3, "dt": 0.01}, 0.02),
     "a function's breaks": (driven, {}, 0.4),
+    "states of elements": (stated, {}, 0.4),
+    "states, radau": (stated, {"integrator": "radau", "t_end": 1.0}, 0.4),
+    "states, joint": (stated, {"method": "joint", "integrator": "adams"}, 0.4),
     "events": (stone, {"t_end": 2.0, "dt": 0.05, "events": stiffer}, 0.35),
     "jumps": (bouncing, {}, 0.6),
     "jumps in joint coordinates": (swinging, {"method": "joint"}, 0.6),
@@ -71,7 +75,7 @@ CASES = {
 }
 SLOW_IN_PYTHON = (
     "dopri5", "rk4", "radau", "stiff", "penalty", "lsq", "a singular pose", "adams",
-    "no projection", "radau across singular poses", "within a crossing of radau",
+    "no projection", "radau across singular poses", "within a crossing of radau", "states, radau",
 )  # fmt: skip
 
 

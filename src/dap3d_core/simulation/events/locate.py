@@ -37,8 +37,11 @@ class EventLocator:
         occurrences: what was found.
         numbers: of the forces, which events may change.
         jumps: of velocities, which events may set; made where one does.
+        horizon: time that no step goes beyond.
         take_rows: takes what was reported before an input changes.
     """
+
+    horizon = np.inf
 
     def __init__(self, compiled: CompiledModel, events: Sequence[Event]) -> None:
         self.compiled, self.events = compiled, checked_events(events)
@@ -111,13 +114,18 @@ class EventLocator:
         limit = integration.statistics.rhs + budget
         while integration.status is Status.RUNNING and not integration.rows_are_full:
             self._step(integration)
-            if integration.statistics.rhs > limit:
+            if integration.statistics.rhs > limit or integration.t >= self.horizon:
                 break
         return integration.status
 
     def look_again(self, integration: Integration) -> None:
         """Act on the events whose numbers passed their levels in a jump of velocities."""
         self._take_notice(integration, self._instant(integration))
+
+    def begin_anew(self, integration: Integration) -> None:
+        """Look at the events again where what they watch may have jumped: that is no event."""
+        self._values = self._all(self._instant(integration))
+        self._sides = [float(np.sign(value)) for value in self._values]
 
     def _step(self, integration: Integration) -> None:
         arrays = self._arrays(integration)
@@ -132,7 +140,7 @@ class EventLocator:
                 integration.advance_to(end)
             return self._instant(integration)
 
-        integration.advance_to(np.inf)
+        integration.advance_to(self.horizon)
         if integration.t == t:
             return
         here = self._instant(integration)
@@ -246,8 +254,7 @@ class EventLocator:
             if event.sense * side <= 0.0:
                 changes |= self._act(integration, event, int(-side))
         if changes:  # numbers may jump with them: that is no event
-            self._values = self._all(self._instant(integration))
-            self._sides = [float(np.sign(value)) for value in self._values]
+            self.begin_anew(integration)
 
     def _act(self, integration: Integration, event: Event, direction: int) -> bool:
         """Do what an event asks for; whether it changed numbers of forces, velocities, states."""
