@@ -47,7 +47,7 @@ def test_inputs_and_what_sets_them_are_imported_where_a_scene_has_some():
         "dap3d_core.interface.codegen.terms",
     }
     script = "import dap3d_core as dap\ndap.{}"
-    assert not imported(script.format("simulate('fourbar2', t_end=0.02)")) & names
+    assert not imported(script.format("simulate('fourbar2', t_end=0.1)")) & names
     found = imported(script.format("start('pen1').step(0.01)"))
     assert names & found == names - {
         "dap3d_core.scene.signals",

@@ -45,7 +45,7 @@ class Hold:
         self.integration = integration
         work = integration.work
         self._real, self._integer = quick_view(work.real), quick_view(work.integer)
-        self._rows = work.rows
+        self._rows, self._times = work.rows, work.times
         self._advance = integration.prepared()
         self._budget = max(LEAST_WORK, WORK_OF_A_CALL // max(1, bodies))
         self._is_simple = not work.switch_count and work.fixed_step == 0.0
@@ -56,6 +56,11 @@ class Hold:
     def t(self) -> float:
         """Time reached by accepted steps."""
         return float(self._real[T])
+
+    @property
+    def is_open(self) -> bool:
+        """True in the course of a hold, until its end has been reached and reported."""
+        return self._first_h >= 0.0
 
     def to(self, end: float, budget: int | None = None) -> bool:
         """Integrate to the end of a hold; True once it is reached.
@@ -69,10 +74,15 @@ class Hold:
         real[LIMIT] = end
         self._advance(self._budget if budget is None else budget)
         real[LIMIT] = math.inf
-        if real[T] < end or self._integer[STATUS] != RUNNING:
+        if real[T] < end or self._integer[STATUS] != RUNNING or self._waits(end):
             return False
         self.land(end)
         return True
+
+    def _waits(self, end: float) -> bool:
+        """True if a report before the end of the hold waits until rows are taken."""
+        integer, rows = self._integer, self._rows
+        return integer[ROWS] == len(rows) and bool(self._times[integer[NEXT]] < end)
 
     def begin(self) -> None:
         """Note down the step that a hold begins with."""

@@ -12,9 +12,9 @@ from dap3d_core.scene.validate.coerce_values import LARGEST
 
 
 def number_of(value: Any) -> float:
-    """A number, numpy's as well; NaN where it is none."""
+    """A number, numpy's as well; NaN where it is none, or several."""
     try:
-        return float(value)
+        return float(value) if np.ndim(value) == 0 else float("nan")
     except (TypeError, ValueError):
         return float("nan")
 
@@ -53,10 +53,10 @@ class HeldInputs:
             k = index.get(name)
             if k is None:
                 raise ValueError(self._unknown(name))
-            if value == values[k]:
-                continue
             if type(value) is not float:
                 value = number_of(value)
+            if value == values[k]:
+                continue
             if not -LARGEST <= value <= LARGEST:
                 raise ValueError(
                     f"input {name} is set to {given[name]!r}; it should be a finite number"

@@ -65,6 +65,11 @@ class SampledControl:
         self._history: list[tuple[float, list[float]]] = []
         self._next = 0.0
 
+    @property
+    def titles(self) -> list[str]:
+        """Names of the controllers."""
+        return [controller.title for controller in self.controllers]
+
     def notes(self, dt: float) -> list[str]:
         """Notes on controllers that are slow."""
         found = []
@@ -93,7 +98,7 @@ class SampledControl:
         deadline = time.perf_counter() + CHUNK_SECONDS
         budget = 0 if step_by_step else None
         while True:
-            if hold.t >= self._next:
+            if hold.t >= self._next and not hold.is_open:
                 self._sample(hold, locator)
             end = self._next
             reached = _with_events(hold, locator, end) if locator else hold.to(end, budget)
@@ -136,7 +141,7 @@ class SampledControl:
         try:
             changes = self._inputs.set(given)
         except ValueError as error:
-            who = " or ".join(controller.title for controller in self.controllers)
+            who = " or ".join(self.titles)
             raise SimulationError(f"controller {who} at t = {now:.9g} s: {error}") from error
         if changes or not self._history:
             self._history.append((now, list(self._inputs.values)))
@@ -189,7 +194,7 @@ class SampledControl:
     def state(self, integrations: Sequence[Integration]) -> dict[str, Any]:
         """State of the controllers' schedule and inputs, as plain data."""
         return {
-            "titles": [one.title for one in self.controllers],
+            "titles": self.titles,
             "every": [one.every for one in self.controllers],
             "counts": list(self._counts),
             "inputs": list(self._inputs.values),

@@ -15,7 +15,7 @@ from dap3d_core.result import Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
-from dap3d_core.simulation.control.sampled import jump
+from dap3d_core.simulation.control.sampled import ALIKE, jump
 from dap3d_core.simulation.control.state_view import StateView
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.handover import hand_over
@@ -48,7 +48,7 @@ class SteppedRun:
         self.notes = run.notes
         self._inputs = HeldInputs(evaluator)
         self._failure = ""
-        self._is_recorded = record
+        self._is_recorded, self._t_end = record, run.t_end
         integration = self._integration = run.present
         self._log = StateLog(evaluator, integration.work.state[Y], self._inputs)
         self._attach()
@@ -84,6 +84,8 @@ class SteppedRun:
         end = t + dt
         if not t < end < math.inf:
             raise ValueError(f"dt is {dt!r}; it should be a positive number of seconds")
+        if abs(end - self._t_end) <= ALIKE * dt:
+            end = self._t_end
         if inputs and self._inputs.set(inputs):
             jump(self._evaluator, hold, drives=self._inputs.drives)
         if self._is_recorded:
@@ -130,7 +132,8 @@ class SteppedRun:
         """
         log, t = self._log, self.t
         record = self._run.record("stopped" if self._failure else "done")
-        record = attrs.evolve(record, settings=record.settings | {"t_end": t, "dt": None})
+        more = {"t_end": t, "dt": None, "controllers": ["steps of a script"]}
+        record = attrs.evolve(record, settings=record.settings | more)
         log.add(t)
         rows = log.reports()
         log.count -= 1
@@ -152,7 +155,7 @@ class SteppedRun:
             present.rows()  # those of the integration are not used
             if present.status is Status.RUNNING and present.t < min(end, run.until):
                 self._hold.to(min(end, run.until), 0 if run.until < math.inf else None)
-            elif present.status is Status.RUNNING and present.t < run.until:
+            elif present.t >= end and present.status in (Status.RUNNING, Status.FINISHED):
                 return
             elif hand_over(run):
                 self._attach()
