@@ -40,23 +40,25 @@ PART = 6e-6
 SLOWEST, SMALLEST = 0.1, 1e-4
 #: What an element is; the last two only of types with states of their own (state_tangent.py).
 WRENCH_ELEMENT, JOINT_ELEMENT, FRICTION_ELEMENT, RATE_ELEMENT, POSITION_ELEMENT = range(5)
-#: Most body slots of an element (interface/codegen/instance_layout.py).
-SLOTS = 3
 #: Columns of ``elements``.
-LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY, STATE_AT = range(10)
+LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY = range(9)
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
 class StateTangent(Arrays):
     """Tables and derivatives of elements with states of their own (state_tangent.py)."""
 
-    types: ClassVar[dict[str, Any]] = {"records": INTEGER_MATRIX, "record": INTEGERS}
+    types: ClassVar[dict[str, Any]] = {
+        "at": INTEGERS,
+        "records": INTEGER_MATRIX,
+        "record": INTEGERS,
+    }
 
+    at: Integers  # (groups,) of ``elements``: place of the first state in idx, or -1
     records: Integers  # (elements, 8) COUNT, ...
     record: Integers  # (states,) of the element whose first state it is
     values: Floats
     size: Floats  # (states,) least size of a state, of which steps are parts
-    rates: Floats  # (states,) scratch
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
@@ -70,8 +72,7 @@ class Tangent(Arrays):
         "states": StateTangent.type_of(),
     }
 
-    # LOOP, KIND, ...; ROW_AT, STATE_AT: places in idx of the joint's row, of the first state or -1
-    elements: Integers  # (groups, 10)
+    elements: Integers  # (groups, 9): LOOP, KIND, ...; ROW_AT: place of the joint's row in idx
     pairs: Integers  # places in ``coupling`` for the slots (a, b) of each element, -1 for none
     blocks: Integers  # (pairs, 3) place in ``coupling``, body of the rows, body of the columns
     coupling: Floats

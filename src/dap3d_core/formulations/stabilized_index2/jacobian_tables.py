@@ -17,7 +17,7 @@ from dap3d_core.formulations.stabilized_index2.jacobian import (
     Tangent,
 )
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
-from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.interface.codegen.loop_source import computes_rate, stride
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.model import Group, Model
 
@@ -35,6 +35,7 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
     system, plan, n = evaluator.system, evaluator.plan, evaluator.model.body_count
     place = {(b, b): _BLOCK * (b - 1) for b in range(1, n + 1)}
     elements: list[tuple[int, ...]] = []
+    at: list[int] = []
     pairs: list[Integers] = []
     count = widest = 0
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
@@ -42,17 +43,21 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         kinds = _KINDS | _WITH_STATES if layout.states else _KINDS
         if kind not in kinds:
             continue
+        codes = [kinds[kind]]
+        if kind == "wrench" and computes_rate(group.type_info):
+            codes.append(RATE_ELEMENT)
         slots = len(group.type_info.layout.slots)
         rows = int(getattr(group.type_info.type, "rows", 0))
-        elements.append((loop, kinds[kind], stride(group.type_info), layout.par_width, slots,
-                         layout.integers, rows, count, int(_sees_velocity(kind, group)),
-                         layout.integers - 1 if layout.states else -1))  # fmt: skip
+        elements += [(loop, code, stride(group.type_info), layout.par_width, slots,
+                      layout.integers, rows, count, int(_sees_velocity(kind, group)))
+                     for code in codes]  # fmt: skip
+        at += [layout.integers - 1 if layout.states else -1 for _ in codes]
         pairs.append(_pairs(group.bodies, place))
         count += pairs[-1].size
         widest = max(widest, 6 * slots + rows, layout.state_width)
     blocks = [(where, a, b) for (a, b), where in place.items()]
     return Tangent(
-        elements=np.array(elements, dtype=np.int64).reshape(-1, 10),
+        elements=np.array(elements, dtype=np.int64).reshape(-1, 9),
         pairs=np.concatenate([np.zeros(0, dtype=np.int64), *pairs]),
         blocks=np.array(blocks, dtype=np.int64).reshape(-1, 3),
         coupling=np.zeros(_BLOCK * len(place)),
@@ -65,12 +70,12 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         saved=np.zeros(BODY_WIDTH),
         ahead=np.zeros(widest),
         behind=np.zeros(widest),
-        states=_state_tangent(evaluator.model),
+        states=_state_tangent(evaluator.model, at),
     )
 
 
-def _state_tangent(model: Model) -> StateTangent:
-    """Tables and arrays of the derivatives by and of states, element by element."""
+def _state_tangent(model: Model, at: Sequence[int]) -> StateTangent:
+    """Tables and arrays of the derivatives by and of states; at: as of ``StateTangent``."""
     records: list[tuple[int, ...]] = []
     record = np.zeros(model.state_count, dtype=np.int64)
     start = size = 0
@@ -83,11 +88,11 @@ def _state_tangent(model: Model) -> StateTangent:
             records.append((m, *places[:-1].tolist(), slots, rows))
             start, size = start + m, int(places[-1])
     return StateTangent(
+        at=np.array(at, dtype=np.int64),
         records=np.array(records, dtype=np.int64).reshape(-1, 8),
         record=record,
         values=np.zeros(size),
         size=np.zeros(model.state_count),
-        rates=np.zeros(model.state_count),
     )
 
 
@@ -118,5 +123,8 @@ def _sees_velocity(kind: str, group: Group) -> bool:
     """
     if kind in ("acceleration", "position"):
         return False
-    wanted: Sequence[Any] = parameters(group.type_info.kernels[kind])
+    kernels = group.type_info.kernels
+    wanted: Sequence[Any] = parameters(kernels[kind])
+    if kind == "wrench" and "rate" in kernels:
+        wanted = [*wanted, *parameters(kernels["rate"])]
     return any(q.velocity for q in in_order(group.type_info.names, wanted))

@@ -228,27 +228,20 @@ def differentiate_loop(
     slopes = dict(zip(numbers, unit[by_numbers:], strict=False))
     columns = [(slots + field, order) for field, order in functions]
     by_functions = dict(zip(columns, unit[by_numbers + len(numbers) : by_states], strict=True))
-
     friction = _Multipliers(multipliers, idx, unit[of_bodies:]) if multipliers is not None else None
     outputs = [_Outputs(), _Outputs(friction if what == "friction" else None), _Outputs()]
+    outputs.append(_Outputs())  # of rates
     loop_arrays = SimpleNamespace(
         body=_Bodies(arrays.body, idx, places, directions),
         F=_Functions(arrays.F, idx, by_functions),
         idx=_Integers(),
         par=_Numbers(arrays.par, p0, (count, layout.par_width), slopes),
         states=_States(arrays.states, idx, unit[by_states:] if states else None),
+        rates=outputs[3],
     )
-    _run(loop, t, loop_arrays, outputs)
-    bodies, size = np.ascontiguousarray(idx[:, places]), (count, directions)
-    if what == "acceleration":
-        return LoopDerivatives(bodies, _of_joint(outputs, slots, rows, layout.integers, size))
-    if what in ("position", "rate"):
-        column, width, name = layout.integers, rows, "C"
-        if what == "rate":
-            column, width, name = layout.integers - 1, layout.state_width, what
-        value, slope = _gathered(outputs[0], [column], width, size)
-        return LoopDerivatives(bodies, {name: (value[:, 0], slope[:, 0])})
-    return LoopDerivatives(bodies, {what: _gathered(outputs[0], list(range(slots)), 6, size)})
+    _run(loop, t, loop_arrays, outputs[:3])
+    found = _results(type_info, what, outputs, (count, directions))
+    return LoopDerivatives(np.ascontiguousarray(idx[:, places]), found)
 
 
 def _run(loop: Loop, t: float, arrays: SimpleNamespace, outputs: list[_Outputs]) -> None:
@@ -259,6 +252,21 @@ def _run(loop: Loop, t: float, arrays: SimpleNamespace, outputs: list[_Outputs])
         namespace["loop"](t, arrays, 0, 0, 1, *outputs)
 
 
+def _results(
+    type_info: TypeInfo, what: str, outputs: list[_Outputs], size: tuple[int, int]
+) -> dict[str, tuple[Floats, Floats]]:
+    """What a loop wrote, by kernel; size: (m, d)."""
+    layout, rows = type_info.layout, int(getattr(type_info.type, "rows", 0))
+    slots, row = len(layout.slots), layout.integers
+    if what == "acceleration":
+        return _of_joint(outputs, slots, rows, row, size)
+    if what == "position":
+        return {"C": _of_one(outputs[0], row, rows, size)}
+    if what == "rate":
+        return {what: _of_one(outputs[3], row - 1, layout.state_width, size)}
+    return {what: _gathered(outputs[0], list(range(slots)), 6, size)}
+
+
 def _of_joint(
     outputs: list[_Outputs], slots: int, rows: int, row: int, size: tuple[int, int]
 ) -> dict[str, tuple[Floats, Floats]]:
@@ -267,9 +275,14 @@ def _of_joint(
     shape = (size[0], slots, rows, 6)
     results = {"J": (J.reshape(shape), J_slope.reshape(*shape, size[1]))}
     for name, output in (("gamma", outputs[1]), ("nu", outputs[2])):
-        value, slope = _gathered(output, [row], rows, size)
-        results[name] = value[:, 0], slope[:, 0]
+        results[name] = _of_one(output, row, rows, size)
     return results
+
+
+def _of_one(output: _Outputs, column: int, width: int, size: tuple[int, int]) -> Any:
+    """Values (m, width) and derivatives (m, width, d) behind one index of the instances."""
+    value, slope = _gathered(output, [column], width, size)
+    return value[:, 0], slope[:, 0]
 
 
 def _gathered(

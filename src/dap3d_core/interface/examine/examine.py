@@ -40,14 +40,13 @@ from dap3d_core.interface.codegen.return_shapes import (
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
-from dap3d_core.interface.examine.check_states import check_state_names, check_states
 from dap3d_core.interface.examine.random_values import (
     numbers,
     random_field,
     random_pose,
     random_quantity,
 )
-from dap3d_core.interface.fields import specs_of
+from dap3d_core.interface.fields import SLOTS, slot_of, specs_of
 from dap3d_core.interface.types import SYMBOLS, Force, Function, Joint, TypeBase
 
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
@@ -65,13 +64,14 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         _check_conditions(type_, conditions, class_)
     variants = tuple((conditions, examine(class_, seed)) for conditions, class_ in own_variants)
     _check_class(type_, is_abstract=bool(variants))
-    check_states(type_, is_abstract=bool(variants))
+    has_states = _declares_states(type_, is_abstract=bool(variants))
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
     _check_symbol(type_, layout)
     _check_actuates(type_, layout)
-    if layout.states:
-        check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
+    _check_reset(type_, layout)
+    if has_states:
+        _check_state_names(type_, layout)
     names = namespace(type_, layout)
     kernels: dict[str, Callable[..., Any]] = type_.kernels()
     outputs: dict[str, tuple[str, ...]] = {}
@@ -84,8 +84,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
             offered = jump_names(type_.kind, kernel_name, outputs, len(layout.slots)) | names
         _check_names(type_, kernel_name, parameters(kernel), offered)
         quantities = [offered[n] for n in parameters(kernel)]
-        is_of_rows = kernel_name == "impulse" and type_.kind == "force"
-        rows = row_count(outputs, len(layout.slots)) if is_of_rows else 0
+        rows = row_count(outputs, len(layout.slots)) if kernel_name == "impulse" else 0
         outputs[kernel_name] = _output(type_, kernel_name, kernel, quantities, rng, rows)
 
     for kernel_name in kernels:
@@ -113,6 +112,22 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         friction_joint=_joint_of_friction(type_),
         derived=derived,
     )
+
+
+def _declares_states(type_: type[TypeBase], *, is_abstract: bool) -> bool:
+    """True for a type with states of its own, which are checked."""
+    if not type_.states and "rate" not in type_.kernels():
+        return False
+    from dap3d_core.interface.examine.check_states import check_states
+
+    check_states(type_, is_abstract=is_abstract)
+    return True
+
+
+def _check_state_names(type_: type[TypeBase], layout: InstanceLayout) -> None:
+    from dap3d_core.interface.examine.check_states import check_state_names
+
+    check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
 
 
 def _output(
@@ -335,6 +350,13 @@ def _check_fields(type_: type[TypeBase]) -> None:
             raise PluginError(f"{who}.{name} is across {spec.across}, which is no vector field")
         if name in taken:
             raise PluginError(f"{who} has a field {name}, which is the body's; take another name")
+        slot = slot_of(name) if spec.kind in ("point", "body") else None
+        if slot and slot not in body_slots(type_):
+            before = SLOTS[SLOTS.index(slot) - 1]
+            raise PluginError(
+                f"{who}.{name} is on a body {slot}, but nothing is on a body {before}; the bodies "
+                f"of a type are {', '.join(SLOTS)}, without a gap after j"
+            )
 
 
 def _check_members(type_: type[TypeBase]) -> None:
@@ -371,6 +393,12 @@ def _check_names(
             )
 
 
+def _check_reset(type_: type[TypeBase], layout: InstanceLayout) -> None:
+    if "reset" in type_.kernels() and not layout.states:
+        who = where_is(type_)
+        raise PluginError(f'{who} defines reset, but no states; add e.g. states = ("z",) and rate')
+
+
 def _check_jumps(type_: type[TypeBase], outputs: Mapping[str, Sequence[str]], slots: int) -> None:
     """Check what a type says of its jumps besides the kernels themselves."""
     who, rows = where_is(type_), row_count(outputs, slots) if type_.kind == "force" else 0
@@ -380,8 +408,6 @@ def _check_jumps(type_: type[TypeBase], outputs: Mapping[str, Sequence[str]], sl
             f"{who} defines {jumps[0]}, but no switch: velocities and states jump where a switch "
             "changes its sign; define switch, a number that does so there"
         )
-    if "reset" in outputs and not type_.states:
-        raise PluginError(f'{who} defines reset, but no states; add e.g. states = ("z",) and rate')
     if rows and "impulse" not in outputs:
         raise PluginError(f"{who} defines J without impulse, which nothing calls; define impulse")
     if not issubclass(type_, Force):
@@ -406,7 +432,7 @@ def _expected(
     """
     slots = len(body_slots(type_))
     if kernel == "impulse":
-        if rows:
+        if rows and type_.kind == "force":
             return (rows,), f"{rows} numbers, the change of J v, one for each row of J"
         return (slots, 2, 3), f"(impulse, moment of impulse) for each of {slots} bodies"
     if kernel == "J" and type_.kind == "force":
