@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import dap3d_core as dap
+from dap3d_core.interface import Force, PluginError, Point, Vector, examine, point, vector
 from dap3d_core.testing import check_type
 
 PLUGIN = '''
@@ -152,3 +153,28 @@ def test_reactions_name_every_body(scene):
     total = sum(reaction[s].force for s in "ijklm")
     np.testing.assert_allclose(total, 0.0, atol=1e-12)
     assert np.max(np.abs(result.quantity("star.m.force").values - reaction["m"].force)) == 0.0
+
+
+def test_a_gap_between_the_bodies_is_refused():
+    """A point on a body l, and none on a body k; a vector whose name ends in _n has no slot."""
+
+    class Gap(Force):
+        keyword = "gap"
+        P_i: Point = point()
+        P_l: Point = point()
+
+        def wrench(r_P_i):
+            return ((r_P_i, r_P_i),)
+
+    with pytest.raises(PluginError, match=r"P_l is on a body l, but nothing is on a body k"):
+        examine(Gap)
+
+    class Axis(Force):
+        keyword = "axis"
+        P_i: Point = point()
+        a_n: Vector = vector()
+
+        def wrench(a_n):
+            return ((a_n, a_n),)
+
+    assert examine(Axis).layout.slots == ("i",)

@@ -61,7 +61,12 @@ def test_instances_hold_what_types_need(scene_of, registry):
     assert all(type(x) is float for x in J2.values["P_i"]), "integers became floats"
     assert J3.functions == (1,)
     assert (J3.values["body_i"], J3.values["body_j"]) == ("crank", "ground")
-    assert J4.values == {"P_i": (0.0, 0.0, -1.0), "P_j": (0.0, 4.0, 0.0), "length": 8.0}
+    assert J4.values == {
+        "P_i": (0.0, 0.0, -1.0),
+        "P_j": (0.0, 4.0, 0.0),
+        "length": 8.0,
+        "function": None,
+    }
     g, spring = checked.forces
     assert g.bodies == ()
     assert g.values == {"gravity": 9.81, "wgt": (0.0, 0.0, -1.0)}

@@ -35,7 +35,7 @@ INSTALLED = {
     "fix": ["none: the bodies move as one"],
     "weld": ["none: the bodies move as one"],
     "screw": ["1 screw about a_j, constant in body j"],
-    "sph-sph": [ONE_ROW],
+    "sph-sph": [ONE_ROW, ON_TIME],  # a link, a driven leg
     "rP": [ONE_ROW],
     "disk": [ON_VELOCITY, ONE_ROW, ON_VELOCITY, ON_VELOCITY],
     "drive-rot": [ON_TIME],
@@ -43,6 +43,7 @@ INSTALLED = {
     "rel-rot": [ON_VELOCITY, ON_VELOCITY],
     "rel-tran": [ON_VELOCITY, ON_VELOCITY],
     "gear": ["refused: it joins three bodies"],
+    "follow": ["refused: it joins three bodies"] * 2,
     "point-on-plane": [ONE_ROW],
     "point-on-surface": [ONE_ROW],
 }
