@@ -24,7 +24,7 @@ FOLLOWED = [
         for name in (
             "bad-input", "events", "jumps", "methods", "post-processing", "report", "view",
             "what-a-type-can-say",
-        )  # fmt: skip
+        )
     ),
     *(
         page
