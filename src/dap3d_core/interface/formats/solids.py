@@ -55,8 +55,9 @@ def inertia_of_mesh(
 
     Args:
         vertices, triangles: of the mesh.
-        all_positive: the apex is the centroid of the surface, and all tetrahedra count as positive,
-            as MuJoCo does by default ("legacy"): triangles may then have any sense.
+        all_positive: all tetrahedra count as positive, as MuJoCo does by default ("legacy"): so
+            triangles may have any sense; the mass centre with the centroid of the surface as apex,
+            then volume and inertia with the mass centre as apex.
 
     Raises:
         ValueError: the mesh encloses no volume.
@@ -66,7 +67,24 @@ def inertia_of_mesh(
         a, b, c = (vertices[triangles[:, k]] for k in range(3))
         areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         apex = areas @ (a + b + c) / (3.0 * areas.sum())
-    a, b, c = (vertices[triangles[:, k]] - apex for k in range(3))
+    volume, com, second = _tetrahedra(vertices - apex, triangles, all_positive)
+    if not all_positive:
+        second = second - np.outer(com, com)
+    else:
+        apex, com = apex + com, np.zeros(3)
+        volume, _, second = _tetrahedra(vertices - apex, triangles, all_positive)
+    return volume, apex + com, np.trace(second) * np.eye(3) - second
+
+
+def _tetrahedra(
+    vertices: Floats, triangles: Integers, all_positive: bool
+) -> tuple[float, Floats, Floats]:
+    """Volume, first and second moments over it, of the tetrahedra of triangles and the origin.
+
+    Raises:
+        ValueError: they enclose no volume.
+    """
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
     determinants = np.einsum("ij,ij->i", a, np.cross(b, c))
     if all_positive:
         determinants = np.abs(determinants)
@@ -74,10 +92,8 @@ def inertia_of_mesh(
     if not abs(volume) > 0.0:
         raise ValueError("the mesh encloses no volume")
     total = a + b + c
-    com = determinants @ total / (24.0 * volume)
     second = sum(np.einsum("i,ij,ik->jk", determinants, p, p) for p in (a, b, c, total))
-    second = second / (120.0 * volume) - np.outer(com, com)
-    return volume, apex + com, np.trace(second) * np.eye(3) - second
+    return volume, determinants @ total / (24.0 * volume), second / (120.0 * volume)
 
 
 def inertia_moved(inertial: Inertial, frame: Frame) -> Inertial:
