@@ -1,12 +1,14 @@
 """The coordinates that a formulation integrates: those of bodies, or of its own."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
+from dap3d_core.assembly.evaluate import place_bodies
+from dap3d_core.kernels.runtime.cache import prepared
 from dap3d_core.model.rotations import to_body
 from dap3d_core.model.state_layout import COORDINATES, VELOCITIES, split
 
@@ -67,6 +69,11 @@ class Coordinates:
     def body_states(self, y: Floats) -> Floats:
         """The same states (k, size + 1) in coordinates of bodies."""
         return y
+
+    def placer(self, y: Floats) -> Callable[[], object]:
+        """A function that places the bodies of the state y, as it is then, in the system."""
+        system = self.evaluator.system
+        return prepared(place_bodies, y, system.body, system.metric)
 
     def continued(self, expected: Floats, y: Floats) -> Floats:
         """The state y as the motion led to it, near the one expected; ``project`` may shift it."""

@@ -1,6 +1,6 @@
 """Joint coordinates as the state of an evaluator: from body coordinates and back."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -38,6 +38,7 @@ from dap3d_core.formulations.joint.tree_nodes import (
     tree_nodes,
     unsuitable_motion,
 )
+from dap3d_core.kernels.runtime.cache import prepared
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.linear.ordering.spanning_forest import SpanningForest, spanning_forest
@@ -200,6 +201,11 @@ class Coordinates:
         for state, row in zip(y, out, strict=True):
             body_state(state, row, self.evaluator.system)
         return out
+
+    def placer(self, y: Floats) -> Callable[[], object]:
+        """As of ``formulations.coordinates.Coordinates``."""
+        out = np.empty(self.evaluator.model.u0.size + 1)
+        return prepared(body_state, y, out, self.evaluator.system)
 
     def continued(self, expected: Floats, y: Floats) -> Floats:
         """The state y with angles that ``project`` has not brought back, near those expected."""

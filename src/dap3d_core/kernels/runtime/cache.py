@@ -88,6 +88,12 @@ def compiled_into(function):
     return Compiled(function, is_inlined=True) if jit_is_on() else function
 
 
+def prepared(function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+    """A compiled function with its arguments, whose types are looked up once, for many calls."""
+    code = function.of(*arguments) if isinstance(function, Compiled) else function
+    return functools.partial(code, *arguments)
+
+
 class Compiled:
     """A function of the core, compiled for the types that it is called with.
 

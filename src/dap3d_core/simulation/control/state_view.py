@@ -2,20 +2,18 @@
 
 import math
 from collections.abc import Callable
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.assembly.evaluate import place_bodies
 from dap3d_core.assembly.motion.joint_motion import ROTATION, TRANSLATION
 from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.stepping.hold import T, quick_view
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import Y
-from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, P, R, V, W
 from dap3d_core.result import Result, RunMetadata
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -53,17 +51,8 @@ class StateView:
         """Show the state of an integration from here on."""
         self._integration = integration
         self._real = quick_view(integration.work.real)
-        self._place_bodies = self._placer(integration.work.state[Y])
+        self._place_bodies = self._evaluator.coordinates.placer(integration.work.state[Y])
         self.changed()
-
-    def _placer(self, y: Floats) -> Callable[[], Any]:
-        """The compiled function that places the bodies of the state y in the driver's arrays."""
-        evaluator = self._evaluator
-        if evaluator.formulation.has_own_coordinates:
-            return partial(evaluator.body_state, y)
-        body, metric = evaluator.system.body, evaluator.system.metric
-        call = place_bodies.of(y, body, metric) if jit_is_on() else place_bodies
-        return partial(call, y, body, metric)
 
     def changed(self) -> None:
         """The state is another."""
