@@ -205,7 +205,7 @@ def test_a_tyre_builds_up_its_side_force():
 
 
 def test_a_clutch_takes_a_flywheel_along():
-    """J_1 w_1 + J_2 w_2 = M t; the twist x: m x'' + c x' + k x = M m / J_1, from rest, m reduced."""
+    """J_1 w_1 + J_2 w_2 = M t; the twist: m x'' + c x' + k x = M m / J_1, from rest, m reduced."""
     result = run("clutch", rtol=1e-12)
     J1, J2, M, k, c, t_on = 0.2, 0.8, 3.0, 400.0, 2.0, 0.5
     w1, w2 = result.w[:, 0, 2], result.w[:, 1, 2]

@@ -63,8 +63,9 @@ class Switch:
     def band(self) -> float:
         """Distance beyond zero from which on it has passed: of a knot, and of contact at rest."""
         if self.kind == "switch":
-            touches = self.jumps and getattr(self.group.type_info.type, "unilateral", ())
-            return ROUNDING * self.length if touches and not self.words else 0.0
+            type_: Any = self.group.type_info.type
+            touches = self.jumps and type_.unilateral and not self.words
+            return ROUNDING * self.length if touches else 0.0
         row, numbers = self.group.numbers[self.place], self.group.type_info.layout.numbers
         own = [place for name, place in numbers.items() if is_knots(name)]
         knots = [row[at : at + count] for at, (count,) in own]

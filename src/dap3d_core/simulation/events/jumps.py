@@ -198,8 +198,8 @@ class Jumps:
         for k in np.flatnonzero(stays).tolist():
             raise SimulationError(
                 f"the run stopped at t = {integration.t:.9g} s: {self._title(k)} comes to rest "
-                "in contact, and nothing carries it: its type has no wrench below zero of its switch, and the "
-                "bodies would pass through each other. Give the type a wrench there, as ptp_stop "
+                "in contact, and nothing carries it: its type has no wrench, and the bodies would "
+                "pass through each other. Give it a wrench below zero of its switch, as ptp_stop "
                 "and its like have, or end the run by an event before"
             )
 

@@ -135,7 +135,6 @@ def test_bounces_end_on_the_spring_of_a_stop(e, v_rest):
 
 def test_bounces_without_end_end_with_a_clear_message():
     """Impacts pile up at t = (1 + e) / (1 - e) v0 / g, down to the rounding of positions."""
-    assert pytest.approx(1.35457, abs=1e-5) == 3.0 * V0 / G
     words = r"t = 1\.3545\d+ s: force floor comes to rest in contact"
     with pytest.raises(dap.SimulationError, match=words) as error:
         dap.simulate(ball(e=0.5), t_end=5.0)
