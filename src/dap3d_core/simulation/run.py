@@ -245,4 +245,6 @@ class Run(RunState):
         notes += event_locator.notes() if event_locator else []
         notes += event_notes(self.integrations, self.events())
         notes += crossing_notes(self.crossed)
-        return notes + stiffness_notes(self.integrations, self.settings.integrator)
+        return notes + stiffness_notes(
+            self.integrations, self.settings.integrator, self.evaluator.formulation
+        )

@@ -170,11 +170,14 @@ class Coordinates:
     @contextmanager
     def at(self, u: Floats) -> Iterator[Floats]:
         """The state y of a state u; the reference of a run is restored afterwards."""
-        before = self._tree.constants.copy()
+        tree = self._tree
+        arrays = [tree.constants, *([tree.kept.smallest, tree.kept.settings] if self.kept else [])]
+        before = [array.copy() for array in arrays]
         try:
             yield self.start(u)
         finally:
-            self._tree.constants[:] = before
+            for array, values in zip(arrays, before, strict=True):
+                array[:] = values
 
     @property
     def _tree(self) -> TreeArrays:
