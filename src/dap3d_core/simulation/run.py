@@ -271,4 +271,6 @@ class Run(RunState):
         notes += self.jumps.notes(self.present) if self.jumps is not None else []
         notes += event_notes(self.integrations, self.events())
         notes += crossing_notes(self.crossed)
-        return notes + stiffness_notes(self.integrations, self.settings.integrator)
+        return notes + stiffness_notes(
+            self.integrations, self.settings.integrator, self.evaluator.formulation
+        )

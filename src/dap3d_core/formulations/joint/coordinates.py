@@ -230,12 +230,15 @@ class Coordinates:
     @contextmanager
     def at(self, u: Floats) -> Iterator[Floats]:
         """The state y of a state u; the reference of a run is restored afterwards."""
-        before = self._tree.constants.copy()
+        tree = self._tree
+        arrays = [tree.constants, *([tree.kept.smallest, tree.kept.settings] if self.kept else [])]
+        before = [array.copy() for array in arrays]
         try:
             self._tree.constants[:], y = self._constants_and_state(u)
             yield y
         finally:
-            self._tree.constants[:] = before
+            for array, values in zip(arrays, before, strict=True):
+                array[:] = values
 
     @property
     def _node_of(self) -> Integers:

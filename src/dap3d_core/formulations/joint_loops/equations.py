@@ -56,7 +56,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     place_tree(y, system)
     apply_forces(t, system, loops)
     if has_friction(system):
-        power = accelerate(t, system, loops)
+        power = accelerate(t, system, loops, False)
     else:
         linearise_kept(t, system, loops)
         power = reduce_nodes(system, system.force, True)
@@ -80,14 +80,14 @@ def factorise(system: System) -> None:
 
 
 @compiled
-def accelerate(t: float, system: System, loops: Any) -> float:
+def accelerate(t: float, system: System, loops: Any, is_report: bool) -> float:
     """Scaled ``acceleration`` and all ``multipliers``, with friction; returns the power.
 
-    The bodies are placed, and ``force`` is known.
+    The bodies are placed, and ``force`` is known. Reports at singular poses are counted.
     """
     power = linearise_tree(t, system, loops)
     linearise_kept(t, system, loops)
-    if not factorise_anyway(system):
+    if not factorise_anyway(system) and is_report:
         system.settings[SINGULAR] += 1.0
     power += solve_with_friction(t, system, loops, solve)
     return power + power_of_drivers(system)
@@ -122,7 +122,7 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     """
     place_tree(y, system)
     apply_forces(t, system, loops)
-    accelerate(t, system, loops)
+    accelerate(t, system, loops, True)
     body_accelerations(system, out)
     report_multipliers(system, out)
     report_levels(t, out, system, loops)

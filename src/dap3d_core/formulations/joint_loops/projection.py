@@ -64,8 +64,8 @@ from dap3d_core.formulations.joint_loops.profile import (
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import R, V, W
 
-#: Pivots of dependent rows rise by this where compliances are divided by LESS; where they rise by
-#: less than HELD, the rows hold something themselves.
+#: Pivots of dependent rows fall by LESS where compliances do; where they fall by less than HELD,
+#: the rows hold something themselves.
 LESS, HELD = 16.0, 10.0
 
 

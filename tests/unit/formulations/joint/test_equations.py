@@ -159,6 +159,13 @@ def test_radau_says_that_it_keeps_body_coordinates():
         dap.simulate("pen1", t_end=0.1, method="joint", integrator="radau")
 
 
+def test_a_stiff_tree_is_told_which_method_radau_takes():
+    """Integrator auto stays with dop853; the governor's note says what would take fewer steps."""
+    found = dap.simulate("A05", t_end=0.1, dt=0.05, rtol=1e-5, method="joint", integrator="auto")
+    assert found.method == "joint"
+    assert any("radau, or auto, takes fewer, with method standard" in n for n in found.notes)
+
+
 def hinged_spring(theta_0=0.0):
     """A rod on a hinge; the moment of its torsion spring has a knot that it passes, with turns."""
     scene = dap.Scene(name="hinged spring")

@@ -274,6 +274,18 @@ def test_rows_that_contradict_each_other_are_refused():
         dap.simulate(scene, method="joint", t_end=0.1, dt=0.1)
 
 
+def test_a_report_elsewhere_leaves_the_reference_of_a_run():
+    """Constants of the tree, what is known of its kept rows: those of the start stay."""
+    model = CompiledModel(four_bar(), method="joint")
+    elsewhere = dap.simulate(four_bar(), method="standard", t_end=0.5, dt=0.5).u[-1]
+    tree = model.evaluator.system.tree
+    model.evaluator.coordinates.start(model.model.u0)
+    arrays = tree.constants, tree.kept.smallest, tree.kept.settings
+    before = [array.copy() for array in arrays]
+    model.evaluator.report(0.0, elsewhere)
+    assert all(map(np.array_equal, arrays, before))
+
+
 def test_another_model_of_the_structure_has_its_own_tree():
     """As in a sweep: another pivot, to which the tree and its kept rows have other numbers."""
     scenes = [four_bar(), four_bar(lift=0.3)]
