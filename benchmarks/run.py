@@ -35,6 +35,7 @@ import start
 import states
 import streaming
 import study
+import tree_loops
 import trees
 import whole_runs
 from rich.console import Console
@@ -87,6 +88,7 @@ def main():
     benchmarks = {
         "right_hand_side": lambda: right_hand_side.measure(arguments.against),
         "trees": trees.measure,
+        "tree_loops": tree_loops.measure,
         "kernels": kernels.measure,
         "derived": derived.measure,
         "extension": extension.measure,

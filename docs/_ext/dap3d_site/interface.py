@@ -80,6 +80,14 @@ def _hooks() -> Iterator[str]:
     for _, hook in hooks.GROUPS.values():
         yield f"## {hook}"
         yield directive("autofunction", f"dap3d_core.interface.hooks.{hook}")
+    yield "## Formats"
+    yield (
+        "Importers and exporters of files of models have entry points of their own "
+        "([robots](../how-to/robots.md#formats-of-your-own)); `hookimpl`, and all else that they "
+        "need, is in `dap3d_core.interface.formats`."
+    )
+    rows = [(kind, code(group), code(hook)) for kind, (group, hook) in hooks.FORMAT_GROUPS.items()]
+    yield table(("kind", "entry-point group", "hook"), rows)
     yield "## hookimpl"
     yield (
         "`@hookimpl` before a function of the name of a hook, without arguments. "

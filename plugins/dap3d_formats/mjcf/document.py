@@ -19,7 +19,7 @@ from dap3d_formats.axes import unit
 #: Elements that share the defaults of actuators.
 ACTUATORS = (
     "general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder", "muscle",
-    "adhesion", "dcmotor", "plugin",
+    "adhesion", "dcmotor", "orientation", "pid", "plugin",
 )  # fmt: skip
 
 

@@ -75,7 +75,7 @@ class TypeBase:
     def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
         """Constants of this instance, such as the coefficients of a polynomial.
 
-        A 3-tuple with a name in _i, _j or _k is a vector in that body's axes.
+        A 3-tuple with a name in _i, _j, _k, ... is a vector in that body's axes.
         """
         return {}
 
@@ -86,7 +86,7 @@ class Joint(TypeBase):
     Subclasses define, each a pure function of named quantities (spec 2):
 
     * ``C``      position level, one number a row that ``holonomic`` keeps;
-    * ``J``      dC/dq, one block of rows x 6 (tuples of rows) a body slot, in the order i, j, k;
+    * ``J``      dC/dq, one block of rows x 6 (tuples of rows) a body slot, in their order;
     * ``gamma``  right-hand side of the acceleration level, J v_dot = gamma;
     * ``nu``     right-hand side of the velocity level, J v = nu; zero where not defined.
 

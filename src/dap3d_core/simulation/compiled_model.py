@@ -284,6 +284,7 @@ class CompiledModel:
             AssemblyError: as ``find_start``.
         """
         key = correct, tuple(hold), metric
+        self.evaluator.set_inputs(self.model.input_values)
         if state is not None or key not in self._starts:
             try:
                 start = find_start(self.evaluator, *key, state)

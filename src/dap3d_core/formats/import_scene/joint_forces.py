@@ -1,5 +1,6 @@
 """What acts on the coordinates of joints: springs, dampers, stops, rotors, couplings, inputs."""
 
+import re
 from math import isfinite, pi
 from typing import TYPE_CHECKING, Any
 
@@ -8,6 +9,7 @@ import numpy as np
 from dap3d_core.formats.import_scene.joints import JointEnds, from_ground
 from dap3d_core.interface.formats.articulation import Articulation, Joint, Limits
 from dap3d_core.interface.formats.frames import Floats
+from dap3d_core.scene.scene import GROUND
 
 if TYPE_CHECKING:
     from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
@@ -56,10 +58,11 @@ class JointCoordinate:
     def __init__(self, builder: "SceneBuilder", joint: Joint) -> None:
         joint = from_ground(builder, joint)
         self.builder, self.joint = builder, joint
-        self.ends = _SameEnds(builder, joint)
+        self.ends = NamedEnds(builder, joint)
         self.turns = joint.kind == "revolute"
         finite = [abs(x) for one in joint.limits for x in (one.lower, one.upper) if isfinite(x)]
-        self.back = 0.0 if self.turns else 1.0 + 2.0 * max([*finite, abs(joint.rest[0])])
+        rest = abs(joint.rest[0]) if joint.stiffness[0] else 0.0
+        self.back = 0.0 if self.turns else 1.0 + 2.0 * max([*finite, rest])
         if not self.turns and not all(map(isfinite, (joint.limits[0].lower,))):
             self.back = FAR
 
@@ -82,7 +85,7 @@ class JointCoordinate:
         if self.turns:
             fields |= {"theta_0": rest or None, "turns": True if k else None}
         else:
-            fields |= {"l0": self.back + rest}
+            fields |= {"l0": self.back + rest} if k else {}
         name = self.builder.names.free("forces", f"{self.ends.name}_spring" if k else
                                        f"{self.ends.name}_damper")  # fmt: skip
         self.builder.scene.add_force(keyword, name, k=k or None, c=c or None, **fields)
@@ -120,7 +123,7 @@ def perpendicular(axis: Floats) -> Floats:
     return np.asarray(across / np.linalg.norm(across))
 
 
-class _SameEnds(JointEnds):
+class NamedEnds(JointEnds):
     """The ends of a joint that has its name in the scene already."""
 
     def __init__(self, builder: "SceneBuilder", joint: Joint) -> None:
@@ -157,7 +160,7 @@ def wheel_of(builder: "SceneBuilder", joint: Joint, inertia: float) -> str:
 
 def follow(builder: "SceneBuilder", joint: Joint, wheel: str, ratio: float, suffix: str) -> None:
     """Couple the coordinate of a joint with a wheel."""
-    ends = _SameEnds(builder, joint)
+    ends = NamedEnds(builder, joint)
     name = builder.names.free("joints", f"{ends.name}_{suffix}")
     builder.scene.add_joint(
         "follow", name, body_i=ends.child, a_j=ends.vector("j", joint.axes[0], "_axis"),
@@ -200,7 +203,30 @@ def _light(builder: "SceneBuilder", *joints: Joint) -> float:
 
 
 def add_inputs(builder: "SceneBuilder", model: Articulation) -> None:
-    """Add actuators as inputs with a force on the coordinate of their joint."""
+    """Add actuators as inputs, each a factor of a force or moment on both sides of a joint.
+
+    The force of a slider acts on the line of its axis, on both bodies.
+    """
+    scene, names = builder.scene, builder.names
     for actuator in model.actuators:
-        text = "actuators: this version has no inputs; add forces of your own"
-        builder.remarks.leave_out(actuator.place, text)
+        joint = from_ground(builder, model.joints[actuator.joint])
+        if builder.moves_alone(joint):
+            builder.remarks.leave_out(actuator.place, "an actuator of a joint that does not move")
+            continue
+        others = (scene.bodies, scene.points, scene.joints, scene.forces)
+        clash = any(actuator.name in table for table in others)
+        wanted = re.sub(r"\W", "_", f"{actuator.name}_input" if clash else actuator.name)
+        name = names.of("inputs", wanted, actuator.place, builder.remarks)
+        scene.add_input(name, 0.0)
+        ends = NamedEnds(builder, joint)
+        axis = np.asarray(joint.axes[0], dtype=float)
+        sides = (("i", ends.child, ends.on_child, 1.0), ("j", ends.parent, ends.on_parent, -1.0))
+        for end, body, frame, sign in sides:
+            if body == GROUND:
+                continue
+            vector = tuple((sign * actuator.gear * (frame.A @ axis) + 0.0).tolist())
+            force = names.free("forces", f"{name}_{end}")
+            if joint.kind == "revolute":
+                scene.add_force("np", force, body_i=body, np=vector, input=name)
+            else:
+                scene.add_force("fp", force, P_i=ends.point(end), fp=vector, input=name)

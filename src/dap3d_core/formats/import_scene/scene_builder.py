@@ -107,6 +107,10 @@ def scene_of(
     placed = tree.place(options.positions, options.rates)
     scene = Scene(name=model.name)
     scene.simulation.t_end, scene.simulation.dt = DURATION, STEP
+    if not all(group.has_mass for group in groups.values()):
+        scene.simulation.method = "joint"
+        text = "method joint, for links without mass: others lose digits to them"
+        remarks.translate(model.place, text)
     builder = SceneBuilder(scene, remarks, groups, member, options.positions, options.rates,
                            names or Names())  # fmt: skip
     builder.bodies[WORLD] = GROUND

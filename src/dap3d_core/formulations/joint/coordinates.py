@@ -12,6 +12,7 @@ from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.tree_arrays import KeptRowArrays, TreeArrays
 from dap3d_core.formulations.joint.equations import TWO_TURNS, body_state
 from dap3d_core.formulations.joint.node_layout import (
+    CENTRE,
     CHILD,
     CHILD_BLOCK,
     CONSTANT_WIDTH,
@@ -20,6 +21,7 @@ from dap3d_core.formulations.joint.node_layout import (
     FREE,
     JOINT_PARENT,
     JOINT_WIDTH,
+    MASS,
     MOTION,
     PARENT_BLOCK,
     PRISMATIC,
@@ -29,7 +31,7 @@ from dap3d_core.formulations.joint.node_layout import (
     SPHERICAL,
     WORK_WIDTH,
 )
-from dap3d_core.formulations.joint.reference import Reference
+from dap3d_core.formulations.joint.reference import Reference, inertias_about
 from dap3d_core.formulations.joint.tree_nodes import (
     SEGMENTS,
     TreeNodes,
@@ -40,11 +42,13 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.linear.ordering.spanning_forest import SpanningForest, spanning_forest
 from dap3d_core.model import Model
-from dap3d_core.model.state_layout import u_from_y, velocities_of
+from dap3d_core.model.state_layout import split, u_from_y, velocities_of
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
 
+#: A note says where right-hand sides take more than this time of method standard.
+COSTLY = 1.2
 #: Joints that words name.
 MOST_NAMES = 5
 #: Quantities of the segments of a state, as in tolerances.
@@ -93,7 +97,11 @@ class Coordinates:
         self.size = self.nodes.layout.size - 1
         self.length_count = len(self.kept)
         self.equations = "joint_loops" if self.kept else "joint"
-        evaluator.system = _with_tree(evaluator, self.nodes, tree, tuple(self.kept))
+        #: The last start of a run: u, the constants of the tree, y.
+        self._last: tuple[Floats, Floats, Floats] | None = None
+        rows = _kept_rows(evaluator, self.nodes, tuple(self.kept)) if self.kept else None
+        self._cost_ratio = rows[1] if rows else 0.0
+        evaluator.system = _with_tree(evaluator, self.nodes, tree, rows[0] if rows else None)
 
     @property
     def quantities(self) -> list[str]:
@@ -126,7 +134,13 @@ class Coordinates:
     @property
     def notes(self) -> list[str]:
         """As of ``formulations.coordinates.Coordinates``."""
-        return [f"method joint: {self._kept_words()}"] if self.kept else []
+        notes = [f"method joint: {self._kept_words()}"] if self.kept else []
+        if self._cost_ratio > COSTLY:
+            notes.append(
+                f"method joint takes some {self._cost_ratio:.2g} times as long as standard or lsq "
+                "here: its kept rows meet far from ground, or many of them do; auto takes those"
+            )
+        return notes
 
     def _kept_words(self) -> str:
         """Joints whose rows are kept, with the reasons."""
@@ -137,16 +151,48 @@ class Coordinates:
         return f"{count} rows kept, of {', '.join(named)}{more}"
 
     def start(self, u: Floats) -> Floats:
-        """The state y of a run from a state u (13 n,), whose poses become the reference."""
-        reference = Reference(self.nodes, self.evaluator.model, u)
-        self._tree.constants[:] = reference.constants()
-        y = reference.state()
+        """The state y of a run from a state u (13 n,), whose poses become the reference.
+
+        Runs from the same state, one after another, find what the first of them computed.
+        """
+        if self._last is None or not np.array_equal(self._last[0], u):
+            self._last = u.copy(), *self._constants_and_state(u)
+        _, self._tree.constants[:], first = self._last
+        y = first.copy()
         y[self.nodes.layout["states"]] = self.evaluator.states
         if self.kept:
             from dap3d_core.formulations.joint_loops.reference_pivots import judge_kept_rows
 
             judge_kept_rows(self.evaluator, y)
         return y
+
+    def _constants_and_state(self, u: Floats) -> tuple[Floats, Floats]:
+        """``TreeArrays.constants`` with the reference u (13 n,), and its state."""
+        reference = Reference(self.nodes, self.evaluator.model, u)
+        return reference.constants(), reference.state()
+
+    def starts(self, u: Floats, others: Floats) -> Floats:
+        """States (k, size + 1) of runs whose poses at the start are those of u (13 n,).
+
+        others: (k, 13 n) states whose velocities are taken.
+        """
+        reference = Reference(self.nodes, self.evaluator.model, u)
+        ground = np.zeros((len(others), 1, 3))
+        _, _, v, w = split(others)
+        reference.v, reference.w = (np.concatenate([ground, x], axis=1) for x in (v, w))
+        return reference.state()
+
+    def inertia_places(self, bodies: Integers) -> Integers:
+        """(7 b,) indices in the tree's constants of the mass and inertia of bodies, from 1."""
+        first = CONSTANT_WIDTH * self._node_of[bodies] + MASS
+        places: Integers = (first[:, None] + np.arange(7)).ravel()
+        return places
+
+    def inertias(self, bodies: Integers, mass: Floats, Jp: Floats) -> Floats:
+        """(k, 7 b) numbers for ``inertia_places`` of masses (k, b) and inertias (k, b, 3, 3)."""
+        constants = self._tree.constants.reshape(-1, CONSTANT_WIDTH)
+        centre = constants[self._node_of[bodies], CENTRE : CENTRE + 3]
+        return inertias_about(centre, mass, Jp).reshape(len(mass), -1)
 
     def body_states(self, y: Floats) -> Floats:
         """States (k, ...) in coordinates of bodies of states (k, size + 1)."""
@@ -180,9 +226,18 @@ class Coordinates:
         """The state y of a state u; the reference of a run is restored afterwards."""
         before = self._tree.constants.copy()
         try:
-            yield self.start(u)
+            self._tree.constants[:], y = self._constants_and_state(u)
+            yield y
         finally:
             self._tree.constants[:] = before
+
+    @property
+    def _node_of(self) -> Integers:
+        """(n + 1,) the node that each body is."""
+        body = self.nodes.body
+        has_mass = np.flatnonzero(body >= 0)
+        nodes: Integers = has_mass[np.argsort(body[has_mass])]
+        return nodes
 
     @property
     def _tree(self) -> TreeArrays:
@@ -191,7 +246,7 @@ class Coordinates:
 
 
 def _with_tree(
-    evaluator: "Evaluator", nodes: TreeNodes, tree: SpanningForest, kept: tuple[int, ...]
+    evaluator: "Evaluator", nodes: TreeNodes, tree: SpanningForest, kept: KeptRowArrays | None
 ) -> System:
     """The system with arrays of a tree; ``body`` is then the first rows of its places."""
     system, model, plan = evaluator.system, evaluator.model, evaluator.plan
@@ -209,17 +264,22 @@ def _with_tree(
         scratch=np.zeros(48),
         force=np.zeros_like(system.force),
         slope=np.zeros(nodes.layout.size),
-        kept=_kept_rows(evaluator, nodes, kept) if kept else None,
+        kept=kept,
     )
     return attrs.evolve(system, body=places[:bodies], tree=arrays)
 
 
-def _kept_rows(evaluator: "Evaluator", nodes: TreeNodes, joints: tuple[int, ...]) -> KeptRowArrays:
-    from dap3d_core.formulations.joint_loops.tables import kept_calls, kept_row_arrays, kept_rows
+def _kept_rows(
+    evaluator: "Evaluator", nodes: TreeNodes, joints: tuple[int, ...]
+) -> tuple[KeptRowArrays, float]:
+    """Arrays of kept rows, and the time that a right-hand side takes over that of standard."""
+    from dap3d_core.formulations.joint_loops import tables
 
-    kept = kept_rows(joints, evaluator.model, nodes)
-    calls = kept_calls(kept, evaluator.loop_groups, evaluator.system.groups)
-    return kept_row_arrays(kept, evaluator.model, evaluator.plan, nodes, calls)
+    model, plan = evaluator.model, evaluator.plan
+    kept = tables.kept_rows(joints, model, nodes)
+    calls = tables.kept_calls(kept, evaluator.loop_groups, evaluator.system.groups)
+    ratio = tables.cost_ratio(kept, nodes, plan, model.body_count)
+    return tables.kept_row_arrays(kept, model, plan, nodes, calls), ratio
 
 
 def _joints(tree: SpanningForest, model: Model, plan: Plan) -> Integers:

@@ -40,8 +40,6 @@ PART = 6e-6
 SLOWEST, SMALLEST = 0.1, 1e-4
 #: What an element is; the last two only of types with states of their own (state_tangent.py).
 WRENCH_ELEMENT, JOINT_ELEMENT, FRICTION_ELEMENT, RATE_ELEMENT, POSITION_ELEMENT = range(5)
-#: Most body slots of an element (interface/codegen/instance_layout.py).
-SLOTS = 3
 #: Columns of ``elements``.
 LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY = range(9)
 

@@ -46,7 +46,7 @@ from dap3d_core.interface.examine.random_values import (
     random_pose,
     random_quantity,
 )
-from dap3d_core.interface.fields import specs_of
+from dap3d_core.interface.fields import SLOTS, slot_of, specs_of
 from dap3d_core.interface.types import SYMBOLS, Force, Function, Joint, TypeBase
 
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
@@ -350,6 +350,13 @@ def _check_fields(type_: type[TypeBase]) -> None:
             raise PluginError(f"{who}.{name} is across {spec.across}, which is no vector field")
         if name in taken:
             raise PluginError(f"{who} has a field {name}, which is the body's; take another name")
+        slot = slot_of(name) if spec.kind in ("point", "body") else None
+        if slot and slot not in body_slots(type_):
+            before = SLOTS[SLOTS.index(slot) - 1]
+            raise PluginError(
+                f"{who}.{name} is on a body {slot}, but nothing is on a body {before}; the bodies "
+                f"of a type are {', '.join(SLOTS)}, without a gap after j"
+            )
 
 
 def _check_members(type_: type[TypeBase]) -> None:

@@ -6,6 +6,7 @@ from contextlib import suppress
 
 import numpy as np
 
+from dap3d_core.interface.fields import SLOTS
 from dap3d_core.model.groups import Floats
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result.arrays import AXES
@@ -14,7 +15,6 @@ from dap3d_core.result.quantities.catalogue import (
     ACTIONS,
     POINT_ARRAYS,
     QUANTITIES,
-    SLOTS,
     SYSTEM,
     Quantity,
     QuantityOwner,

@@ -38,6 +38,7 @@ class EventLocator:
         numbers: of the forces, which events may change.
         jumps: of velocities, which events may set; made where one does.
         horizon: time that no step goes beyond.
+        take_rows: takes what was reported before an input changes.
     """
 
     horizon = np.inf
@@ -46,6 +47,7 @@ class EventLocator:
         self.compiled, self.events = compiled, checked_events(events)
         self.numbers = Numbers(compiled)
         self.jumps: Jumps | None = None
+        self.take_rows: Callable[[], None] = lambda: None
         self.occurrences: list[EventRecord] = []
         self._samplers = [Sampler(event.every) for event in self.events]
         self._values: list[float] = []
@@ -59,6 +61,7 @@ class EventLocator:
             "values": self._values,
             "sides": self._sides,
             "samplers": [sampler.state() for sampler in self._samplers],
+            "inputs": self.compiled.evaluator.inputs.tolist(),
         }
 
     def restore(self, found: Mapping[str, Any]) -> None:
@@ -81,6 +84,10 @@ class EventLocator:
             raise ValueError("what is known of how events change is damaged")
         for sampler, state in zip(self._samplers, states, strict=True):
             sampler.restore(state)
+        inputs: Any = found.get("inputs")
+        if not _are_numbers(inputs, (len(self.compiled.model.input_names),)):
+            raise ValueError("the inputs that events have set should be a number for each")
+        self.compiled.evaluator.set_inputs(inputs)
         if any(one.changes for one in self.occurrences):
             self.numbers.given = self.compiled.evaluator.system.par.copy()
 
@@ -261,13 +268,22 @@ class EventLocator:
         if here.changes:
             integration.restart()
         after, work = None, 0.0
-        if here.velocities or here.states:
+        if here.inputs:
+            self._set_inputs(here.inputs)
+        if here.velocities or here.states or here.inputs:
             after, work = self._set_state(integration, event, here)
         self.occurrences.append(
             EventRecord(name=event.title, t=here.t, direction=direction, kind=kind, u=here.u,
                        changes=here.changes, u_after=after, work=work)
         )  # fmt: skip
         return bool(here.changes)
+
+    def _set_inputs(self, inputs: Mapping[int, float]) -> None:
+        """Set inputs from here on; what was reported so far has those before."""
+        self.take_rows()
+        values = self.compiled.evaluator.inputs
+        values[list(inputs)] = list(inputs.values())
+        self.compiled.evaluator.set_inputs(values)
 
     def _set_state(
         self, integration: Integration, event: Event, here: Instant

@@ -36,6 +36,9 @@ def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
     if model.state_count:  # what an element stores and loses by its states is not told
         return False
     driven = any(np.any(g.functions > 0) for g in model.joints)
+    driven = driven or any(
+        np.any(g.functions[:, : len(g.type_info.layout.functions)] > 0) for g in model.forces
+    )
     if driven or model.friction or any("energy" not in g.type_info.kernels for g in model.forces):
         return False
     rng = np.random.default_rng(1)
