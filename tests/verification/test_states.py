@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from support.own_types import registry_of
 from support.problems import four_bar
-from support.state_types import REGISTRY, pulled, pulled_exactly, steered
+from support.state_types import REGISTRY, ZERO, pulled, pulled_exactly, steered
 
 import dap3d_core as dap
+from dap3d_core.interface import number
+from dap3d_core.kernels import abs, dot, neg, scale, sqrt, sub
+from dap3d_joints.revolute import Revolute
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
 
@@ -156,3 +160,54 @@ def test_a_closed_loop_with_states_by_every_formulation(method):
     z = want.quantity("late.z").values
     assert np.ptp(z) > 0.1
     assert got.quantity("late.z").values == pytest.approx(z, abs=1e-8)
+
+
+class Bearing(Revolute):
+    """A hinge whose friction has bristles, and grows with the load: z_dot = w - |w| z / g."""
+
+    keyword, states = "test-bearing", ("z",)
+    stiffness: float = number()
+    g: float = number(positive=True)
+
+    def rate(a_i, w_i, w_j, z, g):
+        w = dot(a_i, sub(w_i, w_j))
+        return w - abs(w) * z / g
+
+    def friction(a_i, lam, z, stiffness, mu):
+        load = mu * sqrt(lam[0] * lam[0] + lam[1] * lam[1] + lam[2] * lam[2])
+        moment = scale(-load * stiffness * z, a_i)
+        return (ZERO, moment), (ZERO, neg(moment))
+
+
+def bearings():
+    """A wheel on a bearing that rubs; another that does not stands before it in the scene."""
+    scene = dap.Scene(name="bearings")
+    scene.add_body("wheel", mass=3.0, Jp=(0.1, 0.1, 0.2), w=(0.0, 0.0, 5.0))
+    scene.add_body("other", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(1.0, 0.0, 0.0))
+    scene.add_point("off", "ground", (1.0, 0.0, 0.0))
+    axes = {"a_j": "ground.z"}
+    scene.add_joint("test-bearing", "b2", P_i="other.O", P_j="off", a_i="other.z", stiffness=1.0,
+                    g=0.02, z_0=0.01, **axes)  # fmt: skip
+    scene.add_joint("test-bearing", "b1", P_i="wheel.O", P_j="ground.O", a_i="wheel.z",
+                    stiffness=100.0, g=0.01, **axes)  # fmt: skip
+    scene.add_force("weight", "gravity")
+    scene.add_force("friction", "rubbing", joint="b1", mu=0.3)
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("method", "integrator"),
+    [("standard", "dop853"), ("standard", "radau"), ("joint", "dop853"), ("lsq", "adams")],
+)
+def test_friction_of_a_joint_by_its_state(method, integrator):
+    """Load m g: J w' = -mu m g s z, against SciPy; the state of the other bearing stays."""
+    compiled = dap.compile(bearings(), registry=registry_of(Bearing), method=method)
+    result = dap.simulate(compiled, t_end=0.05, dt=0.01, integrator=integrator, **PRECISE)
+
+    def rates(t, y):
+        return -0.3 * 3.0 * 9.81 * 100.0 * y[1] / 0.2, y[0] - abs(y[0]) * y[1] / 0.01
+
+    w, z = reference(rates, (5.0, 0.0), result.t)
+    assert result.quantity("wheel.w.z").values == pytest.approx(w, abs=1e-9)
+    assert result.quantity("b1.z").values == pytest.approx(z, abs=1e-10)
+    assert result.quantity("b2.z").values == pytest.approx(0.01, abs=1e-15)

@@ -26,7 +26,12 @@ from dap3d_core.simulation.kinematics.motion_data import (
     motion_on,
     read_motion,
 )
-from dap3d_core.simulation.kinematics.pose_equations import ChosenRows, Flags, required_forces
+from dap3d_core.simulation.kinematics.pose_equations import (
+    ChosenRows,
+    Flags,
+    held_states,
+    required_forces,
+)
 from dap3d_core.simulation.redundancy.freedoms import motion_words
 
 Floats = NDArray[np.float64]
@@ -147,6 +152,7 @@ def _solved(
     pulling = Pulling(model)
     pulling.look(arrays)
     notes = [*compiled.notes, *misfit_notes(motion.misfit), *_notes(evaluator, chosen, forces)]
+    notes += held_states(model)
     about = RunMetadata(
         scene_text=compiled.scene_text,
         stats=RunStatistics(

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.model import Model
 from dap3d_core.model.rotations import to_body, to_global
 from dap3d_core.model.state_layout import split
 from dap3d_core.simulation.initial.assemble import finite_rows
@@ -169,3 +170,11 @@ def required_forces(evaluator: Evaluator, t: float, u: Floats, v_dot: Floats) ->
     force = model.mass[:, None] * accelerations[:, :3]
     inertial = np.hstack([force, to_global(p, moment)])
     return np.asarray((inertial - evaluator.applied_forces(t, u)).ravel())
+
+
+def held_states(model: Model) -> list[str]:
+    """Note that states of elements stay as they are; none where there are no states."""
+    if not model.state_count:
+        return []
+    names = ", ".join(f"{state.element}.{state.name}" for state in model.element_states)
+    return [f"no motion is integrated: states of elements keep their initial values ({names})"]

@@ -40,7 +40,8 @@ def arguments_of(type_info, rng):
             par[q * type_info.layout.par_width + offset :][:2] = 400, 20
     outs = [rng.standard_normal(600) for _ in range(3)]
     outs[1][0] = 3.0  # where switches begin
-    return LoopArrays(body=body, F=F, idx=idx, par=par), outs
+    states = rng.standard_normal(BODIES + type_info.layout.state_width)
+    return LoopArrays(body=body, F=F, idx=idx, par=par, states=states), outs
 
 
 def run(loop, type_info, seed):
@@ -48,7 +49,7 @@ def run(loop, type_info, seed):
     arrays, outs = arguments_of(type_info, np.random.default_rng(seed))
     with np.errstate(all="ignore"):
         loop(0.7, arrays, 0, 0, INSTANCES, *outs)
-    return np.concatenate([arrays.par, arrays.F.ravel(), *outs])
+    return np.concatenate([arrays.par, arrays.F.ravel(), arrays.rates, *outs])
 
 
 REGISTRY = load_registry()

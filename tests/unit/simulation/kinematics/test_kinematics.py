@@ -196,3 +196,12 @@ def test_a_result_has_all_its_quantities_and_files(tmp_path):
     assert stored.integrator == "kinematics"
     assert all(entry.ok in (True, None) for entry in stored.ledger.values())
     assert "energy" not in stored.ledger  # work is the change of the kinetic energy, no measure
+
+
+def test_states_of_elements_stay_and_that_is_said():
+    """Nothing is integrated: their forces are those of the initial values."""
+    scene = pushed((0.0, 0.01, 0.0))
+    scene.add_force("maxwell", "late", P_i="slider.O", P_j="guide", k=10.0, c=1.0, z_0=0.02)
+    result = dap.kinematics(scene, t_end=1.0, dt=0.5)
+    assert result.quantity("late.z").values.tolist() == [0.02] * 3
+    assert any("states of elements keep their initial values (late.z)" in n for n in result.notes)
