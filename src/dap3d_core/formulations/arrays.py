@@ -52,7 +52,7 @@ def build_loops(
 
 def _groups_for(model: Model, kind: str) -> tuple[Group, ...]:
     if kind == "friction":
-        return model.friction
+        return (*model.friction, *model.forces)
     return (*model.functions, *model.forces, *model.joints)
 
 
@@ -85,7 +85,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         settings=np.array(
             [1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model), 0.0]
         ),
-        friction=np.zeros(12 * (n + 1) + 3 * plan.row_size if model.friction else 0),
+        friction=np.zeros(12 * (n + 1) + 3 * plan.row_size if model.iterated_forces else 0),
         idx=idx,
         groups=groups,
         kinds=starts,
@@ -213,6 +213,8 @@ def _integers_of(group: Group, plan: Plan) -> Integers:
         parts.append(np.array([plan.joint_block[m] for m in joints], dtype=np.int64))
     elif kind == "function":
         parts.append(1 + group.members[:, None])
+    for read in group.read:
+        parts += [read.bodies, read.functions, plan.joint_row[read.members][:, None]]
     table = np.ascontiguousarray(np.hstack(parts), dtype=np.int64)
     assert table.shape[1] == stride(group.type_info)
     return table

@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.body_pose import BodyPose, pose
+from dap3d_core.interface.codegen.reactions import joint_fields
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.rotations import read_only, to_global
 from dap3d_core.model.state_layout import (
@@ -120,6 +121,12 @@ class Model:
     def acting(self) -> tuple[Group, ...]:
         """Groups of what may have angles, in the order of the loops (formulations/arrays.py)."""
         return (*self.forces, *self.joints)
+
+    @cached_property
+    def iterated_forces(self) -> tuple[str, ...]:
+        """Names of the forces that depend on multipliers: friction of joints, forces on reactions."""
+        groups = (*self.friction, *(group for group in self.forces if group.read))
+        return tuple(self.force_names[k] for group in groups for k in group.members.tolist())
 
     @property
     def report_layout(self) -> Layout:
@@ -290,6 +297,7 @@ class _Groups:
         are_good = not faults
         self.forces = made("force", direct)
         self.functions = made("function", functions)
+        self._read_reactions(checked, faults)
         self.friction: tuple[Group, ...] = ()
         try:
             if are_good:
@@ -299,6 +307,19 @@ class _Groups:
         if faults:
             raise ModelError(*faults)
         self.notes = [note for grouping in by_kind.values() for note in grouping.notes]
+
+    def _read_reactions(
+        self, checked: ValidatedScene, faults: list[tuple[str, str, str]]
+    ) -> None:
+        """Bind forces to the joints whose reactions they read."""
+        if faults or not any(joint_fields(group.type_info.type) for group in self.forces):
+            return
+        from dap3d_core.model.reaction_groups import bound_to_joints
+
+        try:
+            self.forces = bound_to_joints(self.forces, checked.forces, self.joints, checked.joints)
+        except PrepareError as error:
+            faults.extend(_faults("force", checked.forces, error))
 
 
 def _faults(

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.interface.codegen.loop_source import stride, write
+from dap3d_core.interface.codegen.reactions import body_columns, row_columns
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.kernels.dual_numbers import Dual, DualFunctions
 from dap3d_core.kernels.runtime import generated_modules
@@ -35,7 +36,7 @@ class LoopDerivatives:
     Attributes:
         bodies: (m, places) bodies that an instance reads; the first ones are its slots.
         outputs: kernel -> its values (m, ...) and derivatives (m, ..., d), with
-            d = 12 places, then one for each multiplier of a joint with friction, then one for each
+            d = 12 places, then one for each multiplier that the loop reads, then one for each
             number and each function.
     """
 
@@ -145,15 +146,18 @@ class _Functions:
 
 @attrs.frozen(eq=False)
 class _Multipliers:
-    """-lambda of all rows, as friction reads it; slopes: by lambda of each row of a joint."""
+    """-lambda of all rows, as friction reads it; slopes: by lambda of each row of each joint.
+
+    A joint is known by the column of its first row's index.
+    """
 
     values: Floats
     idx: Integers
-    slopes: Floats
+    slopes: dict[int, Floats]
 
     def at(self, k: _Column) -> Dual:
         values = self.values[self.idx[:, k.column] + k.shift][:, None]
-        return Dual(values, -self.slopes[k.shift])
+        return Dual(values, -self.slopes[k.column][k.shift])
 
 
 class _Outputs:
@@ -207,15 +211,23 @@ def differentiate_loop(
     first = slots + len(layout.functions)
     places = [*range(slots), *range(first, first + len(layout.others))]
     rows = int(getattr(type_info.type, "rows", 0))
+    read: dict[int, int] = {}
+    if what == "friction":
+        read = row_columns(type_info) or {layout.integers: rows}
+        places += body_columns(type_info)
     of_bodies = DIRECTIONS * len(places)
-    by_numbers = of_bodies + (rows if what == "friction" else 0)
+    by_numbers = of_bodies + sum(read.values())
     directions = by_numbers + len(numbers) + len(functions)
     unit = np.eye(directions)[:, None]
     slopes = dict(zip(numbers, unit[by_numbers:], strict=False))
     columns = [(slots + field, order) for field, order in functions]
     by_functions = dict(zip(columns, unit[by_numbers + len(numbers) :], strict=True))
 
-    friction = _Multipliers(multipliers, idx, unit[of_bodies:]) if multipliers is not None else None
+    by_lambda, at = {}, of_bodies
+    for column, count_of_rows in read.items():
+        by_lambda[column] = unit[at : at + count_of_rows]
+        at += count_of_rows
+    friction = _Multipliers(multipliers, idx, by_lambda) if multipliers is not None else None
     outputs = [_Outputs(), _Outputs(friction if what == "friction" else None), _Outputs()]
     loop_arrays = SimpleNamespace(
         body=_Bodies(arrays.body, idx, places, directions),

@@ -2,12 +2,14 @@
 
 The integers of an instance are in ``idx`` from ``b0``: the bodies of its slots, the rows of F of
 its functions, the bodies of its vectors of no slot, then for a joint the index of its first row in
-the row vectors and for each slot that of its block in D; its numbers are in ``par`` from ``p1``.
+the row vectors and for each slot that of its block in D, and for a force those of the joints whose
+reactions it reads; its numbers are in ``par`` from ``p1``.
 """
 
 from collections.abc import Iterable, Sequence
 
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
+from dap3d_core.interface.codegen.reactions import integers_of_joints, reaction_lines
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.types import Joint
 from dap3d_core.kernels.runtime.loop_modules import Loop
@@ -33,7 +35,9 @@ def stride(type_info: TypeInfo) -> int:
     n = type_info.layout.integers
     if type_info.type.kind == "joint":
         return n + 1 + len(type_info.layout.slots)
-    return n + 1 if type_info.type.kind == "function" else n
+    if type_info.type.kind == "function":
+        return n + 1
+    return n + integers_of_joints(type_info)
 
 
 def write(type_info: TypeInfo, what: str) -> Loop | None:
@@ -45,8 +49,10 @@ def write(type_info: TypeInfo, what: str) -> Loop | None:
         wanted += [n for name in layout.angles for n in (name, f"{name}_dot")]
     if not kernels and not wanted:
         return None
-    lines = [f"b0 = i0 + q * {stride(type_info)}"]
-    lines += [f"p1 = p0 + q * {layout.par_width}"]
+    instance, numbers = f"i0 + q * {stride(type_info)}", f"p0 + q * {layout.par_width}"
+    reads = type_info.joints if what == "friction" else ()
+    lines = list(reaction_lines(type_info, wanted, instance, numbers)) if reads else []
+    lines += [f"b0 = {instance}", f"p1 = {numbers}"]
     lines += [f"b_{s} = idx[b0 + {n}]" for n, s in enumerate(layout.slots)]
     first = len(layout.slots) + len(layout.functions)
     lines += [f"b_{name} = idx[b0 + {first + n}]" for n, name in enumerate(layout.others)]
@@ -63,7 +69,9 @@ def write(type_info: TypeInfo, what: str) -> Loop | None:
         lines.append(f"out = kernel_{name}({arguments})")
         lines += _store(type_info, name)
     title = f"{type_info.type.keyword}{type_info.given}: {', '.join(kernels) or what}"
-    return Loop(title, {f"kernel_{n}": k for n, k in kernels.items()}, lines)
+    called = {f"kernel_{n}": k for n, k in kernels.items()}
+    called |= {f"kernel_J_{joint.field}": joint.type_info.kernels["J"] for joint in reads}
+    return Loop(title, called, lines)
 
 
 def _store_angle(name: str, offset: int) -> Iterable[str]:

@@ -23,6 +23,7 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     namespace,
     parameters,
 )
+from dap3d_core.interface.codegen.reactions import READING, reaction_names
 from dap3d_core.interface.codegen.return_shapes import ShapeError, checked_shape, entries, value_at
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
@@ -62,6 +63,8 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         kernel, offered = kernels[kernel_name], names
         if kernel_name == "friction" and issubclass(type_, Joint):
             offered = friction_names(type_.rows) | names
+        elif kernel_name in READING:
+            offered = reaction_names(type_) | names
         _check_names(type_, kernel_name, parameters(kernel), offered)
         quantities = [offered[n] for n in parameters(kernel)]
         outputs[kernel_name] = _output(type_, kernel_name, kernel, quantities, rng)

@@ -180,6 +180,12 @@ def equilibrium(
     state = None
     if start is not None:
         state = start_state(start, compiled.model, compiled.checked.registry)
+    if reading := [compiled.model.force_names[k] for group in compiled.model.forces if group.read
+                   for k in group.members.tolist()]:  # fmt: skip
+        raise SimulationError(
+            "statics does not know forces that depend on the reactions of joints: leave "
+            f"{', '.join(reading)} out of the scene, or let a damped motion come to rest"
+        )
     with compiled.borrow_evaluator() as evaluator:
         first = compiled.start(True, settings.hold, str(settings.correct_metric), state)
         rest = find_rest(evaluator, first.u, first.angles)

@@ -120,7 +120,7 @@ def _force(point: OperatingPoint, evaluator: Evaluator, name: str) -> tuple[Floa
         if kind == "wrench" and number in group.members:
             unit, columns = _columns(group, name, field) if field else ("1", [])
             return _wrench(point, evaluator, loop, group, number, columns), unit
-    raise UnknownNameError(f"input {name!r}: {element} acts by the friction of a joint alone")
+    raise UnknownNameError(f"input {name!r}: {element} acts by reactions of joints alone")
 
 
 def _columns(group: Group, name: str, field: str) -> tuple[str, list[int]]:

@@ -70,7 +70,7 @@ class BatchRunner:
                 self.parameter_map = parameter_map
                 # Switches of one copy would interrupt all, friction is iterated for all.
                 shared = evaluator.formulation.accepts_redundant or bool(evaluator.switches)
-                shared = shared or bool(compiled.model.friction)
+                shared = shared or bool(compiled.model.iterated_forces)
                 if pack > 1 and not shared and reduction.is_of_single_copies:
                     self.packed = PackedBatch(compiled, evaluator, times, pack)
 

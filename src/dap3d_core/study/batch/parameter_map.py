@@ -252,6 +252,8 @@ class ParameterMap:
         if field in self._reads(instance).constants:
             raise NotCopiedError
         component = index[0] if index else 0
+        if any(self._rows_of(instance, read).size for g, _ in self._groups() for read in g.read):
+            raise NotCopiedError  # forces that read its reaction have a copy of its numbers
         for group, first in self._groups():
             spot = group.type_info.layout.numbers.get(field)
             if spot is not None:
