@@ -35,12 +35,12 @@ ENDS, BEGINS, UNSEEN = 1, 0, -1
 # Places in ``settings``: projection tolerances of position and velocity, a scratch number, how
 # often the multipliers did not settle with friction, the numbers of the penalty formulation, how
 # often a pose was singular where something was reported, the length that tolerances speak of
-# (Model.length), 1.0 where pivots are those of equal masses, and how often the turns of an angle
-# were in doubt.
+# (Model.length), 1.0 where pivots are those of equal masses, how often the turns of an angle
+# were in doubt, and 1.0 where forces read reactions: multipliers that do not settle end a run.
 (
     TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SINGULAR, LENGTH, EVEN,
-    DOUBTFUL, SETTINGS
-) = range(12)  # fmt: skip
+    DOUBTFUL, JAMS, SETTINGS
+) = range(13)  # fmt: skip
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
@@ -74,7 +74,7 @@ class System(LoopArrays):
     weight: Floats  # (rows,) from a row's residual to one in m: 1 in scenes of ordinary size
     smallest: Floats  # (rows,) a pivot not above this is singular
     settings: Floats  # (SETTINGS,) see above
-    friction: Floats  # where joints rub: two of the size of ``force``, three of rows
+    friction: Floats  # where forces depend on multipliers (common/friction.py: memory_size)
     groups: Integers  # (loops, 3) i0, p0, count
     kinds: Integers  # (KINDS + 1,) first loop of each kind
     row: Integers  # (model rows,) place of each constraint row in the row vectors

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import EVEN, KINDS, LENGTH, Floats, Integers, System
+from dap3d_core.formulations.common.friction import memory_size
 from dap3d_core.interface.codegen.compile_loops import compiled_loop
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.kernels.runtime.function_lists import loop_list
@@ -83,9 +84,12 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         K=np.zeros(plan.matrix_size),
         weight=np.ones(plan.row_size),
         settings=np.array(
-            [1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model), 0.0]
+            [
+                *(1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model), 0.0),
+                float(any(group.read for group in model.forces)),
+            ]
         ),
-        friction=np.zeros(12 * (n + 1) + 3 * plan.row_size if model.iterated_forces else 0),
+        friction=np.zeros(memory_size(n + 1, plan.row_size) if model.iterated_forces else 0),
         idx=idx,
         groups=groups,
         kinds=starts,

@@ -124,7 +124,7 @@ class Model:
 
     @cached_property
     def iterated_forces(self) -> tuple[str, ...]:
-        """Names of the forces that depend on multipliers: friction of joints, forces on reactions."""
+        """Names of forces that depend on multipliers: friction of joints, forces on reactions."""
         groups = (*self.friction, *(group for group in self.forces if group.read))
         return tuple(self.force_names[k] for group in groups for k in group.members.tolist())
 
@@ -308,9 +308,7 @@ class _Groups:
             raise ModelError(*faults)
         self.notes = [note for grouping in by_kind.values() for note in grouping.notes]
 
-    def _read_reactions(
-        self, checked: ValidatedScene, faults: list[tuple[str, str, str]]
-    ) -> None:
+    def _read_reactions(self, checked: ValidatedScene, faults: list[tuple[str, str, str]]) -> None:
         """Bind forces to the joints whose reactions they read."""
         if faults or not any(joint_fields(group.type_info.type) for group in self.forces):
             return

@@ -100,7 +100,8 @@ def _wrong_rows(
                 declared = specs[field].rows
                 if declared is not None and declared != count:
                     refused[rows] = f"{field} is to be a joint of {_rows(declared)}"
-            refused[rows] = refused[rows] or _refusal(group, kernel, dict(zip(fields, rows)))
+            counts = dict(zip(fields, rows, strict=True))
+            refused[rows] = refused[rows] or _refusal(group, kernel, counts)
         if refused[rows]:
             owned = ", ".join(f"{n} has {_rows(c)}" for n, c in zip(names, rows, strict=True))
             yield member, f"{refused[rows]}; joint {owned}"

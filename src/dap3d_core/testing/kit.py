@@ -8,6 +8,7 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.interface.codegen.reactions import joints_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.examine.examine import examine
@@ -192,6 +193,11 @@ def _of_force(subject: SampledType) -> list[Check]:
         Check("energy", subject, energy, forces.potential),
         Check("frame", subject, ground, forces.frame),
         Check("action and reaction", subject, ground, forces.balance),
+        *(
+            [Check("unloaded", subject, "", forces.unloaded)]
+            if joints_read(subject.type_info)
+            else ()
+        ),
     ]
 
 

@@ -203,18 +203,15 @@ def differentiate_loop(
         by kernel: "wrench" or "friction" (m, slots, 6), force and moment about the mass centre;
         "J" (m, slots, rows, 6); "gamma", "nu" (m, rows).
     """
-    loop = write(type_info, what)
-    assert loop is not None
+    loop: Any = write(type_info, what)
     layout, (i0, p0, count), width = type_info.layout, group, stride(type_info)
     idx = arrays.idx[i0 : i0 + count * width].reshape(count, width)
-    slots = len(layout.slots)
-    first = slots + len(layout.functions)
+    slots, first = len(layout.slots), len(layout.slots) + len(layout.functions)
     places = [*range(slots), *range(first, first + len(layout.others))]
     rows = int(getattr(type_info.type, "rows", 0))
-    read: dict[int, int] = {}
-    if what == "friction":
-        read = row_columns(type_info) or {layout.integers: rows}
-        places += body_columns(type_info)
+    is_read = what == "friction"
+    read = (row_columns(type_info) or {layout.integers: rows}) if is_read else {}
+    places += body_columns(type_info) if is_read else []
     of_bodies = DIRECTIONS * len(places)
     by_numbers = of_bodies + sum(read.values())
     directions = by_numbers + len(numbers) + len(functions)
@@ -223,11 +220,9 @@ def differentiate_loop(
     columns = [(slots + field, order) for field, order in functions]
     by_functions = dict(zip(columns, unit[by_numbers + len(numbers) :], strict=True))
 
-    by_lambda, at = {}, of_bodies
-    for column, count_of_rows in read.items():
-        by_lambda[column] = unit[at : at + count_of_rows]
-        at += count_of_rows
-    friction = _Multipliers(multipliers, idx, by_lambda) if multipliers is not None else None
+    ends = of_bodies + np.cumsum(list(read.values()), dtype=np.int64)
+    of_rows = {c: unit[e - n : e] for (c, n), e in zip(read.items(), ends, strict=True)}
+    friction = _Multipliers(multipliers, idx, of_rows) if multipliers is not None else None
     outputs = [_Outputs(), _Outputs(friction if what == "friction" else None), _Outputs()]
     loop_arrays = SimpleNamespace(
         body=_Bodies(arrays.body, idx, places, directions),

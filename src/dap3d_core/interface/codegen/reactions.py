@@ -7,6 +7,7 @@ change, and have derivatives by the poses of all bodies.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 import attrs
 
@@ -39,7 +40,11 @@ def reaction_names(
     for field, spec in joint_fields(type_).items():
         about = f"the reaction of joint {field} on its body i"
         for head, shape, doc in (
-            ("lam", ((rows or {}).get(field) or spec.rows or MOST_ROWS,), f"multipliers of joint {field}, one a row"),
+            (
+                "lam",
+                ((rows or {}).get(field) or spec.rows or MOST_ROWS,),
+                f"multipliers of joint {field}, one a row",
+            ),
             ("force", (3,), f"force of {about}, N, global"),
             ("moment", (3,), f"moment of {about}, N m, about its mass centre, global"),
         ):
@@ -71,7 +76,11 @@ def bind_joints(type_info: TypeInfo, joints: Mapping[str, TypeInfo]) -> TypeInfo
     Raises:
         PluginError: the rows of a joint depend on an angle whose turns are counted.
     """
-    layout, width, integers = type_info.layout, type_info.layout.par_width, type_info.layout.integers
+    layout, width, integers = (
+        type_info.layout,
+        type_info.layout.par_width,
+        type_info.layout.integers,
+    )
     bound = []
     for field, joint in joints.items():
         bound.append(JointOfForce(field, joint, integers, width))
@@ -79,7 +88,7 @@ def bind_joints(type_info: TypeInfo, joints: Mapping[str, TypeInfo]) -> TypeInfo
         integers += joint.layout.integers + 1
         width += joint.layout.par_width
 
-    def renamed(of_kernel: Mapping[str, object]) -> dict[str, object]:
+    def renamed(of_kernel: Mapping[str, Any]) -> dict[str, Any]:
         return {"friction" if n == "wrench" else n: value for n, value in of_kernel.items()}
 
     return attrs.evolve(
@@ -91,6 +100,33 @@ def bind_joints(type_info: TypeInfo, joints: Mapping[str, TypeInfo]) -> TypeInfo
         joints=tuple(bound),
         given=type_info.given + "".join(f" of {j.type_info.type.keyword}" for j in bound),
     )
+
+
+def with_sample_reactions(type_info: TypeInfo) -> TypeInfo:
+    """A force with numbers of ``out2`` in place of reactions, to be examined without a scene.
+
+    Vectors among them are fixed in its first body, so that they turn with a common rigid motion.
+    """
+    first, names = 0, {}
+    for name, argument in _read(type_info).items():
+        slot = type_info.layout.slots[0]
+        numbers = "".join(f"-out2[{first + k}], " for k in range(argument.shape[0]))
+        code, needs = f"({numbers})", tuple[str, ...]()
+        if not name.startswith("lam_"):
+            code, needs = f"rotate(x_A_{slot}, {code})", (f"A_{slot}",)
+        names[name] = attrs.evolve(argument, code=code, needs=needs)
+        first += argument.shape[0]
+    return attrs.evolve(type_info, names=type_info.names | names) if names else type_info
+
+
+def sample_size(type_info: TypeInfo) -> int:
+    """Numbers of ``out2`` that stand for reactions."""
+    return sum(argument.shape[0] for argument in _read(type_info).values())
+
+
+def _read(type_info: TypeInfo) -> dict[str, KernelArgument]:
+    used = {n for kernel in READING for n in _parameters(type_info, kernel)}
+    return {n: q for n, q in reaction_names(type_info.type).items() if n in used}
 
 
 def integers_of_joints(type_info: TypeInfo) -> int:
@@ -160,7 +196,9 @@ def _parameters(type_info: TypeInfo, kernel: str) -> tuple[str, ...]:
 
 def _check_angles(type_info: TypeInfo, joint: JointOfForce) -> None:
     """The copy of the joint's numbers does not count turns."""
-    if not {f"force_{joint.field}", f"moment_{joint.field}"} & set(_parameters(type_info, "wrench")):
+    if not {f"force_{joint.field}", f"moment_{joint.field}"} & set(
+        _parameters(type_info, "wrench")
+    ):
         return
     of_joint = joint.type_info
     needed = {q.name for q in in_order(of_joint.names, parameters(of_joint.kernels["J"]))}

@@ -302,12 +302,22 @@ def _check_fields(type_: type[TypeBase]) -> None:
             "declare points, and form the others in the kernel: sub(r_Q_j, r_Q_i)"
         )
     taken = {f"{q}_{s}" for q in ("r", "A", "p", "w", "mass", "Jp") for s in body_slots(type_)}
+    reactions = reaction_names(type_)
     for name, spec in specs.items():
         other = specs.get(spec.across)
         if spec.across and (other is None or other.kind != "vector"):
             raise PluginError(f"{who}.{name} is across {spec.across}, which is no vector field")
         if name in taken:
             raise PluginError(f"{who} has a field {name}, which is the body's; take another name")
+        if name in reactions:
+            raise PluginError(
+                f"{who} has a field {name}, which is the reaction of a joint that it names; take "
+                "another name"
+            )
+        if spec.rows is not None and not (isinstance(spec.rows, int) and spec.rows > 0):
+            raise PluginError(
+                f"{who}.{name} is to be a joint of rows = {spec.rows!r}; take 1 or more"
+            )
 
 
 def _check_members(type_: type[TypeBase]) -> None:
@@ -332,6 +342,8 @@ def _check_names(
             near, declared = get_close_matches(name, names, 1), no_field(type_, name)
             hint = f"did you mean {near[0]}? " if near else ""
             hint = f"{declared}; " if declared else hint
+            if name in reaction_names(type_):
+                hint = f"reactions are known to {' and '.join(READING)} alone; "
             raise PluginError(
                 f"{who} asks for {name}, which its fields do not offer; {hint}"
                 f"they offer {', '.join(names)}"

@@ -63,7 +63,10 @@ class LuPlan:
 
 
 def make_lu_plan(
-    body_count: int, nodes: Sequence[JointNode], coupled: Iterable[tuple[int, ...]]
+    body_count: int,
+    nodes: Sequence[JointNode],
+    coupled: Iterable[tuple[int, ...]],
+    reading: Iterable[tuple[int, int]] = (),
 ) -> LuPlan:
     """Find the elimination program.
 
@@ -71,6 +74,7 @@ def make_lu_plan(
         body_count: bodies without ground, numbered from 1.
         nodes: joint nodes, as ordering/elimination_order.py merges joints.
         coupled: bodies of each element that couples them directly, ground (0) allowed.
+        reading: joint nodes, and bodies on which an element acts that reads their multipliers.
     """
     joints = len(nodes)
     sizes = [ROW_SIZE * node.rows for node in nodes] + [BODY_SIZE] * body_count
@@ -85,6 +89,9 @@ def make_lu_plan(
         there = {joints + b - 1 for b in bodies if b}
         for a in there:
             neighbours[a] |= there - {a}
+    for k, b in reading:
+        neighbours[k].add(joints + b - 1)
+        neighbours[joints + b - 1].add(k)
     before = sum(len(others) for others in neighbours)
     waits = _waits(nodes, of_body, range(1, body_count + 1)) if nodes else {}
     order, below = _eliminate(neighbours, sizes, waits)

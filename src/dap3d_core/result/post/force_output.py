@@ -144,9 +144,7 @@ class ForceLoops:
         """True if there is a loop of a kind."""
         return kind in self._loops
 
-    def call(
-        self, kind: str, time: float, out: Floats, multipliers: Floats | None = None
-    ) -> None:
+    def call(self, kind: str, time: float, out: Floats, multipliers: Floats | None = None) -> None:
         """Runs a loop, if there is one, at the current poses; it adds to ``out``.
 
         multipliers: (rows,) -lambda as the driver has it, for a loop that reads reactions.

@@ -16,6 +16,7 @@ from dap3d_core.result.post.reactions import Reaction, reactions
 from dap3d_core.scene import Scene, check
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.equilibrium.rest import Rest, find_rest
+from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import violation
 from dap3d_core.simulation.initial.start_state import NamedState, Start, start_state
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of

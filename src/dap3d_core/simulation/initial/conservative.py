@@ -34,7 +34,11 @@ def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
     """
     model = evaluator.model
     driven = any(np.any(g.functions > 0) for g in model.joints)
-    if driven or model.iterated_forces or any("energy" not in g.type_info.kernels for g in model.forces):
+    if (
+        driven
+        or model.iterated_forces
+        or any("energy" not in g.type_info.kernels for g in model.forces)
+    ):
         return False
     rng = np.random.default_rng(1)
     r, p, _, _ = split(u)

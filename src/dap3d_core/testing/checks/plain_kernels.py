@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dap3d_core.interface.codegen.kernel_arguments import friction_names, parameters
+from dap3d_core.interface.codegen.reactions import READING, reaction_names
 from dap3d_core.interface.errors import line_of, plain_words
 from dap3d_core.interface.examine.examine import ATTEMPTS
 from dap3d_core.interface.examine.random_values import random_quantity
@@ -85,6 +86,8 @@ def _not_plain(subject: SampledType, name: str, kernel: Callable[..., Any]) -> s
     offered, rng = subject.type_info.names, random.Random(f"{subject.seed} {name}")
     if name == "friction":
         offered = friction_names(subject.type.rows) | offered
+    elif name in READING:
+        offered = reaction_names(subject.type) | offered
     tries = 0
     for _ in range(ATTEMPTS):
         values = [random_quantity(offered[n], rng) for n in parameters(kernel)]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH, size
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
+from dap3d_core.interface.codegen.reactions import sample_size
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, prepared, set_ends
@@ -43,7 +44,7 @@ class RandomElement:
         fields: values of its fields, for messages.
         idx: bodies of its slots (1, 2, 3), rows of functions, bodies of vectors, row, blocks.
         par: its numbers, followed by tables.
-        lam: multipliers, for the friction of a joint.
+        lam: multipliers, for the friction of a joint; reactions that a force reads.
     """
 
     fields: Mapping[str, Any]
@@ -126,10 +127,12 @@ class Kernels:
     def _outs(self, dtype: Any, element: RandomElement) -> tuple[NDArray[Any], ...]:
         """Three outputs, large enough for every kernel; the second holds a joint's multipliers."""
         rows = getattr(self.type_info.type, "rows", 0)
-        count = 6 * BODIES * max(rows, 1) + len(self.type_info.outputs.get("switch", ()))
+        count = max(6 * BODIES * max(rows, 1), len(element.lam)) + len(
+            self.type_info.outputs.get("switch", ())
+        )
         outs = tuple(np.zeros(count) for _ in range(3))
-        if "friction" in self.names():
-            outs[1][:rows] = -np.array(element.lam)  # the solution is minus lambda
+        if "friction" in self.names() or not rows:
+            outs[1][: len(element.lam)] = -np.array(element.lam)  # the solution is minus lambda
         return tuple(out.astype(dtype) for out in outs)
 
     def _value_in(self, name: str, table: NDArray[Any], outs: tuple[NDArray[Any], ...]) -> Any:
@@ -195,7 +198,7 @@ def draw(
     poses = {s: pose(state.r[k + 1], state.p[k + 1]) for k, s in enumerate(slots)}
     values = _values(type_info, fields, poses, rng)
     shown = {n: v for n, v in fields.items() if isinstance(v, (bool, int, float, str, tuple))}
-    lam = numbers(rng, getattr(type_info.type, "rows", 0))
+    lam = numbers(rng, getattr(type_info.type, "rows", 0) or sample_size(type_info))
     return RandomElement(shown, tuple(idx), tuple(_numbers(type_info, values, rng)), lam)
 
 

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import attrs
 import numpy as np
 
+from dap3d_core.interface.codegen.reactions import with_sample_reactions
 from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
@@ -230,7 +231,10 @@ def sampled_types(type_info: TypeInfo, seed: int, poses: int) -> list[SampledTyp
     if own is not None:
         variants.append((own, type_info))
     variants += [(dict(conditions), e) for conditions, e in type_info.variants]
-    return [SampledType(_given(e, values), values, seed, poses) for values, e in variants]
+    return [
+        SampledType(with_sample_reactions(_given(e, values)), values, seed, poses)
+        for values, e in variants
+    ]
 
 
 def _given(type_info: TypeInfo, values: Mapping[str, Any]) -> TypeInfo:
