@@ -21,7 +21,7 @@ from dap3d_core.kernels.compiler import objects, ready
 
 #: The model, and how often each case is run.
 MODEL, REPEATS = "fourbar3", 5
-PLUGIN = """
+FORCE = """
 from dap3d_core.interface import Body, Force, body, hookimpl
 interface_version = 1
 class Push(Force):
@@ -48,6 +48,46 @@ body_i = "a"
 t_end = 0.1
 dt = 0.05
 """
+#: A joint of C alone: J and gamma are derived from it.
+JOINT = """
+from dap3d_core.interface import Joint, Point, hookimpl, point
+from dap3d_core.kernels import dot, sub
+interface_version = 1
+class Rod(Joint):
+    keyword, rows = "rod", 1
+    P_i: Point = point()
+    P_j: Point = point()
+    def C(r_P_i, r_P_j):
+        d = sub(r_P_i, r_P_j)
+        return ({strength} * (dot(d, d) - 1.0),)
+@hookimpl
+def dap3d_joints():
+    return [Rod]
+"""
+RODS = """
+[scene]
+name = "held"
+schema = 1
+[bodies.a]
+mass = 1.0
+Jp = [1.0, 1.0, 1.0]
+r = [1.0, 0.0, 0.0]
+[points.end]
+body = "a"
+sPp = [0.0, 0.0, 0.0]
+[points.base]
+body = "ground"
+sPp = [0.0, 0.0, 0.0]
+[joints.rod]
+type = "rod"
+P_i = "end"
+P_j = "base"
+[simulation]
+t_end = 0.1
+dt = 0.05
+"""
+#: What is edited: the plugin, its scene.
+EDITED = {"pushed": (FORCE, SCENE), "held": (JOINT, RODS)}
 
 
 def seconds(command, env, folder):
@@ -60,21 +100,24 @@ def seconds(command, env, folder):
 
 def measure():
     """Rows of the table: first runs, runs that find all in the cache, a run after an edit."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        sources, own = sys.executable, folder / "pushed"
-        own.mkdir()
-        (own / "scene.toml").write_text(SCENE)
+    with tempfile.TemporaryDirectory() as root:
+        folder = Path(root)
+        sources = sys.executable
+        for name, (_, scene) in EDITED.items():
+            (folder / name).mkdir()
+            (folder / name / "scene.toml").write_text(scene)
         cases = {
             "first run": (sources, MODEL),
             "first run from a wheel": (_python_with_wheel(folder / "wheel"), MODEL),
             "warm run": (sources, MODEL),
             "first run, radau": (sources, MODEL, "--integrator", "radau"),
-            "edit to result": (sources, str(own), "--allow-code"),
+            "edit to result": (sources, str(folder / "pushed"), "--allow-code"),
+            "edit to result, J and gamma derived": (sources, str(folder / "held"), "--allow-code"),
         }
         times = {case: [] for case in cases}
         for strength in range(REPEATS + 1):
-            (own / "plugin.py").write_text(PLUGIN.format(strength=float(-strength)))
+            for name, (plugin, _) in EDITED.items():
+                (folder / name / "plugin.py").write_text(plugin.format(strength=-1.0 - strength))
             for case, (python, *arguments) in cases.items():
                 cache = folder / case
                 if case.startswith("first run"):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from dap3d_core.exchange import export
+    from dap3d_core.formats import import_model
     from dap3d_core.interface import PluginError
     from dap3d_core.matlab import import_matlab
     from dap3d_core.plot import animate, plot
@@ -61,6 +62,7 @@ _HOMES = {
     "export": ("exchange", "export"),
     "fit": ("study.fit.fit", "fit"),
     "import_matlab": ("matlab", "import_matlab"),
+    "import_model": ("formats", "import_model"),
     "inverse": ("simulation.kinematics.inverse", "inverse"),
     "kinematics": ("simulation.kinematics.kinematics", "kinematics"),
     "linearize": ("simulation.linearization.linearization", "linearize"),
@@ -97,6 +99,7 @@ __all__ = [
     "export",
     "fit",
     "import_matlab",
+    "import_model",
     "inverse",
     "kinematics",
     "linearize",

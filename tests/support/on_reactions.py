@@ -75,3 +75,14 @@ class Servo(Force):
 
 
 ON_REACTIONS = (Brake, Tyre, PinFriction, Servo)
+
+
+class WornBrake(Brake):
+    """The brake with a state: the work of friction that its shoe has taken, J."""
+
+    keyword, states = "worn-brake", ("worn",)
+
+    def rate(a_i, w_i, w_j, force_shoe, mu, radius, w_tol):
+        speed = dot(a_i, sub(w_i, w_j))
+        load = sqrt(dot(force_shoe, force_shoe))
+        return mu * radius * load * speed * tanh(speed / w_tol)

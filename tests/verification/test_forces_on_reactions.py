@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from support.on_reactions import ON_REACTIONS
+from support.on_reactions import ON_REACTIONS, WornBrake
 from support.own_types import registry_of
 
 import dap3d_core as dap
 from dap3d_core.simulation import CompiledModel, SimulationError
 
 G = 9.81
-REGISTRY = registry_of(*ON_REACTIONS)
+REGISTRY = registry_of(*ON_REACTIONS, WornBrake)
 SETTINGS = {"t_end": 0.4, "dt": 0.1, "rtol": 1e-10, "atol": 1e-12}
 
 
@@ -59,6 +59,16 @@ def test_a_tyre_loaded_by_its_contact():
     force = -k * m * G * slip
     assert result.rd[:, 0, 0] - R * result.w[:, 0, 1] == pytest.approx(slip, abs=1e-9)
     assert result.rd[:, 0, 0] == pytest.approx(force[0] / m / rate * (1 - slip / slip[0]), abs=1e-9)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_a_rate_reads_reactions(integrator):
+    """The work that a brake takes is the kinetic energy that its drum loses."""
+    scene = drum()
+    scene.forces["brake"].type = "worn-brake"
+    result = dap.simulate(compiled(scene), integrator=integrator, **SETTINGS)
+    lost = 0.5 * 0.04 * (50.0**2 - result.w[:, 0, 2] ** 2)
+    assert result.quantity("brake.worn").values == pytest.approx(lost, abs=1e-8)
 
 
 def pendulum(own):

@@ -1,15 +1,15 @@
 """From a state to bodies, functions, forces, rows: what every formulation evaluates.
 
-The integrated state y has the order of u, with the angular velocity in body axes, and one number
-more: the work done on the system (docs/decisions/0002). It reads r, p of all bodies; v, w' of all
-bodies; work.
+The integrated state y has the order of u, with the angular velocity in body axes, and more at its
+end: the states of elements that have some (docs/decisions/0054), and the work done on the system
+(docs/decisions/0002). It reads r, p of all bodies; v, w' of all bodies; states; work.
 """
 
 from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import VALUE, Floats, System
+from dap3d_core.assembly.arrays import RATE, VALUE, Floats, System
 from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unscaled
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.kernels.runtime.array_struct import pointer
@@ -49,6 +49,31 @@ def place_bodies(y: Floats, body: Floats, metric: Floats) -> None:
 
 
 @compiled_into
+def place_states(y: Floats, system: System) -> None:
+    """States of elements of a state, whatever its coordinates: they stand before the work."""
+    states = system.states
+    first = y.shape[0] - 1 - states.shape[0]
+    for k in range(states.shape[0]):
+        states[k] = y[first + k]
+
+
+@compiled_into
+def place_state(y: Floats, system: System) -> None:
+    """Bodies and states of elements as they are in the state y."""
+    place_bodies(y, system.body, system.metric)
+    place_states(y, system)
+
+
+@compiled_into
+def state_rates(t: float, out: Floats, system: System, loops: Any) -> None:
+    """Derivatives of the elements' states into dy/dt, once the multipliers are known."""
+    count = system.states.shape[0]
+    if count > 0:
+        found = out[out.shape[0] - 1 - count :]
+        call_kinds(RATE, RATE, t, system, loops, found, system.multipliers, found)
+
+
+@compiled_into
 def place_metric(s: Floats, k: Floats) -> None:
     """B = A U of a body as placed; s: its row of body, k: its row of metric."""
     a00, a01, a02, a10, a11, a12 = s[3], s[4], s[5], s[6], s[7], s[8]
@@ -80,8 +105,8 @@ def call_kinds(
 
 @compiled_into
 def place(t: float, y: Floats, system: System, loops: Any) -> None:
-    """Bodies and functions of time as they are at time t in the state y; writes into ``force``."""
-    place_bodies(y, system.body, system.metric)
+    """Bodies, states and functions of time at time t in the state y; writes into ``force``."""
+    place_state(y, system)
     call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
 
 

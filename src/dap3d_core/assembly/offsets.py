@@ -17,6 +17,6 @@ def velocity_offset(b: int, n: int) -> int:
 
 
 @compiled_into
-def work_offset(n: int) -> int:
-    """Index of the work done on n bodies."""
+def states_offset(n: int) -> int:
+    """Index of the first state of an element, in coordinates of n bodies; the work is last."""
     return STATE * n

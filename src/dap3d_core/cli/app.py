@@ -24,7 +24,7 @@ COMMANDS = {
         "models", "plugins", "describe", "new-plugin", "check-plugin", "info", "post", "export",
         "plot", "animate", "view", "report", "import-matlab",
     )
-}  # fmt: skip
+} | {"import": "dap3d_core.cli.commands.import_model"}  # fmt: skip
 
 
 class _Commands(Mapping[str, click.Command]):

@@ -13,6 +13,7 @@ from dap3d_core.kernels.runtime.function_lists import loop_list
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.model import Group, Model
+from dap3d_core.model.element_states import first_states
 
 #: Usual alpha, Omega (1/s), mu of the penalty formulation (spec 9).
 PENALTY = (1e7, 10.0, 1.0)
@@ -78,6 +79,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         metric=metric,
         F=np.zeros((model.function_count + 1, 5)),
         par=par,
+        states=model.initial_states.copy(),
         **{name: np.zeros(6 * (n + 1)) for name in BODY_VECTORS},
         **{name: np.zeros(plan.row_size) for name in ROW_VECTORS},
         D=np.zeros(plan.block_size),
@@ -190,7 +192,7 @@ def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[An
     rows = []
     for _, group in what:
         if id(group) not in at:
-            table = _integers_of(group, plan)
+            table = _integers_of(group, plan, model)
             at[id(group)] = (i0, p0)
             numbers = group.packed_numbers(p0)
             idx.append(table.ravel())
@@ -207,10 +209,12 @@ def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[An
     )
 
 
-def _integers_of(group: Group, plan: Plan) -> Integers:
+def _integers_of(group: Group, plan: Plan, model: Model) -> Integers:
     """The rows of ``idx`` of a group, as interface/codegen/loop_source.py lays them out."""
     kind = group.type_info.type.kind
     parts = [group.bodies, group.functions]
+    if group.type_info.layout.states:
+        parts.append(first_states(model.acting, group)[:, None])
     if kind == "joint":
         joints = group.members if group.joints is None else group.joints
         parts.append(plan.joint_row[joints][:, None])
@@ -218,7 +222,8 @@ def _integers_of(group: Group, plan: Plan) -> Integers:
     elif kind == "function":
         parts.append(1 + group.members[:, None])
     for read in group.read:
-        parts += [read.bodies, read.functions, plan.joint_row[read.members][:, None]]
+        unused = np.zeros((read.count, int(bool(read.type_info.layout.states))), dtype=np.int64)
+        parts += [read.bodies, read.functions, unused, plan.joint_row[read.members][:, None]]
     table = np.ascontiguousarray(np.hstack(parts), dtype=np.int64)
     assert table.shape[1] == stride(group.type_info)
     return table

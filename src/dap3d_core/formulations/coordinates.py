@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
-from dap3d_core.model.state_layout import COORDINATES, VELOCITIES, y_from_u
+from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
@@ -18,7 +18,7 @@ class UnsuitableError(ValueError):
 
 
 class Coordinates:
-    """The integrated state y (13 n + 1,) of bodies, as in model/state_layout.py.
+    """The integrated state y of bodies, as in model/state_layout.py.
 
     Attributes:
         size: components of y that steer the step: all but the work.
@@ -28,20 +28,22 @@ class Coordinates:
     def __init__(self, evaluator: "Evaluator") -> None:
         """Args: the evaluator whose states they are."""
         self.evaluator = evaluator
-        self.size = evaluator.model.u0.size
+        self.size = evaluator.model.integrated_layout.size - 1
         self.length_count = len(evaluator.plan.nodes) - 1
 
     @property
     def quantities(self) -> list[str]:
-        """Quantity of each component, as in tolerances: "r", "p", "v" or "w"."""
-        n = self.evaluator.model.body_count
-        return [*"rrrpppp"] * n + [*"vvvwww"] * n
+        """Quantity of each component, as in tolerances: "r", "p", "v", "w" or "z"."""
+        model = self.evaluator.model
+        n = model.body_count
+        return [*"rrrpppp"] * n + [*"vvvwww"] * n + ["z"] * model.state_count
 
     @property
     def bodies(self) -> Integers:
-        """(size,) body of each component, from 0."""
-        each = np.arange(self.evaluator.model.body_count)
-        return np.concatenate([np.repeat(each, COORDINATES), np.repeat(each, VELOCITIES)])
+        """(size,) body of each component, from 0; -1 of states of elements."""
+        model = self.evaluator.model
+        each, states = np.arange(model.body_count), np.full(model.state_count, -1)
+        return np.concatenate([np.repeat(each, COORDINATES), np.repeat(each, VELOCITIES), states])
 
     def structure(self) -> tuple[str, str]:
         """Return the structure that solves the equations, and a description of its size."""
@@ -54,10 +56,10 @@ class Coordinates:
 
     def start(self, u: Floats) -> Floats:
         """The state y that a run from a state u (13 n,) begins with."""
-        return y_from_u(u)
+        return self.evaluator.integrated(u)
 
     def body_states(self, y: Floats) -> Floats:
-        """The same states (k, 13 n + 1) in coordinates of bodies."""
+        """The same states (k, size + 1) in coordinates of bodies."""
         return y
 
     def continued(self, expected: Floats, y: Floats) -> Floats:
@@ -67,4 +69,4 @@ class Coordinates:
     @contextmanager
     def at(self, u: Floats) -> Iterator[Floats]:
         """The state y of a state u, for evaluations outside a run."""
-        yield y_from_u(u)
+        yield self.evaluator.integrated(u)

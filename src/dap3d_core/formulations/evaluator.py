@@ -24,7 +24,7 @@ from dap3d_core.assembly.arrays import (
     Integers,
     System,
 )
-from dap3d_core.assembly.evaluate import call_kinds, place_bodies
+from dap3d_core.assembly.evaluate import call_kinds, place_state
 from dap3d_core.formulations import FORMULATIONS, REPORT, RHS
 from dap3d_core.formulations.arrays import build_loops, build_system, load_numbers
 from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pattern, scaled_rows
@@ -33,7 +33,14 @@ from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import euler_rates, to_body, to_global
-from dap3d_core.model.state_layout import join, split, velocities_of, y_from_u
+from dap3d_core.model.state_layout import (
+    bodies_of,
+    join,
+    split,
+    u_from_y,
+    velocities_of,
+    y_from_u,
+)
 
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
 IGNORE_FLOAT_ERRORS = np.errstate(all="ignore")
@@ -46,6 +53,7 @@ class Evaluator:
         model, plan, system, loops: what it evaluates.
         formulation: its properties.
         report_size: numbers that ``report`` writes (formulations/standard.py).
+        states: (states,) of elements, in evaluations at a state u of the bodies alone.
     """
 
     def __init__(
@@ -57,6 +65,7 @@ class Evaluator:
         announce: called with the name of each group loop that has to be compiled.
         """
         self.model = model
+        self.states: Floats = model.initial_states
         self.formulation = FORMULATIONS[method]
         self.plan: Plan = make_plan(model.body_count, model.joint_slots, model.joint_rows.tolist())
         self.loops, self.loop_groups = build_loops(model, self.formulation.loops, announce)
@@ -115,7 +124,7 @@ class Evaluator:
             ValueError: the structure is another.
         """
         self.loop_groups = load_numbers(self.system, self.model, model, self.loop_groups)
-        self.model = model
+        self.model, self.states = model, model.initial_states
         self.__dict__.pop("switches", None)  # they name groups
         self.store_initial_function_values()
         self._weigh_rows()
@@ -123,12 +132,20 @@ class Evaluator:
             self.coordinates = self.formulation.coordinates(self)
 
     @IGNORE_FLOAT_ERRORS
-    def start(self, t: float, u: ArrayLike, angles: Floats | None = None) -> None:
+    def start(
+        self,
+        t: float,
+        u: ArrayLike,
+        angles: Floats | None = None,
+        states: Floats | None = None,
+    ) -> None:
         """Make ready for a run from a state u (13 n,): whole turns are counted from here.
 
         angles: (angles,) those that the state's are within half a turn of, rad, in the order of
             reports; zeros by default.
+        states: (states,) of elements; their initial values by default.
         """
+        self.states = self.model.initial_states if states is None else states
         for places in self.turn_places():
             self.system.par[places] = 0.0
         if angles is not None:
@@ -196,13 +213,26 @@ class Evaluator:
         return self.formulation.functions(turns=turns, switches=switches)
 
     def integrated(self, u: ArrayLike) -> Floats:
-        """The integrated state y (13 n + 1,) of a state u (13 n,), in coordinates of bodies."""
-        return y_from_u(np.asarray(u, dtype=float))
+        """The integrated state y of a state u (13 n,) and ``states``, in coordinates of bodies."""
+        return y_from_u(np.asarray(u, dtype=float), states=self.states)
 
     def body_state(self, y: Floats) -> Floats:
-        """The state y (13 n + 1,) in coordinates of bodies of one that is integrated."""
+        """The state y in coordinates of bodies of one that is integrated."""
         state: Floats = self.coordinates.body_states(y[None])[0]
         return state
+
+    def bodies_of(self, y: Floats) -> Floats:
+        """View of the bodies' part (13 n,) of a state y in coordinates of bodies."""
+        return bodies_of(y, len(self.states))
+
+    def hold(self, y: Floats) -> Floats:
+        """Keep the states of elements of a state y for evaluations; its state u (13 n,).
+
+        y: in coordinates of bodies.
+        """
+        self.states = y[self.model.integrated_layout["states"]].copy()
+        u: Floats = u_from_y(y[None], len(self.states))[0]
+        return u
 
     def body_rows(self, rows: Floats) -> Floats:
         """Reported rows (k, 1 + y + report_size) with y in coordinates of bodies."""
@@ -225,19 +255,31 @@ class Evaluator:
         y = self.integrated(u)
         out = np.zeros_like(y)
         self.functions[RHS](float(t), y, out, self.system, self.loops)
-        w_dot = split(out)[3]
-        w_dot[:] = to_global(split(y)[1], w_dot)  # omega_dot = A omega'_dot, no extra term
-        return out[:-1]
+        u_dot = self.bodies_of(out)
+        w_dot = split(u_dot)[3]
+        p = split(self.bodies_of(y))[1]
+        w_dot[:] = to_global(p, w_dot)  # omega_dot = A omega'_dot, no extra term
+        return u_dot
+
+    @IGNORE_FLOAT_ERRORS
+    def state_rates(self, t: float, u: ArrayLike) -> Floats:
+        """(states,) derivatives of the states of elements at time t, a state u and ``states``."""
+        with self.coordinates.at(np.asarray(u, dtype=float)) as y:
+            out = np.zeros_like(y)
+            self.functions[RHS](float(t), y, out, self.system, self.loops)
+        rates: Floats = out[len(out) - 1 - len(self.states) : -1].copy()
+        return rates
 
     @IGNORE_FLOAT_ERRORS
     def rates(self, t: float, u: ArrayLike, v_dot: Floats) -> Floats:
-        """dy/dt (13 n + 1,) with given accelerations (6 n,): r_ddot, omega_dot of each body."""
+        """dy/dt with given accelerations (6 n,): r_ddot, omega_dot of each body."""
         y = self.integrated(u)
         out = np.zeros_like(y)
         self.functions[RHS](float(t), y, out, self.system, self.loops)
-        velocities_of(out)[:] = v_dot
-        w_dot = split(out)[3]
-        w_dot[:] = to_body(split(y)[1], w_dot)
+        u_dot = self.bodies_of(out)
+        velocities_of(u_dot)[:] = v_dot
+        w_dot = split(u_dot)[3]
+        w_dot[:] = to_body(split(self.bodies_of(y))[1], w_dot)
         return out
 
     @IGNORE_FLOAT_ERRORS
@@ -293,7 +335,7 @@ class Evaluator:
     def place(self, t: float, u: ArrayLike) -> None:
         """Place the bodies of a state u (13 n,) and evaluate the functions of time."""
         s = self.system
-        place_bodies(self.integrated(u), s.body, s.metric)
+        place_state(self.integrated(u), s)
         self._call(VALUE, t, s.force, s.force, s.force)
 
     def _call(self, kind: int, t: float, out1: Floats, out2: Floats, out3: Floats) -> None:

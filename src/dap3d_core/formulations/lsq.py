@@ -20,7 +20,13 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
-from dap3d_core.assembly.evaluate import global_accelerations, largest, rates, zero
+from dap3d_core.assembly.evaluate import (
+    global_accelerations,
+    largest,
+    rates,
+    state_rates,
+    zero,
+)
 from dap3d_core.formulations.common.constraints import (
     PART,
     project_onto,
@@ -95,6 +101,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces and drivers last."""
     power = accelerate(t, y, system, loops)
     rates(y, system.metric, system.acceleration, out)
+    state_rates(t, out, system, loops)
     out[out.shape[0] - 1] = power
 
 

@@ -21,6 +21,7 @@ from dap3d_core.assembly.evaluate import (
     place,
     rates,
     scale_forces,
+    state_rates,
     zero,
 )
 from dap3d_core.formulations.common.constraints import (
@@ -77,6 +78,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces and drivers last."""
     power = accelerate(t, y, system, loops)
     rates(y, system.metric, system.acceleration, out)
+    state_rates(t, out, system, loops)
     out[out.shape[0] - 1] = power
 
 

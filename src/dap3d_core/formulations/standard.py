@@ -14,7 +14,7 @@ solved by the block LDL^T of linear/ldlt/factor.py. Needs independent rows.
 from typing import Any
 
 from dap3d_core.assembly.arrays import EVEN, LENGTH, SINGULAR, Floats, System
-from dap3d_core.assembly.evaluate import global_accelerations, rates
+from dap3d_core.assembly.evaluate import global_accelerations, rates, state_rates
 from dap3d_core.formulations import regularised
 from dap3d_core.formulations.common.constraints import (
     acceleration_residual,
@@ -81,6 +81,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     no rounding of its acceleration any more, but noise that no step can follow.
     """
     power = solve_equations(t, y, system, loops, None, solve)
+    state_rates(t, out, system, loops)
     if system.settings[EVEN] != 0.0:
         power += settle_rows(system)
     rates(y, system.metric, system.acceleration, out)

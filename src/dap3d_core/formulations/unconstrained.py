@@ -17,9 +17,10 @@ from dap3d_core.assembly.arrays import (
 from dap3d_core.assembly.evaluate import (
     call_kinds,
     global_accelerations,
-    place_bodies,
+    place_state,
     rates,
     scale_forces,
+    state_rates,
     zero,
 )
 from dap3d_core.assembly.state_update import normalise
@@ -30,7 +31,7 @@ from dap3d_core.kernels.runtime.cache import compiled
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled ``acceleration``; returns the power of the forces."""
     body, metric, force = system.body, system.metric, system.force
-    place_bodies(y, body, metric)
+    place_state(y, system)
     zero(force)
     call_kinds(VALUE, WRENCH, t, system, loops, force, force, force)
     return scale_forces(body, metric, force, system.acceleration)
@@ -41,6 +42,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of the forces last."""
     power = accelerate(t, y, system, loops)
     rates(y, system.metric, system.acceleration, out)
+    state_rates(t, out, system, loops)
     out[out.shape[0] - 1] = power
 
 

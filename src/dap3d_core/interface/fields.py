@@ -24,8 +24,8 @@ class FieldSpec:
     """Properties of a field, for validation, documentation and the generation of loops.
 
     Attributes:
-        kind: body, point, vector, vector2, number, vec3, matrix, table, function, choice, joint or
-            angle.
+        kind: body, point, vector, vector2, number, numbers, vec3, matrix, table, function, choice,
+            joint or angle.
         default: value where the scene gives none; REQUIRED where it must.
         unit: SI unit of a number, "" for none.
         doc: its meaning, one short sentence.
@@ -40,7 +40,7 @@ class FieldSpec:
         unit_length: a vector is normalised (with a warning where its length is not 1).
         ground: a vector must be fixed in ground.
         argument: the argument of a function; "" for time.
-        columns: numbers in a row of a table.
+        columns: numbers in a row of a table; count of ``numbers``.
         given: a table is given in the scene; False: ``prepare`` returns it.
         axes: the fields an angle is measured between: two vectors, and the axis.
         rows: number of rows that a joint must have; None for any.
@@ -133,6 +133,11 @@ def number(
 def vec3(default: Any = REQUIRED, *, unit: str = "", direction: bool = False, doc: str = "") -> Any:
     """Three finite numbers; with ``direction`` a length other than 1 is noted."""
     return _field(FieldSpec("vec3", default, unit, doc, direction=direction))
+
+
+def numbers(count: int, default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
+    """As many finite numbers as ``count``."""
+    return _field(FieldSpec("numbers", default, unit, doc, columns=count))
 
 
 def matrix(default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:

@@ -34,3 +34,8 @@ GROUPS = {
     "force": ("dap3d.forces", "dap3d_forces"),
     "function": ("dap3d.functions", "dap3d_functions"),
 }
+#: The same of file formats, whose hooks lie in ``interface.formats``: no scene needs them.
+FORMAT_GROUPS = {
+    "importer": ("dap3d.importers", "dap3d_importers"),
+    "exporter": ("dap3d.exporters", "dap3d_exporters"),
+}

@@ -10,6 +10,8 @@ from typing import Any, ClassVar
 
 import attrs
 
+from dap3d_core.interface.element_states import add_state_fields, state_lengths
+
 #: Increased by one when a type written for the old interface no longer works.
 INTERFACE_VERSION = 1
 
@@ -42,6 +44,8 @@ class TypeBase:
     #: not be invariant to a common rigid motion of its bodies (docs/check-plugin.md).
     ground_axes: ClassVar[bool] = False
     symbol: ClassVar[str] = ""
+    #: States of its own: names, or name -> length (docs/concepts/kernels.md).
+    states: ClassVar[tuple[str, ...] | Mapping[str, int]] = ()
 
     def __init_subclass__(cls, **conditions: Any) -> None:
         super().__init_subclass__()
@@ -54,6 +58,7 @@ class TypeBase:
             function = vars(cls).get(name)
             if callable(function):
                 setattr(cls, name, staticmethod(function))
+        add_state_fields(cls)
         # slots would make a second class, but hooks return the first
         attrs.define(cls, slots=False, kw_only=True)
 
@@ -61,6 +66,11 @@ class TypeBase:
     def kernels(cls) -> dict[str, Callable[..., Any]]:
         """The pure functions this type defines, by name."""
         return {n: getattr(cls, n) for n in cls.kernel_names if getattr(cls, n, None) is not None}
+
+    @classmethod
+    def state_lengths(cls) -> dict[str, int]:
+        """Length of each of its states."""
+        return state_lengths(cls)
 
     def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
         """Constants of this instance, such as the coefficients of a polynomial.
@@ -111,7 +121,7 @@ class Joint(TypeBase):
     """
 
     kind = "joint"
-    kernel_names = ("C", "C_dot", "J", "gamma", "nu", "friction", "switch")
+    kernel_names = ("C", "C_dot", "J", "gamma", "nu", "friction", "switch", "rate")
     switch_words: ClassVar[str] = ""
     rows: ClassVar[int] = 0
     holonomic: ClassVar[bool | tuple[bool, ...]] = True
@@ -154,7 +164,7 @@ class Force(TypeBase):
     """
 
     kind = "force"
-    kernel_names = ("wrench", "energy", "switch")
+    kernel_names = ("wrench", "energy", "switch", "rate")
     switch_words: ClassVar[str] = ""
     each_body: ClassVar[bool] = False
     energy_where: ClassVar[str] = ""

@@ -12,12 +12,14 @@ import numpy as np
 
 from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.codegen.reactions import joint_fields
+from dap3d_core.model.element_states import ElementState, initial_values, states_of, width_of
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.rotations import read_only, to_global
 from dap3d_core.model.state_layout import (
     COORDINATES,
     VELOCITIES,
     Layout,
+    integrated_layout,
     report_layout,
     row_layout,
     state_layout,
@@ -117,9 +119,32 @@ class Model:
             for angle in group.type_info.layout.angles
         )
 
+    @cached_property
+    def state_count(self) -> int:
+        """Numbers of the states of their own that forces and joints have."""
+        return sum(width_of(g) * g.count for g in self.acting)
+
+    @cached_property
+    def element_states(self) -> tuple[ElementState, ...]:
+        """The states of forces, then of joints, in the order in which they are integrated."""
+        found: list[ElementState] = []
+        start = 0
+        for group in self.acting:
+            if width_of(group):
+                is_joint = group.type_info.type.kind == "joint"
+                names = self.joint_names if is_joint else self.force_names
+                found += states_of(group, start, names)
+                start += width_of(group) * group.count
+        return tuple(found)
+
+    @cached_property
+    def initial_states(self) -> Floats:
+        """(states,) initial values of the states of elements."""
+        return read_only(initial_values(self.acting))
+
     @property
     def acting(self) -> tuple[Group, ...]:
-        """Groups of what may have angles, in the order of the loops (formulations/arrays.py)."""
+        """Groups of what may have angles or states, in the order of the loops."""
         return (*self.forces, *self.joints)
 
     @cached_property
@@ -129,6 +154,11 @@ class Model:
         return tuple(self.force_names[k] for group in groups for k in group.members.tolist())
 
     @property
+    def integrated_layout(self) -> Layout:
+        """Layout of the integrated state y, in coordinates of bodies."""
+        return integrated_layout(self.body_count, self.state_count)
+
+    @property
     def report_layout(self) -> Layout:
         """Layout of what is reported in addition to the state."""
         return report_layout(self.body_count, self.row_count, self.angle_count)
@@ -136,7 +166,7 @@ class Model:
     @property
     def row_layout(self) -> Layout:
         """Layout of a reported row."""
-        return row_layout(self.body_count, self.row_count, self.angle_count)
+        return row_layout(self.body_count, self.row_count, self.angle_count, self.state_count)
 
     @cached_property
     def irc(self) -> Integers:

@@ -1,8 +1,9 @@
 """Layouts of state vectors and of reported rows. All offsets into them are computed here.
 
 The state u of n bodies holds the coordinates r, p of each, then the velocities r_dot, omega. The
-integrated state y has the same order, with omega' in body axes, and ends with the work done on the
-system (docs/decisions/0002). A reported row is t, y, and what is evaluated there.
+integrated state y has the same order, with omega' in body axes; behind them stand the states of
+elements that have some (docs/decisions/0054), and last the work done on the system
+(docs/decisions/0002). A reported row is t, y, and what is evaluated there.
 """
 
 from functools import cache
@@ -50,17 +51,17 @@ def state_layout(n: int) -> Layout:
 
 
 @cache
-def integrated_layout(n: int) -> Layout:
-    """Layout of the integrated state y of n bodies."""
-    return Layout(coordinates=COORDINATES * n, velocities=VELOCITIES * n, work=1)
+def integrated_layout(n: int, states: int = 0) -> Layout:
+    """Layout of the integrated state y of n bodies and so many states of elements."""
+    return Layout(coordinates=COORDINATES * n, velocities=VELOCITIES * n, states=states, work=1)
 
 
 @cache
-def tree_layout(angles: int, lengths: int, rotations: int, poses: int) -> Layout:
+def tree_layout(angles: int, lengths: int, rotations: int, poses: int, states: int = 0) -> Layout:
     """Layout of the integrated state of trees in joint coordinates, and the work.
 
     Of coordinates: angles, lengths, Euler parameters, (r, p); then their rates: of the latter two
-    omega' and (r_dot, omega').
+    omega' and (r_dot, omega'); then the states of elements.
     """
     return Layout(
         angles=angles,
@@ -71,6 +72,7 @@ def tree_layout(angles: int, lengths: int, rotations: int, poses: int) -> Layout
         length_rates=lengths,
         rotation_rates=3 * rotations,
         pose_rates=VELOCITIES * poses,
+        states=states,
         work=1,
     )
 
@@ -83,9 +85,9 @@ def report_layout(n: int, rows: int, angles: int) -> Layout:
 
 
 @cache
-def row_layout(n: int, rows: int, angles: int) -> Layout:
+def row_layout(n: int, rows: int, angles: int, states: int = 0) -> Layout:
     """Layout of a reported row."""
-    parts = integrated_layout(n), report_layout(n, rows, angles)
+    parts = integrated_layout(n, states), report_layout(n, rows, angles)
     return Layout(t=1, **{name: part.length(name) for part in parts for name in part.names})
 
 
@@ -128,14 +130,22 @@ def join(r: ArrayLike, p: ArrayLike, v: ArrayLike, w: ArrayLike) -> Floats:
     return np.concatenate([q.reshape(*q.shape[:-2], -1), s.reshape(*s.shape[:-2], -1)], axis=-1)
 
 
-def y_from_u(u: ArrayLike, work: ArrayLike = 0.0) -> Floats:
-    """Integrated states y (..., 13 n + 1) of states u (..., 13 n)."""
+def y_from_u(u: ArrayLike, work: ArrayLike = 0.0, states: ArrayLike = ()) -> Floats:
+    """Integrated states y of states u (..., 13 n) and states of elements (..., s) or (s,)."""
     r, p, v, w = split(u)
     work = np.broadcast_to(np.asarray(work, dtype=float), r.shape[:-2])[..., None]
-    return np.concatenate([join(r, p, v, to_body(p, w)), work], axis=-1)
+    own = np.asarray(states, dtype=float)
+    own = np.broadcast_to(own, (*r.shape[:-2], own.shape[-1]))
+    return np.concatenate([join(r, p, v, to_body(p, w)), own, work], axis=-1)
 
 
-def u_from_y(y: ArrayLike) -> Floats:
-    """States u (..., 13 n) of integrated states y (..., 13 n + 1)."""
-    r, p, v, w = split(y)
+def bodies_of(y: Floats, states: int) -> Floats:
+    """View of the bodies' part (..., 13 n) of integrated states y with so many states."""
+    return y[..., : y.shape[-1] - 1 - states]
+
+
+def u_from_y(y: ArrayLike, states: int = 0) -> Floats:
+    """States u (..., 13 n) of integrated states y with so many states of elements."""
+    y = np.asarray(y, dtype=float)
+    r, p, v, w = split(y[..., : y.shape[-1] - states])
     return join(r, p, v, to_global(p, w))

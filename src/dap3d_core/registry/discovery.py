@@ -11,7 +11,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.hooks import GROUPS
+from dap3d_core.interface.hooks import FORMAT_GROUPS, GROUPS
 
 #: Environment variable that excludes types, separated by commas: all of a distribution, ``NAME``,
 #: or one of them, ``NAME:KEYWORD``.
@@ -25,7 +25,8 @@ class Source:
     """Origin of a type.
 
     Attributes:
-        kind: joint, force or function; "" for a distribution whose entry points cannot be read.
+        kind: joint, force or function, importer or exporter; "" for a distribution whose entry
+            points cannot be read.
         keyword: the type's name in a scene.
         module: the module of the plugin, or the path of a model's own file.
         distribution, version: the installed package; both "" for a model's own file.
@@ -56,7 +57,8 @@ def discover(groups: Collection[str] | None = None) -> list[Source]:
     Installed distributions are read again when a folder of sys.path has changed.
 
     Args:
-        groups: entry-point groups to read; all three by default, none with an empty collection.
+        groups: entry-point groups to read; by default the three of types, none with an empty
+            collection.
     """
     wanted = frozenset(g for g, _ in GROUPS.values()) if groups is None else frozenset(groups)
     return list(_discover(wanted, blocked_words(), tuple(map(_changed, sys.path))))
@@ -67,7 +69,8 @@ def _discover(
     groups: frozenset[str], blocked: frozenset[str], path: tuple[tuple[str, int], ...]
 ) -> tuple[Source, ...]:
     """The types; ``path`` is the search path with times of change, a key of the cache."""
-    kinds = {group: kind for kind, (group, _) in GROUPS.items() if group in groups}
+    known = (GROUPS | FORMAT_GROUPS).items()
+    kinds = {group: kind for kind, (group, _) in known if group in groups}
     sources = [source for one in _declaring(kinds) for source in _sources(one, kinds, blocked)]
     order = {kind: k for k, kind in enumerate(GROUPS)}
     sources.sort(key=lambda s: (order.get(s.kind, -1), s.keyword, s.distribution))

@@ -8,7 +8,7 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import read_only
-from dap3d_core.model.state_layout import Layout, row_layout, state_layout, u_from_y
+from dap3d_core.model.state_layout import Layout, bodies_of, row_layout, state_layout, u_from_y
 from dap3d_core.result.model_summary import ModelSummary
 
 #: Components of a vector, and of Euler parameters.
@@ -58,6 +58,7 @@ COLUMNS = (
     Column("velocity_residual", "", "SI", "largest |D v - nu| of the constraint rows"),
     Column("acceleration_residual", "", "SI", "largest |D v_dot - gamma| of the constraint rows"),
     Column("angles", "angle", "rad", "angles of forces and joints that count whole turns"),
+    Column("states", "element_state", "SI", "states of their own of forces and joints"),
 )
 #: Present only where a run estimated its error (post/global_error.py).
 U_ERROR = Column(
@@ -78,6 +79,7 @@ class Arrays:
         potential_energy: (nt,) J.
         position_residual, velocity_residual, acceleration_residual: (nt,) largest magnitude.
         angles: (nt, k) of k angles whose turns are counted, rad, as in ``Model.angles_of``.
+        states: (nt, s) states of forces and joints, as in ``ModelSummary.state_names``.
         u_error: (nt, 13 n) estimated error of u; None where the run made no estimate.
     """
 
@@ -91,6 +93,7 @@ class Arrays:
     velocity_residual: Floats
     acceleration_residual: Floats
     angles: Floats
+    states: Floats
     u_error: Floats | None = None
 
     def __attrs_post_init__(self) -> None:
@@ -109,8 +112,9 @@ class Arrays:
 
     @property
     def width(self) -> int:
-        """Numbers of u, v_dot, Lam and angles at an instant."""
-        return sum(a.shape[1] for a in (self.u, self.v_dot, self.Lam, self.angles))
+        """Numbers of u, v_dot, Lam, angles and states at an instant."""
+        every = self.u, self.v_dot, self.Lam, self.angles, self.states
+        return sum(a.shape[1] for a in every)
 
     def columns(self) -> Iterator[Floats]:
         """The arrays of ``COLUMNS``, in their order."""
@@ -146,7 +150,7 @@ def joined(parts: Sequence[Arrays]) -> Arrays:
 def column_sizes(summary: ModelSummary) -> dict[str, int]:
     """Length of each dimension that a column may have besides time."""
     row = _layout(summary)
-    sizes = {"velocity": "v_dot", "row": "Lam", "angle": "angles"}
+    sizes = {"velocity": "v_dot", "row": "Lam", "angle": "angles", "element_state": "states"}
     state = state_layout(summary.body_count).size
     return {"state": state} | {k: row.length(name) for k, name in sizes.items()}
 
@@ -157,25 +161,27 @@ def row_width(summary: ModelSummary) -> int:
 
 
 def _layout(summary: ModelSummary) -> Layout:
-    return row_layout(summary.body_count, summary.row_count, summary.angle_count)
+    states = len(summary.state_names)
+    return row_layout(summary.body_count, summary.row_count, summary.angle_count, states)
 
 
-def _states(y: Floats) -> Floats:
-    """States of integrated states, bit for bit the same however the rows are cut into pieces.
+def _states(y: Floats, states: int) -> Floats:
+    """States u of integrated states, bit for bit the same however the rows are cut into pieces.
 
     Of one vector alone numpy adds the products in another order than of several.
     """
     if len(y) > 1:
-        return u_from_y(y)
-    return u_from_y(np.repeat(y, 2, axis=0))[:1] if len(y) else y[:, :-1]
+        return u_from_y(y, states)
+    return u_from_y(np.repeat(y, 2, axis=0), states)[:1] if len(y) else bodies_of(y, states)
 
 
 def arrays_of(rows: Floats, summary: ModelSummary) -> Arrays:
     """Splits rows of integrator output into arrays.
 
     Args:
-        rows: (nt, row_width): t; the integrated state (angular velocity in body axes, work last);
-            v_dot; lambda; angles; potential energy; largest residuals of the three levels.
+        rows: (nt, row_width): t; the integrated state (angular velocity in body axes; states of
+            elements; work last); v_dot; lambda; angles; potential energy; largest residuals of the
+            three levels.
         summary: the model of the rows.
 
     Raises:
@@ -186,7 +192,10 @@ def arrays_of(rows: Floats, summary: ModelSummary) -> Arrays:
     if rows.ndim != 2 or rows.shape[1] != width:
         raise ValueError(f"rows should have the shape (nt, {width}), not {rows.shape}")
     layout = _layout(summary)
-    t, *_, work, v_dot, Lam, angles, energy, residuals = (rows[:, layout[n]] for n in layout.names)
-    u = _states(rows[:, layout["coordinates"].start : layout["work"].stop])
-    columns = (t[:, 0], u, v_dot, Lam, work[:, 0], energy[:, 0], *residuals.T, angles)
+    t, _, _, states, work, v_dot, Lam, angles, energy, residuals = (
+        rows[:, layout[name]] for name in layout.names
+    )
+    y = rows[:, layout["coordinates"].start : layout["work"].stop]
+    u = _states(y, states.shape[1])
+    columns = (t[:, 0], u, v_dot, Lam, work[:, 0], energy[:, 0], *residuals.T, angles, states)
     return Arrays(*map(np.array, columns))

@@ -25,6 +25,8 @@ class ModelSummary:
         is_isolated: True if momentum is conserved: no force, and no joint with ground or with a
             single body.
         angle_count: number of angles of forces and joints with counted turns.
+        state_names: (states,) of each number of the elements' states: forces.spring.z, or
+            forces.spring.z.1 where there are several.
     """
 
     body_names: tuple[str, ...]
@@ -38,6 +40,7 @@ class ModelSummary:
     has_potential: bool
     is_isolated: bool
     angle_count: int = 0
+    state_names: tuple[str, ...] = ()
 
     @property
     def body_count(self) -> int:
@@ -94,8 +97,10 @@ def summary_of(model: Model) -> ModelSummary:
         point_names=model.point_names,
         point_body=model.point_body,
         point_local=model.point_local,
-        has_potential=all("energy" in g.type_info.type.kernels() for g in model.forces),
+        has_potential=not model.state_count
+        and all("energy" in g.type_info.type.kernels() for g in model.forces),
         is_isolated=not model.forces
         and all(len(slots) > 1 and 0 not in slots for slots in model.joint_slots),
         angle_count=model.angle_count,
+        state_names=tuple(name for state in model.element_states for name in state.labels),
     )

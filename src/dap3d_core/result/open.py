@@ -114,6 +114,8 @@ def _subject(dataset: Any, values: dict[str, Any]) -> ModelSummary:
             shape = [0, *(3 for _ in constant.dimensions[1:])]
             kind = "i8" if constant.name in ("joint_rows", "point_body") else "f8"
             parts[constant.name] = np.zeros(shape, dtype=kind)
+    if "element_state" in dataset.dimensions:
+        parts["state_names"] = tuple(map(str, dataset.variables["element_state"][:]))
     if "angle" in dataset.dimensions:
         parts["angle_count"] = len(dataset.dimensions["angle"])
     for flag in ("has_potential", "is_isolated"):

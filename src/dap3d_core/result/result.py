@@ -339,7 +339,9 @@ class Result:
         missing = {index[name]: name for name in names if name not in self._reactions}
         if missing:
             evaluator, angles = self.evaluator, self._angles()
-            by_joint = reactions(evaluator, self.t, self.u, self.Lam, missing, angles)
+            by_joint = reactions(
+                evaluator, self.t, self.u, self.Lam, missing, angles, self._states()
+            )
             self._reactions |= {missing[joint]: actions for joint, actions in by_joint.items()}
 
     # ------------------------------------------------------------------ forces
@@ -375,7 +377,7 @@ class Result:
             actuation = self.record.actuation.get(name)
             self._forces[name] = force_output(
                 self.evaluator, self.t, self.u, self.v_dot, name, index, self.Lam, self._angles(),
-                None if actuation is None else np.array(actuation),
+                None if actuation is None else np.array(actuation), self._states(),
             )  # fmt: skip
         return self._forces[name]
 
@@ -390,6 +392,10 @@ class Result:
         )
         self.note(note)
         return None
+
+    def _states(self) -> Floats | None:
+        """(nt, s) states of elements; None of a scene without any."""
+        return self.arrays.states if self.summary.state_names else None
 
     # ------------------------------------------------------------------ system
 

@@ -338,7 +338,8 @@ def check_position(run: RunState, rows: int) -> None:
         ValueError: it does not.
     """
     model, last = run.evaluator.model, run.present
-    state_of(u_from_y(run.evaluator.body_state(last.y)[None])[0], model.body_names)
+    y = run.evaluator.body_state(last.y)
+    state_of(u_from_y(y[None], model.state_count)[0], model.body_names)
     reported = last.work.next_report
     if rows - reported not in (0, 1):  # an event that ends a run reports its own instant
         raise ValueError(f"{rows} rows are reported of the {reported} that its instants need")

@@ -9,7 +9,6 @@ import attrs
 import numpy as np
 
 from dap3d_core.integrators import Integration, StepCounts
-from dap3d_core.model.state_layout import integrated_layout
 from dap3d_core.result import INFORMATION, EventRecord, RunMetadata, RunStatistics
 from dap3d_core.scene import Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -200,7 +199,7 @@ class RunState:
         """
         if self.evaluator.formulation.has_own_coordinates:
             return {}
-        part = integrated_layout(self.evaluator.model.body_count)["velocities"]
+        part = self.evaluator.model.integrated_layout["velocities"]
         noise = np.zeros(6)
         for integration in self.integrations:
             rows = integration.rate_noise[part].reshape(-1, 6)

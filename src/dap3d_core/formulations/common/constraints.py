@@ -31,6 +31,7 @@ from dap3d_core.assembly.evaluate import (
     largest_weighted,
     place,
     place_bodies,
+    place_state,
     scale_forces,
     scale_velocities,
     zero,
@@ -122,7 +123,7 @@ def evaluate_forces(t: float, y: Floats, system: System, loops: Any) -> float:
     Functions of time stand ready after that.
     """
     body, metric, force = system.body, system.metric, system.force
-    place_bodies(y, body, metric)
+    place_state(y, system)
     zero(force)
     call_kinds(VALUE, WRENCH, t, system, loops, force, force, force)
     return scale_forces(body, metric, force, system.acceleration)

@@ -51,6 +51,7 @@ MOST_NAMES = 5
 QUANTITIES = {
     "angles": "p", "lengths": "r", "rotations": "pppp", "poses": "rrrpppp",
     "angle_rates": "w", "length_rates": "v", "rotation_rates": "www", "pose_rates": "vvvwww",
+    "states": "z",
 }  # fmt: skip
 
 
@@ -86,7 +87,7 @@ class Coordinates:
         if tree.kept:
             raise UnsuitableError(_why_kept(model, tree.kept, reasons))
         self.evaluator = evaluator
-        self.nodes: TreeNodes = tree_nodes(tree, motions, model.body_count)
+        self.nodes: TreeNodes = tree_nodes(tree, motions, model.body_count, model.state_count)
         self.size = self.nodes.layout.size - 1
         evaluator.system = _with_tree(
             evaluator.system, self.nodes, tree, evaluator.plan, model.joint_rows
@@ -102,8 +103,8 @@ class Coordinates:
 
     @property
     def bodies(self) -> Integers:
-        """(size,) body that each component moves, from 0."""
-        table, found = self.nodes.table, np.zeros(self.size, dtype=np.int64)
+        """(size,) body that each component moves, from 0; -1 of states of elements."""
+        table, found = self.nodes.table, np.full(self.size, -1)
         for motion, (_, _, size, rate_size) in SEGMENTS.items():
             nodes = 1 + np.flatnonzero(table[1:, MOTION] == motion)
             for column, count in ((COORDINATE, size), (RATE, rate_size)):
@@ -123,11 +124,13 @@ class Coordinates:
         """The state y of a run from a state u (13 n,), whose poses become the reference."""
         reference = Reference(self.nodes, self.evaluator.model, u)
         self._tree.constants[:] = reference.constants()
-        return reference.state()
+        y = reference.state()
+        y[self.nodes.layout["states"]] = self.evaluator.states
+        return y
 
     def body_states(self, y: Floats) -> Floats:
-        """States (k, 13 n + 1) of bodies of states (k, size + 1)."""
-        out = np.empty((len(y), self.evaluator.model.u0.size + 1))
+        """States (k, ...) in coordinates of bodies of states (k, size + 1)."""
+        out = np.empty((len(y), self.evaluator.model.integrated_layout.size))
         for state, row in zip(y, out, strict=True):
             body_state(state, row, self.evaluator.system)
         return out

@@ -26,9 +26,16 @@ from dap3d_core.assembly.arrays import (
     Floats,
     System,
 )
-from dap3d_core.assembly.evaluate import call_kinds, place_metric, scale_forces, zero
+from dap3d_core.assembly.evaluate import (
+    call_kinds,
+    place_metric,
+    place_states,
+    scale_forces,
+    state_rates,
+    zero,
+)
 from dap3d_core.assembly.metric import in_body_axes
-from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset, work_offset
+from dap3d_core.assembly.offsets import coordinate_offset, states_offset, velocity_offset
 from dap3d_core.formulations.common.constraints import (
     linearise,
     report_levels,
@@ -57,11 +64,13 @@ TWO_TURNS = 12.566370614359172
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces last."""
     place_tree(y, system)
+    place_states(y, system)
     apply_forces(t, system, loops)
     power = reduce_tree(system, system.force)
     if has_friction(system):
         power = accelerate(t, system, loops)
     spread_tree(y, out, system)
+    state_rates(t, out, system, loops)
     out[out.shape[0] - 1] = power
 
 
@@ -131,6 +140,7 @@ def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> Non
 def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
     place_tree(y, system)
+    place_states(y, system)
     apply_forces(t, system, loops)
     accelerate(t, system, loops)
     body_accelerations(system, out)
@@ -143,6 +153,7 @@ def accepted(t: float, y: Floats, out: Floats, system: System, loops: Any) -> No
     """Count the turns of angles at an accepted state; ``out`` is left as it is."""
     doubtful = system.settings[DOUBTFUL : DOUBTFUL + 1]
     place_tree(y, system)
+    place_states(y, system)
     call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
     call_kinds(ANGLE, ANGLE, t, system, loops, doubtful, doubtful, doubtful)
 
@@ -152,6 +163,7 @@ def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Switches at a state into ``out``, as in common/switching_functions.py."""
     place_of_next = system.settings[SCRATCH : SCRATCH + 1]
     place_tree(y, system)
+    place_states(y, system)
     call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
     place_of_next[0] = 0.0
     call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, place_of_next)
@@ -159,7 +171,7 @@ def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 
 @compiled
 def body_state(y: Floats, out: Floats, system: System) -> None:
-    """The integrated state in body coordinates (13 n + 1,) of one in joint coordinates."""
+    """The integrated state in coordinates of bodies of one in joint coordinates."""
     body = system.body
     n = body.shape[0] - 1
     place_tree(y, system)
@@ -170,4 +182,6 @@ def body_state(y: Floats, out: Floats, system: System) -> None:
         for k in range(4):
             out[c + 3 + k] = s[18 + k]
         out[f + 3], out[f + 4], out[f + 5] = in_body_axes(s, s[15], s[16], s[17])
-    out[work_offset(n)] = y[y.shape[0] - 1]
+    last, count = y.shape[0] - 1, system.states.shape[0]
+    for k in range(count + 1):
+        out[states_offset(n) + k] = y[last - count + k]

@@ -101,8 +101,10 @@ class TreeNodes:
     frame: Integers
 
 
-def tree_nodes(tree: SpanningTree, motions: ModelMotions, body_count: int) -> TreeNodes:
-    """Lay out the nodes of a tree."""
+def tree_nodes(
+    tree: SpanningTree, motions: ModelMotions, body_count: int, state_count: int
+) -> TreeNodes:
+    """Lay out the nodes of a tree; its state has as many states of elements besides."""
     chains = list(_chains(tree, motions))
     parts = np.ones(len(tree.joint), dtype=np.int64)
     for entries, _, kinds, *_ in chains:
@@ -126,7 +128,7 @@ def tree_nodes(tree: SpanningTree, motions: ModelMotions, body_count: int) -> Tr
     parent = np.arange(count) - 1
     parent[0], parent[first] = 0, node_of_body[tree.parent]
     table = _table(motion, parent, body, body_count)
-    layout = _place_coordinates(table)
+    layout = _place_coordinates(table, state_count)
     return TreeNodes(table, tuple(groups), layout, int(table[:, ROW].max()) + 1, body, frame)
 
 
@@ -163,10 +165,10 @@ def _table(motion: Integers, parent: Integers, body: Integers, body_count: int) 
     return table
 
 
-def _place_coordinates(table: Integers) -> Layout:
+def _place_coordinates(table: Integers, state_count: int) -> Layout:
     """Give every node its places in the state; the layout of that."""
     counts = [int(np.count_nonzero(table[1:, MOTION] == motion)) for motion in SEGMENTS]
-    layout = tree_layout(*counts)
+    layout = tree_layout(*counts, states=state_count)
     for motion, (segment, rates, size, rate_size) in SEGMENTS.items():
         nodes = 1 + np.flatnonzero(table[1:, MOTION] == motion)
         order = np.arange(len(nodes))

@@ -23,7 +23,7 @@ from typing import Any, ClassVar
 import attrs
 
 from dap3d_core.assembly.arrays import Floats, Integers, System
-from dap3d_core.assembly.evaluate import rates, zero
+from dap3d_core.assembly.evaluate import rates, state_rates, zero
 from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unscaled
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.assembly.state_update import add_displacement
@@ -120,6 +120,7 @@ def evaluate_stage(
         power += apply_friction(t, system, loops)
     add_transposed(system.blocks, system.D, x, -1.0, system.acceleration)
     rates(y, system.metric, system.acceleration, out)
+    state_rates(t, out, system, loops)
     out[out.shape[0] - 1] = power + power_of_drivers(system)
     zero(system.change)
     add_transposed(system.blocks, system.D, mu, 1.0, system.change)

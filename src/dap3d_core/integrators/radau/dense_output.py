@@ -13,8 +13,8 @@ polynomial's, moved onto D v_dot = gamma, since the multipliers of the stages ar
 from typing import Any
 
 from dap3d_core.assembly.arrays import VALUE, Floats, System
-from dap3d_core.assembly.evaluate import call_kinds, place_bodies, rates, zero
-from dap3d_core.assembly.offsets import velocity_offset, work_offset
+from dap3d_core.assembly.evaluate import call_kinds, place_state, rates, zero
+from dap3d_core.assembly.offsets import velocity_offset
 from dap3d_core.formulations.common.constraints import (
     PART,
     acceleration_residual,
@@ -55,7 +55,7 @@ def find_slope(
     inverse, stages = work.method.inverse, work.Z
     metric, force = system.metric, system.force
     n = metric.shape[0] - 1
-    place_bodies(y, system.body, metric)
+    place_state(y, system)
     if system.row.shape[0] > 0:
         call_kinds(VALUE, VALUE, t1, system, loops, force, force, force)
         linearise(t1, system, loops)
@@ -66,10 +66,10 @@ def find_slope(
     else:
         zero(system.change)
     rates(y, metric, system.change, out)
-    for k in range(velocity_offset(1, n), work_offset(n)):
+    last = y.shape[0] - 1
+    for k in range(velocity_offset(1, n), last):
         out[k] += (inverse[2, 0] * stages[0, k] + inverse[2, 1] * stages[1, k]
                    + inverse[2, 2] * stages[2, k]) / h  # fmt: skip
-    last = work_offset(n)
     out[last] = work.F[2, last]
     return 0.0
 

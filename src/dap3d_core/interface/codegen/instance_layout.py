@@ -6,6 +6,7 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.interface.element_states import state_shape
 from dap3d_core.interface.fields import slot_of, specs_of
 from dap3d_core.interface.types import TypeBase
 
@@ -30,6 +31,8 @@ class InstanceLayout:
         tables: name -> (offset of its start and its number of rows, columns).
         angles: name -> offset of the angle at the last accepted step, its rate and the time there.
         par_width: numbers of an instance.
+        states: name -> (offset, shape) of its own states; the index of the first one among those
+            of all elements is the last of these integers.
     """
 
     slots: tuple[str, ...]
@@ -40,11 +43,17 @@ class InstanceLayout:
     tables: dict[str, tuple[int, int]]
     angles: dict[str, int]
     par_width: int
+    states: dict[str, Place] = attrs.field(factory=dict)
 
     @property
     def integers(self) -> int:
-        """Number of bodies and functions of an instance in ``idx``."""
-        return len(self.slots) + len(self.functions) + len(self.others)
+        """Number of bodies and functions of an instance in ``idx``, and of its states' index."""
+        return len(self.slots) + len(self.functions) + len(self.others) + bool(self.states)
+
+    @property
+    def state_width(self) -> int:
+        """Numbers of all states of an instance."""
+        return sum(size(shape) for _, shape in self.states.values())
 
 
 def body_slots(type_: type[TypeBase]) -> tuple[str, ...]:
@@ -90,9 +99,9 @@ def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> InstanceLa
         elif spec.kind == "vector2":
             numbers["P_i"], numbers["P_j"] = (width, (3,)), (width + 3, (3,))
             width += 6
-        elif spec.kind in shapes:
-            numbers[name] = width, shapes[spec.kind]
-            width += size(shapes[spec.kind])
+        elif spec.kind in shapes or spec.kind == "numbers":
+            numbers[name] = width, shapes.get(spec.kind, (spec.columns,))
+            width += size(numbers[name][1])
             if spec.kind == "vector" and not spec.ground and slot_of(name) not in slots:
                 others.append(name)
         elif spec.kind == "function" and not spec.argument:
@@ -105,5 +114,16 @@ def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> InstanceLa
         numbers[name] = width, shape_of(constants[name])
         width += size(numbers[name][1])
     return InstanceLayout(
-        slots, tuple(functions), tuple(others), stored, numbers, tables, angles, width
-    )
+        slots, tuple(functions), tuple(others), stored, numbers, tables, angles, width,
+        state_places(type_),
+    )  # fmt: skip
+
+
+def state_places(type_: type[TypeBase]) -> dict[str, Place]:
+    """Offset and shape of each state."""
+    states: dict[str, Place] = {}
+    offset = 0
+    for name, length in type_.state_lengths().items():
+        states[name] = offset, state_shape(length)
+        offset += length
+    return states

@@ -15,7 +15,7 @@ from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import TypeBase
 
 #: Kernels that may use quantities of the velocity level; all others use positions and time only.
-VELOCITY_KERNELS = ("C_dot", "gamma", "wrench", "friction", "switch")
+VELOCITY_KERNELS = ("C_dot", "gamma", "wrench", "friction", "switch", "rate")
 #: Numbers of a force ``friction`` for the kernel ``friction`` of its joint.
 FRICTION_NUMBERS = ("mu", "v_tol", "radius")
 #: Suffixes of a function's value and derivatives.
@@ -83,6 +83,8 @@ def namespace(type_: type[TypeBase], layout: InstanceLayout) -> dict[str, Kernel
             _offer_field(offer, name, spec, layout)
     for name in layout.constants:
         _offer_constant(offer, name, layout)
+    for name, (at, shape) in layout.states.items():
+        offer(name, shape, _state(at, shape), doc="state of the element", derivable=False)
     return names
 
 
@@ -131,7 +133,7 @@ def _offer_field(
         rates = {"rate": grows, "rate_name": f"{name}_dot"}
         offer(name, (3,), "sub(x_r_P_j, x_r_P_i)", ("r_P_i", "r_P_j"), doc=between, **rates)
         offer(f"{name}_dot", (3,), "sub(x_v_P_j, x_v_P_i)", ("v_P_i", "v_P_j"), True, rate)
-    elif spec.kind in ("number", "vec3", "matrix"):
+    elif spec.kind in ("number", "numbers", "vec3", "matrix"):
         doc = f"{spec.doc or name}{f', {spec.unit}' if spec.unit else ''}"
         offer(name, layout.numbers[name][1], stored(layout, name), doc=doc)
     elif spec.kind == "function":
@@ -232,6 +234,11 @@ def stored(layout: InstanceLayout, name: str) -> str:
     if shape == (3, 3):
         return f"matrix_in(par, p1 + {offset})"
     return _nested(shape, offset)
+
+
+def _state(at: int, shape: tuple[int, ...]) -> str:
+    """Expression for a state of an instance."""
+    return _tuple(f"states[z0 + {at} + {{}}]", shape[0]) if shape else f"states[z0 + {at}]"
 
 
 def _nested(shape: tuple[int, ...], offset: int) -> str:

@@ -1,9 +1,10 @@
 """Source of the group loops of a type: compute quantities, call the kernels, store numbers.
 
 The integers of an instance are in ``idx`` from ``b0``: the bodies of its slots, the rows of F of
-its functions, the bodies of its vectors of no slot, then for a joint the index of its first row in
-the row vectors and for each slot that of its block in D, and for a force those of the joints whose
-reactions it reads; its numbers are in ``par`` from ``p1``.
+its functions, the bodies of its vectors of no slot, the index of its first state where it has
+states of its own, then for a joint the index of its first row in the row vectors and for each slot
+that of its block in D, and for a force those of the joints whose reactions it reads; its numbers
+are in ``par`` from ``p1``.
 """
 
 from collections.abc import Iterable, Sequence
@@ -26,6 +27,7 @@ LOOP_KINDS = {
     "switch": ("switch",),
     "angle": (),  # the angles of the type's fields, at an accepted step
     "turned": (),  # the same angles, for reports
+    "rate": ("rate",),
     "knot": ("knot",),  # as switches; of functions of an argument (specialise.py)
 }
 
@@ -50,12 +52,14 @@ def write(type_info: TypeInfo, what: str) -> Loop | None:
     if not kernels and not wanted:
         return None
     instance, numbers = f"i0 + q * {stride(type_info)}", f"p0 + q * {layout.par_width}"
-    reads = type_info.joints if what == "friction" else ()
+    reads = type_info.joints if what in ("friction", "rate") else ()
     lines = list(reaction_lines(type_info, wanted, instance, numbers)) if reads else []
     lines += [f"b0 = {instance}", f"p1 = {numbers}"]
     lines += [f"b_{s} = idx[b0 + {n}]" for n, s in enumerate(layout.slots)]
     first = len(layout.slots) + len(layout.functions)
     lines += [f"b_{name} = idx[b0 + {first + n}]" for n, name in enumerate(layout.others)]
+    if layout.states:
+        lines += [f"z0 = idx[b0 + {layout.integers - 1}]", "states = arrays.states"]
     if type_info.type.kind == "joint":
         lines.append(f"row = idx[b0 + {layout.integers}]")
     lines += [f"x_{q.name} = {q.code}" for q in in_order(type_info.names, wanted) if q.code]
@@ -100,6 +104,8 @@ def _store(type_info: TypeInfo, kernel: str) -> Iterable[str]:
         yield from (f"F[row, {k}] = {path}" for k, path in enumerate(paths))
     elif kernel in ("switch", "knot"):
         yield from _append(paths)
+    elif kernel == "rate":
+        yield from (f"out1[z0 + {k}] = {path}" for k, path in enumerate(paths))
     elif kernel in ("wrench", "friction"):
         for n, s in enumerate(layout.slots):
             yield f"d = 6 * b_{s}"

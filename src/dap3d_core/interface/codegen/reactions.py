@@ -74,7 +74,7 @@ def bind_joints(type_info: TypeInfo, joints: Mapping[str, TypeInfo]) -> TypeInfo
         the type, with its ``wrench`` as kernel ``friction``.
 
     Raises:
-        PluginError: the rows of a joint depend on an angle whose turns are counted.
+        PluginError: J of a joint depends on an angle whose turns are counted, or on a state.
     """
     layout, width, integers = (
         type_info.layout,
@@ -84,7 +84,7 @@ def bind_joints(type_info: TypeInfo, joints: Mapping[str, TypeInfo]) -> TypeInfo
     bound = []
     for field, joint in joints.items():
         bound.append(JointOfForce(field, joint, integers, width))
-        _check_angles(type_info, bound[-1])
+        _check_own(type_info, bound[-1])
         integers += joint.layout.integers + 1
         width += joint.layout.par_width
 
@@ -194,17 +194,16 @@ def _parameters(type_info: TypeInfo, kernel: str) -> tuple[str, ...]:
     return parameters(type_info.kernels[kernel]) if kernel in type_info.kernels else ()
 
 
-def _check_angles(type_info: TypeInfo, joint: JointOfForce) -> None:
-    """The copy of the joint's numbers does not count turns."""
-    if not {f"force_{joint.field}", f"moment_{joint.field}"} & set(
-        _parameters(type_info, "wrench")
-    ):
+def _check_own(type_info: TypeInfo, joint: JointOfForce) -> None:
+    """The copy of the joint's numbers counts no turns, and has no states."""
+    vectors = {f"force_{joint.field}", f"moment_{joint.field}"}
+    if not vectors & {n for kernel in READING for n in _parameters(type_info, kernel)}:
         return
     of_joint = joint.type_info
     needed = {q.name for q in in_order(of_joint.names, parameters(of_joint.kernels["J"]))}
-    if angles := sorted(needed & set(of_joint.layout.angles)):
+    if own := sorted(needed & {*of_joint.layout.angles, *of_joint.layout.states}):
         raise PluginError(
             f"{where_is(type_info.type)} asks for the reaction of joint {joint.field}; but J of "
-            f"{of_joint.type.keyword} depends on the turns of its angle {angles[0]}, which only "
-            f"the joint counts: take lam_{joint.field}"
+            f"{of_joint.type.keyword} depends on {own[0]}, which only the joint knows: take "
+            f"lam_{joint.field}"
         )

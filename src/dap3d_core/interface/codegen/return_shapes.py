@@ -4,6 +4,7 @@ Kernels may omit brackets around a single entry: a joint of one row may return a
 an element of one body its pair or block. ``entries`` gives the expression of each number.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 from dap3d_core.interface.codegen.instance_layout import shape_of, size
@@ -29,6 +30,25 @@ def entries(value: Any, shape: tuple[int, ...], what: str, name: str = "out") ->
     if size(actual) != size(shape) or [n for n in actual if n > 1] != [n for n in shape if n > 1]:
         raise ShapeError(f"it should return {what}, shape {shape}; it returned shape {actual}")
     return _paths(actual, name)
+
+
+def state_entries(value: Any, shapes: Sequence[tuple[int, ...]], name: str = "out") -> list[str]:
+    """As ``entries``, of what ``rate`` returns: the derivative of each state, in their order.
+
+    Raises:
+        ShapeError: the value has another shape.
+    """
+    what = f"{sum(map(size, shapes))} numbers, the derivatives of its states"
+    if len(shapes) == 1:
+        return entries(value, shapes[0], what, name)
+    count = len(value) if isinstance(value, (tuple, list)) else 1
+    if count != len(shapes):
+        raise ShapeError(
+            f"it should return {len(shapes)} derivatives, one for each state; it returned {count}"
+        )
+    parts = zip(value, shapes, strict=True)
+    found = [entries(part, shape, what, f"{name}[{k}]") for k, (part, shape) in enumerate(parts)]
+    return [path for paths in found for path in paths]
 
 
 def checked_shape(value: Any) -> tuple[int, ...]:

@@ -15,7 +15,13 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.body_pose import BodyPose
-from dap3d_core.interface.codegen.instance_layout import InstanceLayout, body_slots, layout_of, size
+from dap3d_core.interface.codegen.instance_layout import (
+    InstanceLayout,
+    body_slots,
+    layout_of,
+    size,
+    state_places,
+)
 from dap3d_core.interface.codegen.kernel_arguments import (
     VELOCITY_KERNELS,
     KernelArgument,
@@ -24,10 +30,17 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     parameters,
 )
 from dap3d_core.interface.codegen.reactions import READING, reaction_names
-from dap3d_core.interface.codegen.return_shapes import ShapeError, checked_shape, entries, value_at
+from dap3d_core.interface.codegen.return_shapes import (
+    ShapeError,
+    checked_shape,
+    entries,
+    state_entries,
+    value_at,
+)
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
+from dap3d_core.interface.examine.check_states import check_state_names, check_states
 from dap3d_core.interface.examine.random_values import (
     numbers,
     random_field,
@@ -52,10 +65,13 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         _check_conditions(type_, conditions, class_)
     variants = tuple((conditions, examine(class_, seed)) for conditions, class_ in own_variants)
     _check_class(type_, is_abstract=bool(variants))
+    check_states(type_, is_abstract=bool(variants))
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
     _check_symbol(type_, layout)
     _check_actuates(type_, layout)
+    if layout.states:
+        check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
     names = namespace(type_, layout)
     kernels, outputs = type_.kernels(), {}
 
@@ -106,7 +122,10 @@ def _output(
     for _ in range(ATTEMPTS):
         try:
             value = kernel(*(random_quantity(q, rng) for q in quantities))
-            paths = entries(value, *_expected(type_, kernel_name, value))
+            if kernel_name == "rate":
+                paths = state_entries(value, [s for _, s in state_places(type_).values()])
+            else:
+                paths = entries(value, *_expected(type_, kernel_name, value))
         except ShapeError as error:
             raise PluginError(f"{who}: {error}") from None
         except Exception as error:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 import attrs
+import numpy as np
 
 from dap3d_core.kernels.compiler.types import FLOAT, INT, Numbers, Signature, Table
 from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, VECTOR, Arrays, pointer
@@ -20,6 +21,7 @@ class LoopArrays(Arrays):
     F: Any  # (functions+1, 5) functions of time, at t and (the last column) at 0
     idx: Any  # integers of all instances
     par: Any  # numbers of all instances
+    states: Any = attrs.field(factory=lambda: np.zeros(0))  # of elements that have some
 
 
 _OUT = Numbers()

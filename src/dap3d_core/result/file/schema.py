@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from dap3d_core.result.arrays import AXES, COLUMNS, EULER, U_ERROR, Arrays, column_sizes
+from dap3d_core.result.arrays import AXES, COLUMNS, EULER, U_ERROR, Arrays, Column, column_sizes
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.metadata import RunMetadata, RunStatistics, to_json
 from dap3d_core.result.model_summary import ModelSummary
@@ -41,6 +41,7 @@ NAMES = {
     "body": "names of the bodies",
     "joint": "names of the joints",
     "point": "names of the points; animation points come last",
+    "element_state": "names of the states of their own of forces and joints",
     "axis": "axes of a vector",
     "euler": "Euler parameters, body to global",
 }
@@ -124,6 +125,7 @@ def define(
         **{name: range(size) for name, size in column_sizes(summary).items()},
         "joint": summary.joint_names,
         "point": summary.point_names,
+        "element_state": summary.state_names,
     }
     dataset.createDimension("time", nt or None)
     for name, values in entries.items():
@@ -143,17 +145,22 @@ def define(
             )
             write_attributes(variable, about(constant.unit, constant.meaning))
             variable[:] = array
-    storage: dict[str, Any] = {"contiguous": True} if nt else {}
-    for column in (*COLUMNS, U_ERROR) if with_error else COLUMNS:
+    _define_rows(dataset, (*COLUMNS, U_ERROR) if with_error else COLUMNS, is_sized=bool(nt))
+    write_attributes(dataset, attributes(summary, record))
+    dataset.sync()
+    return os.path.getsize(dataset.filepath())
+
+
+def _define_rows(dataset: Any, columns: tuple[Column, ...], *, is_sized: bool) -> None:
+    """Defines the variables of the columns whose dimensions there are."""
+    storage: dict[str, Any] = {"contiguous": True} if is_sized else {}
+    for column in columns:
         if dataset.dimensions.keys() >= set(column.dimensions):
             variable = dataset.createVariable(
                 column.name, "f8", column.dimensions, fill_value=False, **storage
             )
             coordinates = {"coordinates": "t"} if column.name != "t" else {}
             write_attributes(variable, about(column.unit, column.meaning) | coordinates)
-    write_attributes(dataset, attributes(summary, record))
-    dataset.sync()
-    return os.path.getsize(dataset.filepath())
 
 
 def allocate_rows(dataset: Any) -> None:

@@ -83,6 +83,9 @@ def check_subject(summary: ModelSummary) -> None:
         for name in getattr(summary, f"{kind}_names"):
             if not name or not name.isprintable():
                 raise ValueError(f"{name!r} is no name of a {kind}")
+    for name in summary.state_names:
+        if not name.isprintable() or name.count(".") not in (2, 3):
+            raise ValueError(f"{name!r} is no name of a state")
     for constant in ("mass", "Jp", "point_local"):
         if not (np.abs(getattr(summary, constant)) <= MOST).all():
             raise ValueError(f"{constant} holds a number that no scene may have")
@@ -131,7 +134,11 @@ def _is_length(value: Any) -> bool:
 
 def _is_tolerance(value: Any) -> bool:
     """True for one number, one for each quantity, or none."""
-    return value is None or is_number(value) or (_are_numbers(value) and set(value) == set("rpvw"))
+    return (
+        value is None
+        or is_number(value)
+        or (_are_numbers(value) and set("rpvw") <= set(value) <= set("rpvwz"))
+    )
 
 
 def _are_numbers(value: Any) -> bool:

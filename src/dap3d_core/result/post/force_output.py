@@ -47,6 +47,7 @@ def force_output(
     Lam: Floats,
     angles: Floats | None,
     actuation: Floats | None = None,
+    states: Floats | None = None,
 ) -> ForceOutput:
     """Evaluates a force element.
 
@@ -59,6 +60,7 @@ def force_output(
         element: its index among the forces of the model.
         Lam: (nt, m) multipliers, m rows in the order of the model.
         angles: (nt, k) angles as in ``Arrays``; None to count them from one instant to the next.
+        states: (nt, s) states of elements; None for their initial values.
         actuation: (nt,) what takes the place of the field that its type ``actuates``; the element
             has no potential then.
 
@@ -71,7 +73,7 @@ def force_output(
     force, energy = np.zeros_like(evaluator.system.force), np.zeros(1)
     out, potential = np.zeros((len(t), len(bodies), 6)), np.zeros(len(t))
     minus_lambda = np.zeros_like(evaluator.system.multipliers)
-    for k, time in place_at(evaluator, t, u):
+    for k, time in place_at(evaluator, t, u, states):
         if angles is None:
             loops.call("angle", time, force)
         else:
@@ -153,7 +155,8 @@ class ForceLoops:
 
         if self.has(kind):
             s = self._evaluator.system
-            arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=self.parameters.par)
+            par = self.parameters.par
+            arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=par, states=s.states)
             q, loops = self._loops[kind], self._evaluator.loops
             given = out if multipliers is None else multipliers
             call_loop(loops, q, time, arrays, self._groups[q], out, given, given)

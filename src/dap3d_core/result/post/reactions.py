@@ -94,6 +94,7 @@ def reactions(
     Lam: Floats,
     joints: Collection[int],
     angles: Floats | None = None,
+    states: Floats | None = None,
 ) -> dict[int, dict[str, Reaction]]:
     """Reactions of joints on each of their bodies: D_slot^T lambda (spec 2).
 
@@ -104,13 +105,14 @@ def reactions(
         Lam: (nt, m) multipliers, m rows in the order of the model.
         joints: indices of the joints in the model.
         angles: (nt, k) angles as in ``Arrays``; None if unknown.
+        states: (nt, s) states of elements; None for their initial values.
 
     Returns:
         For each joint a reaction for each slot, by its letter.
     """
     loops = _joint_loops(evaluator, np.array(list(joints), dtype=np.int64))
     wrenches = [np.empty((len(t), *loop.shape)) for loop in loops]
-    for k, time in place_at(evaluator, t, u):
+    for k, time in place_at(evaluator, t, u, states):
         for loop, out in zip(loops, wrenches, strict=True):
             if angles is not None:
                 loop.parameters.set_angles(angles[k])
@@ -122,8 +124,10 @@ def reactions(
     }
 
 
-def place_at(evaluator: "Evaluator", t: Floats, u: Floats) -> Iterator[tuple[int, float]]:
-    """Sets bodies and functions to each instant in turn; yields its index and time."""
+def place_at(
+    evaluator: "Evaluator", t: Floats, u: Floats, states: Floats | None = None
+) -> Iterator[tuple[int, float]]:
+    """Sets bodies, states and functions to each instant in turn; yields its index and time."""
     from dap3d_core.assembly.arrays import VALUE
     from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 
@@ -131,6 +135,7 @@ def place_at(evaluator: "Evaluator", t: Floats, u: Floats) -> Iterator[tuple[int
     for k, y in enumerate(evaluator.integrated(u) if len(t) else ()):
         time = float(t[k])
         place_bodies(y, s.body, s.metric)
+        s.states[:] = evaluator.states if states is None else states[k]
         call_kinds(VALUE, VALUE, time, s, evaluator.loops, s.force, s.force, s.force)
         yield k, time
 
@@ -229,6 +234,7 @@ class _JointLoop:
         from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop
 
         s, D = self.evaluator.system, self._D.reshape(-1)
-        arrays = LoopArrays(body=s.body, F=s.F, idx=self._idx, par=self.parameters.par)
+        par = self.parameters.par
+        arrays = LoopArrays(body=s.body, F=s.F, idx=self._idx, par=par, states=s.states)
         call_loop(self.evaluator.loops, self.q, time, arrays, self._group, D, self._gamma, self._nu)
         return np.asarray(np.einsum("msrv,mr->msv", self._D, Lam[self._rows]))

@@ -20,6 +20,7 @@ from dap3d_core.result.quantities.catalogue import (
     QuantityOwner,
     QuantitySource,
 )
+from dap3d_core.result.quantities.element_states import components_of, state_quantity, states_of
 
 NORM = "norm"
 #: Names of joint coordinates, of which a joint has some.
@@ -42,7 +43,8 @@ def find(result: QuantitySource, name: str) -> Quantity:
         name: ``BODY.`` r p rd w wp rdd wd wpd; ``POINT.`` r v a (also rP rPd rPdd); ``JOINT.`` or
             ``JOINT.SLOT.`` force moment force_body moment_body moment_at_point, without a slot on
             the body of the first; ``JOINT.lambda`` (rows from 1); ``JOINT.`` q1 q1_dot q2 q2_dot
-            ... angle length angle_rate length_rate; ``FORCE.`` or ``FORCE.SLOT.`` the actions as of
+            ... angle length angle_rate length_rate; ``JOINT.`` and ``FORCE.`` states of their own,
+            their numbers from 1; ``FORCE.`` or ``FORCE.SLOT.`` the actions as of
             a joint; ``FORCE.`` length length_rate tension energy; energy.kinetic .potential .total;
             work; ``NAME.actuation`` of actuators of inverse dynamics; constraint.position
             .velocity .acceleration; t; outputs of the scene.
@@ -69,6 +71,8 @@ def find(result: QuantitySource, name: str) -> Quantity:
                 columns = _components(result, owner, attribute)
                 if not component or component in columns:
                     return _quantity(result, name, owner, attribute, component)
+            elif state := state_quantity(result, name, owner, attribute, component):
+                return state
     if output := _output(result, name):
         return output
     raise _unknown(result, name)
@@ -176,7 +180,7 @@ def _columns(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tu
     if attribute == "lambda" and owner.kind == "joint":
         return tuple(str(k + 1) for k in range(result.summary.joint_rows[owner.place]))
     known = QUANTITIES[owner.kind].get(attribute)
-    return known.components if known else ()
+    return known.components if known else components_of(result.summary, owner, attribute)
 
 
 def _components(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tuple[str, ...]:
@@ -253,7 +257,8 @@ def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]
     names = ACTIONS if owner.slot else QUANTITIES[owner.kind]
     is_actuator = owner.name in result.record.actuation
     known = (name for name in names if name != ACTUATION or is_actuator)
-    return (*known, *_coordinate_names(result, owner))
+    states = states_of(result.summary, owner)
+    return (*known, *states, *_coordinate_names(result, owner))
 
 
 def _fault(result: QuantitySource, owner: QuantityOwner, rest: list[str]) -> str:

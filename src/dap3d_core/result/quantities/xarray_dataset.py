@@ -12,6 +12,8 @@ from dap3d_core.result.quantities.lookup import available_outputs
 if TYPE_CHECKING:
     import xarray
 
+#: Dimension of the states of elements, left out where there are none.
+STATES = "element_state"
 #: Variables and dimensions that a Jacobian adds to a file (netcdf_export.py).
 JACOBIAN = ("Jac", "Jac_row", "Jac_column", "Jac_value", "entry", "velocity")
 
@@ -30,6 +32,8 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
     variables: dict[str, Any] = {}
     for column in (*COLUMNS[1:], U_ERROR) if arrays.has_error else COLUMNS[1:]:
         values = getattr(arrays, column.name)
+        if column.dimension == STATES and not values.shape[1]:
+            continue
         variables[column.name] = (column.dimensions, values, about(column.unit, column.meaning))
     for motion in MOTION:
         dimensions = ("time", *motion.dimensions)
@@ -54,6 +58,8 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
         "axis": AXES,
         "euler": EULER,
     }
+    if summary.state_names:
+        labels[STATES] = summary.state_names
     coordinates = {
         name: (name, np.array(names, dtype=str), about("1", NAMES[name]))
         for name, names in labels.items()

@@ -49,6 +49,7 @@ _READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
         maximum=spec.maximum,
         whole=spec.whole,
     ),
+    "numbers": lambda spec, value: numbers_of(value, spec.columns),
     "vec3": lambda spec, value: numbers_of(value, 3),
     "matrix": lambda spec, value: matrix_of(value),
     "table": lambda spec, value: list_of(value),

@@ -30,7 +30,7 @@ from dap3d_core.scene.validate.mistake_collector import Collector
 CORRECT_METRICS = ("unit", "mass")
 #: Default absolute tolerance, SI, and the quantities that may have one of their own.
 USUAL_ATOL = 1e-10
-QUANTITIES = ("r", "p", "v", "w")
+QUANTITIES = ("r", "p", "v", "w", "z")
 #: Relative tolerances below are beyond double precision.
 SMALLEST_RTOL = 1e-14
 #: Shorter times, s, leave double precision in products and quotients.
@@ -53,7 +53,7 @@ def _tolerance(value: Any) -> Any:
         return bounded(number_of(value), minimum=0.0)
     for name, part in value.items():
         if name not in QUANTITIES:
-            what = f"has no quantity {name!r}: r (m), p, v (m/s), w (rad/s)"
+            what = f"has no quantity {name!r}: r (m), p, v (m/s), w (rad/s), z (states)"
             return Fault(what, nearest=nearest(str(name), QUANTITIES) or "")
         number = bounded(number_of(part), minimum=0.0)
         if isinstance(number, Fault):

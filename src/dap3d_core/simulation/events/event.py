@@ -147,7 +147,7 @@ class Instant:
         self._compiled, self._y, self._numbers = compiled, y, numbers
         self.t = t
         self._body_state = compiled.evaluator.body_state(y)
-        u = u_from_y(self._body_state[None])[0]
+        u = u_from_y(self._body_state[None], compiled.model.state_count)[0]
         u.flags.writeable = False
         self.u: Floats = u
         self.changes: dict[str, dict[str, Any]] = {}

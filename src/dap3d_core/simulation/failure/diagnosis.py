@@ -4,13 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import KINDS
-from dap3d_core.assembly.evaluate import place_bodies
+from dap3d_core.assembly.evaluate import place_state
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.pivots import near_singular_rows
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.model import Group
-from dap3d_core.model.state_layout import by_body, u_from_y, velocities_of
+from dap3d_core.model.state_layout import by_body, velocities_of
 from dap3d_core.scene.validate.coerce_values import LARGEST
 
 Floats = NDArray[np.float64]
@@ -40,7 +40,7 @@ def find_offender(evaluator: Evaluator, t: float, y: Floats, t_stop: float) -> s
 def fastest_body(evaluator: Evaluator, y: Floats) -> str:
     """Name the body whose velocities are the largest; where all is finite it is to blame."""
     n = evaluator.model.body_count
-    speeds = np.abs(velocities_of(y)).reshape(n, -1)
+    speeds = np.abs(velocities_of(evaluator.bodies_of(y))).reshape(n, -1)
     b = int(np.argmax(speeds.max(axis=1)))
     v, w = speeds[b, :3].max(), speeds[b, 3:].max()
     return (
@@ -50,11 +50,15 @@ def fastest_body(evaluator: Evaluator, y: Floats) -> str:
 
 
 def _at(evaluator: Evaluator, t: float, y: Floats) -> str:
-    for name, numbers in zip(evaluator.model.body_names, by_body(y), strict=True):
+    bodies = by_body(evaluator.bodies_of(y))
+    for name, numbers in zip(evaluator.model.body_names, bodies, strict=True):
         if fault := _fault(numbers):
             return f"the state of body {name} is {fault}"
+    states = y[evaluator.model.integrated_layout["states"]]
+    if fault := _fault(states):
+        return f"the state {_worst_state(evaluator, states)} is {fault}"
     s = evaluator.system
-    place_bodies(y, s.body, s.metric)
+    place_state(y, s)
     s.F[:, :4] = 0.0  # filled again one by one: the present values may not be finite
     for q, (kind, group) in enumerate(evaluator.loop_groups):
         for k in range(group.count):
@@ -72,7 +76,7 @@ def _without_direction(evaluator: Evaluator, t: float, y: Floats) -> str:
     """The joint of the first row whose gradient is zero: no force of it can hold anything."""
     if not evaluator.model.row_count:
         return ""
-    rows = evaluator.rows(t, u_from_y(y))
+    rows = evaluator.rows(t, evaluator.hold(y))
     size = np.bincount(rows.row, np.abs(rows.value), minlength=rows.shape[0])
     zero = np.flatnonzero(size == 0.0)
     if not len(zero):
@@ -85,7 +89,7 @@ def _steepest(evaluator: Evaluator, t: float, y: Floats) -> str:
     model = evaluator.model
     if not model.row_count:
         return ""
-    rows = evaluator.rows(t, u_from_y(y))
+    rows = evaluator.rows(t, evaluator.hold(y))
     largest = np.abs(rows.gamma)
     np.maximum.at(largest, rows.row, np.abs(rows.value))
     worst = int(np.argmax(largest))
@@ -97,7 +101,9 @@ def _steepest(evaluator: Evaluator, t: float, y: Floats) -> str:
 
 def _runaway(evaluator: Evaluator, t: float, y: Floats) -> str:
     """The body with the largest number or rate, where no step can go on with it."""
-    largest = np.max(np.abs(np.hstack([by_body(y), _rates(evaluator, t, y)])), axis=1)
+    largest = np.max(
+        np.abs(np.hstack([by_body(evaluator.bodies_of(y)), _rates(evaluator, t, y)])), axis=1
+    )
     first = int(np.argmax(largest))
     if not largest[first] > ENORMOUS:
         return ""
@@ -123,7 +129,16 @@ def _accelerated(evaluator: Evaluator, t: float, y: Floats) -> str:
 
 def _rates(evaluator: Evaluator, t: float, y: Floats) -> Floats:
     """(n, 13) dy/dt of each body."""
-    return by_body(evaluator.rhs(t, u_from_y(y)))
+    return by_body(evaluator.rhs(t, evaluator.hold(y)))
+
+
+def _worst_state(evaluator: Evaluator, values: Floats) -> str:
+    """Name of the state of an element with the largest of some numbers, or one not finite."""
+    worst = int(np.argmax(np.where(np.isfinite(values), np.abs(values), np.inf)))
+    for state in evaluator.model.element_states:
+        if state.first <= worst < state.first + state.length:
+            return f"{state.name} of {state.kind} {state.element}"
+    return ""
 
 
 def _fault_of(evaluator: Evaluator, q: int, k: int, kind: str, group: Group, t: float) -> str:
@@ -132,6 +147,8 @@ def _fault_of(evaluator: Evaluator, q: int, k: int, kind: str, group: Group, t: 
         out[:] = 0.0
     joint_outs = {"acceleration": (s.D, s.gamma, s.nu), "position": (s.residual,) * 3,
                   "friction": (s.force, s.multipliers, s.multipliers)}  # fmt: skip
+    if kind == "rate":
+        joint_outs[kind] = (np.zeros(len(s.states)), s.multipliers, s.multipliers)
     if kind == "switch":
         joint_outs[kind] = np.zeros(len(group.type_info.outputs[kind])), np.zeros(1), np.zeros(1)
     outs = joint_outs.get(kind, (s.force, s.force, s.force))
@@ -157,13 +174,15 @@ def _call_one(
 def _title(kind: str) -> str:
     assert kind in KINDS
     titles = {"value": "function", "wrench": "force", "energy": "the energy of force",
-              "friction": "the friction of force"}  # fmt: skip
+              "friction": "the friction of force", "rate": "the rate of the states of"}  # fmt: skip
     return titles.get(kind, "joint")
 
 
 def _name(evaluator: Evaluator, kind: str, group: Group, k: int) -> str:
     names = {"value": evaluator.model.function_names, "wrench": evaluator.model.force_names}
     names["energy"] = names["friction"] = evaluator.model.force_names
+    if kind == "rate" and group.type_info.type.kind == "force":
+        names["rate"] = evaluator.model.force_names
     return str(names.get(kind, evaluator.model.joint_names)[int(group.members[k])])
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import ENERGY, VALUE, WRENCH
-from dap3d_core.assembly.evaluate import call_kinds, place_bodies
+from dap3d_core.assembly.evaluate import call_kinds, place_state
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.model.rotations import to_global
 from dap3d_core.model.state_layout import join, split, velocities_of
@@ -33,6 +33,8 @@ def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
         u: (13 n,) a state about which the forces are tried.
     """
     model = evaluator.model
+    if model.state_count:  # what an element stores and loses by its states is not told
+        return False
     driven = any(np.any(g.functions > 0) for g in model.joints)
     if (
         driven
@@ -70,7 +72,7 @@ def _moved(r: Floats, p: Floats, v: Floats, w: Floats, h: float) -> tuple[Floats
 def _power(evaluator: Evaluator, u: Floats) -> tuple[float, float]:
     """Power of the applied forces, and the sum of its parts' sizes."""
     s = evaluator.system
-    place_bodies(evaluator.integrated(u), s.body, s.metric)
+    place_state(evaluator.integrated(u), s)
     s.force[:] = 0.0
     _call(evaluator, VALUE, s.force)
     _call(evaluator, WRENCH, s.force)
@@ -82,7 +84,7 @@ def _energy(evaluator: Evaluator, r: Floats, p: Floats, v: Floats, w: Floats, h:
     """The potential energy h seconds later at constant velocities."""
     s = evaluator.system
     u = join(*_moved(r, p, v, w, h), v, w)
-    place_bodies(evaluator.integrated(u), s.body, s.metric)
+    place_state(evaluator.integrated(u), s)
     value = np.zeros(1)
     _call(evaluator, ENERGY, value)
     return float(value[0])

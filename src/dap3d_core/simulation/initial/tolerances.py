@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import Integration
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE, Y
+from dap3d_core.model.element_states import tolerances
 from dap3d_core.model.state_layout import split
 from dap3d_core.scene import Simulation
 from dap3d_core.scene.validate.settings import QUANTITIES, USUAL_ATOL
@@ -39,8 +40,14 @@ def resolved_atol(atol: Any, evaluator: Evaluator) -> float | dict[str, float]:
     usual = usual_atol(evaluator)
     if atol is None:
         return usual
-    every = usual if isinstance(usual, dict) else dict.fromkeys(QUANTITIES, usual)
-    return every | {name: float(value) for name, value in atol.items()}
+    names = _quantities(evaluator)
+    every = usual if isinstance(usual, dict) else dict.fromkeys(names, usual)
+    return every | {name: float(value) for name, value in atol.items() if name in names}
+
+
+def _quantities(evaluator: Evaluator) -> tuple[str, ...]:
+    """Quantities that have a tolerance: without states of elements those of bodies alone."""
+    return QUANTITIES if evaluator.model.state_count else QUANTITIES[:-1]
 
 
 def usual_atol(evaluator: Evaluator) -> float | dict[str, float]:
@@ -49,8 +56,9 @@ def usual_atol(evaluator: Evaluator) -> float | dict[str, float]:
     if length == 1.0:
         return USUAL_ATOL
     time = _time_of(evaluator)
-    scales = {"r": length, "p": 1.0, "v": length / time, "w": 1.0 / time}
-    return {name: float(f"{USUAL_ATOL * scale:.6g}") for name, scale in scales.items()}
+    scales = {"r": length, "p": 1.0, "v": length / time, "w": 1.0 / time, "z": 1.0}
+    names = _quantities(evaluator)
+    return {name: float(f"{USUAL_ATOL * scales[name]:.6g}") for name in names}
 
 
 def _time_of(evaluator: Evaluator) -> float:
@@ -103,7 +111,8 @@ def rounding_notes(runs: Sequence[Integration], evaluator: Evaluator) -> list[st
     names = evaluator.model.body_names
     noise = work.h * work.tolerance[NOISE, :-1]
     above = noise > work.tolerance[ABSOLUTE, :-1] + work.rtol * np.abs(work.state[Y, :-1])
-    bodies = [names[k] for k in np.unique(evaluator.coordinates.bodies[above]).tolist()]
+    found = np.unique(evaluator.coordinates.bodies[above]).tolist()
+    bodies = [names[k] for k in found if k >= 0]
     if not bodies:
         return []
     words = ", ".join(bodies[:MOST_NAMES]) + (", ..." if len(bodies) > MOST_NAMES else "")
@@ -118,10 +127,19 @@ def _largest(vectors: Floats) -> float:
 
 
 def atol_vector(atol: float | Mapping[str, float], evaluator: Evaluator) -> float | Floats:
-    """Absolute tolerances of the components of y, in its order; a number stays one."""
+    """Absolute tolerances of the components of y, in its order; a number may stay one.
+
+    States of elements have those that their fields give.
+    """
+    own = tolerances(evaluator.model.acting) if evaluator.model.state_count else np.zeros(0)
     if not isinstance(atol, Mapping):
-        return atol
-    return np.array([*(atol[name] for name in evaluator.coordinates.quantities), USUAL_ATOL])
+        if not own.any():
+            return atol
+        atol = dict.fromkeys(QUANTITIES, atol)
+    every = np.array([*(atol[name] for name in evaluator.coordinates.quantities), USUAL_ATOL])
+    last = len(every) - 1
+    every[last - len(own) : last] = np.where(own > 0.0, own, every[last - len(own) : last])
+    return every
 
 
 def tighter(atol: float | Mapping[str, float], factor: float) -> float | dict[str, float]:
@@ -140,7 +158,7 @@ def words_of(atol: float | Mapping[str, float]) -> str:
 
 def atol_notes(given: Any, used: float | Mapping[str, float], evaluator: Evaluator) -> list[str]:
     """That the usual tolerances were scaled to the scene, in words."""
-    if not isinstance(used, Mapping) or (given is not None and set(given) == set(QUANTITIES)):
+    if not isinstance(used, Mapping) or (given is not None and {*given} >= {*used}):
         return []
     if evaluator.model.length == 1.0:
         return []

@@ -139,6 +139,7 @@ def _solved(
     arrays = Arrays(
         motion.t.copy(), motion.u, motion.v_dot, forces.Lam, kinetic - kinetic[0],
         forces.potential, position, velocity, acceleration, forces.angles,
+        np.tile(evaluator.states, (len(motion.t), 1)),
     )  # fmt: skip
     pulling = Pulling(model)
     pulling.look(arrays)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.model.state_layout import y_from_u
 from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
 from dap3d_core.result.arrays import arrays_of
 from dap3d_core.result.file.atomic_write import check_target, check_utf8
@@ -334,7 +333,7 @@ class _Kinematics:
         layout = self.evaluator.model.row_layout
         self.evaluator.count_turns(pose.t, pose.u)
         report = self.evaluator.report(pose.t, pose.u)
-        row = np.concatenate([[pose.t], y_from_u(pose.u), report])
+        row = np.concatenate([[pose.t], self.evaluator.integrated(pose.u), report])
         row[layout["v_dot"]] = pose.v_dot  # from the rows alone, nearer to rounding
         row[layout["residuals"].stop - 1] = pose.residual
         if is_singular:  # of the reactions what the motion determines

@@ -5,7 +5,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.model.state_layout import join, split, velocities_of, y_from_u
+from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.result import INFORMATION, Result, RunMetadata
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import correct_initial
@@ -65,7 +65,7 @@ def mode_motion(
             with suppress(AssemblyError):  # a mode shape is straight, the joints are not
                 u = correct_initial(evaluator, u, point.t).u
             report = evaluator.report(point.t, u)
-            rows.append(np.concatenate([[t], y_from_u(u), report]))
+            rows.append(np.concatenate([[t], evaluator.integrated(u), report]))
     note = (
         f"{INFORMATION}mode {mode + 1} of a linearisation, eigenvalue {eigenvalues[mode]:.6g}: "
         "displacements along a mode shape, joints closed; no simulation"

@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.model.state_layout import split, y_from_u
+from dap3d_core.model.state_layout import split
 from dap3d_core.result import Result, RunMetadata, UnknownNameError, find
 from dap3d_core.simulation.linearization.inputs import Inputs
 from dap3d_core.simulation.linearization.mode_motion import displaced_state
@@ -105,4 +105,4 @@ def _row(point: OperatingPoint, h: float, direction: tuple[Floats, ...]) -> Floa
     report = evaluator.report(point.t, u)
     report[layout["v_dot"]] = point.tangent.a + h * a_change
     report[layout["Lam"]] = point.tangent.multipliers + h * lam_change
-    return np.concatenate([[point.t], y_from_u(u), report])
+    return np.concatenate([[point.t], evaluator.integrated(u), report])

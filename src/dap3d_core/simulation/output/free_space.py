@@ -7,7 +7,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from dap3d_core.model.state_layout import integrated_layout
 from dap3d_core.scene import MISSING, Mistake, SceneError
 
 #: Reports of less are not worth a look at the machine, bytes.
@@ -109,4 +108,4 @@ def _size(byte_count: float) -> str:
 
 def row_width(evaluator: Any) -> int:
     """Numbers that a run stores for each instant: time, state, work, and further reports."""
-    return int(1 + integrated_layout(evaluator.model.body_count).size + evaluator.report_size)
+    return int(1 + evaluator.model.integrated_layout.size + evaluator.report_size)

@@ -73,5 +73,6 @@ class Observer:
 
     def _energies(self, y: NDArray[np.float64]) -> tuple[float, float]:
         """Kinetic energy and the work done so far, J."""
-        u = u_from_y(self._evaluator.body_state(y))
+        state = self._evaluator.body_state(y)
+        u = u_from_y(state, self._evaluator.model.state_count)
         return float(kinetic_energy(self._subject, u[None])[0]), float(y[-1])

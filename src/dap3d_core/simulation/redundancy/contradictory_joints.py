@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import Model
-from dap3d_core.model.state_layout import u_from_y, velocities_of
+from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import (
     FIT,
@@ -51,7 +51,7 @@ def find_contradiction(evaluator: Evaluator, t: float, y: Floats, rank: int) -> 
     model = evaluator.model
     if not 0 < model.row_count <= MOST_ROWS:
         return ""
-    u = u_from_y(y)
+    u = evaluator.hold(y)
     try:
         finite_rows(evaluator, t, u)
     except AssemblyError:  # which find_offender reports

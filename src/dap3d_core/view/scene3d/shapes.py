@@ -1,8 +1,6 @@
 """Shapes of a scene as marks, lines and meshes; marks and meshes as triangles."""
 
-import re
 from collections.abc import Sequence
-from io import BytesIO
 from itertools import product
 from pathlib import Path
 from typing import Any, ClassVar
@@ -12,6 +10,7 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import to_global
+from dap3d_core.scene.files.read_mesh import read_mesh
 from dap3d_core.scene.scene import Scene
 from dap3d_core.scene.validate.coerce_values import Fault
 from dap3d_core.scene.validate.mistake_collector import Collector
@@ -24,8 +23,6 @@ from dap3d_core.view.scene3d.solids import Triangles, solid
 MOST_TRIANGLES = 300_000
 #: Nor are further ones, once it holds so many triangles.
 MOST_IN_ALL = 1_000_000
-#: Nor are larger files read, bytes: that many triangles as text.
-LARGEST_MESH = 100 * 2**20
 #: A shape that reaches farther from the origin of its body is not drawn, m: graphics hardware
 #: computes lengths in single precision, in which larger ones overflow.
 FARTHEST = 1e15
@@ -203,50 +200,10 @@ def _mesh(folder: Path | None, name: str) -> tuple[Floats, Any] | str:
     path = mesh_file(folder, name)
     if isinstance(path, Fault):
         return path.what
-    try:
-        import trimesh
-    except ImportError:
-        return "reading meshes needs trimesh: pip install 'dap3d[mesh]'"
-    try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST_MESH + 1)
-        if len(data) > LARGEST_MESH:
-            return f"{name} has more than {LARGEST_MESH >> 20} MiB; save fewer triangles, or binary"
-        kind = path.suffix[1:].lower()
-        whole = _without_groups(data) if kind == "obj" else _one_solid(data)
-        # from memory: materials, which are other files, are not read
-        with np.errstate(all="ignore"):  # numbers are judged below
-            mesh: Any = trimesh.load(
-                BytesIO(whole), file_type=kind, force="mesh", skip_materials=True
-            )
-        vertices = np.asarray(mesh.vertices, dtype=np.float64)
-        triangles = np.asarray(mesh.faces, dtype=np.int64)
-    except Exception as error:  # a broken file makes a reader fail in any way
-        return f"{name} cannot be read: {error or type(error).__name__}"
-    if not len(triangles):
-        return f"{name} holds no triangles; is it a mesh?"
-    if not np.all(np.isfinite(vertices)):
-        return f"{name} holds no numbers"
+    mesh = read_mesh(path, name)
+    if isinstance(mesh, str):
+        return mesh
+    vertices, triangles = mesh
     if len(triangles) > MOST_TRIANGLES:
         return f"{name} has {len(triangles)} triangles; at most {MOST_TRIANGLES} are drawn"
     return vertices, triangles
-
-
-def _without_groups(data: bytes) -> bytes:
-    """An OBJ file reduced to vertices and faces.
-
-    The reader makes a mesh of each group, object and material, and the time to join them grows
-    with the square of their number.
-    """
-    text = data.replace(b"\r\n", b"\n").replace(b"\\\n", b"")
-    lines = re.findall(rb"^[ \t]*[vf][ \t][^\n#]*", text, re.MULTILINE)
-    return b"\n".join(lines).replace(b"usemtl", b"") + b"\n"
-
-
-def _one_solid(data: bytes) -> bytes:
-    """An STL file with all facets in one solid, for the same reason; a binary file has one."""
-    if len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
-        return data
-    first, *others = data.lower().split(b"endsolid")
-    facets = [part[part.find(b"facet") :] for part in others if b"facet" in part]
-    return b"".join([first, *facets, b"\nendsolid" if others else b""])

@@ -131,7 +131,10 @@ def prepare(constants):
         (joint(gama=lambda w_i: 0.0), ["defines gama", "nothing calls", "did you mean gamma?"]),
         (
             joint(helper=lambda w_i: 0.0),
-            ["defines helper", "may define C, C_dot, J, gamma, nu, friction, switch, prepare"],
+            [
+                "defines helper",
+                "may define C, C_dot, J, gamma, nu, friction, switch, rate, prepare",
+            ],
         ),
         (force(energie=lambda r_i: 0.0), ["defines energie", "did you mean energy?"]),
         (joint(gamma=None, C=None, holonomic=False), ["does not define gamma"]),

@@ -8,6 +8,7 @@ from io import BytesIO
 import pytest
 
 import dap3d_core as dap
+from dap3d_core.scene.files import read_mesh
 from dap3d_core.view.scene3d import shapes
 
 pytest.importorskip("trimesh")
@@ -50,7 +51,7 @@ def test_bad_ones_are_told(tmp_path, name, data):
 
 def test_large_ones_are_not_read(tmp_path):
     with (tmp_path / "large.stl").open("wb") as file:
-        file.truncate(shapes.LARGEST_MESH + 1)
+        file.truncate(read_mesh.LARGEST_MESH + 1)
     assert "MiB" in shapes._mesh(tmp_path, "large.stl")
 
 
@@ -84,7 +85,7 @@ def test_groups_are_read_as_one_mesh(tmp_path, name, data, joined):
     (tmp_path / name).write_bytes(data)
     vertices, triangles = shapes._mesh(tmp_path, name)
     assert (len(vertices), len(triangles)) == (3, 400)
-    whole = BytesIO(getattr(shapes, joined)(data))
+    whole = BytesIO(getattr(read_mesh, joined)(data))
     found = trimesh.load_scene(whole, file_type=name[-3:], skip_materials=True)
     assert len(found.geometry) == 1
 

@@ -1,0 +1,1 @@
+"""The standard file formats: URDF, SDF, MJCF."""

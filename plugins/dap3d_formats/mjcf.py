@@ -1,0 +1,3 @@
+"""MJCF."""
+
+interface_version = 1

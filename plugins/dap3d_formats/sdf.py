@@ -1,0 +1,3 @@
+"""SDF."""
+
+interface_version = 1

@@ -1,0 +1,52 @@
+"""Elements and attributes of URDF, and what becomes of them."""
+
+from dap3d_formats.elements import Table, noted, refused, taken, translated
+
+_CONTACT = "contact properties; bodies do not touch each other"
+_SHAPE = {"": ("taken", "")}
+
+URDF: Table = {
+    "robot": taken() | taken("name") | noted("version", "the version of the format"),
+    "link": taken() | taken("name") | noted("type", "the type of a link has no effect"),
+    "inertial": taken(),
+    "origin": taken() | taken("xyz rpy"),
+    "mass": taken() | taken("value"),
+    "inertia": taken() | taken("ixx ixy ixz iyy iyz izz"),
+    "visual": taken() | noted("name", "names of shapes"),
+    "collision": translated("", "drawn where a link has no visual")
+    | noted("name group", "names of shapes"),
+    "geometry": taken(),
+    "box": taken() | taken("size"),
+    "sphere": taken() | taken("radius"),
+    "cylinder": taken() | taken("radius length"),
+    "capsule": taken() | taken("radius length"),
+    "mesh": taken() | taken("filename scale"),
+    "material": taken() | taken("name"),
+    "color": translated("", "without its opacity") | taken("rgba"),
+    "texture": noted("", "textures are not drawn"),
+    "verbose": noted("", "no effect"),
+    "contact": noted("", _CONTACT),
+    "contact_coefficients": noted("", _CONTACT),
+    "self_collision_checking": noted("", _CONTACT),
+    "joint": taken() | taken("name type"),
+    "parent": taken() | taken("link"),
+    "child": taken() | taken("link"),
+    "axis": taken() | taken("xyz"),
+    "dynamics": taken() | taken("damping")
+    | translated("friction", "no type of force is friction that does not depend on the load"),
+    "limit": translated("", "elastic stops") | taken("lower upper")
+    | noted("effort velocity", "limits of forces and speeds are those of a controller"),
+    "mimic": translated("", "a joint follow of the same rates; the offset is that of the start")
+    | taken("joint multiplier offset"),
+    "calibration": noted("", "reference positions of encoders"),
+    "safety_controller": noted("", "limits of a controller"),
+    "constraint": translated("", "a joint that closes a loop") | taken("name type"),
+    "child_origin": taken() | taken("xyz rpy"),
+    "transmission": noted("", "motors and gears; add forces of your own"),
+    "gazebo": noted("", "settings of a simulator"),
+    "ros2_control": noted("", "settings of a controller"),
+    "sensor": noted("", "sensors"),
+    "mujoco": noted("", "settings of a compiler"),
+    "drake:": noted("", "settings of a simulator"),
+    "xacro:": refused("", "macros are expanded before"),
+}  # fmt: skip

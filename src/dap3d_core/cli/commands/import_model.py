@@ -1,0 +1,152 @@
+"""``dap3d import``: a scene made of a model of another program."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dap3d_core.cli.framework import options
+from dap3d_core.cli.framework.command import command
+from dap3d_core.cli.process.exit_codes import DONE, Refused
+
+if TYPE_CHECKING:
+    from dap3d_core.cli.console.console import Terminal
+    from dap3d_core.formats import ImportReport
+    from dap3d_core.scene import Scene
+
+
+@command(
+    "Make a scene of a URDF, SDF or MJCF model.",
+    click.argument("file", type=click.Path()),
+    options.output("The folder for the scene and its meshes; by default that of the file's name, "
+                   "in the current folder.", metavar="FOLDER"),
+    click.option("-f", "--format", "kind", metavar="NAME",
+                 help="The importer: urdf, sdf, mjcf or one of a plugin; by default by the file."),
+    click.option("--package", "packages", multiple=True, metavar="NAME=FOLDER",
+                 help="The folder of a package, for files package://NAME/...; may be repeated."),
+    click.option("--root", type=click.Path(), metavar="FOLDER",
+                 help="Files that the model names must lie in it; by default the file's folder."),
+    click.option("--position", "positions", multiple=True, metavar="JOINT=VALUE",
+                 help="Start a joint there, in rad or m; may be repeated."),
+    click.option("--free-base", is_flag=True,
+                 help="Free the base, where the format leaves open whether it is fixed."),
+    click.option("--keep-fixed", is_flag=True, help="Keep fixed joints; do not merge their links."),
+    click.option("--balance-inertia", is_flag=True,
+                 help="Replace principal moments that no body has by their mean."),
+    click.option("--strict", is_flag=True, help="Refuse a model if something would be left out."),
+    click.option("--allow-code", is_flag=True,
+                 help="Evaluate the expressions of a xacro file, which are code."),
+    options.FORCE, options.JSON,
+    saves=True,
+)  # fmt: skip
+def import_model(
+    file: str,
+    *,
+    output: str | None,
+    kind: str | None,
+    packages: tuple[str, ...],
+    root: str | None,
+    positions: tuple[str, ...],
+    free_base: bool,
+    keep_fixed: bool,
+    balance_inertia: bool,
+    strict: bool,
+    allow_code: bool,
+    force: bool,
+    as_json: bool,
+) -> int:
+    """Make a scene of a model of another program.
+
+    FILE is a URDF, xacro, SDF or MJCF file. Links that fixed joints hold together become one body,
+    closed loops stay closed, shapes and meshes are drawn.
+
+    \b
+    dap3d import arm.urdf                 write arm/scene.toml and arm/meshes/
+    dap3d run arm
+
+    The report says what was taken, what the scene says in another way, and what is left out, each
+    with its line.
+    """
+    import dap3d_core as dap
+    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.framework.paths import writable
+
+    scene, report = dap.import_model(
+        file, format=kind, packages=_pairs("--package", packages), root=root, free_base=free_base,
+        keep_fixed=keep_fixed, balance_inertia=balance_inertia, strict=strict,
+        allow_code=allow_code, positions=_numbers(positions),
+    )  # fmt: skip
+    folder = Path(output or Path(file).stem)
+    if folder.is_file():
+        raise Refused(f"{folder} is a file; -o names a folder")
+    _make(folder)
+    sources = (Path(file), *report.meshes)
+    for name in ("scene.toml", *report.meshes.values()):
+        _make((folder / name).parent)
+        writable(folder / name, force=force, sources=sources)
+    try:
+        target = report.save(scene, folder)
+    except OSError as error:
+        raise Refused(f"cannot write {folder}: {error.strerror or error}") from error
+    if as_json:
+        print_json({"scene": target} | _as_data(report))
+    else:
+        _show(stdout(), scene, report, target)
+    return DONE
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Refused(f"cannot make the folder {folder}: {error.strerror or error}") from error
+
+
+def _pairs(option: str, words: tuple[str, ...]) -> dict[str, str]:
+    """NAME=VALUE words as a dictionary."""
+    pairs = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        if not (name and equals and value):
+            raise Refused(f"{option} {word}: write NAME=VALUE")
+        pairs[name] = value
+    return pairs
+
+
+def _numbers(words: tuple[str, ...]) -> dict[str, float]:
+    numbers = {}
+    for name, value in _pairs("--position", words).items():
+        try:
+            numbers[name] = float(value)
+        except ValueError:
+            raise Refused(f"--position {name}={value}: {value!r} is no number") from None
+    return numbers
+
+
+def _as_data(report: "ImportReport") -> dict[str, Any]:
+    """The report for a program: each remark with its file and line."""
+
+    def remarks(listed: Any) -> list[dict[str, Any]]:
+        return [
+            {"file": one.place.file, "line": one.place.line, "text": one.text, "count": one.count}
+            for one in listed
+        ]
+
+    return {
+        "file": report.file, "format": report.format, "taken": report.taken,
+        "translated": remarks(report.translated), "left_out": remarks(report.left_out),
+        "notes": list(report.notes), "meshes": sorted(report.meshes.values()),
+    }  # fmt: skip
+
+
+def _show(console: "Terminal", scene: "Scene", report: "ImportReport", target: Path) -> None:
+    console.title(f"{report.format} model {scene.name}")
+    taken = ", ".join(f"{number} {part}" for part, number in report.taken.items() if number)
+    console.facts([("taken", taken)])
+    console.section("translated with a difference", [str(one) for one in report.translated])
+    console.section("left out", [str(one) for one in report.left_out])
+    console.section("notes", list(report.notes))
+    holds = f"{len(scene.bodies)} bodies, {len(scene.joints)} joints, {len(scene.forces)} forces"
+    console.facts([("scene", f"{target}: {holds}"), ("meshes", str(len(report.meshes) or ""))])
+    console.say("Simulate it with:")
+    console.say(f"dap3d run {target.parent}", indent=4, whole=True)

@@ -1,0 +1,139 @@
+"""Joints of a model as joints of a scene: body i is the child, body j the parent."""
+
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.interface.formats.articulation import WORLD, Joint
+from dap3d_core.interface.formats.frames import Frame
+from dap3d_core.interface.formats.remarks import FormatError
+
+if TYPE_CHECKING:
+    from dap3d_core.formats.to_scene import SceneBuilder
+
+
+def add_joint(builder: "SceneBuilder", joint: Joint) -> None:
+    """Add a joint.
+
+    Raises:
+        FormatError: no type of the scene is this joint.
+    """
+    adders = {
+        "revolute": _revolute, "prismatic": _prismatic, "fixed": _fixed, "ball": _ball,
+        "universal": _universal, "cylindrical": _cylindrical, "screw": _screw,
+    }  # fmt: skip
+    if joint.kind not in adders:
+        raise FormatError(f"joint {joint.name}: no type of the scene is {joint.kind}", joint.place)
+    ends = JointEnds(builder, from_ground(builder, joint))
+    adders[joint.kind](ends)
+
+
+def from_ground(builder: "SceneBuilder", joint: Joint) -> Joint:
+    """The same joint, with parent and child exchanged where the child is ground: body i moves."""
+    if builder.member[joint.child][0] != WORLD:
+        return joint
+    axes = tuple(tuple(-x for x in axis) for axis in reversed(joint.axes))
+    return attrs.evolve(joint, parent=joint.child, child=joint.parent, in_parent=joint.in_child,
+                        in_child=joint.in_parent, axes=axes)  # fmt: skip
+
+
+class JointEnds:
+    """The two ends of a joint in a scene, with points and vectors made as they are needed."""
+
+    def __init__(self, builder: "SceneBuilder", joint: Joint) -> None:
+        self.builder, self.joint, self.scene = builder, joint, builder.scene
+        self.child, self.on_child = builder.attached(joint.child, joint.in_child)
+        self.parent, self.on_parent = builder.attached(joint.parent, joint.in_parent)
+        self.name = builder.names.of("joints", joint.name, joint.place, builder.remarks)
+
+    def point(self, end: str, offset: Any = (0.0, 0.0, 0.0), suffix: str = "") -> str:
+        """The name of a point at the joint's origin on the child ("i") or the parent ("j").
+
+        Args:
+            end: i or j.
+            offset: (3,) from the origin, in the joint's frame.
+            suffix: of the name.
+        """
+        body, frame = self._end(end)
+        at = frame.r + frame.A @ np.asarray(offset)
+        if not at.any():
+            return f"{body}.O"
+        numbers = tuple(float(x) + 0.0 for x in at)
+        made, key = self.builder.names.scene_names, f"{body}: {numbers}"
+        if ("points", key) not in made:
+            name = self.builder.names.free("points", f"{self.name}_{end}{suffix}")
+            made["points", key] = self.scene.add_point(name, body, numbers)
+        return made["points", key]
+
+    def vector(self, end: str, direction: Any, suffix: str = "") -> str:
+        """The name of a vector in the joint's frame, fixed in the child ("i") or the parent."""
+        body, frame = self._end(end)
+        components = frame.A @ np.asarray(direction, dtype=float)
+        for k, letter in enumerate("xyz"):
+            if np.array_equal(components, np.eye(3)[k]):
+                return f"{body}.{letter}"
+        numbers = tuple(float(x) + 0.0 for x in components)
+        made, key = self.builder.names.scene_names, f"{body}: {numbers}"
+        if ("vectors", key) not in made:
+            name = self.builder.names.free("vectors", f"{self.name}_{end}{suffix}")
+            made["vectors", key] = self.scene.add_vector(name, body, numbers)
+        return made["vectors", key]
+
+    def _end(self, end: str) -> tuple[str, Frame]:
+        return (self.child, self.on_child) if end == "i" else (self.parent, self.on_parent)
+
+
+def _add(ends: JointEnds, keyword: str, **fields: Any) -> None:
+    ends.scene.add_joint(keyword, ends.name, **fields)
+
+
+def _revolute(ends: JointEnds) -> None:
+    axis = ends.joint.axes[0]
+    _add(ends, "rev", P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", axis),
+         a_j=ends.vector("j", axis))  # fmt: skip
+
+
+def _prismatic(ends: JointEnds) -> None:
+    _add(ends, "tran", P_i=ends.point("i"), P_j=ends.point("j"),
+         a_j=ends.vector("j", ends.joint.axes[0]), A_c=_relative(ends))  # fmt: skip
+
+
+def _fixed(ends: JointEnds) -> None:
+    """All six freedoms: a slider, and a driver that holds it."""
+    axis = ends.vector("j", (0.0, 0.0, 1.0))
+    P_i, P_j = ends.point("i"), ends.point("j")
+    _add(ends, "tran", P_i=P_i, P_j=P_j, a_j=axis, A_c=_relative(ends))
+    lock = ends.builder.names.free("joints", f"{ends.name}_lock")
+    ends.scene.add_joint("drive-tran", lock, P_i=P_i, P_j=P_j, a_j=axis, length=0.0)
+
+
+def _relative(ends: JointEnds) -> Any:
+    """A_i^T A_j, the rotation of the parent in the child."""
+    A = ends.on_child.A @ ends.on_parent.A.T
+    return None if np.array_equal(A, np.eye(3)) else tuple(tuple(map(float, row)) for row in A)
+
+
+def _ball(ends: JointEnds) -> None:
+    _add(ends, "sph", P_i=ends.point("i"), P_j=ends.point("j"))
+
+
+def _universal(ends: JointEnds) -> None:
+    first, second = ends.joint.axes
+    if abs(np.dot(first, second)) > 1e-9:
+        what = f"joint {ends.joint.name}: the axes of a universal joint are perpendicular"
+        raise FormatError(what, ends.joint.place)
+    _add(ends, "univ", P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", second),
+         n_j=ends.vector("j", first))  # fmt: skip
+
+
+def _cylindrical(ends: JointEnds) -> None:
+    axis = ends.joint.axes[0]
+    _add(ends, "cyl", P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", axis),
+         a_j=ends.vector("j", axis))  # fmt: skip
+
+
+def _screw(ends: JointEnds) -> None:
+    axis = ends.joint.axes[0]
+    _add(ends, "screw", P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", axis),
+         a_j=ends.vector("j", axis), pitch=ends.joint.pitch)  # fmt: skip

@@ -1,0 +1,146 @@
+"""Reads the files of a model: none outside of its folder and of packages that the user names."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import attrs
+
+from dap3d_core.formats.mesh_file import read_mesh
+from dap3d_core.interface.formats.frames import Floats, Integers
+from dap3d_core.interface.formats.remarks import FormatError, Place, Remarks
+from dap3d_core.interface.formats.xml_tree import XmlElement, parse_xml
+from dap3d_core.registry.regular_files import read_regular
+
+#: Larger files are not read, bytes.
+LARGEST = 64 * 2**20
+#: Number of included files beyond which a model is refused, and their depth.
+MOST_INCLUDES, DEEPEST_INCLUDE = 500, 30
+
+
+@attrs.define(eq=False)
+class SourceFiles:
+    """The file that is imported, and those that it names (``interface.formats.Source``).
+
+    Attributes:
+        path: the file.
+        folder: the folder that its files must lie in, or below.
+        packages: name of a package -> its folder.
+        allow_code: whether the user allows that code of the file is run.
+        remarks: of the import.
+        text: replaces the contents of the file, as the output of a macro processor.
+    """
+
+    path: Path
+    folder: Path
+    packages: Mapping[str, Path] = attrs.Factory(dict)
+    allow_code: bool = False
+    remarks: Remarks = attrs.Factory(Remarks)
+    text: bytes | str | None = None
+    _open: list[Path] = attrs.Factory(list)
+    _count: int = 0
+    _meshes: dict[Path, tuple[Floats, Integers]] = attrs.Factory(dict)
+
+    def xml(self) -> XmlElement:
+        """The root of the file itself."""
+        if self.text is not None:
+            return parse_xml(self.text, self.path.name)
+        self._open = [self.path.resolve()]
+        return parse_xml(self._read(self.path, Place()), self.path.name)
+
+    def include(self, name: str, place: Place, base: Path | None = None) -> XmlElement:
+        """The root of another file that it names.
+
+        Raises:
+            FormatError: it is not found, lies elsewhere, or includes itself.
+        """
+        path = self._inside(name, place, base or self.folder)
+        if path is None or not path.is_file():
+            raise FormatError(f"there is no file {name}", place)
+        resolved = path.resolve()
+        self._count += 1
+        if resolved in self._open:
+            chain = " -> ".join(p.name for p in (*self._open, resolved))
+            raise FormatError(f"the file includes itself: {chain}", place)
+        if self._count > MOST_INCLUDES or len(self._open) > DEEPEST_INCLUDE:
+            raise FormatError(f"includes more than {MOST_INCLUDES} files, or too deep", place)
+        return parse_xml(self._read(path, place), self._name(path))
+
+    def entered(self, path: Path) -> None:
+        """Open an included file: what it includes must not be that file again."""
+        self._open.append(path.resolve())
+
+    def left(self) -> None:
+        """Close the included file that was opened last."""
+        self._open.pop()
+
+    def locate(self, uri: str, place: Place, base: Path | None = None) -> Path | None:
+        """The path of a file that the model names; None, with a remark, where there is none.
+
+        Raises:
+            FormatError: it lies outside of the folder of the model, or would have to be fetched.
+        """
+        path = self._inside(uri, place, base or self.folder)
+        if path is not None and not path.is_file():
+            self.remarks.leave_out(place, f"there is no file {uri}: its shape is not drawn")
+            return None
+        return path
+
+    def mesh(self, path: Path, place: Place) -> tuple[Floats, Integers]:
+        """Vertices (k, 3) and triangles (m, 3) of a mesh file.
+
+        Raises:
+            FormatError: it cannot be read, is too large, or trimesh is not installed.
+        """
+        if path not in self._meshes:
+            self._meshes[path] = read_mesh(path, place)
+        return self._meshes[path]
+
+    def _inside(self, uri: str, place: Place, base: Path) -> Path | None:
+        """A path within the folder or a package; None, with a remark, for an unknown package.
+
+        Raises:
+            FormatError: it lies elsewhere.
+        """
+        root, name = self.folder, uri.strip()
+        scheme, separator, rest = name.partition("://")
+        if separator and scheme in ("package", "model"):
+            package, _, name = rest.partition("/")
+            if package not in self.packages:
+                what = f"package {package} is not known: files in it are left out; "
+                what += f"--package {package}=FOLDER names its folder"
+                self.remarks.leave_out(place, what)
+                return None
+            root = base = self.packages[package]
+        elif separator and scheme == "file":
+            name = rest
+        elif separator:
+            raise FormatError(f"{uri!r} is no file of the model; nothing is fetched", place)
+        if "\0" in name or not name.isprintable():
+            raise FormatError("the name of a file holds control characters", place)
+        try:
+            path = Path(os.path.normpath(base / name))
+            roots = [root, *self.packages.values()]
+            if any(path.resolve().is_relative_to(one.resolve()) for one in roots):
+                return path
+        except (OSError, RuntimeError, ValueError) as error:
+            raise FormatError(f"{uri!r} is no path: {error}", place) from None
+        remedy = "copy it there, or import with --root FOLDER, a folder that holds both"
+        raise FormatError(f"{uri!r} lies outside of the folder of the model", place, remedy)
+
+    def _read(self, path: Path, place: Place) -> bytes:
+        try:
+            data = read_regular(path, LARGEST + 1)
+        except OSError as error:
+            what = f"{path} cannot be read: {error.strerror or error}"
+            raise FormatError(what, place) from None
+        if len(data) > LARGEST:
+            raise FormatError(f"{path.name} has more than {LARGEST >> 20} MiB", place)
+        return data
+
+    def _name(self, path: Path) -> str:
+        """A file as messages name it: relative to the folder of the model."""
+        try:
+            return str(path.resolve().relative_to(self.folder.resolve()))
+        except ValueError:
+            return path.name

@@ -1,0 +1,250 @@
+"""``import_model``: the scene of a model of another program."""
+
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from dap3d_core.formats.add_shapes import MeshFiles
+from dap3d_core.formats.files import SourceFiles
+from dap3d_core.formats.names import Names
+from dap3d_core.formats.to_scene import ImportOptions, scene_of
+from dap3d_core.interface.errors import PluginError
+from dap3d_core.interface.formats import Articulation, FormatError, Importer, Remark, Remarks
+from dap3d_core.interface.formats.xml_tree import XmlElement
+from dap3d_core.registry import Registry, load_registry
+from dap3d_core.registry.formats import Formats, load_formats
+from dap3d_core.scene import Scene, SceneError, check
+from dap3d_core.scene.errors import MISSING, Mistake
+
+
+@attrs.frozen
+class ImportReport:
+    """The report of an import.
+
+    Attributes:
+        file: the file.
+        format: the importer's keyword.
+        taken: number of links, joints, couplings and actuators in the file.
+        translated: contents that the scene says in another way, with the difference.
+        left_out: contents without a counterpart.
+        notes: notes of the check of the scene.
+        meshes: mesh file -> its name in the scene, below the scene's folder.
+    """
+
+    file: str
+    format: str
+    taken: dict[str, int]
+    translated: tuple[Remark, ...]
+    left_out: tuple[Remark, ...]
+    notes: tuple[str, ...]
+    meshes: dict[Path, str]
+
+    def save(self, scene: Scene, folder: str | os.PathLike[str]) -> Path:
+        """Write the scene into a folder, with its meshes below; returns the scene file.
+
+        Raises:
+            SceneError: the scene cannot be written.
+            OSError: a mesh cannot be copied.
+        """
+        target = Path(folder)
+        for source, name in self.meshes.items():
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, target / name)
+        target.mkdir(parents=True, exist_ok=True)
+        return scene.save(target)
+
+
+def import_model(
+    path: str | os.PathLike[str],
+    *,
+    format: str | None = None,
+    packages: Mapping[str, str | os.PathLike[str]] | None = None,
+    root: str | os.PathLike[str] | None = None,
+    free_base: bool = False,
+    keep_fixed: bool = False,
+    balance_inertia: bool = False,
+    strict: bool = False,
+    allow_code: bool = False,
+    positions: Mapping[str, float | Sequence[float]] | None = None,
+    rates: Mapping[str, float | Sequence[float]] | None = None,
+    registry: Registry | None = None,
+) -> tuple[Scene, ImportReport]:
+    """The scene of a model of another program: URDF, SDF, MJCF, or a format of a plugin.
+
+    Args:
+        path: the file.
+        format: keyword of an importer; by default that of the file.
+        packages: name of a package, in ``package://NAME/...``, -> its folder.
+        root: the folder that files which the model names must lie in; by default that of the file.
+        free_base: links without a joint to a parent are free, where the format leaves it open.
+        keep_fixed: fixed joints between moving links stay joints.
+        balance_inertia: principal moments of inertia that no body has are replaced by their mean.
+        strict: refuse a model of which something would be left out.
+        allow_code: evaluate the expressions of a xacro file.
+        positions, rates: of joints where the scene starts, by name.
+        registry: the installed types; by default all.
+
+    Returns:
+        The scene, checked, and a report of what was taken, translated and left out.
+
+    Raises:
+        SceneError: the file cannot be imported; with its line.
+    """
+    try:
+        file = Path(os.fsdecode(path))
+    except TypeError:
+        raise _refusal(FormatError(f"a model is a file, not {path!r}")) from None
+    meshes, names = MeshFiles(), Names()
+    try:
+        model, source, keyword = read_articulation(
+            file, format=format, packages=packages, root=root, allow_code=allow_code
+        )
+        start, moving = _coordinates(positions, model), _coordinates(rates, model)
+        options = ImportOptions(free_base, keep_fixed, balance_inertia, start, moving)
+        scene = scene_of(model, source.remarks, options, meshes=meshes, names=names)
+    except FormatError as error:
+        raise _refusal(error, file) from None
+    if strict:
+        _refuse_omissions(source.remarks)
+    scene.description = f"From {file.name}."
+    try:
+        checked = check(scene, load_registry() if registry is None else registry)
+    except SceneError as error:
+        raise SceneError(_relocated(m, names, file) for m in error.mistakes) from None
+    return scene, _report(file, keyword, model, source.remarks, checked.notes, meshes)
+
+
+def _refuse_omissions(remarks: Remarks) -> None:
+    """Refuse a model of which something is left out.
+
+    Raises:
+        SceneError: each omission, with its line.
+    """
+    if remarks.left_out:
+        raise SceneError(
+            Mistake("", MISSING, f"{one.text}: it would be left out", file=one.place.file,
+                    line=one.place.line)
+            for one in remarks.left_out
+        )  # fmt: skip
+
+
+def _report(
+    file: Path, keyword: str, model: Articulation, remarks: Remarks, notes: Sequence[str],
+    meshes: MeshFiles,
+) -> ImportReport:  # fmt: skip
+    parts = ("links", "joints", "couplings", "actuators")
+    return ImportReport(
+        str(file), keyword, {part: len(getattr(model, part)) for part in parts},
+        remarks.translated, remarks.left_out, tuple(notes),
+        {path: name for (path, _), name in meshes.names.items()},
+    )  # fmt: skip
+
+
+def read_articulation(
+    file: Path,
+    *,
+    format: str | None = None,
+    packages: Mapping[str, str | os.PathLike[str]] | None = None,
+    root: str | os.PathLike[str] | None = None,
+    allow_code: bool = False,
+) -> tuple[Articulation, SourceFiles, str]:
+    """The model in a file before it becomes a scene, its files, and the importer's keyword.
+
+    Raises:
+        FormatError: the file cannot be read.
+        PluginError: there is no such importer, or it is broken.
+    """
+    if not file.exists():
+        raise FormatError(f"there is no file {file}")
+    folders = {name: Path(os.fsdecode(folder)) for name, folder in (packages or {}).items()}
+    for name, folder in folders.items():
+        if not folder.is_dir():
+            raise FormatError(f"package {name}: {folder} is no folder")
+    folder = file.parent if root is None else Path(os.fsdecode(root))
+    source = SourceFiles(file, folder, folders, allow_code)
+    importer, keyword = _importer(source, format)
+    try:
+        return importer.read(source), source, keyword
+    except (FormatError, PluginError):
+        raise
+    except RecursionError:
+        raise FormatError("is nested too deep") from None
+
+
+def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:
+    """The importer of a file: the one wanted, by its suffix, or by the root of its XML.
+
+    Raises:
+        FormatError: no installed format is that of the file.
+    """
+    formats = load_formats("importer")
+    if wanted is not None:
+        return formats.get(wanted), wanted
+    suffix, loaded = source.path.suffix.lower(), _usable(formats)
+    fitting = {k: one for k, one in loaded.items() if suffix in one.suffixes}
+    if len(fitting) != 1:
+        name = _root_name(source)
+        fitting = {k: one for k, one in loaded.items() if name in one.roots} or fitting
+    if len(fitting) == 1:
+        keyword, importer = next(iter(fitting.items()))
+        return importer, keyword
+    known = ", ".join(f"{k} ({' '.join(one.suffixes)})" for k, one in loaded.items())
+    what = f"is no file of a format that is installed: {known or 'none is'}"
+    raise FormatError(what, remedy="name its format with --format")
+
+
+def _usable(formats: Formats) -> dict[str, Importer]:
+    """The importers that can be loaded: a broken one hurts its own files alone."""
+    usable: dict[str, Importer] = {}
+    for keyword in formats.keywords:
+        try:
+            usable[keyword] = formats.get(keyword)
+        except PluginError:
+            continue
+    return usable
+
+
+def _root_name(source: SourceFiles) -> str:
+    root: XmlElement = source.xml()
+    return root.name
+
+
+def _coordinates(
+    given: Mapping[str, Any] | None, model: Articulation
+) -> dict[str, tuple[float, ...]]:
+    """Coordinates of joints as tuples.
+
+    Raises:
+        FormatError: there is no such joint.
+    """
+    coordinates = {}
+    for name, value in (given or {}).items():
+        if name not in model.joints:
+            raise FormatError(f"position of {name}: there is no such joint in the file")
+        values = tuple(map(float, value if isinstance(value, Sequence) else (value,)))
+        coordinates[name] = values
+    return coordinates
+
+
+def _relocated(mistake: Mistake, names: Names, file: Path) -> Mistake:
+    """A mistake of the scene, at the line of the file that it comes from."""
+    table, _, rest = mistake.key.partition(".")
+    place = names.places.get((table, rest.partition(".")[0]))
+    if place is None:
+        return attrs.evolve(mistake, file=str(file))
+    return attrs.evolve(mistake, file=place.file, line=place.line)
+
+
+def _refusal(error: FormatError, file: Path | None = None) -> SceneError:
+    """The error of a scene for that of a file."""
+    place = error.place
+    name = place.file or ("" if file is None else file.name)
+    if file is not None and name == file.name:
+        name = str(file)
+    return SceneError(
+        [Mistake("", MISSING, error.what, remedy=error.remedy, file=name, line=place.line)]
+    )

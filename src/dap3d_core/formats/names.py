@@ -1,0 +1,44 @@
+"""Names of a file as names of a scene."""
+
+import attrs
+
+from dap3d_core.interface.formats.remarks import Place, Remarks
+from dap3d_core.scene.scene import fault_of_name
+
+
+@attrs.define
+class Names:
+    """The names taken in each table of a scene.
+
+    Attributes:
+        taken: table -> names.
+        scene_names: (table, name in the file) -> name in the scene.
+        places: (table, name in the scene) -> its place in the file.
+    """
+
+    taken: dict[str, set[str]] = attrs.Factory(dict)
+    scene_names: dict[tuple[str, str], str] = attrs.Factory(dict)
+    places: dict[tuple[str, str], Place] = attrs.Factory(dict)
+
+    def of(self, table: str, name: str, place: Place, remarks: Remarks) -> str:
+        """A name that the scene can have: the same one, or one made of it, which is remarked."""
+        good = (
+            "".join(c if c.isprintable() and c != "." else "_" for c in name.strip()) or "unnamed"
+        )
+        if fault_of_name(good):
+            good = f"{good}_"
+        good = self.free(table, good)
+        self.scene_names[table, name], self.places[table, good] = good, place
+        if good != name:
+            remarks.translate(place, f"{name!r} is called {good!r} in the scene")
+        return good
+
+    def free(self, table: str, name: str) -> str:
+        """The name, or the first of NAME_2, NAME_3, ... that is free, which is taken."""
+        taken = self.taken.setdefault(table, set())
+        number, candidate = 1, name
+        while candidate in taken:
+            number += 1
+            candidate = f"{name}_{number}"
+        taken.add(candidate)
+        return candidate

@@ -1,0 +1,133 @@
+"""Links that move as one: merged along fixed joints, with their mass and inertia together."""
+
+import attrs
+import numpy as np
+
+from dap3d_core.formats.spanning_tree import SpanningTree
+from dap3d_core.interface.formats.articulation import WORLD, Inertial, Link
+from dap3d_core.interface.formats.frames import IDENTITY, Frame
+from dap3d_core.interface.formats.remarks import FormatError, Remarks
+from dap3d_core.interface.formats.solids import inertia_moved, total_inertia
+
+#: Mass and inertia of a link without any that moves, as a part of the least of the others.
+STAND_IN = 1e-9
+#: Departure from symmetry up to which an inertia matrix counts as symmetric, relative.
+ASYMMETRY = 1e-6
+
+
+@attrs.define(eq=False)
+class RigidGroup:
+    """Links that move as one.
+
+    Attributes:
+        name: of the link that the others are fixed to; WORLD for what does not move.
+        links: the links, with their frames in that one.
+        inertial: mass and inertia together, in the axes of that link.
+    """
+
+    name: str
+    links: list[tuple[Link, Frame]]
+    inertial: Inertial = attrs.Factory(lambda: Inertial(0.0))
+
+
+def rigid_groups(
+    tree: SpanningTree,
+    remarks: Remarks,
+    *,
+    fixed_base: bool,
+    keep_fixed: bool,
+    balance_inertia: bool = False,
+) -> tuple[dict[str, RigidGroup], dict[str, tuple[str, Frame]]]:
+    """The groups of a model, and of each link its group and its frame in it.
+
+    Args:
+        tree: the tree of the model.
+        remarks: takes what is merged.
+        fixed_base: links without a joint to a parent belong to the world.
+        keep_fixed: fixed joints between moving links stay joints.
+        balance_inertia: principal moments that no body has are replaced by their mean.
+
+    Raises:
+        FormatError: a mass or an inertia is impossible.
+    """
+    model = tree.model
+    member: dict[str, tuple[str, Frame]] = {WORLD: (WORLD, IDENTITY)}
+    groups = {WORLD: RigidGroup(WORLD, [])}
+    for name in tree.order:
+        joint, link = tree.placing.get(name), model.links[name]
+        if joint is None and fixed_base:
+            member[name] = (WORLD, model.base_poses.get(name, IDENTITY))
+            text = "fixed to ground, and its mass without effect; --free-base frees it"
+            remarks.translate(link.place, f"{name} has no joint to a parent: {text}")
+        elif joint is not None and joint.kind == "fixed":
+            group, frame = member[joint.parent]
+            if group == WORLD or not keep_fixed:
+                here = joint.in_parent @ joint.in_child.inverse()
+                member[name] = (group, frame @ here)
+                if group != WORLD:
+                    remarks.translate(joint.place, "links of fixed joints are merged into one body")
+        if name not in member:
+            member[name] = (name, IDENTITY)
+            groups[name] = RigidGroup(name, [])
+        group, frame = member[name]
+        groups[group].links.append((link, frame))
+    for group_ in groups.values():
+        if group_.name != WORLD:
+            parts = [
+                inertia_moved(_checked(link, remarks, balance_inertia), frame)
+                for link, frame in group_.links
+                if link.inertial
+            ]
+            group_.inertial = total_inertia(parts) if parts else Inertial(0.0)
+    _stand_in(groups, remarks)
+    return groups, member
+
+
+def _checked(link: Link, remarks: Remarks, balance_inertia: bool) -> Inertial:
+    """The inertial of a link.
+
+    Raises:
+        FormatError: it is impossible.
+    """
+    inertial = link.inertial or Inertial(0.0)
+    scale = float(np.abs(inertial.inertia).max(initial=0.0))
+    finite = np.isfinite([inertial.mass, *inertial.com, *inertial.inertia.ravel()]).all()
+    if not finite or inertial.mass < 0.0:
+        raise FormatError(f"link {link.name}: mass and inertia should be numbers, not negative",
+                          link.place)  # fmt: skip
+    if np.abs(inertial.inertia - inertial.inertia.T).max(initial=0.0) > ASYMMETRY * scale:
+        raise FormatError(f"link {link.name}: the inertia matrix is not symmetric", link.place)
+    least, middle, most = np.linalg.eigvalsh(inertial.inertia).tolist()
+    if least < -ASYMMETRY * scale or least + middle < most * (1.0 - ASYMMETRY):
+        if balance_inertia:
+            text = "principal moments of inertia that no body has are replaced by their mean"
+            remarks.translate(link.place, text)
+            mean = (least + middle + most) / 3.0
+            return Inertial(inertial.mass, inertial.com, mean * np.eye(3))
+        what = f"link {link.name}: no body has the principal moments of inertia {least:.4g}, "
+        what += f"{middle:.4g}, {most:.4g}: the largest is at most the sum of the others"
+        raise FormatError(what, link.place, "correct the file, or take their mean with "
+                          "--balance-inertia (balance_inertia=True)")  # fmt: skip
+    return inertial
+
+
+def _stand_in(groups: dict[str, RigidGroup], remarks: Remarks) -> None:
+    """Give groups that move without mass, or without inertia, the least that can be computed."""
+    moving = [g for g in groups.values() if g.name != WORLD]
+    masses = [g.inertial.mass for g in moving if g.inertial.mass > 0.0]
+    moments = [m for g in moving for m in np.linalg.eigvalsh(g.inertial.inertia) if m > 0.0]
+    mass, moment = STAND_IN * min(masses, default=1.0), STAND_IN * min(moments, default=1.0)
+    for group in moving:
+        link, old = group.links[0][0], group.inertial
+        new_mass, inertia = old.mass or mass, old.inertia
+        least = float(np.linalg.eigvalsh(inertia)[0])
+        largest = float(np.abs(inertia).max(initial=0.0))
+        if least <= STAND_IN * largest:
+            inertia = inertia + (moment - min(least, 0.0)) * np.eye(3)
+        if not old.mass:
+            text = "a link without mass that moves has a billionth of the least mass of the others"
+            remarks.translate(link.place, text)
+        elif inertia is not old.inertia:
+            text = "a principal moment of inertia of 0 is a billionth of the least of the others"
+            remarks.translate(link.place, text)
+        group.inertial = Inertial(new_mass, old.com, inertia)

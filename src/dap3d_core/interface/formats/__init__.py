@@ -1,0 +1,70 @@
+"""The interface of file formats: what an importer returns and what an exporter is given."""
+
+from dap3d_core.interface.formats.articulation import (
+    WORLD,
+    Actuator,
+    Articulation,
+    Coupling,
+    Geometry,
+    Inertial,
+    Joint,
+    Limits,
+    Link,
+)
+from dap3d_core.interface.formats.format_types import Exporter, Importer, Source, hookimpl
+from dap3d_core.interface.formats.frames import (
+    IDENTITY,
+    Frame,
+    axis_angle,
+    euler_angles,
+    from_quaternion,
+    quaternion,
+    rpy,
+    rpy_of,
+)
+from dap3d_core.interface.formats.remarks import FormatError, Place, Remark, Remarks
+from dap3d_core.interface.formats.solids import (
+    inertia_moved,
+    inertia_of_mesh,
+    inertia_of_solid,
+    total_inertia,
+)
+from dap3d_core.interface.formats.xml_tree import XmlElement, parse_xml
+
+#: Version of this interface, which a module of formats says as ``interface_version``.
+INTERFACE_VERSION = 1
+
+__all__ = [
+    "IDENTITY",
+    "INTERFACE_VERSION",
+    "WORLD",
+    "Actuator",
+    "Articulation",
+    "Coupling",
+    "Exporter",
+    "FormatError",
+    "Frame",
+    "Geometry",
+    "Importer",
+    "Inertial",
+    "Joint",
+    "Limits",
+    "Link",
+    "Place",
+    "Remark",
+    "Remarks",
+    "Source",
+    "XmlElement",
+    "axis_angle",
+    "euler_angles",
+    "from_quaternion",
+    "hookimpl",
+    "inertia_moved",
+    "inertia_of_mesh",
+    "inertia_of_solid",
+    "parse_xml",
+    "quaternion",
+    "rpy",
+    "rpy_of",
+    "total_inertia",
+]

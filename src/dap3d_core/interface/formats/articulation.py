@@ -1,0 +1,200 @@
+"""An articulated model: links, joints and what acts in them, between a file and a scene.
+
+Every importer makes one and every exporter is given one, so that a format is translated once in
+each direction. Lengths in m, angles in rad, masses in kg.
+"""
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.interface.formats.frames import IDENTITY, Floats, Frame
+from dap3d_core.interface.formats.remarks import NOWHERE, Place
+
+#: The name of what does not move, as parent or child of a joint.
+WORLD = "world"
+#: Kinds of joints -> number of their coordinates. The axes of universal and planar joints are two:
+#: of a universal joint the first is fixed in the parent and the second in the child; of a planar
+#: one they are the directions of sliding, and the child turns about their cross product.
+KINDS = {
+    "fixed": 0, "revolute": 1, "prismatic": 1, "screw": 1, "cylindrical": 2, "universal": 2,
+    "ball": 3, "planar": 3, "free": 6,
+}  # fmt: skip
+
+
+def _floats(value: Any) -> Floats:
+    return np.array(value, dtype=np.float64)
+
+
+@attrs.frozen(eq=False)
+class Inertial:
+    """Mass and inertia of a link.
+
+    Attributes:
+        mass: kg.
+        com: (3,) mass centre in the axes of the link.
+        inertia: (3, 3) about the mass centre, in the axes of the link, kg m^2.
+    """
+
+    mass: float
+    com: Floats = attrs.field(default=(0.0, 0.0, 0.0), converter=_floats)
+    inertia: Floats = attrs.field(factory=lambda: np.zeros((3, 3)), converter=_floats)
+
+
+@attrs.frozen(eq=False)
+class Geometry:
+    """A shape of a link, which is drawn.
+
+    Attributes:
+        kind: box, sphere, cylinder, capsule, ellipsoid or mesh.
+        size: edges of a box; radius of a sphere; radius and length of a cylinder and (without its
+            caps) a capsule, along z; semi-axes of an ellipsoid.
+        pose: its frame in the link.
+        mesh: path of the file of a mesh, as ``Source.locate`` returns it.
+        scale: (3,) factors of a mesh.
+        color: "#rrggbb", or "".
+        collision: True for the shape of contacts, which is drawn where a link has no other.
+        place: its place in the file.
+    """
+
+    kind: str
+    size: tuple[float, ...] = ()
+    pose: Frame = IDENTITY
+    mesh: Any = None
+    scale: tuple[float, ...] = (1.0, 1.0, 1.0)
+    color: str = ""
+    collision: bool = False
+    place: Place = NOWHERE
+
+
+@attrs.define(eq=False)
+class Link:
+    """A rigid link.
+
+    Attributes:
+        name: its name in the file.
+        inertial: its mass and inertia, or None for none.
+        geometries: its shapes.
+        place: its place in the file.
+    """
+
+    name: str
+    inertial: Inertial | None = None
+    geometries: list[Geometry] = attrs.Factory(list)
+    place: Place = NOWHERE
+
+
+@attrs.frozen
+class Limits:
+    """Limits of a coordinate.
+
+    Attributes:
+        lower, upper: rad or m; infinite for none.
+        stiffness: of the stops, N m/rad or N/m; None where the format says none.
+    """
+
+    lower: float = -float("inf")
+    upper: float = float("inf")
+    stiffness: float | None = None
+
+
+@attrs.define(eq=False)
+class Joint:
+    """A joint between two links.
+
+    Attributes:
+        name: its name in the file.
+        kind: one of KINDS.
+        parent, child: names of links, or WORLD.
+        in_parent, in_child: the joint's frame in the parent, and in the child; they coincide where
+            the coordinates are zero.
+        axes: (3,) unit vectors in the joint's frame: one; two for universal and planar.
+        pitch: of a screw, m a turn.
+        limits, damping, friction, stiffness, rest, armature: of each coordinate: a number, or a
+            tuple for kinds with several axes. Forces are N m or N; ``rest`` is the coordinate
+            without force of the spring.
+        position: coordinate or coordinates where the model starts.
+        closes: True for a joint that closes a loop: it does not place its child.
+        place: its place in the file.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    in_parent: Frame = IDENTITY
+    in_child: Frame = IDENTITY
+    axes: tuple[Any, ...] = ((0.0, 0.0, 1.0),)
+    pitch: float = 0.0
+    limits: tuple[Limits, ...] = (Limits(),)
+    damping: tuple[float, ...] = (0.0,)
+    friction: tuple[float, ...] = (0.0,)
+    stiffness: tuple[float, ...] = (0.0,)
+    rest: tuple[float, ...] = (0.0,)
+    armature: tuple[float, ...] = (0.0,)
+    position: tuple[float, ...] = ()
+    closes: bool = False
+    place: Place = NOWHERE
+
+
+@attrs.frozen(eq=False)
+class Coupling:
+    """A coordinate that follows another: q = offset + ratio q_of_other.
+
+    Attributes:
+        name: its name in the file, or "".
+        joint, other: names of joints with one coordinate.
+        ratio, offset: see above.
+        place: its place in the file.
+    """
+
+    name: str
+    joint: str
+    other: str
+    ratio: float = 1.0
+    offset: float = 0.0
+    place: Place = NOWHERE
+
+
+@attrs.frozen(eq=False)
+class Actuator:
+    """A force on the coordinate of a joint: gear times the input.
+
+    Attributes:
+        name: its name in the file, which becomes that of an input.
+        joint: the joint.
+        gear: N m or N for an input of 1.
+        place: its place in the file.
+    """
+
+    name: str
+    joint: str
+    gear: float = 1.0
+    place: Place = NOWHERE
+
+
+@attrs.define(eq=False)
+class Articulation:
+    """A model of links and joints.
+
+    Attributes:
+        name: of the model.
+        links, joints: by name, in the order of the file.
+        couplings, actuators: in the order of the file.
+        gravity: (3,) m/s^2.
+        fixed_base: whether links without a joint to a parent are fixed to the world, rather than
+            free; None where the format leaves it open.
+        base_poses: of links without a joint to a parent.
+        place: the place of the model in its file.
+    """
+
+    name: str
+    links: dict[str, Link] = attrs.Factory(dict)
+    joints: dict[str, Joint] = attrs.Factory(dict)
+    couplings: list[Coupling] = attrs.Factory(list)
+    actuators: list[Actuator] = attrs.Factory(list)
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    fixed_base: bool | None = None
+    place: Place = NOWHERE
+    base_poses: dict[str, Frame] = attrs.Factory(dict)

@@ -1,0 +1,112 @@
+"""Base classes of importers and exporters, and their hooks."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+import pluggy
+
+from dap3d_core.interface.formats.articulation import Articulation
+from dap3d_core.interface.formats.frames import Floats, Integers
+from dap3d_core.interface.formats.remarks import Place, Remarks
+from dap3d_core.interface.formats.xml_tree import XmlElement
+
+hookspec = pluggy.HookspecMarker("dap3d")
+hookimpl = pluggy.HookimplMarker("dap3d")
+
+
+class Source(Protocol):
+    """The file that is imported, and the files that it may name.
+
+    Every file is read through it: it refuses those that lie outside of the folder of the model and
+    of the packages that the user names.
+
+    Attributes:
+        path: the file.
+        remarks: takes what is translated with a difference and what is left out.
+        allow_code: whether the user allows that code of the file is run.
+        packages: name of a package -> its folder.
+    """
+
+    path: Path
+    remarks: Remarks
+    allow_code: bool
+    packages: Mapping[str, Path]
+
+    def xml(self) -> XmlElement:
+        """The root of the file itself."""
+
+    def include(self, name: str, place: Place, base: Path | None = None) -> XmlElement:
+        """The root of another file that it names; a cycle is refused."""
+
+    def locate(self, uri: str, place: Place, base: Path | None = None) -> Path | None:
+        """The path of a file that it names, such as a mesh; None, with a remark, if not found."""
+
+    def mesh(self, path: Path, place: Place) -> tuple[Floats, Integers]:
+        """Vertices (k, 3) and triangles (m, 3) of a mesh file."""
+
+
+class Importer:
+    """A format that models are read from.
+
+    Attributes:
+        keyword: its name: ``dap3d import --format KEYWORD``.
+        title: its name for people.
+        suffixes: endings of its files, such as ".urdf".
+        roots: names of the root element, where its files are XML.
+    """
+
+    keyword: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+    suffixes: ClassVar[tuple[str, ...]] = ()
+    roots: ClassVar[tuple[str, ...]] = ()
+
+    def read(self, source: Source) -> Articulation:
+        """The model in a file.
+
+        Raises:
+            FormatError: it cannot be read.
+        """
+        raise NotImplementedError
+
+
+class Exporter:
+    """A format that models are written to.
+
+    Attributes:
+        keyword: its name: ``dap3d export --format KEYWORD``.
+        title: its name for people.
+        suffix: ending of its files.
+    """
+
+    keyword: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+    suffix: ClassVar[str] = ""
+
+    def write(self, model: Articulation, remarks: Remarks) -> str:
+        """The text of a file.
+
+        Args:
+            model: the model; meshes have paths relative to the folder of the scene.
+            remarks: takes what is translated with a difference and what is left out.
+
+        Raises:
+            FormatError: the format cannot say something that would change the mechanism.
+        """
+        raise NotImplementedError
+
+
+@hookspec
+def dap3d_importers() -> list[type[Importer]]:
+    """The importers of a module: a list of subclasses of ``Importer``."""
+    raise NotImplementedError
+
+
+@hookspec
+def dap3d_exporters() -> list[type[Exporter]]:
+    """The exporters of a module: a list of subclasses of ``Exporter``."""
+    raise NotImplementedError
+
+
+#: Base class of each kind.
+BASES: dict[str, Any] = {"importer": Importer, "exporter": Exporter}

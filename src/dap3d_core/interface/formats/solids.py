@@ -1,0 +1,88 @@
+"""Masses and inertias of solids of uniform density."""
+
+from collections.abc import Iterable, Sequence
+from math import pi
+
+import numpy as np
+
+from dap3d_core.interface.formats.articulation import Inertial
+from dap3d_core.interface.formats.frames import Floats, Frame, Integers
+
+
+def inertia_of_solid(kind: str, size: Sequence[float]) -> tuple[float, Floats]:
+    """Volume, and inertia about the centre for a mass of 1, of a solid.
+
+    Args:
+        kind: box, sphere, cylinder, capsule or ellipsoid.
+        size: as of ``Geometry``.
+
+    Raises:
+        ValueError: there is no such kind.
+    """
+    if kind == "box":
+        x, y, z = (edge * edge / 12.0 for edge in size)
+        return float(np.prod(size)), np.diag([y + z, z + x, x + y])
+    if kind in ("sphere", "ellipsoid"):
+        a, b, c = size if kind == "ellipsoid" else (size[0],) * 3
+        x, y, z = (semi * semi / 5.0 for semi in (a, b, c))
+        return 4.0 / 3.0 * pi * a * b * c, np.diag([y + z, z + x, x + y])
+    if kind == "cylinder":
+        r, length = size
+        across = r * r / 4.0 + length * length / 12.0
+        return pi * r * r * length, np.diag([across, across, r * r / 2.0])
+    if kind == "capsule":
+        return _capsule(*size)
+    raise ValueError(f"no solid is of kind {kind}")
+
+
+def _capsule(r: float, length: float) -> tuple[float, Floats]:
+    """A cylinder with two half balls, whose mass centres lie 3/8 r beyond its ends."""
+    tube, ball = pi * r * r * length, 4.0 / 3.0 * pi * r**3
+    volume = tube + ball
+    along = (tube * r * r / 2.0 + ball * 0.4 * r * r) / volume
+    across = tube * (r * r / 4.0 + length * length / 12.0)
+    across += ball * (0.4 * r * r + length * length / 4.0 + 3.0 / 8.0 * length * r)
+    return volume, np.diag([across / volume, across / volume, along])
+
+
+def inertia_of_mesh(vertices: Floats, triangles: Integers) -> tuple[float, Floats, Floats]:
+    """Volume, mass centre, and inertia about it for a mass of 1, of a closed mesh.
+
+    The tetrahedra of all triangles and the origin are summed with their signs: M. Kallay,
+    "Computing the moment of inertia of a solid defined by a triangle mesh" (2006).
+
+    Raises:
+        ValueError: the mesh encloses no volume.
+    """
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    determinants = np.einsum("ij,ij->i", a, np.cross(b, c))
+    volume = float(determinants.sum()) / 6.0
+    if not abs(volume) > 0.0:
+        raise ValueError("the mesh encloses no volume")
+    total = a + b + c
+    com = determinants @ total / (24.0 * volume)
+    second = sum(np.einsum("i,ij,ik->jk", determinants, p, p) for p in (a, b, c, total))
+    second = second / (120.0 * volume) - np.outer(com, com)
+    return volume, com, np.trace(second) * np.eye(3) - second
+
+
+def inertia_moved(inertial: Inertial, frame: Frame) -> Inertial:
+    """The same in the axes of another frame; ``frame`` is the pose of the link in it."""
+    com = frame.r + frame.A @ inertial.com
+    return Inertial(inertial.mass, com, frame.A @ inertial.inertia @ frame.A.T)
+
+
+def total_inertia(parts: Iterable[Inertial]) -> Inertial:
+    """Mass, mass centre and inertia of parts in the same axes, by Steiner's theorem."""
+    listed = list(parts)
+    if len(listed) == 1:
+        return listed[0]
+    mass = sum(part.mass for part in listed)
+    if not mass > 0.0:
+        return Inertial(0.0)
+    com = sum(part.mass * part.com for part in listed) / mass
+    inertia = np.zeros((3, 3))
+    for part in listed:
+        d = part.com - com
+        inertia += part.inertia + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+    return Inertial(mass, com, inertia)

@@ -1,0 +1,110 @@
+"""Models of other programs as scenes: what is common to all formats."""
+
+import numpy as np
+import pytest
+from support.process import REPOSITORY
+
+import dap3d_core as dap
+from dap3d_core.model.rotations import rotation
+
+ARM = REPOSITORY / "tests" / "data" / "formats" / "arm.urdf"
+
+
+def turned(axis, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return {
+        "x": np.array([[1, 0, 0], [0, c, -s], [0, s, c]]),
+        "y": np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]),
+    }[axis]
+
+
+def steiner(mass, d):
+    return mass * (d @ d * np.eye(3) - np.outer(d, d))
+
+
+def test_links_of_a_fixed_joint_are_one_body_with_their_inertia():
+    """By Steiner's theorem; the inertia of the lower link is turned by a quarter."""
+    scene, report = dap.import_model(ARM)
+    assert list(scene.bodies) == ["upper", "lower"]
+    J = np.array([[0.02, -0.01, 0], [-0.01, 0.06, 0], [0, 0, 0.07]])
+    A = turned("x", 0.3)
+    J_tool = A @ np.diag([0.001, 0.002, 0.0025]) @ A.T
+    com, tool = np.array([0.4, 0, 0]), np.array([0.8, 0, 0.1])
+    middle = (com + 0.5 * tool) / 1.5
+    expected = J + steiner(1.0, com - middle) + J_tool + steiner(0.5, tool - middle)
+    assert scene.bodies["lower"].mass == 1.5
+    np.testing.assert_allclose(scene.bodies["lower"].Jp, expected, rtol=0, atol=1e-16)
+    assert any("merged" in remark.text for remark in report.translated)
+
+
+def test_fixed_joints_may_be_kept():
+    """The tool is a body of its own, and moves with the lower link: 6 rows of rank 6."""
+    scene, _ = dap.import_model(ARM, keep_fixed=True)
+    assert list(scene.bodies) == ["upper", "lower", "tool"]
+    merged, _ = dap.import_model(ARM)
+    results = [dap.simulate(one, t_end=0.2, dt=0.1, rtol=1e-11) for one in (scene, merged)]
+    assert results[0].method == results[1].method == "standard"  # no row is redundant
+    # both integrate the same motion, each to 1e-11
+    np.testing.assert_allclose(results[0].r[:, 0], results[1].r[:, 0], rtol=0, atol=1e-9)
+
+
+def test_a_model_starts_at_the_positions_given():
+    """Against forward kinematics by hand."""
+    scene, _ = dap.import_model(ARM, positions={"shoulder": 0.7, "elbow": -0.4})
+    upper, lower = turned("y", 0.7), turned("y", 0.7 + 0.5 - 0.4)
+    np.testing.assert_allclose(rotation(np.array(scene.bodies["lower"].p)), lower, atol=1e-15)
+    elbow = [0, 0, 1] + upper @ [1, 0, 0]
+    middle = (np.array([0.4, 0, 0]) + 0.5 * np.array([0.8, 0, 0.1])) / 1.5
+    np.testing.assert_allclose(scene.bodies["lower"].r, elbow + lower @ middle, atol=1e-15)
+
+
+def test_joint_coordinates_have_the_sign_of_the_file():
+    """A rate of a joint becomes the angular velocities of the bodies, and the joint's rate."""
+    scene, _ = dap.import_model(ARM, rates={"shoulder": 0.7, "elbow": -0.4})
+    assert scene.bodies["upper"].w == (0.0, 0.7, 0.0)
+    np.testing.assert_allclose(scene.bodies["lower"].w, (0.0, 0.3, 0.0), atol=1e-16)
+    result = dap.simulate(scene, t_end=0.0)
+    np.testing.assert_allclose(
+        result.quantity("shoulder.angle_rate").values.ravel(), 0.7, rtol=1e-14
+    )
+    np.testing.assert_allclose(result.quantity("elbow.angle_rate").values.ravel(), -0.4, rtol=1e-14)
+
+
+def test_stops_push_back_and_dampers_brake():
+    """The moments of an elastic stop and a damper on the joint, by their laws."""
+    scene, report = dap.import_model(ARM, positions={"shoulder": 2.1}, rates={"shoulder": 0.5})
+    result = dap.simulate(scene, t_end=0.0)
+    moments = {name: result.force(name).on["i"].moment[0] for name in scene.forces if "sho" in name}
+    assert set(moments) == {"shoulder_damper", "shoulder_stops"}
+    np.testing.assert_allclose(moments["shoulder_damper"], (0.0, -0.3 * 0.5, 0.0), atol=1e-15)
+    np.testing.assert_allclose(moments["shoulder_stops"], (0.0, -1e4 * 0.1, 0.0), rtol=1e-12)
+    assert any("beyond its limits" in remark.text for remark in report.translated)
+
+
+def test_what_is_left_out_is_said_with_its_line_and_strict_refuses_it():
+    """Limits of effort, at line 36."""
+    _, report = dap.import_model(ARM)
+    assert any(r.place.line == 36 and "effort" in r.text for r in report.left_out)
+    with pytest.raises(dap.SceneError, match=r"arm\.urdf:36: effort"):
+        dap.import_model(ARM, strict=True)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('<child link="lower"/>', '<child link="lowr"/>', r"no link 'lowr'; did you mean 'lower'"),
+        ('type="continuous"', 'type="hinge"', r"39: joint elbow: type 'hinge' is unknown"),
+        ('xyz="0 2 0"', 'xyz="0 0 0"', r"an axis needs a direction"),
+        ('mass value="2"', 'mass value="two"', r":9: value of <mass> = 'two' should be a finite"),
+        ('mass value="2"', 'mass value="nan"', r":9: value of <mass> = 'nan' should be a finite"),
+        ('ixx="0.01"', 'ixx="1"', r":6: link upper: no body has the principal moments"),
+        ('parent link="base"', 'parent link="lower"', r"hangs from itself"),
+        ('lower="-1"', 'lower="3"', r":36: joint shoulder: lower = 3 lies above upper = 2"),
+    ],
+)
+def test_mistakes_of_a_file_are_told_with_their_line(tmp_path, old, new, message):
+    text = ARM.read_text()
+    assert text.count(old) == 1
+    (tmp_path / "arm.urdf").write_text(text.replace(old, new))
+    with pytest.raises(dap.SceneError, match=message):
+        dap.import_model(tmp_path / "arm.urdf")
