@@ -22,10 +22,10 @@ Integers = NDArray[np.int64]
 #: The order of the group loops in the list: all loops of one kind stand together.
 KINDS = (
     "value", "wrench", "energy", "acceleration", "position", "friction", "angle", "turned",
-    "switch", "knot", "rate"
+    "switch", "bound", "knot", "rate"
 )  # fmt: skip
 (
-    VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, TURNED, SWITCH, KNOT, RATE
+    VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, TURNED, SWITCH, BOUND, KNOT, RATE
 ) = range(len(KINDS))  # fmt: skip
 
 # What a switch does where it becomes negative, or changes its sign: the run ends; the integration

@@ -15,7 +15,7 @@ from dap3d_core.assembly.arrays import step_functions
 RHS, PROJECT, REPORT, ACCEPTED, WATCH = range(5)
 
 #: Kinds of group loops that every formulation calls, and those of joints.
-_ALL = ("value", "wrench", "energy", "angle", "turned", "switch", "knot", "rate")
+_ALL = ("value", "wrench", "energy", "angle", "turned", "switch", "bound", "knot", "rate")
 _OF_JOINTS = ("acceleration", "position", "friction")
 
 

@@ -22,7 +22,8 @@ class Switch:
     Attributes:
         group, place: the element, as an instance of a group.
         kind: "switch": the element's own; "knot": the distance of an argument from where the
-            function that the element is given takes another form.
+            function that the element is given takes another form; "bound": that of an unknown of
+            the element from its bound.
         is_one_of_several, part: where the kernel gives a tuple, which of its numbers.
     """
 
@@ -36,12 +37,19 @@ class Switch:
     def words(self) -> str:
         """Reason to end the run where it becomes negative; "" if integration restarts there."""
         type_: Any = self.group.type_info.type
+        if self.kind == "bound":
+            from dap3d_core.interface.codegen.unknowns import bound_words
+
+            unknown, which, field = bound_words(self.group.type_info)[self.part]
+            at, _ = self.group.type_info.layout.numbers[field]
+            value = self.group.numbers[self.place, at]
+            return f"its unknown {unknown} passed its {which} value, {field} = {value:g}"
         return str(type_.switch_words) if self.kind == "switch" else ""
 
     @property
     def band(self) -> float:
         """Distance beyond a knot from which on an argument has passed it."""
-        if self.kind == "switch":
+        if self.kind != "knot":
             return 0.0
         row, numbers = self.group.numbers[self.place], self.group.type_info.layout.numbers
         own = [place for name, place in numbers.items() if is_knots(name)]
@@ -53,7 +61,8 @@ class Switch:
         is_joint = self.group.type_info.type.kind == "joint"
         names = model.joint_names if is_joint else model.force_names
         name = names[int(self.group.members[self.place])]
-        return f"{name} [{self.part + 1}]" if self.is_one_of_several else name
+        is_numbered = self.is_one_of_several and self.kind != "bound"
+        return f"{name} [{self.part + 1}]" if is_numbered else name
 
 
 def switches_of(loops: Iterable[tuple[str, Group]]) -> tuple[Switch, ...]:
@@ -61,7 +70,7 @@ def switches_of(loops: Iterable[tuple[str, Group]]) -> tuple[Switch, ...]:
     return tuple(
         Switch(group, k, kind, len(group.type_info.outputs[kind]) > 1, part)
         for kind, group in loops
-        if kind in ("switch", "knot")
+        if kind in ("switch", "bound", "knot")
         for k in range(group.count)
         for part in range(len(group.type_info.outputs[kind]))
     )

@@ -358,12 +358,12 @@ def _faults(
 
 
 def _rows(joint: Instance) -> int:
-    return int(joint.type_info.type.rows)  # type: ignore[attr-defined]
+    return joint.type_info.row_count
 
 
 def _position_mask(joint: Instance) -> tuple[bool, ...]:
-    mask = joint.type_info.type.holonomic  # type: ignore[attr-defined]
-    return (mask,) * _rows(joint) if isinstance(mask, bool) else tuple(mask)
+    mask: tuple[bool, ...] = joint.type_info.type.constraint_mask()  # type: ignore[attr-defined]
+    return mask
 
 
 class _Poses(dict[int, BodyPose]):

@@ -122,7 +122,7 @@ def _refusal(group: Group, kernel: Callable[..., Any], rows: Mapping[str, int]) 
 
 
 def _row_count(group: Group) -> int:
-    return int(group.type_info.type.rows)  # type: ignore[attr-defined]
+    return group.type_info.row_count
 
 
 def _rows(count: int) -> str:

@@ -28,6 +28,8 @@ def refusal_of(type_info: TypeInfo) -> str:
     slots = len(type_info.layout.slots)
     if slots > 2:
         return f"it joins {('three', 'four')[slots - 3] if slots < 5 else slots} bodies"
+    if type_info.layout.unknowns:
+        return f"it has unknowns of its own: {', '.join(type_info.layout.unknowns)}"
     if type_.velocity_rows():
         return "it has rows of the velocity level"
     if "t" in _names_in_rows(type_info):

@@ -39,7 +39,7 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         if kind not in _KINDS:
             continue
         slots = len(group.type_info.layout.slots)
-        rows = int(getattr(group.type_info.type, "rows", 0))
+        rows = group.type_info.row_count
         read = _joints_read(group) if kind == "friction" else []
         elements.append((loop, _KINDS[kind], stride(group.type_info),
                          group.type_info.layout.par_width, slots, group.type_info.layout.integers,

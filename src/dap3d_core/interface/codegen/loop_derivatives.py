@@ -208,7 +208,7 @@ def differentiate_loop(
     idx = arrays.idx[i0 : i0 + count * width].reshape(count, width)
     slots, first = len(layout.slots), len(layout.slots) + len(layout.functions)
     places = [*range(slots), *range(first, first + len(layout.others))]
-    rows = int(getattr(type_info.type, "rows", 0))
+    rows = type_info.row_count
     is_read = what == "friction"
     read = (row_columns(type_info) or {layout.integers: rows}) if is_read else {}
     places += body_columns(type_info) if is_read else []

@@ -29,7 +29,7 @@ class JointOfForce:
     @property
     def rows(self) -> int:
         """Number of its multipliers."""
-        return int(self.type_info.type.rows)  # type: ignore[attr-defined]
+        return self.type_info.row_count
 
 
 @attrs.frozen
@@ -62,6 +62,11 @@ class TypeInfo:
     given: str = ""
     derived: tuple[str, ...] = ()
     joints: tuple[JointOfForce, ...] = ()
+
+    @property
+    def row_count(self) -> int:
+        """Rows of a joint that constrain the bodies; 0 of other types."""
+        return int(getattr(self.type, "rows", 0)) - len(self.layout.unknowns)
 
     def chosen(self, values: Mapping[str, Any]) -> "TypeInfo":
         """The variant for the values of an instance's fields; itself where none fits."""

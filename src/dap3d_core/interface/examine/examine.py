@@ -39,8 +39,10 @@ from dap3d_core.interface.codegen.return_shapes import (
 )
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
+from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
 from dap3d_core.interface.examine.check_states import check_state_names, check_states
+from dap3d_core.interface.examine.check_unknowns import check_unknowns
 from dap3d_core.interface.examine.random_values import (
     numbers,
     random_field,
@@ -96,6 +98,9 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     derived = tuple(n for n in lacking if n in kernels)  # nu is left out where it is zero
     for kernel_name in derived:
         call(kernel_name)
+    if layout.unknowns:  # distances from their bounds
+        count = 2 * len([name for name in layout.unknowns if name not in type_.periodic])  # type: ignore[attr-defined]
+        outputs["bound"] = tuple(f"out[{k}]" for k in range(count))
     functions = tuple(n for n, s in specs_of(type_).items() if s.kind == "function" and s.argument)
     return TypeInfo(
         type_,
@@ -295,6 +300,7 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     if kind != "function" and not by_joint and not body_slots(type_):
         raise PluginError(f"{who} acts on no body; declare a field such as P_i: Point = point()")
     _check_fields(type_)
+    check_unknowns(type_)
     _check_members(type_)
     for name in needed:
         if name not in kernels:
@@ -387,6 +393,9 @@ def _expected(type_: type[TypeBase], kernel: str, value: Any) -> tuple[tuple[int
         return (4,) if isinstance(value, (tuple, list)) else (), "(f, f', f'', f''')"
     if not issubclass(type_, Joint):
         return (), "one number"
+    if kernel == "G":
+        n, k = len(type_.position_rows()), len(unknown_names(type_))
+        return (n, k), f"{n} rows of the derivatives of C by its {k} unknowns"
     if kernel == "J":
         return (slots, type_.rows, 6), f"a block of {type_.rows} x 6 for each of {slots} bodies"
     if kernel in ("C", "C_dot"):
