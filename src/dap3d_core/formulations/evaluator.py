@@ -178,17 +178,21 @@ class Evaluator:
 
     def _seek_unknowns(self) -> None:
         """Find the unknowns of joints at the poses as given, from where their fields begin."""
-        found = False
+        signs: list[slice] = []
         for q, (kind, group) in enumerate(self.loop_groups):
             layout, p0 = group.type_info.layout, int(self.system.groups[q, 1])
             for name in layout.unknowns if kind == "angle" else ():
-                found = True
-                for k, of_start in ((0, f"{name}{START}"), (1, ""), (2, "")):
-                    first = p0 + layout.angles[name] + k
-                    places = slice(first, p0 + layout.par_width * group.count, layout.par_width)
-                    at = layout.numbers[of_start][0] if of_start else 0
-                    self.system.par[places] = group.numbers[:, at] if of_start else 0.0
-        for _ in range(SEEKING if found else 0):
+                first, end = p0 + layout.angles[name], p0 + layout.par_width * group.count
+                places = [slice(first + k, end, layout.par_width) for k in range(ANGLE_WIDTH + 1)]
+                for place in places:
+                    self.system.par[place] = 0.0
+                self.system.par[places[0]] = group.numbers[:, layout.numbers[f"{name}{START}"][0]]
+                signs.append(places[-1])
+        for _ in range(SEEKING if signs else 0):
+            self.count_turns(0.0, self.model.u0)
+        for place in signs:  # of what was found
+            self.system.par[place] = 0.0
+        if signs:
             self.count_turns(0.0, self.model.u0)
 
     @IGNORE_FLOAT_ERRORS

@@ -15,29 +15,41 @@ PASSES = 4
 LEFT = 1e-7
 
 
-def eliminate(G, columns):
-    """Columns of R, and Q^T of each column; G by rows, columns of as many numbers as it has rows."""
+def eliminate(G, columns, signs=()):
+    """Columns of R, Q^T of each column, and the signs of the diagonal of R.
+
+    G by rows; columns of as many numbers as it has rows. A sign of zero is chosen so that no digits
+    are lost. Signs that stay as they were chosen at first keep Q smooth: only where a column comes
+    to lie along its sign does Q turn fast.
+    """
     count, unknowns = len(G), len(G[0])
     found = [[row[c] for row in G] for c in range(unknowns)] + [list(c) for c in columns]
+    chosen = []
     for j in range(unknowns):
-        v = found[j]
-        square = v[j] * v[j]
+        v, rest = found[j], 0.0
         for r in range(j + 1, count):
-            square = square + v[r] * v[r]
-        length = sqrt(square)
-        length = where(v[j] > 0.0, -length, length)  # no digits are lost in the difference
-        first = v[j] - length
-        factor = -1.0 / (length * first)
+            rest = rest + v[r] * v[r]
+        sign = where(v[j] > 0.0, -1.0, 1.0)
+        if signs:
+            sign = where(signs[j] == 0.0, sign, signs[j])
+        length = sqrt(v[j] * v[j] + rest)
+        along = sign * v[j]
+        near = along > 0.0  # of v_j - sign |v| digits would be lost
+        first = sign * where(near, -rest / where(near, along + length, 1.0), along - length)
+        square = first * first + rest
+        still = square == 0.0
+        factor = where(still, 0.0, 2.0 / where(still, 1.0, square))
         for y in found[j + 1 :]:
-            along = first * y[j]
+            total = first * y[j]
             for r in range(j + 1, count):
-                along = along + v[r] * y[r]
-            along = along * factor
-            y[j] = y[j] - along * first
+                total = total + v[r] * y[r]
+            total = total * factor
+            y[j] = y[j] - total * first
             for r in range(j + 1, count):
-                y[r] = y[r] - along * v[r]
-        v[j] = length
-    return found[:unknowns], found[unknowns:]
+                y[r] = y[r] - total * v[r]
+        v[j] = sign * length
+        chosen.append(sign)
+    return found[:unknowns], found[unknowns:], chosen
 
 
 def back_substituted(R, y):
@@ -52,7 +64,7 @@ def back_substituted(R, y):
 
 def least_change(G, C):
     """The change x of the unknowns of least |C + G x|, reversed."""
-    R, (y,) = eliminate(G, (C,))
+    R, (y,), _ = eliminate(G, (C,))
     return back_substituted(R, y)
 
 

@@ -119,6 +119,14 @@ class Model:
             for angle in group.type_info.layout.angles
         )
 
+    def unknowns_of(self, joint: str) -> dict[str, int]:
+        """Unknowns of a joint -> where they stand among the angles that are reported."""
+        names = {n for group in self.joints for n in group.type_info.layout.unknowns}
+        places = enumerate(self.angle_names)
+        prefix = f"joints.{joint}."
+        found = {label.removeprefix(prefix): k for k, label in places if label.startswith(prefix)}
+        return {name: k for name, k in found.items() if name in names}
+
     @cached_property
     def state_count(self) -> int:
         """Numbers of the states of their own that forces and joints have."""

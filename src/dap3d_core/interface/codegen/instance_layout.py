@@ -115,7 +115,7 @@ def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> InstanceLa
     unknowns = unknown_names(type_) if type_.kind == "joint" else ()
     for name in unknowns:
         angles[name] = width
-        width += ANGLE_WIDTH
+        width += ANGLE_WIDTH + 1  # and a sign (unknowns.py)
     stored = tuple(name for name in constants if name not in tables)
     for name in stored:
         numbers[name] = width, shape_of(constants[name])

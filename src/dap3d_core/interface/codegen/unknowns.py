@@ -1,13 +1,15 @@
 """Lines of group loops of joints that have unknowns of their own (kernels/elimination.py).
 
 An unknown is kept like an angle whose turns are counted: its value, rate and time at the last
-accepted step, from which it is predicted. The rows of the position level, less as many as there are
+accepted step, from which it is predicted. Behind them is the sign of its column of R, which is
+chosen at the start, so that multipliers mean the same from then on. The rows of the position level, less as many as there are
 unknowns, come before those of the velocity level.
 """
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.loop_source import (
     append,
@@ -57,6 +59,9 @@ def write_with_unknowns(
             is_unknown = name in unknowns
             kept = keep(at, kept_value(type_info, name), f"x_{name}_dot")
             lines += kept if is_unknown else store_angle(name, at)
+        lines.append("_, _, signs = eliminate(G, (), signs)")
+        lines += [f"par[p1 + {layout.angles[name] + ANGLE_WIDTH}] = signs[{k}]"
+                  for k, name in enumerate(unknowns)]  # fmt: skip
     elif what == "turned":
         lines += append([kept_value(type_info, name) for name in layout.angles])
     elif what == "bound":
@@ -87,6 +92,8 @@ def solving_lines(type_info: TypeInfo, what: str, rates: bool) -> Iterator[str]:
     if what not in ("angle", "turned"):  # a start may be found from far by several calls
         yield f"{names}= settled(({names}), C_of, G_of)"
     yield f"G = G_of({names})"
+    places = [f"par[p1 + {layout.angles[name] + ANGLE_WIDTH}]" for name in unknowns]
+    yield f"signs = {_tuple(places)}"
     if rates:
         has_nu = "nu" in type_info.kernels
         yield f"J = {called_with(type_info, 'J')}"
@@ -101,7 +108,7 @@ def store_position(type_info: TypeInfo) -> Iterator[str]:
     """Call C, and store the rows that remain."""
     unknowns = len(type_info.layout.unknowns)
     yield f"out = {called_with(type_info, 'C')}"
-    yield f"_, reduced = eliminate(G, ({_tuple(type_info.outputs['C'])},))"
+    yield f"_, reduced, _ = eliminate(G, ({_tuple(type_info.outputs['C'])},), signs)"
     for r in range(len(type_info.type.position_rows()) - unknowns):
         yield f"out1[row + {r}] = reduced[0][{unknowns + r}]"
 
@@ -117,7 +124,8 @@ def store_acceleration(type_info: TypeInfo) -> Iterator[str]:
     entry = _entries(type_info)
     columns = [[entry("J", n, r, c) for r in position] for n in range(slots) for c in range(6)]
     columns += [[entry(name, r) for r in position] for name in kernels[1:]]
-    yield f"_, reduced = eliminate(G, ({''.join(f'{_tuple(column)}, ' for column in columns)}))"
+    columns_of = "".join(f"{_tuple(column)}, " for column in columns)
+    yield f"_, reduced, _ = eliminate(G, ({columns_of}), signs)"
     remaining = len(position) - unknowns
     rows: list[tuple[int, Callable[..., str]]] = [
         (r, lambda which, k, r=r: f"reduced[{which}][{unknowns + r}]") for r in range(remaining)

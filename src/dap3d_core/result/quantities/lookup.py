@@ -21,6 +21,7 @@ from dap3d_core.result.quantities.catalogue import (
     QuantitySource,
 )
 from dap3d_core.result.quantities.element_states import components_of, state_quantity, states_of
+from dap3d_core.result.quantities.joint_unknowns import unknown_quantity, unknowns_of
 
 NORM = "norm"
 #: Names of joint coordinates, of which a joint has some.
@@ -73,6 +74,8 @@ def find(result: QuantitySource, name: str) -> Quantity:
                     return _quantity(result, name, owner, attribute, component)
             elif state := state_quantity(result, name, owner, attribute, component):
                 return state
+            elif unknown := unknown_quantity(result, name, owner, attribute, component):
+                return unknown
     if output := _output(result, name):
         return output
     raise _unknown(result, name)
@@ -258,7 +261,8 @@ def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]
     is_actuator = owner.name in result.record.actuation
     known = (name for name in names if name != ACTUATION or is_actuator)
     states = states_of(result.summary, owner)
-    return (*known, *states, *_coordinate_names(result, owner))
+    unknowns = unknowns_of(result, owner)
+    return (*known, *states, *unknowns, *_coordinate_names(result, owner))
 
 
 def _fault(result: QuantitySource, owner: QuantityOwner, rest: list[str]) -> str:
