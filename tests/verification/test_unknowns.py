@@ -90,7 +90,9 @@ def test_periodic_unknowns_begin_again():
 def test_an_unknown_that_leaves_its_bounds_ends_the_run(integrator):
     """At the instant, with the joint, the unknown, the bound."""
     model = compiled(bead(speed=6.0, s_max=1.0))
-    with pytest.raises(SimulationError, match="wire .* s passed its greatest .* s_max = 1") as caught:
+    with pytest.raises(
+        SimulationError, match="wire .* s passed its greatest .* s_max = 1"
+    ) as caught:
         dap.simulate(model, integrator=integrator, t_end=2.0, dt=0.5, **SETTINGS)
     instant = caught.value.result.t[-1]
     reached = on_the_wire(6.0, np.array([0.0, instant]))[0][-1]
@@ -163,7 +165,7 @@ def test_an_ellipsoid_on_a_plane(rolls):
     result = dap.simulate(compiled(scene), t_end=1.0, dt=0.25, **SETTINGS)
 
     def rates(_, u):
-        r, q, v, w = np.split(u, [3, 7, 10])
+        _, q, v, w = np.split(u, [3, 7, 10])
         R = Rotation.from_quat(np.roll(q, -1)).as_matrix()
         e0, e = q[0], q[1:]
         q_dot = 0.5 * np.array([-e @ w, *(e0 * w + np.cross(w, e))])

@@ -25,7 +25,8 @@ KINDS = (
     "switch", "bound", "knot", "rate"
 )  # fmt: skip
 (
-    VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, TURNED, SWITCH, BOUND, KNOT, RATE
+    VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, TURNED, SWITCH, BOUND, KNOT,
+    RATE
 ) = range(len(KINDS))  # fmt: skip
 
 # What a switch does where it becomes negative, or changes its sign: the run ends; the integration

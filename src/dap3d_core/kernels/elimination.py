@@ -9,7 +9,7 @@ import math
 
 from dap3d_core.kernels.scalar_math import sqrt, where
 
-#: Newton passes from the unknowns that the last accepted step predicts: 1e-2 becomes 1e-16 in three.
+#: Newton passes from what the last accepted step predicts: 1e-2 becomes 1e-16 in three.
 PASSES = 4
 #: A last pass that changes the unknowns by more, of their size and one, has not found them.
 LEFT = 1e-7

@@ -170,6 +170,8 @@ def _of_joint(subject: SampledType) -> list[Check]:
         Check("frame", subject, ground, joints.frame),
         Check("action and reaction", subject, ground, joints.action_and_reaction),
     ]
+    if "G" in subject.type_info.kernels:
+        checks.insert(0, Check("G", subject, "", joints.gradient_of_unknowns))
     if "friction" in subject.type_info.kernels:
         checks.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))
         for name, run in (("friction frame", forces.frame), ("friction balance", forces.balance)):

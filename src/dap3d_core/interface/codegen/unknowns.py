@@ -2,12 +2,14 @@
 
 An unknown is kept like an angle whose turns are counted: its value, rate and time at the last
 accepted step, from which it is predicted. Behind them is the sign of its column of R, which is
-chosen at the start, so that multipliers mean the same from then on. The rows of the position level, less as many as there are
-unknowns, come before those of the velocity level.
+chosen at the start, so that multipliers mean the same from then on. The rows of the position level,
+less as many as there are unknowns, come before those of the velocity level.
 """
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
+
+import attrs
 
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
 from dap3d_core.interface.codegen.kernel_arguments import parameters
@@ -21,6 +23,7 @@ from dap3d_core.interface.codegen.loop_source import (
 )
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.element_unknowns import GREATEST, LEAST
+from dap3d_core.interface.types import Joint
 from dap3d_core.kernels.elimination import eliminate, least_change, settled, solved
 from dap3d_core.kernels.runtime.loop_modules import Loop
 
@@ -83,11 +86,12 @@ def solving_lines(type_info: TypeInfo, what: str, rates: bool) -> Iterator[str]:
         at = layout.angles[name]
         ahead = f"par[p1 + {at + 1}] * (t - par[p1 + {at + 2}])"
         yield f"x_{name} = par[p1 + {at}] + {ahead}"
-    count = len(type_info.type.position_rows())
+    count = len(_joint(type_info).position_rows())
     for kernel, shape in (("C", None), ("G", len(unknowns))):
         paths = type_info.outputs[kernel]
         text = _tuple(paths) if shape is None else _rows(paths, count, shape)
-        yield f"{kernel}_of = lambda {names[:-2]}: (lambda out: {text})({called_with(type_info, kernel)})"
+        call = called_with(type_info, kernel)
+        yield f"{kernel}_of = lambda {names[:-2]}: (lambda out: {text})({call})"
     yield f"{names}= solved(({names}), C_of, G_of)"
     if what not in ("angle", "turned"):  # a start may be found from far by several calls
         yield f"{names}= settled(({names}), C_of, G_of)"
@@ -99,7 +103,7 @@ def solving_lines(type_info: TypeInfo, what: str, rates: bool) -> Iterator[str]:
         yield f"J = {called_with(type_info, 'J')}"
         if has_nu:
             yield f"nu = {called_with(type_info, 'nu')}"
-        rows = [_rate(type_info, row, has_nu) for row in type_info.type.position_rows()]
+        rows = [_rate(type_info, row, has_nu) for row in _joint(type_info).position_rows()]
         yield f"rates = least_change(G, {_tuple(rows)})"
         yield from (f"x_{name}_dot = -rates[{k}]" for k, name in enumerate(unknowns))
 
@@ -109,13 +113,13 @@ def store_position(type_info: TypeInfo) -> Iterator[str]:
     unknowns = len(type_info.layout.unknowns)
     yield f"out = {called_with(type_info, 'C')}"
     yield f"_, reduced, _ = eliminate(G, ({_tuple(type_info.outputs['C'])},), signs)"
-    for r in range(len(type_info.type.position_rows()) - unknowns):
+    for r in range(len(_joint(type_info).position_rows()) - unknowns):
         yield f"out1[row + {r}] = reduced[0][{unknowns + r}]"
 
 
 def store_acceleration(type_info: TypeInfo) -> Iterator[str]:
     """Call J, gamma and nu, and store the rows that remain."""
-    type_: Any = type_info.type
+    type_ = _joint(type_info)
     layout, unknowns = type_info.layout, len(type_info.layout.unknowns)
     position, velocity, slots = type_.position_rows(), type_.velocity_rows(), len(layout.slots)
     kernels = [name for name in ("J", "gamma", "nu") if name in type_info.kernels]
@@ -146,9 +150,25 @@ def store_acceleration(type_info: TypeInfo) -> Iterator[str]:
             yield f"{array}[row + {remaining + k}] = {entry(name, r)}"
 
 
+def with_sample_unknowns(type_info: TypeInfo) -> TypeInfo:
+    """A joint with rows as its kernels return them: unknowns and their rates are rows of ``F``.
+
+    They stand behind its functions of time, for checks of formulas.
+    """
+    layout, names = type_info.layout, {}
+    for k, name in enumerate(layout.unknowns):
+        row = 1 + len(layout.functions) + k
+        for order, of_order in enumerate((name, f"{name}_dot")):
+            argument = type_info.names[of_order]
+            names[of_order] = attrs.evolve(argument, code=f"F[{row}, {order}]")
+    angles = {name: at for name, at in layout.angles.items() if name not in layout.unknowns}
+    raw = attrs.evolve(layout, unknowns=(), angles=angles)
+    return attrs.evolve(type_info, layout=raw, names=type_info.names | names)
+
+
 def kept_value(type_info: TypeInfo, name: str) -> str:
     """Expression of an unknown as it is kept: within its bounds, where it is periodic."""
-    if name not in type_info.layout.unknowns or name not in type_info.type.periodic:
+    if name not in type_info.layout.unknowns or name not in _joint(type_info).periodic:
         return f"x_{name}"
     low, high = (f"par[p1 + {type_info.layout.numbers[f'{name}{suffix}'][0]}]"
                  for suffix in (LEAST, GREATEST))  # fmt: skip
@@ -159,7 +179,7 @@ def bound_values(type_info: TypeInfo) -> list[str]:
     """Distances of the unknowns from their bounds, but for those that are periodic."""
     values = []
     for name in type_info.layout.unknowns:
-        if name not in type_info.type.periodic:
+        if name not in _joint(type_info).periodic:
             for suffix, sign in ((LEAST, ""), (GREATEST, "-")):
                 at = type_info.layout.numbers[f"{name}{suffix}"][0]
                 values.append(f"{sign}(x_{name} - par[p1 + {at}])")
@@ -171,9 +191,14 @@ def bound_words(type_info: TypeInfo) -> list[tuple[str, str, str]]:
     return [
         (name, words, f"{name}{suffix}")
         for name in type_info.layout.unknowns
-        if name not in type_info.type.periodic
+        if name not in _joint(type_info).periodic
         for suffix, words in ((LEAST, "least"), (GREATEST, "greatest"))
     ]
+
+
+def _joint(type_info: TypeInfo) -> type[Joint]:
+    assert issubclass(type_info.type, Joint)
+    return type_info.type
 
 
 def _tuple(paths: Any) -> str:
@@ -186,7 +211,7 @@ def _rows(paths: Any, rows: int, columns: int) -> str:
 
 def _entries(type_info: TypeInfo) -> Callable[..., str]:
     """Expression of an entry of J (slot, row, column), or of a row of another kernel."""
-    rows = type_info.type.rows
+    rows = _joint(type_info).rows
 
     def entry(kernel: str, *index: int) -> str:
         place = index[0] if len(index) == 1 else (index[0] * rows + index[1]) * 6 + index[2]

@@ -73,8 +73,9 @@ class Kernels:
     def value(self, name: str, element: RandomElement, state: State) -> Floats:
         """The value of a kernel, as an array of its rows.
 
-        C (position rows,), C_dot (velocity rows,), J (slots, rows, 6), gamma and nu (rows,), wrench
-        and friction (slots, 2, 3), energy (1,), switch (n,), value (4,).
+        C (position rows,), G (position rows, unknowns), C_dot (velocity rows,), J (slots, rows, 6),
+        gamma and nu (rows,), wrench and friction (slots, 2, 3), energy (1,), switch (n,), value
+        (4,).
         """
         body, table = state.body().astype(object), state.table().astype(object)
         return self._run(name, element, float(state.t), body, table).astype(float)
@@ -140,6 +141,9 @@ class Kernels:
         slots = len(self.type_info.layout.slots)
         if name == "J":
             return outs[0][: 6 * type_.rows * slots].reshape(slots, type_.rows, 6)
+        if name == "G":
+            rows = len(type_.position_rows())
+            return outs[0][: len(self.type_info.outputs["G"])].reshape(rows, -1)
         if name == "C":
             return outs[0][list(type_.position_rows())]
         if name == "C_dot":

@@ -42,6 +42,7 @@ class Direction:
     move: Floats
     turn: Floats
     time: float = 0.0
+    own: tuple[float, ...] = ()  # of a joint's unknowns
 
     @classmethod
     def of(cls, slot: int, component: int) -> "Direction":
@@ -49,6 +50,12 @@ class Direction:
         both = np.zeros((2, BODIES, 3))
         both[component // 3, slot + 1, component % 3] = 1.0
         return cls(both[0], both[1])
+
+    @classmethod
+    def of_unknown(cls, k: int, count: int) -> "Direction":
+        """One of the unknowns of a joint."""
+        still = np.zeros((BODIES, 3))
+        return cls(still, still, own=tuple(float(n == k) for n in range(count)))
 
     @classmethod
     def in_time(cls) -> "Direction":
@@ -60,8 +67,8 @@ class Direction:
 class State:
     """Time, and for ground and each slot r (4, 3), p (4, 4), velocity, angular velocity (4, 3).
 
-    ``mass`` (4,) and ``Jp`` (4, 9) are the bodies' inertia, ``functions`` those of time; None
-    for an absent one.
+    ``mass`` (4,) and ``Jp`` (4, 9) are the bodies' inertia, ``functions`` those of time; None for
+    an absent one; ``unknowns`` (k, 2) are those of a joint, with their rates.
     """
 
     t: float
@@ -72,6 +79,7 @@ class State:
     mass: Floats
     Jp: Floats
     functions: tuple[TimeFunction | None, ...]
+    unknowns: Floats = attrs.field(factory=lambda: np.zeros((0, 2)))
 
     def body(self) -> Floats:
         """(4, BODY_WIDTH) columns of the bodies, as a group loop reads them."""
@@ -93,12 +101,15 @@ class State:
     def table(self) -> Floats:
         """(functions + 1, 5) f, f', f'', f''' at t, and f at 0; row 0 is the absent function."""
         rows = [(*f.at(self.t), f.at(0.0)[0]) if f else (0.0,) * 5 for f in self.functions]
-        return np.array([(0.0,) * 5, *rows])
+        own = [(*x, 0.0, 0.0, 0.0) for x in self.unknowns.tolist()]  # with their rates
+        return np.array([(0.0,) * 5, *rows, *own])
 
     def table_rate(self, along: Direction) -> Floats:
         """The rate of ``table`` along a direction."""
-        rate = np.zeros((len(self.functions) + 1, 5))
-        rate[:, :3] = along.time * self.table()[:, 1:4]
+        known = len(self.functions) + 1
+        rate = np.zeros((known + len(self.unknowns), 5))
+        rate[:known, :3] = along.time * self.table()[:known, 1:4]
+        rate[known:, 0] = along.own or 0.0
         return rate
 
     def moved(self, along: Direction, h: float) -> "State":
@@ -111,6 +122,9 @@ class State:
             t=self.t + along.time * h,
             r=self.r + h * along.move,
             p=quaternion_product(q, self.p),
+            unknowns=self.unknowns + [[h * rate, 0.0] for rate in along.own]
+            if along.own
+            else self.unknowns,
         )
 
     def together(self, q: Floats, shift: Floats, speed: Floats, spin: Floats) -> "State":
@@ -137,16 +151,19 @@ class State:
 
     def motion(self) -> Direction:
         """The direction in which the state moves: its velocities, and time."""
-        return Direction(self.v, self.w, 1.0)
+        return Direction(self.v, self.w, 1.0, tuple(self.unknowns[:, 1].tolist()))
 
 
-def random_state(rng: random.Random, functions: Sequence[bool], *, grounded: bool) -> State:
+def random_state(
+    rng: random.Random, functions: Sequence[bool], *, grounded: bool, unknowns: int = 0
+) -> State:
     """A random state.
 
     Args:
         rng: random numbers.
         functions: True for each function of time that is present.
         grounded: slot j is on ground.
+        unknowns: number of the unknowns of a joint.
     """
     poses = [random_pose(rng) for _ in range(BODIES)]
     r, p = np.array([x.r for x in poses]), np.array([x.p for x in poses])
@@ -157,7 +174,9 @@ def random_state(rng: random.Random, functions: Sequence[bool], *, grounded: boo
     for b in (0, 2) if grounded else (0,):
         r[b], p[b], v[b], w[b], mass[b], Jp[b] = 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0
     present = (TimeFunction(numbers(rng, 5)) if is_present else None for is_present in functions)
-    return State(rng.uniform(0.1, 1.0), r, p, v, w, mass, Jp, tuple(present))
+    given, t = tuple(present), rng.uniform(0.1, 1.0)
+    own = np.array([numbers(rng, 2) for _ in range(unknowns)]).reshape(-1, 2)
+    return State(t, r, p, v, w, mass, Jp, given, own)
 
 
 def quaternion_product(a: Floats, b: Floats) -> Floats:
