@@ -1,7 +1,7 @@
 """Constant force in body axes."""
 
-from dap3d_core.interface import Body, Force, Point, body, hookimpl, point, vec3
-from dap3d_core.kernels import cross, rotate
+from dap3d_core.interface import Body, Force, Point, body, function, hookimpl, input_, point, vec3
+from dap3d_core.kernels import cross, rotate, scale
 
 interface_version = 1
 
@@ -9,7 +9,8 @@ interface_version = 1
 class BodyForce(Force):
     """A force at P_i of body i, constant in its axes (manual: ``fp``; spec 6).
 
-    Without P_i it acts at the mass centre. force = A_i fp, moment = s_i x A_i fp
+    Without P_i it acts at the mass centre. force = A_i fp, moment = s_i x A_i fp. A function of
+    time or an input is a factor of fp.
     """
 
     keyword = "fp"
@@ -17,9 +18,27 @@ class BodyForce(Force):
     body_i: Body = body(default=None, doc="the body it acts on")
     P_i: Point = point(default=None, doc="where it acts; the mass centre when left out")
     fp: tuple = vec3(unit="N", doc="components in body axes")
+    function: str = function(doc="factor of fp, a function of time")
+    input: str = input_(instead_of="function", doc="factor of fp, an input")
 
     def wrench(A_i, fp, s_P_i):
         F = rotate(A_i, fp)
+        return ((F, cross(s_P_i, F)),)
+
+
+class OfTime(BodyForce, function=True):
+    """The force times a function of time."""
+
+    def wrench(A_i, fp, f, s_P_i):
+        F = rotate(A_i, scale(f, fp))
+        return ((F, cross(s_P_i, F)),)
+
+
+class Actuated(BodyForce, input=True):
+    """The force times an input."""
+
+    def wrench(A_i, fp, input, s_P_i):
+        F = rotate(A_i, scale(input, fp))
         return ((F, cross(s_P_i, F)),)
 
 

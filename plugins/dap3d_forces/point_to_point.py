@@ -1,6 +1,6 @@
 """Point-to-point spring, damper and actuator."""
 
-from dap3d_core.interface import Force, Vector2, function, hookimpl, number, vector2
+from dap3d_core.interface import Force, Vector2, function, hookimpl, input_, number, vector2
 from dap3d_core.kernels import cross, dot, neg, scale, sqrt
 
 interface_version = 1
@@ -15,7 +15,8 @@ class PointToPoint(Force):
         energy = k (l - l0)^2 / 2 + f_a l
 
     A function of l - l0 takes the place of k (l - l0): F = f(l - l0) + c l_dot + f_a, without an
-    energy. Where the two points coincide u is undefined: a scene that starts so is refused, and a
+    energy. A factor, a function of time, or an input multiplies f_a, which then counts as work.
+    Where the two points coincide u is undefined: a scene that starts so is refused, and a
     run that comes there stops and says so.
     """
 
@@ -27,6 +28,8 @@ class PointToPoint(Force):
     l0: float = number(default=0.0, unit="m", minimum=0.0, doc="undeformed length")
     f_a: float = number(default=0.0, unit="N", doc="force of the actuator, tension positive")
 
+    factor: str = function(doc="factor of f_a, a function of time")
+    input: str = input_(instead_of="factor", doc="factor of f_a, an input")
     function: str = function(argument="l - l0", doc="force, N, in place of k (l - l0)")
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a):
@@ -39,7 +42,35 @@ class PointToPoint(Force):
         return 0.5 * k * (length - l0) * (length - l0) + f_a * length
 
 
-class Curve(PointToPoint, function=True):
+class OfTime(PointToPoint, function=False, factor=True):
+    """The actuator's force times a function of time."""
+
+    energy_where = "without f_a"
+
+    def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a, factor):
+        length = sqrt(dot(d, d))
+        u = scale(1.0 / length, d)
+        return pull(k * (length - l0) + c * dot(u, d_dot) + factor * f_a, u, s_P_i, s_P_j)
+
+    def energy(d, k, l0):
+        return spring_energy(d, k, l0)
+
+
+class Actuated(PointToPoint, function=False, input=True):
+    """The actuator's force times an input."""
+
+    energy_where = "without f_a"
+
+    def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a, input):
+        length = sqrt(dot(d, d))
+        u = scale(1.0 / length, d)
+        return pull(k * (length - l0) + c * dot(u, d_dot) + input * f_a, u, s_P_i, s_P_j)
+
+    def energy(d, k, l0):
+        return spring_energy(d, k, l0)
+
+
+class Curve(PointToPoint, function=True, factor=False, input=False):
     """The spring is a function of the elongation."""
 
     energy = None
@@ -48,6 +79,34 @@ class Curve(PointToPoint, function=True):
         length = sqrt(dot(d, d))
         u = scale(1.0 / length, d)
         return pull(f(length - l0) + c * dot(u, d_dot) + f_a, u, s_P_i, s_P_j)
+
+
+class CurveOfTime(PointToPoint, function=True, factor=True):
+    """A spring curve, and the actuator's force times a function of time."""
+
+    energy = None
+
+    def wrench(d, d_dot, s_P_i, s_P_j, c, l0, f_a, f, factor):
+        length = sqrt(dot(d, d))
+        u = scale(1.0 / length, d)
+        return pull(f(length - l0) + c * dot(u, d_dot) + factor * f_a, u, s_P_i, s_P_j)
+
+
+class ActuatedCurve(PointToPoint, function=True, input=True):
+    """A spring curve, and the actuator's force times an input."""
+
+    energy = None
+
+    def wrench(d, d_dot, s_P_i, s_P_j, c, l0, f_a, f, input):
+        length = sqrt(dot(d, d))
+        u = scale(1.0 / length, d)
+        return pull(f(length - l0) + c * dot(u, d_dot) + input * f_a, u, s_P_i, s_P_j)
+
+
+def spring_energy(d, k, l0):
+    """Potential k (l - l0)^2 / 2."""
+    x = sqrt(dot(d, d)) - l0
+    return 0.5 * k * x * x
 
 
 def pull(T, u, s_i, s_j):

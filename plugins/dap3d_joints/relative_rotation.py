@@ -1,6 +1,6 @@
 """Relative rotation driver: prescribes how fast one body turns against another about an axis."""
 
-from dap3d_core.interface import Body, Joint, Vector, body, function, hookimpl, vector
+from dap3d_core.interface import Body, Joint, Vector, body, function, hookimpl, input_, vector
 from dap3d_core.kernels import cross, dot, neg, row
 
 interface_version = 1
@@ -11,7 +11,8 @@ ZERO = (0.0, 0.0, 0.0)
 class RelativeRotation(Joint):
     """The rate of rotation of body j against body i along a_j is f_dot(t) (manual: ``rel-rot``).
 
-    Spec 4.7. One row, of the velocity level alone; without a function it locks the rotation:
+    Spec 4.7. One row, of the velocity level alone; without a function it locks the rotation. An
+    input may give the rate in place of f_dot: it is held, and velocities jump where it is set.
 
         J v   = a_j . (w_j - w_i) = f_dot = nu
         J_i   = [0, -a_j^T],  J_j = [0, a_j^T]
@@ -27,6 +28,7 @@ class RelativeRotation(Joint):
     body_j: Body = body(default="ground", doc="body that is turned")
     a_j: Vector = vector(doc="axis, on body j")
     function: str = function(doc="angle as a function of time; only its rates are used")
+    input: str = input_(instead_of="function", unit="rad/s", doc="rate of rotation")
 
     def J(a_j):
         return row(ZERO, neg(a_j)), row(ZERO, a_j)
@@ -36,6 +38,16 @@ class RelativeRotation(Joint):
 
     def gamma(a_j, w_i, w_j, f_ddot):
         return f_ddot - dot(a_j, cross(w_j, w_i))
+
+
+class Held(RelativeRotation, input=True):
+    """The rate is an input."""
+
+    def nu(input):
+        return input
+
+    def gamma(a_j, w_i, w_j):
+        return -dot(a_j, cross(w_j, w_i))
 
 
 @hookimpl

@@ -1,6 +1,6 @@
 """Relative translation driver: prescribes how fast a mass centre moves against another."""
 
-from dap3d_core.interface import Body, Joint, Vector, body, function, hookimpl, vector
+from dap3d_core.interface import Body, Joint, Vector, body, function, hookimpl, input_, vector
 from dap3d_core.kernels import dot, neg, row, sub
 
 interface_version = 1
@@ -12,7 +12,8 @@ class RelativeTranslation(Joint):
     """The velocity of mass centre j relative to mass centre i, along a_j, is f_dot(t).
 
     Manual: ``rel-tran``, whose Jacobian stands in the wrong slots; spec 4.8. One row, of the
-    velocity level alone; without a function it locks the relative translation:
+    velocity level alone; without a function it locks the relative translation. An input may give
+    the velocity in place of f_dot: it is held, and velocities jump where it is set.
 
         J v   = a_j . (r_dot_j - r_dot_i) = f_dot = nu
         J_i   = [-a_j^T, 0],  J_j = [a_j^T, 0]
@@ -27,6 +28,7 @@ class RelativeTranslation(Joint):
     body_j: Body = body(default="ground", doc="body that is moved")
     a_j: Vector = vector(doc="direction, on body j")
     function: str = function(doc="distance as a function of time; only its rates are used")
+    input: str = input_(instead_of="function", unit="m/s", doc="relative velocity")
 
     def J(a_j):
         return row(neg(a_j), ZERO), row(a_j, ZERO)
@@ -36,6 +38,16 @@ class RelativeTranslation(Joint):
 
     def gamma(a_j_dot, v_i, v_j, f_ddot):
         return f_ddot - dot(a_j_dot, sub(v_j, v_i))
+
+
+class Held(RelativeTranslation, input=True):
+    """The velocity is an input."""
+
+    def nu(input):
+        return input
+
+    def gamma(a_j_dot, v_i, v_j):
+        return -dot(a_j_dot, sub(v_j, v_i))
 
 
 @hookimpl

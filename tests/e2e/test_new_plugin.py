@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from xml.etree import ElementTree
 
 import pytest
 from click.testing import CliRunner
@@ -33,7 +34,8 @@ def test_the_package_is_complete(kind, tmp_path):
     files = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
     module = "dap3d_my_own_type"
     assert files == {"pyproject.toml", "README.md", "scene.toml", f"src/{module}/__init__.py",
-                     "tests/test_my_own_type.py"}  # fmt: skip
+                     "tests/test_my_own_type.py", ".github/badge.py",
+                     ".github/workflows/tests.yml"}  # fmt: skip
     assert all(name in said for name in files)
     project = tomllib.loads((folder / "pyproject.toml").read_text())
     assert project["project"]["name"] == "dap3d-my-own-type"
@@ -47,6 +49,58 @@ def test_the_package_is_complete(kind, tmp_path):
     assert "My.own-Type" in (folder / "scene.toml").read_text()
     for name in files:
         assert "$" not in (folder / name).read_text(), name
+
+
+def test_the_badge_shows_what_check_plugin_says(tmp_path):
+    """Its words and its colour are those of the JSON: right, wrong, and a check that broke off."""
+    new_plugin(tmp_path, "mine", "--kind", "force")
+    script = tmp_path / ".github" / "badge.py"
+    done = CliRunner().invoke(group, ["check-plugin", "weight", "fix", "--json"])
+    wrong = json.loads(done.output)
+    wrong["types"][0]["ok"] = False
+    texts = (done.output, json.dumps(wrong), done.output[:100])
+    shown = ("2 of 2 types right", "1 of 2 types right", "not checked")
+    colors = set()
+    for text, words in zip(texts, shown, strict=True):
+        (tmp_path / "check.json").write_text(text)
+        drawn = subprocess.run(
+            [sys.executable, script, tmp_path / "check.json"], capture_output=True, text=True
+        ).stdout
+        picture = ElementTree.fromstring(drawn)
+        assert words in [one.text for one in picture.iter() if one.tag.endswith("text")]
+        colors |= {one.get("fill") for one in picture.iter() if one.get("x") and one.get("rx")}
+    assert len(colors) == 3
+
+
+@pytest.mark.slow
+def test_the_workflow_publishes_the_badge(tmp_path):
+    """Its steps leave a branch "badges" with the picture alone, again and again."""
+    yaml = pytest.importorskip("yaml")
+    folder, origin = tmp_path / "mine", tmp_path / "origin"
+    new_plugin(folder, "mine", "--kind", "force")
+    steps = yaml.safe_load((folder / ".github/workflows/tests.yml").read_text())
+    runs = {s["name"]: s["run"] for s in steps["jobs"]["tests"]["steps"] if "run" in s}
+    assert runs["Check the formulas"].startswith("dap3d check-plugin mine --json")
+
+    def shell(words, where):
+        done = subprocess.run(
+            ["bash", "-e", "-c", words], cwd=where, capture_output=True, text=True,
+            env=environment(HOME=str(tmp_path), PATH=os.environ["PATH"]),
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    shell("git init --quiet --bare origin", tmp_path)
+    first = "git init --quiet && git add . && git -c user.name=a -c user.email=a@b commit -qm one"
+    shell(f"{first} && git remote add origin {origin} && git push --quiet origin HEAD:main", folder)
+    for n in range(2):
+        clone = tmp_path / f"clone{n}"
+        shell(f"git clone --quiet --branch main {origin} {clone}", tmp_path)
+        (clone / "check-plugin.json").write_text('{"types": [{"ok": true}]}')
+        shell(runs["Draw the badge"].replace("python", sys.executable), clone)
+        shell(runs["Publish the badge"], clone)
+    assert shell("git ls-tree --name-only badges", origin).split() == ["check-plugin.svg"]
+    assert shell("git log --format=%s badges", origin).count("\n") == 1
 
 
 @pytest.mark.slow

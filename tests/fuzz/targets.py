@@ -10,6 +10,7 @@ from fuzz.acceptable import check_any_scene, check_good_scene
 from fuzz.damage import damaged_scenes
 from fuzz.expressions import check_expression, expressions
 from fuzz.matlab import check_model, damaged_models
+from fuzz.models import check_model_file, damaged_model_files
 from fuzz.numbers import changes, check_change
 from fuzz.programs import check_program, sources
 from fuzz.results import check_result, damaged_results
@@ -66,6 +67,7 @@ TARGETS = {
         Target("scenes", scenes().map(str.encode), check_good_scene, ".toml"),
         Target("damaged", damaged_scenes(), check_any_scene, ".toml"),
         Target("matlab", damaged_models(), check_model, ".json"),
+        Target("models", damaged_model_files(), check_model_file, ".txt"),
         Target("results", damaged_results(), check_result, ".nc"),
         Target("numbers", changes(), check_change, ".json"),
         Target("quantities", quantity_names(), check_quantity, ".txt"),

@@ -15,6 +15,7 @@ COUNTS = {
     "scenes": (3, 15),
     "damaged": (10, 60),
     "matlab": (15, 100),
+    "models": (25, 300),
     "results": (5, 25),
     "numbers": (5, 50),
     "quantities": (20, 150),

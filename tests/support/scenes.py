@@ -49,7 +49,11 @@ def scene_for(type_info, rng, *, ground=None, values=None):
     if ground:
         owner[ground] = "ground"
     fields = {}
-    for name, spec in specs_of(type_info.type).items():
+    specs = specs_of(type_info.type)
+    replaced = {s.instead_of for n, s in specs.items() if s.kind == "input" and values.get(n)}
+    for name, spec in specs.items():
+        if name in replaced:
+            continue
         value = _field(scene, name, spec, owner, rng, values.get(name))
         if value is not None:
             fields[name] = value
@@ -85,8 +89,14 @@ def _field(scene, name, spec, owner, rng, wanted):
         return rotation(rng.normal(size=4))
     if spec.kind == "table":  # increasing: a table of arguments is one
         return np.cumsum(rng.uniform(0.1, 0.5, 8))
-    if spec.kind == "function" and spec.argument and not wanted:
+    if spec.kind == "function" and (wanted is False or (spec.argument and not wanted)):
         return None
+    if spec.kind == "functions":
+        return [
+            scene.add_function("a", f"{name}{k}", coeff=rng.uniform(-1, 1, 3)) for k in range(3)
+        ]
+    if spec.kind == "input":
+        return scene.add_input(name, rng.uniform(-1, 1)) if wanted else None
     if spec.kind == "function":
         return scene.add_function("a", f"{name}_of_time", coeff=rng.uniform(-1, 1, 3))
     if spec.kind == "choice":

@@ -1,7 +1,11 @@
 """States of elements against exact solutions, by every formulation and integrator."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 from support.state_types import REGISTRY, pulled, pulled_exactly
 
 import dap3d_core as dap
@@ -45,3 +49,95 @@ def test_a_state_in_a_velocity_row():
     assert result.quantity("cart.r.x").values == pytest.approx(x, abs=1e-10)
     power = result.quantity("wheel.force.x").values
     assert power == pytest.approx(2.0 * 1.5 / 0.25 * fall, abs=1e-8)
+
+
+def reference(rates, start, t):
+    """Solution (n, nt) of equations of its own, by SciPy at 1e-13, without interpolation."""
+    found = [np.array(start)]
+    for span in pairwise(t):
+        end = solve_ivp(rates, span, found[-1], "DOP853", rtol=1e-13, atol=1e-15)
+        found.append(end.y[:, -1])
+    return np.array(found).T
+
+
+def sliding_mass(force, x=1.5, v=0.0, **fields):
+    """A mass of 2 kg on the x axis with a force to ground."""
+    scene = dap.Scene(name="sliding mass")
+    scene.add_body("cart", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(x, 0.0, 0.0), r_dot=(v, 0.0, 0.0))
+    ends = {"P_i": "cart.O"} | ({} if "a_j" in fields else {"P_j": "ground.O"})
+    scene.add_force(force, "element", **ends, **fields)
+    return scene
+
+
+PRECISE = {"rtol": 1e-12, "atol": 1e-14}
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "adams", "radau"])
+def test_the_standard_linear_solid(integrator):
+    """maxwell with a spring beside it: the exponential of its matrix, to 1e-9."""
+    k, c, k_p, mass = 80.0, 4.0, 30.0, 2.0
+    scene = sliding_mass("maxwell", k=k, c=c, k_p=k_p, l0=1.0, z_0=0.1)
+    result = dap.simulate(scene, t_end=2.0, dt=0.1, integrator=integrator, **PRECISE)
+    A = np.array([[0.0, 1.0, 0.0], [-(k + k_p) / mass, 0.0, k / mass], [k / c, 0.0, -k / c]])
+    want = np.array([expm(A * t) @ (0.5, 0.0, 0.1) for t in result.t])
+    assert result.quantity("cart.r.x").values - 1.0 == pytest.approx(want[:, 0], abs=1e-9)
+    assert result.quantity("element.z").values == pytest.approx(want[:, 2], abs=1e-9)
+    elongation = want[:, 0] - want[:, 2]
+    energy = 0.5 * (k * elongation**2 + k_p * want[:, 0] ** 2)
+    assert result.quantity("element.energy").values == pytest.approx(energy, abs=1e-8)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_hysteresis_of_bouc_and_wen(integrator):
+    """x, v and z of the same equations in SciPy, to 1e-9."""
+    k, alpha, beta, gamma, n = 100.0, 0.2, 30.0, 10.0, 2.0
+    fields = {"k": k, "alpha": alpha, "beta": beta, "gamma": gamma, "n": n, "l0": 1.0}
+    result = dap.simulate(
+        sliding_mass("bouc-wen", **fields), t_end=2.0, dt=0.1, integrator=integrator, **PRECISE
+    )
+
+    def rates(t, y):
+        x, v, z = y
+        force = k * (alpha * (x - 1.0) + (1.0 - alpha) * z)
+        return v, -force / 2.0, v - abs(z) ** (n - 1.0) * (beta * abs(v) * z + gamma * v * abs(z))
+
+    x, v, z = reference(rates, (1.5, 0.0, 0.0), result.t)
+    assert result.quantity("cart.r.x").values == pytest.approx(x, abs=1e-9)
+    assert result.quantity("cart.rd.x").values == pytest.approx(v, abs=1e-9)
+    assert result.quantity("element.z").values == pytest.approx(z, abs=1e-9)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "radau", "auto"])
+def test_friction_of_bristles(integrator):
+    """LuGre: a mass on a spring slides, turns back, and comes to rest with bent bristles."""
+    law = {"f_n": 20.0, "mu_c": 0.3, "mu_s": 0.5, "v_s": 0.05, "sigma_0": 2e4, "sigma_1": 50.0,
+           "sigma_2": 1.0}  # fmt: skip
+    scene = sliding_mass("lugre", x=1.4, a_j="ground.x", **law)
+    scene.add_force("ptp", "spring", P_i="cart.O", P_j="ground.O", k=100.0, l0=1.0)
+    result = dap.simulate(scene, t_end=1.0, dt=0.05, integrator=integrator, **PRECISE)
+
+    def rates(t, y):
+        x, v, z = y
+        g = 20.0 * (0.3 + 0.2 * np.exp(-((v / 0.05) ** 2)))
+        z_dot = v - 2e4 * abs(v) * z / g
+        friction = 2e4 * z + 50.0 * z_dot + v
+        return v, (-100.0 * (x - 1.0) - friction) / 2.0, z_dot
+
+    x, v, z = reference(rates, (1.4, 0.0, 0.0), result.t)
+    assert np.min(v) < -0.2, "it slides"
+    assert result.quantity("cart.r.x").values == pytest.approx(x, abs=1e-9)
+    assert result.quantity("element.z").values == pytest.approx(z, abs=1e-9)
+    assert result.quantity("cart.rd.x").values == pytest.approx(v, abs=1e-9)
+
+
+def test_stiff_bristles_cost_radau_few_steps():
+    """Bristles a thousand times stiffer cost at most twice the steps of radau."""
+    steps = []
+    for sigma_0 in (1e5, 1e8):
+        law = {"f_n": 20.0, "mu_c": 0.3, "mu_s": 0.5, "v_s": 0.05, "sigma_0": sigma_0}
+        scene = sliding_mass("lugre", x=1.4, a_j="ground.x", z_atol=1e-4 / sigma_0, **law)
+        scene.add_force("ptp", "spring", P_i="cart.O", P_j="ground.O", k=100.0, l0=1.0)
+        result = dap.simulate(scene, t_end=1.0, integrator="radau", rtol=1e-6)
+        steps.append(result.stats.steps)
+        assert result.stats.rhs < 20 * result.stats.steps
+    assert steps[1] < 2 * steps[0]

@@ -91,7 +91,7 @@ def test_an_unknown_that_leaves_its_bounds_ends_the_run(integrator):
     """At the instant, with the joint, the unknown, the bound."""
     model = compiled(bead(speed=6.0, s_max=1.0))
     with pytest.raises(
-        SimulationError, match="wire .* s passed its greatest .* s_max = 1"
+        SimulationError, match=r"wire .* s passed its greatest .* s_max = 1"
     ) as caught:
         dap.simulate(model, integrator=integrator, t_end=2.0, dt=0.5, **SETTINGS)
     instant = caught.value.result.t[-1]

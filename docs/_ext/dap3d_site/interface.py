@@ -8,8 +8,8 @@ from dap3d_core.interface.fields import FieldSpec
 from dap3d_site.markdown import code, directive, page, table
 
 #: Makers of fields, in the order in which one meets them.
-MAKERS = ("body", "point", "vector", "vector2", "number", "vec3", "matrix", "function", "angle",
-          "table", "choice", "joint")  # fmt: skip
+MAKERS = ("body", "point", "vector", "vector2", "number", "vec3", "matrix", "function", "functions",
+          "input_", "angle", "table", "choice", "joint")  # fmt: skip
 #: Annotations of fields: the class of what a scene names there is not seen by the author.
 ANNOTATIONS = ("Body", "Point", "Vector", "Vector2")
 CLASSES = ("Joint", "Force", "Function")

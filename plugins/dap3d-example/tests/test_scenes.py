@@ -4,10 +4,13 @@ Tolerances follow from the run's own, rtol 1e-10, but where the closed form itse
 motions: that is said there.
 """
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 import dap3d_core as dap
 
@@ -141,3 +144,61 @@ def test_a_controller_with_integral_part():
     np.testing.assert_allclose(
         result.w[:, 1, 2], 20.0 - 20.0 * np.exp(-decay * t) * wave, atol=1e-7
     )
+
+
+PRECISE = {"rtol": 1e-12, "atol": {"r": 1e-14, "p": 1e-14, "v": 1e-14, "w": 1e-14, "z": 1e-14}}
+
+
+def reference(rates, start, t):
+    """Solution (n, nt) of equations of its own, by SciPy at 1e-13, without interpolation."""
+    found = [np.array(start)]
+    for span in pairwise(t):
+        end = solve_ivp(rates, span, found[-1], "DOP853", rtol=1e-13, atol=1e-15)
+        found.append(end.y[:, -1])
+    return np.array(found).T
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_a_hydraulic_cylinder(integrator):
+    """x, v and both pressures; 1e-9 of the largest of each."""
+    result = run("cylinder", **PRECISE, integrator=integrator)
+
+    def rates(t, y):
+        x, v, p_a, p_b = y
+        s, q = x - 0.5, 1e-4 * np.sin(2.0 * np.pi * t) - 1e-12 * (p_a - p_b)
+        of_a = 1e8 * (q - 2e-3 * v) / (1e-4 + 2e-3 * s)
+        of_b = 1e8 * (1e-3 * v - q) / (1e-4 + 1e-3 * (0.8 - s))
+        return v, (2e-3 * p_a - 1e-3 * p_b) / 200.0, of_a, of_b
+
+    want = reference(rates, (0.9, 0.0, 1e6, 2e6), result.t)
+    for name, y in zip(("sledge.r.x", "sledge.rd.x", "lift.p_a", "lift.p_b"), want, strict=True):
+        got = result.quantity(name).values
+        np.testing.assert_allclose(got, y, rtol=0.0, atol=1e-9 * np.max(np.abs(y)))
+
+
+def test_a_pi_controller_carries_a_load():
+    """J w' = gain e + integral z - load, z' = e: z -> load / integral, by the exponential."""
+    result = run("servo", **PRECISE)
+    J, gain, integral, load, speed = 0.1, 0.4, 1.5, 0.6, 30.0
+    A = np.array([[-gain / J, integral / J], [-1.0, 0.0]])
+    rest = np.array([speed, load / integral])
+    want = np.array([rest - expm(A * t) @ rest for t in result.t])
+    np.testing.assert_allclose(result.w[:, 0, 2], want[:, 0], atol=1e-9)
+    np.testing.assert_allclose(result.quantity("drive.z").values, want[:, 1], atol=1e-9)
+    lin = dap.linearize(SCENES / "servo.toml", at=result, t=float(result.t[-1]))
+    poles = np.sort_complex(np.roots([J, gain, integral]))
+    found = lin.eigenvalues[np.abs(lin.eigenvalues) > 1e-6]
+    np.testing.assert_allclose(np.sort_complex(found), poles, rtol=1e-10)
+
+
+def test_a_tyre_builds_up_its_side_force():
+    """v_y and the slip angle, at constant v_x; the force acts at the mass centre."""
+    result = run("tyre", **PRECISE)
+
+    def rates(t, y):
+        force = 2700.0 * np.tanh(40000.0 * y[1] / 2700.0)
+        return force / 300.0, -(y[0] + 15.0 * y[1]) / 0.6
+
+    v_y, alpha = reference(rates, (2.0, 0.0), result.t)
+    np.testing.assert_allclose(result.quantity("sledge.rd.y").values, v_y, atol=1e-9)
+    np.testing.assert_allclose(result.quantity("wheel.alpha").values, alpha, atol=1e-9)

@@ -22,16 +22,16 @@ Integers = NDArray[np.int64]
 #: The order of the group loops in the list: all loops of one kind stand together.
 KINDS = (
     "value", "wrench", "energy", "acceleration", "position", "friction", "angle", "turned",
-    "switch", "bound", "knot", "rate"
+    "switch", "bound", "knot", "rate", "impulse", "reset"
 )  # fmt: skip
 (
     VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, TURNED, SWITCH, BOUND, KNOT,
-    RATE
+    RATE, IMPULSE, RESET
 ) = range(len(KINDS))  # fmt: skip
 
 # What a switch does where it becomes negative, or changes its sign: the run ends; the integration
-# begins anew; the same without a note.
-ENDS, BEGINS, UNSEEN = 1, 0, -1
+# begins anew; the same without a note; velocities or states jump.
+ENDS, BEGINS, UNSEEN, JUMPS = 1, 0, -1, 2
 
 # Places in ``settings``: projection tolerances of position and velocity, a scratch number, how
 # often the multipliers did not settle with friction, the numbers of the penalty formulation, how

@@ -1,14 +1,15 @@
 """Reads the files of a model: none outside of its folder and of packages that the user names."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import attrs
 
 from dap3d_core.formats.mesh_file import read_mesh
 from dap3d_core.interface.formats.frames import Floats, Integers
-from dap3d_core.interface.formats.remarks import FormatError, Place, Remarks
+from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Place, Remarks
 from dap3d_core.interface.formats.xml_tree import XmlElement, parse_xml
 from dap3d_core.registry.regular_files import read_regular
 
@@ -27,6 +28,7 @@ class SourceFiles:
         folder: the folder that its files must lie in, or below.
         packages: name of a package -> its folder.
         allow_code: whether the user allows that code of the file is run.
+        shapes: whether files of shapes are looked for.
         remarks: of the import.
         text: replaces the contents of the file, as the output of a macro processor.
     """
@@ -35,6 +37,7 @@ class SourceFiles:
     folder: Path
     packages: Mapping[str, Path] = attrs.Factory(dict)
     allow_code: bool = False
+    shapes: bool = True
     remarks: Remarks = attrs.Factory(Remarks)
     text: bytes | str | None = None
     _open: list[Path] = attrs.Factory(list)
@@ -46,7 +49,7 @@ class SourceFiles:
         if self.text is not None:
             return parse_xml(self.text, self.path.name)
         self._open = [self.path.resolve()]
-        return parse_xml(self._read(self.path, Place()), self.path.name)
+        return parse_xml(self._read(self.path, NOWHERE), self.path.name)
 
     def include(self, name: str, place: Place, base: Path | None = None) -> XmlElement:
         """The root of another file that it names.
@@ -55,7 +58,7 @@ class SourceFiles:
             FormatError: it is not found, lies elsewhere, or includes itself.
         """
         path = self._inside(name, place, base or self.folder)
-        if path is None or not path.is_file():
+        if not path.is_file():
             raise FormatError(f"there is no file {name}", place)
         resolved = path.resolve()
         self._count += 1
@@ -66,22 +69,31 @@ class SourceFiles:
             raise FormatError(f"includes more than {MOST_INCLUDES} files, or too deep", place)
         return parse_xml(self._read(path, place), self._name(path))
 
-    def entered(self, path: Path) -> None:
-        """Open an included file: what it includes must not be that file again."""
-        self._open.append(path.resolve())
+    @contextmanager
+    def including(self, name: str, base: Path | None = None) -> Iterator[None]:
+        """While what an included file holds is read: it must not include itself."""
+        self._open.append(self._inside(name, NOWHERE, base or self.folder).resolve())
+        try:
+            yield
+        finally:
+            self._open.pop()
 
-    def left(self) -> None:
-        """Close the included file that was opened last."""
-        self._open.pop()
+    def locate(
+        self, uri: str, place: Place, base: Path | None = None, *, required: bool = False
+    ) -> Path | None:
+        """The path of the file of a shape; None, with a remark, where there is none.
 
-    def locate(self, uri: str, place: Place, base: Path | None = None) -> Path | None:
-        """The path of a file that the model names; None, with a remark, where there is none.
+        With ``required`` it must be there.
 
         Raises:
             FormatError: it lies outside of the folder of the model, or would have to be fetched.
         """
+        if not self.shapes and not required:
+            return None
         path = self._inside(uri, place, base or self.folder)
-        if path is not None and not path.is_file():
+        if not path.is_file() and required:
+            raise FormatError(f"there is no file {uri}, whose mass properties count", place)
+        if not path.is_file():
             self.remarks.leave_out(place, f"there is no file {uri}: its shape is not drawn")
             return None
         return path
@@ -96,21 +108,20 @@ class SourceFiles:
             self._meshes[path] = read_mesh(path, place)
         return self._meshes[path]
 
-    def _inside(self, uri: str, place: Place, base: Path) -> Path | None:
-        """A path within the folder or a package; None, with a remark, for an unknown package.
+    def _inside(self, uri: str, place: Place, base: Path) -> Path:
+        """A path within the folder or a package.
 
         Raises:
-            FormatError: it lies elsewhere.
+            FormatError: it lies elsewhere, or its package is not known.
         """
         root, name = self.folder, uri.strip()
         scheme, separator, rest = name.partition("://")
         if separator and scheme in ("package", "model"):
             package, _, name = rest.partition("/")
             if package not in self.packages:
-                what = f"package {package} is not known: files in it are left out; "
-                what += f"--package {package}=FOLDER names its folder"
-                self.remarks.leave_out(place, what)
-                return None
+                remedy = f"name its folder with --package {package}=FOLDER, or leave shapes out "
+                remedy += "with --no-shapes"
+                raise FormatError(f"{uri}: the package {package} is not known", place, remedy)
             root = base = self.packages[package]
         elif separator and scheme == "file":
             name = rest

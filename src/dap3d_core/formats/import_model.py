@@ -67,6 +67,7 @@ def import_model(
     free_base: bool = False,
     keep_fixed: bool = False,
     balance_inertia: bool = False,
+    shapes: bool = True,
     strict: bool = False,
     allow_code: bool = False,
     positions: Mapping[str, float | Sequence[float]] | None = None,
@@ -83,6 +84,7 @@ def import_model(
         free_base: links without a joint to a parent are free, where the format leaves it open.
         keep_fixed: fixed joints between moving links stay joints.
         balance_inertia: principal moments of inertia that no body has are replaced by their mean.
+        shapes: links have their shapes; without, files of meshes are not looked for.
         strict: refuse a model of which something would be left out.
         allow_code: evaluate the expressions of a xacro file.
         positions, rates: of joints where the scene starts, by name.
@@ -101,7 +103,7 @@ def import_model(
     meshes, names = MeshFiles(), Names()
     try:
         model, source, keyword = read_articulation(
-            file, format=format, packages=packages, root=root, allow_code=allow_code
+            file, format=format, packages=packages, root=root, allow_code=allow_code, shapes=shapes
         )
         start, moving = _coordinates(positions, model), _coordinates(rates, model)
         options = ImportOptions(free_base, keep_fixed, balance_inertia, start, moving)
@@ -151,6 +153,7 @@ def read_articulation(
     packages: Mapping[str, str | os.PathLike[str]] | None = None,
     root: str | os.PathLike[str] | None = None,
     allow_code: bool = False,
+    shapes: bool = True,
 ) -> tuple[Articulation, SourceFiles, str]:
     """The model in a file before it becomes a scene, its files, and the importer's keyword.
 
@@ -165,7 +168,7 @@ def read_articulation(
         if not folder.is_dir():
             raise FormatError(f"package {name}: {folder} is no folder")
     folder = file.parent if root is None else Path(os.fsdecode(root))
-    source = SourceFiles(file, folder, folders, allow_code)
+    source = SourceFiles(file, folder, folders, allow_code, shapes)
     importer, keyword = _importer(source, format)
     try:
         return importer.read(source), source, keyword

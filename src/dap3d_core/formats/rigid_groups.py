@@ -9,8 +9,10 @@ from dap3d_core.interface.formats.frames import IDENTITY, Frame
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
 from dap3d_core.interface.formats.solids import inertia_moved, total_inertia
 
-#: Mass and inertia of a link without any that moves, as a part of the least of the others.
-STAND_IN = 1e-9
+#: Mass and inertia of a link without any that moves, as a part of what it carries.
+STAND_IN = 1e-8
+#: Principal moments below this part of the largest count as zero.
+SMALLEST = 1e-12
 #: Departure from symmetry up to which an inertia matrix counts as symmetric, relative.
 ASYMMETRY = 1e-6
 
@@ -23,11 +25,13 @@ class RigidGroup:
         name: of the link that the others are fixed to; WORLD for what does not move.
         links: the links, with their frames in that one.
         inertial: mass and inertia together, in the axes of that link.
+        has_mass: False where the mass is a stand-in.
     """
 
     name: str
     links: list[tuple[Link, Frame]]
     inertial: Inertial = attrs.Factory(lambda: Inertial(0.0))
+    has_mass: bool = True
 
 
 def rigid_groups(
@@ -79,7 +83,7 @@ def rigid_groups(
                 if link.inertial
             ]
             group_.inertial = total_inertia(parts) if parts else Inertial(0.0)
-    _stand_in(groups, remarks)
+    _stand_in(tree, groups, member, remarks)
     return groups, member
 
 
@@ -111,23 +115,47 @@ def _checked(link: Link, remarks: Remarks, balance_inertia: bool) -> Inertial:
     return inertial
 
 
-def _stand_in(groups: dict[str, RigidGroup], remarks: Remarks) -> None:
-    """Give groups that move without mass, or without inertia, the least that can be computed."""
+def _stand_in(
+    tree: SpanningTree,
+    groups: dict[str, RigidGroup],
+    member: dict[str, tuple[str, Frame]],
+    remarks: Remarks,
+) -> None:
+    """Give groups that move without mass, or without inertia, the least that can be computed.
+
+    It is a part of what the group carries: much less would be lost to rounding in the equations of
+    motion, much more would be seen in accelerations.
+    """
     moving = [g for g in groups.values() if g.name != WORLD]
     masses = [g.inertial.mass for g in moving if g.inertial.mass > 0.0]
     moments = [m for g in moving for m in np.linalg.eigvalsh(g.inertial.inertia) if m > 0.0]
-    mass, moment = STAND_IN * min(masses, default=1.0), STAND_IN * min(moments, default=1.0)
-    for group in moving:
-        link, old = group.links[0][0], group.inertial
-        new_mass, inertia = old.mass or mass, old.inertia
-        least = float(np.linalg.eigvalsh(inertia)[0])
-        largest = float(np.abs(inertia).max(initial=0.0))
-        if least <= STAND_IN * largest:
-            inertia = inertia + (moment - min(least, 0.0)) * np.eye(3)
-        if not old.mass:
-            text = "a link without mass that moves has a billionth of the least mass of the others"
-            remarks.translate(link.place, text)
-        elif inertia is not old.inertia:
-            text = "a principal moment of inertia of 0 is a billionth of the least of the others"
-            remarks.translate(link.place, text)
-        group.inertial = Inertial(new_mass, old.com, inertia)
+    usual = min(masses, default=1.0), min(moments, default=1.0)
+    carried: dict[str, tuple[float, float]] = {}
+    for name in reversed(tree.order):
+        if name not in groups:
+            continue
+        group = groups[name]
+        _complete(group, carried.get(name, usual), remarks)
+        joint = tree.placing.get(name)
+        if joint is not None:
+            mean = float(np.trace(group.inertial.inertia)) / 3.0
+            own = (group.inertial.mass, mean) if group.has_mass else carried.get(name, usual)
+            carried.setdefault(member[joint.parent][0], own)
+
+
+def _complete(group: RigidGroup, scale: tuple[float, float], remarks: Remarks) -> None:
+    """Complete mass and inertia of a group by parts of a mass and a moment of inertia."""
+    place, old = group.links[0][0].place, group.inertial
+    mass, moment = (STAND_IN * x for x in scale)
+    group.has_mass = old.mass > 0.0
+    inertia = old.inertia
+    least = float(np.linalg.eigvalsh(inertia)[0])
+    if least <= SMALLEST * float(np.abs(inertia).max(initial=0.0)):
+        inertia = inertia + (moment - min(least, 0.0)) * np.eye(3)
+    if not old.mass:
+        text = f"a link without mass that moves has {STAND_IN:g} of the mass that it carries"
+        remarks.translate(place, text)
+    elif inertia is not old.inertia:
+        text = f"a moment of inertia of 0 is {STAND_IN:g} of the least of the others"
+        remarks.translate(place, text)
+    group.inertial = Inertial(old.mass or mass, old.com, inertia)

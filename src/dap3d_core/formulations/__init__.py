@@ -15,7 +15,8 @@ from dap3d_core.assembly.arrays import step_functions
 RHS, PROJECT, REPORT, ACCEPTED, WATCH = range(5)
 
 #: Kinds of group loops that every formulation calls, and those of joints.
-_ALL = ("value", "wrench", "energy", "angle", "turned", "switch", "bound", "knot", "rate")
+_ALL = ("value", "wrench", "energy", "angle", "turned", "switch", "bound", "knot", "rate",
+        "impulse", "reset")  # fmt: skip
 _OF_JOINTS = ("acceleration", "position", "friction")
 
 
@@ -44,12 +45,14 @@ class Formulation:
         """Kinds of the group loops that it calls."""
         return (*_ALL, *_OF_JOINTS) if self.needs_joints else _ALL
 
-    def functions(self, *, turns: bool, switches: bool) -> Any:
+    def functions(self, *, turns: bool, switches: bool, equations: str = "") -> Any:
         """Its compiled functions as the list that an integrator takes.
 
         They are rhs, project, report; accepted where ``turns`` are counted; watch for ``switches``.
+
+        equations: the module that has them, where it is not the one of the formulation's name.
         """
-        module: Any = import_module(f"dap3d_core.formulations.{self.name}")
+        module: Any = import_module(f"dap3d_core.formulations.{equations or self.name}")
         functions = [module.rhs, module.project, module.report]
         if turns or switches:
             if not self.has_own_coordinates:
@@ -75,6 +78,6 @@ FORMULATIONS = {
         Formulation("standard"),
         Formulation("penalty", accepts_redundant=True, is_exact=False),
         Formulation("lsq", accepts_redundant=True),
-        Formulation("joint", has_own_coordinates=True),
+        Formulation("joint", accepts_redundant=True, has_own_coordinates=True),
     )
 }

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
-from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
+from dap3d_core.model.rotations import to_body
+from dap3d_core.model.state_layout import COORDINATES, VELOCITIES, split
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
@@ -54,6 +55,11 @@ class Coordinates:
             f"nodes and {len(ordering.hubs)} hubs; {plan.fill} blocks of fill"
         )
 
+    @property
+    def notes(self) -> list[str]:
+        """Return notes on the choice of coordinates, for the results of runs."""
+        return []
+
     def start(self, u: Floats) -> Floats:
         """The state y that a run from a state u (13 n,) begins with."""
         return self.evaluator.integrated(u)
@@ -65,6 +71,24 @@ class Coordinates:
     def continued(self, expected: Floats, y: Floats) -> Floats:
         """The state y as the motion led to it, near the one expected; ``project`` may shift it."""
         return y
+
+    def with_jump(self, y: Floats, dv: Floats, states: Floats, work: float) -> Floats:
+        """The state y after a jump.
+
+        Args:
+            y: the state before.
+            dv: (6 n,) changes of r_dot and omega of each body, global axes.
+            states: (states,) of elements then.
+            work: of the impulses, J.
+        """
+        after = y.copy()
+        parts = dv.reshape(-1, 2, 3)
+        _, p, v, w = split(self.evaluator.bodies_of(after))
+        v += parts[:, 0]
+        w += to_body(p, parts[:, 1])
+        after[self.evaluator.model.integrated_layout["states"]] = states
+        after[-1] += work
+        return after
 
     @contextmanager
     def at(self, u: Floats) -> Iterator[Floats]:

@@ -1,6 +1,7 @@
 """The evaluator of a model: plan, arrays, group loops and formulation, called from Python."""
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
@@ -76,7 +77,7 @@ class Evaluator:
         self.store_initial_function_values()
         self._seek_unknowns()
         self._weigh_rows()
-        self.report_size = model.report_layout.size
+        self.report_size = model.report_layout["inputs"].start
         if self.formulation.has_own_coordinates:
             _ = self.coordinates  # its arrays take the place of those so far
 
@@ -135,6 +136,7 @@ class Evaluator:
         self._weigh_rows()
         if self.formulation.has_own_coordinates:
             self.coordinates = self.formulation.coordinates(self)
+            self.__dict__.pop("functions", None)  # other joints may be in the tree
 
     @IGNORE_FLOAT_ERRORS
     def start(
@@ -215,10 +217,30 @@ class Evaluator:
                     for k in range(offset, offset + ANGLE_WIDTH):
                         yield slice(p0 + k, p0 + width * group.count, width)
 
+    @property
+    def inputs(self) -> Floats:
+        """(inputs,) the values that elements read, a copy."""
+        values: Floats = self.system.F[self.model.input_rows, 0]
+        return values
+
+    def set_inputs(self, values: ArrayLike) -> None:
+        """Set the values that elements read, (inputs,); they hold until they are set again."""
+        self.system.F[self.model.input_rows, 0] = values
+
+    @contextmanager
+    def held_inputs(self) -> Iterator[None]:
+        """Put the values of inputs back at the end."""
+        values = self.inputs
+        try:
+            yield
+        finally:
+            self.set_inputs(values)
+
     @IGNORE_FLOAT_ERRORS
     def store_initial_function_values(self, t: float = 0.0) -> None:
         """Keep each function's value at the start, for drivers that count from it."""
         s = self.system
+        self.set_inputs(self.model.input_values)
         self._call(VALUE, t, s.force, s.force, s.force)
         s.F[:, 4] = s.F[:, 0]
 
@@ -238,7 +260,8 @@ class Evaluator:
     def functions(self) -> Any:
         """The compiled functions (rhs, project, report, ...) that an integrator takes."""
         turns, switches = self.counts_turns, bool(self.switches)
-        return self.formulation.functions(turns=turns, switches=switches)
+        equations = self.coordinates.equations if self.formulation.has_own_coordinates else ""
+        return self.formulation.functions(turns=turns, switches=switches, equations=equations)
 
     def integrated(self, u: ArrayLike) -> Floats:
         """The integrated state y of a state u (13 n,) and ``states``, in coordinates of bodies."""
@@ -269,6 +292,16 @@ class Evaluator:
         end = rows.shape[1] - self.report_size
         states = self.coordinates.body_states(np.ascontiguousarray(rows[:, 1:end]))
         return np.hstack([rows[:, :1], states, rows[:, end:]])
+
+    def with_inputs(self, rows: Floats, values: Floats | None = None) -> Floats:
+        """Reported rows with inputs, (inputs,) or (k, inputs), behind them; by default the present.
+
+        The last numbers of a row of results, which compiled code does not write.
+        """
+        if not self.model.input_names:
+            return rows
+        values = self.inputs if values is None else values
+        return np.hstack([rows, np.broadcast_to(values, (len(rows), values.shape[-1]))])
 
     @IGNORE_FLOAT_ERRORS
     def rhs(self, t: float, u: ArrayLike) -> Floats:
@@ -312,15 +345,16 @@ class Evaluator:
 
     @IGNORE_FLOAT_ERRORS
     def report(self, t: float, u: ArrayLike) -> Floats:
-        """Report of a run at a state, (report_size,).
+        """Report of a run at a state, of the size of the model's report layout.
 
-        v_dot, lambda, angles whose turns are counted, potential energy and the largest residuals of
-        the three levels.
+        v_dot, lambda, angles whose turns are counted, potential energy, the largest residuals of
+        the three levels, and inputs.
         """
         out = np.zeros(self.report_size)
         with self.coordinates.at(np.asarray(u, dtype=float)) as y:
             self.functions[REPORT](float(t), y, out, self.system, self.loops)
-        return out
+        whole: Floats = self.with_inputs(out[None])[0]
+        return whole
 
     @IGNORE_FLOAT_ERRORS
     def applied_forces(self, t: float, u: ArrayLike) -> Floats:

@@ -6,11 +6,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import BEGINS, ENDS, UNSEEN, Floats
+from dap3d_core.assembly.arrays import BEGINS, ENDS, JUMPS, UNSEEN, Floats
 from dap3d_core.interface.codegen.specialise import is_knots
 from dap3d_core.model import Group, Model
 from dap3d_core.model.knots import narrowest
 
+#: Kernels by which velocities and states jump.
+JUMPING = frozenset(("impulse", "reset"))
 #: The part of the narrowest range between two knots that counts as at the knot.
 NEAR_KNOT = 1e-6
 
@@ -47,6 +49,20 @@ class Switch:
         return str(type_.switch_words) if self.kind == "switch" else ""
 
     @property
+    def jumps(self) -> bool:
+        """True if velocities or states may jump where it changes its sign."""
+        return self.kind == "switch" and not JUMPING.isdisjoint(self.group.type_info.kernels)
+
+    @property
+    def effect(self) -> int:
+        """Effect on a run: ENDS, BEGINS, UNSEEN or JUMPS."""
+        if self.words:
+            return ENDS
+        if self.kind == "knot":
+            return UNSEEN
+        return JUMPS if self.jumps else BEGINS
+
+    @property
     def band(self) -> float:
         """Distance beyond a knot from which on an argument has passed it."""
         if self.kind != "knot":
@@ -77,7 +93,6 @@ def switches_of(loops: Iterable[tuple[str, Group]]) -> tuple[Switch, ...]:
 
 
 def effects_of(switches: Iterable[Switch]) -> Floats:
-    """(2, switches) effect of each on a run (ENDS, BEGINS, UNSEEN), and its band."""
-    effects = [(ENDS if s.words else UNSEEN if s.kind == "knot" else BEGINS, s.band)
-               for s in switches]  # fmt: skip
+    """(2, switches) effect of each on a run, and its band."""
+    effects = [(s.effect, s.band) for s in switches]
     return np.array(effects, dtype=float).reshape(-1, 2).T.copy()

@@ -24,8 +24,8 @@ class FieldSpec:
     """Properties of a field, for validation, documentation and the generation of loops.
 
     Attributes:
-        kind: body, point, vector, vector2, number, numbers, vec3, matrix, table, function, choice,
-            joint or angle.
+        kind: body, point, vector, vector2, number, numbers, vec3, matrix, table, function,
+            functions, input, choice, joint or angle.
         default: value where the scene gives none; REQUIRED where it must.
         unit: SI unit of a number, "" for none.
         doc: its meaning, one short sentence.
@@ -44,6 +44,7 @@ class FieldSpec:
         given: a table is given in the scene; False: ``prepare`` returns it.
         axes: the fields an angle is measured between: two vectors, and the axis.
         rows: number of rows that a joint must have; None for any.
+        instead_of: field that an input takes the place of; "" for none.
     """
 
     kind: str
@@ -66,6 +67,7 @@ class FieldSpec:
     given: bool = True
     axes: tuple[str, str, str] = ("", "", "")
     rows: int | None = None
+    instead_of: str = ""
 
     @property
     def required(self) -> bool:
@@ -160,11 +162,31 @@ def function(default: Any = None, *, argument: str = "", doc: str = "") -> Any:
     """A function by name; absent, it is zero. With ``REQUIRED`` the scene must give it.
 
     Of time it offers its value and derivatives ``f``, ``f_dot``, ``f_ddot``, and ``f_0``, its value
-    at t = 0. With ``argument`` (the name of its argument) kernels call ``f(x)``, ``f_dot(x)``,
-    ``f_ddot(x)``: value, first and second derivative; where it may be omitted, such kernels belong
-    to a variant of the type for ``function=True``.
+    at t = 0; next to a field of the name ``f`` they begin with its own name. With ``argument`` (the
+    name of its argument) kernels call ``f(x)``, ``f_dot(x)``, ``f_ddot(x)``: value, first and
+    second derivative; where it may be omitted, such kernels belong to a variant of the type for
+    ``function=True``.
     """
     return _field(FieldSpec("function", default, doc=doc, argument=argument))
+
+
+def functions(*, doc: str = "") -> Any:
+    """Several functions by name, for a function type that combines them.
+
+    The field offers its kernel a tuple of functions of one argument, each of which returns
+    (f, f', f'', f''') there. A function that names itself, directly or through others, is refused.
+    """
+    return _field(FieldSpec("functions", REQUIRED, doc=doc))
+
+
+def input_(default: Any = None, *, instead_of: str = "", unit: str = "", doc: str = "") -> Any:
+    """An input of the scene by name: a number that is set from outside, and held until then.
+
+    It offers its value under the name of the field. Where it may be omitted, kernels that name it
+    belong to a variant of the type for ``input=True`` (the name of the field). A scene gives it or
+    the field ``instead_of``, not both.
+    """
+    return _field(FieldSpec("input", default, unit, doc, instead_of=instead_of))
 
 
 def choice(

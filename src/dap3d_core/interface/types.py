@@ -104,7 +104,9 @@ class Joint(TypeBase):
       ``lam`` (its multipliers), ``mu``, ``v_tol``, ``radius``; a force ``friction`` switches it on;
     * ``switch``    a number, or a tuple of numbers, smooth in time. With ``switch_words`` the run
       ends with this message where one becomes negative; without, the integration restarts where
-      one changes its sign: there the element's law takes another branch (docs/events.md).
+      one changes its sign: there the element's law takes another branch (docs/events.md);
+    * ``impulse``   impulses on its bodies where a switch changes its sign, as for forces without
+      ``J``. Its own rows hold through a jump (docs/jumps.md).
 
     ``prepare(self, bodies)`` may return constants of the poses in the scene. A subclass that names
     values of fields, ``class NoSlip(Disk, slip="xyz")``, is a variant of the type: it replaces it,
@@ -129,7 +131,9 @@ class Joint(TypeBase):
     """
 
     kind = "joint"
-    kernel_names = ("C", "C_dot", "G", "J", "gamma", "nu", "friction", "switch", "rate")
+    kernel_names = (
+        "C", "C_dot", "G", "J", "gamma", "nu", "friction", "switch", "rate", "impulse", "reset"
+    )  # fmt: skip
     switch_words: ClassVar[str] = ""
     rows: ClassVar[int] = 0
     holonomic: ClassVar[bool | tuple[bool, ...]] = True
@@ -170,6 +174,13 @@ class Force(TypeBase):
     for joints. A force that defines neither and names one joint, by a ``joint`` field, switches on
     the friction of that joint; one with a ``wrench`` does not.
 
+    Where a ``switch`` changes its sign velocities may jump (docs/jumps.md), by ``impulse``:
+
+    * without ``J``: for each body slot (impulse, moment of impulse about the mass centre), global;
+    * with ``J``, one block of rows x 6 a body slot, as of a joint: the change of J v, one number a
+      row. It takes ``Jv``, J v before. Where ``impulse`` names ``Jv`` and the type has no ``J``,
+      that is derived from ``switch``, whose rates the rows then are.
+
     Attributes:
         keyword: the name of the type in a scene.
         each_body: True if the element acts on every body of the scene (slot i in turn).
@@ -179,11 +190,17 @@ class Force(TypeBase):
             wrench; "" for no condition.
         actuates: field, a number or three, that an actuator sets: the wrench is linear in it. Of
             three numbers the direction stays. Inverse dynamics finds it; "" for no such field.
+        unilateral: rows of ``J``, from 0, whose impulses are not negative: they push and do not
+            pull.
+        restitution: field, the coefficient of restitution e of all rows: J v becomes -e J v. It is
+            for ``dap3d check-plugin``; "" for no such field.
     """
 
     kind = "force"
-    kernel_names = ("wrench", "energy", "switch", "rate")
+    kernel_names = ("wrench", "energy", "switch", "rate", "J", "impulse", "reset")
     switch_words: ClassVar[str] = ""
+    unilateral: ClassVar[tuple[int, ...]] = ()
+    restitution: ClassVar[str] = ""
     each_body: ClassVar[bool] = False
     energy_where: ClassVar[str] = ""
     actuates: ClassVar[str] = ""

@@ -16,6 +16,7 @@ from dap3d_core.interface.codegen.specialise import (
     bind_functions,
     uncalled,
 )
+from dap3d_core.interface.codegen.terms import bind_terms
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
@@ -134,8 +135,8 @@ class Grouping:
         """
         by_type: dict[Any, list[int]] = {}
         for place, instance in enumerate(instances):
-            given = tuple((n, f.type_info.type) for n, f in self._given(instance).items())
-            by_type.setdefault((instance.type_info.type, given), []).append(place)
+            given = tuple((n, f.structure) for n, f in self._given(instance).items())
+            by_type.setdefault((instance.structure, given), []).append(place)
         return _each(
             lambda places: self._group(
                 [instances[k] for k in places], [members[k] for k in places]
@@ -199,7 +200,10 @@ class Grouping:
             members = [m for m in members for _ in range(n)]
             instances = [attrs.evolve(i, bodies=(b,)) for i in instances for b in range(1, n + 1)]
         count = len(instances)
-        numbers, tables = self._numbers(type_info, instances, members)
+        if instances[0].terms:
+            type_info, numbers, tables = self._combined(instances, members)
+        else:
+            numbers, tables = self._numbers(type_info, instances, members)
         functions = [self._given(i) for i in instances]
         if functions[0]:
             type_info, numbers, more = self._with_functions(type_info, functions, numbers, members)
@@ -226,13 +230,13 @@ class Grouping:
         members: Sequence[int],
     ) -> tuple[TypeInfo, Floats, list[tuple[int, int, Floats]]]:
         """The type with its functions known, their numbers behind its own, their tables."""
-        types = {field: f.type_info for field, f in functions[0].items()}
+        types: dict[str, TypeInfo] = {}
         tables: list[tuple[int, int, Floats]] = []
         counts: dict[str, int] = {}
-        for field, given in types.items():
+        for field in functions[0]:
             column = [of_instance[field] for of_instance in functions]
             try:
-                more, found = self._numbers(given, column, range(len(column)))
+                types[field], more, found = self._combined(column, range(len(column)))
             except PrepareError as error:
                 raise PrepareError(
                     *[(members[k], f"function {column[k].name}: {w}") for k, w in error.faults]
@@ -242,6 +246,27 @@ class Grouping:
             counts[field] = knots.shape[1]
             numbers = np.hstack([numbers, more, knots])
         return bind_functions(type_info, types, counts), numbers, tables
+
+    def _combined(
+        self, functions: list[Instance], members: Sequence[int]
+    ) -> tuple[TypeInfo, Floats, list[tuple[int, int, Floats]]]:
+        """The type of functions of one structure with their terms known, numbers and tables."""
+        type_info = functions[0].type_info
+        numbers, tables = self._numbers(type_info, functions, members)
+        if not functions[0].terms:
+            return type_info, numbers, tables
+        terms = []
+        for column in zip(*(function.terms for function in functions), strict=True):
+            try:
+                term, more, found = self._combined(list(column), range(len(column)))
+            except PrepareError as error:
+                raise PrepareError(
+                    *[(members[k], f"function {column[k].name}: {w}") for k, w in error.faults]
+                ) from error
+            terms.append(term)
+            tables += [(k, numbers.shape[1] + offset, rows) for k, offset, rows in found]
+            numbers = np.hstack([numbers, more])
+        return bind_terms(type_info, terms), numbers, tables
 
     def _numbers(
         self, type_info: TypeInfo, instances: list[Instance], members: Sequence[int]

@@ -23,6 +23,8 @@ def breaks_of(function: Instance) -> Floats:
     Raises:
         PluginError: ``breaks`` of the type failed.
     """
+    if function.terms:
+        return np.concatenate([breaks_of(term) for term in function.terms])
     type_: Any = function.type_info.type
     fields = specs_of(type_)
     thing = type_(**{n: v for n, v in function.values.items() if n in fields})
@@ -37,6 +39,8 @@ def breaks_of(function: Instance) -> Floats:
 
 def breaks_are_told(function: Instance) -> bool:
     """True if the type of a function gives its breaks, or says that it has none."""
+    if function.terms:
+        return all(map(breaks_are_told, function.terms))
     type_: Any = function.type_info.type
     return bool(type_.smooth) or type_.breaks is not Function.breaks
 

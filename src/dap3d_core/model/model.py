@@ -51,7 +51,9 @@ class Model:
         joints, forces, functions: groups of instances of one type; of the functions those of time
             that an element uses.
         friction: groups of joints' own friction, switched on by forces.
-        function_count: number of functions; F has one row more, for the absent one.
+        function_count: number of functions and inputs; F has one row more, for the absent one.
+        input_names: in file order.
+        input_rows, input_values: (inputs,) their rows of F, and their values at the start of a run.
         point_names, point_body (points,), point_local (points, 3): for rP; animation points last.
         notes: what types warned about.
     """
@@ -79,6 +81,9 @@ class Model:
     point_body: Integers
     point_local: Floats
     notes: tuple[str, ...] = ()
+    input_names: tuple[str, ...] = ()
+    input_rows: Integers = attrs.field(factory=lambda: np.zeros(0, dtype=np.int64))
+    input_values: Floats = attrs.field(factory=lambda: np.zeros(0))
 
     @property
     def body_count(self) -> int:
@@ -169,12 +174,14 @@ class Model:
     @property
     def report_layout(self) -> Layout:
         """Layout of what is reported in addition to the state."""
-        return report_layout(self.body_count, self.row_count, self.angle_count)
+        inputs = len(self.input_names)
+        return report_layout(self.body_count, self.row_count, self.angle_count, inputs)
 
     @property
     def row_layout(self) -> Layout:
         """Layout of a reported row."""
-        return row_layout(self.body_count, self.row_count, self.angle_count, self.state_count)
+        states, inputs = self.state_count, len(self.input_names)
+        return row_layout(self.body_count, self.row_count, self.angle_count, states, inputs)
 
     @cached_property
     def irc(self) -> Integers:
@@ -290,11 +297,14 @@ def build_model(checked: ValidatedScene) -> Model:
         forces=groups.forces,
         functions=groups.functions,
         friction=groups.friction,
-        function_count=len(checked.functions),
+        function_count=len(checked.functions) + len(checked.inputs),
         point_names=tuple(checked.point_names),
         point_body=checked.point_body,
         point_local=checked.point_local,
         notes=tuple(groups.notes),
+        input_names=tuple(checked.inputs),
+        input_rows=1 + len(checked.functions) + np.arange(len(checked.inputs)),
+        input_values=np.array(list(checked.inputs.values()), dtype=float),
     )
     for value in attrs.astuple(model, recurse=False):
         if isinstance(value, np.ndarray):

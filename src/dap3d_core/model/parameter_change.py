@@ -48,7 +48,7 @@ def changed(checked: ValidatedScene, model: Model, place: int, fields: Mapping[s
 
 def _value(force: str, specs: Mapping[str, FieldSpec], name: str, value: Any) -> Any:
     """The value of a field, checked as in a scene."""
-    numeric = [n for n, s in specs.items() if s.kind in ("number", "vec3", "matrix")]
+    numeric = [n for n, s in specs.items() if s.kind in ("number", "numbers", "vec3", "matrix")]
     if name not in numeric:
         near = nearest(name, numeric)
         hint = f"did you mean {near!r}?" if near else f"it has {', '.join(numeric) or 'none'}"
@@ -59,7 +59,8 @@ def _value(force: str, specs: Mapping[str, FieldSpec], name: str, value: Any) ->
         limits = {n: getattr(spec, n) for n in ("positive", "minimum", "maximum", "whole")}
         found = bounded(number_of(value), **limits)
     else:
-        found = numbers_of(value, 3) if spec.kind == "vec3" else matrix_of(value)
+        count = {"vec3": 3, "numbers": spec.columns}.get(spec.kind, 0)
+        found = numbers_of(value, count) if count else matrix_of(value)
     if isinstance(found, Fault):
         raise ValueError(f"force {force}: {name} {found.what}, not {value!r}")
     return found

@@ -78,16 +78,19 @@ def tree_layout(angles: int, lengths: int, rotations: int, poses: int, states: i
 
 
 @cache
-def report_layout(n: int, rows: int, angles: int) -> Layout:
-    """Layout of reports in addition to the state: n bodies, constraint rows, counted angles."""
+def report_layout(n: int, rows: int, angles: int, inputs: int = 0) -> Layout:
+    """Layout of reports in addition to the state: n bodies, constraint rows, angles, inputs.
+
+    Compiled code writes all but the inputs.
+    """
     sizes = {"v_dot": VELOCITIES * n, "Lam": rows, "angles": angles}
-    return Layout(**sizes, potential_energy=1, residuals=3)
+    return Layout(**sizes, potential_energy=1, residuals=3, inputs=inputs)
 
 
 @cache
-def row_layout(n: int, rows: int, angles: int, states: int = 0) -> Layout:
+def row_layout(n: int, rows: int, angles: int, states: int = 0, inputs: int = 0) -> Layout:
     """Layout of a reported row."""
-    parts = integrated_layout(n, states), report_layout(n, rows, angles)
+    parts = integrated_layout(n, states), report_layout(n, rows, angles, inputs)
     return Layout(t=1, **{name: part.length(name) for part in parts for name in part.names})
 
 

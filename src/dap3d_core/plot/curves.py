@@ -26,6 +26,7 @@ from dap3d_core.plot.style import (
     with_unit,
 )
 from dap3d_core.result import Quantity, Result, UnknownNameError, find
+from dap3d_core.result.post.smooth_parts import smooth_parts
 
 #: A curve of fewer instants is drawn through about so many points.
 POINTS = 600
@@ -39,11 +40,15 @@ def cubic(a: float, h: "float | Floats", x: Floats, x_dot: Floats) -> Floats:
 
 
 def _refined(t: Floats, x: Floats, x_dot: Floats) -> Floats:
-    """A curve x (nt,) with derivative x_dot, at its instants and at equal fractions between."""
+    """A curve x (nt,) with derivative x_dot, at its instants and at equal fractions between.
+
+    A derivative that is NaN is taken for that of the straight line between two instants.
+    """
     if not 1 < len(t) < POINTS:
         return x
     between = -(-POINTS // len(t))
     h, ends, rates = np.diff(t), np.stack([x[:-1], x[1:]]), np.stack([x_dot[:-1], x_dot[1:]])
+    rates = np.where(np.isnan(rates), np.diff(x) / h, rates)
     pieces = [cubic(k / between, h, ends, rates) for k in range(between)]
     return np.append(np.stack(pieces, axis=1).reshape(-1), x[-1])
 
@@ -209,10 +214,32 @@ def _curves(
 ) -> Iterable[Curve]:
     """The curves of a quantity of a run; ``alone`` in its panel, it has the name of its run."""
     names = [f"{quantity.name}.{c}" for c in quantity.components] or [quantity.name]
+    parts = smooth_parts(result)
+    of_parts = [
+        _points(part, over, quantity)
+        if part is result
+        else _points(part, find(part, over.name), find(part, quantity.name))
+        for part in parts
+    ]
+    for name, *points in zip(names, *of_parts, strict=True):
+        label = run if alone and run else ", ".join(part for part in (name, run) if part)
+        yield Curve(label, _interrupted(points), quantity, number)
+
+
+def _points(result: Result, over: Quantity, quantity: Quantity) -> list[tuple[Floats, Floats]]:
+    """The curve of each component of a quantity."""
     columns = quantity.values.reshape(len(result.t), -1).T
     over_rate, rate = rate_of(result, over), rate_of(result, quantity)
     rates = [None] * len(columns) if rate is None else rate.reshape(len(result.t), -1).T
-    for name, values, own in zip(names, columns, rates, strict=True):
-        label = run if alone and run else ", ".join(part for part in (name, run) if part)
-        points = smooth(result.t, over.values, values, over_rate, own)
-        yield Curve(label, points, quantity, number)
+    return [smooth(result.t, over.values, values, over_rate, own)
+            for values, own in zip(columns, rates, strict=True)]  # fmt: skip
+
+
+def _interrupted(parts: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+    """Curves one behind the other, with a gap between two."""
+    if len(parts) == 1:
+        return parts[0]
+    gap = np.full(1, np.nan)
+    x, y = (np.concatenate([z for part in axis for z in (part, gap)][:-1])
+            for axis in zip(*parts, strict=True))  # fmt: skip
+    return x, y

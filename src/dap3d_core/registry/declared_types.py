@@ -6,7 +6,7 @@ import os
 import shlex
 import tomllib
 import warnings
-from importlib.metadata import distributions
+from importlib.metadata import Distribution, distributions
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -63,10 +63,9 @@ def not_yet_installed(keyword: str) -> str:
     """
     for distribution in distributions():
         try:
-            origin = json.loads(distribution.read_text("direct_url.json") or "{}")
-            if not origin.get("dir_info", {}).get("editable"):
+            folder = editable_folder(distribution)
+            if folder is None:
                 continue
-            folder = _folder(origin["url"])
             file = folder / "pyproject.toml"
             entry_points = tomllib.loads(file.read_text("utf-8"))["project"]["entry-points"]
             groups = [entry_points.get(group, {}) for group, _ in GROUPS.values()]
@@ -78,6 +77,17 @@ def not_yet_installed(keyword: str) -> str:
                 f"run pip install -e {shlex.quote(str(folder))} again"
             )
     return ""
+
+
+def editable_folder(distribution: Distribution) -> Path | None:
+    """The folder of the sources of an editable install; None for any other install.
+
+    Raises:
+        Exception: what the install says of its origin is damaged.
+    """
+    origin = json.loads(distribution.read_text("direct_url.json") or "{}")
+    is_editable = origin.get("dir_info", {}).get("editable")
+    return _folder(origin["url"]) if is_editable else None
 
 
 def _folder(url: str) -> Path:

@@ -9,7 +9,7 @@ from dap3d_core.interface import PluginError
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.registry.declared_types import not_yet_installed
-from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover
+from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover, normal_name
 from dap3d_core.registry.guard import OverdueError
 from dap3d_core.registry.loading import compile_kernels, load, load_file
 from dap3d_core.registry.suggestions import nearest
@@ -72,7 +72,7 @@ class Registry:
 
         Args:
             kind: joint, force or function.
-            keyword: the type's name in a scene.
+            keyword: the type's name in a scene, or ``package:keyword``.
             limit_s: time limit of the loading of its plugin; by default none.
 
         Raises:
@@ -81,12 +81,31 @@ class Registry:
                 Names distribution, module or file, reason and remedy.
         """
         _check_kind(kind)
-        sources = [s for s in self.sources.get((kind, keyword), []) if not s.blocked]
+        sources = self.sources_of(kind, keyword)
         if not sources:
             raise self._unknown(kind, keyword)
         if len(sources) > 1:
             raise PluginError(_collision(sources))
         return self._load(sources[0], limit_s)
+
+    def sources_of(self, kind: str, keyword: str) -> list[Source]:
+        """The origins of a type that are not blocked; several where packages collide.
+
+        Args:
+            kind: joint, force or function.
+            keyword: of the type, or ``package:keyword``, the type of one distribution.
+        """
+        package, _, word = keyword.rpartition(":")
+        if not package or (kind, keyword) in self.sources:
+            return [s for s in self.sources.get((kind, keyword), ()) if not s.blocked]
+        name, same = normal_name(package), self.sources.get((kind, word.strip()), ())
+        return [s for s in same if not s.blocked and normal_name(s.distribution) == name]
+
+    def word_of(self, source: Source) -> str:
+        """The keyword of a type, or ``package:keyword`` where several packages have this one."""
+        is_shared = len(self.sources_of(source.kind, source.keyword)) > 1
+        named = is_shared and source.distribution
+        return f"{source.distribution}:{source.keyword}" if named else source.keyword
 
     def keywords(self, kind: str) -> tuple[str, ...]:
         """All keywords of a kind, sorted, without those of blocked packages. Loads nothing."""
@@ -175,6 +194,9 @@ class Registry:
         return info
 
     def _unknown(self, kind: str, keyword: str) -> UnknownTypeError:
+        package, _, word = keyword.rpartition(":")
+        if package and (rivals := self.sources_of(kind, word)):
+            return self._not_of_package(rivals, package)
         known = self.keywords(kind)
         near = nearest(keyword, known)
         words = f"there is no {kind} type {keyword!r}"
@@ -191,6 +213,16 @@ class Registry:
             words += f"; {how}"
         error = UnknownTypeError(words)
         error.nearest = near if near and not blocked and not others else None
+        return error
+
+    @staticmethod
+    def _not_of_package(sources: list[Source], package: str) -> UnknownTypeError:
+        """The error for ``package:keyword`` where other packages bring the keyword."""
+        known = [f"{s.distribution}:{s.keyword}" for s in sources if s.distribution]
+        what = f"the distribution {package!r} brings no {sources[0].kind} type"
+        others = " and ".join(map(str, sources))
+        error = UnknownTypeError(f"{what} {sources[0].keyword!r}, which is brought by {others}")
+        error.nearest = nearest(f"{package}:{sources[0].keyword}", known) or None
         return error
 
 
@@ -229,7 +261,8 @@ def _collision(sources: list[Source]) -> str:
     if len(names) == 1:
         return f"{title} is declared twice, by {both}; update or uninstall {names[0]}"
     others = " or ".join(n for n in names if n != OWN)
+    words = " or ".join(f'"{n}:{sources[0].keyword}"' for n in names)
     return (
-        f"{title} is brought by {both}; give the one of {others} another keyword, uninstall one of "
-        f"them, or leave one type out with {leaving}"
+        f"{title} is brought by {both}; say which one in the scene, type = {words}, give the one "
+        f"of {others} another keyword, uninstall one of them, or leave one type out with {leaving}"
     )

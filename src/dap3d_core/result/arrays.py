@@ -59,6 +59,7 @@ COLUMNS = (
     Column("acceleration_residual", "", "SI", "largest |D v_dot - gamma| of the constraint rows"),
     Column("angles", "angle", "rad", "angles of forces and joints that count whole turns"),
     Column("states", "element_state", "SI", "states of their own of forces and joints"),
+    Column("inputs", "input", "1", "inputs of the scene, as they acted at that instant"),
 )
 #: Present only where a run estimated its error (post/global_error.py).
 U_ERROR = Column(
@@ -80,6 +81,7 @@ class Arrays:
         position_residual, velocity_residual, acceleration_residual: (nt,) largest magnitude.
         angles: (nt, k) of k angles whose turns are counted, rad, as in ``Model.angles_of``.
         states: (nt, s) states of forces and joints, as in ``ModelSummary.state_names``.
+        inputs: (nt, k) of k inputs of the scene.
         u_error: (nt, 13 n) estimated error of u; None where the run made no estimate.
     """
 
@@ -94,6 +96,7 @@ class Arrays:
     acceleration_residual: Floats
     angles: Floats
     states: Floats
+    inputs: Floats
     u_error: Floats | None = None
 
     def __attrs_post_init__(self) -> None:
@@ -112,8 +115,8 @@ class Arrays:
 
     @property
     def width(self) -> int:
-        """Numbers of u, v_dot, Lam, angles and states at an instant."""
-        every = self.u, self.v_dot, self.Lam, self.angles, self.states
+        """Numbers of u, v_dot, Lam, angles, states and inputs at an instant."""
+        every = self.u, self.v_dot, self.Lam, self.angles, self.states, self.inputs
         return sum(a.shape[1] for a in every)
 
     def columns(self) -> Iterator[Floats]:
@@ -152,7 +155,8 @@ def column_sizes(summary: ModelSummary) -> dict[str, int]:
     row = _layout(summary)
     sizes = {"velocity": "v_dot", "row": "Lam", "angle": "angles", "element_state": "states"}
     state = state_layout(summary.body_count).size
-    return {"state": state} | {k: row.length(name) for k, name in sizes.items()}
+    inputs = len(summary.input_names)
+    return {"state": state} | {k: row.length(name) for k, name in sizes.items()} | {"input": inputs}
 
 
 def row_width(summary: ModelSummary) -> int:
@@ -161,8 +165,9 @@ def row_width(summary: ModelSummary) -> int:
 
 
 def _layout(summary: ModelSummary) -> Layout:
-    states = len(summary.state_names)
-    return row_layout(summary.body_count, summary.row_count, summary.angle_count, states)
+    s = summary
+    states, inputs = len(s.state_names), len(s.input_names)
+    return row_layout(s.body_count, s.row_count, s.angle_count, states, inputs)
 
 
 def _states(y: Floats, states: int) -> Floats:
@@ -181,7 +186,7 @@ def arrays_of(rows: Floats, summary: ModelSummary) -> Arrays:
     Args:
         rows: (nt, row_width): t; the integrated state (angular velocity in body axes; states of
             elements; work last); v_dot; lambda; angles; potential energy; largest residuals of the
-            three levels.
+            three levels; inputs.
         summary: the model of the rows.
 
     Raises:
@@ -192,10 +197,21 @@ def arrays_of(rows: Floats, summary: ModelSummary) -> Arrays:
     if rows.ndim != 2 or rows.shape[1] != width:
         raise ValueError(f"rows should have the shape (nt, {width}), not {rows.shape}")
     layout = _layout(summary)
-    t, _, _, states, work, v_dot, Lam, angles, energy, residuals = (
+    t, _, _, states, work, v_dot, Lam, angles, energy, residuals, inputs = (
         rows[:, layout[name]] for name in layout.names
     )
     y = rows[:, layout["coordinates"].start : layout["work"].stop]
     u = _states(y, states.shape[1])
-    columns = (t[:, 0], u, v_dot, Lam, work[:, 0], energy[:, 0], *residuals.T, angles, states)
+    columns = (
+        t[:, 0],
+        u,
+        v_dot,
+        Lam,
+        work[:, 0],
+        energy[:, 0],
+        *residuals.T,
+        angles,
+        states,
+        inputs,
+    )
     return Arrays(*map(np.array, columns))

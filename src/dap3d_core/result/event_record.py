@@ -6,8 +6,8 @@ from typing import Any
 import attrs
 
 #: A switch that restarted the integration, or ended the run; an event that stopped it, was
-#: recorded, or changed parameters of a force.
-KINDS = ("switch", "end", "stop", "record", "change")
+#: recorded, or changed parameters of a force or velocities; a jump of velocities by elements.
+KINDS = ("switch", "end", "stop", "record", "change", "jump")
 
 
 def _state(u: Any) -> tuple[float, ...] | None:
@@ -19,12 +19,17 @@ class EventRecord:
     """A switch or an event at a located instant.
 
     Attributes:
-        name: of the event; of a switch ``force NAME`` or ``joint NAME``.
+        name: of the event; of a switch ``force NAME`` or ``joint NAME``; of a jump those of all
+            elements whose impulses acted.
         t: s.
-        direction: +1 if its function rose through its level, -1 if it fell.
+        direction: +1 if its function rose through its level, -1 if it fell; of a jump that of the
+            first switch, 0 without one.
         kind: one of ``KINDS``.
-        u: (13 n) the state, of events; None for switches.
+        u: (13 n) the state, of events and before jumps; None for switches.
         changes: force -> field -> new value of changed parameters.
+        u_after: (13 n) the state after a jump of velocities; None for all else.
+        work: of the impulses of a jump, J.
+        states: element -> state -> value of states of elements that a jump has changed.
     """
 
     name: str
@@ -33,6 +38,9 @@ class EventRecord:
     kind: str = attrs.field(validator=attrs.validators.in_(KINDS))
     u: tuple[float, ...] | None = attrs.field(default=None, converter=_state)
     changes: Mapping[str, Mapping[str, Any]] = attrs.Factory(dict)
+    u_after: tuple[float, ...] | None = attrs.field(default=None, converter=_state)
+    work: float = 0.0
+    states: Mapping[str, Mapping[str, Any]] = attrs.Factory(dict)
 
     @property
     def words(self) -> str:
@@ -42,6 +50,10 @@ class EventRecord:
             of = [f"{force}.{n} = {_short(x)}" for force, new in self.changes.items()
                   for n, x in new.items()]  # fmt: skip
             what = f": {', '.join(of)}" if of else ""
+        if self.kind == "jump":
+            of = [f", {element}.{n} = {_short(x)}" for element, new in self.states.items()
+                  for n, x in new.items()]  # fmt: skip
+            return f"t = {self.t:.9g} s: jump by {self.name}: work {self.work:.6g} J{''.join(of)}"
         if self.kind in ("switch", "end"):
             way = f": its switch became {'positive' if self.direction > 0 else 'negative'}"
         else:

@@ -27,6 +27,7 @@ class ModelSummary:
         angle_count: number of angles of forces and joints with counted turns.
         state_names: (states,) of each number of the elements' states: forces.spring.z, or
             forces.spring.z.1 where there are several.
+        input_names: of the inputs, in file order.
     """
 
     body_names: tuple[str, ...]
@@ -41,6 +42,7 @@ class ModelSummary:
     is_isolated: bool
     angle_count: int = 0
     state_names: tuple[str, ...] = ()
+    input_names: tuple[str, ...] = ()
 
     @property
     def body_count(self) -> int:
@@ -103,4 +105,5 @@ def summary_of(model: Model) -> ModelSummary:
         and all(len(slots) > 1 and 0 not in slots for slots in model.joint_slots),
         angle_count=model.angle_count,
         state_names=tuple(name for state in model.element_states for name in state.labels),
+        input_names=model.input_names,
     )

@@ -104,7 +104,7 @@ def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, Arrays]:
 
 def _subject(dataset: Any, values: dict[str, Any]) -> ModelSummary:
     parts: dict[str, Any] = {}
-    for kind in ("body", "joint", "point"):
+    for kind in ("body", "joint", "point", "input"):
         names = dataset.variables[kind][:] if kind in dataset.dimensions else ()
         parts[f"{kind}_names"] = tuple(map(str, names))
     for constant in CONSTANTS:

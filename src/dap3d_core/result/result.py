@@ -178,6 +178,11 @@ class Result:
         return self.arrays.work
 
     @property
+    def inputs(self) -> Floats:
+        """(nt, k) inputs of the scene, as they acted at each instant."""
+        return self.arrays.inputs
+
+    @property
     def error(self) -> ErrorEstimate | None:
         """Estimated global error of the state: ``.r``, ``.p``, ``.rd``, ``.w``, ``.u``; no bound.
 
@@ -267,7 +272,7 @@ class Result:
         Raises:
             ResultError: as ``model``.
         """
-        return jacobians(self.evaluator, self.t, self.u)
+        return jacobians(self.evaluator, self.t, self.u, self.inputs)
 
     def reaction(self, joint: str) -> Mapping[str, Reaction]:
         """Reaction of a joint on each of its bodies, ground included: D^T lambda (spec 2).
@@ -340,7 +345,7 @@ class Result:
         if missing:
             evaluator, angles = self.evaluator, self._angles()
             by_joint = reactions(
-                evaluator, self.t, self.u, self.Lam, missing, angles, self._states()
+                evaluator, self.t, self.u, self.Lam, missing, angles, self._states(), self.inputs
             )
             self._reactions |= {missing[joint]: actions for joint, actions in by_joint.items()}
 
@@ -377,7 +382,7 @@ class Result:
             actuation = self.record.actuation.get(name)
             self._forces[name] = force_output(
                 self.evaluator, self.t, self.u, self.v_dot, name, index, self.Lam, self._angles(),
-                None if actuation is None else np.array(actuation), self._states(),
+                None if actuation is None else np.array(actuation), self._states(), self.inputs,
             )  # fmt: skip
         return self._forces[name]
 

@@ -13,6 +13,7 @@ COUNTED = (
     ("joints", "joint", "joints"),
     ("forces", "force", "forces"),
     ("functions", "function", "functions"),
+    ("inputs", "input", "inputs"),
     ("shapes", "shape", "shapes"),
 )
 
@@ -34,6 +35,7 @@ class SceneDisplay:
         elements = [
             (one, element.name, element.type, _fields(element.fields))
             for table, one, _ in COUNTED[2:]
+            if table != "inputs"
             for element in getattr(scene, table).values()
         ]
         parts = [f"<p><strong>{escape(title)}</strong></p>"]

@@ -94,6 +94,14 @@ class Element:
 
 
 @attrs.define
+class Input:
+    """A number that is set from outside: its name, its value at the start of a run."""
+
+    name: str
+    value: Any = attrs.field(default=0.0, converter=plain)
+
+
+@attrs.define
 class AnimationPoint:
     """A point that is only drawn: name of its body, its coordinates there (3 numbers, m)."""
 
@@ -161,9 +169,10 @@ NAMED: dict[str, type] = {
     "joints": Element,
     "forces": Element,
     "functions": Element,
+    "inputs": Input,
     "shapes": Element,
 }
-TABLES = ("scene", "parameters", *NAMED, "outputs", "animation", "simulation")
+TABLES = ("scene", "requires", "parameters", *NAMED, "outputs", "animation", "simulation")
 
 
 @attrs.define(repr=False)
@@ -173,8 +182,9 @@ class Scene(SceneDisplay):
     Attributes:
         name, description: for people.
         schema: version of the file format.
-        bodies, points, vectors, vectors2, joints, forces, functions, shapes: by name, in file
-            order.
+        bodies, points, vectors, vectors2, joints, forces, functions, inputs, shapes: by name, in
+            file order.
+        requires: ranges of versions of the distributions that bring its types, by name.
         parameters: numbers by name, for expressions in place of numbers (text that begins with =).
         outputs: expressions of quantities, by name.
         animation, simulation: points to draw; settings of a run.
@@ -193,7 +203,9 @@ class Scene(SceneDisplay):
     joints: dict[str, Element] = attrs.Factory(dict)
     forces: dict[str, Element] = attrs.Factory(dict)
     functions: dict[str, Element] = attrs.Factory(dict)
+    inputs: dict[str, Input] = attrs.Factory(dict)
     shapes: dict[str, Element] = attrs.Factory(dict)
+    requires: dict[str, Any] = attrs.Factory(dict)
     parameters: dict[str, Any] = attrs.Factory(dict)
     outputs: dict[str, Any] = attrs.Factory(dict)
     animation: Animation = attrs.Factory(Animation)
@@ -219,6 +231,7 @@ class Scene(SceneDisplay):
             self,
             animation=attrs.evolve(self.animation, points=points),
             simulation=_copied(self.simulation),
+            requires=dict(self.requires),
             parameters=dict(self.parameters),
             outputs=dict(self.outputs),
             faults=list(self.faults),
@@ -304,6 +317,18 @@ class Scene(SceneDisplay):
         """
         return self._add_element("functions", type, name, fields)
 
+    def add_input(self, name: str, value: Any = 0.0, **unknown: Any) -> str:
+        """Add an input, a number that a controller or a script sets, and return its name.
+
+        Args:
+            name: a word, also the name of the quantity in results.
+            value: at the start of a run.
+
+        Raises:
+            SceneError: the name is taken or illegal, or a key is unknown.
+        """
+        return self._add("inputs", name, {"value": value} | unknown)
+
     def add_shape(self, type: str, name: str | None = None, **fields: Any) -> str:
         """Add a shape that is drawn (box, sphere, cylinder, cone, disk, line, mesh); its name.
 
@@ -311,6 +336,17 @@ class Scene(SceneDisplay):
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
         return self._add_element("shapes", type, name, fields)
+
+    def add_requirement(self, name: str, versions: str = "*") -> str:
+        """Add a distribution that brings types of the scene, and return its name.
+
+        Args:
+            name: what pip installs, such as ``dap3d-example``.
+            versions: a range of versions, such as ``">=0.2, <1"``; ``"*"`` is any. It is checked
+                with the whole scene.
+        """
+        self.requires[plain(name)] = plain(versions)
+        return name
 
     def add_parameter(self, name: str, value: float | str) -> str:
         """Add a parameter, a number that expressions such as ``"= L / 2"`` name; returns its name.

@@ -133,6 +133,7 @@ class CompiledModel:
             *self.model.notes,
             *notes_on_drivers(self.checked),
             *notes_on_laws(self.checked),
+            *(f"{INFORMATION}{note}" for note in self.evaluator.coordinates.notes),
             *(f"{INFORMATION}{note}" for note in cache_notes()),
         ]
         self._redundancy: Redundancy | None = None

@@ -46,6 +46,11 @@ class InitialState:
         """(angles,) angles from which turns are counted on; None where they begin at zero."""
         return None if self.state is None else self.state.angles
 
+    @property
+    def states(self) -> Floats | None:
+        """(s,) states of elements; None for their initial values."""
+        return None if self.state is None else self.state.states
+
 
 def find_start(
     evaluator: Evaluator,
@@ -67,6 +72,8 @@ def find_start(
         AssemblyError: the positions cannot be assembled, or a row is not finite.
     """
     u, initial = evaluator.model.u0 if state is None else state.u, None
+    given = None if state is None else state.states
+    evaluator.states = evaluator.model.initial_states if given is None else given
     if correct or (state is not None and state.is_interpolated):
         held = [evaluator.model.body_names.index(name) + 1 for name in hold]
         initial = correct_initial(evaluator, u, hold=held, metric=metric)

@@ -222,8 +222,16 @@ class ResumedRun:
             raise self._damaged(f"its start: {error}") from error
         if angles is not None and not np.isfinite(angles).all():
             raise self._damaged("the turns of its start are not finite")
+        states = stored.get("start.states")
+        if (0 if states is None else states.size) != model.state_count or (
+            states is not None and not np.isfinite(states).all()
+        ):
+            raise self._damaged("the states of elements at its start are of another model")
         return StartState(
-            u, angles, is_interpolated=self._found.header.get("start_is_interpolated") is True
+            u,
+            angles,
+            is_interpolated=self._found.header.get("start_is_interpolated") is True,
+            states=states,
         )
 
     def _restore(self, run: RunState) -> None:
@@ -245,6 +253,8 @@ class ResumedRun:
             run.crossed, until = header["crossed"], header["until"]
             run.until = math.inf if until is None else until
             restore_system(run, stored)
+            if run.jumps is not None:
+                run.jumps.restore(header.get("jumps"))
             check_position(run, header["rows"])
         except ValueError as error:
             raise self._damaged(str(error)) from error

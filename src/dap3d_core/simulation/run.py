@@ -34,6 +34,7 @@ from dap3d_core.simulation.settings import (
 
 if TYPE_CHECKING:
     from dap3d_core.simulation.checkpoint.save import CheckpointWriter
+    from dap3d_core.simulation.events.jumps import Jumps
 
 #: Seconds that a compiled chunk should take: Ctrl-C and the progress bar wait for its end.
 CHUNK_SECONDS = 0.1
@@ -62,7 +63,9 @@ class Run(RunState):
         self.initialise()
         if restore is not None:
             restore(self)
-        elif self.checkpoint_writer is not None:
+        elif self.jumps is not None:
+            self.jumps.begin(self.present)
+        if restore is None and self.checkpoint_writer is not None:
             self.checkpoint_writer.begin()
         return self.finish()
 
@@ -174,7 +177,7 @@ class Run(RunState):
     def _integration(self, start: InitialState) -> Integration:
         evaluator, settings, singular, u0 = self.evaluator, self.settings, self.singular, start.u
         store_reference_pivots(evaluator, 0.0, u0 if singular is None else singular.aside)
-        evaluator.start(0.0, u0, start.angles)
+        evaluator.start(0.0, u0, start.angles, start.states)
         y0 = evaluator.coordinates.start(u0)
         width = 1 + len(y0) + evaluator.report_size
         self.options = options = integration_options(evaluator, settings) | {
@@ -206,6 +209,8 @@ class Run(RunState):
                 self.event_locator.advance(integration, budget)
             else:
                 integration.advance(budget)
+            if self.jumps is not None:
+                self._let_jump(self.jumps, integration)
             self._take_rows()
             self.is_whole = True
             if self.checkpoint_writer is not None:
@@ -218,6 +223,14 @@ class Run(RunState):
             if done and seconds > 0.0 and self.until == np.inf:
                 budget = int(min(max(1.0, done * CHUNK_SECONDS / seconds), 4.0 * budget, 1e9))
 
+    def _let_jump(self, jumps: "Jumps", integration: Integration) -> None:
+        """Where the integration stopped for it, let velocities jump, and events take notice."""
+        if integration.status is not Status.JUMPED:
+            return
+        jumps.apply(integration)
+        if self.event_locator:
+            self.event_locator.look_again(integration)
+
     def _take_rows(self) -> None:
         """Take what was reported since the last chunk; in a long run, also onto disk."""
         if not self.integrations:
@@ -228,7 +241,7 @@ class Run(RunState):
                 first = len(rows[0]) - self.evaluator.report_size
                 accelerations = self.singular.acceleration
                 rows[0, first : first + len(accelerations)] = accelerations
-            self.recorder.take(rows, lambda: self.record("done"))
+            self.recorder.take(self.evaluator.with_inputs(rows), lambda: self.record("done"))
 
     def _result(self, status: str) -> Result | None:
         """The result of what was computed, whole on disk if it has an output; None of nothing."""
@@ -243,6 +256,7 @@ class Run(RunState):
             notes += rounding_notes(self.integrations, self.evaluator)
         notes += recorder.pulling.notes()
         notes += event_locator.notes() if event_locator else []
+        notes += self.jumps.notes(self.present) if self.jumps is not None else []
         notes += event_notes(self.integrations, self.events())
         notes += crossing_notes(self.crossed)
         return notes + stiffness_notes(self.integrations, self.settings.integrator)

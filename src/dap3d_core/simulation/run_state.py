@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import Integration, StepCounts
 from dap3d_core.result import INFORMATION, EventRecord, RunMetadata, RunStatistics
 from dap3d_core.scene import Simulation
@@ -23,6 +24,7 @@ from dap3d_core.simulation.output.termination import occurrences
 from dap3d_core.simulation.settings import report_times, settings_notes
 
 if TYPE_CHECKING:
+    from dap3d_core.simulation.events.jumps import Jumps
     from dap3d_core.simulation.initial.start_state import StartState
 
 #: The setting ``start`` in a result whose run was given another state.
@@ -60,6 +62,7 @@ class RunState:
         estimate_error: a second run is to estimate the error of this one.
         limits: of the steps of such a second run.
         start: a state in place of the scene's initial conditions; None for what the settings say.
+        jumps: changes of velocities by elements; None where no type of the scene has any.
         recorder, watcher: the rows reported so far; the events of a script.
         started, compile_time: clock at the start, compilation left out; seconds of compilation.
     """
@@ -107,6 +110,9 @@ class RunState:
         self.until = np.inf
         self.options: dict[str, Any] = {}
         self.event_locator = EventLocator(compiled, events) if events else None
+        self.jumps = _jumps_of(self.evaluator)
+        if self.event_locator is not None:
+            self.event_locator.jumps = self.jumps
         watch = callbacks.watch
         self.observer = None if watch is None else Observer(self.evaluator, self.t_end, watch)
         check_room(len(self.times), row_width(self.evaluator), self.settings.dt, output)
@@ -150,13 +156,16 @@ class RunState:
 
     def events(self) -> list[EventRecord]:
         """Crossings of switches and events of the script so far, by time."""
-        of_script = self.event_locator.occurrences if self.event_locator else []
-        return occurrences(self.evaluator, self.integrations, of_script)
+        others = self.event_locator.occurrences if self.event_locator else []
+        if self.jumps is not None:
+            others = [*others, *self.jumps.records]
+        return occurrences(self.evaluator, self.integrations, others)
 
     def record(self, status: str, more_notes: Sequence[str] = ()) -> RunMetadata:
         """The metadata of the result so far."""
         counts, events = self.statistics(), self.events()
         changes = any(event.changes for event in events)
+        changes |= self.jumps is not None and self.jumps.lose
         return RunMetadata(
             scene_text=self.compiled.scene_text,
             stats=RunStatistics(
@@ -208,3 +217,12 @@ class RunState:
             return {}
         v, w = np.linalg.norm(noise.reshape(2, 3), axis=1).tolist()
         return {"rate_noise": {"v": v, "w": w}}
+
+
+def _jumps_of(evaluator: Evaluator) -> "Jumps | None":
+    """What changes velocities in a run of a model; None where none of its types does."""
+    if not any(switch.jumps for switch in evaluator.switches):
+        return None
+    from dap3d_core.simulation.events.jumps import Jumps
+
+    return Jumps(evaluator)

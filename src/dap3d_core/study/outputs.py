@@ -222,7 +222,7 @@ class Reduction:
         if not all(self.of_rows.values()):
             return False
         layout = self.compiled.model.row_layout
-        rows = np.random.default_rng(0).random((3, layout.size))
+        rows = np.random.default_rng(0).random((3, layout["inputs"].start))
         for name in ("work", "potential_energy", "residuals"):
             rows[..., layout[name]] = np.nan
         probe = self.result(self.compiled.model, rows)
@@ -233,7 +233,9 @@ class Reduction:
     def result(self, model: Model, rows: Floats, evaluator: Evaluator | None = None) -> Result:
         """A result in memory, of rows of a model that an evaluator evaluates."""
         record = RunMetadata(scene_text=self.compiled.scene_text)
-        return Result.of_run(model, rows, record, lambda: evaluator or self.compiled.evaluator)
+        evaluator = evaluator or self.compiled.evaluator
+        rows = evaluator.with_inputs(rows, model.input_values)
+        return Result.of_run(model, rows, record, lambda: evaluator)
 
     def _look_up(self, outputs: Sequence[Output]) -> tuple[Output, ...]:
         probe = probe_of(self.compiled.scene_text, self.compiled.evaluator)

@@ -12,7 +12,14 @@ from dap3d_core.interface.codegen.reactions import joints_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.examine.examine import examine
-from dap3d_core.testing.checks import forces, functions, joints, plain_kernels, purity
+from dap3d_core.testing.checks import (
+    forces,
+    functions,
+    joints,
+    plain_kernels,
+    purity,
+    states,
+)
 from dap3d_core.testing.checks.findings import (
     FAILED,
     LEFT_OUT,
@@ -149,6 +156,10 @@ def _checks(type_info: TypeInfo, poses: int, seed: int) -> list[Check]:
             checks.append(Check("energy", subject, by_joint, forces.potential))
             continue
         checks += of_kind[subject.type.kind](subject)
+        if "rate" in subject.type_info.kernels:
+            ground = joints.against_ground(subject)
+            checks.append(Check("rate", subject, "", states.tangent))
+            checks.append(Check("rate frame", subject, ground, states.frame))
         checks.append(Check("purity", subject, "", purity.purity))
         checks.append(Check("plain", subject, "", plain_kernels.plain))
         checks.append(Check("compiled", subject, "", purity.compiled))
@@ -191,6 +202,8 @@ def _of_force(subject: SampledType) -> list[Check]:
     energy = "" if "energy" in subject.kernels.names() else "it has no energy"
     if not energy and subject.type.energy_where:
         energy = f"its energy is declared to be that of the wrench only {subject.type.energy_where}"
+    if "wrench" not in subject.kernels.names():
+        ground = "it has no wrench, and acts by its jumps alone"
     return [
         Check("energy", subject, energy, forces.potential),
         Check("frame", subject, ground, forces.frame),

@@ -277,6 +277,23 @@ def test_two_distributions_with_one_keyword_are_both_named(install, monkeypatch)
     assert states == {"dap3d-push": "ok", "Other.Push": "blocked"}
 
 
+def test_a_keyword_with_its_package_names_one_of_two(install):
+    """Either of two types that share a keyword; another package is refused with who brings it."""
+    install("dap3d-push", GOOD)
+    install("Other-Push", GOOD)
+    assert 'type = "Other-Push:push" or "dap3d-push:push"' in message()
+    registry = load_registry()
+    words = ("dap3d-push:push", "other_push:push", "Other-Push:push")
+    modules = [registry.get("force", word).type.__module__ for word in words]
+    assert modules == ["dap3d_push_module", "Other_Push_module", "Other_Push_module"]
+    assert registry.get("force", words[1]) is registry.get("force", words[2]), "loaded once"
+    with pytest.raises(UnknownTypeError, match="'dap3d-pushes' brings no force type") as caught:
+        registry.get("force", "dap3d-pushes:push")
+    assert caught.value.nearest == "dap3d-push:push"
+    with pytest.raises(UnknownTypeError, match="there is no force type"):
+        registry.get("force", "dap3d-push:shove")
+
+
 def test_a_name_that_shadows_a_standard_type_is_a_collision(install):
     install("dap3d-mine", GOOD.replace('"push"', '"weight"'), "weight")
     said = message(keyword="weight")

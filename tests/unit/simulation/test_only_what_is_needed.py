@@ -29,6 +29,15 @@ def test_the_command_help_imports_nothing_heavy():
     assert not imported(script) & HEAVY
 
 
+def test_requirements_are_read_where_a_scene_has_them():
+    """The check of another scene brings in no comparison of versions."""
+    names = {"packaging", "dap3d_core.scene.requirements"}
+    script = "import dap3d_core as dap\nscene = dap.load('pen1')\n{}\n"
+    script += "from dap3d_core.scene import check\ncheck(scene, dap.load_registry())"
+    assert not imported(script.format("")) & names
+    assert names <= imported(script.format("scene.add_requirement('dap3d')"))
+
+
 def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     """Method standard brings in nothing of them."""
     names = {"dap3d_core.formulations.joint", "dap3d_core.assembly.motion.classify"}

@@ -46,7 +46,11 @@ class JointRows:
         # no joint here has a function of time: all rows of F are that of none
         functions = np.zeros((1 + int(np.max(group.functions, initial=0)), 5))
         par = group.packed_numbers(0)
-        self._arrays = LoopArrays(body=self._body, F=functions, idx=idx.ravel(), par=par)
+        # nor do its rows depend on states of its own
+        states = np.zeros(group.type_info.layout.state_width)
+        self._arrays = LoopArrays(
+            body=self._body, F=functions, idx=idx.ravel(), par=par, states=states
+        )
         found = [compiled_loop(group.type_info, kind) for kind in _KINDS]
         self._has_angles = found[ANGLE] is not None
         self._loops = loop_list([loop for loop in found if loop is not None])
@@ -62,7 +66,8 @@ class JointRows:
                 others[same, column] = rows[same, slot]
         place = np.arange(self.count)[:, None]
         blocks = 6 * self.row_count * (place * self._slots + np.arange(self._slots))
-        idx: Integers = np.hstack([rows, others, place * self.row_count, blocks])
+        first = np.zeros((self.count, int(bool(group.type_info.layout.states))), np.int64)
+        idx: Integers = np.hstack([rows, others, first, place * self.row_count, blocks])
         assert idx.shape[1] == stride(group.type_info)
         return idx
 

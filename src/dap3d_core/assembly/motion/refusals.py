@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import Integers
+from dap3d_core.interface.codegen.instance_layout import prefix_of
 from dap3d_core.interface.codegen.kernel_arguments import DERIVATIVES
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.element_unknowns import unknown_names
@@ -17,6 +18,7 @@ LEAST_ROWS = 3
 _ROWS = ("C", "C_dot", "J", "gamma", "nu")
 
 ON_TIME = "its rows depend on time"
+ON_STATES = "its rows depend on states of its own"
 NOT_CLOSED = "no pose with C = 0 was found from the one given"
 DEPENDENT = "its rows depend on each other where C = 0"
 NOT_CONSTANT = "the axes of its free motions are constant in neither body"
@@ -35,6 +37,8 @@ def refusal_of(type_info: TypeInfo) -> str:
         return "it has rows of the velocity level"
     if "t" in _names_in_rows(type_info):
         return ON_TIME
+    if _names_in_rows(type_info) & type_info.layout.states.keys():
+        return ON_STATES
     if type_.rows < LEAST_ROWS:
         rows = "1 row costs" if type_.rows == 1 else f"{type_.rows} rows cost"
         return f"its {rows} less than {6 - type_.rows} joint coordinates"
@@ -67,8 +71,8 @@ def _depends_on_time(group: Group) -> Any:
     names = _names_in_rows(group.type_info)
     depends = np.zeros(group.count, dtype=bool)
     for column, field in enumerate(group.type_info.layout.functions):
-        f = "f" if field == "function" else field
-        if names & {f"{f}{suffix}" for suffix in (*DERIVATIVES, "_0")}:
+        f = prefix_of(group.type_info.type, field)
+        if names & {field, *(f"{f}{suffix}" for suffix in (*DERIVATIVES, "_0"))}:
             depends |= group.functions[:, column] > 0
     return depends
 

@@ -45,8 +45,8 @@ def check_plugin(
 ) -> int:
     """Check the formulas of types of joints, forces and functions.
 
-    NAME is the keyword of a type, a distribution or a module that brings types, or a Python file
-    with types of its own (with --allow-code).
+    NAME is the keyword of a type (PACKAGE:KEYWORD where two packages share one), a distribution or
+    a module that brings types, or a Python file with types of its own (with --allow-code).
 
     J, nu and gamma are compared with time derivatives, by complex step and by differences, at
     random poses on and off the constraints; energies with wrenches; and much else
@@ -56,13 +56,14 @@ def check_plugin(
 
     import dap3d_core as dap
     from dap3d_core.cli.console.console import count, print_json, stdout
+    from dap3d_core.testing.packages import check_named
 
     if every == bool(names):
         raise Refused("name what is to be checked, or give --all for all installed types")
     registry, types = _named_types(dap.load_registry(), names, allow_code=allow_code)
     console, reports = stdout(), []
     for kind, keyword in types:
-        report = _check(registry, kind, keyword, poses, seed)
+        report = check_named(registry, kind, keyword, poses=poses, seed=seed)
         reports.append(report)
         if not as_json and not (quiet and report.ok):
             _show(console, report, quiet=quiet)
@@ -107,18 +108,24 @@ def _named_types(
 
 
 def _types_of(registry: "Registry", name: str) -> Iterator[tuple[str, str]]:
-    """The types of a keyword, a distribution, a module or a file; all for an empty name."""
+    """The types of a keyword, a distribution, a module or a file; all for an empty name.
+
+    A keyword that several packages share is named with the package.
+    """
     from dap3d_core.registry.discovery import normal_name
 
     known: dict[str, None] = {}
     matched = False
-    for key, sources in registry.sources.items():
-        for source in (s for s in sources if s.kind and not s.blocked):
+    for sources in registry.sources.values():
+        active = [s for s in sources if s.kind and not s.blocked]
+        for source in active:
             names = (source.keyword, source.module, normal_name(source.distribution))
             known |= dict.fromkeys(n for n in (*names[:2], source.distribution) if n)
-            if not name or name in names or normal_name(name) == names[2]:
+            package, _, word = name.rpartition(":")
+            is_one = word == source.keyword and normal_name(package) == names[2]
+            if not name or name in names or normal_name(name) == names[2] or is_one:
                 matched = True
-                yield key
+                yield source.kind, registry.word_of(source)
     if not matched:
         from dap3d_core.cli.framework.error_messages import type_hint
 
@@ -126,24 +133,6 @@ def _types_of(registry: "Registry", name: str) -> Iterator[tuple[str, str]]:
             f"there is no type, distribution or module {name!r}{type_hint(name, list(known))} "
             "(dap3d plugins lists them)"
         )
-
-
-def _check(registry: "Registry", kind: str, keyword: str, poses: int, seed: int) -> "Report":
-    """The report on a type; it has a single finding if the type cannot be loaded."""
-    from dap3d_core.interface import PluginError
-    from dap3d_core.registry import LOAD_LIMIT
-    from dap3d_core.testing import CheckOutcome, Finding, Report, check_type
-
-    try:
-        type_info = registry.get(kind, keyword, limit_s=LOAD_LIMIT)
-        return check_type(type_info, poses=poses, seed=seed)
-    except PluginError as error:
-        finding = Finding("loading", "", "", 0, str(error))
-        outcome = CheckOutcome(
-            "loading", "", "failed", "it can be loaded", None, None, (), (finding,)
-        )
-        title = registry.sources[kind, keyword][0].module
-        return Report(kind, keyword, title, seed, poses, (outcome,))
 
 
 def _show(console: "Terminal", report: "Report", *, quiet: bool) -> None:

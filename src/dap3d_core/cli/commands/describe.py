@@ -60,7 +60,7 @@ def describe(keyword: str, *, names: bool, source: bool, allow_code: bool, as_js
 def _is_type(registry: "Registry", keyword: str) -> bool:
     from dap3d_core.interface.hooks import GROUPS
 
-    return any(keyword in registry.keywords(kind) for kind in GROUPS)
+    return any(registry.sources_of(kind, keyword) for kind in GROUPS)
 
 
 def _kinds(registry: "Registry", keyword: str) -> list[str]:
@@ -69,7 +69,7 @@ def _kinds(registry: "Registry", keyword: str) -> list[str]:
     from dap3d_core.interface.hooks import GROUPS
 
     known = {kind: registry.keywords(kind) for kind in GROUPS}
-    kinds = [kind for kind, keywords in known.items() if keyword in keywords]
+    kinds = [kind for kind in known if registry.sources_of(kind, keyword)]
     if not kinds:
         hint = type_hint(keyword, sorted({k for keywords in known.values() for k in keywords}))
         lists = "; ".join(f"{kind}s: {', '.join(all_) or 'none'}" for kind, all_ in known.items())
@@ -92,7 +92,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
 
     type_info = registry.get(kind, keyword)
     type_: Any = type_info.type
-    source = registry.sources[kind, keyword][0]
+    source = registry.sources_of(kind, keyword)[0]
     return {
         "kind": kind,
         "keyword": keyword,

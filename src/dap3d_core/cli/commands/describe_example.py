@@ -117,6 +117,12 @@ class _Example:
                 if f"function.{motor}" not in self.elements:
                     self.add(self.first("function", lambda _: True), motor)
                 yield name, f'"{motor}"'
+        elif spec.kind == "functions":
+            self.add(self.first("function", lambda other: other.layout.numbers != {}), "first")
+            yield name, '["first"]'
+        elif spec.kind == "input" and spec.required:
+            self.elements["input.command"] = "[inputs.command]\nvalue = 1.0\n"
+            yield name, '"command"'
         elif spec.kind == "joint":
             self.add(self.first("joint", _has_friction), "J1")
             yield name, '"J1"'

@@ -33,11 +33,12 @@ if TYPE_CHECKING:
     click.option("--keep-fixed", is_flag=True, help="Keep fixed joints; do not merge their links."),
     click.option("--balance-inertia", is_flag=True,
                  help="Replace principal moments that no body has by their mean."),
+    click.option("--no-shapes", is_flag=True, help="Leave shapes out; their files are not read."),
     click.option("--strict", is_flag=True, help="Refuse a model if something would be left out."),
     click.option("--allow-code", is_flag=True,
                  help="Evaluate the expressions of a xacro file, which are code."),
     options.FORCE, options.JSON,
-    saves=True,
+    saves=True, name="import",
 )  # fmt: skip
 def import_model(
     file: str,
@@ -50,6 +51,7 @@ def import_model(
     free_base: bool,
     keep_fixed: bool,
     balance_inertia: bool,
+    no_shapes: bool,
     strict: bool,
     allow_code: bool,
     force: bool,
@@ -73,7 +75,7 @@ def import_model(
 
     scene, report = dap.import_model(
         file, format=kind, packages=_pairs("--package", packages), root=root, free_base=free_base,
-        keep_fixed=keep_fixed, balance_inertia=balance_inertia, strict=strict,
+        keep_fixed=keep_fixed, balance_inertia=balance_inertia, shapes=not no_shapes, strict=strict,
         allow_code=allow_code, positions=_numbers(positions),
     )  # fmt: skip
     folder = Path(output or Path(file).stem)

@@ -44,8 +44,9 @@ def new_plugin(
 
     NAME is the keyword that scenes will have for the type: letters, digits, and - _ . between them.
 
-    The package is complete: a type that works, its tests, a scene that runs, a README. Make the
-    type your own, and let dap3d check-plugin say whether its formulas are right.
+    The package is complete: a type that works, its tests, a scene that runs, a README, and a
+    workflow that runs the checks at each push, on GitHub Actions. Make the type your own, and let
+    dap3d check-plugin say whether its formulas are right.
     """
     from dap3d_core.cli.console.console import print_json, stdout
 
@@ -115,8 +116,9 @@ def _check_free(names: dict[str, str], *, force: bool) -> None:
     kind, keyword = names["kind"], names["keyword"]
     if rivals := sources.get((kind, keyword)):
         raise Refused(
-            f"there is a {kind} type {keyword!r} already, from {rivals[0]}: with both installed no "
-            "scene could use either. Use another name, or --force if one of them will be removed"
+            f"there is a {kind} type {keyword!r} already, from {rivals[0]}: with both installed "
+            f'scenes must say which, type = "{names["distribution"]}:{keyword}". Use another '
+            "name, or --force"
         )
     if importlib.util.find_spec(module) is not None:
         raise Refused(
@@ -154,6 +156,8 @@ def _texts(names: dict[str, str]) -> dict[str, str]:
         "pyproject.toml": ("every", "pyproject.toml"),
         "README.md": ("every", "README.md"),
         "scene.toml": (kind, "scene"),
+        ".github/workflows/tests.yml": ("every", "tests.yml"),
+        ".github/badge.py": ("every", "badge.py"),
         f"src/{module}/__init__.py": (kind, "type"),
         f"tests/test_{module.removeprefix('dap3d_')}.py": (kind, "test"),
     }

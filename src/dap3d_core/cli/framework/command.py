@@ -26,7 +26,7 @@ NO_COLOR = click.option(
 
 
 def command(
-    short_help: str, *options: Option, saves: bool = False
+    short_help: str, *options: Option, saves: bool = False, name: str | None = None
 ) -> Callable[[Callable[..., int]], "Command"]:
     """Decorator that turns a function into the command of its name.
 
@@ -34,12 +34,13 @@ def command(
         short_help: its line in the list of commands.
         options: in the order of its help; ``--debug`` and ``--no-color`` follow.
         saves: see ``Command``.
+        name: of the command, where it is no name of a function.
     """
 
     def decorate(function: Callable[..., int]) -> Command:
         for option in reversed((*options, DEBUG, NO_COLOR)):
             function = option(function)
-        make = click.command(cls=Command, short_help=short_help, saves=saves)
+        make = click.command(name, cls=Command, short_help=short_help, saves=saves)
         return make(function)
 
     return decorate

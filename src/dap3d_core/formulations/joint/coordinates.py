@@ -1,6 +1,6 @@
 """Joint coordinates as the state of an evaluator: from body coordinates and back."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -9,8 +9,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers, System
 from dap3d_core.assembly.motion.classify import classify
-from dap3d_core.assembly.tree_arrays import TreeArrays
-from dap3d_core.formulations.coordinates import UnsuitableError
+from dap3d_core.assembly.tree_arrays import KeptRowArrays, TreeArrays
 from dap3d_core.formulations.joint.equations import TWO_TURNS, body_state
 from dap3d_core.formulations.joint.node_layout import (
     CHILD,
@@ -31,7 +30,6 @@ from dap3d_core.formulations.joint.node_layout import (
     WORK_WIDTH,
 )
 from dap3d_core.formulations.joint.reference import Reference
-from dap3d_core.formulations.joint.spanning_tree import SpanningTree, spanning_tree
 from dap3d_core.formulations.joint.tree_nodes import (
     SEGMENTS,
     TreeNodes,
@@ -40,12 +38,14 @@ from dap3d_core.formulations.joint.tree_nodes import (
 )
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.linear.ldlt.plan import Plan
+from dap3d_core.linear.ordering.spanning_forest import SpanningForest, spanning_forest
 from dap3d_core.model import Model
+from dap3d_core.model.state_layout import u_from_y, velocities_of
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
 
-#: Joints that a message names.
+#: Joints that words name.
 MOST_NAMES = 5
 #: Quantities of the segments of a state, as in tolerances.
 QUANTITIES = {
@@ -53,23 +53,25 @@ QUANTITIES = {
     "angle_rates": "w", "length_rates": "v", "rotation_rates": "www", "pose_rates": "vvvwww",
     "states": "z",
 }  # fmt: skip
+#: Segments of rates.
+RATES = ("angle_rates", "length_rates", "rotation_rates", "pose_rates")
 
 
 class Coordinates:
-    """Joint coordinates of a model that is a tree, with their rates.
+    """Joint coordinates of a model on a spanning tree of its joints, with their rates.
 
     Attributes:
-        size, length_count: as of ``formulations.coordinates.Coordinates``; no pose is singular.
+        size, length_count: as of ``formulations.coordinates.Coordinates``.
+        equations: the package of formulations that has the compiled functions.
         nodes: of the tree.
+        kept: joints that are not in the tree, whose rows are kept, and the reasons in words.
     """
-
-    length_count = 0
 
     def __init__(self, evaluator: "Evaluator") -> None:
         """Give an evaluator the arrays of a tree.
 
         Raises:
-            UnsuitableError: the joints make no tree, or the motion of one is not known.
+            UnsuitableError: the rows that are kept on the tree would take too much memory.
             PluginError: the kernels of a type cannot be compiled.
         """
         model = evaluator.model
@@ -83,15 +85,15 @@ class Coordinates:
             else:
                 bodies = zip(group.body_i.tolist(), group.body_j.tolist(), strict=True)
                 ends |= zip(joints, bodies, strict=True)
-        tree = spanning_tree(model, ends)
-        if tree.kept:
-            raise UnsuitableError(_why_kept(model, tree.kept, reasons))
+        tree = spanning_forest(model.body_count, ends, model.joint_rows.tolist())
+        reasons |= {cut.joint: cut.words(model.joint_names) for cut in tree.cuts}
         self.evaluator = evaluator
+        self.kept: dict[int, str] = dict(sorted(reasons.items()))
         self.nodes: TreeNodes = tree_nodes(tree, motions, model.body_count, model.state_count)
         self.size = self.nodes.layout.size - 1
-        evaluator.system = _with_tree(
-            evaluator.system, self.nodes, tree, evaluator.plan, model.joint_rows
-        )
+        self.length_count = len(self.kept)
+        self.equations = "joint_loops" if self.kept else "joint"
+        evaluator.system = _with_tree(evaluator, self.nodes, tree, tuple(self.kept))
 
     @property
     def quantities(self) -> list[str]:
@@ -118,7 +120,21 @@ class Coordinates:
         names = {REVOLUTE: "angles", PRISMATIC: "lengths", SPHERICAL: "balls", FREE: "free bodies"}
         counts = {name: int(np.count_nonzero(table == motion)) for motion, name in names.items()}
         parts = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-        return "tree", f"{len(table)} nodes: {parts or 'nothing moves'}"
+        words = f"{len(table)} nodes: {parts or 'nothing moves'}"
+        return "tree", f"{words}; {self._kept_words()}" if self.kept else words
+
+    @property
+    def notes(self) -> list[str]:
+        """As of ``formulations.coordinates.Coordinates``."""
+        return [f"method joint: {self._kept_words()}"] if self.kept else []
+
+    def _kept_words(self) -> str:
+        """Joints whose rows are kept, with the reasons."""
+        model, kept = self.evaluator.model, list(self.kept)
+        named = [f"{model.joint_names[k]} ({self.kept[k]})" for k in kept[:MOST_NAMES]]
+        more = f" and {len(kept) - MOST_NAMES} more" if len(kept) > MOST_NAMES else ""
+        count = int(np.sum(model.joint_rows[kept]))
+        return f"{count} rows kept, of {', '.join(named)}{more}"
 
     def start(self, u: Floats) -> Floats:
         """The state y of a run from a state u (13 n,), whose poses become the reference."""
@@ -126,6 +142,10 @@ class Coordinates:
         self._tree.constants[:] = reference.constants()
         y = reference.state()
         y[self.nodes.layout["states"]] = self.evaluator.states
+        if self.kept:
+            from dap3d_core.formulations.joint_loops.reference_pivots import judge_kept_rows
+
+            judge_kept_rows(self.evaluator, y)
         return y
 
     def body_states(self, y: Floats) -> Floats:
@@ -141,6 +161,19 @@ class Coordinates:
         turns = np.rint((expected[angles] - y[angles]) / TWO_TURNS)
         continued[angles] += TWO_TURNS * turns
         return continued
+
+    def with_jump(self, y: Floats, dv: Floats, states: Floats, work: float) -> Floats:
+        """As of ``formulations.coordinates.Coordinates``."""
+        u = u_from_y(self.body_states(y[None]), len(states))[0]
+        velocities_of(u)[:] += dv
+        moved = Reference(self.nodes, self.evaluator.model, u).state()
+        after = y.copy()
+        for name in RATES:
+            place = self.nodes.layout[name]
+            after[place] = moved[place]
+        after[self.nodes.layout["states"]] = states
+        after[-1] += work
+        return after
 
     @contextmanager
     def at(self, u: Floats) -> Iterator[Floats]:
@@ -158,16 +191,17 @@ class Coordinates:
 
 
 def _with_tree(
-    system: System, nodes: TreeNodes, tree: SpanningTree, plan: Plan, joint_rows: Integers
+    evaluator: "Evaluator", nodes: TreeNodes, tree: SpanningForest, kept: tuple[int, ...]
 ) -> System:
     """The system with arrays of a tree; ``body`` is then the first rows of its places."""
+    system, model, plan = evaluator.system, evaluator.model, evaluator.plan
     bodies, count = len(system.body), len(nodes.table)
     places = np.zeros((nodes.row_count, BODY_WIDTH))
     places[:bodies] = system.body
     revolutes = int(np.count_nonzero(nodes.table[1:, MOTION] == REVOLUTE))
     arrays = TreeArrays(
         nodes=nodes.table,
-        joints=_joints(tree, plan, joint_rows),
+        joints=_joints(tree, model, plan),
         places=places,
         constants=np.zeros(count * CONSTANT_WIDTH),
         work=np.zeros(count * WORK_WIDTH),
@@ -175,33 +209,31 @@ def _with_tree(
         scratch=np.zeros(48),
         force=np.zeros_like(system.force),
         slope=np.zeros(nodes.layout.size),
+        kept=_kept_rows(evaluator, nodes, kept) if kept else None,
     )
     return attrs.evolve(system, body=places[:bodies], tree=arrays)
 
 
-def _joints(tree: SpanningTree, plan: Plan, joint_rows: Integers) -> Integers:
+def _kept_rows(evaluator: "Evaluator", nodes: TreeNodes, joints: tuple[int, ...]) -> KeptRowArrays:
+    from dap3d_core.formulations.joint_loops.tables import kept_calls, kept_row_arrays, kept_rows
+
+    kept = kept_rows(joints, evaluator.model, nodes)
+    calls = kept_calls(kept, evaluator.loop_groups, evaluator.system.groups)
+    return kept_row_arrays(kept, evaluator.model, evaluator.plan, nodes, calls)
+
+
+def _joints(tree: SpanningForest, model: Model, plan: Plan) -> Integers:
     """``TreeArrays.joints``."""
     rows = []
-    for k, parent, child, (at_parent, at_child) in zip(
+    for k, parent, child in zip(
         tree.joint[::-1].tolist(), tree.parent[::-1].tolist(), tree.child[::-1].tolist(),
-        tree.slot[::-1].tolist(), strict=True,
+        strict=True,
     ):  # fmt: skip
         if k >= 0:
-            row = [0] * JOINT_WIDTH
-            blocks = plan.joint_block[k]
-            row[CHILD_BLOCK], row[CHILD] = blocks[at_child], 6 * child
+            row, slots, blocks = [0] * JOINT_WIDTH, model.joint_slots[k], plan.joint_block[k]
+            row[CHILD_BLOCK], row[CHILD] = blocks[slots.index(child)], 6 * child
             if parent:
-                row[PARENT_BLOCK], row[JOINT_PARENT] = blocks[at_parent], 6 * parent
-            row[ROW_COUNT], row[FIRST_ROW] = joint_rows[k], plan.joint_row[k]
+                row[PARENT_BLOCK], row[JOINT_PARENT] = blocks[slots.index(parent)], 6 * parent
+            row[ROW_COUNT], row[FIRST_ROW] = model.joint_rows[k], plan.joint_row[k]
             rows.append(row)
     return np.array(rows, dtype=np.int64).reshape(-1, JOINT_WIDTH)
-
-
-def _why_kept(model: Model, kept: tuple[int, ...], refused: Mapping[int, str]) -> str:
-    """Message: why joints cannot be in the tree, and what to do."""
-    words = [
-        f"joint {model.joint_names[k]}: {refused.get(k, 'it closes a loop')}"
-        for k in kept[:MOST_NAMES]
-    ]
-    more = f"; and {len(kept) - MOST_NAMES} more" if len(kept) > MOST_NAMES else ""
-    return f"{'; '.join(words)}{more}. Use method standard or auto"

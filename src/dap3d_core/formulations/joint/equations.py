@@ -88,6 +88,13 @@ def accelerate(t: float, system: System, loops: Any) -> float:
 
     The bodies are placed, and ``force`` is known.
     """
+    power = linearise_tree(t, system, loops)
+    return power + solve_with_friction(t, system, loops, solve)
+
+
+@compiled
+def linearise_tree(t: float, system: System, loops: Any) -> float:
+    """Scaled forces into ``acceleration``, D^ of all joints; returns the power of the forces."""
     body, metric, size = system.body, system.metric, system.force.shape[0]
     for b in range(1, body.shape[0]):
         place_metric(body[b], metric[b])
@@ -95,34 +102,54 @@ def accelerate(t: float, system: System, loops: Any) -> float:
     linearise(t, system, loops)
     if has_friction(system):
         zero(system.friction[size : 2 * size])
-    return power + solve_with_friction(t, system, loops, solve)
+    return power
 
 
 @compiled
 def solve(system: System) -> None:
     """``acceleration`` and ``multipliers`` from the scaled forces in ``acceleration``."""
-    total, left, v_dot = system.tree.force, system.change, system.velocity
+    sum_forces(system)
+    reduce_tree(system, system.tree.force)
+    spread_tree(system.tree.slope, system.tree.slope, system)
+    store_reactions(system)
+    zero(system.multipliers)
+    joint_multipliers(system, system.change)
+
+
+@compiled
+def sum_forces(system: System) -> None:
+    """``tree.force``: applied forces with friction."""
+    total = system.tree.force
     size = total.shape[0]
     for k in range(size):
         total[k] = system.force[k]
     if has_friction(system):
         for k in range(size):
             total[k] += system.friction[size + k]
-    reduce_tree(system, total)
-    spread_tree(system.tree.slope, system.tree.slope, system)
+
+
+@compiled
+def store_reactions(system: System) -> None:
+    """Scaled ``acceleration`` of the bodies; less the scaled forces that were there, ``change``."""
+    left, v_dot = system.change, system.velocity
     body_accelerations(system, v_dot)
-    for k in range(size):
+    for k in range(left.shape[0]):
         left[k] = system.acceleration[k]
     scale_accelerations(system, v_dot, system.acceleration)
-    for k in range(size):
+    for k in range(left.shape[0]):
         left[k] = system.acceleration[k] - left[k]
-    joint_multipliers(system, left)
 
 
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Bring Euler parameters to unit length, and angles within two turns: there are no rows."""
     out[0] = out[1] = out[2] = out[3] = 0.0
+    settle_coordinates(y, system)
+
+
+@compiled
+def settle_coordinates(y: Floats, system: System) -> None:
+    """Bring Euler parameters to unit length, and angles within two turns."""
     nodes = system.tree.nodes
     for n in range(1, nodes.shape[0]):
         motion, i = nodes[n, MOTION], nodes[n, COORDINATE]

@@ -9,7 +9,6 @@ unknowns. What it does to the parent is taken from that one's, and so on.
 # mypy: disable-error-code="no-any-return"
 
 from dap3d_core.assembly.arrays import Floats, System
-from dap3d_core.assembly.evaluate import zero
 from dap3d_core.assembly.metric import in_body_axes, scaled
 from dap3d_core.formulations.joint.node_layout import (
     CHILD,
@@ -40,13 +39,12 @@ def scale_accelerations(system: System, v_dot: Floats, out: Floats) -> None:
 
 @compiled
 def joint_multipliers(system: System, left: Floats) -> None:
-    """-lambda of all rows into ``multipliers``.
+    """-lambda of the rows of the tree's joints into ``multipliers``, which are zero before.
 
     left: (6 (n+1),) scaled accelerations less scaled forces; what ground's joints give is left.
     """
     joints, D, x = pointer(system.tree.joints), pointer(system.D), pointer(system.multipliers)
     work, rest = system.tree.scratch, system.tree.scratch[42:]
-    zero(system.multipliers)
     for q in range(system.tree.joints.shape[0]):
         j = JOINT_WIDTH * q
         rows, first, child = joints[j + ROW_COUNT], joints[j + FIRST_ROW], joints[j + CHILD]

@@ -28,6 +28,9 @@ from dap3d_core.formulations.joint.node_layout import (
     HAS_CHILDREN,
     HAS_MASS,
     INERTIA,
+    INVERSE,
+    INVERSE_BALL,
+    INVERSE_FREE,
     IS_FIRST,
     LINK_NOW,
     MASS,
@@ -65,6 +68,12 @@ def reduce_tree(system: System, forces: Floats) -> float:
 
     forces: (6 (n+1),) force and moment about the mass centre on each body, global axes.
     """
+    return reduce_nodes(system, forces, False)
+
+
+@compiled_into
+def reduce_nodes(system: System, forces: Floats, keeps: bool) -> float:
+    """``reduce_tree``; keeps: D^-1 of every freedom is stored as well, for rows on the tree."""
     tree, b = pointer(system.tree.nodes), pointer(system.tree.places)
     K, C, F = pointer(system.tree.work), pointer(system.tree.constants), pointer(forces)
     power = 0.0
@@ -90,22 +99,26 @@ def reduce_tree(system: System, forces: Floats) -> float:
         m, is_first = WORK_WIDTH * tree[t + PARENT], flags & IS_FIRST != 0
         arm = vector_of(K, k + LINK_NOW)
         if motion == REVOLUTE:
-            M, H, J, moment, force = release_turn(K, k, M, H, J, moment, force)
+            M, H, J, moment, force = release_turn(K, k, M, H, J, moment, force, keeps)
             if m != 0:
                 H, J, moment = carry(arm, M, H, J, moment, force)
                 add_to_parent(K, m, is_first, M, H, J, moment, force)
         elif motion == SPHERICAL:
+            if keeps:
+                put_six(K, k + INVERSE_BALL, inverse_of(J))
             M, force = release_rotation(K, k, M, H, J, moment, force)
             if m != 0:
                 H, J, moment = carry_ball(arm, M, force)
                 add_to_parent(K, m, is_first, M, H, J, moment, force)
         elif motion == FREE:
+            if keeps:
+                put_six(K, k + INVERSE_FREE, inverse_of(J))
             M, force = release_rotation(K, k, M, H, J, moment, force)
             put_six(K, k + MATRIX_M, M)
             put(K, k + FORCE, force)
         else:
             if motion == PRISMATIC:
-                M, H, J, moment, force = release_slide(K, k, M, H, J, moment, force)
+                M, H, J, moment, force = release_slide(K, k, M, H, J, moment, force, keeps)
             if m != 0:
                 H, J, moment = carry(arm, M, H, J, moment, force)
                 add_to_parent(K, m, is_first, M, H, J, moment, force)
@@ -165,30 +178,32 @@ def missing(J: Symmetric, mass: float, w: Vector, K: Floats, k: int, f: Vector, 
 
 @compiled_into
 def release_turn(
-    K: Floats, k: int, M: Symmetric, H: Matrix, J: Symmetric, moment: Vector, force: Vector
-) -> Any:
+    K: Floats, k: int, M: Symmetric, H: Matrix, J: Symmetric, moment: Vector, force: Vector,
+    keeps: bool,
+) -> Any:  # fmt: skip
     """Eliminate a rotation about an axis through P."""
     axis = vector_of(K, k + AXIS_NOW)
     u, v = symmetric_times(J, axis), transposed_times(H, axis)
     d, lack = dot(axis, u), dot(axis, moment)
-    return release(K, k, u, v, d, lack, M, H, J, moment, force)
+    return release(K, k, u, v, d, lack, M, H, J, moment, force, keeps)
 
 
 @compiled_into
 def release_slide(
-    K: Floats, k: int, M: Symmetric, H: Matrix, J: Symmetric, moment: Vector, force: Vector
-) -> Any:
+    K: Floats, k: int, M: Symmetric, H: Matrix, J: Symmetric, moment: Vector, force: Vector,
+    keeps: bool,
+) -> Any:  # fmt: skip
     """Eliminate a translation along an axis."""
     axis = vector_of(K, k + AXIS_NOW)
     u, v = matrix_times(H, axis), symmetric_times(M, axis)
     d, lack = dot(axis, v), dot(axis, force)
-    return release(K, k, u, v, d, lack, M, H, J, moment, force)
+    return release(K, k, u, v, d, lack, M, H, J, moment, force, keeps)
 
 
 @compiled_into
 def release(
     K: Floats, k: int, u: Vector, v: Vector, d: float, lack: float,
-    M: Symmetric, H: Matrix, J: Symmetric, moment: Vector, force: Vector,
+    M: Symmetric, H: Matrix, J: Symmetric, moment: Vector, force: Vector, keeps: bool,
 ) -> Any:  # fmt: skip
     """Eliminate one freedom, with U = (u, v), D = d and what its equation lacks."""
     part = 1.0 / d
@@ -197,6 +212,8 @@ def release(
     put(K, k + GAIN, g)
     put(K, k + GAIN + 3, h)
     K[k + FREE_RATE] = rate
+    if keeps:
+        K[k + INVERSE] = part
     J = (J[0] - u[0] * g[0], J[1] - u[0] * g[1], J[2] - u[0] * g[2],
          J[3] - u[1] * g[1], J[4] - u[1] * g[2], J[5] - u[2] * g[2])  # fmt: skip
     H = (H[0] - u[0] * h[0], H[1] - u[0] * h[1], H[2] - u[0] * h[2],

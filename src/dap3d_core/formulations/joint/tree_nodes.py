@@ -31,7 +31,7 @@ from dap3d_core.formulations.joint.node_layout import (
     SPHERICAL,
     TREE_WIDTH,
 )
-from dap3d_core.formulations.joint.spanning_tree import SpanningTree
+from dap3d_core.linear.ordering.spanning_forest import SpanningForest
 from dap3d_core.model.state_layout import Layout, tree_layout
 
 #: Motions of nodes by the kinds of elementary motions.
@@ -102,7 +102,7 @@ class TreeNodes:
 
 
 def tree_nodes(
-    tree: SpanningTree, motions: ModelMotions, body_count: int, state_count: int
+    tree: SpanningForest, motions: ModelMotions, body_count: int, state_count: int
 ) -> TreeNodes:
     """Lay out the nodes of a tree; its state has as many states of elements besides."""
     chains = list(_chains(tree, motions))
@@ -133,7 +133,7 @@ def tree_nodes(
 
 
 def _chains(
-    tree: SpanningTree, motions: ModelMotions
+    tree: SpanningForest, motions: ModelMotions
 ) -> Iterator[tuple[Integers, JointMotions | None, tuple[int, ...], str]]:
     """(entries, motions from parent to child, motions of the nodes, child's slot) of joints."""
     free = np.flatnonzero(tree.joint < 0)

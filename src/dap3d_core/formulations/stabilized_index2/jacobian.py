@@ -38,17 +38,30 @@ PART = 6e-6
 #: Least step of a velocity in m/s (times PART), and least size of an element in m: below the
 #: velocities at which Coulomb friction turns.
 SLOWEST, SMALLEST = 0.1, 1e-4
-#: What an element is.
-WRENCH_ELEMENT, JOINT_ELEMENT, FRICTION_ELEMENT = range(3)
+#: What an element is; the last two only of types with states of their own (state_tangent.py).
+WRENCH_ELEMENT, JOINT_ELEMENT, FRICTION_ELEMENT, RATE_ELEMENT, POSITION_ELEMENT = range(5)
 #: Most body slots of an element (interface/codegen/instance_layout.py).
 SLOTS = 3
 #: Columns of ``elements``.
 (
-    LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY, FIRST_READING,
-    JOINTS_READ, ELEMENT_WIDTH
-) = range(12)  # fmt: skip
+    LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY, STATE_AT,
+    FIRST_READING, JOINTS_READ, ELEMENT_WIDTH
+) = range(13)  # fmt: skip
 #: Columns of ``readings``.
 PLACE, BODY, FIRST_ROW, ROW_COUNT = range(4)
+
+
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class StateTangent(Arrays):
+    """Tables and derivatives of elements with states of their own (state_tangent.py)."""
+
+    types: ClassVar[dict[str, Any]] = {"records": INTEGER_MATRIX, "record": INTEGERS}
+
+    records: Integers  # (elements, 8) COUNT, ...
+    record: Integers  # (states,) of the element whose first state it is
+    values: Floats
+    size: Floats  # (states,) least size of a state, of which steps are parts
+    rates: Floats  # (states,) scratch
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
@@ -60,11 +73,11 @@ class Tangent(Arrays):
         "pairs": INTEGERS,
         "blocks": INTEGER_MATRIX,
         "readings": INTEGER_MATRIX,
+        "states": StateTangent.type_of(),
     }
 
-    elements: (
-        Integers  # (groups, ELEMENT_WIDTH): LOOP, ...; ROW_AT: place of the joint's row in idx
-    )
+    # LOOP, KIND, ...; ROW_AT, STATE_AT: places in idx of the joint's row, of the first state or -1
+    elements: Integers  # (groups, ELEMENT_WIDTH)
     pairs: Integers  # places in ``coupling`` for the slots (a, b) of each element, -1 for none
     blocks: Integers  # (pairs, 3) place in ``coupling``, body of the rows, body of the columns
     coupling: Floats
@@ -78,6 +91,7 @@ class Tangent(Arrays):
     saved: Floats  # (BODY_WIDTH,) scratch
     ahead: Floats  # (outputs,) what the element returns with a body moved forwards
     behind: Floats  # (outputs,) the same backwards
+    states: StateTangent
 
 
 @compiled
@@ -326,7 +340,8 @@ def differentiate(t: float, x: Floats, system: System, loops: Any, tangent: Tang
     zero(tangent.turning)
     zero(tangent.force_by_lambda)
     for e in range(tangent.elements.shape[0]):
-        for q in range(system.groups[tangent.elements[e, LOOP], 2]):
+        count = system.groups[tangent.elements[e, LOOP], 2]
+        for q in range(count if tangent.elements[e, KIND] < RATE_ELEMENT else 0):
             differentiate_element(t, e, q, x, system, loops, tangent)
             if tangent.elements[e, KIND] == FRICTION_ELEMENT:
                 differentiate_friction(t, e, q, x, system, loops, tangent)

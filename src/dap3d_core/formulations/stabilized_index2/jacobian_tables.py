@@ -11,17 +11,22 @@ from dap3d_core.formulations.stabilized_index2.jacobian import (
     ELEMENT_WIDTH,
     FRICTION_ELEMENT,
     JOINT_ELEMENT,
+    POSITION_ELEMENT,
+    RATE_ELEMENT,
     WRENCH_ELEMENT,
+    StateTangent,
     Tangent,
 )
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
-from dap3d_core.model import Group
+from dap3d_core.model import Group, Model
 
 _KINDS = {
     "wrench": WRENCH_ELEMENT, "acceleration": JOINT_ELEMENT, "friction": FRICTION_ELEMENT
 }  # fmt: skip
+#: The same of types with states of their own, as their derivatives by states need them.
+_WITH_STATES = {"rate": RATE_ELEMENT, "position": POSITION_ELEMENT}
 #: Numbers of a block of ``coupling``.
 _BLOCK = 72
 
@@ -36,14 +41,16 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
     readings: list[tuple[int, ...]] = []
     count = widest = size = 0
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
-        if kind not in _KINDS:
+        layout = group.type_info.layout
+        kinds = _KINDS | _WITH_STATES if layout.states else _KINDS
+        if kind not in kinds:
             continue
         slots = len(group.type_info.layout.slots)
         rows = group.type_info.row_count
         read = _joints_read(group) if kind == "friction" else []
-        elements.append((loop, _KINDS[kind], stride(group.type_info),
-                         group.type_info.layout.par_width, slots, group.type_info.layout.integers,
-                         rows, count, int(_sees_velocity(kind, group)),
+        elements.append((loop, kinds[kind], stride(group.type_info), layout.par_width, slots,
+                         layout.integers, rows, count, int(_sees_velocity(kind, group)),
+                         layout.integers - 1 if layout.states else -1,
                          len(readings), len(read)))  # fmt: skip
         for q, bodies in enumerate(group.bodies.tolist()):
             for joints in read:
@@ -53,7 +60,7 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
                     size += 6 * mine if b else 0
         pairs.append(_pairs(group.bodies, place))
         count += pairs[-1].size
-        widest = max(widest, 6 * slots + rows)
+        widest = max(widest, 6 * slots + rows, layout.state_width)
     blocks = [(where, a, b) for (a, b), where in place.items()]
     return Tangent(
         elements=np.array(elements, dtype=np.int64).reshape(-1, ELEMENT_WIDTH),
@@ -70,6 +77,29 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         saved=np.zeros(BODY_WIDTH),
         ahead=np.zeros(widest),
         behind=np.zeros(widest),
+        states=_state_tangent(evaluator.model),
+    )
+
+
+def _state_tangent(model: Model) -> StateTangent:
+    """Tables and arrays of the derivatives by and of states, element by element."""
+    records: list[tuple[int, ...]] = []
+    record = np.zeros(model.state_count, dtype=np.int64)
+    start = size = 0
+    for group in model.acting:
+        layout, rows = group.type_info.layout, int(getattr(group.type_info.type, "rows", 0))
+        m, slots = layout.state_width, len(layout.slots)
+        for _ in range(group.count if m else 0):
+            record[start] = len(records)
+            places = np.cumsum([size, m * m, 12 * m * slots, 6 * m * slots, rows * m, rows * m])
+            records.append((m, *places[:-1].tolist(), slots, rows))
+            start, size = start + m, int(places[-1])
+    return StateTangent(
+        records=np.array(records, dtype=np.int64).reshape(-1, 8),
+        record=record,
+        values=np.zeros(size),
+        size=np.zeros(model.state_count),
+        rates=np.zeros(model.state_count),
     )
 
 
@@ -103,7 +133,7 @@ def _sees_velocity(kind: str, group: Group) -> bool:
 
     The rate D v - nu of a joint is linear in the velocities: its derivative is D.
     """
-    if kind == "acceleration":
+    if kind in ("acceleration", "position"):
         return False
     wanted: Sequence[Any] = parameters(group.type_info.kernels[kind])
     return any(q.velocity for q in in_order(group.type_info.names, wanted))

@@ -25,7 +25,7 @@ import attrs
 from dap3d_core.assembly.arrays import Floats, Integers, System
 from dap3d_core.assembly.evaluate import rates, state_rates, zero
 from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unscaled
-from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
+from dap3d_core.assembly.offsets import coordinate_offset, states_offset, velocity_offset
 from dap3d_core.assembly.state_update import add_displacement
 from dap3d_core.formulations.common.constraints import (
     evaluate_forces,
@@ -45,6 +45,12 @@ from dap3d_core.formulations.stabilized_index2.jacobian import (
     Tangent,
     turn_to_body,
 )
+from dap3d_core.formulations.stabilized_index2.state_tangent import (
+    FIRST,
+    UNKNOWN,
+    WIDTH_OF,
+    fill_states,
+)
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -55,7 +61,16 @@ class StageMatrix(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(
-            ("nodes", "columns", "updates", "block_place", "joint_place", "read_place"),
+            (
+                "nodes",
+                "columns",
+                "updates",
+                "block_place",
+                "joint_place",
+                "read_place",
+                "state_nodes",
+                "state_places",
+            ),
             INTEGER_MATRIX,
         ),
         **dict.fromkeys(("body_first", "body_place", "pair_place", "held"), INTEGERS),
@@ -71,6 +86,8 @@ class StageMatrix(Arrays):
     block_place: Integers  # (b, 3) of each block of D: (joint, body), (body, joint), first unknown
     joint_place: Integers  # (joint nodes, 3) diagonal block, rows, first row
     read_place: Integers  # (k, 3) of Tangent.readings: block, rows of its joint node, first row
+    state_nodes: Integers  # as of ``fill_states``, as the next one
+    state_places: Integers
     held: Integers  # (row_size,) 1 where a row has a position level
     spin: Floats  # (n + 1, 15): L^T [w' x] U / 2 by rows; L^T w'; U^T w'
     D: Floats  # (block_size,)
@@ -205,6 +222,7 @@ def fill_matrix(s: Any, K: Any, blocks: Integers, matrix: StageMatrix, tangent: 
             given = matrix.compliance[f + r] / s
             K[d + r * (2 * m + 1)] = -given if matrix.held[f + r] != 0 else -1.0
             K[d + (m + r) * (2 * m + 1)] = -given
+    fill_states(s, K, matrix.state_nodes, matrix.state_places, matrix.held, tangent)
 
 
 @compiled
@@ -251,6 +269,10 @@ def scale_residual(
         m, f, o = blocks[q, 2], blocks[q, 3], matrix.block_place[q, 2]
         for r in range(m):
             x[o + r], x[o + m + r] = rows[0, f + r], rows[1, f + r]
+    for e in range(matrix.state_nodes.shape[0]):
+        z, o = states_offset(count) + matrix.state_nodes[e, FIRST], matrix.state_nodes[e, UNKNOWN]
+        for d in range(matrix.state_nodes[e, WIDTH_OF]):
+            x[o + d] = R[z + d]
 
 
 @compiled
@@ -299,6 +321,10 @@ def unscale_solution(
         out[c + 6] = e[12] * along - e[11] * w0 + e[10] * w1 + e[9] * w2
         out[f + 3], out[f + 4], out[f + 5] = unscaled(k, x[o + 9], x[o + 10], x[o + 11])
     out[out.shape[0] - 1] = 0.0
+    for e in range(matrix.state_nodes.shape[0]):
+        z, o = states_offset(count) + matrix.state_nodes[e, FIRST], matrix.state_nodes[e, UNKNOWN]
+        for d in range(matrix.state_nodes[e, WIDTH_OF]):
+            out[z + d] = x[o + d]
     for q in range(blocks.shape[0]):
         m, f, o = blocks[q, 2], blocks[q, 3], matrix.block_place[q, 2]
         for r in range(m):

@@ -11,7 +11,7 @@ from dap3d_core.integrators.radau.state import (
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, Y
 from dap3d_core.integrators.stepping.step_control import EPSILON, LARGEST
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.model.state_layout import COORDINATES, STATE, VELOCITIES
+from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
 
 #: An iteration that converges slower than this does not.
 SLOWEST = 0.99
@@ -28,10 +28,10 @@ STALLED, MOST_ROUNDINGS = 10.0, 1e6
 def newton_limit(work: RadauState) -> float:
     """Norm of a change at which the iteration ends (HW IV.8), not below what rounding allows."""
     y, rtol = work.state[Y], work.rtol
-    n = (y.shape[0] - 1) // STATE
+    n = work.frames.shape[1] - 1
     limit = min(0.03, math.sqrt(rtol))
     first = 0
-    for count in (COORDINATES * n, VELOCITIES * n):
+    for count in (COORDINATES * n, VELOCITIES * n):  # states of elements have units of their own
         top = 0.0
         low = atol = LARGEST
         for k in range(first, first + count):

@@ -14,7 +14,7 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import VALUE, Floats, System
 from dap3d_core.assembly.evaluate import call_kinds, place_state, rates, zero
-from dap3d_core.assembly.offsets import velocity_offset
+from dap3d_core.assembly.offsets import states_offset, velocity_offset
 from dap3d_core.formulations.common.constraints import (
     PART,
     acceleration_residual,
@@ -67,6 +67,8 @@ def find_slope(
         zero(system.change)
     rates(y, metric, system.change, out)
     last = y.shape[0] - 1
+    for k in range(states_offset(n), last):
+        out[k] = 0.0
     for k in range(velocity_offset(1, n), last):
         out[k] += (inverse[2, 0] * stages[0, k] + inverse[2, 1] * stages[1, k]
                    + inverse[2, 2] * stages[2, k]) / h  # fmt: skip

@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.stabilized_index2.jacobian import BODY, FIRST_ROW
@@ -19,14 +19,18 @@ from dap3d_core.integrators.radau.tableau import ORDER, radau_method
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.restore import check_alike, check_pivots, restored
 from dap3d_core.integrators.stepping.rounding import SMALLEST_ATOL
-from dap3d_core.linear.lu.plan import LuPlan, make_lu_plan
+from dap3d_core.linear.lu.plan import LuPlan, StateNode, make_lu_plan
 from dap3d_core.linear.ordering.ordering import JointNode
+from dap3d_core.model import Model
 
 #: e_i of a tangent with dependent rows as part of the squared length of row i. Rows that depend on
 #: others on the constraints alone, as those of Bennett's linkage, are independent by d aside, where
 #: predicted stages are: below d^2 of this part the tangent takes them for rows that hold the motion
 #: (docs/decisions/0033). Above, rows that are as little independent converge slowly.
 REGULAR = 1e-6
+
+
+Integers = NDArray[np.int64]
 
 
 class Effort(NamedTuple):
@@ -45,7 +49,8 @@ def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan
     readings = tangent.readings.tolist()
     reading = [_node_of(row[FIRST_ROW], starts, nodes) for row in readings]
     read = [(k, row[BODY]) for k, row in zip(reading, readings, strict=True) if row[BODY]]
-    lu = make_lu_plan(n, nodes, coupled_bodies(tangent), read)
+    states = _state_nodes(model, nodes)
+    lu = make_lu_plan(n, nodes, coupled_bodies(tangent), states, read)
     of_row = {}
     joints = []
     for k, node in enumerate(nodes):
@@ -56,6 +61,7 @@ def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan
     for _, b, _, first, _ in plan.blocks.tolist():
         k = of_row[first]
         places.append((*lu.joint_blocks(k, b), int(lu.joint_first[k])))
+    state_nodes, state_places = _state_tables(evaluator, states, lu)
     held = np.zeros(plan.row_size, dtype=np.int64)
     held[evaluator.system.row] = model.position_row
     blocks = tangent.blocks.tolist()
@@ -79,6 +85,8 @@ def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan
             ],
             dtype=np.int64,
         ).reshape(-1, 3),
+        state_nodes=state_nodes,
+        state_places=state_places,
         held=held,
         spin=np.zeros((n + 1, 15)),
         D=np.zeros(plan.block_size),
@@ -90,6 +98,45 @@ def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan
 def _node_of(row: int, starts: Sequence[int], nodes: Sequence[JointNode]) -> int:
     """The joint node that a row belongs to."""
     return next(k for k, node in enumerate(nodes) if 0 <= row - starts[k] < node.rows)
+
+
+def _state_nodes(model: Model, nodes: Sequence[JointNode]) -> list[StateNode]:
+    """The elements with states of their own, in the order of these."""
+    node_of = {joint: k for k, node in enumerate(nodes) for joint in node.joints}
+    found = []
+    for group in model.acting:
+        width, is_joint = group.type_info.layout.state_width, group.type_info.type.kind == "joint"
+        for member, bodies in zip(group.members.tolist(), group.bodies.tolist(), strict=True):
+            if width:
+                found.append(StateNode(width, tuple(bodies), node_of[member] if is_joint else -1))
+    return found
+
+
+def _state_tables(
+    evaluator: Evaluator, states: Sequence[StateNode], lu: LuPlan
+) -> tuple[Integers, Integers]:
+    """Tables ``nodes`` and ``places`` of ``fill_states``."""
+    plan, model = evaluator.plan, evaluator.model
+    joints = [int(k) for g in model.joints if g.type_info.layout.states for k in g.members]
+    joint = iter(joints)
+    rows, places, first = [], [], 0
+    widest = max((len(node.bodies) for node in states), default=0)
+    for e, node in enumerate(states):
+        row = [first, int(lu.element_first[e]), lu.element_block(e), 0, 0, 0, 0, node.size]
+        if node.joint >= 0:
+            of_node = plan.ordering.nodes[node.joint]
+            own = int(plan.joint_row[next(joint)])
+            shift = own - int(plan.joint_row[of_node.joints[0]])
+            row[3:7] = lu.joint_element_block(node.joint, e), of_node.rows, shift, own
+        rows.append(row)
+        blocks = [lu.element_blocks(e, b) if b else (-1, -1) for b in node.bodies]
+        flat = [place for pair in blocks for place in pair]
+        places.append(flat + [-1] * (2 * widest - len(flat)))
+        first += node.size
+    return (
+        np.array(rows, dtype=np.int64).reshape(-1, 8),
+        np.array(places, dtype=np.int64).reshape(len(states), 2 * widest),
+    )
 
 
 class RadauIntegration(Integration):

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
-from dap3d_core.assembly.evaluate import place, zero
+from dap3d_core.assembly.evaluate import largest, place, zero
 from dap3d_core.assembly.offsets import velocity_offset
 from dap3d_core.assembly.state_update import add_displacement, add_velocity
 from dap3d_core.formulations.common.constraints import linearise
-from dap3d_core.formulations.stabilized_index2.jacobian import Tangent, differentiate
+from dap3d_core.formulations.stabilized_index2.jacobian import SMALLEST, Tangent, differentiate
 from dap3d_core.formulations.stabilized_index2.stage_equations import (
     StageMatrix,
     add_transposed,
@@ -31,6 +31,7 @@ from dap3d_core.formulations.stabilized_index2.stage_equations import (
     scale_residual,
     unscale_solution,
 )
+from dap3d_core.formulations.stabilized_index2.state_tangent import differentiate_states
 from dap3d_core.integrators.radau.convergence import (
     SLOWEST,
     converges,
@@ -42,6 +43,7 @@ from dap3d_core.integrators.radau.state import (
     RadauState,
 )
 from dap3d_core.integrators.stepping.integration_state import (
+    ABSOLUTE,
     SCRATCH,
     TRIAL,
     Y,
@@ -90,7 +92,19 @@ def find_tangent(
     work.jacobian_count += 1
     work.tangent_needed, work.tangent_is_current = 0, 1
     work.factored_step = 0.0
-    return 0.0 if differentiate(at, system.multipliers, system, loops, tangent) else math.nan
+    if not differentiate(at, system.multipliers, system, loops, tangent):
+        return math.nan
+    own, rtol = tangent.states, work.rtol
+    count = own.size.shape[0]
+    if count == 0:
+        return 0.0
+    first = argument.shape[0] - 1 - count
+    for k in range(count):
+        own.size[k] = work.tolerance[ABSOLUTE, first + k] / (rtol if rtol > 0.0 else 1.0)
+        if not own.size[k] > 0.0:
+            own.size[k] = SMALLEST
+    differentiate_states(at, system.multipliers, system, loops, tangent)
+    return 0.0 if largest(own.values) < math.inf else math.nan
 
 
 @compiled

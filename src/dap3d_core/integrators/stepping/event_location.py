@@ -22,15 +22,17 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import ENDS, UNSEEN
+from dap3d_core.assembly.arrays import ENDS, JUMPS, UNSEEN
 from dap3d_core.integrators.stepping.integration_state import (
     BAND,
     BEND,
     CHATTERED,
     COUNT,
+    CROSSED,
     DOES,
     FOUND,
     FOUND_RATE,
+    JUMPED,
     RATE,
     RUNNING,
     SAMPLE,
@@ -288,6 +290,9 @@ def bisect_crossing(
             s[SIDE, k] = 0.0  # it stays zero: it has no side until it leaves
     if crossed:
         reset_step_control(work)
+        for k in range(s.shape[1]):
+            if s[CROSSED, k] != 0.0 and work.end_status == 0:
+                work.status = JUMPED
 
 
 @compiled
@@ -316,6 +321,8 @@ def record_crossings(work: IntegrationState, t: float) -> None:
         record_crossing(work, k, t)
         if s[DOES, k] == ENDS and s[SIDE, k] < 0.0:
             work.end_status, work.terminal_switch = SWITCHED, k
+        if s[DOES, k] == JUMPS:
+            s[CROSSED, k] = s[SIDE, k]
         if s[COUNT, k] == 0.0 or t - s[SINCE, k] > CHATTER_SPAN * (work.times[-1] - work.times[0]):
             s[SINCE, k], s[COUNT, k] = t, 0.0
         s[COUNT, k] += 1.0

@@ -32,13 +32,14 @@ class Status(IntEnum):
     CHATTERED = 6  # a switch changed its sign again and again while time hardly advanced
     ENDED = 7  # a user event requested it
     STIFF = 8  # the scene has become stiff, and the integration was to stop then
+    JUMPED = 9  # velocities or states jump here; who advances it changes them and goes on
 
 
 # The same as plain integers, for compiled code.
 RUNNING, FINISHED = int(Status.RUNNING), int(Status.FINISHED)
 STEP_FLOOR, NOT_FINITE = int(Status.STEP_FLOOR), int(Status.NOT_FINITE)
 PROJECTION_FAILED, SWITCHED = int(Status.PROJECTION_FAILED), int(Status.SWITCHED)
-CHATTERED, STIFF = int(Status.CHATTERED), int(Status.STIFF)
+CHATTERED, STIFF, JUMPED = int(Status.CHATTERED), int(Status.STIFF), int(Status.JUMPED)
 
 # Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch.
 Y, TRIAL, SCRATCH, OTHER, STATES = range(5)
@@ -47,10 +48,11 @@ ABSOLUTE, NOISE, TOLERANCES = range(3)
 # Rows of ``switches``: value, side (the sign that it keeps; 0: none yet), rate and bend (change of
 # the rate in time) at t; value and rate at the trial state; value at a sample; what it does
 # (assembly.system); how far beyond zero it is left on its side; since when its changes are counted,
-# and how many there were.
-VALUE, SIDE, RATE, BEND, FOUND, FOUND_RATE, SAMPLE, DOES, BAND, SINCE, COUNT, SWITCH_ROWS = range(
-    12
-)
+# and how many there were; to which side it has just gone, where velocities jump for that.
+(
+    VALUE, SIDE, RATE, BEND, FOUND, FOUND_RATE, SAMPLE, DOES, BAND, SINCE, COUNT, CROSSED,
+    SWITCH_ROWS
+) = range(13)  # fmt: skip
 #: Rows of ``crossings``, the first ones of a run: time, which switch, to which side.
 LOGGED = 1000
 

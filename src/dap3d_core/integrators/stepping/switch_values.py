@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import ENDS, UNSEEN
+from dap3d_core.assembly.arrays import ENDS, JUMPS, UNSEEN
 from dap3d_core.integrators.stepping.integration_state import (
     BAND,
     BEND,
@@ -102,8 +102,8 @@ def changes_sign(s: Floats, row: int) -> bool:
 
 @compiled
 def record_crossing(work: IntegrationState, k: int, t: float) -> None:
-    """Record that a switch changed its sign, unless it is UNSEEN."""
-    if work.switches[DOES, k] == UNSEEN:
+    """Record that a switch changed its sign, unless it is UNSEEN, or velocities jump there."""
+    if work.switches[DOES, k] == UNSEEN or work.switches[DOES, k] == JUMPS:
         return
     count = work.crossing_count
     if count < LOGGED:

@@ -47,7 +47,7 @@ def compile_all(type_info: TypeInfo) -> None:
     Raises:
         PluginError: one of them cannot be compiled.
     """
-    if not type_info.argument_functions or not _calls_functions(type_info):
+    if not _calls_functions(type_info):
         for what in LOOP_KINDS:
             if what != "friction":
                 compiled_loop(with_sample_reactions(type_info), what)

@@ -1,6 +1,7 @@
 """Storage of the instances of a type: integers and numbers of each."""
 
 from collections.abc import Mapping
+from inspect import signature
 from math import prod
 from typing import Any
 
@@ -25,7 +26,8 @@ class InstanceLayout:
 
     Attributes:
         slots: body slots, in the order of the J blocks.
-        functions: function fields of time, in order; their rows of F follow the bodies in ``idx``.
+        functions: function fields of time and input fields that kernels name, in order; their rows
+            of F follow the bodies in ``idx``.
         others: vector fields of no slot, in order; the bodies they are fixed in come next.
         constants: names that ``prepare`` returns.
         numbers: name -> (offset in ``par``, shape) of the stored numbers.
@@ -84,6 +86,18 @@ def shape_of(value: Any) -> tuple[int, ...]:
     return ()
 
 
+def prefix_of(type_: type[TypeBase], field: str) -> str:
+    """How the names begin that a function field offers: ``f`` unless the type has a field f."""
+    return "f" if field == "function" and "f" not in specs_of(type_) else field
+
+
+def _is_named(type_: type[TypeBase], field: str) -> bool:
+    """True if a kernel names what a field offers that is a row of F."""
+    f = prefix_of(type_, field)
+    offered = {f, f"{f}_dot", f"{f}_ddot", f"{f}_0"}
+    return any(offered & set(signature(kernel).parameters) for kernel in type_.kernels().values())
+
+
 def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> InstanceLayout:
     """The layout of the instances of a type, given the constants of one of them."""
     numbers: dict[str, Place] = {}
@@ -107,8 +121,9 @@ def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> InstanceLa
             width += size(numbers[name][1])
             if spec.kind == "vector" and not spec.ground and slot_of(name) not in slots:
                 others.append(name)
-        elif spec.kind == "function" and not spec.argument:
-            functions.append(name)
+        elif spec.kind == "input" or (spec.kind == "function" and not spec.argument):
+            if _is_named(type_, name):
+                functions.append(name)
         elif spec.kind == "angle":
             angles[name] = width
             width += ANGLE_WIDTH

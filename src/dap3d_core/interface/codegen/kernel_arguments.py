@@ -10,16 +10,20 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.codegen.instance_layout import InstanceLayout, size
+from dap3d_core.interface.codegen.instance_layout import InstanceLayout, prefix_of, size
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import TypeBase
 
 #: Kernels that may use quantities of the velocity level; all others use positions and time only.
-VELOCITY_KERNELS = ("C_dot", "gamma", "wrench", "friction", "switch", "rate")
+VELOCITY_KERNELS = (
+    "C_dot", "gamma", "wrench", "friction", "switch", "rate", "impulse", "reset"
+)  # fmt: skip
 #: Numbers of a force ``friction`` for the kernel ``friction`` of its joint.
 FRICTION_NUMBERS = ("mu", "v_tol", "radius")
 #: Suffixes of a function's value and derivatives.
 DERIVATIVES = ("", "_dot", "_ddot")
+#: ``KernelArgument.derivative`` of a tuple of functions.
+SEVERAL = 4
 
 
 @attrs.frozen
@@ -34,7 +38,8 @@ class KernelArgument:
         needs: names that must be computed before.
         doc: its meaning, for ``describe``.
         columns: of a table; 0 for all else.
-        derivative: order of the derivative of a function to be called; -1 for all else.
+        derivative: order of the derivative of a function to be called, SEVERAL of a tuple of
+            functions; -1 for all else.
         rate: its rate of change as an expression of ``needs`` and the velocities ``V_i``, ``W_i``
             of the bodies, for derivations. "" for a constant.
         rate_name: the name of its rate; "" where there is none.
@@ -80,7 +85,7 @@ def namespace(type_: type[TypeBase], layout: InstanceLayout) -> dict[str, Kernel
     for name, spec in specs_of(type_).items():
         is_argument = name == "x" and type_.kind == "function"
         if name not in layout.constants and not is_argument:  # v_i may be a vector, not a velocity
-            _offer_field(offer, name, spec, layout)
+            _offer_field(offer, name, prefix_of(type_, name), spec, layout)
     for name in layout.constants:
         _offer_constant(offer, name, layout)
     for name in layout.unknowns:
@@ -121,7 +126,7 @@ def _offer_body(offer: Callable[..., None], s: str) -> None:
 
 
 def _offer_field(
-    offer: Callable[..., None], name: str, spec: FieldSpec, layout: InstanceLayout
+    offer: Callable[..., None], name: str, prefix: str, spec: FieldSpec, layout: InstanceLayout
 ) -> None:
     if spec.kind == "point" and (slot := slot_of(name)):
         _offer_point(offer, name, slot, layout)
@@ -141,7 +146,13 @@ def _offer_field(
         doc = f"{spec.doc or name}{f', {spec.unit}' if spec.unit else ''}"
         offer(name, layout.numbers[name][1], stored(layout, name), doc=doc)
     elif spec.kind == "function":
-        _offer_function(offer, name, spec, layout)
+        _offer_function(offer, name, prefix, spec, layout)
+    elif spec.kind == "functions":
+        doc = f"{spec.doc or name}: a tuple of functions, to be called"
+        offer(name, (), "", doc=doc, derivative=SEVERAL, derivable=False)
+    elif spec.kind == "input":
+        doc = f"{spec.doc or name}: an input, held until it is set again"
+        offer(name, (), f"F[{_row_of(name, layout)}, 0]", doc=doc)
     elif spec.kind == "table":
         offset, columns = layout.tables[name]
         sample = f"({'0.0, ' * columns})"
@@ -153,21 +164,27 @@ def _offer_field(
 
 
 def _offer_function(
-    offer: Callable[..., None], name: str, spec: FieldSpec, layout: InstanceLayout
+    offer: Callable[..., None], name: str, f: str, spec: FieldSpec, layout: InstanceLayout
 ) -> None:
-    f = "f" if name == "function" else name
     if spec.argument:
         for order, suffix in enumerate(DERIVATIVES):
             doc = f"function of {spec.argument}, derivative {order}; to be called"
             offer(f"{f}{suffix}", (), "", doc=doc, derivative=order)
         return
-    at = f"idx[b0 + {len(layout.slots) + layout.functions.index(name)}]"
+    at = _row_of(name, layout)
     for order, suffix in enumerate(DERIVATIVES):
         doc, code = f"function of time, derivative {order}", f"F[{at}, {order}]"
         higher = f"{f}{DERIVATIVES[order + 1]}" if order < 2 else ""
         rates = {"rate": f"x_{higher}", "rate_name": higher} if higher else {"derivable": False}
         offer(f"{f}{suffix}", (), code, doc=doc, **rates)
     offer(f"{f}_0", (), f"F[{at}, 4]", doc="its value at t = 0")
+
+
+def _row_of(name: str, layout: InstanceLayout) -> str:
+    """Expression for the row of F of a field; that of zeros where no kernel names it."""
+    if name not in layout.functions:
+        return "0"
+    return f"idx[b0 + {len(layout.slots) + layout.functions.index(name)}]"
 
 
 def _offer_angle(

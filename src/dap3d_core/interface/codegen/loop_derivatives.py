@@ -37,7 +37,7 @@ class LoopDerivatives:
         bodies: (m, places) bodies that an instance reads; the first ones are its slots.
         outputs: kernel -> its values (m, ...) and derivatives (m, ..., d), with
             d = 12 places, then one for each multiplier that the loop reads, then one for each
-            number and each function.
+            number, each function and each state.
     """
 
     bodies: Integers
@@ -144,6 +144,17 @@ class _Functions:
         return Dual(value, self.slopes.get((column, order)))
 
 
+class _States:
+    """States of all instances, with derivatives by their own where there are directions for it."""
+
+    def __init__(self, values: Floats, idx: Integers, slopes: Floats | None) -> None:
+        self.values, self.idx, self.slopes = values, idx, slopes
+
+    def __getitem__(self, k: _Column) -> Dual:
+        value = self.values[self.idx[:, k.column] + k.shift][:, None]
+        return Dual(value, None if self.slopes is None else self.slopes[k.shift])
+
+
 @attrs.frozen(eq=False)
 class _Multipliers:
     """-lambda of all rows, as friction reads it; slopes: by lambda of each row of each joint.
@@ -185,12 +196,13 @@ def differentiate_loop(
     multipliers: Floats | None = None,
     numbers: Sequence[int] = (),
     functions: Sequence[tuple[int, int]] = (),
+    states: bool = False,
 ) -> LoopDerivatives:
     """Values and derivatives of what a group loop computes.
 
     Args:
         type_info: the type.
-        what: "wrench", "friction" or "acceleration" (J, gamma, nu).
+        what: "wrench", "friction", "acceleration" (J, gamma, nu), "position" (C) or "rate".
         t: time, s.
         arrays: with ``body``, ``F``, ``idx`` and ``par``, as the compiled loops read them.
         group: first integer in ``idx``, first number in ``par``, number of instances.
@@ -198,27 +210,29 @@ def differentiate_loop(
         numbers: indices of an instance's own numbers by which to differentiate, too.
         functions: by which functions of time as well: index among the type's fields, and 0 for the
             value, 1 and 2 for its rates.
+        states: True to differentiate by an instance's own states as well.
 
     Returns:
         by kernel: "wrench" or "friction" (m, slots, 6), force and moment about the mass centre;
-        "J" (m, slots, rows, 6); "gamma", "nu" (m, rows).
+        "J" (m, slots, rows, 6); "gamma", "nu", "C" (m, rows); "rate" (m, states).
     """
     loop: Any = write(type_info, what)
     layout, (i0, p0, count), width = type_info.layout, group, stride(type_info)
     idx = arrays.idx[i0 : i0 + count * width].reshape(count, width)
     slots, first = len(layout.slots), len(layout.slots) + len(layout.functions)
     places = [*range(slots), *range(first, first + len(layout.others))]
-    rows = type_info.row_count
-    is_read = what == "friction"
-    read = (row_columns(type_info) or {layout.integers: rows}) if is_read else {}
-    places += body_columns(type_info) if is_read else []
+    read: dict[int, int] = {}
+    if what == "friction":
+        read = row_columns(type_info) or {layout.integers: type_info.row_count}
+        places += body_columns(type_info)
     of_bodies = DIRECTIONS * len(places)
     by_numbers = of_bodies + sum(read.values())
-    directions = by_numbers + len(numbers) + len(functions)
+    by_states = by_numbers + len(numbers) + len(functions)
+    directions = by_states + (layout.state_width if states else 0)
     unit = np.eye(directions)[:, None]
     slopes = dict(zip(numbers, unit[by_numbers:], strict=False))
     columns = [(slots + field, order) for field, order in functions]
-    by_functions = dict(zip(columns, unit[by_numbers + len(numbers) :], strict=True))
+    by_functions = dict(zip(columns, unit[by_numbers + len(numbers) : by_states], strict=True))
 
     ends = of_bodies + np.cumsum(list(read.values()), dtype=np.int64)
     of_rows = {c: unit[e - n : e] for (c, n), e in zip(read.items(), ends, strict=True)}
@@ -229,12 +243,28 @@ def differentiate_loop(
         F=_Functions(arrays.F, idx, by_functions),
         idx=_Integers(),
         par=_Numbers(arrays.par, p0, (count, layout.par_width), slopes),
+        states=_States(arrays.states, idx, unit[by_states:] if states else None),
     )
     _run(loop, t, loop_arrays, outputs)
-    bodies, size = np.ascontiguousarray(idx[:, places]), (count, directions)
+    bodies = np.ascontiguousarray(idx[:, places])
+    return LoopDerivatives(bodies, _returned(type_info, what, outputs, (count, directions)))
+
+
+def _returned(
+    type_info: TypeInfo, what: str, outputs: list[_Outputs], size: tuple[int, int]
+) -> dict[str, tuple[Floats, Floats]]:
+    """What a loop wrote, by kernel; size: (m, d)."""
+    layout, rows = type_info.layout, type_info.row_count
+    slots = len(layout.slots)
     if what == "acceleration":
-        return LoopDerivatives(bodies, _of_joint(outputs, slots, rows, layout.integers, size))
-    return LoopDerivatives(bodies, {what: _gathered(outputs[0], list(range(slots)), 6, size)})
+        return _of_joint(outputs, slots, rows, layout.integers, size)
+    if what in ("position", "rate"):
+        column, width, name = layout.integers, rows, "C"
+        if what == "rate":
+            column, width, name = layout.integers - 1, layout.state_width, what
+        value, slope = _gathered(outputs[0], [column], width, size)
+        return {name: (value[:, 0], slope[:, 0])}
+    return {what: _gathered(outputs[0], list(range(slots)), 6, size)}
 
 
 def _run(loop: Loop, t: float, arrays: SimpleNamespace, outputs: list[_Outputs]) -> None:

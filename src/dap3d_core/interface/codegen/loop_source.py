@@ -9,6 +9,7 @@ are in ``par`` from ``p1``.
 
 from collections.abc import Iterable, Sequence
 
+from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, JUMP_NAMES, jump_lines
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
 from dap3d_core.interface.codegen.reactions import integers_of_joints, reaction_lines
 from dap3d_core.interface.codegen.type_info import TypeInfo
@@ -26,10 +27,12 @@ LOOP_KINDS = {
     "value": ("value",),
     "friction": ("friction",),
     "switch": ("switch",),
+    "impulse": ("J", "impulse"),
     "angle": (),  # the angles of the type's fields, at an accepted step
     "turned": (),  # the same angles, for reports
     "rate": ("rate",),
     "bound": (),  # as switches; of unknowns
+    "reset": ("reset",),
     "knot": ("knot",),  # as switches; of functions of an argument (specialise.py)
 }
 
@@ -44,9 +47,18 @@ def stride(type_info: TypeInfo) -> int:
     return n + integers_of_joints(type_info)
 
 
+def kernels_of(kind: str, what: str) -> tuple[str, ...]:
+    """The kernels that a loop (a key of LOOP_KINDS) of a type calls; kind: of the type."""
+    has_rows = (kind == "force") == (what == "impulse")  # those of a force are for its jumps
+    return tuple(name for name in LOOP_KINDS[what] if has_rows or name != "J")
+
+
 def write(type_info: TypeInfo, what: str) -> Loop | None:
     """The loop that computes ``what`` (a key of LOOP_KINDS); None where there is no such kernel."""
-    kernels = {n: k for n, k in type_info.kernels.items() if n in LOOP_KINDS[what]}
+    of_loop = kernels_of(type_info.type.kind, what)
+    kernels = {n: k for n, k in type_info.kernels.items() if n in of_loop}
+    if what == "impulse" and "impulse" not in kernels:
+        return None
     layout = type_info.layout
     wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
     if what in ("angle", "turned"):
@@ -57,6 +69,8 @@ def write(type_info: TypeInfo, what: str) -> Loop | None:
         from dap3d_core.interface.codegen.unknowns import write_with_unknowns
 
         return write_with_unknowns(type_info, what, kernels, wanted)
+    if what in JUMP_KINDS:
+        wanted = [n for n in wanted if n not in JUMP_NAMES]
     reads = type_info.joints if what in ("friction", "rate") else ()
     lines = list(gathering_lines(type_info, wanted, reactions=bool(reads)))
     if what == "angle":
@@ -64,7 +78,9 @@ def write(type_info: TypeInfo, what: str) -> Loop | None:
             lines += store_angle(name, at)
     elif what == "turned":
         lines += append([f"x_{name}" for name in layout.angles])
-    for name in kernels:
+    if what in JUMP_KINDS:
+        lines += jump_lines(type_info, what, kernels)
+    for name in kernels if what not in JUMP_KINDS else ():
         lines.append(f"out = {called_with(type_info, name)}")
         lines += store(type_info, name)
     title = f"{type_info.type.keyword}{type_info.given}: {', '.join(kernels) or what}"

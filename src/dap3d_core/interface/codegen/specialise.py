@@ -13,17 +13,16 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.codegen.instance_layout import InstanceLayout
 from dap3d_core.interface.codegen.kernel_arguments import (
     DERIVATIVES,
     FRICTION_NUMBERS,
     KernelArgument,
     friction_names,
     in_order,
-    namespace,
     parameters,
     stored,
 )
+from dap3d_core.interface.codegen.terms import names_behind, shifted
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 
@@ -63,10 +62,10 @@ def bind_functions(
     calls: dict[str, tuple[_Given, int]] = {}
     for field, of_argument in functions.items():
         prefix = "f" if field == "function" else field
-        behind = _behind(of_argument.layout, layout.par_width)
+        behind = shifted(of_argument.layout, layout.par_width)
         value = of_argument.kernels["value"]
         names_of_value = parameters(value)
-        own = in_order(namespace(of_argument.type, behind), [n for n in names_of_value if n != "x"])
+        own = in_order(names_behind(of_argument, behind), [n for n in names_of_value if n != "x"])
         names |= {f"{prefix}__{q.name}": attrs.evolve(q, name=f"{prefix}__{q.name}") for q in own}
         wanted = tuple("x" if n == "x" else f"{prefix}__{n}" for n in names_of_value)
         given = _Given(f"{prefix}__value", value, wanted, f"{prefix}{KNOTS}", knots[field])
@@ -81,7 +80,7 @@ def bind_functions(
                 given.knots, shape, False, stored(layout, given.knots)
             )
     kernels = {n: _with_functions(type_info, n, k, calls) for n, k in type_info.kernels.items()}
-    title = f"({', '.join(g.type.keyword for g in functions.values())})"
+    title = f"({', '.join(g.type.keyword + g.given for g in functions.values())})"
     bound = attrs.evolve(type_info, layout=layout, names=names, kernels=kernels, given=title)
     calling = [
         n for n in CALLING if set(parameters(type_info.kernels.get(n, _nothing))) & set(calls)
@@ -139,16 +138,6 @@ def bind_friction(type_info: TypeInfo) -> TypeInfo:
         names[name] = quantity if name not in type_info.layout.numbers else names[name]
     layout = attrs.evolve(layout, numbers=numbers, par_width=width)
     return attrs.evolve(type_info, layout=layout, names=names, kernels={"friction": kernel})
-
-
-def _behind(layout: InstanceLayout, start: int) -> InstanceLayout:
-    """A layout with its numbers shifted to ``start``."""
-    return attrs.evolve(
-        layout,
-        numbers={n: (start + at, shape) for n, (at, shape) in layout.numbers.items()},
-        tables={n: (start + at, columns) for n, (at, columns) in layout.tables.items()},
-        par_width=start + layout.par_width,
-    )
 
 
 def _with_functions(

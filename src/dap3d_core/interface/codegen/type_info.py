@@ -49,6 +49,7 @@ class TypeInfo:
         given: the types of its functions of an argument, for titles.
         derived: kernels derived from others.
         joints: of a force, the joints whose reactions it reads, once a scene has named them.
+        terms: of a function that combines functions, the types of those.
     """
 
     type: type[TypeBase]
@@ -62,6 +63,7 @@ class TypeInfo:
     given: str = ""
     derived: tuple[str, ...] = ()
     joints: tuple[JointOfForce, ...] = ()
+    terms: tuple["TypeInfo", ...] = ()
 
     @property
     def row_count(self) -> int:
@@ -74,8 +76,8 @@ class TypeInfo:
 
         def holds(name: str, wanted: Any) -> bool:
             value = values[name]
-            is_function = specs[name].kind == "function"
-            return (value is not None) == wanted if is_function else bool(value == wanted)
+            is_reference = specs[name].kind in ("function", "input")
+            return (value is not None) == wanted if is_reference else bool(value == wanted)
 
         for conditions, type_info in self.variants:
             if all(holds(name, wanted) for name, wanted in conditions.items()):

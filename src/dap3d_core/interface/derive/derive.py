@@ -1,9 +1,10 @@
 """Derives missing formulas of a type from the given ones.
 
 A joint that defines ``C`` (and ``C_dot`` for the rows of the velocity level) gets ``J``, ``gamma``
-and ``nu``, a force that defines ``energy`` its ``wrench``, a function that returns f alone its
-derivatives. Formulas written by hand are used unchanged. The derived kernels are a module in the
-cache folder, named by a digest of the type's sources: sympy is needed for the first use only.
+and ``nu``, a force that defines ``energy`` its ``wrench``, one whose ``impulse`` names ``Jv`` its
+``J`` of ``switch``, a function that returns f alone its derivatives. Formulas written by hand are
+used unchanged. The derived kernels are a module in the cache folder, named by a digest of the
+type's sources: sympy is needed for the first use only.
 """
 
 from collections.abc import Callable, Mapping
@@ -11,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from dap3d_core.interface.codegen.instance_layout import InstanceLayout
-from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
+from dap3d_core.interface.codegen.kernel_arguments import KernelArgument, parameters
 from dap3d_core.interface.types import Joint, TypeBase
 
 Kernel = Callable[..., Any]
 
 #: Kernels from which others are derived.
-GIVEN = {"joint": ("C", "C_dot"), "force": ("energy",), "function": ("value",)}
+GIVEN = {"joint": ("C", "C_dot"), "force": ("energy", "switch"), "function": ("value",)}
 
 
 class CannotDeriveError(ValueError):
@@ -38,7 +39,9 @@ def missing(type_: type[TypeBase], gives_one_number: bool = False) -> tuple[str,
             return by_unknowns
         return (*by_unknowns, *(n for n in ("J", "gamma", "nu") if n not in defined))
     if type_.kind == "force":
-        return ("wrench",) if "energy" in defined and "wrench" not in defined else ()
+        wanted = ("wrench",) if "energy" in defined and "wrench" not in defined else ()
+        has_rates = "Jv" in parameters(defined["impulse"]) if "impulse" in defined else False
+        return (*wanted, "J") if has_rates and "J" not in defined else wanted
     return ("value",) if gives_one_number else ()
 
 
@@ -57,7 +60,7 @@ def derive(
     from dap3d_core.kernels.runtime import generated_modules
     from dap3d_core.kernels.runtime.source_digest import digest, identities, sources
 
-    given = {n: k for n, k in type_.kernels().items() if n in GIVEN[type_.kind]}
+    given = {n: k for n, k in type_.kernels().items() if n in _given_of(type_.kind, wanted)}
     offered, here = [repr(q) for q in names.values()], Path(__file__)
     how = [here.with_name(f"{n}.py").read_bytes() for n in ("derive", "symbolic", "kernel_printer")]
     kernels = given.values()
@@ -94,7 +97,7 @@ def _text(
                 C, C_dot, type_.position_rows(), type_.rows, symbols, layout.unknowns
             )
         elif type_.kind == "force":
-            found, steps = symbolic.derive_wrench(given["energy"], symbols)
+            found, steps = _of_force(symbolic, given, wanted, symbols)
         else:
             found, steps = symbolic.derive_value(given["value"], symbols)
         if all(x == 0 for x in symbolic.flat(found.get("nu", 0))):
@@ -107,3 +110,30 @@ def _text(
     title = f'"""{", ".join(wanted)} of {type_.keyword}, derived from {", ".join(given)}."""\n'
     imports = f"\nfrom dap3d_core.kernels import {', '.join(words)}\n" if words else ""
     return title + imports + "".join(f"\n\n{source}" for source, _ in parts)
+
+
+def _given_of(kind: str, wanted: tuple[str, ...]) -> tuple[str, ...]:
+    """The kernels from which these are derived."""
+    if kind != "force":
+        return GIVEN[kind]
+    return tuple(given for given, name in zip(GIVEN[kind], ("wrench", "J"), strict=True)
+                 if name in wanted)  # fmt: skip
+
+
+def _of_force(
+    symbolic: Any, given: Mapping[str, Kernel], wanted: tuple[str, ...], symbols: Any
+) -> tuple[dict[str, Any], Any]:
+    """Wrench and rows of a force, as far as wanted, with their steps."""
+    found: dict[str, Any] = {}
+    steps: dict[Any, Any] = {}
+    if "wrench" in wanted:
+        found, steps = symbolic.derive_wrench(given["energy"], symbols)
+    if "J" in wanted:
+        if "switch" not in given:
+            raise symbolic.DerivationError(
+                "impulse names Jv, and there is neither J nor a switch to derive it from; define "
+                "switch, a number that changes its sign where velocities jump"
+            )
+        rows, more = symbolic.derive_rows(given["switch"], symbols)
+        found, steps = found | rows, steps | more
+    return found, steps

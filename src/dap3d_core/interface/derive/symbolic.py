@@ -16,7 +16,7 @@ import attrs
 import sympy
 from sympy.logic.boolalg import Boolean
 
-from dap3d_core.interface.codegen.kernel_arguments import KernelArgument, parameters
+from dap3d_core.interface.codegen.kernel_arguments import SEVERAL, KernelArgument, parameters
 from dap3d_core.interface.errors import line_of, plain_words
 from dap3d_core.kernels import add, cross, dot, sub
 
@@ -188,6 +188,10 @@ class Symbols(Mapping[str, Any]):
         """The argument of a kernel for a name: symbols in tuples, or a function to be called."""
         if name not in self._values:
             quantity = self.names[name]
+            if quantity.derivative == SEVERAL:
+                raise DerivationError(
+                    f"{name} are several functions; return (f, f', f'', f''') of their combination"
+                )
             if quantity.derivative >= 0:
                 self._values[name] = self._function(name)
             elif quantity.columns:
@@ -394,6 +398,30 @@ def derive_wrench(energy: Callable[..., Any], symbols: Symbols) -> tuple[dict[st
     force = [-x for x in _coefficients(gradient, symbols, of_rates=False)]
     pairs = [[force[n : n + 3], force[n + 3 : n + 6]] for n in range(0, len(force), 6)]
     return {"wrench": pairs}, program.steps
+
+
+def derive_rows(switch: Callable[..., Any], symbols: Symbols) -> tuple[dict[str, Any], Steps]:
+    """Rows J of a force, whose rates J v are those of its switches as far as its bodies move.
+
+    Raises:
+        DerivationError: a switch depends on velocities, or cannot be differentiated.
+    """
+    velocity = [n for n in parameters(switch) if symbols.names[n].velocity]
+    if velocity:
+        raise DerivationError(
+            f"switch names {velocity[0]}, a quantity of the velocity level, so that its rate is no "
+            "J v; write J by hand"
+        )
+    program = Program.of(traced(switch, symbols, "switch"), symbols.fresh)
+    J: list[Any] = [[] for _ in range(len(symbols.basic) // 6)]
+    steps: Steps = dict(program.steps)
+    for k in range(len(program.results)):
+        with_gradient, gradient = program.gradient(k)
+        steps |= with_gradient.steps
+        coefficients = _coefficients(gradient, symbols, of_rates=False)
+        for n, block in enumerate(J):
+            block.append(coefficients[6 * n : 6 * n + 6])
+    return {"J": J}, steps
 
 
 def derive_value(value: Callable[..., Any], symbols: Symbols) -> tuple[dict[str, Any], Steps]:

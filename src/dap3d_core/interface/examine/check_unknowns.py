@@ -37,6 +37,10 @@ def check_unknowns(type_: type[TypeBase]) -> None:
             f"{who} has unknowns and friction; let a force rub that reads the multipliers of the "
             "joint, by a field joint()"
         )
+    if jumps := [name for name in ("impulse", "reset") if name in kernels]:
+        raise PluginError(
+            f"{who} has unknowns and {jumps[0]}, which knows only rows of bodies; let a force jump"
+        )
     if "C" not in kernels:
         return  # which is refused in words of its own
     rows = len(type_.position_rows())
@@ -50,6 +54,12 @@ def check_unknowns(type_: type[TypeBase]) -> None:
             raise PluginError(f"{who}.C does not name {name}, which is to be found by its rows")
         if "C_dot" in kernels and f"{name}_dot" in parameters(kernels["C_dot"]):
             raise PluginError(f"{who}.C_dot is to be linear in the velocities; it names {name}_dot")
+
+
+def bound_count(type_: type[TypeBase]) -> int:
+    """Bounds at which a run ends: two of each unknown that is not periodic."""
+    assert issubclass(type_, Joint)
+    return 2 * len([name for name in unknown_names(type_) if name not in type_.periodic])
 
 
 def _check_name(type_: type[Joint], name: Any) -> None:

@@ -22,6 +22,7 @@ from dap3d_core.interface.codegen.instance_layout import (
     size,
     state_places,
 )
+from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, jump_names, row_count
 from dap3d_core.interface.codegen.kernel_arguments import (
     VELOCITY_KERNELS,
     KernelArgument,
@@ -42,7 +43,7 @@ from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missin
 from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
 from dap3d_core.interface.examine.check_states import check_state_names, check_states
-from dap3d_core.interface.examine.check_unknowns import check_unknowns
+from dap3d_core.interface.examine.check_unknowns import bound_count, check_unknowns
 from dap3d_core.interface.examine.random_values import (
     numbers,
     random_field,
@@ -50,7 +51,7 @@ from dap3d_core.interface.examine.random_values import (
     random_quantity,
 )
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.interface.types import SYMBOLS, Function, Joint, TypeBase
+from dap3d_core.interface.types import SYMBOLS, Force, Function, Joint, TypeBase
 
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
 ATTEMPTS = 200
@@ -75,20 +76,21 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     if layout.states:
         check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
     names = namespace(type_, layout)
-    kernels, outputs = type_.kernels(), {}
+    kernels: dict[str, Callable[..., Any]] = type_.kernels()
+    outputs: dict[str, tuple[str, ...]] = {}
 
     def call(kernel_name: str) -> None:
-        kernel, offered = kernels[kernel_name], names
-        if kernel_name == "friction" and issubclass(type_, Joint):
-            offered = friction_names(type_.rows) | names
-        elif kernel_name in READING:
-            offered = reaction_names(type_) | names
+        kernel = kernels[kernel_name]
+        offered = _further_names(type_, kernel_name, outputs, len(layout.slots)) | names
         _check_names(type_, kernel_name, parameters(kernel), offered)
         quantities = [offered[n] for n in parameters(kernel)]
-        outputs[kernel_name] = _output(type_, kernel_name, kernel, quantities, rng)
+        is_of_rows = kernel_name == "impulse" and type_.kind == "force"
+        rows = row_count(outputs, len(layout.slots)) if is_of_rows else 0
+        outputs[kernel_name] = _output(type_, kernel_name, kernel, quantities, rng, rows)
 
     for kernel_name in kernels:
-        call(kernel_name)
+        if kernel_name not in JUMP_KINDS:  # they take rows that may be derived
+            call(kernel_name)
     lacking = missing(type_, outputs.get("value") == ("out",))
     if lacking:
         try:
@@ -96,11 +98,11 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         except CannotDeriveError as error:
             raise PluginError(f"{where_is(type_)}: {error}") from error
     derived = tuple(n for n in lacking if n in kernels)  # nu is left out where it is zero
-    for kernel_name in derived:
+    for kernel_name in (*derived, *(name for name in JUMP_KINDS if name in kernels)):
         call(kernel_name)
     if layout.unknowns:  # distances from their bounds
-        count = 2 * len([name for name in layout.unknowns if name not in type_.periodic])  # type: ignore[attr-defined]
-        outputs["bound"] = tuple(f"out[{k}]" for k in range(count))
+        outputs["bound"] = tuple(f"out[{k}]" for k in range(bound_count(type_)))
+    _check_jumps(type_, outputs, len(layout.slots))
     functions = tuple(n for n, s in specs_of(type_).items() if s.kind == "function" and s.argument)
     return TypeInfo(
         type_,
@@ -115,22 +117,34 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     )
 
 
+def _further_names(
+    type_: type[TypeBase], kernel: str, outputs: Mapping[str, tuple[str, ...]], slots: int
+) -> dict[str, KernelArgument]:
+    """Names that one kernel alone may use."""
+    if kernel == "friction" and issubclass(type_, Joint):
+        return friction_names(type_.rows)
+    if kernel in JUMP_KINDS:
+        return jump_names(type_.kind, kernel, outputs, slots)
+    return reaction_names(type_) if kernel in READING else {}
+
+
 def _output(
     type_: type[TypeBase],
     kernel_name: str,
     kernel: Callable[..., Any],
     quantities: Sequence[KernelArgument],
     rng: random.Random,
+    rows: int = 0,
 ) -> tuple[str, ...]:
     """Expressions of a kernel's numbers; it may be undefined for some random inputs, not all."""
     who = f"{where_is(type_)}.{kernel_name}"
     for _ in range(ATTEMPTS):
         try:
             value = kernel(*(random_quantity(q, rng) for q in quantities))
-            if kernel_name == "rate":
+            if kernel_name in ("rate", "reset"):
                 paths = state_entries(value, [s for _, s in state_places(type_).values()])
             else:
-                paths = entries(value, *_expected(type_, kernel_name, value))
+                paths = entries(value, *_expected(type_, kernel_name, value, rows))
         except ShapeError as error:
             raise PluginError(f"{who}: {error}") from None
         except Exception as error:
@@ -254,7 +268,7 @@ def _is_finite(value: Any) -> bool:
 
 def _joint_of_friction(type_: type[TypeBase]) -> str:
     """The field of the joint by whose friction a force acts; "" where it has a law of its own."""
-    if type_.kind != "force" or {"wrench", "energy"} & set(type_.kernels()):
+    if type_.kind != "force" or {"wrench", "energy", "impulse"} & set(type_.kernels()):
         return ""
     joints = [name for name, spec in specs_of(type_).items() if spec.kind == "joint"]
     if len(joints) > 1:
@@ -271,10 +285,11 @@ def _check_conditions(type_: type[TypeBase], conditions: Mapping[str, Any], vari
     for name, wanted in conditions.items():
         spec = specs.get(name)
         allowed = spec.choices if spec is not None and spec.kind == "choice" else (True, False)
-        if spec is None or spec.kind not in ("choice", "function") or wanted not in allowed:
+        kinds = ("choice", "function", "input")
+        if spec is None or spec.kind not in kinds or wanted not in allowed:
             raise PluginError(
                 f"{where_is(variant)} is the variant for {name} = {wanted!r}, "
-                f"which no choice or function of {type_.__name__} can be"
+                f"which no choice, function or input of {type_.__name__} can be"
             )
 
 
@@ -289,7 +304,8 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     kernels, by_joint = type_.kernels(), bool(_joint_of_friction(type_))
     derivable = missing(type_)
     needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[kind]
-    needed = [] if derivable else needed
+    acts_by_jumps = kind == "force" and "impulse" in kernels
+    needed = [] if derivable or acts_by_jumps else needed
     if (is_abstract and not kernels) or by_joint:
         needed = []
     elif issubclass(type_, Joint):
@@ -381,9 +397,47 @@ def _check_names(
             )
 
 
-def _expected(type_: type[TypeBase], kernel: str, value: Any) -> tuple[tuple[int, ...], str]:
-    """The shape that a kernel should return, and its description for messages."""
+def _check_jumps(type_: type[TypeBase], outputs: Mapping[str, Sequence[str]], slots: int) -> None:
+    """Check what a type says of its jumps besides the kernels themselves."""
+    who, rows = where_is(type_), row_count(outputs, slots) if type_.kind == "force" else 0
+    jumps = [name for name in JUMP_KINDS if name in outputs]
+    if jumps and "switch" not in outputs:
+        raise PluginError(
+            f"{who} defines {jumps[0]}, but no switch: velocities and states jump where a switch "
+            "changes its sign; define switch, a number that does so there"
+        )
+    if "reset" in outputs and not type_.states:
+        raise PluginError(f'{who} defines reset, but no states; add e.g. states = ("z",) and rate')
+    if rows and "impulse" not in outputs:
+        raise PluginError(f"{who} defines J without impulse, which nothing calls; define impulse")
+    if not issubclass(type_, Force):
+        return
+    if not all(isinstance(k, int) and 0 <= k < rows for k in type_.unilateral):
+        words = f"0 to {rows - 1}" if rows else "and it has none"
+        raise PluginError(f"{who}.unilateral names rows of J, {words}; it is {type_.unilateral!r}")
+    e = specs_of(type_).get(type_.restitution)
+    if type_.restitution and (e is None or e.kind != "number" or not rows):
+        raise PluginError(
+            f"{who}: restitution = {type_.restitution!r} is the field of a number, the coefficient "
+            "of restitution of rows J"
+        )
+
+
+def _expected(
+    type_: type[TypeBase], kernel: str, value: Any, rows: int = 0
+) -> tuple[tuple[int, ...], str]:
+    """The shape that a kernel should return, and its description for messages.
+
+    rows: of J, where ``impulse`` of a force gives the change of J v.
+    """
     slots = len(body_slots(type_))
+    if kernel == "impulse":
+        if rows:
+            return (rows,), f"{rows} numbers, the change of J v, one for each row of J"
+        return (slots, 2, 3), f"(impulse, moment of impulse) for each of {slots} bodies"
+    if kernel == "J" and type_.kind == "force":
+        count = max(1, size(checked_shape(value)) // (6 * slots))
+        return (slots, count, 6), f"a block of rows x 6 for each of {slots} bodies"
     if kernel == "switch":
         shape = (len(value),) if isinstance(value, tuple) and value else ()
         return shape, "one number, or a tuple of numbers"

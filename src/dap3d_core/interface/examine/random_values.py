@@ -5,7 +5,7 @@ import random
 from typing import Any
 
 from dap3d_core.interface.body_pose import BodyPose, pose
-from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
+from dap3d_core.interface.codegen.kernel_arguments import SEVERAL, KernelArgument
 from dap3d_core.interface.fields import FieldSpec
 
 
@@ -40,6 +40,8 @@ def random_value(shape: tuple[int, ...], rng: random.Random) -> Any:
 
 def random_quantity(quantity: KernelArgument, rng: random.Random) -> Any:
     """A random argument of a kernel: numbers, a table, or a function to be called."""
+    if quantity.derivative == SEVERAL:
+        return tuple(_random_line(rng) for _ in range(3))
     if quantity.derivative >= 0:
         a, b = rng.uniform(0.5, 1.5), rng.uniform(0.5, 1.5)
         return lambda x: a + b * x
@@ -47,6 +49,11 @@ def random_quantity(quantity: KernelArgument, rng: random.Random) -> Any:
         rows = [(float(k), *numbers(rng, quantity.columns - 1)) for k in range(3)]
         return [x for row in rows for x in row], 0, len(rows), (0.0,) * quantity.columns
     return random_value(quantity.shape, rng)
+
+
+def _random_line(rng: random.Random) -> Any:
+    a, b = rng.uniform(0.5, 1.5), rng.uniform(0.5, 1.5)
+    return lambda x: (a + b * x, b, 0.0, 0.0)
 
 
 def random_field(spec: FieldSpec, rng: random.Random) -> Any:
@@ -70,4 +77,6 @@ def random_field(spec: FieldSpec, rng: random.Random) -> Any:
         return float(math.ceil(low)) if spec.whole else value
     if spec.kind == "choice":
         return spec.choices[0]
-    return None if spec.kind == "function" else spec.kind
+    if spec.kind == "functions":
+        return ("f", "g", "h")
+    return None if spec.kind in ("function", "input") else spec.kind

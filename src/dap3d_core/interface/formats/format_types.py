@@ -1,6 +1,7 @@
 """Base classes of importers and exporters, and their hooks."""
 
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -39,8 +40,16 @@ class Source(Protocol):
     def include(self, name: str, place: Place, base: Path | None = None) -> XmlElement:
         """The root of another file that it names; a cycle is refused."""
 
-    def locate(self, uri: str, place: Place, base: Path | None = None) -> Path | None:
-        """The path of a file that it names, such as a mesh; None, with a remark, if not found."""
+    def including(self, name: str, base: Path | None = None) -> AbstractContextManager[None]:
+        """While what an included file holds is read: it must not include itself."""
+
+    def locate(
+        self, uri: str, place: Place, base: Path | None = None, *, required: bool = False
+    ) -> Path | None:
+        """The path of a file that it names, such as a mesh; None, with a remark, if not found.
+
+        With ``required`` it must be there.
+        """
 
     def mesh(self, path: Path, place: Place) -> tuple[Floats, Integers]:
         """Vertices (k, 3) and triangles (m, 3) of a mesh file."""

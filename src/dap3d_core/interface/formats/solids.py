@@ -45,17 +45,31 @@ def _capsule(r: float, length: float) -> tuple[float, Floats]:
     return volume, np.diag([across / volume, across / volume, along])
 
 
-def inertia_of_mesh(vertices: Floats, triangles: Integers) -> tuple[float, Floats, Floats]:
+def inertia_of_mesh(
+    vertices: Floats, triangles: Integers, *, all_positive: bool = False
+) -> tuple[float, Floats, Floats]:
     """Volume, mass centre, and inertia about it for a mass of 1, of a closed mesh.
 
-    The tetrahedra of all triangles and the origin are summed with their signs: M. Kallay,
-    "Computing the moment of inertia of a solid defined by a triangle mesh" (2006).
+    The tetrahedra of all triangles and an apex are summed with their signs: M. Kallay, "Computing
+    the moment of inertia of a solid defined by a triangle mesh" (2006).
+
+    Args:
+        vertices, triangles: of the mesh.
+        all_positive: the apex is the centroid of the surface, and all tetrahedra count as positive,
+            as MuJoCo does by default ("legacy"): triangles may then have any sense.
 
     Raises:
         ValueError: the mesh encloses no volume.
     """
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    apex = np.zeros(3)
+    if all_positive:
+        a, b, c = (vertices[triangles[:, k]] for k in range(3))
+        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        apex = areas @ (a + b + c) / (3.0 * areas.sum())
+    a, b, c = (vertices[triangles[:, k]] - apex for k in range(3))
     determinants = np.einsum("ij,ij->i", a, np.cross(b, c))
+    if all_positive:
+        determinants = np.abs(determinants)
     volume = float(determinants.sum()) / 6.0
     if not abs(volume) > 0.0:
         raise ValueError("the mesh encloses no volume")
@@ -63,7 +77,7 @@ def inertia_of_mesh(vertices: Floats, triangles: Integers) -> tuple[float, Float
     com = determinants @ total / (24.0 * volume)
     second = sum(np.einsum("i,ij,ik->jk", determinants, p, p) for p in (a, b, c, total))
     second = second / (120.0 * volume) - np.outer(com, com)
-    return volume, com, np.trace(second) * np.eye(3) - second
+    return volume, apex + com, np.trace(second) * np.eye(3) - second
 
 
 def inertia_moved(inertial: Inertial, frame: Frame) -> Inertial:

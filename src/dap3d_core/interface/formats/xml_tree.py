@@ -15,6 +15,8 @@ from dap3d_core.interface.formats.remarks import FormatError, Place
 
 #: Depth of nested elements beyond which a file is refused.
 DEEPEST = 200
+#: Larger numbers are refused: no length, mass or angle of a model is, and their powers overflow.
+LARGEST = 1e50
 #: Number of elements beyond which a file is refused.
 MOST_ELEMENTS = 500_000
 
@@ -95,7 +97,7 @@ def numbers_in(text: str, label: str, place: Place, count: int | None) -> tuple[
         values = tuple(map(float, text.split()))
     except ValueError:
         values = (math.nan,)
-    if (count is not None and len(values) != count) or not all(map(math.isfinite, values)):
+    if (count is not None and len(values) != count) or not all(abs(x) <= LARGEST for x in values):
         wanted = {None: "finite numbers", 1: "a finite number"}.get(
             count, f"{count} finite numbers"
         )

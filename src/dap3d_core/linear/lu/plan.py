@@ -1,6 +1,7 @@
 """The static elimination program of a block matrix that is not symmetric, but for its pattern.
 
-Nodes are bodies (positions and velocities together) and joints (the multipliers of both levels).
+Nodes are bodies (positions and velocities together), joints (the multipliers of both levels) and
+elements with states of their own.
 Joints and force elements couple bodies directly, too. The order is that of
 ordering/elimination_order.py with every body waiting like a hub: the cheapest node comes next, a
 joint of the spanning tree after its outboard body, a joint that closes a loop after the bodies of
@@ -8,6 +9,7 @@ its loop. So trees have no fill.
 """
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -32,7 +34,8 @@ class LuPlan:
         columns: (k, 4) neighbours eliminated later: place of the block below the diagonal, of the
             one to its right, first unknown, unknowns.
         updates: (u, 5) place of left and right factor and of the target, rows, columns.
-        body_first, joint_first: (bodies + 1,), (joint nodes,) first unknown.
+        body_first, joint_first, element_first: (bodies + 1,), (joint nodes,), (elements with
+            states,) first unknown.
         fill: blocks that are zero before the factorisation.
     """
 
@@ -43,6 +46,7 @@ class LuPlan:
     updates: Integers
     body_first: Integers
     joint_first: Integers
+    element_first: Integers
     fill: int
     _place: dict[tuple[int, int], int]
     _joint_count: int
@@ -61,11 +65,36 @@ class LuPlan:
         """Place of the diagonal block of joint node k."""
         return self._place[k, k]
 
+    def element_blocks(self, e: int, b: int) -> tuple[int, int]:
+        """Places of the blocks (states of element e, body b) and (body b, these)."""
+        own, body = self._element(e), self._joint_count - 1 + b
+        return self._place[own, body], self._place[body, own]
+
+    def element_block(self, e: int) -> int:
+        """Place of the diagonal block of the states of element e."""
+        return self._place[self._element(e), self._element(e)]
+
+    def joint_element_block(self, k: int, e: int) -> int:
+        """Place of the block of rows of joint node k and columns of the states of element e."""
+        return self._place[k, self._element(e)]
+
+    def _element(self, e: int) -> int:
+        return self._joint_count + len(self.body_first) - 1 + e
+
+
+class StateNode(NamedTuple):
+    """States of an element: how many, the bodies it acts on, and its joint node; -1 for none."""
+
+    size: int
+    bodies: tuple[int, ...]
+    joint: int = -1
+
 
 def make_lu_plan(
     body_count: int,
     nodes: Sequence[JointNode],
     coupled: Iterable[tuple[int, ...]],
+    elements: Sequence[StateNode] = (),
     reading: Iterable[tuple[int, int]] = (),
 ) -> LuPlan:
     """Find the elimination program.
@@ -74,10 +103,12 @@ def make_lu_plan(
         body_count: bodies without ground, numbered from 1.
         nodes: joint nodes, as ordering/elimination_order.py merges joints.
         coupled: bodies of each element that couples them directly, ground (0) allowed.
+        elements: those with states of their own.
         reading: joint nodes, and bodies on which an element acts that reads their multipliers.
     """
     joints = len(nodes)
     sizes = [ROW_SIZE * node.rows for node in nodes] + [BODY_SIZE] * body_count
+    sizes += [element.size for element in elements]
     neighbours: list[set[int]] = [set() for _ in sizes]
     of_body: list[list[int]] = [[] for _ in range(body_count + 1)]
     for k, node in enumerate(nodes):
@@ -92,15 +123,26 @@ def make_lu_plan(
     for k, b in reading:
         neighbours[k].add(joints + b - 1)
         neighbours[joints + b - 1].add(k)
+    for e, element in enumerate(elements, start=joints + body_count):
+        for other in (*(joints + b - 1 for b in element.bodies if b), element.joint):
+            if other >= 0:
+                neighbours[e].add(other)
+                neighbours[other].add(e)
     before = sum(len(others) for others in neighbours)
     waits = _waits(nodes, of_body, range(1, body_count + 1)) if nodes else {}
     order, below = _eliminate(neighbours, sizes, waits)
-    return _lay_out(sizes, order, below, joints, before)
+    return _lay_out(sizes, order, below, joints, before, len(elements))
 
 
 def _lay_out(
-    sizes: Sequence[int], order: Sequence[int], below: dict[int, set[int]], joints: int, before: int
+    sizes: Sequence[int],
+    order: Sequence[int],
+    below: dict[int, set[int]],
+    joints: int,
+    before: int,
+    elements: int,
 ) -> LuPlan:
+    end = len(sizes) - elements
     rank = {node: k for k, node in enumerate(order)}
     first = [0] * len(sizes)
     place: dict[tuple[int, int], int] = {}
@@ -134,8 +176,9 @@ def _lay_out(
         nodes=np.array(rows, dtype=np.int64).reshape(-1, 5),
         columns=np.array(columns, dtype=np.int64).reshape(-1, 4),
         updates=np.array(updates, dtype=np.int64).reshape(-1, 5),
-        body_first=np.array([0, *first[joints:]], dtype=np.int64),
+        body_first=np.array([0, *first[joints:end]], dtype=np.int64),
         joint_first=np.array(first[:joints], dtype=np.int64),
+        element_first=np.array(first[end:], dtype=np.int64),
         fill=2 * len(columns) - before,
         place=place,
         joint_count=joints,

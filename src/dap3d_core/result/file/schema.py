@@ -42,6 +42,7 @@ NAMES = {
     "joint": "names of the joints",
     "point": "names of the points; animation points come last",
     "element_state": "names of the states of their own of forces and joints",
+    "input": "names of the inputs",
     "axis": "axes of a vector",
     "euler": "Euler parameters, body to global",
 }
@@ -123,8 +124,7 @@ def define(
         "axis_2": AXES,
         "euler": EULER,
         **{name: range(size) for name, size in column_sizes(summary).items()},
-        "joint": summary.joint_names,
-        "point": summary.point_names,
+        **{kind: getattr(summary, f"{kind}_names") for kind in ("joint", "point", "input")},
         "element_state": summary.state_names,
     }
     dataset.createDimension("time", nt or None)

@@ -151,16 +151,26 @@ def are_events(value: Any) -> bool:
 
 
 def _is_event(value: Mapping[str, Any]) -> bool:
-    changes, u = value.get("changes", {}), value.get("u")
+    changes = value.get("changes", {})
     return (
         isinstance(value.get("name"), str)
         and is_number(value.get("t"))
-        and value.get("direction") in (-1, 1)
+        and value.get("direction") in ((-1, 0, 1) if value.get("kind") == "jump" else (-1, 1))
         and value.get("kind") in KINDS
-        and (u is None or (isinstance(u, list) and all(map(is_number, u))))
-        and isinstance(changes, dict)
-        and all(isinstance(v, dict) and _is_plain(v) for v in changes.values())
+        and all(_is_state(value.get(name)) for name in ("u", "u_after"))
+        and is_number(value.get("work", 0.0))
+        and all(_are_values(values) for values in (changes, value.get("states", {})))
     )
+
+
+def _are_values(values: Any) -> bool:
+    return isinstance(values, dict) and all(
+        isinstance(v, dict) and _is_plain(v) for v in values.values()
+    )
+
+
+def _is_state(u: Any) -> bool:
+    return u is None or (isinstance(u, list) and all(map(is_number, u)))
 
 
 def _are_sources(value: Any) -> bool:

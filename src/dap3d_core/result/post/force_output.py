@@ -48,6 +48,7 @@ def force_output(
     angles: Floats | None,
     actuation: Floats | None = None,
     states: Floats | None = None,
+    inputs: Floats | None = None,
 ) -> ForceOutput:
     """Evaluates a force element.
 
@@ -63,6 +64,7 @@ def force_output(
         states: (nt, s) states of elements; None for their initial values.
         actuation: (nt,) what takes the place of the field that its type ``actuates``; the element
             has no potential then.
+        inputs: (nt, k) inputs; None for those that the evaluator has.
 
     Raises:
         UnknownNameError: the element acts on every body or in a joint.
@@ -73,7 +75,7 @@ def force_output(
     force, energy = np.zeros_like(evaluator.system.force), np.zeros(1)
     out, potential = np.zeros((len(t), len(bodies), 6)), np.zeros(len(t))
     minus_lambda = np.zeros_like(evaluator.system.multipliers)
-    for k, time in place_at(evaluator, t, u, states):
+    for k, time in place_at(evaluator, t, u, states, inputs):
         if angles is None:
             loops.call("angle", time, force)
         else:

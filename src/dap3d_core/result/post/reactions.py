@@ -60,28 +60,33 @@ class Reaction:
         return self.moment - np.cross(to_global(self.p, self.local), self.force)
 
 
-def rows_at(evaluator: "Evaluator", t: Floats, u: Floats) -> Iterator["ConstraintRows"]:
-    """Yields the constraint rows at each instant."""
-    for time, state in zip(t, u, strict=True):
-        yield evaluator.rows(time, state)
+def rows_at(
+    evaluator: "Evaluator", t: Floats, u: Floats, inputs: Floats
+) -> Iterator["ConstraintRows"]:
+    """Yields the constraint rows at each instant, with inputs (nt, k)."""
+    with evaluator.held_inputs():
+        for time, state, values in zip(t, u, inputs, strict=True):
+            evaluator.set_inputs(values)
+            yield evaluator.rows(time, state)
 
 
-def jacobians(evaluator: "Evaluator", t: Floats, u: Floats) -> Any:
+def jacobians(evaluator: "Evaluator", t: Floats, u: Floats, inputs: Floats) -> Any:
     """The constraint Jacobian D of C(q, t) at each reported instant, D v = nu (spec 2).
 
     Args:
         evaluator: evaluates the model.
         t: (nt,) s.
         u: (nt, 13 n) states.
+        inputs: (nt, k).
 
     Returns:
         (nt, m, 6 n) array; beyond 1000 rows a list of nt scipy CSR arrays (m, 6 n).
     """
     model = evaluator.model
     if model.row_count > DENSE_ROWS:
-        return [rows.sparse() for rows in rows_at(evaluator, t, u)]
+        return [rows.sparse() for rows in rows_at(evaluator, t, u, inputs)]
     D = np.zeros((len(t), model.row_count, 6 * model.body_count))
-    for k, rows in enumerate(rows_at(evaluator, t, u)):
+    for k, rows in enumerate(rows_at(evaluator, t, u, inputs)):
         D[k] = rows.dense()
     return read_only(D)
 
@@ -95,6 +100,7 @@ def reactions(
     joints: Collection[int],
     angles: Floats | None = None,
     states: Floats | None = None,
+    inputs: Floats | None = None,
 ) -> dict[int, dict[str, Reaction]]:
     """Reactions of joints on each of their bodies: D_slot^T lambda (spec 2).
 
@@ -106,13 +112,14 @@ def reactions(
         joints: indices of the joints in the model.
         angles: (nt, k) angles as in ``Arrays``; None if unknown.
         states: (nt, s) states of elements; None for their initial values.
+        inputs: (nt, k) inputs; None for those that the evaluator has.
 
     Returns:
         For each joint a reaction for each slot, by its letter.
     """
     loops = _joint_loops(evaluator, np.array(list(joints), dtype=np.int64))
     wrenches = [np.empty((len(t), *loop.shape)) for loop in loops]
-    for k, time in place_at(evaluator, t, u, states):
+    for k, time in place_at(evaluator, t, u, states, inputs):
         for loop, out in zip(loops, wrenches, strict=True):
             if angles is not None:
                 loop.parameters.set_angles(angles[k])
@@ -125,19 +132,26 @@ def reactions(
 
 
 def place_at(
-    evaluator: "Evaluator", t: Floats, u: Floats, states: Floats | None = None
+    evaluator: "Evaluator",
+    t: Floats,
+    u: Floats,
+    states: Floats | None = None,
+    inputs: Floats | None = None,
 ) -> Iterator[tuple[int, float]]:
-    """Sets bodies, states and functions to each instant in turn; yields its index and time."""
+    """Sets bodies, states, functions and inputs to each instant; yields its index and time."""
     from dap3d_core.assembly.arrays import VALUE
     from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 
     s = evaluator.system
-    for k, y in enumerate(evaluator.integrated(u) if len(t) else ()):
-        time = float(t[k])
-        place_bodies(y, s.body, s.metric)
-        s.states[:] = evaluator.states if states is None else states[k]
-        call_kinds(VALUE, VALUE, time, s, evaluator.loops, s.force, s.force, s.force)
-        yield k, time
+    with evaluator.held_inputs():
+        for k, y in enumerate(evaluator.integrated(u) if len(t) else ()):
+            time = float(t[k])
+            if inputs is not None:
+                evaluator.set_inputs(inputs[k])
+            place_bodies(y, s.body, s.metric)
+            s.states[:] = evaluator.states if states is None else states[k]
+            call_kinds(VALUE, VALUE, time, s, evaluator.loops, s.force, s.force, s.force)
+            yield k, time
 
 
 def actions_of(

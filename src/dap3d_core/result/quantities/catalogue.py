@@ -39,8 +39,8 @@ class Quantity(NamedTuple):
         label: what it is in words: "velocity of crank, z".
         unit: SI unit, "1" for none, "SI" where it depends on the row.
         components: names of the columns; empty for (nt,).
-        owner: "body", "point", "joint", "force" or "output"; "coordinate" for one of a joint; ""
-            for one of the whole system.
+        owner: "body", "point", "joint", "force", "input" or "output"; "coordinate" for one of a
+            joint, "state" for one of its own of a joint or a force; "" for one of the whole system.
         rate: name of the quantity that is its time derivative, "" for none.
         operands: names of the quantities that an output is computed from.
     """

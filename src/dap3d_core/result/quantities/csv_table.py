@@ -136,7 +136,7 @@ def _write(
         rows = slice(start, start + size)
         block = np.column_stack([column.values[rows] for column in columns])
         if jacobian:
-            D = jacobians(result.evaluator, result.t[rows], result.u[rows])
+            D = jacobians(result.evaluator, result.t[rows], result.u[rows], result.inputs[rows])
             block = np.hstack([block, D.reshape(len(D), -1)])
         writer.writerows(block.tolist())  # repr of a float: reading gives the same number
 

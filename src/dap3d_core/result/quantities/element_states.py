@@ -35,6 +35,6 @@ def state_quantity(
     label = f"{state} of {owner.label}" + (f", {component}" if component else "")
     if component or "" in columns:
         values = source.arrays.states[:, columns[component]]
-        return Quantity(name, values, state, label, "SI", (), owner.kind)
+        return Quantity(name, values, state, label, "SI", (), "state")
     values = source.arrays.states[:, list(columns.values())]
-    return Quantity(name, values, state, label, "SI", tuple(columns), owner.kind)
+    return Quantity(name, values, state, label, "SI", tuple(columns), "state")

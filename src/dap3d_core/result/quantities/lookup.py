@@ -48,7 +48,7 @@ def find(result: QuantitySource, name: str) -> Quantity:
             their numbers from 1; ``FORCE.`` or ``FORCE.SLOT.`` the actions as of
             a joint; ``FORCE.`` length length_rate tension energy; energy.kinetic .potential .total;
             work; ``NAME.actuation`` of actuators of inverse dynamics; constraint.position
-            .velocity .acceleration; t; outputs of the scene.
+            .velocity .acceleration; t; inputs and outputs of the scene.
 
     Raises:
         UnknownNameError: there is no such quantity; names the nearest.
@@ -63,6 +63,9 @@ def find(result: QuantitySource, name: str) -> Quantity:
             settings = result.record.settings
             label, unit = settings.get("over") or label, settings.get("over_unit") or unit
         return Quantity(name, values(result), label, label, unit, ())
+    if name in result.summary.input_names:
+        column = result.arrays.inputs[:, result.summary.input_names.index(name)]
+        return Quantity(name, column, "input", f"input {name}", "1", (), "input")
     for kinds in (NAMED, ("force",)):
         for owner, attribute, component in _parsed(result, name, kinds):
             if owner.kind == "joint" and not component and COORDINATE.fullmatch(attribute):
@@ -241,7 +244,7 @@ def _unknown(result: QuantitySource, name: str) -> UnknownNameError:
         return UnknownNameError(f"the output {parts[0]} has {components}, not {name!r}")
     heads = [n for n in SYSTEM if n.startswith(f"{parts[0]}.")]
     if heads or len(parts) == 1:
-        known = (*SYSTEM, *result.outputs)
+        known = (*SYSTEM, *result.summary.input_names, *result.outputs)
         choices = heads or ["BODY.r", "BODY.w.z", "POINT.v", "JOINT.force.norm", *known]
         fault = f"there is no quantity {name!r}; there are {', '.join(choices)}"
         return UnknownNameError(fault, nearest(name, known))
@@ -303,7 +306,8 @@ def names_of(result: QuantitySource, begin: str = "") -> list[str]:
         Whole names, and names of owners, which end in a dot.
     """
     owners = [name for indices in _indices(result).values() for name in indices]
-    names = [*(f"{name}." for name in owners), *SYSTEM, *result.outputs]
+    known = (*SYSTEM, *result.summary.input_names, *result.outputs)
+    names = [*(f"{name}." for name in owners), *known]
     head = begin.rpartition(".")[0]
     if head in result.outputs:
         names += [f"{head}.{one}" for one in _with_norm(find(result, head).components)]

@@ -190,7 +190,7 @@ def _add_jacobian(file: Any, result: "Result") -> None:
         if name not in file.dimensions:
             file.createDimension(name, size)
     variable = None
-    for k, rows in enumerate(rows_at(result.evaluator, result.t, result.u)):
+    for k, rows in enumerate(rows_at(result.evaluator, result.t, result.u, result.inputs)):
         if variable is None and sparse:
             file.createDimension("entry", len(rows.value))
             for name, places in (("row", rows.row), ("column", rows.column)):

@@ -22,9 +22,9 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
     """A result as an xarray.Dataset.
 
     Returns:
-        Dimensions time, body, point, axis, euler, state, velocity, row, joint; coordinates t (s)
-        as ``time``, and names; each variable with ``units`` and ``long_name``; the attributes of
-        the file. Jacobian and reactions are left out: they need the model.
+        Dimensions time, body, point, axis, euler, state, velocity, row, joint, input; coordinates
+        t (s) as ``time``, and names; each variable with ``units`` and ``long_name``; the attributes
+        of the file. Jacobian and reactions are left out: they need the model.
     """
     import xarray
 
@@ -57,6 +57,7 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
         "joint": summary.joint_names,
         "axis": AXES,
         "euler": EULER,
+        **({"input": summary.input_names} if summary.input_names else {}),
     }
     if summary.state_names:
         labels[STATES] = summary.state_names

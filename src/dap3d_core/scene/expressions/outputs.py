@@ -10,7 +10,7 @@ from dap3d_core.scene.validate.coerce_values import Fault
 from dap3d_core.scene.validate.mistake_collector import Collector
 
 #: Tables whose parts have quantities: an output has another name.
-OWNERS = ("bodies", "points", "joints", "forces")
+OWNERS = ("bodies", "points", "joints", "forces", "inputs")
 #: Names of dimensions and variables of every data set.
 DIMENSIONS = ("time", "point", "axis", "euler", "status", "note")
 #: Outputs that name outputs that name outputs ...: longest chain.
@@ -22,7 +22,7 @@ def read_outputs(report: Collector) -> dict[str, Expression]:
     expressions = {}
     for name, value in report.scene.outputs.items():
         key = ("outputs", str(name))
-        if fault := _fault_of_name(report.scene, name):
+        if fault := fault_of_quantity(report.scene, name):
             report.add(key, name, f"not a name for an output: {fault}")
         expression = report.read(key, value, read_expression)
         if not isinstance(expression, Fault):
@@ -42,13 +42,20 @@ def outputs_of(outputs: Mapping[str, Any]) -> dict[str, Expression]:
     return expressions
 
 
-def _fault_of_name(scene: Scene, name: Any) -> str:
-    """The reason why something cannot name an output; "" where it can."""
+def fault_of_quantity(scene: Scene, name: Any, but: str = "") -> str:
+    """The reason why something cannot name an output or an input; "" where it can.
+
+    Args:
+        scene: the scene.
+        name: the name.
+        but: the table that it stands in.
+    """
     if fault := fault_of_name(name) or fault_of_word(name):
         return fault
     if name in DIMENSIONS:
         return "data sets have a dimension or a variable of this name"
-    table = next((table for table in OWNERS if name in getattr(scene, table)), None)
+    tables = (table for table in OWNERS if table != but)
+    table = next((table for table in tables if name in getattr(scene, table)), None)
     return f"there is one of this name in {table} already" if table else ""
 
 

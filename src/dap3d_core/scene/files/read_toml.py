@@ -105,7 +105,7 @@ def scene_of(data: dict[str, Any]) -> Scene:
         named = getattr(scene, table)
         for name, content in _table(mistakes, (table,), data.get(table, {})).items():
             named[name] = _entry(mistakes, (table, name), content, class_)
-    for table in ("parameters", "outputs"):
+    for table in ("requires", "parameters", "outputs"):
         content = _table(mistakes, (table,), data.get(table, {}))
         setattr(scene, table, {name: plain(value) for name, value in content.items()})
     scene.animation = _animation(mistakes, data.get("animation", {}))

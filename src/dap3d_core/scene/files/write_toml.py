@@ -29,6 +29,7 @@ def to_toml(scene: Scene) -> str:
         raise SceneError(m for _, m in scene.faults)
     header = {"name": scene.name, "description": scene.description, "schema": scene.schema}
     lines = _table("scene", ((k, v) for k, v in header.items() if v != ""))
+    lines += _table("requires", scene.requires.items(), needed=False)
     lines += _table("parameters", scene.parameters.items(), needed=False)
     for table in NAMED:
         for name, entry in getattr(scene, table).items():

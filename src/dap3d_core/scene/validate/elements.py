@@ -91,10 +91,18 @@ class Reader:
         self.body_names = (GROUND, *geometry.bodies.body_names)
         self.slots = () if getattr(type_info.type, "each_body", False) else type_info.layout.slots
         self.function_index = {name: k for k, name in enumerate(report.scene.functions, 1)}
+        #: Rows of F: those of functions, then those of inputs.
+        self.rows = {
+            "function": self.function_index,
+            "input": {
+                n: k for k, n in enumerate(report.scene.inputs, 1 + len(self.function_index))
+            },
+        }
         specs = {n: s for n, s in specs_of(type_info.type).items() if s.given}
         takes_ends = ENDS[0] not in specs and any(s.kind == "vector2" for s in specs.values())
         self.ends = ENDS if takes_ends else ()
         self.fields = [self._field(name, spec) for name, spec in specs.items()]
+        self.kinds = {name: spec.kind for name, spec in specs.items()}
         self.known = dict.fromkeys([*specs, *self.ends])
         # Bodies and points that may be left out follow from the other fields of their slot.
         self.late = [
@@ -133,7 +141,7 @@ class Reader:
                 values[field.name] = ZERO if is_point else self.body_names[bodies[field.slot]]
         type_info = self.type_info.chosen(values) if self.type_info.variants else self.type_info
         functions = tuple(
-            [self.function_index.get(values[name], 0) for name in type_info.layout.functions]
+            [self.rows[self.kinds[n]].get(values[n], 0) for n in type_info.layout.functions]
         )
         others = tuple([reading.others[name] for name in type_info.layout.others])
         return Instance(element.name, type_info, bodies, functions, values, others)
@@ -234,13 +242,36 @@ class _Reading:
     def function(self, field: _Field, value: Any) -> None:
         self.name_of(field, value, self.reader.function_index)
 
+    def functions(self, field: _Field, value: Any) -> None:
+        """Several functions by name."""
+        declared = self.reader.function_index
+        self.values[field.name] = value
+        if type(value) is not tuple or not value:
+            remedy = f'write {field.name} = ["{value}"]' if value in declared else ""
+            self.refuse(field.name, "should be a list of names of functions", remedy=remedy)
+            return
+        for name in value:
+            if not (isinstance(name, str) and name in declared):
+                self.refuse(field.name, *missing_words(self.report, "function", name, declared))
+
+    def input(self, field: _Field, value: Any) -> None:
+        other = field.spec.instead_of
+        if value is not None and self.element.fields.get(other) is not None:
+            self.refuse(field.name, f"give {other} or {field.name}, not both")
+        is_function = isinstance(value, str) and value in self.reader.function_index
+        remedy = f"{value} is a function, not one of [inputs]" if is_function else ""
+        self.name_of(field, value, self.report.scene.inputs, remedy)
+
     def joint(self, field: _Field, value: Any) -> None:
         self.name_of(field, value, self.report.scene.joints)
 
-    def name_of(self, field: _Field, value: Any, declared: dict[str, Any]) -> None:
+    def name_of(
+        self, field: _Field, value: Any, declared: dict[str, Any], remedy: str = ""
+    ) -> None:
         self.values[field.name] = value
         if value is not None and not (isinstance(value, str) and value in declared):
-            self.refuse(field.name, *missing_words(self.report, field.spec.kind, value, declared))
+            words, near, other = missing_words(self.report, field.spec.kind, value, declared)
+            self.refuse(field.name, words, near, other or remedy)
 
     def value(self, field: _Field, value: Any) -> None:
         """A number, a list of numbers, a matrix or a word."""
@@ -321,13 +352,21 @@ _FIELD_READERS = {
     "vector": _Reading.vector,
     "vector2": _Reading.vector2,
     "function": _Reading.function,
+    "functions": _Reading.functions,
+    "input": _Reading.input,
     "joint": _Reading.joint,
 }
 
 
+def combines(type_info: TypeInfo) -> bool:
+    """True if a type of function combines other functions."""
+    return any(spec.kind == "functions" for spec in specs_of(type_info.type).values())
+
+
 def _of(field: _Field) -> str:
     """The kind and the description of a field, for the message that it is missing."""
-    kinds = {"vec3": "3 numbers", "matrix": "3x3 numbers", "choice": "a word", "table": "numbers"}
+    kinds = {"vec3": "3 numbers", "matrix": "3x3 numbers", "choice": "a word", "table": "numbers",
+             "functions": "names", "input": "an input"}  # fmt: skip
     kind = kinds.get(field.spec.kind, f"a {field.spec.kind}")
     return f" ({kind}: {field.spec.doc})" if field.spec.doc else f" ({kind})"
 

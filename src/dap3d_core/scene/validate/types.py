@@ -22,13 +22,18 @@ class Types:
         report: takes mistakes and notes; its scene is read.
         registry: the installed types.
         allow_code: whether the model's own file may be run.
+        to_install: the command that installs distributions which the scene requires; "" if none
+            lacks.
 
     Attributes:
         registry: the one in use; with the types of the model's own file once that was loaded.
     """
 
-    def __init__(self, report: Collector, registry: Registry, *, allow_code: bool) -> None:
+    def __init__(
+        self, report: Collector, registry: Registry, *, allow_code: bool, to_install: str = ""
+    ) -> None:
         self.report, self.registry, self.allow_code = report, registry, allow_code
+        self.to_install = to_install
         folder = report.scene.folder
         file = folder / PLUGIN_FILE if folder is not None else None
         self.file: Path | None = file if file is not None and file.is_file() else None
@@ -68,6 +73,8 @@ class Types:
             what, remedy = str(error), "allow it with --allow-code (allow_code=True in Python)"
         except UnknownTypeError as error:
             what = str(error) + (f"; {self._refused}" if self._refused else "")
+            if self.to_install:
+                remedy = f"the scene requires packages that are missing: {self.to_install}"
         except PluginError as error:
             what = str(error)
         what += f" ({count} more elements of this type)" if count else ""

@@ -12,6 +12,8 @@ from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene
 
 if TYPE_CHECKING:
     from dap3d_core.scene.validate.bodies import Bodies
+    from dap3d_core.scene.validate.geometry import Geometry
+    from dap3d_core.scene.validate.types import Types
 
 
 def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> ValidatedScene:
@@ -39,8 +41,8 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     _check_names(report)
     bodies = read_bodies(report)
     geometry = read_geometry(report, bodies)
-    types = Types(report, registry, allow_code=allow_code)
-    functions = read_elements(report, geometry, "functions", types.of("functions"))
+    types = Types(report, registry, allow_code=allow_code, to_install=_check_requires(report))
+    inputs, functions = _read_signals(report, geometry, types)
     joints = read_elements(report, geometry, "joints", types.of("joints"))
     forces = read_elements(report, geometry, "forces", types.of("forces"))
     report_twins(report, "joints", joints)
@@ -52,7 +54,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
 
     types.note_unused_file()
     _note_loose_bodies(report, bodies, [*joints, *forces])
-    _note_unused_functions(report, [*joints, *forces])
+    _note_unused_signals(report, [*joints, *forces], functions)
     notes = [*report.notes(), *notes_of(scene.simulation), *types.registry.notes]
     return ValidatedScene(
         scene=scene,
@@ -65,6 +67,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
         joints=joints,
         forces=forces,
         functions=functions,
+        inputs=inputs,
         notes=notes,
     )
 
@@ -78,6 +81,34 @@ def _check_names(report: Collector) -> None:
             if fault := fault_of_name(name):
                 key = (table, str(name))
                 report.add(key, name, f"not a name for one of the {table}: {fault}")
+
+
+def _read_signals(
+    report: Collector, geometry: "Geometry", types: "Types"
+) -> tuple[dict[str, float], list[Instance]]:
+    """Inputs, and functions with those that they combine."""
+    from dap3d_core.scene.validate.elements import combines, read_elements
+
+    inputs = {}
+    if report.scene.inputs:
+        from dap3d_core.scene.signals.inputs import read_inputs
+
+        inputs = read_inputs(report)
+    functions = read_elements(report, geometry, "functions", types.of("functions"))
+    if any(combines(function.type_info) for function in functions):
+        from dap3d_core.scene.signals.combinations import combine_functions
+
+        functions = combine_functions(report, functions)
+    return inputs, functions
+
+
+def _check_requires(report: Collector) -> str:
+    """Check the distributions that the scene requires; the command that installs what lacks."""
+    if not report.scene.requires:
+        return ""
+    from dap3d_core.scene.requirements import read_requirements
+
+    return read_requirements(report)
 
 
 def _check_shapes_and_outputs(report: Collector, bodies: "Bodies") -> None:
@@ -102,10 +133,17 @@ def _note_loose_bodies(report: Collector, bodies: "Bodies", elements: list[Insta
             report.note(f"bodies.{name}: no joint and no force acts on it", "bodies left alone")
 
 
-def _note_unused_functions(report: Collector, elements: list[Instance]) -> None:
+def _note_unused_signals(
+    report: Collector, elements: list[Instance], functions: list[Instance]
+) -> None:
     used = {index for e in elements for index in e.functions}
     called = {e.values[field] for e in elements for field in e.type_info.argument_functions}
+    called |= {term.name for function in functions for term in function.terms}
     for index, name in enumerate(report.scene.functions, 1):
         if index not in used and name not in called:
             key = dotted(("functions", name))
             report.note(f"{key}: no joint and no force uses it", "functions left unused")
+    if report.scene.inputs:
+        from dap3d_core.scene.signals.inputs import note_unread_inputs
+
+        note_unread_inputs(report, elements)

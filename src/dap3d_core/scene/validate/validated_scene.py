@@ -26,12 +26,13 @@ class Instance:
         bodies: body index of each slot of ``type_info.layout.slots`` (ground 0); empty for an
             element that acts on each body.
         functions: for each of ``type_info.layout.functions`` 0 where absent, else 1 + its index
-            in the functions of the scene.
+            in the functions of the scene, behind which its inputs follow.
         others: body index of each of ``type_info.layout.others``, vectors that no slot belongs to.
         values: field -> plain value. Points and vectors: 3 numbers on their body, vectors of unit
             length; a vector2 gives the two points ``P_i`` and ``P_j``; numbers: floats, or None
             where ``prepare`` returns them; vec3, table: tuples; matrix: three rows; references to
-            bodies, functions and joints: words; choices: words, False or True.
+            bodies, functions, inputs and joints: words; choices: words, False or True.
+        terms: of a function that combines functions, those.
     """
 
     name: str
@@ -40,6 +41,13 @@ class Instance:
     functions: tuple[int, ...]
     values: dict[str, Any]
     others: tuple[int, ...] = ()
+    terms: tuple["Instance", ...] = ()
+
+    @property
+    def structure(self) -> Any:
+        """What instances of one group loop have in common: the type, and those of its terms."""
+        terms = tuple(term.structure for term in self.terms)
+        return (self.type_info.type, terms) if terms else self.type_info.type
 
 
 @attrs.frozen(eq=False)
@@ -62,6 +70,7 @@ class ValidatedScene:
         point_local: (points, 3) coordinates on that body, m.
         animation_count: number of animation points among the points.
         joints, forces, functions: in file order.
+        inputs: value of each input at the start of a run, by name, in file order.
         notes: changes, assumptions and unusual values; none of them stops a run.
     """
 
@@ -82,4 +91,5 @@ class ValidatedScene:
     joints: list[Instance]
     forces: list[Instance]
     functions: list[Instance]
+    inputs: dict[str, float]
     notes: list[str]

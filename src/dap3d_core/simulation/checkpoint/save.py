@@ -144,6 +144,8 @@ def checkpoint_of(run: RunState) -> Checkpoint:
     }
     if run.event_locator is not None:
         header["events"] = run.event_locator.state()
+    if run.jumps is not None:
+        header["jumps"] = run.jumps.state()
     return Checkpoint(json.loads(to_json(header)), arrays_of(run))
 
 
@@ -158,4 +160,6 @@ def arrays_of(run: RunState) -> dict[str, NDArray[Any]]:
         found["start.u"] = run.start.u
         if run.start.angles is not None:
             found["start.angles"] = run.start.angles
+        if run.start.states is not None:
+            found["start.states"] = run.start.states
     return found | {f"system.{name}": getattr(run.evaluator.system, name) for name in CHECKPOINTED}

@@ -35,6 +35,7 @@ class Equilibrium:
         u: (13 n,) the state: r, p, zero velocities.
         r, p: (n, 3) positions, m; (n, 4) Euler parameters.
         angles: (angles,) angles whose turns are counted, rad, in the order of the model.
+        states: (s,) states of elements, in the order of the model.
         Lam: (m,) Lagrange multipliers; those of least norm where they are not unique.
         unbalanced: (n, 6) force, N, and moment about the mass centre, N m, left on each body.
         residual: largest of these as a part of the largest force or moment on a body: rounding.
@@ -55,6 +56,7 @@ class Equilibrium:
         self.u, self.Lam = read_only(rest.u), read_only(rest.multipliers)
         self.r, self.p, _, _ = split(self.u)
         self.angles = read_only(rest.angles)
+        self.states = read_only(rest.states)
         self.unbalanced = read_only(rest.unbalanced)
         self.residual = rest.search.pose.residual
         evaluator = compiled.evaluator
@@ -79,8 +81,10 @@ class Equilibrium:
         model = self.compiled.model
         angles = dict(zip(model.angle_names, self.angles.tolist(), strict=True))
         note = f"{INFORMATION}the start is an equilibrium"
+        names = [name for state in model.element_states for name in state.labels]
+        states = dict(zip(names, self.states.tolist(), strict=True))
         return NamedState(str(self.compiled.scene.name) or "the equilibrium", model.body_names,
-                          self.u, angles, (note,))  # fmt: skip
+                          self.u, angles, (note,), states=states)  # fmt: skip
 
     def reaction(self, joint: str) -> Mapping[str, Reaction]:
         """Reaction of a joint on each of its bodies, ground included: D^T lambda.
@@ -100,7 +104,7 @@ class Equilibrium:
             raise unknown("joint", joint, names)
         k = names.index(joint)
         found = reactions(self.compiled.evaluator, np.zeros(1), self.u[None], self.Lam[None], [k],
-                          self.angles[None])[k]  # fmt: skip
+                          self.angles[None], self.states[None])[k]  # fmt: skip
         return {
             slot: attrs.evolve(r, force=r.force[0], moment=r.moment[0], p=r.p[0])
             for slot, r in found.items()
@@ -118,6 +122,10 @@ class Equilibrium:
         for body, r, p in zip(scene.bodies.values(), self.r.tolist(), self.p.tolist(), strict=True):
             body.r, body.p = tuple(r), tuple(p)
             body.r_dot = body.w = (0.0, 0.0, 0.0)
+        for state in self.compiled.model.element_states:
+            values = self.states[state.first : state.first + state.length].tolist()
+            element = getattr(scene, f"{state.kind}s")[state.element]
+            element.fields[f"{state.name}_0"] = values[0] if state.length == 1 else tuple(values)
         scene.simulation.start = "scene"
         changed = self._changed_references(scene)
         if changed:
@@ -189,5 +197,5 @@ def equilibrium(
         )
     with compiled.borrow_evaluator() as evaluator:
         first = compiled.start(True, settings.hold, str(settings.correct_metric), state)
-        rest = find_rest(evaluator, first.u, first.angles)
+        rest = find_rest(evaluator, first.u, first.angles, first.states)
         return Equilibrium(compiled, rest, tuple(compiled.notes))

@@ -30,6 +30,7 @@ class Rest:
     Attributes:
         u: (13 n,) the state, without velocities.
         angles: (angles,) angles whose turns are counted, rad.
+        states: (s,) states of elements.
         multipliers: (rows,) lambda, those of least norm where they are not unique.
         unbalanced: (n, 6) force, N, and moment about the mass centre, N m, of forces and reactions
             together on each body.
@@ -39,6 +40,7 @@ class Rest:
 
     u: Floats
     angles: Floats
+    states: Floats
     multipliers: Floats
     unbalanced: Floats
     search: Search
@@ -46,19 +48,27 @@ class Rest:
     notes: tuple[str, ...]
 
 
-def find_rest(evaluator: Evaluator, u: Floats, angles: Floats | None = None) -> Rest:
+def find_rest(
+    evaluator: Evaluator,
+    u: Floats,
+    angles: Floats | None = None,
+    states: Floats | None = None,
+) -> Rest:
     """The equilibrium that a model comes to from a state u (13 n,) on the constraints.
 
     Args:
         evaluator: the model.
         u: the state; its velocities are left out.
         angles: (angles,) from which turns are counted on; None where they begin at zero.
+        states: (s,) states of elements to begin with; None for their initial values.
 
     Raises:
         SimulationError: there is none, or none was found; names what gives way.
     """
-    evaluator.start(0.0, u, angles)
+    evaluator.start(0.0, u, angles, states)
     search = search_equilibrium(evaluator, u)
+    if evaluator.model.state_count:
+        search = _with_states(evaluator, search)
     if search.outcome is not Outcome.BALANCED:
         raise SimulationError(failure(search, evaluator.model))
     statics, pose = Statics(evaluator), search.pose
@@ -72,12 +82,34 @@ def find_rest(evaluator: Evaluator, u: Floats, angles: Floats | None = None) -> 
     return Rest(
         pose.u,
         evaluator.counted_angles(0.0, pose.u),
+        evaluator.states.copy(),
         multipliers,
         (force + D.T @ multipliers).reshape(-1, 6),
         search,
         stability,
         (*findings(search, stability, evaluator.model), *assumptions(evaluator, u, rows)),
     )
+
+
+def _with_states(evaluator: Evaluator, search: Search) -> Search:
+    """The search, its pose such that the states of elements are at rest as well.
+
+    Raises:
+        SimulationError: states do not come to rest; names them.
+    """
+    from dap3d_core.simulation.equilibrium.states_at_rest import find_together, moving_states
+
+    moving = moving_states(evaluator, 0.0, search.pose.u)
+    if not moving:
+        return search
+    statics = Statics(evaluator)
+    statics.settles = False
+    found = find_together(statics, search.pose)
+    if found is None:
+        names = ", ".join(f"{state.element}.{state.name}" for state in moving)
+        raise SimulationError(f"no equilibrium: the rate of {names} vanishes neither for any "
+                              "value of the state nor at another pose")  # fmt: skip
+    return attrs.evolve(search, pose=found, outcome=Outcome.BALANCED)
 
 
 def start_at_rest(evaluator: Evaluator, u: Floats) -> StartState:
@@ -89,4 +121,4 @@ def start_at_rest(evaluator: Evaluator, u: Floats) -> StartState:
     rest = find_rest(evaluator, u)
     steps = rest.search.steps
     note = f"{INFORMATION}the run starts at an equilibrium, found in {steps} steps"
-    return StartState(rest.u, rest.angles, (note, *rest.notes))
+    return StartState(rest.u, rest.angles, (note, *rest.notes), states=rest.states)

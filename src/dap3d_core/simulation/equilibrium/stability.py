@@ -64,17 +64,35 @@ def stability_of(statics: Statics, pose: StaticPose) -> Stability:
         fate = _fate(statics, pose, idle)
         escaping = idle[:1] if fate is Fate.ESCAPES else escaping
         idle = idle if fate is Fate.STAYS else idle[:0]
-    if not is_symmetric and not len(escaping):
+    if not (is_symmetric and tangent.states is None) and not len(escaping):
         mass, damping = (statics.reduced(matrix, pose) for matrix in (tangent.M, tangent.damping))
-        escaping = (pose.free @ _growing_motions(mass, damping, K)).T
+        motions = np.vstack([np.hstack([0.0 * K, np.eye(len(K))]),
+                             -np.linalg.solve(mass, np.hstack([K, damping]))])  # fmt: skip
+        if tangent.states is not None:
+            motions = _with_states(statics, pose, mass, damping)
+        escaping = (pose.free @ _growing_motions(motions, len(K))).T
     return Stability(not len(escaping), values, escaping, idle, is_symmetric)
 
 
-def _growing_motions(mass: Floats, damping: Floats, K: Floats) -> Floats:
-    """(f, k) shapes of the motions of M x'' + C x' + K x = 0 that grow."""
-    f = len(K)
-    lower = -np.linalg.solve(mass, np.hstack([K, damping]))
-    rates, shapes = np.linalg.eig(np.vstack([np.eye(f, 2 * f, f), lower]))
+def _with_states(statics: Statics, pose: StaticPose, mass: Floats, damping: Floats) -> Floats:
+    """The matrix of small motions x, x', and of the states of elements."""
+    fixed = statics.fixed_tangent(pose)
+    own = fixed.states
+    assert own is not None
+    f, s = len(mass), len(own.rates)
+    basis = statics.scale[:, None] * pose.free
+    forces = [-statics.reduced(fixed.stiffness, pose), -damping, basis.T @ own.force_by_states]
+    matrix = np.zeros((2 * f + s, 2 * f + s))
+    matrix[:f, f : 2 * f] = np.eye(f)
+    matrix[f : 2 * f] = np.linalg.solve(mass, np.hstack(forces))
+    by_motion = (own.rate_by_displacement @ basis, own.rate_by_velocity @ basis)
+    matrix[2 * f :] = np.hstack([*by_motion, own.rate_by_states.toarray()])
+    return matrix
+
+
+def _growing_motions(motions: Floats, f: int) -> Floats:
+    """(f, k) shapes of f freedoms in the motions (x, x', ...)' = A (x, x', ...) that grow."""
+    rates, shapes = np.linalg.eig(motions)
     shapes = shapes[:f, (rates.real > GROWING * np.abs(rates).max()) & (rates.imag >= 0.0)]
     # the phase that leaves the largest real part
     phase = np.exp(-0.5j * np.angle(np.sum(shapes**2, axis=0)))

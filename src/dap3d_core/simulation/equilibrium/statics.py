@@ -75,12 +75,14 @@ class Statics:
         evaluator: the evaluator. Angles count their turns from the pose that it saw last.
         t: the time, s.
         length: L, m.
+        settles: states of elements follow the pose; False to hold them.
     """
 
     def __init__(self, evaluator: Evaluator, t: float = 0.0) -> None:
         """Args: the evaluator, the time."""
         self.evaluator, self.t = evaluator, t
         self._size_nearby = 0.0
+        self.settles = True
         self.length = evaluator.model.part_size
         n = evaluator.model.body_count
         self.scale = np.tile(np.repeat([self.length, 1.0], 3), n)
@@ -107,13 +109,15 @@ class Statics:
         return StaticPose(u, force, rows, gradient, free, multipliers, free.T @ force, size)
 
     def force(self, u: Floats) -> Floats:
-        """(6 n,) scaled applied forces at a state."""
+        """(6 n,) scaled applied forces at a state, those of elements with their states settled."""
+        self._settle(u)
         applied: Floats = self.scale * self.evaluator.applied_forces(self.t, u).ravel()
         return applied
 
     def _force_parts(self, u: Floats) -> Floats:
         """(6 n,) scaled forces added up by their magnitudes, type by type."""
         s, loops = self.evaluator.system, self.evaluator.loops
+        self._settle(u)
         self.evaluator.place(self.t, u)
         parts = np.zeros(len(self.scale) + 6)
         for q in range(s.kinds[WRENCH], s.kinds[WRENCH + 1]):
@@ -148,7 +152,27 @@ class Statics:
         return self.reduced(self.tangent(pose).stiffness, pose)
 
     def tangent(self, pose: StaticPose) -> TangentMatrices:
-        """The equations of motion and their derivatives at a pose, at rest.
+        """The equations of motion and their derivatives at a pose, at rest, states settled.
+
+        Raises:
+            SimulationError: forces or rows have no derivative there.
+        """
+        fixed = self.fixed_tangent(pose)
+        if fixed.states is None:
+            return fixed
+        from dap3d_core.simulation.equilibrium.states_at_rest import with_settled
+
+        return with_settled(fixed, self.evaluator)
+
+    def _settle(self, u: Floats) -> None:
+        """Let the states of elements come to rest at a pose."""
+        if self.evaluator.model.state_count and self.settles:
+            from dap3d_core.simulation.equilibrium.states_at_rest import settle
+
+            settle(self.evaluator, self.t, u)
+
+    def fixed_tangent(self, pose: StaticPose) -> TangentMatrices:
+        """The same with the states of elements held.
 
         Raises:
             SimulationError: forces or rows have no derivative there.

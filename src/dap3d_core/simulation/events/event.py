@@ -17,6 +17,8 @@ from dap3d_core.simulation.compiled_model import CompiledModel
 
 Floats = NDArray[np.float64]
 ACTIONS = ("stop", "record")
+#: Velocities of a body that an event may set, and where they lie among its six.
+VELOCITIES = {"r_dot": slice(0, 3), "w": slice(3, 6)}
 
 
 @attrs.frozen
@@ -33,7 +35,7 @@ class Event:
         direction: +1 upwards, -1 downwards, 0 both.
         action: "record" notes the instant in ``result.events``; "stop" ends the run there as well;
             a function is called with the ``Instant`` there, and may change numbers of forces
-            (``Instant.set``).
+            and velocities of bodies (``Instant.set``).
         name: what it is called in the result; made from the rest where it is left out.
         every: s, the largest distance of two looks at it; by default as its values ask for it.
 
@@ -151,6 +153,8 @@ class Instant:
         u.flags.writeable = False
         self.u: Floats = u
         self.changes: dict[str, dict[str, Any]] = {}
+        #: number of a body, from 0 -> (6,) velocities that it is to have, NaN where any
+        self.velocities: dict[int, Floats] = {}
 
     def __getitem__(self, name: str) -> Any:
         """A quantity by its name in results: a number, or (components,).
@@ -161,18 +165,42 @@ class Instant:
         values = self._result.quantity(name).values[0]
         return values if np.ndim(values) else float(values)
 
-    def set(self, force: str, **fields: Any) -> None:
-        """Change numbers of a force from here to the end of the run, and for this run alone.
+    def set(self, name: str, **fields: Any) -> None:
+        """Change numbers of a force from here on, or velocities of a body here, in this run alone.
+
+        Velocities are set together when the action has returned: by impulses on these bodies, with
+        the joints held, so that the velocities of all others follow (docs/jumps.md).
 
         Args:
-            force: its name.
-            fields: field -> new value, a number, three numbers or a matrix.
+            name: of the force or body.
+            fields: of a force field -> new value, a number, three numbers or a matrix; of a body
+                ``r_dot``, ``w``: three numbers in global axes, None for one that the joints give.
 
         Raises:
-            ValueError: there is no such force or field, or the value is not allowed.
+            ValueError: there is no such force, body or field, or the value is not allowed.
         """
-        self._numbers.set(force, fields)
-        self.changes.setdefault(force, {}).update(fields)
+        bodies = self._compiled.model.body_names
+        if name in bodies and (fields.keys() <= VELOCITIES.keys() or not self._has_force(name)):
+            self._set_velocities(name, bodies.index(name), fields)
+        else:
+            self._numbers.set(name, fields)
+        self.changes.setdefault(name, {}).update(fields)
+
+    def _has_force(self, name: str) -> bool:
+        return name in self._compiled.model.force_names
+
+    def _set_velocities(self, name: str, body: int, fields: dict[str, Any]) -> None:
+        velocities = self.velocities.get(body, np.full(6, np.nan))
+        for field, value in fields.items():
+            if field not in VELOCITIES:
+                words = f"an event sets {' and '.join(VELOCITIES)} of a body"
+                raise ValueError(f"{words}; {name}.{field} stays as it is in a run")
+            parts = list(value) if np.ndim(value) == 1 else []
+            if len(parts) != 3 or not all(x is None or _is_number(x) for x in parts):
+                words = "three finite numbers, None for one that the joints give"
+                raise ValueError(f"{name}.{field} = {value!r} should be {words}")
+            velocities[VELOCITIES[field]] = [np.nan if x is None else x for x in parts]
+        self.velocities[body] = velocities
 
     @cached_property
     def _result(self) -> Result:
@@ -182,8 +210,9 @@ class Instant:
             evaluator.functions[REPORT](
                 self.t, y, row[-evaluator.report_size :], evaluator.system, evaluator.loops
             )
+        row = evaluator.with_inputs(row[None])
         record = RunMetadata(scene_text=self._compiled.scene_text)
-        return Result.of_run(evaluator.model, row[None], record, lambda: evaluator)
+        return Result.of_run(evaluator.model, row, record, lambda: evaluator)
 
 
 class Numbers:
@@ -201,9 +230,9 @@ class Numbers:
         """As ``Instant.set``."""
         names = self._compiled.model.force_names
         if force not in names:
-            near = nearest(force, names)
+            near = nearest(force, (*names, *self._compiled.model.body_names))
             hint = f"did you mean {near!r}?" if near else f"forces: {', '.join(names) or 'none'}"
-            raise ValueError(f"there is no force {force!r}; {hint}")
+            raise ValueError(f"there is no force or body {force!r}; {hint}")
         model, par = self._compiled.model, self._compiled.evaluator.system.par
         change = changed(self._compiled.checked, model, names.index(force), fields)
         if self.given is None:

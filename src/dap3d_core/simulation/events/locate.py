@@ -7,7 +7,7 @@ step (its error, the constraints) holds of the state at an event.
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -22,6 +22,9 @@ from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, Instant, Numbers, checked_events
 from dap3d_core.simulation.events.sampling import Sampler
 
+if TYPE_CHECKING:
+    from dap3d_core.simulation.events.jumps import Jumps
+
 Floats = NDArray[np.float64]
 
 EPSILON = float(np.finfo(float).eps)
@@ -33,11 +36,13 @@ class EventLocator:
     Attributes:
         occurrences: what was found.
         numbers: of the forces, which events may change.
+        jumps: of velocities, which events may set; made where one does.
     """
 
     def __init__(self, compiled: CompiledModel, events: Sequence[Event]) -> None:
         self.compiled, self.events = compiled, checked_events(events)
         self.numbers = Numbers(compiled)
+        self.jumps: Jumps | None = None
         self.occurrences: list[EventRecord] = []
         self._samplers = [Sampler(event.every) for event in self.events]
         self._values: list[float] = []
@@ -102,6 +107,10 @@ class EventLocator:
             if integration.statistics.rhs > limit:
                 break
         return integration.status
+
+    def look_again(self, integration: Integration) -> None:
+        """Act on the events whose numbers passed their levels in a jump of velocities."""
+        self._take_notice(integration, self._instant(integration))
 
     def _step(self, integration: Integration) -> None:
         arrays = self._arrays(integration)
@@ -230,12 +239,11 @@ class EventLocator:
             if event.sense * side <= 0.0:
                 changes |= self._act(integration, event, int(-side))
         if changes:  # numbers may jump with them: that is no event
-            integration.restart()
             self._values = self._all(self._instant(integration))
             self._sides = [float(np.sign(value)) for value in self._values]
 
     def _act(self, integration: Integration, event: Event, direction: int) -> bool:
-        """Do what an event asks for; whether numbers of forces were changed."""
+        """Do what an event asks for; whether it changed numbers of forces or velocities."""
         here, kind = self._instant(integration), "change"
         if callable(event.action):
             event.action(here)
@@ -243,11 +251,26 @@ class EventLocator:
             kind = event.action
         if kind == "stop":
             integration.end()
+        if here.changes:
+            integration.restart()
+        after, work = None, 0.0
+        if here.velocities:
+            after, work = self._set_velocities(integration, event, here)
         self.occurrences.append(
             EventRecord(name=event.title, t=here.t, direction=direction, kind=kind, u=here.u,
-                       changes=here.changes)
+                       changes=here.changes, u_after=after, work=work)
         )  # fmt: skip
         return bool(here.changes)
+
+    def _set_velocities(
+        self, integration: Integration, event: Event, here: Instant
+    ) -> tuple[Floats, float]:
+        """Set the velocities that an action asks for; the state after it, and the work, J."""
+        if self.jumps is None:
+            from dap3d_core.simulation.events.jumps import Jumps
+
+            self.jumps = Jumps(self.compiled.evaluator)
+        return self.jumps.set_velocities(integration, here.velocities, event.title)
 
 
 def hermite(

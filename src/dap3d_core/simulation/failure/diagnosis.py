@@ -58,8 +58,10 @@ def _at(evaluator: Evaluator, t: float, y: Floats) -> str:
     if fault := _fault(states):
         return f"the state {_worst_state(evaluator, states)} is {fault}"
     s = evaluator.system
+    inputs = evaluator.inputs
     place_state(y, s)
     s.F[:, :4] = 0.0  # filled again one by one: the present values may not be finite
+    evaluator.set_inputs(inputs)
     for q, (kind, group) in enumerate(evaluator.loop_groups):
         for k in range(group.count):
             if fault := _fault_of(evaluator, q, k, kind, group, t):

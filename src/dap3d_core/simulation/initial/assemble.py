@@ -20,7 +20,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.linear.ldlt.plan import Integers
 from dap3d_core.linear.rank.rank import DENSE_ROWS, factor_independent
 from dap3d_core.model import Model
-from dap3d_core.model.state_layout import join, split, velocities_of
+from dap3d_core.model.state_layout import join, split, state_layout, velocities_of
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Body, Scene
 from dap3d_core.simulation.errors import AssemblyError
@@ -302,8 +302,9 @@ def displaced(u: Floats, change: Floats, n: int) -> Floats:
 
 def distance(u: Floats, other: Floats, n: int) -> tuple[Floats, Floats]:
     """Largest displacement, m, and rotation, rad, of a body between states (..., 13 n or more)."""
-    r, p, _, _ = split(u)
-    s, q, _, _ = split(other)
+    size = state_layout(n).size
+    r, p, _, _ = split(u[..., :size])
+    s, q, _, _ = split(other[..., :size])
     cosine = np.sum(p * q, axis=-1)
     sine = np.linalg.norm(p - np.sign(cosine)[..., None] * q, axis=-1)
     cosine = np.clip(np.abs(cosine), 0.0, 1.0)

@@ -38,12 +38,14 @@ class StartState:
             turns begin at zero.
         notes: where it comes from.
         is_interpolated: it is near the constraints, and has to be brought onto them.
+        states: (s,) states of elements, in the order of the model; None for their initial values.
     """
 
     u: Floats
     angles: Floats | None
     notes: tuple[str, ...] = ()
     is_interpolated: bool = False
+    states: Floats | None = None
 
 
 @attrs.frozen(eq=False)
@@ -56,6 +58,7 @@ class NamedState:
         u: (13 n,) the state.
         angles: name (``Model.angle_names``) -> angle whose turns are counted, rad.
         notes, is_interpolated: as of ``StartState``.
+        states: name (``ModelSummary.state_names``) -> state of an element.
     """
 
     title: str
@@ -64,6 +67,7 @@ class NamedState:
     angles: Mapping[str, float]
     notes: tuple[str, ...] = ()
     is_interpolated: bool = False
+    states: Mapping[str, float] = attrs.field(factory=dict)
 
 
 class HasNamedState(Protocol):
@@ -142,7 +146,13 @@ def _matched(named: NamedState, model: Model) -> StartState:
     if uncounted:
         notes.append(f"turns are counted from zero, for the start has none: {_listed(uncounted)}")
     angles = np.array([named.angles.get(name, 0.0) for name in names]) if names else None
-    return StartState(u, angles, tuple(notes), named.is_interpolated)
+    labels = [label for state in model.element_states for label in state.labels]
+    if missing := sorted({n.rpartition(".")[0] for n in labels if n not in named.states}):
+        notes.append(f"states begin with their initial values, for the start has none of "
+                     f"{_listed(missing)}")  # fmt: skip
+    given = zip(labels, model.initial_states.tolist(), strict=True)
+    states = np.array([named.states.get(n, value) for n, value in given]) if labels else None
+    return StartState(u, angles, tuple(notes), named.is_interpolated, states)
 
 
 def _state_of_result(
@@ -161,6 +171,7 @@ def _state_of_result(
     notes = [f"{INFORMATION}the start is the state of {title} at t = {time:.9g} s; the run begins "
              "at t = 0, and so do functions of time"]  # fmt: skip
     if before != after:
+        _refuse_jumps(result, before, after)
         notes.append(
             f"{INFORMATION}the start was interpolated between the reported instants "
             f"{result.t[before]:.9g} s and {result.t[after]:.9g} s of the result"
@@ -172,8 +183,35 @@ def _state_of_result(
         names = _angle_names_of(result, registry)
         angles = dict(zip(names, values.tolist(), strict=False))  # none where they are not known
     u = _state_at(result, before, after, fraction)
+    states = _states_at(result, before, after, fraction)
     return NamedState(title, result.summary.body_names, u, angles, tuple(notes),
-                      before != after)  # fmt: skip
+                      before != after, states)  # fmt: skip
+
+
+def _states_at(result: Result, before: int, after: int, fraction: float) -> dict[str, float]:
+    """States of elements by name; between reported instants by a cubic through the nearest."""
+    names = result.summary.state_names
+    if not names or before == after:
+        values = result.arrays.states[before] if names else np.zeros(0)
+        return dict(zip(names, values.tolist(), strict=True))
+    near = np.arange(max(0, before - 1), min(len(result.t), after + 2))
+    t = result.t[near]
+    time = result.t[before] + fraction * (result.t[after] - result.t[before])
+    weights = [np.prod([(time - s) / (x - s) for s in t if s != x]) for x in t]
+    values = np.array(weights) @ result.arrays.states[near]
+    return dict(zip(names, values.tolist(), strict=True))
+
+
+def _refuse_jumps(result: Result, before: int, after: int) -> None:
+    """SceneError where velocities jumped between two reported instants: nothing leads across."""
+    first, last = float(result.t[before]), float(result.t[after])
+    for jump in result.events:
+        if jump.u_after is not None and first < jump.t <= last:
+            raise _mistake(
+                result.record.title or "the result",
+                f"velocities jumped at t = {jump.t:.9g} s, between the reported instants "
+                f"{first:.9g} s and {last:.9g} s; give one of these as the time of the start",
+            )
 
 
 def _interval(result: Result, t: Any) -> tuple[int, int, float]:

@@ -140,6 +140,7 @@ def _solved(
         motion.t.copy(), motion.u, motion.v_dot, forces.Lam, kinetic - kinetic[0],
         forces.potential, position, velocity, acceleration, forces.angles,
         np.tile(evaluator.states, (len(motion.t), 1)),
+        np.tile(model.input_values, (len(motion.t), 1)),
     )  # fmt: skip
     pulling = Pulling(model)
     pulling.look(arrays)

@@ -243,7 +243,8 @@ class _Fit:
         arrays = Arrays(t, u, np.zeros((count, 6 * model.body_count)),
                         np.zeros((count, model.row_count)), nothing, nothing, nothing, nothing,
                         nothing, np.zeros((count, model.angle_count)),
-                        np.tile(self.evaluator.states, (count, 1)))  # fmt: skip
+                        np.tile(self.evaluator.states, (count, 1)),
+                        np.tile(model.input_values, (count, 1)))  # fmt: skip
         record = RunMetadata(scene_text=self._scene_text)
         result = Result(self._summary, arrays, record, lambda: (model, lambda: self.evaluator))
         return np.array([self._found(result, label) for label in self._labels])

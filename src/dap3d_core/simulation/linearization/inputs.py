@@ -12,6 +12,7 @@ from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.loop_derivatives import differentiate_loop
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.model import Group
+from dap3d_core.model.element_states import first_states
 from dap3d_core.result.arrays import AXES
 from dap3d_core.result.errors import UnknownNameError, unknown
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
@@ -29,6 +30,7 @@ class Inputs:
 
     Attributes:
         wrench: (6 n, inputs) force and moment on each body.
+        rate: (s, inputs) rates of the states of elements.
         driver: (drivers, inputs) accelerations of drivers.
         rows: of these drivers; None where there are none.
         units: SI units of the inputs.
@@ -37,6 +39,7 @@ class Inputs:
     """
 
     wrench: Floats
+    rate: Floats
     driver: Floats
     rows: DriverRows | None
     units: tuple[str, ...]
@@ -51,10 +54,12 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
         UnknownNameError: there is no such force, field or component; names the nearest.
     """
     wrench = np.zeros((6 * point.model.body_count, len(names)))
+    rate = np.zeros((point.model.state_count, len(names)))
     units, elements, notes = [], [], []
     drivers: list[list[Floats]] = []
     driver = np.zeros((len(names), len(names)))
     with point.compiled.borrow_evaluator() as evaluator:
+        evaluator.states = point.states
         evaluator.place(point.t, point.u)
         for k, name in enumerate(names):
             element = name.partition(".")[0]
@@ -63,17 +68,17 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
                 drivers.append(_driver(point, evaluator, name))
                 units.append("SI")
                 continue
-            wrench[:, k], unit = _force(point, evaluator, name)
+            unit = _force(point, evaluator, name, wrench[:, k], rate[:, k])
             units.append(unit)
             elements.append(element)
-            if not np.any(wrench[:, k]):
+            if not np.any(wrench[:, k]) and not np.any(rate[:, k]):
                 notes.append(f"input {name} has no effect at this state")
     rows = None
     if drivers:
         by = np.array(drivers).transpose(1, 2, 0)
         rows = DriverRows(nu=(by[0], by[1]), gamma=(by[2], by[3], by[4]))
     driver = driver[: len(drivers)]
-    return Inputs(wrench, driver, rows, tuple(units), frozenset(elements), tuple(notes))
+    return Inputs(wrench, rate, driver, rows, tuple(units), frozenset(elements), tuple(notes))
 
 
 def _driver(point: OperatingPoint, evaluator: Evaluator, name: str) -> list[Floats]:
@@ -112,14 +117,19 @@ def _inputs_known(point: OperatingPoint, evaluator: Evaluator) -> list[str]:
     return known
 
 
-def _force(point: OperatingPoint, evaluator: Evaluator, name: str) -> tuple[Floats, str]:
-    """(6 n,) force by a unit input, and the unit of the input."""
+def _force(
+    point: OperatingPoint, evaluator: Evaluator, name: str, wrench: Floats, rate: Floats
+) -> str:
+    """Forces (6 n,) and rates of states (s,) by a unit input; returns the unit of the input."""
     element, _, field = name.partition(".")
     number = point.model.force_names.index(element)
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
         if kind == "wrench" and number in group.members:
             unit, columns = _columns(group, name, field) if field else ("1", [])
-            return _wrench(point, evaluator, loop, group, number, columns), unit
+            wrench[:] = _wrench(point, evaluator, loop, group, number, columns)
+            if columns and group.type_info.layout.states:
+                _rate(point, evaluator, group, number, columns, rate)
+            return unit
     raise UnknownNameError(f"input {name!r}: {element} acts by reactions of joints alone")
 
 
@@ -128,7 +138,8 @@ def _columns(group: Group, name: str, field: str) -> tuple[str, list[int]]:
     field, _, axis = field.partition(".")
     type_info = group.type_info
     specs, layout = specs_of(type_info.type), type_info.layout
-    read = parameters(type_info.kernels["wrench"])
+    read = [n for k in ("wrench", "rate") if k in type_info.kernels
+            for n in parameters(type_info.kernels[k])]  # fmt: skip
     prepared: Any = getattr(type_info.type.prepare, "__code__", None)
     known = [
         n
@@ -150,6 +161,26 @@ def _columns(group: Group, name: str, field: str) -> tuple[str, list[int]]:
         return specs[field].unit or "1", [offset + AXES.index(axis)]
     what = f"a component of {field} (x, y or z)" if shape == (3,) else f"{field} alone"
     raise UnknownNameError(f"input {name!r}: name {what}")
+
+
+def _rate(
+    point: OperatingPoint,
+    evaluator: Evaluator,
+    group: Group,
+    number: int,
+    columns: list[int],
+    rate: Floats,
+) -> None:
+    """Rates (s,) of the states of a force by one of its numbers."""
+    system = evaluator.system
+    loop = evaluator.loop_groups.index(("rate", group))
+    i0, p0, count = system.groups[loop].tolist()
+    own = differentiate_loop(group.type_info, "rate", point.t, system, (i0, p0, count),
+                             numbers=columns)  # fmt: skip
+    slope = own.outputs["rate"][1][..., -1]
+    for first, part in zip(first_states(point.model.acting, group)[group.members == number],
+                           slope[group.members == number], strict=True):  # fmt: skip
+        rate[first : first + len(part)] = part
 
 
 def _wrench(

@@ -37,7 +37,7 @@ class Linearization:
 
     States are displacements xi and velocities eta in independent coordinates: orthonormal bases of
     what the constraint rows allow, scaled by masses and inertias; of drivers that are inputs a
-    displacement and a rate each. Everything is computed on first use.
+    displacement and a rate each; last the states of elements. Everything is computed on first use.
 
     Attributes:
         t: time, s.
@@ -101,7 +101,7 @@ class Linearization:
         """(states, inputs) input matrix."""
         space, inputs = self._space, self._inputs
         B: Floats = space.force_input @ inputs.wrench + space.driver_input @ inputs.driver
-        return B
+        return B + space.own @ inputs.rate if len(inputs.rate) else B
 
     @property
     def C(self) -> Floats:
@@ -115,13 +115,19 @@ class Linearization:
 
     @property
     def state_count(self) -> int:
-        """Number of states: displacements and velocities."""
+        """Number of states: displacements, velocities, states of elements."""
         return len(self._space.A)
 
     @property
     def coordinate_count(self) -> int:
         """Number of displacements among the states; they come first."""
         return self._space.coordinate_count
+
+    @property
+    def element_states(self) -> tuple[str, ...]:
+        """Names of the states of elements, the last among the states: ``spring.z``."""
+        states = self._point.model.element_states
+        return tuple(name.partition(".")[2] for state in states for name in state.labels)
 
     @property
     def dof(self) -> int:
@@ -161,7 +167,9 @@ class Linearization:
                 "to_control needs python-control: pip install 'dap3d[control]'"
             ) from error
         states = [f"xi{k + 1}" for k in range(self.coordinate_count)]
-        states += [f"eta{k + 1}" for k in range(self.state_count - len(states))]
+        own = len(self.element_states)
+        states += [f"eta{k + 1}" for k in range(self.state_count - len(states) - own)]
+        states += [name.replace(".", "_") for name in self.element_states]
         signals = {
             "inputs": [name.replace(".", "_") for name in self.inputs],
             "outputs": [name.replace(".", "_") for name in self.outputs],
@@ -182,6 +190,7 @@ class Linearization:
         space = self._own_space
         scale = np.ones(len(space.A))
         scale[: space.coordinate_count] = space.size or 1.0
+        scale[len(scale) - space.own.shape[1] :] = _balance(space, scale)
         all_of_them = eigenvalues_of(scale[:, None] * space.A / scale, space.size)
         vectors = all_of_them.vectors / scale[:, None]
         return Eigenvalues(all_of_them.values, space.displacement @ vectors)
@@ -284,6 +293,18 @@ class Linearization:
         )
 
 
+def _balance(space: StateSpace, scale: Floats) -> Floats:
+    """Scales of the states of elements, of any unit, by which they couple alike both ways."""
+    count = space.own.shape[1]
+    A = scale[:, None] * space.A / scale
+    rest = len(A) - count
+    into, out = np.abs(A[rest:, :rest]).sum(axis=1), np.abs(A[:rest, rest:]).sum(axis=0)
+    is_coupled = (into > 0.0) & (out > 0.0)
+    balanced = np.sqrt(np.where(is_coupled, out, 1.0) / np.where(is_coupled, into, 1.0))
+    found: Floats = np.where(is_coupled, balanced, 1.0)
+    return found
+
+
 def linearize(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     at: Any = None,
@@ -307,7 +328,8 @@ def linearize(
             its instant t; an equilibrium (``.r``, ``.p``), at rest; or u (13 n,).
         t: time, s: of the functions of time and the drivers.
         inputs: ``FORCE.FIELD`` for a number of a force element, ``FORCE.FIELD.x`` for a component
-            (``motor.n_a``, ``push.f.z``); ``FORCE`` for a factor on all of its force, 1 at the
+            (``motor.n_a``, ``push.f.z``), also of one that the rates of its states depend on;
+            ``FORCE`` for a factor on all of its force, 1 at the
             state. ``DRIVER``, a joint with a function of time: an acceleration, in m/s^2 or
             rad/s^2, beside that of the function; the displacement and rate that it adds are states.
         outputs: quantities by name as in results (``body.r.x``, ``P.v``, ``J1.force.z``, ...).

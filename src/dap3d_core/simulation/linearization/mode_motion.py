@@ -57,6 +57,7 @@ def mode_motion(
     amplitude = min(factors)
     rows = []
     with point.compiled.borrow_evaluator() as evaluator:
+        evaluator.states = point.states
         for t in np.linspace(0.0, period, instants):
             phase = np.exp(2j * np.pi * t / period)
             velocity = amplitude * np.real(shape * phase * 2j * np.pi / period)

@@ -32,6 +32,8 @@ Floats = NDArray[np.float64]
 OFF_CONSTRAINTS = 1e-6
 #: A switch this close to zero is at its point of change.
 AT_SWITCH = 1e-9
+#: Rates of states below this part of their terms are zero.
+STEADY_STATES = 1e-8
 #: An instant of a result within this part of its time span of the requested one is that one.
 SAME_INSTANT = 1e-9
 
@@ -44,6 +46,7 @@ class OperatingPoint:
         compiled: the scene.
         t: time, s.
         u: (13 n,) the state, on the constraints.
+        states: (s,) states of elements.
         tangent: derivatives of the equations of motion.
         frames: axes in which the equations are written.
         redundancy: rank of the constraints.
@@ -53,6 +56,7 @@ class OperatingPoint:
     compiled: CompiledModel
     t: float
     u: Floats
+    states: Floats
     tangent: TangentMatrices
     frames: SteadyFrames
     redundancy: Redundancy
@@ -96,8 +100,8 @@ def operating_point(
     model = compiled.model
     notes: list[str] = []
     with compiled.borrow_evaluator() as evaluator:
-        u, turns = _state(compiled, at, t, notes)
-        evaluator.start(t, u, turns)
+        u, turns, states = _state(compiled, at, t, notes)
+        evaluator.start(t, u, turns, states)
         _check(evaluator, t, u)
         redundancy = redundancy_of(evaluator, u, t)
         if redundancy.singular is not None:
@@ -107,7 +111,8 @@ def operating_point(
             )
         tangent = tangent_matrices(evaluator, t, u)
         frames = steady_frames(model, tangent, u, redundancy.rank.dependencies)
-    if not frames.is_steady:
+    if not (frames.is_steady and _keeps_states(model, tangent, evaluator.states)):
+        frames = attrs.evolve(frames, is_steady=False)
         notes.append(
             "the state is neither at rest nor in steady motion: the matrices hold at this instant "
             "alone, and the eigenvalues say nothing about stability"
@@ -124,21 +129,35 @@ def operating_point(
             "joints with friction: linearised with the smooth law of friction at this state, "
             "which at rest is a strong damper and no stiction"
         )
-    return OperatingPoint(compiled, t, u, tangent, frames, redundancy, tuple(notes))
+    return OperatingPoint(
+        compiled, t, u, evaluator.states, tangent, frames, redundancy, tuple(notes)
+    )
+
+
+def _keeps_states(model: Model, tangent: TangentMatrices, states: Floats) -> bool:
+    """True if the states of elements do not change, but for rounding."""
+    own = tangent.states
+    if own is None:
+        return True
+    size = np.full(6 * model.body_count, 1.0)
+    size.reshape(-1, 6)[:, :3] = model.part_size
+    terms = abs(own.rate_by_states) @ np.abs(states)
+    terms += abs(own.rate_by_displacement) @ size + abs(own.rate_by_velocity) @ size
+    return bool(np.all(np.abs(own.rates) <= STEADY_STATES * terms))
 
 
 def _state(
     compiled: CompiledModel, at: Any, t: float, notes: list[str]
-) -> tuple[Floats, Floats | None]:
-    """The state, and the angles with counted turns that a result has there."""
+) -> tuple[Floats, Floats | None, Floats | None]:
+    """The state, and the angles with counted turns and states of elements that a result has."""
     model = compiled.model
     if at is None:
         settings = compiled.scene.simulation
         start = compiled.start(settings.correct, settings.hold, str(settings.correct_metric))
         notes += start_notes(start, compiled.evaluator, compiled.scene)
         if t != 0.0 and settings.correct:  # drivers have moved on
-            return correct_initial(compiled.evaluator, start.u, t).u.copy(), None
-        return start.u.copy(), None
+            return correct_initial(compiled.evaluator, start.u, t).u.copy(), None, None
+        return start.u.copy(), None, None
     if isinstance(at, Result):
         if at.summary.body_names != model.body_names:
             raise SimulationError("the result is of another scene: its bodies differ")
@@ -148,13 +167,15 @@ def _state(
             near = f"; the nearest is t = {at.t[k]:.9g} s" if k >= 0 else ""
             raise SimulationError(f"the result has no instant at t = {t:.9g} s{near}")
         angles = at.arrays.angles[k] if at.summary.angle_count == model.angle_count else None
-        return at.u[k].copy(), angles
+        states = at.arrays.states[k] if at.arrays.states.shape[1] == model.state_count else None
+        return at.u[k].copy(), angles, states
     if hasattr(at, "r") and hasattr(at, "p"):
         r, p = np.asarray(at.r, dtype=float), np.asarray(at.p, dtype=float)
         if r.shape != (model.body_count, 3) or p.shape != (model.body_count, 4):
             raise SimulationError("the equilibrium is of another scene: its bodies differ")
-        return join(r, p, np.zeros_like(r), np.zeros_like(r)), getattr(at, "angles", None)
-    return state_of(at, model.body_names), None
+        u = join(r, p, np.zeros_like(r), np.zeros_like(r))
+        return u, getattr(at, "angles", None), getattr(at, "states", None)
+    return state_of(at, model.body_names), None, None
 
 
 def _check(evaluator: Evaluator, t: float, u: Floats) -> None:

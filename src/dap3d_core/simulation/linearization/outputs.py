@@ -25,6 +25,8 @@ ABSCISSAE = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
 #: Largest displacement of a body, as a part of the model's size or in rad, and of a velocity.
 STEP = 2e-3
+#: Least size of a state of an element, of which steps are parts.
+LEAST = 1e-3
 
 
 @attrs.frozen(eq=False)
@@ -50,20 +52,21 @@ def output_derivatives(
     states = len(space.A)
     directions = [
         (space.displacement[:, k], space.velocity[:, k], space.acceleration[:, k],
-         space.multipliers[:, k]) for k in range(states)
+         space.multipliers[:, k], space.own[k]) for k in range(states)
     ]  # fmt: skip
+    unmoved = np.zeros(space.own.shape[1])
     none = np.zeros(6 * point.model.body_count)
     for wrench, driver in zip(inputs.wrench.T, inputs.driver.T, strict=True):
         a_change = space.acceleration_by_force @ wrench + space.acceleration_by_driver @ driver
         lam_change = space.multipliers_by_force @ wrench + space.multipliers_by_driver @ driver
-        directions.append((none, none, a_change, lam_change))
+        directions.append((none, none, a_change, lam_change, unmoved))
     steps = [_step(point, *direction) for direction in directions]
     rows = [
         _row(point, x * h, direction)
         for h, direction in zip(steps, directions, strict=True)
         for x in ABSCISSAE
     ]
-    rows.append(_row(point, 0.0, directions[0] if directions else (none, none, none, none)))
+    rows.append(_row(point, 0.0, directions[0] if directions else (none,) * 4 + (unmoved,)))
     record = RunMetadata(scene_text=point.compiled.scene_text)
     result = Result.of_run(point.model, np.array(rows), record, lambda: point.evaluator)
     matrix = np.zeros((len(names), len(directions)))
@@ -92,6 +95,7 @@ def _step(point: OperatingPoint, *direction: Floats) -> float:
     largest = max(
         float(np.max(np.abs(direction[0]) * weights)),
         float(np.max(np.abs(direction[1]) * weights)) / speed,
+        float(np.max(np.abs(direction[4]) / np.maximum(np.abs(point.states), LEAST), initial=0.0)),
     )
     return STEP / largest if largest > 0.0 else 1.0
 
@@ -99,7 +103,8 @@ def _step(point: OperatingPoint, *direction: Floats) -> float:
 def _row(point: OperatingPoint, h: float, direction: tuple[Floats, ...]) -> Floats:
     """A reported row of the state displaced by h along a direction."""
     model, evaluator = point.model, point.evaluator
-    x, v_change, a_change, lam_change = direction
+    x, v_change, a_change, lam_change, z_change = direction
+    evaluator.states = point.states + h * z_change
     u = displaced_state(point.u, h * x, h * v_change)
     layout = model.report_layout
     report = evaluator.report(point.t, u)

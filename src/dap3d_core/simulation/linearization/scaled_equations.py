@@ -7,7 +7,9 @@ have the unit mass matrix. In axes that turn with Omega (steady_motion.py) the e
     v^_dot = -K x^ - C v^ + (D^T + F) lambda      C: with Omega x on velocities
     0 = D v^ + G x^       all rows                0 = D x^    those with a position level
 
-F: friction of joints by their multipliers.
+F: friction of joints by their multipliers. With states z of elements:
+
+    z_dot = Z_x x^ + Z_v v^ + Z_z z      v^_dot = ... + Z_f z      rows: ... + Z_C z, Z_nu z
 """
 
 from typing import Any
@@ -26,6 +28,25 @@ Floats = NDArray[np.float64]
 
 
 @attrs.frozen(eq=False, kw_only=True)
+class ScaledStates:
+    """The matrices Z above, as scipy CSR arrays.
+
+    Attributes:
+        by_displacement, by_velocity: (s, 6 n); by_states: (s, s), of the rates.
+        force: (6 n, s).
+        position, velocity, acceleration: (rows, s) of D x^, D v^ + G x^, D a - gamma.
+    """
+
+    by_displacement: Any
+    by_velocity: Any
+    by_states: Any
+    force: Any
+    position: Any
+    velocity: Any
+    acceleration: Any
+
+
+@attrs.frozen(eq=False, kw_only=True)
 class ScaledEquations:
     """The matrices above, as scipy CSR arrays; rows of D have unit length.
 
@@ -37,6 +58,7 @@ class ScaledEquations:
         acceleration_by_displacement, acceleration_by_velocity: (rows, 6 n) of D a - gamma.
         gradient: (rows,) lengths of the rows of D before; multipliers are lambda gradient.
         position_row: (rows,) True where a row has a position level.
+        states: of elements; None where there are none.
     """
 
     U: Any
@@ -50,6 +72,7 @@ class ScaledEquations:
     acceleration_by_velocity: Any
     gradient: Floats
     position_row: NDArray[np.bool_]
+    states: ScaledStates | None = None
 
 
 def scaled_equations(
@@ -90,6 +113,22 @@ def scaled_equations(
         acceleration_by_velocity=by_velocity,
         gradient=gradient,
         position_row=tangent.position_row,
+        states=_scaled_states(tangent, U, inverse),
+    )
+
+
+def _scaled_states(tangent: TangentMatrices, U: Any, inverse: Any) -> ScaledStates | None:
+    own = tangent.states
+    if own is None:
+        return None
+    return ScaledStates(
+        by_displacement=own.rate_by_displacement @ U,
+        by_velocity=own.rate_by_velocity @ U,
+        by_states=own.rate_by_states,
+        force=U.T @ own.force_by_states,
+        position=inverse @ own.position_by_states,
+        velocity=inverse @ own.velocity_by_states,
+        acceleration=inverse @ own.acceleration_by_states,
     )
 
 

@@ -1,10 +1,10 @@
 """Lowest modes of large scenes, from the sparse equations without independent coordinates.
 
-With z = (x^, v^, lambda) the linearised equations are a pencil E z_dot = B z, E singular: position
-rows stand as D x^ = 0, rows of the velocity level alone as D v^ + G x^ = 0, redundant rows are left
-out. Arnoldi iterations with (B - sigma E)^-1 E (scipy.sparse.linalg.eigs, ARPACK) find the
-eigenvalues nearest to a small real sigma; those at infinity, which the constraints add, become zero
-and stay out of the way.
+With y = (x^, v^, lambda, z), z of elements with states, the linearised equations are a pencil
+E y_dot = B y, E singular: position rows stand as D x^ = 0, rows of the velocity level alone as
+D v^ + G x^ = 0, redundant rows are left out. Arnoldi iterations with (B - sigma E)^-1 E
+(scipy.sparse.linalg.eigs, ARPACK) find the eigenvalues nearest to a small real sigma; those at
+infinity, which the constraints add, become zero and stay out of the way.
 """
 
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ def lowest_eigenvalues(
     Raises:
         SimulationError: the iteration does not converge.
     """
-    from scipy.sparse import block_array, csc_array, eye_array
+    from scipy.sparse import block_array, block_diag, csc_array, eye_array
     from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
 
     six = equations.K.shape[0]
@@ -45,11 +45,18 @@ def lowest_eigenvalues(
     identity = eye_array(six)
     on_x = D.multiply(position[:, None]) + G.multiply(~position[:, None])
     on_v = D.multiply(~position[:, None])
-    B = block_array([[equations.S, identity, None],
-                     [-equations.K, -equations.C, D.T + F],
-                     [on_x, on_v, None]]).tocsc()  # fmt: skip
-    E = block_array([[identity, None, None], [None, identity, None],
-                     [None, None, csc_array((len(chosen), len(chosen)))]]).tocsc()  # fmt: skip
+    terms = [[equations.S, identity, None],
+                [-equations.K, -equations.C, D.T + F],
+                [on_x, on_v, None]]  # fmt: skip
+    masses = [identity, identity, csc_array((len(chosen), len(chosen)))]
+    if (own := equations.states) is not None:
+        by_rows = own.position[chosen].multiply(position[:, None])
+        by_rows = by_rows + own.velocity[chosen].multiply(~position[:, None])
+        for row, block in zip(terms, (None, own.force, by_rows), strict=True):
+            row.append(block)
+        terms.append([own.by_displacement, own.by_velocity, None, own.by_states])
+        masses.append(eye_array(own.by_states.shape[0]))
+    B, E = block_array(terms).tocsc(), block_diag(masses).tocsc()
     largest = max(np.sqrt(_norm(equations.K)), _norm(equations.C), _norm(equations.S))
     sigma = SHIFT * largest if largest > 0.0 else 1.0
     factors = splu(csc_array(B - sigma * E))

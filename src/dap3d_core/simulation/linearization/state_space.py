@@ -12,7 +12,8 @@ states, its acceleration the input. C, nu and gamma of its rows change by df = w
 
     x^ = Q xi + D_p^+ nu_1 w        v^ = N eta + P xi + D^+ ((nu_0 - G D_p^+ nu_1) w + nu_1 w_dot)
 
-with nu_k the derivative of nu by the k-th rate of the function.
+with nu_k the derivative of nu by the k-th rate of the function. The states of elements come last;
+where rows depend on them they are in x^ and v^, as those of drivers are.
 """
 
 import attrs
@@ -38,13 +39,14 @@ class DriverRows:
 
 @attrs.frozen(eq=False, kw_only=True)
 class StateSpace:
-    """The state matrix in independent coordinates z = (xi, w, eta, w_dot), w of drivers.
+    """The state matrix in independent coordinates z = (xi, w, eta, w_dot, states), w of drivers.
 
     Attributes:
         A: (states, states) z_dot = A z.
         displacement, velocity: (6 n, states) displacements and velocities (global axes) of states.
         acceleration: (6 n, states), multipliers: (rows, states): their changes.
         force_input: (states, 6 n) z_dot by forces on the bodies.
+        own: (states, s) unit columns of the states of elements among all.
         acceleration_by_force: (6 n, 6 n), multipliers_by_force: (rows, 6 n).
         driver_input: (states, drivers), acceleration_by_driver: (6 n, drivers),
             multipliers_by_driver: (rows, drivers): by accelerations of drivers.
@@ -58,6 +60,7 @@ class StateSpace:
     acceleration: Floats
     multipliers: Floats
     force_input: Floats
+    own: Floats
     acceleration_by_force: Floats
     multipliers_by_force: Floats
     driver_input: Floats
@@ -89,24 +92,33 @@ def state_space(
     holonomic = rows if np.all(position) else _Rows(D[position], position_rank)
     Q = _extended(N, holonomic.null)
     moved = holonomic.pseudoinverse(nu[1][position])
-    x = np.hstack([Q, moved, np.zeros((len(U), N.shape[1] + count))])
-    v = np.hstack([np.zeros((len(U), Q.shape[1] + count)), N, rows.pseudoinverse(nu[1])])
+    own = _Own.of(equations, len(U), len(D))
+    shifted = -holonomic.pseudoinverse(own.position[position])
+    x = np.hstack([Q, moved, np.zeros((len(U), N.shape[1] + count)), shifted])
+    driven, followed = rows.pseudoinverse(nu[1]), -rows.pseudoinverse(own.velocity)
+    v = np.hstack([np.zeros((len(U), Q.shape[1] + count)), N, driven, followed])
     v += rows.pseudoinverse(_placed(nu[0], Q.shape[1], x.shape[1]) - G @ x)
     by_motion = equations.acceleration_by_displacement @ x + equations.acceleration_by_velocity @ v
     by_motion -= _placed(gamma[0], Q.shape[1], x.shape[1])
-    by_motion -= _placed(gamma[1], x.shape[1] - count, x.shape[1])
+    last = x.shape[1] - own.count
+    by_motion -= _placed(gamma[1], last - count, x.shape[1])
+    by_motion += _placed(own.acceleration, last, x.shape[1])
     solve = _Accelerations(equations, rows)
-    v_dot, lam = solve(-(K @ x + C @ v), -by_motion)
+    v_dot, lam = solve(_placed(own.force, last, x.shape[1]) - (K @ x + C @ v), -by_motion)
     by_force, lam_by_force = solve(U.T, np.zeros((len(D), len(U))))
     by_driver, lam_by_driver = solve(np.zeros((len(U), count)), gamma[2])
     rate = np.zeros((count, x.shape[1]))
-    rate[:, x.shape[1] - count :] = np.eye(count)
+    rate[:, last - count : last] = np.eye(count)
+    rate_of_own = own.by_displacement @ x + own.by_velocity @ v
+    rate_of_own += _placed(own.by_states, last, x.shape[1])
     above = np.zeros((Q.shape[1] + count, len(U)))
-    below = np.zeros((count, len(U)))
+    below = np.zeros((count + own.count, len(U)))
     largest = (np.linalg.norm(matrix, np.inf) for matrix in (K, C, S))
     size = max(power**exponent for power, exponent in zip(largest, (0.5, 1.0, 1.0), strict=True))
+    size = max(size, float(np.max(np.abs(np.diag(own.by_states)), initial=0.0)))
     return StateSpace(
-        A=np.vstack([Q.T @ (v + S @ x), rate, N.T @ v_dot, 0.0 * rate]),
+        A=np.vstack([Q.T @ (v + S @ x), rate, N.T @ v_dot, 0.0 * rate, rate_of_own]),
+        own=np.eye(x.shape[1])[:, last:],
         displacement=U @ x,
         velocity=U @ v,
         acceleration=U @ v_dot,
@@ -114,12 +126,44 @@ def state_space(
         force_input=np.vstack([above, N.T @ by_force, below]),
         acceleration_by_force=U @ by_force,
         multipliers_by_force=lam_by_force / back,
-        driver_input=np.vstack([above @ by_driver, N.T @ by_driver, np.eye(count)]),
+        driver_input=np.vstack(
+            [above @ by_driver, N.T @ by_driver, np.eye(count), below[count:] @ by_driver]
+        ),
         acceleration_by_driver=U @ by_driver,
         multipliers_by_driver=lam_by_driver / back,
         coordinate_count=Q.shape[1] + count,
         size=float(size),
     )
+
+
+@attrs.frozen(eq=False, kw_only=True)
+class _Own:
+    """The matrices of ``ScaledStates``, dense; without columns where there are no states."""
+
+    by_displacement: Floats
+    by_velocity: Floats
+    by_states: Floats
+    force: Floats
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
+
+    @property
+    def count(self) -> int:
+        """Number of states."""
+        return len(self.by_states)
+
+    @classmethod
+    def of(cls, equations: ScaledEquations, six: int, rows: int) -> "_Own":
+        """Of equations of ``six`` displacements and so many rows."""
+        names = [field.name for field in attrs.fields(cls)]
+        if equations.states is not None:
+            return cls(**{name: getattr(equations.states, name).toarray() for name in names})
+        shapes = dict.fromkeys(names, (rows, 0)) | {
+            "by_displacement": (0, six), "by_velocity": (0, six), "by_states": (0, 0),
+            "force": (six, 0),
+        }  # fmt: skip
+        return cls(**{name: np.zeros(shape) for name, shape in shapes.items()})
 
 
 def _extended(basis: Floats, wider: Floats) -> Floats:

@@ -15,7 +15,7 @@ A <- (1 + theta~) A, at unchanged velocities (r_dot, omega), omega in global axe
 of the bodies.
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -25,8 +25,11 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.loop_derivatives import LoopDerivatives, differentiate_loop
 from dap3d_core.model import Group, Model
 from dap3d_core.model.rotations import rotation, skew
-from dap3d_core.model.state_layout import split
+from dap3d_core.model.state_layout import split, velocities_of
 from dap3d_core.simulation.errors import SimulationError
+
+if TYPE_CHECKING:
+    from dap3d_core.formulations.common.state_derivatives import StateDerivatives
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -57,6 +60,7 @@ class TangentMatrices:
         velocity_by_displacement: (rows, 6 n) d(D v - nu)/dx; by velocities it is D.
         acceleration_by_displacement: (rows, 6 n) d(D a - gamma)/dx at fixed a.
         acceleration_by_velocity: (rows, 6 n) d(D a - gamma)/dv.
+        states: the derivatives by and of states of elements; None where there are none.
     """
 
     M: Any
@@ -74,6 +78,7 @@ class TangentMatrices:
     velocity_by_displacement: Any
     acceleration_by_displacement: Any
     acceleration_by_velocity: Any
+    states: "StateDerivatives | None" = None
 
 
 def tangent_matrices(
@@ -107,6 +112,11 @@ def tangent_matrices(
         if kind in ("wrench", "friction", "acceleration"):
             assembly.add(loop, kind, group)
     M = assembly.add_inertia(u)
+    states = None
+    if model.state_count:
+        from dap3d_core.formulations.common.state_derivatives import state_derivatives
+
+        states = state_derivatives(evaluator, t, velocities_of(u), assembly.multipliers, assembly.a)
     return TangentMatrices(
         M=M,
         f=assembly.f,
@@ -117,6 +127,7 @@ def tangent_matrices(
         gamma=rows.gamma,
         D=rows.sparse(),
         position_row=model.position_row,
+        states=states,
         **assembly.matrices(),
     )
 

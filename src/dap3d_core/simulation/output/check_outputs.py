@@ -40,4 +40,5 @@ def probe_of(scene_text: str, evaluator: Evaluator) -> Result:
     y = evaluator.integrated(evaluator.model.u0)
     row = np.concatenate([[0.0], y, np.zeros(evaluator.report_size)])
     record = RunMetadata(scene_text=scene_text)
-    return Result.of_run(evaluator.model, row[None], record, lambda: evaluator)
+    rows = evaluator.with_inputs(row[None])
+    return Result.of_run(evaluator.model, rows, record, lambda: evaluator)

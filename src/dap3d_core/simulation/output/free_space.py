@@ -108,4 +108,4 @@ def _size(byte_count: float) -> str:
 
 def row_width(evaluator: Any) -> int:
     """Numbers that a run stores for each instant: time, state, work, and further reports."""
-    return int(1 + evaluator.model.integrated_layout.size + evaluator.report_size)
+    return int(evaluator.model.row_layout.size)

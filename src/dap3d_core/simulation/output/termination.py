@@ -124,6 +124,14 @@ def _title(evaluator: Evaluator, which: int) -> str:
 def _chatter(evaluator: Evaluator, integration: Integration) -> str:
     """Message on a chattering switch, its duration, and the remedy."""
     since, count = integration.chatter
+    switch = evaluator.switches[integration.terminal_switch]
+    if switch.jumps:
+        return (
+            f"{_title(evaluator, integration.terminal_switch)} bounces to rest: velocities jumped "
+            f"{count} times within {integration.t - since:.2g} s (more than {CHATTER} in a "
+            "millionth of the run end it). Let a spring carry slow contact, as v_rest and k of "
+            "ptp_stop and its like do, or end the run by an event before"
+        )
     return (
         f"{_title(evaluator, integration.terminal_switch)} chatters: its switch changed its sign "
         f"{count} times within {integration.t - since:.2g} s (more than {CHATTER} in a millionth "

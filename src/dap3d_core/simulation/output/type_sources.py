@@ -17,11 +17,17 @@ CORE = "dap3d_core"
 
 
 def digests_of(checked: "ValidatedScene") -> dict[str, str]:
-    """For each type of a scene, such as "joint rev", a digest of its sources; "" where unknown."""
-    elements = (*checked.joints, *checked.forces, *checked.functions)
-    types: dict[tuple[str, str], Any] = {
-        (e.type_info.type.kind, e.type_info.type.keyword): e.type_info.type for e in elements
-    }
+    """For each type of a scene, such as "joint rev", a digest of its sources; "" where unknown.
+
+    A type that the scene names with its package is "joint dap3d-other:rev" here as well.
+    """
+    types: dict[tuple[str, str], Any] = {}
+    for table in ("joints", "forces", "functions"):
+        given = getattr(checked.scene, table)
+        for one in getattr(checked, table):
+            type_ = one.type_info.type
+            word = str(given[one.name].type) if one.name in given else type_.keyword
+            types[type_.kind, word] = type_
     return {f"{kind} {word}": digest_of(type_) for (kind, word), type_ in sorted(types.items())}
 
 
@@ -33,7 +39,7 @@ def types_of(checked: "ValidatedScene") -> dict[str, dict[str, str]]:
     found = {}
     for name, digest in digests_of(checked).items():
         kind, word = name.split(" ", 1)
-        sources = [s for s in checked.registry.sources.get((kind, word), ()) if not s.blocked]
+        sources = checked.registry.sources_of(kind, word)
         distribution, version = (
             (sources[0].distribution, sources[0].version) if sources else ("", "")
         )

@@ -116,7 +116,12 @@ def _driver(evaluator: Evaluator, k: int, t: float) -> str:
         for place in np.flatnonzero(group.members == k):
             count = len(group.type_info.layout.functions)
             used = [int(f) - 1 for f in group.functions[place, :count] if f > 0]
-            words = [f"function {model.function_names[f]}: {values[f, 0]:.6g}" for f in used]
+            names = (*model.function_names, *model.input_names)
+            words = [
+                f"{'function' if f < len(model.function_names) else 'input'} {names[f]}: "
+                f"{values[f, 0]:.6g}"
+                for f in used
+            ]
             return f"joint {model.joint_names[k]}" + (f" ({', '.join(words)})" if words else "")
     return f"joint {model.joint_names[k]}"
 

@@ -30,6 +30,8 @@ def batch_runner(reduction: Reduction, times: Floats, pack: int) -> "BatchRunner
     settings = compiled.scene.simulation
     if settings.start != "scene" or compiled.evaluator.formulation.has_own_coordinates:
         return None
+    if any(switch.jumps for switch in compiled.evaluator.switches):
+        return None  # velocities that jump are changed between compiled calls
     try:
         start = compiled.start(bool(settings.correct), settings.hold, str(settings.correct_metric))
     except (AssemblyError, SceneError):
@@ -80,7 +82,7 @@ class BatchRunner:
             which, rows = self._run_mapped(self.parameter_map, values)
         else:
             which, rows = self._run_rebuilt(values, batch.notes, first)
-        multipliers = 2 + 19 * self._compiled.model.body_count
+        multipliers = self._compiled.model.row_layout["Lam"].start
         good = rows.done & (rows.diagnostics[:, driver.FRICTION_FAILURES] == 0.0)
         # those with joints that pull are run individually, and noted
         good &= ~self._pulling.among(rows.rows[..., multipliers:])
@@ -99,9 +101,9 @@ class BatchRunner:
         if moves_start:
             y0 = parameter_map.states(values[which], model.u0)
         else:
-            y0 = np.repeat(
-                self.compiled_batch.evaluator.integrated(self._start.u)[None], len(which), axis=0
-            )
+            evaluator = self.compiled_batch.evaluator
+            y0 = np.repeat(evaluator.integrated(self._start.u)[None], len(which), axis=0)
+        parameter_map.set_states(y0, values[which])
         table, places = table[which], parameter_map.places
         start = driver.CORRECT if moves_start and model.row_count else driver.UNCORRECTED
         rows = self._run_packed(table, places, y0, start)
@@ -141,7 +143,7 @@ class BatchRunner:
         places = self._rebuilder.places
         table = np.array([point.table for point in points]).reshape(-1, len(places))
         y0 = np.array([point.y0 for point in points])
-        y0 = y0.reshape(-1, self._compiled.model.u0.size + 1)
+        y0 = y0.reshape(-1, self._compiled.model.integrated_layout.size)
         return np.array(which, dtype=np.int64), self.compiled_batch.run(table, places, y0)
 
     def _reduce(self, values: Floats, index: Integers, rows: Floats, batch: Batch) -> None:

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.model import Group, Model
+from dap3d_core.model.element_states import width_of
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.model.state_layout import coordinates_of, velocities_of
+from dap3d_core.model.state_layout import bodies_of, coordinates_of, velocities_of
 from dap3d_core.simulation import CompiledModel
 from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch
 from dap3d_core.study.batch.parameter_map import METRIC_WIDTH
@@ -30,7 +31,7 @@ class PackedBatch:
         self._lanes = LaneLayout(one, many, count)
         stops = compiled.breakpoints(float(times[-1])).stops
         self._batch = CompiledBatch(many, compiled.scene.simulation, times, stops)
-        self._shape = len(times), one.model.row_layout.size
+        self._shape = len(times), one.model.row_layout["inputs"].start
         self.count = count
 
     def run(self, table: Floats, places: Integers, y0: Floats) -> BatchRows:
@@ -74,6 +75,8 @@ def packed(model: Model, count: int) -> Model:
             for slots in model.joint_slots
         ),
         function_count=count * model.function_count,
+        input_rows=(model.input_rows + model.function_count * np.arange(count)[:, None]).ravel(),
+        input_values=tiled(model.input_values),
         point_names=(),
         point_body=model.point_body[:0],
         point_local=model.point_local[:0],
@@ -120,6 +123,8 @@ class LaneLayout:
         self.count = count
         self._n = one.model.body_count
         self._row, self._row_of_many = one.model.row_layout, many.model.row_layout
+        self._n_states = one.model.state_count
+        self._states = [g.count * width_of(g) for g in one.model.acting if width_of(g)]
         self._angles = [g.count * len(g.type_info.layout.angles) for g in one.model.acting]
         self._par = np.full((count, one.system.par.size), -1, dtype=np.int64)
         for q, (_, group) in enumerate(one.loop_groups):
@@ -143,8 +148,13 @@ class LaneLayout:
         return np.where(places < par, in_par, np.where(places < par + body, in_body, in_metric))
 
     def join(self, states: Floats) -> Floats:
-        """(k, 13 n count + 1) one integrated state of all, of (k, count, 13 n + 1)."""
-        k, parts = len(states), (coordinates_of(states), velocities_of(states))
+        """(k, ...) one integrated state of all, of (k, count, ...) of the single copies."""
+        k, bodies = len(states), bodies_of(states, self._n_states)
+        parts = [coordinates_of(bodies), velocities_of(bodies)]
+        first = bodies.shape[-1]
+        for width in self._states:
+            parts.append(states[..., first : first + width])
+            first += width
         work = np.zeros((k, 1))
         return np.hstack([*(part.reshape(k, self.count * part.shape[-1]) for part in parts), work])
 
@@ -155,14 +165,15 @@ class LaneLayout:
         """
         k, nt, _ = rows.shape
         count, one, many = self.count, self._row, self._row_of_many
-        out = np.full((k, count, nt, one.size), np.nan)
+        out = np.full((k, count, nt, one["inputs"].start), np.nan)
         out[..., one["t"]] = rows[:, None, :, many["t"]]
         for name in ("coordinates", "velocities", "v_dot", "Lam"):
             part = rows[..., many[name]].reshape(k, nt, count, one.length(name))
             out[..., one[name]] = part.transpose(0, 2, 1, 3)
-        source, target = many["angles"].start, one["angles"].start
-        for width in self._angles:
-            part = rows[:, :, source : source + width * count].reshape(k, nt, count, width)
-            out[..., target : target + width] = part.transpose(0, 2, 1, 3)
-            source, target = source + width * count, target + width
+        for name, widths in (("angles", self._angles), ("states", self._states)):
+            source, target = many[name].start, one[name].start
+            for width in widths:
+                part = rows[:, :, source : source + width * count].reshape(k, nt, count, width)
+                out[..., target : target + width] = part.transpose(0, 2, 1, 3)
+                source, target = source + width * count, target + width
         return out

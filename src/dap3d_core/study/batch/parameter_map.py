@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.arrays import set_metric
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.body_pose import BodyPose, pose
+from dap3d_core.interface.element_states import INITIAL, TOLERANCE
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.types import Function
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
@@ -145,7 +146,7 @@ class ParameterMap:
         return np.hstack(parts), valid
 
     def states(self, values: Floats, u0: Floats) -> Floats:
-        """(k, 13 n + 1) integrated states to start from; u0 (13 n,) is that of the scene."""
+        """Integrated states (k, ...) to start from; u0 (13 n,) is that of the scene."""
         u = np.repeat(u0[None], len(values), axis=0)
         r, p, v, w = (part.copy() for part in split(u))
         parts = {"r": r, "r_dot": v, "w": w}
@@ -154,10 +155,22 @@ class ParameterMap:
             if path[0] == "bodies" and path[2] in parts:
                 body = self._checked.body_index[path[1]] - 1
                 parts[path[2]][:, body, parameter.index[0]] = value
-        return y_from_u(join(r, p, v, w))
+        return y_from_u(join(r, p, v, w), states=self._evaluator.model.initial_states)
+
+    def set_states(self, y0: Floats, values: Floats) -> None:
+        """Set the initial values of elements' states that vary, in states y0 (k, ...)."""
+        model = self._evaluator.model
+        first = model.integrated_layout["states"].start
+        for parameter, value in zip(self.parameters, values.T, strict=True):
+            table, name, field = (*parameter.path, "", "")[:3]
+            for state in model.element_states:
+                own = (f"{state.kind}s", state.element, f"{state.name}{INITIAL}")
+                if (table, name, field) == own:
+                    component = parameter.index[0] if parameter.index else 0
+                    y0[:, first + state.first + component] = value
 
     def are_undefined(self, table: Floats, y0: Floats) -> Booleans:
-        """Points at whose start y0 (k, 13 n + 1) the direction of an element is undefined."""
+        """Points at whose start y0 (k, ...) the direction of an element is undefined."""
         evaluator, count = self._evaluator, len(table)
         first_of = {id(group): first for group, first in self._groups()}
 
@@ -168,7 +181,8 @@ class ParameterMap:
             numbers[:, self.places[own] - first] = table[:, own]
             return numbers.reshape(count, *group.numbers.shape)
 
-        return are_undefined(evaluator.model, u_from_y(y0), numbers_of, model_size(evaluator))
+        u = u_from_y(y0, evaluator.model.state_count)
+        return are_undefined(evaluator.model, u, numbers_of, model_size(evaluator))
 
     # ------------------------------------------------------------------ one parameter
 
@@ -219,6 +233,8 @@ class ParameterMap:
         type_: Any = instance.type_info.type
         spec = specs_of(type_).get(field)
         if spec is None or spec.kind not in ("number", "vec3"):
+            raise NotCopiedError
+        if field.endswith(TOLERANCE) and field.removesuffix(TOLERANCE) in type_.state_lengths():
             raise NotCopiedError
         # with another value another variant may apply
         selects_variant = any(field in conditions for conditions, _ in type_.variants)

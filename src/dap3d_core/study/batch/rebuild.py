@@ -8,6 +8,7 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.model import Model, ModelError, build_model
+from dap3d_core.model.element_states import tolerances
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import SceneError, ValidatedScene, check
@@ -76,6 +77,8 @@ class ModelRebuilder:
         except (SceneError, ModelError, AssemblyError, ValueError):
             return None
         if start.redundancy.rank.rank != self._rank or not start.redundancy.is_plain:
+            return None
+        if not np.array_equal(tolerances(model.acting), tolerances(self._compiled.model.acting)):
             return None
         if stops_of(checked, model, self._t_end) != self._stops:
             return None

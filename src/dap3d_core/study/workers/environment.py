@@ -35,7 +35,7 @@ def environment_of(study: Study) -> Environment:
     for kind in GROUPS:
         elements = getattr(study.scene, f"{kind}s").values()
         for keyword in sorted({e.type for e in elements if isinstance(e.type, str)}):
-            if any(not s.blocked for s in registry.sources.get((kind, keyword), ())):
+            if registry.sources_of(kind, keyword):
                 types[f"{kind} {keyword}"] = _origin(registry, kind, keyword, digests)
     return environment
 
@@ -87,7 +87,7 @@ def with_absolute_path(study: Study) -> Study:
 
 
 def _origin(registry: Registry, kind: str, keyword: str, digests: dict[str, str]) -> dict[str, str]:
-    source = next(s for s in registry.sources[kind, keyword] if not s.blocked)
+    source = registry.sources_of(kind, keyword)[0]
     return {
         "package": source.distribution,
         "version": source.version,

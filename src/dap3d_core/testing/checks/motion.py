@@ -21,7 +21,7 @@ from dap3d_core.model.rigid_motion import Pose, relative
 from dap3d_core.testing.checks.findings import TypeMotion
 from dap3d_core.testing.samples.random_element import RandomElement, RefusalError, draw
 from dap3d_core.testing.samples.random_state import State, random_state
-from dap3d_core.testing.samples.sampled_type import UNDEFINED, SampledType
+from dap3d_core.testing.samples.sampled_type import UNDEFINED, SampledType, given_rows
 
 #: Random joints that must agree, and the most that are drawn to find so many.
 JOINTS, DRAWN = 3, 24
@@ -63,7 +63,9 @@ def _verdict(subject: SampledType, rng: random.Random) -> tuple[JointMotions | N
     """The motion of a random joint, or the reason why it has none; None if there is no joint."""
     type_info = subject.type_info
     specs = specs_of(subject.type)
-    given = [specs[name].required for name in type_info.layout.functions]
+    given = given_rows(type_info, lambda: False)
+    names = type_info.layout.functions
+    given = [specs[n].required or one for n, one in zip(names, given, strict=True)]
     state = random_state(rng, given, grounded=False)
     try:
         group = _group_of(type_info, draw(type_info, subject.drawn_choices, rng, state))
@@ -83,13 +85,13 @@ def _verdict(subject: SampledType, rng: random.Random) -> tuple[JointMotions | N
 def _group_of(type_info: TypeInfo, element: RandomElement) -> Group:
     """A group of one random joint."""
     layout, par = type_info.layout, np.array(element.par)
-    slots = len(layout.slots)
+    slots, others = len(layout.slots), len(layout.functions) + len(layout.others)
     tables = []
     for offset, columns in layout.tables.values():
         start, count = int(par[offset]), int(par[offset + 1])
         tables.append((0, offset, par[start : start + count * columns].reshape(count, columns)))
     idx = np.array([element.idx], dtype=np.int64)
-    return Group(type_info, np.array([0]), idx[:, :slots], idx[:, slots : layout.integers],
+    return Group(type_info, np.array([0]), idx[:, :slots], idx[:, slots : slots + others],
                  par[None, : layout.par_width], tuple(tables))  # fmt: skip
 
 

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, jump_names
 from dap3d_core.interface.codegen.kernel_arguments import friction_names, parameters
 from dap3d_core.interface.codegen.reactions import READING, reaction_names
 from dap3d_core.interface.errors import line_of, plain_words
@@ -88,6 +89,10 @@ def _not_plain(subject: SampledType, name: str, kernel: Callable[..., Any]) -> s
         offered = friction_names(subject.type.rows) | offered
     elif name in READING:
         offered = reaction_names(subject.type) | offered
+    elif name in JUMP_KINDS:
+        info = subject.type_info
+        slots = len(info.layout.slots)
+        offered = jump_names(info.type.kind, name, info.outputs, slots) | offered
     tries = 0
     for _ in range(ATTEMPTS):
         values = [random_quantity(offered[n], rng) for n in parameters(kernel)]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
+from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, kernels_of
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.kernels.runtime.source_digest import reached
 from dap3d_core.testing.checks.compare import Comparison, left_out
@@ -80,9 +80,9 @@ def compiled(subject: SampledType) -> CheckOutcome:
     if not jit_is_on():
         return left_out("compiled", subject, "nothing is compiled (DAP3D_PLAIN)")
     c = Comparison("compiled", subject, "", "compiled numbers against those of plain Python")
-    for kind, kernels in LOOP_KINDS.items():
+    for kind in LOOP_KINDS:
         owner = subject.friction if kind == "friction" and _has_friction(subject) else subject
-        if any(name in owner.kernels.names() for name in kernels):
+        if set(owner.kernels.names()) & set(kernels_of(owner.type.kind, kind)):
             _compare_compiled(c, owner, kind)
     return c.outcome()
 

@@ -13,6 +13,8 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, 
 
 Floats = NDArray[np.float64]
 
+#: In place of a function of time: an input, whose value stays.
+HELD = "held"
 #: Ground, and a body for each of the slots i, j, k.
 BODIES = 4
 
@@ -35,14 +37,29 @@ class TimeFunction:
         )
 
 
+@attrs.frozen
+class HeldInput:
+    """An input: a number without derivatives."""
+
+    value: float
+
+    def at(self, t: float) -> tuple[float, ...]:
+        """(value, 0, 0, 0) at every time."""
+        return self.value, 0.0, 0.0, 0.0
+
+
 @attrs.frozen(eq=False)
 class Direction:
-    """A direction: rates of position (m/s), rotation (rad/s, global) and time; row 0 is ground."""
+    """A direction: rates of position (m/s), rotation (rad/s, global) and time; row 0 is ground.
+
+    In time the states of an element move at their rates; ``own`` (s,) are further rates of them.
+    """
 
     move: Floats
     turn: Floats
     time: float = 0.0
-    own: tuple[float, ...] = ()  # of a joint's unknowns
+    own: Floats = attrs.field(factory=lambda: np.zeros(0))
+    unknowns: tuple[float, ...] = ()  # rates of those of a joint
 
     @classmethod
     def of(cls, slot: int, component: int) -> "Direction":
@@ -52,10 +69,15 @@ class Direction:
         return cls(both[0], both[1])
 
     @classmethod
+    def of_state(cls, k: int, count: int) -> "Direction":
+        """State k of so many."""
+        return cls(np.zeros((BODIES, 3)), np.zeros((BODIES, 3)), 0.0, np.eye(count)[k])
+
+    @classmethod
     def of_unknown(cls, k: int, count: int) -> "Direction":
         """One of the unknowns of a joint."""
         still = np.zeros((BODIES, 3))
-        return cls(still, still, own=tuple(float(n == k) for n in range(count)))
+        return cls(still, still, unknowns=tuple(float(n == k) for n in range(count)))
 
     @classmethod
     def in_time(cls) -> "Direction":
@@ -67,8 +89,9 @@ class Direction:
 class State:
     """Time, and for ground and each slot r (4, 3), p (4, 4), velocity, angular velocity (4, 3).
 
-    ``mass`` (4,) and ``Jp`` (4, 9) are the bodies' inertia, ``functions`` those of time; None for
-    an absent one; ``unknowns`` (k, 2) are those of a joint, with their rates.
+    ``mass`` (4,) and ``Jp`` (4, 9) are the bodies' inertia, ``functions`` those of time; None
+    for an absent one. ``own`` (s,) are the states of the element, ``unknowns`` (k, 2) those of a
+    joint, with their rates.
     """
 
     t: float
@@ -78,7 +101,8 @@ class State:
     w: Floats
     mass: Floats
     Jp: Floats
-    functions: tuple[TimeFunction | None, ...]
+    functions: tuple[TimeFunction | HeldInput | None, ...]
+    own: Floats = attrs.field(factory=lambda: np.zeros(0))
     unknowns: Floats = attrs.field(factory=lambda: np.zeros((0, 2)))
 
     def body(self) -> Floats:
@@ -109,7 +133,7 @@ class State:
         known = len(self.functions) + 1
         rate = np.zeros((known + len(self.unknowns), 5))
         rate[:known, :3] = along.time * self.table()[:known, 1:4]
-        rate[known:, 0] = along.own or 0.0
+        rate[known:, 0] = along.unknowns or 0.0
         return rate
 
     def moved(self, along: Direction, h: float) -> "State":
@@ -122,8 +146,8 @@ class State:
             t=self.t + along.time * h,
             r=self.r + h * along.move,
             p=quaternion_product(q, self.p),
-            unknowns=self.unknowns + [[h * rate, 0.0] for rate in along.own]
-            if along.own
+            unknowns=self.unknowns + [[h * rate, 0.0] for rate in along.unknowns]
+            if along.unknowns
             else self.unknowns,
         )
 
@@ -151,19 +175,17 @@ class State:
 
     def motion(self) -> Direction:
         """The direction in which the state moves: its velocities, and time."""
-        return Direction(self.v, self.w, 1.0, tuple(self.unknowns[:, 1].tolist()))
+        rates = tuple(self.unknowns[:, 1].tolist())
+        return Direction(self.v, self.w, 1.0, unknowns=rates)
 
 
-def random_state(
-    rng: random.Random, functions: Sequence[bool], *, grounded: bool, unknowns: int = 0
-) -> State:
+def random_state(rng: random.Random, functions: Sequence[bool | str], *, grounded: bool) -> State:
     """A random state.
 
     Args:
         rng: random numbers.
-        functions: True for each function of time that is present.
+        functions: True for each function of time that is present, HELD for an input.
         grounded: slot j is on ground.
-        unknowns: number of the unknowns of a joint.
     """
     poses = [random_pose(rng) for _ in range(BODIES)]
     r, p = np.array([x.r for x in poses]), np.array([x.p for x in poses])
@@ -173,10 +195,12 @@ def random_state(
     mass = np.array([rng.uniform(0.5, 2.0) for _ in range(BODIES)])
     for b in (0, 2) if grounded else (0,):
         r[b], p[b], v[b], w[b], mass[b], Jp[b] = 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0
-    present = (TimeFunction(numbers(rng, 5)) if is_present else None for is_present in functions)
-    given, t = tuple(present), rng.uniform(0.1, 1.0)
-    own = np.array([numbers(rng, 2) for _ in range(unknowns)]).reshape(-1, 2)
-    return State(t, r, p, v, w, mass, Jp, given, own)
+    present = (_row_of_time(rng, one) if one else None for one in functions)
+    return State(rng.uniform(0.1, 1.0), r, p, v, w, mass, Jp, tuple(present))
+
+
+def _row_of_time(rng: random.Random, which: bool | str) -> TimeFunction | HeldInput:
+    return HeldInput(*numbers(rng, 1)) if which == HELD else TimeFunction(numbers(rng, 5))
 
 
 def quaternion_product(a: Floats, b: Floats) -> Floats:

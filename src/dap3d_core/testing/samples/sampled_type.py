@@ -11,14 +11,16 @@ import numpy as np
 
 from dap3d_core.interface.codegen.reactions import with_sample_reactions
 from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
+from dap3d_core.interface.codegen.terms import bind_terms
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, examine
+from dap3d_core.interface.examine.random_values import numbers
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.testing.samples.cubic import Cubic
 from dap3d_core.testing.samples.random_element import Kernels, RandomElement, RefusalError, draw
-from dap3d_core.testing.samples.random_state import Direction, Floats, State, random_state
+from dap3d_core.testing.samples.random_state import HELD, Direction, Floats, State, random_state
 
 Cached = TypeVar("Cached")
 #: |C| of an assembled pose; maximal numbers of Newton steps and of starts.
@@ -27,6 +29,8 @@ ASSEMBLED, NEWTON_STEPS, STARTS = 1e-11, 40, 12
 STALLED = 8
 #: Smallest singular value of J, relative to the largest, of an acceptable pose.
 SINGULAR = 1e-3
+#: Functions that a type which combines functions is given.
+TERMS = 3
 #: Errors of kernels at poses where they are undefined.
 UNDEFINED = (ZeroDivisionError, OverflowError, FloatingPointError)
 
@@ -87,14 +91,20 @@ class Sample:
     ) -> tuple[Floats, Floats]:
         h, here = 1e-3, value(self.state)
         odd, even = {}, {}
+        own = self.kernels.state_rate(self.element, self.state, along)
         for k in (1, 2, 3, 4, 6):
-            ahead, back = (value(self.state.moved(along, s * k * h)) for s in (1, -1))
+            ahead, back = (value(self._moved(along, own, s * k * h)) for s in (1, -1))
             odd[k], even[k] = ahead - back, np.abs(ahead - 2.0 * here + back) / (k * h)
         one, two = (
             (45.0 * odd[k] - 9.0 * odd[2 * k] + odd[3 * k]) / (60.0 * k * h) for k in (1, 2)
         )
         corner = np.maximum(even[1] - 0.5 * even[4], 0.0)
         return two, 10.0 * (np.abs(one - two) + corner)
+
+    def _moved(self, along: Direction, own: Floats, h: float) -> State:
+        """The state after a step along a direction, in which its own states have the rates own."""
+        moved = self.state.moved(along, h)
+        return attrs.evolve(moved, own=moved.own + h * own) if len(own) else moved
 
     @property
     def is_good(self) -> bool:
@@ -194,15 +204,19 @@ class SampledType:
         rng = random.Random(title)
         layout = self.type_info.layout
         grounded = k == self.poses - 1 > 0 and layout.slots[1:2] == ("j",)
-        given = [k % 2 == 0 or rng.random() < 0.5 for _ in layout.functions]
+        given = given_rows(self.type_info, lambda: k % 2 == 0 or rng.random() < 0.5)
         given += [False] if self.type.kind == "function" else []  # the row that it fills itself
         reason = "its kernels give no finite numbers"
         for _ in range(ATTEMPTS):
             state = random_state(rng, given, grounded=grounded)
             try:
                 element = draw(self.type_info, self.drawn_choices, rng, state)
-                own = len(unknown_names(self.type))
-                state = random_state(rng, given, grounded=grounded, unknowns=own)
+                state = random_state(rng, given, grounded=grounded)
+                if count := len(unknown_names(self.type)):
+                    unknowns = np.array([numbers(rng, 2) for _ in range(count)])
+                    state = attrs.evolve(state, unknowns=unknowns)
+                if layout.states:
+                    state = attrs.evolve(state, own=np.array(numbers(rng, layout.state_width)))
                 sample = Sample(self.kernels, element, state, grounded,
                                 f"pose {k + 1} off the manifold", self.seed)  # fmt: skip
                 if sample.is_good:
@@ -247,8 +261,18 @@ def _alone(type_info: TypeInfo) -> TypeInfo:
 
 def _given(type_info: TypeInfo, values: Mapping[str, Any]) -> TypeInfo:
     """The type with a cubic for each function of an argument, unless the variant has none."""
+    if any(spec.kind == "functions" for spec in specs_of(type_info.type).values()):
+        return bind_terms(type_info, [examine(Cubic)] * TERMS)
     given = {f: examine(Cubic) for f in type_info.argument_functions if values.get(f, True)}
     return bind_functions(type_info, given, dict.fromkeys(given, 0)) if given else type_info
+
+
+def given_rows(type_info: TypeInfo, is_given: Callable[[], bool]) -> list[bool | str]:
+    """For each function of time of a type whether it is given; HELD for an input."""
+    specs = specs_of(type_info.type)
+    return [
+        HELD if specs[name].kind == "input" else is_given() for name in type_info.layout.functions
+    ]
 
 
 def own_values(type_info: TypeInfo) -> dict[str, Any] | None:
@@ -258,7 +282,8 @@ def own_values(type_info: TypeInfo) -> dict[str, Any] | None:
     without = [(False,) * (not specs[n].required) for n in names]
     ways = [specs[n].choices or way for n, way in zip(names, without, strict=True)]
     for values in (dict(zip(names, way, strict=True)) for way in product(*ways)):
-        given = {n: v or None if specs[n].kind == "function" else v for n, v in values.items()}
+        references = ("function", "input")
+        given = {n: v or None if specs[n].kind in references else v for n, v in values.items()}
         if type_info.chosen(given) is type_info:
             return values
     return None
@@ -323,7 +348,7 @@ def assembled(sample: Sample) -> Sample | None:
             step *= min(1.0, 0.7 / max(float(np.max(np.abs(step))), 1e-300))
             whole = np.zeros((slots, 6))
             whole[free] = step[: C_q.shape[1]].reshape(-1, 6)
-            along = attrs.evolve(_direction(whole), own=tuple(step[C_q.shape[1] :].tolist()))
+            along = attrs.evolve(_direction(whole), unknowns=tuple(step[C_q.shape[1] :].tolist()))
             state = state.moved(along, 1.0)
         else:
             if "C" in kernels.names():

@@ -122,30 +122,6 @@ def test_events_are_found_in_steps_that_bring_an_angle_back():
     assert [one.t for one in found.events] == pytest.approx(expected, abs=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("fourbar3", ["J4: it closes a loop", "J5: its rows depend on time"]),
-        ("fourbar2", ["J2: its 1 row costs less than 5 joint coordinates"]),
-    ],
-)
-def test_what_is_no_tree_of_known_motions_is_refused_by_name(name, words):
-    """One error names joints and reasons, and what to use instead."""
-    with pytest.raises(SimulationError, match="Use method standard or auto") as error:
-        dap.compile(name, method="joint")
-    assert all(f"joint {word}" in str(error.value) for word in words)
-
-
-def test_a_screw_is_refused_by_name():
-    """A motion that is known, of a kind that the recursion does not have."""
-    scene = dap.Scene(name="screw")
-    scene.add_body("nut", mass=1.0, Jp=(1.0, 1.0, 1.0))
-    scene.add_joint("screw", "thread", P_i="nut.O", P_j="ground.O", a_i="nut.z", a_j="ground.z",
-                    pitch=0.1)  # fmt: skip
-    with pytest.raises(SimulationError, match="joint thread: its motion is a screw"):
-        dap.compile(scene, method="joint")
-
-
 def test_what_hangs_on_a_fixed_body_moves_as_on_ground():
     """A joint that leaves nothing free is a node of the tree, with the multipliers of standard."""
     scene = trees.mixed_chain(2)

@@ -7,7 +7,6 @@ from dap3d_core.interface.formats import (
     WORLD,
     Articulation,
     Coupling,
-    Exporter,
     FormatError,
     Frame,
     Geometry,
@@ -18,15 +17,12 @@ from dap3d_core.interface.formats import (
     Link,
     Source,
     XmlElement,
-    hookimpl,
     rpy,
 )
-from dap3d_formats.elements import note_elements
-from dap3d_formats.urdf_elements import URDF
-from dap3d_formats.urdf_writer import UrdfExporter
-from dap3d_formats.urdf_xacro import expanded
-
-interface_version = 1
+from dap3d_formats.axes import across, unit
+from dap3d_formats.element_table import note_elements
+from dap3d_formats.urdf.elements import URDF
+from dap3d_formats.urdf.xacro import expanded
 
 #: Type of a joint -> kind of a joint.
 KINDS = {
@@ -252,40 +248,3 @@ class _Reader:
         if name in self.model.joints:
             raise FormatError(f"there are two joints {name}", element.place)
         self.model.joints[name] = joint
-
-
-def unit(axis: tuple[float, ...], element: XmlElement) -> tuple[float, ...]:
-    """An axis of length 1.
-
-    Raises:
-        FormatError: its length is 0.
-    """
-    length = sum(x * x for x in axis) ** 0.5
-    if not length > 0.0:
-        raise FormatError("an axis needs a direction; its length is 0", element.place)
-    return axis if sorted(map(abs, axis)) == [0.0, 0.0, 1.0] else tuple(x / length for x in axis)
-
-
-def across(normal: tuple[float, ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Two unit vectors x, y with x cross y along a unit vector."""
-    k = min(range(3), key=lambda n: abs(normal[n]))
-    n = normal
-    e = [0.0, 0.0, 0.0]
-    e[k] = 1.0
-    y = (n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2], n[0] * e[1] - n[1] * e[0])
-    length = sum(c * c for c in y) ** 0.5
-    y = (y[0] / length, y[1] / length, y[2] / length)
-    x = (y[1] * n[2] - y[2] * n[1], y[2] * n[0] - y[0] * n[2], y[0] * n[1] - y[1] * n[0])
-    return x, y
-
-
-@hookimpl
-def dap3d_importers() -> list[type[Importer]]:
-    """The importers of this module."""
-    return [UrdfImporter]
-
-
-@hookimpl
-def dap3d_exporters() -> list[type[Exporter]]:
-    """The exporters of this module."""
-    return [UrdfExporter]

@@ -1,9 +1,8 @@
 """Elements and attributes of URDF, and what becomes of them."""
 
-from dap3d_formats.elements import Table, noted, refused, taken, translated
+from dap3d_formats.element_table import Table, noted, taken, translated
 
 _CONTACT = "contact properties; bodies do not touch each other"
-_SHAPE = {"": ("taken", "")}
 
 URDF: Table = {
     "robot": taken() | taken("name") | noted("version", "the version of the format"),
@@ -47,6 +46,4 @@ URDF: Table = {
     "ros2_control": noted("", "settings of a controller"),
     "sensor": noted("", "sensors"),
     "mujoco": noted("", "settings of a compiler"),
-    "drake:": noted("", "settings of a simulator"),
-    "xacro:": refused("", "macros are expanded before"),
 }  # fmt: skip

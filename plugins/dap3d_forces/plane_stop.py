@@ -1,0 +1,59 @@
+"""Stop of a ball, or a point, at a plane."""
+
+from dap3d_core.interface import Force, Point, Vector, hookimpl, number, point, vector
+from dap3d_core.kernels import cross, dot, neg, scale, sub
+from dap3d_forces.rebound import carried, rebound, reduced, stored
+
+interface_version = 1
+
+
+class PlaneStop(Force):
+    """A ball of a radius about P_i at the plane through P_j with normal a_j, without friction.
+
+    The gap is g = a_j . (r_P_i - r_P_j) - radius. Where it closes faster than v_rest an impulse
+    along a_j makes g_dot of it -e g_dot, the joints of the bodies held (docs/jumps.md); slower
+    contact is carried by a spring and damper, of stiffness k and of the damping ratio zeta for the
+    two bodies alone, that pushes and does not pull.
+    """
+
+    keyword = "plane_stop"
+    symbol = "plate"
+    unilateral = (0,)
+    restitution = "e"
+    P_i: Point = point(doc="centre of the ball")
+    P_j: Point = point(default="ground.O", doc="a point of the plane")
+    a_j: Vector = vector(default="ground.z", doc="normal of the plane, to the side of the ball")
+    radius: float = number(default=0.0, unit="m", minimum=0.0, doc="of the ball")
+    e: float = number(default=0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution")
+    k: float = number(unit="N/m", positive=True, doc="stiffness of contact at rest")
+    zeta: float = number(default=1.0, minimum=0.0, doc="damping ratio of contact at rest")
+    v_rest: float = number(
+        default=1e-3, unit="m/s", minimum=0.0, doc="speed below which contact does not rebound"
+    )
+
+    def switch(r_P_i, r_P_j, a_j, radius):
+        return dot(a_j, sub(r_P_i, r_P_j)) - radius
+
+    def J(r_P_i, s_P_i, r_j, a_j):
+        arm, back = sub(r_P_i, r_j), neg(a_j)  # the plane turns about its body
+        return ((*a_j, *cross(s_P_i, a_j)),), ((*back, *cross(arm, back)),)
+
+    def impulse(Jv, e, v_rest):
+        return rebound(Jv, e, v_rest)
+
+    def wrench(
+        r_P_i, s_P_i, v_P_i, r_P_j, v_P_j, r_j, a_j, w_j, mass_i, mass_j, radius, k, zeta
+    ):  # fmt: skip
+        d = sub(r_P_i, r_P_j)
+        g, g_dot = dot(a_j, d) - radius, dot(a_j, sub(sub(v_P_i, v_P_j), cross(w_j, d)))
+        F = scale(carried(g, g_dot, k, zeta, reduced(mass_i, mass_j)), a_j)
+        return (F, cross(s_P_i, F)), (neg(F), neg(cross(sub(r_P_i, r_j), F)))
+
+    def energy(r_P_i, r_P_j, a_j, radius, k):
+        return stored(dot(a_j, sub(r_P_i, r_P_j)) - radius, k)
+
+
+@hookimpl
+def dap3d_forces():
+    """The force types of this module."""
+    return [PlaneStop]

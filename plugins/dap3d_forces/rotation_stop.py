@@ -1,0 +1,72 @@
+"""Stop of the angle between two bodies."""
+
+from dap3d_core.interface import Force, Vector, angle, choice, hookimpl, number, vector
+from dap3d_core.kernels import dot, neg, rotate, scale
+from dap3d_forces.rebound import carried, rebound, reduced, stored
+
+interface_version = 1
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+class RotationStop(Force):
+    """Limit of the angle theta of body j relative to body i about an axis u common to both.
+
+    theta is measured from v_i to v_j and counts whole turns; theta_dot = u . (w_j - w_i). The gap
+    is g = theta - theta_stop for side "min", g = theta_stop - theta for side "max". Where it closes
+    faster than w_rest an impulsive moment along u makes g_dot of it -e g_dot, the joints of the
+    bodies held (docs/jumps.md); slower contact is carried by a spring and damper, of stiffness k
+    and of the damping ratio zeta for the two bodies alone, that pushes and does not pull.
+    """
+
+    keyword = "rot_stop"
+    symbol = "ring"
+    unilateral = (0,)
+    restitution = "e"
+    energy_where = "where the bodies turn about the common axis"
+    v_i: Vector = vector(across="axis", doc="direction the angle is measured from, on body i")
+    v_j: Vector = vector(across="axis", doc="direction it is measured to, on body j")
+    axis: Vector = vector(doc="common axis, on either body")
+    theta: float = angle("v_i", "v_j", "axis")
+    theta_stop: float = number(unit="rad", doc="least or greatest angle")
+    side: str = choice(("min", "max"), default="min", doc="whether it is the least or the greatest")
+    e: float = number(default=0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution")
+    k: float = number(unit="N m/rad", positive=True, doc="stiffness of contact at rest")
+    zeta: float = number(default=1.0, minimum=0.0, doc="damping ratio of contact at rest")
+    w_rest: float = number(
+        default=1e-3, unit="rad/s", minimum=0.0, doc="speed below which contact does not rebound"
+    )
+
+    def prepare(self, bodies):
+        return {"way": 1.0 if self.side == "min" else -1.0}
+
+    def switch(theta, theta_stop, way):
+        return way * (theta - theta_stop)
+
+    def J(axis, way):
+        u = scale(way, axis)
+        return ((*ZERO, *neg(u)),), ((*ZERO, *u),)
+
+    def impulse(Jv, e, w_rest):
+        return rebound(Jv, e, w_rest)
+
+    def wrench(axis, theta, theta_dot, A_i, A_j, Jp_i, Jp_j, theta_stop, way, k, zeta):
+        m = reduced(inertia(A_i, Jp_i, axis), inertia(A_j, Jp_j, axis))
+        g = way * (theta - theta_stop)
+        moment = scale(way * carried(g, way * theta_dot, k, zeta, m), axis)
+        return (ZERO, neg(moment)), (ZERO, moment)
+
+    def energy(theta, theta_stop, way, k):
+        return stored(way * (theta - theta_stop), k)
+
+
+def inertia(A, Jp, u):
+    """The moment of inertia about u of a body with inertia matrix Jp in its axes."""
+    x = tuple(A[0][k] * u[0] + A[1][k] * u[1] + A[2][k] * u[2] for k in range(3))
+    return dot(x, rotate(Jp, x))
+
+
+@hookimpl
+def dap3d_forces():
+    """The force types of this module."""
+    return [RotationStop]

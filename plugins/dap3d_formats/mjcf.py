@@ -1,3 +1,0 @@
-"""MJCF."""
-
-interface_version = 1

@@ -1,0 +1,200 @@
+"""Equalities, tendons and actuators of MJCF."""
+
+from typing import TYPE_CHECKING
+
+import attrs
+from dap3d_formats.mjcf.document import ACTUATORS
+
+from dap3d_core.interface.formats import (
+    WORLD,
+    Actuator,
+    Coupling,
+    FormatError,
+    Frame,
+    Joint,
+    Place,
+    XmlElement,
+    axis_angle,
+    from_quaternion,
+)
+
+if TYPE_CHECKING:
+    from dap3d_formats.mjcf.importer import MjcfReader
+
+#: Joints with one coordinate.
+SCALAR = ("revolute", "prismatic")
+
+
+def read_equalities(reader: "MjcfReader") -> None:
+    """Read equalities: connect, weld, joint, and tendon of a fixed tendon of two joints.
+
+    Raises:
+        FormatError: one names something that is not there.
+    """
+    remarks, document = reader.document.source.remarks, reader.document
+    for holder in document.root.all("equality"):
+        for given in holder:
+            element = document.settled_equality(given)
+            if element.get("active", "true") == "false":
+                remarks.leave_out(element.place, "equalities that are not active")
+            elif element.name in ("connect", "weld"):
+                _close(reader, element)
+            elif element.name == "joint":
+                _couple(reader, element)
+            elif element.name == "tendon":
+                _couple_by_tendon(reader, element)
+
+
+def _link(reader: "MjcfReader", element: XmlElement, key: str) -> str:
+    name = element.get(key) or WORLD
+    if name != WORLD and name not in reader.model.links:
+        raise FormatError(f"{key} of <{element.name}>: there is no body {name!r}", element.place)
+    return name
+
+
+def _close(reader: "MjcfReader", element: XmlElement) -> None:
+    """Close a loop: two points, or two frames, of two bodies coincide."""
+    model = reader.model
+    name = element.get("name") or f"{element.name}{len(model.joints) + 1}"
+    kind = "ball" if element.name == "connect" else "fixed"
+    if "site1" in element.attributes:
+        ends = [_site(reader, element, key) for key in ("site1", "site2")]
+        (parent, in_parent), (child, in_child) = ends
+    else:
+        parent, child = _link(reader, element, "body1"), _link(reader, element, "body2")
+        if kind == "ball":
+            in_parent = Frame(element.numbers("anchor", 3))
+            in_child = _relative(reader, child, parent) @ in_parent
+        else:
+            in_parent, in_child = _weld(reader, element, parent, child)
+    if name in model.joints:
+        raise FormatError(f"there are two joints {name}", element.place)
+    if "solref" in element.attributes or "solimp" in element.attributes:
+        text = "softness of an equality (solref, solimp): it holds exactly"
+        reader.document.source.remarks.translate(element.place, text)
+    model.joints[name] = Joint(name, kind, parent, child, in_parent, in_child, closes=True,
+                               place=element.place)  # fmt: skip
+
+
+def _weld(
+    reader: "MjcfReader", element: XmlElement, parent: str, child: str
+) -> tuple[Frame, Frame]:
+    """The frames of a weld in its two bodies: relpose is that of body 2 in body 1."""
+    relpose = element.numbers("relpose", 7, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    if not any(relpose[3:]):
+        return _relative(reader, parent, child), Frame()
+    anchor = Frame(element.numbers("anchor", 3, (0.0, 0.0, 0.0)))
+    return Frame(relpose[:3], from_quaternion(relpose[3:])) @ anchor, anchor
+
+
+def _site(reader: "MjcfReader", element: XmlElement, key: str) -> tuple[str, Frame]:
+    name = element.require(key)
+    if name not in reader.sites:
+        raise FormatError(f"{key} of <{element.name}>: there is no site {name!r}", element.place)
+    return reader.sites[name]
+
+
+def _relative(reader: "MjcfReader", of: str, other: str) -> Frame:
+    """The pose of link ``other`` in link ``of``, where the model starts."""
+    return _pose(reader, of).inverse() @ _pose(reader, other)
+
+
+def _pose(reader: "MjcfReader", link: str) -> Frame:
+    pose = Frame()
+    while link != WORLD:
+        joint = next(j for j in reader.model.joints.values() if j.child == link and not j.closes)
+        step = joint.in_parent @ joint.in_child.inverse()
+        if joint.kind == "free":
+            q = joint.position
+            step = Frame(q[:3], from_quaternion(q[3:]))
+        pose, link = step @ pose, joint.parent
+    return pose
+
+
+def _joint(reader: "MjcfReader", name: str, place: Place) -> Joint:
+    joint = reader.model.joints.get(name)
+    if joint is None or joint.kind not in SCALAR:
+        raise FormatError(f"there is no hinge or slide {name!r}", place)
+    return joint
+
+
+def _couple(reader: "MjcfReader", element: XmlElement) -> None:
+    """q1 - ref1 = a0 + a1 (q2 - ref2); coordinates of the model are without their references."""
+    joint, remarks = element.require("joint1"), reader.document.source.remarks
+    one = _joint(reader, joint, element.place)
+    a0, a1, *higher = (*element.numbers("polycoef", None, (0.0, 1.0)), 0.0, 0.0)[:5]
+    other = element.get("joint2")
+    if other is None:
+        text = "an equality of one joint holds it fixed"
+        remarks.translate(element.place, text)
+        _hold(reader, one, a0)
+        return
+    _joint(reader, other, element.place)
+    if any(higher):
+        text = "an equality of joints with a polynomial of a higher degree"
+        remarks.leave_out(element.place, text)
+        return
+    reader.model.couplings.append(
+        Coupling(element.get("name") or "", joint, other, a1, a0, element.place)
+    )
+    if a0:
+        one.position = (a0,)
+
+
+def _hold(reader: "MjcfReader", joint: Joint, q: float) -> None:
+    """Make a joint a fixed one at a coordinate."""
+    axis = joint.axes[0]
+    moved = Frame(A=axis_angle(axis, q)) if joint.kind == "revolute" else Frame(
+        tuple(q * x for x in axis))  # fmt: skip
+    held = attrs.evolve(joint, kind="fixed", in_parent=joint.in_parent @ moved)
+    reader.model.joints[joint.name] = held
+
+
+def _couple_by_tendon(reader: "MjcfReader", element: XmlElement) -> None:
+    """The length of a fixed tendon of two joints stays constant: c1 q1 + c2 q2 = 0."""
+    remarks, name = reader.document.source.remarks, element.require("tendon1")
+    tendons = [t for holder in reader.document.root.all("tendon") for t in holder]
+    tendon = next((t for t in tendons if t.get("name") == name), None)
+    if tendon is None:
+        raise FormatError(f"there is no tendon {name!r}", element.place)
+    terms = tendon.all("joint")
+    simple = tendon.name == "fixed" and len(terms) == 2 and "tendon2" not in element.attributes
+    polycoef = element.numbers("polycoef", None, (0.0, 1.0))
+    if not simple or polycoef[0]:
+        remarks.leave_out(element.place, "an equality of tendons but fixed ones of two joints")
+        return
+    (c1, q1), (c2, q2) = ((t.number("coef"), t.require("joint")) for t in terms)
+    for joint in (q1, q2):
+        _joint(reader, joint, element.place)
+    if not c1:
+        remarks.leave_out(element.place, "an equality of a tendon with a coefficient of 0")
+        return
+    reader.model.couplings.append(Coupling(name, q1, q2, -c2 / c1, 0.0, element.place))
+
+
+def read_actuators(reader: "MjcfReader") -> None:
+    """Read motors on joints; others are left out, remarked.
+
+    Raises:
+        FormatError: a motor names a joint that is not there.
+    """
+    remarks = reader.document.source.remarks
+    for holder in reader.document.root.all("actuator"):
+        for given in holder:
+            if given.name not in ACTUATORS:
+                continue
+            element = reader.document.settled(given, "main")
+            joint = element.get("joint") or element.get("jointinparent")
+            name = element.get("name") or f"actuator{len(reader.model.actuators) + 1}"
+            if element.name not in ("motor", "general") or joint is None:
+                remarks.leave_out(element.place, f"an actuator <{element.name}>: its law; give "
+                                  "its force as an input or a controller")  # fmt: skip
+            if joint is None:
+                continue
+            if joint not in reader.model.joints:
+                raise FormatError(f"actuator {name}: there is no joint {joint!r}", element.place)
+            if reader.model.joints[joint].kind not in SCALAR:
+                remarks.leave_out(element.place, "actuators of joints with several coordinates")
+                continue
+            gear = element.numbers("gear", None, (1.0,))[0]
+            reader.model.actuators.append(Actuator(name, joint, gear, element.place))

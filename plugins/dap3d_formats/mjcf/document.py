@@ -1,0 +1,194 @@
+"""An MJCF document: included files, settings of the compiler, default classes."""
+
+from math import atan2, pi
+from typing import Any
+
+import attrs
+from dap3d_formats.axes import unit
+
+from dap3d_core.interface.formats import (
+    FormatError,
+    Frame,
+    Source,
+    XmlElement,
+    axis_angle,
+    euler_angles,
+    from_quaternion,
+)
+
+#: Elements that share the defaults of actuators.
+ACTUATORS = (
+    "general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder", "muscle",
+    "adhesion", "dcmotor", "plugin",
+)  # fmt: skip
+
+
+@attrs.define(eq=False)
+class Document:
+    """A file with its included files, its compiler's settings and its default classes.
+
+    Attributes:
+        root: the root.
+        compiler: attributes of <compiler>, of several the last.
+        defaults: class -> element -> attributes.
+    """
+
+    source: Source
+    root: XmlElement
+    compiler: dict[str, str] = attrs.Factory(dict)
+    defaults: dict[str, dict[str, dict[str, str]]] = attrs.Factory(lambda: {"main": {}})
+
+    @classmethod
+    def of(cls, source: Source) -> "Document":
+        """The document of a file.
+
+        Raises:
+            FormatError: it cannot be read.
+        """
+        root = source.xml()
+        if root.name not in ("mujoco", "mujocoinclude"):
+            raise FormatError(f"an MJCF file is a <mujoco>, not a <{root.name}>", root.place)
+        _include(source, root)
+        document = cls(source, root)
+        for element in root.all("compiler"):
+            document.compiler |= element.attributes
+        if document.compiler.get("coordinate", "local") != "local":
+            raise FormatError('coordinate="global" is no longer a part of MJCF', root.place)
+        for element in root.all("default"):
+            document._read_defaults(element, "main", {})
+        return document
+
+    def _read_defaults(
+        self, element: XmlElement, name: str, inherited: dict[str, dict[str, str]]
+    ) -> None:
+        """Read a class and those below, which have its attributes too."""
+        own = {tag: dict(values) for tag, values in inherited.items()}
+        for tag, values in self.defaults.get(name, {}).items():
+            own.setdefault(tag, {}).update(values)
+        for child in element:
+            if child.name != "default":
+                own.setdefault(_kind(child.name), {}).update(child.attributes)
+        self.defaults[name] = own
+        for child in element.all("default"):
+            self._read_defaults(child, child.require("class"), own)
+
+    def settled(self, element: XmlElement, childclass: str) -> XmlElement:
+        """An element with the attributes of its class.
+
+        Args:
+            element: the element.
+            childclass: class of elements that name none.
+
+        Raises:
+            FormatError: there is no such class.
+        """
+        name = element.get("class") or childclass
+        if name not in self.defaults:
+            known = ", ".join(self.defaults)
+            raise FormatError(f"there is no default class {name!r}; classes: {known}",
+                              element.place)  # fmt: skip
+        values = self.defaults[name].get(_kind(element.name), {})
+        return attrs.evolve(element, attributes=values | element.attributes)
+
+    def settled_equality(self, element: XmlElement) -> XmlElement:
+        """An equality with the attributes of its class, which all equalities share."""
+        name = element.get("class") or "main"
+        values = self.defaults.get(name, {}).get("equality", {})
+        return attrs.evolve(element, attributes=values | element.attributes)
+
+    def flag(self, key: str, default: bool) -> bool:
+        """A setting of the compiler that is true or false."""
+        return self.compiler.get(key, "true" if default else "false") == "true"
+
+    def setting(self, key: str, default: float) -> float:
+        """A setting of the compiler that is a number.
+
+        Raises:
+            FormatError: it is none.
+        """
+        return self.settings.number(key, default)
+
+    @property
+    def settings(self) -> XmlElement:
+        """The compiler's settings as one element, at the place of the last."""
+        place = next((e.place for e in reversed(self.root.all("compiler"))), self.root.place)
+        return XmlElement("compiler", self.compiler, place)
+
+    def angle(self, value: float) -> float:
+        """An angle in rad, as the compiler reads it."""
+        return value if self.compiler.get("angle", "degree") == "radian" else value * pi / 180.0
+
+    def frame(self, element: XmlElement) -> Frame:
+        """The frame of an element: pos, with quat, axisangle, euler, xyaxes or zaxis.
+
+        Raises:
+            FormatError: numbers are missing, or the axes are no frame.
+        """
+        return Frame(element.numbers("pos", 3, (0.0, 0.0, 0.0)), self.rotation(element))
+
+    def rotation(self, element: XmlElement) -> Any:
+        """The rotation of an element."""
+        given = element.attributes
+        if "quat" in given:
+            try:
+                return from_quaternion(element.numbers("quat", 4))
+            except ValueError as error:
+                raise FormatError(str(error), element.place) from None
+        if "axisangle" in given:
+            x, y, z, angle = element.numbers("axisangle", 4)
+            return axis_angle(unit((x, y, z), element), self.angle(angle))
+        if "euler" in given:
+            angles = [self.angle(a) for a in element.numbers("euler", 3)]
+            sequence = self.compiler.get("eulerseq", "xyz")
+            if len(sequence) != 3 or set(sequence) - set("xyzXYZ"):
+                what = f"eulerseq = {sequence!r} should be three of x, y, z, X, Y, Z"
+                raise FormatError(what, element.place)
+            return euler_angles(angles, sequence)
+        if "xyaxes" in given:
+            return _xyaxes(element)
+        if "zaxis" in given:
+            return along(unit(element.numbers("zaxis", 3), element))
+        return Frame().A
+
+
+def _kind(tag: str) -> str:
+    return "actuator" if tag in ACTUATORS else tag
+
+
+def _include(source: Source, element: XmlElement) -> None:
+    """Put what included files hold in their places, all over a tree."""
+    children: list[XmlElement] = []
+    for child in element:
+        if child.name != "include":
+            _include(source, child)
+            children.append(child)
+            continue
+        name = child.require("file")
+        root = source.include(name, child.place)
+        with source.including(name):
+            _include(source, root)
+        children += root.children
+    element.children = children
+
+
+def _xyaxes(element: XmlElement) -> Any:
+    numbers = element.numbers("xyaxes", 6)
+    x = unit(numbers[:3], element)
+    dot = sum(a * b for a, b in zip(x, numbers[3:], strict=True))
+    y = unit(tuple(b - dot * a for a, b in zip(x, numbers[3:], strict=True)), element)
+    z = cross(x, y)
+    return [[x[k], y[k], z[k]] for k in range(3)]
+
+
+def along(z: tuple[float, ...]) -> Any:
+    """The least rotation that turns the z axis to a unit vector, as MuJoCo takes it."""
+    x, y = -z[1], z[0]  # (0, 0, 1) x z
+    sine = (x * x + y * y) ** 0.5
+    if sine < 1e-14:
+        return axis_angle((1.0, 0.0, 0.0), 0.0 if z[2] > 0.0 else pi)
+    return axis_angle((x / sine, y / sine, 0.0), atan2(sine, z[2]))
+
+
+def cross(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float]:
+    """The cross product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])

@@ -1,0 +1,141 @@
+"""Elements and attributes of MJCF, and what becomes of them."""
+
+from dap3d_formats.element_table import Table, noted, refused, taken, translated
+
+_SOLVER = "settings of a solver"
+_CONTACT = "contact properties; bodies do not touch each other"
+_DRAWING = "drawing"
+_SOFT = "softness of limits and equalities"
+_LAW = "the law of an actuator; its force is an input"
+_FRAME = taken("pos quat axisangle xyaxes zaxis euler")
+_CLASS = taken("class")
+_ACTUATOR = (
+    taken("name class joint jointinparent gear")
+    | noted("group user", _DRAWING)
+    | noted("tendon site refsite cranksite slidersite cranklength body slidersite", _LAW)
+    | noted(
+        "ctrllimited forcelimited actlimited ctrlrange forcerange actrange lengthrange actdim "
+        "dyntype gaintype biastype dynprm gainprm biasprm actearly plugin kp kv dampratio timeconst "
+        "inheritrange kd gain bias area diameter scale range force vmax fpmax fvmax lmin lmax vmin "
+        "tausmooth input nsample interp delay armature damping",
+        _LAW,
+    )
+)
+_EQUALITY = (
+    taken("name class active") | translated("solref solimp", "the equality holds exactly")
+)
+
+MJCF: Table = {
+    "mujoco": taken() | taken("model"),
+    "mujocoinclude": taken(),
+    "include": taken() | taken("file"),
+    "compiler": taken()
+    | taken(
+        "angle eulerseq autolimits inertiafromgeom inertiagrouprange meshdir assetdir strippath "
+        "boundmass boundinertia balanceinertia settotalmass coordinate"
+    )
+    | noted("texturedir discardvisual fusestatic convexhull fitaabb usethread", "no effect here")
+    | noted("alignfree saveinertial exactmeshinertia", "no effect here"),
+    "lengthrange": noted("", "muscles"),
+    "option": taken() | taken("gravity")
+    | noted("wind density viscosity magnetic", "fluids and fields")
+    | noted(
+        "timestep impratio tolerance ls_tolerance noslip_tolerance ccd_tolerance sleep_tolerance "
+        "o_margin o_solref o_solimp o_friction integrator cone jacobian solver iterations "
+        "ls_iterations noslip_iterations ccd_iterations sdf_iterations sdf_initpoints "
+        "actuatorgroupdisable apirate mpr_iterations mpr_tolerance collision",
+        _SOLVER,
+    ),
+    "flag": taken() | taken("gravity")
+    | noted(
+        "constraint equality frictionloss limit contact passive spring damper clampctrl warmstart "
+        "filterparent actuation refsafe sensor midphase eulerdamp autoreset nativeccd island "
+        "override energy fwdinv invdiscrete multiccd sleep",
+        _SOLVER,
+    ),
+    "size": noted("", "memory of a simulator"),
+    "visual": noted("", _DRAWING),
+    "statistic": noted("", _DRAWING),
+    "default": taken() | taken("class"),
+    "custom": noted("", "data of a user"),
+    "extension": noted("", "plugins of a simulator are not run"),
+    "asset": taken(),
+    "mesh": taken() | taken("name class file scale refpos refquat inertia")
+    | noted("vertex face normal texcoord builtin params", "meshes without a file are not drawn")
+    | noted("content_type smoothnormal maxhullvert material octree_maxdepth", _DRAWING),
+    "material": taken() | taken("name class rgba")
+    | noted(
+        "texture texrepeat texuniform emission specular shininess reflectance metallic roughness",
+        "textures are not drawn",
+    ),
+    "layer": noted("", "textures are not drawn"),
+    "texture": noted("", "textures are not drawn"),
+    "hfield": noted("", "height fields are not drawn"),
+    "skin": noted("", "skins are not drawn"),
+    "model": noted("", "models that <attach> would take"),
+    "worldbody": taken(),
+    "body": taken() | _FRAME | taken("name childclass")
+    | translated("mocap", "a part of ground")
+    | noted("gravcomp", "compensation of gravity: add a force")
+    | noted("user sleep", "data of a simulator"),
+    "frame": taken() | _FRAME | taken("name childclass"),
+    "inertial": taken() | _FRAME | taken("mass diaginertia fullinertia"),
+    "joint": taken()
+    | taken("name class type pos axis range limited ref springref stiffness damping armature")
+    | translated("frictionloss", "no type of force is friction that does not depend on the load")
+    | noted("springdamper", "give stiffness and damping")
+    | noted("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
+    | noted("actuatorfrcrange actuatorfrclimited actuatorgravcomp", "limits of actuators")
+    | noted("group user align", _DRAWING),
+    "freejoint": taken() | taken("name") | noted("group align", _DRAWING),
+    "geom": taken() | _FRAME
+    | taken("name class type size fromto mesh mass density group rgba material")
+    | noted("shellinertia hfield fitscale", "not drawn")
+    | noted("fluidshape fluidcoef", "fluids")
+    | noted(
+        "contype conaffinity condim priority friction solmix solref solimp margin gap", _CONTACT
+    )
+    | noted("user", _DRAWING),
+    "site": taken() | _FRAME | taken("name class fromto")
+    | noted("type size group material rgba user", _DRAWING),
+    "camera": noted("", _DRAWING),
+    "light": noted("", _DRAWING),
+    "plugin": noted("", "plugins of a simulator are not run"),
+    "composite": refused("", "composites are not expanded; save the compiled model in MuJoCo"),
+    "flexcomp": refused("", "deformable bodies"),
+    "replicate": refused("", "replicates are not expanded; save the compiled model in MuJoCo"),
+    "attach": refused("", "models are not attached; save the compiled model in MuJoCo"),
+    "deformable": noted("", "deformable bodies"),
+    "contact": noted("", _CONTACT),
+    "pair": noted("", _CONTACT),
+    "equality": taken() | _EQUALITY,
+    "connect": taken() | _EQUALITY | taken("body1 body2 anchor site1 site2"),
+    "weld": taken() | _EQUALITY | taken("body1 body2 relpose anchor site1 site2")
+    | noted("torquescale", _SOFT),
+    "equality/joint": taken() | _EQUALITY | taken("joint1 joint2 polycoef"),
+    "equality/tendon": taken() | _EQUALITY | taken("tendon1 tendon2 polycoef"),
+    "flex": noted("", "deformable bodies"),
+    "flexvert": noted("", "deformable bodies"),
+    "distance": noted("", "distances"),
+    "tendon": taken(),
+    "default/tendon": noted("", "tendons but those of equalities"),
+    "fixed": translated("", "where an equality holds it; else left out") | taken("name class")
+    | noted(
+        "group limited actuatorfrclimited range actuatorfrcrange solreflimit solimplimit "
+        "solreffriction solimpfriction frictionloss margin springlength width material rgba "
+        "stiffness damping armature user",
+        "forces and limits of tendons",
+    ),
+    "fixed/joint": taken() | taken("joint coef"),
+    "spatial": noted("", "tendons over sites and pulleys"),
+    "actuator": taken(),
+    **dict.fromkeys(("motor", "general"), taken() | _ACTUATOR),
+    **dict.fromkeys(
+        ("position", "velocity", "intvelocity", "damper", "cylinder", "muscle", "adhesion",
+         "dcmotor"),
+        translated("", _LAW) | _ACTUATOR,
+    ),
+    "actuator/plugin": noted("", "plugins of a simulator are not run"),
+    "sensor": noted("", "sensors"),
+    "keyframe": noted("", "poses; --position gives the start"),
+}  # fmt: skip

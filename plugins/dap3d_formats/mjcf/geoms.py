@@ -1,0 +1,199 @@
+"""Geoms of MJCF: shapes, and the mass that they give to bodies."""
+
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+from dap3d_formats.mjcf.document import Document, along
+
+from dap3d_core.interface.formats import (
+    FormatError,
+    Frame,
+    Geometry,
+    Inertial,
+    XmlElement,
+    from_quaternion,
+    inertia_moved,
+    inertia_of_mesh,
+    inertia_of_solid,
+    total_inertia,
+)
+
+#: Geoms without a volume.
+FLAT = ("plane", "hfield", "sdf")
+#: Density of geoms, kg/m^3.
+WATER = 1000.0
+#: Group from which geoms are hidden at first, as those of contacts are.
+HIDDEN = 3
+
+
+@attrs.define(eq=False)
+class Geoms:
+    """Reads the geoms of a document.
+
+    Attributes:
+        document: the document.
+        assets: meshes by name.
+        colors: materials by name.
+    """
+
+    document: Document
+    assets: dict[str, XmlElement] = attrs.Factory(dict)
+    colors: dict[str, str] = attrs.Factory(dict)
+
+    @classmethod
+    def of(cls, document: Document) -> "Geoms":
+        """The reader, with the assets of the document."""
+        geoms = cls(document)
+        for asset in document.root.all("asset"):
+            for mesh in asset.all("mesh"):
+                name = mesh.get("name") or Path(mesh.get("file") or "").stem
+                geoms.assets[name] = document.settled(mesh, "main")
+            for material in asset.all("material"):
+                settled = document.settled(material, "main")
+                if "rgba" in settled.attributes:
+                    geoms.colors[material.require("name")] = hexadecimal(settled.numbers("rgba"))
+        return geoms
+
+    def geometry(self, geom: XmlElement, frame: Frame) -> Geometry | None:
+        """The shape of a geom with the attributes of its class, or None for what is not drawn.
+
+        Args:
+            geom: the geom.
+            frame: the frame that it is given in, in its link.
+        """
+        kind = self.kind(geom)
+        color = hexadecimal(geom.numbers("rgba")) if "rgba" in geom.attributes else ""
+        color = color or self.colors.get(geom.get("material") or "", "")
+        hidden = geom.number("group", 0.0) >= HIDDEN
+        common: dict[str, Any] = {"color": color, "collision": hidden, "place": geom.place}
+        if kind == "mesh":
+            return self._mesh_shape(geom, frame, common)
+        if kind in FLAT:
+            self.document.source.remarks.leave_out(geom.place, f"a geom {kind} is not drawn")
+            return None
+        size, pose = self.solid(geom, kind)
+        return Geometry(kind, size, frame @ pose, **common)
+
+    def _mesh_shape(self, geom: XmlElement, frame: Frame, common: Any) -> Geometry | None:
+        asset = self._asset(geom)
+        if "file" not in asset.attributes:
+            self.document.source.remarks.leave_out(geom.place, "meshes without a file are not drawn")
+            return None
+        path = self.document.source.locate(self._file(asset), asset.place)
+        if path is None:
+            return None
+        pose = frame @ self.document.frame(geom) @ _reference(asset).inverse()
+        scale = asset.numbers("scale", 3, (1.0, 1.0, 1.0))
+        return Geometry("mesh", mesh=path, scale=scale, pose=pose, **common)
+
+    def inertial(self, geom: XmlElement, frame: Frame) -> Inertial | None:
+        """Mass and inertia of a geom in the axes of its link, or None for none.
+
+        Raises:
+            FormatError: a mesh cannot be read, or encloses nothing.
+        """
+        kind = self.kind(geom)
+        mass = geom.number("mass", -1.0)
+        density = geom.number("density", WATER)
+        if kind in FLAT or mass == 0.0 or (mass < 0.0 and density == 0.0):
+            return None
+        if geom.get("shellinertia") == "true":
+            what = "a geom with shellinertia: give the body an <inertial>"
+            raise FormatError(what, geom.place)
+        if kind == "mesh":
+            volume, com, unit_inertia = self._mesh_inertia(geom)
+            pose = frame @ self.document.frame(geom)
+        else:
+            size, pose = self.solid(geom, kind)
+            volume, unit_inertia = inertia_of_solid(kind, size)
+            com, pose = np.zeros(3), frame @ pose
+        mass = mass if mass > 0.0 else density * abs(volume)
+        return inertia_moved(Inertial(mass, com, mass * unit_inertia), pose)
+
+    def kind(self, geom: XmlElement) -> str:
+        """The type of a geom."""
+        return geom.get("type") or ("mesh" if "mesh" in geom.attributes else "sphere")
+
+    def solid(self, geom: XmlElement, kind: str) -> tuple[tuple[float, ...], Frame]:
+        """Sizes, as of ``Geometry``, and frame of a solid.
+
+        Raises:
+            FormatError: the type is unknown, or sizes are missing.
+        """
+        counts = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
+        if kind not in counts:
+            raise FormatError(f"a geom of type {kind!r} is unknown", geom.place)
+        if "mesh" in geom.attributes:
+            raise FormatError("a primitive geom fitted to a mesh: give its size", geom.place)
+        size, count = geom.numbers("size", None, (0.0,)), counts[kind]
+        pose = self.document.frame(geom)
+        if "fromto" in geom.attributes and kind != "sphere":
+            ends = np.array(geom.numbers("fromto", 6)).reshape(2, 3)
+            half = float(np.linalg.norm(ends[1] - ends[0])) / 2.0
+            if not half > 0.0:
+                raise FormatError("the two ends of fromto are the same point", geom.place)
+            axis = (ends[0] - ends[1]) / (2.0 * half)
+            pose = Frame(ends.mean(axis=0), along(tuple(axis.tolist())))
+            size = (size[0], half) if count == 2 else (size[0], size[min(1, len(size) - 1)], half)
+            if kind in ("box", "ellipsoid") and len(geom.numbers("size")) == 1:
+                size = (size[0], size[0], half)
+        if len(size) < count or min(size[:count]) <= 0.0:
+            raise FormatError(f"size of a {kind} should be {count} numbers greater than 0",
+                              geom.place)  # fmt: skip
+        size = size[:count]
+        if kind in ("capsule", "cylinder"):
+            return (size[0], 2.0 * size[1]), pose
+        return (tuple(2.0 * edge for edge in size) if kind == "box" else size), pose
+
+    def _asset(self, geom: XmlElement) -> XmlElement:
+        name = geom.require("mesh")
+        if name not in self.assets:
+            raise FormatError(f"there is no mesh {name!r} in <asset>", geom.place)
+        return self.assets[name]
+
+    def _file(self, asset: XmlElement) -> str:
+        compiler, name = self.document.compiler, asset.require("file")
+        if compiler.get("strippath") == "true":
+            name = Path(name.replace("\\", "/")).name
+        folder = compiler.get("meshdir") or compiler.get("assetdir") or ""
+        return f"{folder}/{name}" if folder and not name.startswith("/") else name
+
+    def _mesh_inertia(self, geom: XmlElement) -> tuple[float, Any, Any]:
+        """Volume, mass centre, and inertia about it for a mass of 1, of a mesh asset.
+
+        Raises:
+            FormatError: it cannot be read, or encloses nothing.
+        """
+        asset, source = self._asset(geom), self.document.source
+        rule = asset.get("inertia", "legacy")
+        if "file" not in asset.attributes or rule not in ("legacy", "exact"):
+            what = f"the inertia of mesh {asset.get('name')} is not computed here"
+            raise FormatError(what, geom.place, "give its body an <inertial>")
+        path = source.locate(self._file(asset), asset.place, required=True)
+        assert path is not None
+        vertices, triangles = source.mesh(path, asset.place)
+        vertices = vertices * np.array(asset.numbers("scale", 3, (1.0, 1.0, 1.0)))
+        reference = _reference(asset).inverse()
+        vertices = vertices @ reference.A.T + reference.r
+        try:
+            return inertia_of_mesh(vertices, triangles, all_positive=rule == "legacy")
+        except ValueError as error:
+            raise FormatError(f"mesh {path.name}: {error}", geom.place) from None
+
+
+def _reference(asset: XmlElement) -> Frame:
+    """The frame of a mesh in its file."""
+    q = asset.numbers("refquat", 4, (1.0, 0.0, 0.0, 0.0))
+    return Frame(asset.numbers("refpos", 3, (0.0, 0.0, 0.0)), from_quaternion(q))
+
+
+def total(parts: list[Inertial]) -> Inertial | None:
+    """Parts together, or None for none."""
+    return total_inertia(parts) if parts else None
+
+
+def hexadecimal(rgba: tuple[float, ...]) -> str:
+    """A colour as #rrggbb."""
+    return "#" + "".join(f"{round(255 * min(max(x, 0.0), 1.0)):02x}" for x in rgba[:3])

@@ -1,3 +1,0 @@
-"""SDF."""
-
-interface_version = 1

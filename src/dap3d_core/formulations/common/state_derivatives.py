@@ -1,0 +1,166 @@
+"""Derivatives by and of the states of elements, exact to rounding, by dual numbers.
+
+What linearisation and equilibrium need besides the derivatives by the motion of the bodies
+(simulation/linearization/tangent.py, where displacements and forces are explained).
+"""
+
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.interface.codegen.loop_derivatives import differentiate_loop
+from dap3d_core.model import Group
+from dap3d_core.model.element_states import first_states
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Kinds of loops that may see states.
+KINDS = ("rate", "wrench", "friction", "acceleration", "position")
+
+
+@attrs.frozen(eq=False, kw_only=True)
+class StateDerivatives:
+    """Rates of s states of elements of n bodies, and derivatives; matrices are scipy CSR arrays.
+
+    Attributes:
+        rates: (s,) derivatives of the states in time.
+        rate_by_displacement, rate_by_velocity: (s, 6 n).
+        rate_by_states: (s, s).
+        force_by_states: (6 n, s) of applied forces and reactions D^T lambda, lambda fixed.
+        position_by_states: (rows, s) dC/dz.
+        velocity_by_states: (rows, s) d(D v - nu)/dz.
+        acceleration_by_states: (rows, s) d(D a - gamma)/dz.
+    """
+
+    rates: Floats
+    rate_by_displacement: Any
+    rate_by_velocity: Any
+    rate_by_states: Any
+    force_by_states: Any
+    position_by_states: Any
+    velocity_by_states: Any
+    acceleration_by_states: Any
+
+
+def state_derivatives(
+    evaluator: Evaluator, t: float, v: Floats, multipliers: Floats, a: Floats
+) -> StateDerivatives:
+    """Derivatives at the bodies as placed, and ``evaluator.states``.
+
+    Args:
+        evaluator: of the model; its bodies and functions are placed.
+        t: time, s.
+        v, a: (6 n,) velocities and accelerations of the bodies.
+        multipliers: (rows,) lambda.
+    """
+    model, system = evaluator.model, evaluator.system
+    assembly = _Assembly(evaluator, v, multipliers, a)
+    minus_lambda = np.zeros(len(system.multipliers))
+    minus_lambda[system.row] = -multipliers
+    for loop, (kind, group) in enumerate(evaluator.loop_groups):
+        if kind in KINDS and group.type_info.layout.states:
+            i0, p0, count = system.groups[loop].tolist()
+            own = differentiate_loop(group.type_info, kind, t, system, (i0, p0, count),
+                                     minus_lambda, states=True)  # fmt: skip
+            states = first_states(model.acting, group)
+            assembly.add(kind, group, own.bodies, own.outputs, states)
+    return StateDerivatives(rates=assembly.rates, **assembly.matrices())
+
+
+class _Assembly:
+    """Adds up the derivatives of all elements."""
+
+    def __init__(self, evaluator: Evaluator, v: Floats, multipliers: Floats, a: Floats) -> None:
+        model = evaluator.model
+        six, rows, s = 6 * model.body_count, model.row_count, model.state_count
+        self.start, self.multipliers = model.joint_start, multipliers
+        self.v, self.a = (np.vstack([np.zeros((1, 6)), x.reshape(-1, 6)]) for x in (v, a))
+        self.rates = np.zeros(s)
+        by_rows = ("position_by_states", "velocity_by_states", "acceleration_by_states")
+        self.shapes = {"rate_by_displacement": (s, six), "rate_by_velocity": (s, six),
+                       "rate_by_states": (s, s), "force_by_states": (six, s),
+                       **dict.fromkeys(by_rows, (rows, s))}  # fmt: skip
+        self.parts: dict[str, list[tuple[Integers, Integers, Floats]]] = {}
+
+    def matrices(self) -> dict[str, Any]:
+        """All matrices by name."""
+        from scipy.sparse import csr_array
+
+        none = np.zeros(0, dtype=np.int64)
+        found = {}
+        for name, shape in self.shapes.items():
+            first = (none, none, np.zeros(0))
+            row, column, value = zip(first, *self.parts.get(name, []), strict=True)
+            places = np.concatenate(row), np.concatenate(column)
+            found[name] = csr_array((np.concatenate(value), places), shape=shape)
+        return found
+
+    def entries(self, name: str, row: Integers, column: Integers, value: Floats) -> None:
+        """Add entries; negative rows or columns are left out. Arguments broadcast."""
+        row, column, value = (x.ravel() for x in np.broadcast_arrays(row, column, value))
+        chosen = (row >= 0) & (column >= 0) & (value != 0.0)
+        self.parts.setdefault(name, []).append((row[chosen], column[chosen], value[chosen]))
+
+    def add(
+        self,
+        kind: str,
+        group: Group,
+        bodies: Integers,
+        outputs: dict[str, tuple[Floats, Floats]],
+        first: Integers,
+    ) -> None:
+        """Add the elements of a group; first: (m,) their first states."""
+        layout = group.type_info.layout
+        width, slots = layout.state_width, len(layout.slots)
+        own = first[:, None] + np.arange(width)  # (m, width)
+        if kind == "rate":
+            value, slope = outputs["rate"]
+            self.rates[own] = value
+            self.entries("rate_by_states", own[:, :, None], own[:, None, :], slope[..., -width:])
+            for place in range(bodies.shape[1]):
+                column = _components(bodies[:, place])[:, None]
+                part = slope[..., 12 * place : 12 * place + 12]
+                for name, of_level in (("rate_by_displacement", part[..., :6]),
+                                       ("rate_by_velocity", part[..., 6:])):  # fmt: skip
+                    self.entries(name, own[:, :, None], column, of_level)
+        elif kind in ("wrench", "friction"):
+            slope = outputs[kind][1][..., -width:]
+            row = _components(bodies[:, :slots])
+            self.entries("force_by_states", row[..., None], own[:, None, None], slope)
+        else:
+            self.add_rows(kind, group, bodies[:, :slots], outputs, own)
+
+    def add_rows(
+        self,
+        kind: str,
+        group: Group,
+        bodies: Integers,
+        outputs: dict[str, tuple[Floats, Floats]],
+        own: Integers,
+    ) -> None:
+        """Add joints whose rows see their states; own: (m, width) these."""
+        width = own.shape[1]
+        rows = next(iter(outputs.values()))[0].shape[2 if kind == "acceleration" else 1]
+        row = self.start[group.members][:, None] + np.arange(rows)
+        where = row[..., None], own[:, None]
+        if kind == "position":
+            self.entries("position_by_states", *where, outputs["C"][1][..., -width:])
+            return
+        J = outputs["J"][1][..., -width:]
+        reaction = np.einsum("msrcd,mr->mscd", J, self.multipliers[row])
+        place = _components(bodies)[..., None]
+        self.entries("force_by_states", place, own[:, None, None], reaction)
+        for name, motion, side in (("velocity_by_states", self.v, "nu"),
+                                   ("acceleration_by_states", self.a, "gamma")):  # fmt: skip
+            moved = np.einsum("msrcd,msc->mrd", J, motion[bodies])
+            self.entries(name, *where, moved - outputs[side][1][..., -width:])
+
+
+def _components(bodies: Integers) -> Integers:
+    """(..., 6) components of bodies (...); -1 for ground."""
+    first = 6 * (bodies[..., None] - 1) + np.arange(6)
+    return np.where(bodies[..., None] > 0, first, -1)

@@ -1,0 +1,133 @@
+"""The joint formulation where rows are kept: joints that close loops, drivers, rods.
+
+    place, forces    as on a tree
+    reduce           articulated inertias of the tree; what its bodies do if no row is kept
+    carry, multiply  kept rows as loads on the tree; the matrix S = G M^-1 G^T of these
+    solve            S lambda = gamma - (accelerations of the rows so far)
+    push, spread     what lambda does along the freedoms; q_ddot, from ground to the leaves
+
+The same S moves a state onto the kept rows: those of the tree cannot be violated.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+from dap3d_core.assembly.arrays import SINGULAR, Floats, System
+from dap3d_core.assembly.evaluate import zero
+from dap3d_core.formulations.common.constraints import (
+    power_of_drivers,
+    report_levels,
+    report_multipliers,
+)
+from dap3d_core.formulations.common.friction import has_friction, solve_with_friction
+from dap3d_core.formulations.joint.equations import (
+    apply_forces,
+    linearise_tree,
+    store_reactions,
+    sum_forces,
+)
+from dap3d_core.formulations.joint.multipliers import joint_multipliers
+from dap3d_core.formulations.joint.place import place_tree
+from dap3d_core.formulations.joint.reduce import reduce_nodes
+from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
+from dap3d_core.formulations.joint_loops.layout import PART_OF_ROW
+from dap3d_core.formulations.joint_loops.loads import (
+    carry_rows,
+    lacking_accelerations,
+    linearise_kept,
+    multiply_loads,
+    push_freedoms,
+)
+from dap3d_core.formulations.joint_loops.multipliers import (
+    add_kept_reactions,
+    power_of_kept_drivers,
+)
+from dap3d_core.formulations.joint_loops.profile import factor_profile, solve_profile, weigh_rows
+from dap3d_core.formulations.joint_loops.projection import factorise_anyway, project_onto_kept
+from dap3d_core.formulations.lsq import minimum_norm_multipliers
+from dap3d_core.kernels.runtime.cache import compiled
+
+
+@compiled
+def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """dy/dt of a state, the power of forces and drivers last."""
+    place_tree(y, system)
+    apply_forces(t, system, loops)
+    if has_friction(system):
+        power = accelerate(t, system, loops)
+    else:
+        linearise_kept(t, system, loops)
+        power = reduce_nodes(system, system.force, True)
+        factorise(system)
+        lacking_accelerations(system)
+        solve_profile(system)
+        push_freedoms(system)
+        power += power_of_kept_drivers(system)
+    spread_tree(y, out, system)
+    out[out.shape[0] - 1] = power
+
+
+@compiled
+def factorise(system: System) -> None:
+    """Factors of the kept rows' matrix, of the inertias in ``tree.work``."""
+    carry_rows(system)
+    multiply_loads(system)
+    weigh_rows(system, system.tree.kept.settings[PART_OF_ROW])
+    factor_profile(system)
+
+
+@compiled
+def accelerate(t: float, system: System, loops: Any) -> float:
+    """Scaled ``acceleration`` and all ``multipliers``, with friction; returns the power.
+
+    The bodies are placed, and ``force`` is known.
+    """
+    power = linearise_tree(t, system, loops)
+    linearise_kept(t, system, loops)
+    if not factorise_anyway(system):
+        system.settings[SINGULAR] += 1.0
+    power += solve_with_friction(t, system, loops, solve)
+    return power + power_of_drivers(system)
+
+
+@compiled
+def solve(system: System) -> None:
+    """``acceleration`` and ``multipliers`` from the scaled forces in ``acceleration``."""
+    sum_forces(system)
+    reduce_nodes(system, system.tree.force, True)
+    lacking_accelerations(system)
+    solve_profile(system)
+    push_freedoms(system)
+    spread_tree(system.tree.slope, system.tree.slope, system)
+    store_reactions(system)
+    zero(system.multipliers)
+    add_kept_reactions(system, system.change)
+    joint_multipliers(system, system.change)
+
+
+@compiled
+def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """Move a state onto the kept rows; out as in ``project_onto`` (common/constraints.py)."""
+    project_onto_kept(t, y, out, system, loops)
+
+
+@compiled
+def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals.
+
+    Where rows depend on each other lambda is the least that gives these accelerations.
+    """
+    place_tree(y, system)
+    apply_forces(t, system, loops)
+    accelerate(t, system, loops)
+    body_accelerations(system, out)
+    report_multipliers(system, out)
+    report_levels(t, out, system, loops)
+    if system.tree.kept.settings[PART_OF_ROW] > 0.0:
+        for _ in range(2):
+            for k in range(system.total.shape[0]):
+                system.total[k] = system.multipliers[k]
+            minimum_norm_multipliers(system)
+        report_multipliers(system, out)

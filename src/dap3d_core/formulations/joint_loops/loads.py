@@ -1,0 +1,345 @@
+"""Kept rows as loads on a tree: what they do along its freedoms, and what they lack.
+
+A row is a load on the bodies of its joint. Carried to ground against articulated inertias it does g
+along the freedom of each node that it passes, and
+
+    G M^-1 G^T = sum of g D^-1 g^T,      M^-1 the inverse of the tree's mass matrix,
+
+where D is the articulated inertia of the freedom (joint/reduce.py). Featherstone, Efficient
+factorization of the joint-space inertia matrix for branched kinematic trees (2005); Jain, Robot and
+Multibody Dynamics (2011), 10.4.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.assembly.evaluate import zero
+from dap3d_core.formulations.joint.node_layout import ACCELERATION as POINT_ACCELERATION
+from dap3d_core.formulations.joint.node_layout import (
+    ALPHA,
+    AXIS_NOW,
+    CENTRE_NOW,
+    FORCE,
+    FREE,
+    FREE_RATE,
+    GAIN,
+    INVERSE,
+    INVERSE_BALL,
+    INVERSE_FREE,
+    LINK_NOW,
+    MATRIX_H,
+    MATRIX_M,
+    MOMENT,
+    MOTION,
+    PRISMATIC,
+    REVOLUTE,
+    SPHERICAL,
+    SPIN,
+    TREE_WIDTH,
+    WORK_WIDTH,
+)
+from dap3d_core.formulations.joint.place import put, times, vector_of
+from dap3d_core.formulations.joint.reduce import nine_of, six_of, symmetric_times, transposed_times
+from dap3d_core.formulations.joint.spread import solve_symmetric
+from dap3d_core.formulations.joint_loops.layout import (
+    CUT_WIDTH,
+    END_BLOCK,
+    END_BODY,
+    END_STEP,
+    END_WIDTH,
+    FIRST,
+    FIRST_END,
+    FIRST_ROW,
+    FIRST_STEP,
+    LAST_END,
+    LAST_STEP,
+    LEFT,
+    LEFT_COUNT,
+    LEFT_LOADS,
+    LOADS,
+    NEXT_STEP,
+    NODE,
+    PAIR_NODE,
+    PAIR_WIDTH,
+    PLACE,
+    PROFILE_WIDTH,
+    RIGHT,
+    RIGHT_COUNT,
+    RIGHT_LOADS,
+    ROW_COUNT,
+    STEP_WIDTH,
+)
+from dap3d_core.kernels.runtime.array_struct import pointer
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, V, W
+from dap3d_core.kernels.vectors import add, cross, dot, scale, sub
+
+
+@compiled
+def linearise_kept(t: float, system: System, loops: Any) -> None:
+    """D, gamma and nu of the kept rows at the bodies as placed; D along global axes."""
+    calls, kept = system.tree.kept.calls, system.tree.kept
+    D, gamma, nu = pointer(kept.D), pointer(system.gamma), pointer(system.nu)
+    for q in range(kept.call_counts[0]):
+        loop = loops[calls[q, 0]]
+        loop(t, system, calls[q, 1], calls[q, 2], calls[q, 3], D, gamma, nu)
+
+
+@compiled
+def kept_residuals(t: float, system: System, loops: Any) -> None:
+    """C of the kept rows into ``residual``, zero of all others."""
+    calls, kept, C = system.tree.kept.calls, system.tree.kept, pointer(system.residual)
+    zero(system.residual)
+    first = kept.call_counts[0]
+    for q in range(first, first + kept.call_counts[1]):
+        loop = loops[calls[q, 0]]
+        loop(t, system, calls[q, 1], calls[q, 2], calls[q, 3], C, C, C)
+
+
+@compiled
+def carry_rows(system: System) -> None:
+    """``loads``: g of all kept rows at all nodes that they pass; ``tree.work`` is reduced."""
+    kept = system.tree.kept
+    cuts, ends, ways = pointer(kept.cuts), pointer(kept.ends), pointer(kept.ways)
+    D, g, x = pointer(kept.D), pointer(kept.loads), pointer(kept.carried)
+    K, tree = pointer(system.tree.work), pointer(system.tree.nodes)
+    for q in range(kept.cuts.shape[0]):
+        c = CUT_WIDTH * q
+        rows, first = cuts[c + ROW_COUNT], cuts[c + FIRST_STEP]
+        for i in range(6 * rows * (cuts[c + LAST_STEP] - first)):
+            x[i] = 0.0
+        for e in range(cuts[c + FIRST_END], cuts[c + LAST_END]):
+            step, block = ends[END_WIDTH * e + END_STEP], ends[END_WIDTH * e + END_BLOCK]
+            k = WORK_WIDTH * ways[STEP_WIDTH * step + NODE]
+            apply_rows(D, block, rows, vector_of(K, k + CENTRE_NOW), x, 6 * rows * (step - first))
+        for step in range(first, cuts[c + LAST_STEP]):
+            s = STEP_WIDTH * step
+            node, at = ways[s + NODE], 6 * rows * (step - first)
+            k, motion = WORK_WIDTH * node, tree[TREE_WIDTH * node + MOTION]
+            if motion == REVOLUTE:
+                pass_turn(K, k, rows, x, at, g, ways[s + LOADS])
+            elif motion == PRISMATIC:
+                pass_slide(K, k, rows, x, at, g, ways[s + LOADS])
+            elif motion == SPHERICAL:
+                pass_ball(K, k, rows, x, at, g, ways[s + LOADS], 3)
+            elif motion == FREE:
+                pass_ball(K, k, rows, x, at, g, ways[s + LOADS], 6)
+            if ways[s + NEXT_STEP] >= 0:
+                up = 6 * rows * (ways[s + NEXT_STEP] - first)
+                carry_on(vector_of(K, k + LINK_NOW), rows, x, at, up)
+
+
+@compiled_into
+def apply_rows(D: Floats, block: int, rows: int, arm: Any, x: Floats, at: int) -> None:
+    """Add the loads of rows on a body, about the point P of its node; arm: to the mass centre."""
+    for r in range(rows):
+        d, o = block + 6 * r, at + 6 * r
+        f = vector_of(D, d)
+        put(x, o, add(vector_of(x, o), add(vector_of(D, d + 3), cross(arm, f))))
+        put(x, o + 3, add(vector_of(x, o + 3), f))
+
+
+@compiled_into
+def pass_turn(K: Floats, k: int, rows: int, x: Floats, at: int, g: Floats, place: int) -> None:
+    """Take from loads what the freedom of a rotation takes."""
+    axis, u, v = vector_of(K, k + AXIS_NOW), vector_of(K, k + GAIN), vector_of(K, k + GAIN + 3)
+    for r in range(rows):
+        o = at + 6 * r
+        along = dot(axis, vector_of(x, o))
+        g[place + r] = along
+        put(x, o, sub(vector_of(x, o), scale(along, u)))
+        put(x, o + 3, sub(vector_of(x, o + 3), scale(along, v)))
+
+
+@compiled_into
+def pass_slide(K: Floats, k: int, rows: int, x: Floats, at: int, g: Floats, place: int) -> None:
+    """Take from loads what the freedom of a translation takes."""
+    axis, u, v = vector_of(K, k + AXIS_NOW), vector_of(K, k + GAIN), vector_of(K, k + GAIN + 3)
+    for r in range(rows):
+        o = at + 6 * r
+        along = dot(axis, vector_of(x, o + 3))
+        g[place + r] = along
+        put(x, o, sub(vector_of(x, o), scale(along, u)))
+        put(x, o + 3, sub(vector_of(x, o + 3), scale(along, v)))
+
+
+@compiled_into
+def pass_ball(
+    K: Floats, k: int, rows: int, x: Floats, at: int, g: Floats, place: int, size: int
+) -> None:
+    """Take from loads what the freedoms of a ball take, or of a free body: all that is left."""
+    H = nine_of(K, k + MATRIX_H)
+    for r in range(rows):
+        o = at + 6 * r
+        moment = vector_of(x, o)
+        force = sub(vector_of(x, o + 3), transposed_times(H, moment))
+        put(g, place + size * r, moment)
+        if size == 6:
+            put(g, place + size * r + 3, force)
+        put(x, o, (0.0, 0.0, 0.0))
+        put(x, o + 3, force)
+
+
+@compiled_into
+def carry_on(link: Any, rows: int, x: Floats, at: int, up: int) -> None:
+    """Add loads to those of the parent, about its point; link: from there to P."""
+    for r in range(rows):
+        o, p = at + 6 * r, up + 6 * r
+        f = vector_of(x, o + 3)
+        put(x, p, add(vector_of(x, p), add(vector_of(x, o), cross(link, f))))
+        put(x, p + 3, add(vector_of(x, p + 3), f))
+
+
+@compiled
+def multiply_loads(system: System) -> None:
+    """``matrix``: G M^-1 G^T of the kept rows, from ``loads``."""
+    kept = system.tree.kept
+    pairs, profile, S = pointer(kept.pairs), pointer(kept.profile), pointer(kept.matrix)
+    g, K, tree = pointer(kept.loads), pointer(system.tree.work), pointer(system.tree.nodes)
+    zero(kept.matrix)
+    for q in range(kept.pairs.shape[0]):
+        p = PAIR_WIDTH * q
+        k = WORK_WIDTH * pairs[p + PAIR_NODE]
+        motion = tree[TREE_WIDTH * pairs[p + PAIR_NODE] + MOTION]
+        left, right = pairs[p + LEFT_LOADS], pairs[p + RIGHT_LOADS]
+        row, column = pairs[p + LEFT], pairs[p + RIGHT]
+        for r in range(pairs[p + LEFT_COUNT]):
+            at = profile[PROFILE_WIDTH * (row + r) + PLACE] + column
+            count = r + 1 if row == column else pairs[p + RIGHT_COUNT]
+            if motion == SPHERICAL:
+                n = symmetric_times(six_of(K, k + INVERSE_BALL), vector_of(g, left + 3 * r))
+                for e in range(count):
+                    S[at + e] += dot(n, vector_of(g, right + 3 * e))
+            elif motion == FREE:
+                n = symmetric_times(six_of(K, k + INVERSE_FREE), vector_of(g, left + 6 * r))
+                f = solve_symmetric(six_of(K, k + MATRIX_M), vector_of(g, left + 6 * r + 3))
+                for e in range(count):
+                    o = right + 6 * e
+                    S[at + e] += dot(n, vector_of(g, o)) + dot(f, vector_of(g, o + 3))
+            else:
+                x = g[left + r] * K[k + INVERSE]
+                for e in range(count):
+                    S[at + e] += x * g[right + e]
+
+
+@compiled
+def lacking_accelerations(system: System) -> None:
+    """``right``: gamma less the rows' accelerations where no kept row acts, as ``reduce`` left."""
+    kept = system.tree.kept
+    cuts, ends, ways = pointer(kept.cuts), pointer(kept.ends), pointer(kept.ways)
+    D, K, right = pointer(kept.D), pointer(system.tree.work), pointer(kept.right)
+    for q in range(kept.cuts.shape[0]):
+        c = CUT_WIDTH * q
+        rows, first = cuts[c + ROW_COUNT], cuts[c + FIRST]
+        for r in range(rows):
+            right[first + r] = system.gamma[cuts[c + FIRST_ROW] + r]
+        for e in range(cuts[c + FIRST_END], cuts[c + LAST_END]):
+            step, block = ends[END_WIDTH * e + END_STEP], ends[END_WIDTH * e + END_BLOCK]
+            k = WORK_WIDTH * ways[STEP_WIDTH * step + NODE]
+            a = vector_of(K, k + POINT_ACCELERATION)
+            a = add(a, times(K, k + SPIN, vector_of(K, k + CENTRE_NOW)))
+            subtract_product(D, block, rows, a, vector_of(K, k + ALPHA), right, first)
+        for step in range(cuts[c + FIRST_STEP], cuts[c + LAST_STEP]):
+            subtract_free_rates(system, STEP_WIDTH * step, rows, first)
+
+
+@compiled_into
+def subtract_product(
+    D: Floats, block: int, rows: int, a: Any, alpha: Any, right: Floats, first: int
+) -> None:
+    """Subtract D (a; alpha) of one body."""
+    for r in range(rows):
+        d = block + 6 * r
+        right[first + r] -= dot(vector_of(D, d), a) + dot(vector_of(D, d + 3), alpha)
+
+
+@compiled_into
+def subtract_free_rates(system: System, s: int, rows: int, first: int) -> None:
+    """Subtract what the rates of a node do to rows that pass it; s: place of the step."""
+    K, ways, g = pointer(system.tree.work), pointer(system.tree.kept.ways), system.tree.kept.loads
+    node, right = ways[s + NODE], system.tree.kept.right
+    k, motion, place = WORK_WIDTH * node, system.tree.nodes[node, MOTION], ways[s + LOADS]
+    if motion == SPHERICAL:
+        for r in range(rows):
+            right[first + r] -= dot(vector_of(g, place + 3 * r), vector_of(K, k + MOMENT))
+    elif motion == FREE:
+        a = solve_symmetric(six_of(K, k + MATRIX_M), vector_of(K, k + FORCE))
+        for r in range(rows):
+            o = place + 6 * r
+            along = dot(vector_of(g, o), vector_of(K, k + MOMENT))
+            right[first + r] -= along + dot(vector_of(g, o + 3), a)
+    elif motion in (REVOLUTE, PRISMATIC):
+        for r in range(rows):
+            right[first + r] -= g[place + r] * K[k + FREE_RATE]
+
+
+@compiled
+def lacking_velocities(system: System) -> None:
+    """``right``: nu less the rows' velocities at the bodies as placed."""
+    kept = system.tree.kept
+    cuts, ends = pointer(kept.cuts), pointer(kept.ends)
+    D, b, right = pointer(kept.D), pointer(system.tree.places), pointer(kept.right)
+    for q in range(kept.cuts.shape[0]):
+        c = CUT_WIDTH * q
+        rows, first = cuts[c + ROW_COUNT], cuts[c + FIRST]
+        for r in range(rows):
+            right[first + r] = system.nu[cuts[c + FIRST_ROW] + r]
+        for e in range(cuts[c + FIRST_END], cuts[c + LAST_END]):
+            o, block = BODY_WIDTH * ends[END_WIDTH * e + END_BODY], ends[END_WIDTH * e + END_BLOCK]
+            subtract_product(D, block, rows, vector_of(b, o + V), vector_of(b, o + W), right, first)
+
+
+@compiled
+def rest(system: System) -> None:
+    """Forget the forces that ``reduce`` left: what follows is the effect of kept rows alone."""
+    K, nodes = pointer(system.tree.work), system.tree.nodes
+    for n in range(1, nodes.shape[0]):
+        k, motion = WORK_WIDTH * n, nodes[n, MOTION]
+        if motion in (REVOLUTE, PRISMATIC):
+            K[k + FREE_RATE] = 0.0
+        else:
+            put(K, k + MOMENT, (0.0, 0.0, 0.0))
+            put(K, k + FORCE, (0.0, 0.0, 0.0))
+
+
+@compiled
+def push_freedoms(system: System) -> None:
+    """Add the effect of ``multipliers`` of kept rows to what ``reduce`` left for ``spread``."""
+    kept = system.tree.kept
+    cuts, ways = pointer(kept.cuts), pointer(kept.ways)
+    g, K, tree = pointer(kept.loads), pointer(system.tree.work), pointer(system.tree.nodes)
+    for q in range(kept.cuts.shape[0]):
+        c = CUT_WIDTH * q
+        rows, x = cuts[c + ROW_COUNT], kept.multipliers[cuts[c + FIRST] :]
+        for step in range(cuts[c + FIRST_STEP], cuts[c + LAST_STEP]):
+            s = STEP_WIDTH * step
+            node, place = ways[s + NODE], ways[s + LOADS]
+            k, motion = WORK_WIDTH * node, tree[TREE_WIDTH * node + MOTION]
+            if motion == SPHERICAL:
+                n = sum_of_loads(g, place, 3, rows, x)
+                change = symmetric_times(six_of(K, k + INVERSE_BALL), n)
+                put(K, k + MOMENT, add(vector_of(K, k + MOMENT), change))
+            elif motion == FREE:
+                n = sum_of_loads(g, place, 6, rows, x)
+                change = symmetric_times(six_of(K, k + INVERSE_FREE), n)
+                put(K, k + MOMENT, add(vector_of(K, k + MOMENT), change))
+                f = sum_of_loads(g, place + 3, 6, rows, x)
+                put(K, k + FORCE, add(vector_of(K, k + FORCE), f))
+            elif motion in (REVOLUTE, PRISMATIC):
+                total = 0.0
+                for r in range(rows):
+                    total += g[place + r] * x[r]
+                K[k + FREE_RATE] += total * K[k + INVERSE]
+
+
+@compiled_into
+def sum_of_loads(g: Floats, place: int, size: int, rows: int, x: Floats) -> Any:
+    """Sum of three numbers of the loads of rows, times multipliers."""
+    a0, a1, a2 = 0.0, 0.0, 0.0
+    for r in range(rows):
+        o, factor = place + size * r, x[r]
+        a0, a1, a2 = a0 + g[o] * factor, a1 + g[o + 1] * factor, a2 + g[o + 2] * factor
+    return a0, a1, a2

@@ -1,0 +1,158 @@
+"""L D L^T of a symmetric positive matrix by rows, within its profile; of the kept rows.
+
+George, Liu, Computer Solution of Large Sparse Positive Definite Systems (1981), 4. In place of the
+diagonal 1/d is stored.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import numpy as np
+
+from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.assembly.metric import in_body_axes, scaled_moment
+from dap3d_core.formulations.joint_loops.layout import (
+    COUPLED,
+    CUT_WIDTH,
+    END_BLOCK,
+    END_BODY,
+    END_WIDTH,
+    FIRST,
+    FIRST_END,
+    LAST_END,
+    PLACE,
+    ROW_COUNT,
+)
+from dap3d_core.kernels.runtime.array_struct import pointer
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.linear.ldlt.factor import SINGULAR_NODE_RATIO, SINGULAR_PIVOT_RATIO
+
+#: Solutions at most where rows may depend on each other. One leaves some ``PART`` of what lacked
+#: before, less of weak rows; they go on while the square of the change falls by this factor, until
+#: it is rounding. What dependent rows contradict each other in changes by the same each time.
+SOLVES, FALLING, ROUNDING = 12, 0.25, 1e-30
+#: e of such rows by the diagonal of their matrix. A motion that joints permit on C = 0 alone takes
+#: rows for dependent there that are not, a little beside it: the smaller the part, the shorter are
+#: the steps that this leaves.
+PART = 1e-6
+#: A row that moves nothing has a compliance as if it moved a body by this part of its square.
+LEAST_FREE = 1e-4
+
+
+@compiled
+def weigh_rows(system: System, part: float) -> None:
+    """E: ``part`` of the diagonal of ``matrix``; 0.0 where rows are independent.
+
+    At least that of ``LEAST_FREE`` of the row's square in the metric of its bodies: the tree may
+    hold all that a row would move.
+    """
+    kept = system.tree.kept
+    for j in range(kept.compliance.shape[0]):
+        kept.compliance[j] = 0.0
+    if part == 0.0:
+        return
+    cuts, ends, D = pointer(kept.cuts), pointer(kept.ends), pointer(kept.D)
+    for q in range(kept.cuts.shape[0]):
+        c = CUT_WIDTH * q
+        for e in range(cuts[c + FIRST_END], cuts[c + LAST_END]):
+            b = ends[END_WIDTH * e + END_BODY]
+            s, k = system.body[b], system.metric[b]
+            for r in range(cuts[c + ROW_COUNT]):
+                d = ends[END_WIDTH * e + END_BLOCK] + 6 * r
+                x, y, z = in_body_axes(s, D[d + 3], D[d + 4], D[d + 5])
+                x, y, z = scaled_moment(k, x, y, z)
+                shift = (D[d] * D[d] + D[d + 1] * D[d + 1] + D[d + 2] * D[d + 2]) * k[0] * k[0]
+                kept.compliance[cuts[c + FIRST] + r] += shift + x * x + y * y + z * z
+    for j in range(kept.compliance.shape[0]):
+        diagonal = kept.matrix[kept.profile[j, PLACE] + j]
+        kept.compliance[j] = part * max(diagonal, LEAST_FREE * kept.compliance[j])
+
+
+@compiled
+def factor_profile(system: System) -> bool:
+    """Factors of ``matrix``, and E, in its place; False if a pivot is not positive."""
+    kept = system.tree.kept
+    S, profile, E = pointer(kept.matrix), kept.profile, kept.compliance
+    positive = True
+    for j in range(profile.shape[0]):
+        first, row = profile[j, COUPLED], profile[j, PLACE]
+        d = S[row + j] + E[j]
+        for i in range(first, j):
+            s, other = S[row + i], profile[i, PLACE]
+            for e in range(max(first, profile[i, COUPLED]), i):
+                s -= S[row + e] * S[other + e]
+            S[row + i] = s  # d times L
+        for i in range(first, j):
+            s = S[row + i]
+            S[row + i] = s * S[profile[i, PLACE] + i]
+            d -= s * S[row + i]
+        positive = positive and d > 0.0
+        S[row + j] = 1.0 / d if d > 0.0 else np.nan
+    return positive
+
+
+@compiled
+def solve_profile(system: System) -> None:
+    """``multipliers`` for what is lacking in ``right``: (S + E) lambda = right, refined by E."""
+    kept = system.tree.kept
+    right, x, z, E = kept.right, kept.multipliers, kept.solution, kept.compliance
+    size = x.shape[0]
+    for k in range(size):
+        z[k] = right[k]
+    substitute(system, z)
+    for k in range(size):
+        x[k] = z[k]
+    if size == 0 or E[0] == 0.0:
+        return
+    before = np.inf
+    for _ in range(1, SOLVES):
+        for k in range(size):
+            z[k] = right[k] + E[k] * x[k]
+        substitute(system, z)
+        change, total = 0.0, 0.0
+        for k in range(size):
+            change = max(change, E[k] * (z[k] - x[k]) * (z[k] - x[k]))
+            total = max(total, E[k] * z[k] * z[k])
+            x[k] = z[k]
+        if not change > ROUNDING * total or not change < FALLING * before:
+            return
+        before = change
+
+
+@compiled_into
+def substitute(system: System, z: Floats) -> None:
+    """Solve L D L^T z = z."""
+    kept = system.tree.kept
+    S, profile = pointer(kept.matrix), kept.profile
+    for j in range(profile.shape[0]):
+        row, s = profile[j, PLACE], z[j]
+        for i in range(profile[j, COUPLED], j):
+            s -= S[row + i] * z[i]
+        z[j] = s
+    for j in range(profile.shape[0]):
+        z[j] *= S[profile[j, PLACE] + j]
+    for j in range(profile.shape[0] - 1, -1, -1):
+        row, s = profile[j, PLACE], z[j]
+        for i in range(profile[j, COUPLED], j):
+            z[i] -= S[row + i] * s
+
+
+@compiled
+def pivot_lengths(system: System, lengths: Floats) -> int:
+    """Of each kept joint the square root of its pivots' product, as in linear/ldlt/factor.py.
+
+    Returns the number of joints with a pivot not above ``smallest`` and a small product.
+    """
+    kept, counted = system.tree.kept, 0
+    for q in range(kept.cuts.shape[0]):
+        product, small, first = 1.0, 0, kept.cuts[q, FIRST]
+        for j in range(first, first + kept.cuts[q, ROW_COUNT]):
+            if kept.smallest[j] > 0.0:
+                pivot = kept.matrix[kept.profile[j, PLACE] + j]
+                ratio = 1.0 / (abs(pivot) * kept.smallest[j])
+                small |= not ratio > 1.0
+                product *= SINGULAR_PIVOT_RATIO * ratio
+        if not product > SINGULAR_NODE_RATIO:
+            counted += small
+        lengths[q] = np.sqrt(product) if product > 0.0 else 0.0
+    return counted

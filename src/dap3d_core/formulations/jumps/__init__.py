@@ -1,0 +1,1 @@
+"""Jumps of velocities: impulses of elements, solved together with the joints that hold."""

@@ -1,0 +1,228 @@
+"""The tangent of elements with states of their own, by differences as in jacobian.py.
+
+With z the states of an element, x and v as there:
+
+    rate by z, by x and v        of z_dot = rate(...)
+    force by z                   of force + D^T lambda
+    rows by z                    of C and D v - nu, of joints
+
+All of them are blocks of the matrix of a stage, in which the states of an element are a node
+(linear/lu/plan.py). The step of a state is a part of its size, which is at least that below which
+its error control is absolute: a state may have any unit.
+"""
+
+# An element of an array is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+from dap3d_core.assembly.arrays import Floats, Integers, System
+from dap3d_core.assembly.evaluate import zero
+from dap3d_core.assembly.metric import in_body_axes, scaled_moment
+from dap3d_core.formulations.stabilized_index2.jacobian import (
+    JOINT_ELEMENT,
+    KIND,
+    LOOP,
+    PART,
+    POSITION_ELEMENT,
+    RATE_ELEMENT,
+    ROW_AT,
+    ROWS,
+    SLOT_COUNT,
+    STATE_AT,
+    STRIDE,
+    VELOCITY,
+    WIDTH,
+    Tangent,
+    call_element,
+    move_body,
+    scale_columns,
+    sizes_of,
+)
+from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.runtime.function_lists import call_loop
+
+#: Columns of ``StateTangent.records``: number of states; places in ``values`` of rate by z (m x m),
+#: of rate by each slot (m x 12), of force by z of each slot (6 x m), of C and of D v - nu by z
+#: (rows x m); slots; rows.
+COUNT, RATE_BY_STATE, RATE_BY_BODY, FORCE_BY_STATE, C_BY_STATE, NU_BY_STATE, SLOTS_OF, ROWS_OF = (
+    range(8)
+)
+#: Columns of ``StageMatrix.state_nodes``: first state, first unknown, place of the diagonal block;
+#: of the block (joint, states): place, rows of the joint's node, of these the first of the joint,
+#: and that in row vectors; number of states.
+FIRST, UNKNOWN, DIAGONAL, JOINT_BLOCK, NODE_ROWS, ROW_SHIFT, FIRST_ROW, WIDTH_OF = range(8)
+
+
+@compiled
+def differentiate_states(t: float, x: Floats, system: System, loops: Any, tangent: Tangent) -> None:
+    """Derivatives by and of all states, at the bodies and states as placed.
+
+    Args:
+        t: time, s.
+        x: (row_size,) -lambda.
+        system, loops: of the evaluator.
+        tangent: ``tangent.states.values`` are overwritten.
+    """
+    zero(tangent.states.values)
+    for e in range(tangent.elements.shape[0]):
+        row = tangent.elements[e]
+        for q in range(system.groups[row[LOOP], 2] if row[STATE_AT] >= 0 else 0):
+            differentiate_by_states(t, e, q, x, system, loops, tangent)
+            if row[KIND] == RATE_ELEMENT:
+                differentiate_rate(t, e, q, x, system, loops, tangent)
+    scale_state_tangent(system, tangent)
+
+
+@compiled
+def call_any(
+    t: float, e: int, q: int, x: Floats, out: Floats, system: System, loops: Any, tangent: Tangent
+) -> None:
+    """What element q of group e returns: rates, C, or as ``call_element``."""
+    row = tangent.elements[e]
+    if row[KIND] != RATE_ELEMENT and row[KIND] != POSITION_ELEMENT:
+        call_element(t, e, q, x, out, system, loops, tangent)
+        return
+    g = row[LOOP]
+    i0, p0 = system.groups[g, 0] + q * row[STRIDE], system.groups[g, 1] + q * row[WIDTH]
+    found = tangent.states.rates if row[KIND] == RATE_ELEMENT else tangent.gamma
+    call_loop(loops, g, t, system, (i0, p0, 1), found, x, found)
+    first, count = system.idx[i0 + row[STATE_AT]], row[ROWS]
+    if row[KIND] == POSITION_ELEMENT:
+        first = system.idx[i0 + row[ROW_AT]]
+    else:
+        count = tangent.states.records[tangent.states.record[first], COUNT]
+    for k in range(count):
+        out[k] = found[first + k]
+
+
+@compiled
+def differentiate_by_states(
+    t: float, e: int, q: int, x: Floats, system: System, loops: Any, tangent: Tangent
+) -> None:
+    """Add the derivatives of what an element returns by its own states, unscaled."""
+    row, own, z = tangent.elements[e], tangent.states, system.states
+    kind, ahead, behind, values = row[KIND], tangent.ahead, tangent.behind, own.values
+    i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
+    first = system.idx[i0 + row[STATE_AT]]
+    record = own.records[own.record[first]]
+    m = record[COUNT]
+    for k in range(m):
+        kept = z[first + k]
+        step = PART * max(abs(kept), own.size[first + k])
+        z[first + k] = kept + step
+        call_any(t, e, q, x, ahead, system, loops, tangent)
+        z[first + k] = kept - step
+        call_any(t, e, q, x, behind, system, loops, tangent)
+        z[first + k] = kept
+        half = 0.5 / step
+        if kind == RATE_ELEMENT:
+            for c in range(m):
+                values[record[RATE_BY_STATE] + m * c + k] = half * (ahead[c] - behind[c])
+            continue
+        if kind == POSITION_ELEMENT:
+            for c in range(row[ROWS]):
+                values[record[C_BY_STATE] + m * c + k] = half * (ahead[c] - behind[c])
+            continue
+        size = 6 * row[SLOT_COUNT]
+        for c in range(size):
+            values[record[FORCE_BY_STATE] + m * c + k] += half * (ahead[c] - behind[c])
+        for c in range(row[ROWS] if kind == JOINT_ELEMENT else 0):
+            rise = ahead[size + c] - behind[size + c]
+            values[record[NU_BY_STATE] + m * c + k] = half * rise
+
+
+@compiled
+def differentiate_rate(
+    t: float, e: int, q: int, x: Floats, system: System, loops: Any, tangent: Tangent
+) -> None:
+    """Derivatives of the rates of an element by the coordinates of its bodies, unscaled."""
+    row, own = tangent.elements[e], tangent.states
+    i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
+    record = own.records[own.record[system.idx[i0 + row[STATE_AT]]]]
+    m = record[COUNT]
+    extent, speed = sizes_of(e, q, system, tangent)
+    saved, ahead, behind = tangent.saved, tangent.ahead, tangent.behind
+    for n in range(row[SLOT_COUNT]):
+        b, o = system.idx[i0 + n], record[RATE_BY_BODY] + 12 * m * n
+        if b == 0:
+            continue
+        s = system.body[b]
+        for k in range(s.shape[0]):
+            saved[k] = s[k]
+        for c in range(12 if row[VELOCITY] != 0 else 6):
+            scale = extent if c < 3 else 1.0
+            if c >= 6:
+                scale = speed if c < 9 else speed / extent
+            step = PART * scale
+            move_body(s, saved, c, step)
+            call_any(t, e, q, x, ahead, system, loops, tangent)
+            move_body(s, saved, c, -step)
+            call_any(t, e, q, x, behind, system, loops, tangent)
+            for k in range(m):
+                own.values[o + 12 * k + c] = 0.5 / step * (ahead[k] - behind[k])
+        for k in range(s.shape[0]):
+            s[k] = saved[k]
+
+
+@compiled
+def scale_state_tangent(system: System, tangent: Tangent) -> None:
+    """Derivatives into the bodies' scaled coordinates."""
+    own, v = tangent.states, tangent.states.values
+    for e in range(tangent.elements.shape[0]):
+        row = tangent.elements[e]
+        for q in range(system.groups[row[LOOP], 2] if row[KIND] == RATE_ELEMENT else 0):
+            i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
+            record = own.records[own.record[system.idx[i0 + row[STATE_AT]]]]
+            m = record[COUNT]
+            for n in range(row[SLOT_COUNT]):
+                b = system.idx[i0 + n]
+                s, k = system.body[b], system.metric[b]
+                o = record[RATE_BY_BODY] + 12 * m * n
+                for c in range(m if b > 0 else 0):
+                    scale_columns(v, o + 12 * c, k, s)
+                    scale_columns(v, o + 12 * c + 6, k, s)
+                o = record[FORCE_BY_STATE] + 6 * m * n
+                for c in range(o, o + m if b > 0 else o):
+                    f0, f1, f2 = in_body_axes(s, v[c], v[c + m], v[c + 2 * m])
+                    v[c], v[c + m], v[c + 2 * m] = k[0] * f0, k[0] * f1, k[0] * f2
+                    c3, c4, c5 = c + 3 * m, c + 4 * m, c + 5 * m
+                    v[c3], v[c4], v[c5] = scaled_moment(k, v[c3], v[c4], v[c5])
+
+
+@compiled
+def fill_states(s: Any, K: Any, nodes: Integers, places: Integers, held: Integers,
+                tangent: Tangent) -> None:  # fmt: skip
+    """The blocks of states in s - J, for real or complex s in 1/s.
+
+    Args:
+        s, K: as of ``fill_matrix``.
+        nodes: (elements, 8) FIRST, UNKNOWN, ... of each element with states.
+        places: (elements, 2 slots) of each slot the places of the blocks (states, body) and
+            (body, states); -1 for ground.
+        held: (row_size,) 1 where a row has a position level.
+        tangent: with the derivatives.
+    """
+    v = tangent.states.values
+    for e in range(nodes.shape[0]):
+        record = tangent.states.records[e]
+        m, d = record[COUNT], nodes[e, DIAGONAL]
+        for c in range(m):
+            K[d + (m + 1) * c] = s
+            for k in range(m):
+                K[d + m * c + k] -= v[record[RATE_BY_STATE] + m * c + k]
+        for n in range(record[SLOTS_OF]):
+            if places[e, 2 * n] >= 0:
+                o = record[RATE_BY_BODY] + 12 * m * n
+                for k in range(12 * m):
+                    K[places[e, 2 * n] + k] = -v[o + k]
+                o = record[FORCE_BY_STATE] + 6 * m * n
+                for k in range(6 * m):
+                    K[places[e, 2 * n + 1] + 6 * m + k] = -v[o + k]
+        for r in range(record[ROWS_OF]):
+            d, count = nodes[e, JOINT_BLOCK], nodes[e, NODE_ROWS]
+            o, at = m * r, m * (nodes[e, ROW_SHIFT] + r)
+            for k in range(m):
+                if held[nodes[e, FIRST_ROW] + r] != 0:
+                    K[d + at + k] = -v[record[C_BY_STATE] + o + k]
+                K[d + m * count + at + k] = -v[record[NU_BY_STATE] + o + k]

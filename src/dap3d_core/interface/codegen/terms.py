@@ -1,0 +1,95 @@
+"""Completes a function type that combines others by the types of those in a scene.
+
+The kernel of each combination is made once: it takes the numbers of all its terms, and calls the
+kernel of the type with a function for each of them.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import attrs
+
+from dap3d_core.interface.codegen.instance_layout import InstanceLayout
+from dap3d_core.interface.codegen.kernel_arguments import (
+    SEVERAL,
+    KernelArgument,
+    namespace,
+    parameters,
+)
+from dap3d_core.interface.codegen.type_info import TypeInfo
+
+
+def bind_terms(type_info: TypeInfo, terms: Sequence[TypeInfo]) -> TypeInfo:
+    """A function type that combines functions, with those known.
+
+    Args:
+        type_info: the type, with one field of several functions.
+        terms: the types of these functions; their numbers follow its own, in this order.
+    """
+    layout = type_info.layout
+    width = layout.par_width + sum(term.layout.par_width for term in terms)
+    bound = attrs.evolve(
+        type_info,
+        layout=attrs.evolve(layout, par_width=width),
+        kernels={"value": _kernel(type_info, terms)},
+        given=f"({', '.join(term.type.keyword + term.given for term in terms)})",
+        terms=tuple(terms),
+    )
+    return attrs.evolve(bound, names=names_behind(bound, bound.layout))
+
+
+def names_behind(type_info: TypeInfo, layout: InstanceLayout) -> dict[str, KernelArgument]:
+    """Names of a function type whose numbers are shifted, with those of its terms.
+
+    Args:
+        type_info: the type.
+        layout: its layout, shifted.
+    """
+    names = namespace(type_info.type, layout)
+    if not type_info.terms:
+        return names
+    start = layout.par_width - sum(term.layout.par_width for term in type_info.terms)
+    for k, term in enumerate(type_info.terms):
+        behind = shifted(term.layout, start)
+        start = behind.par_width
+        for name, quantity in names_behind(term, behind).items():
+            if name != "x":
+                names[f"g{k}__{name}"] = attrs.evolve(quantity, name=f"g{k}__{name}")
+    return names
+
+
+def shifted(layout: InstanceLayout, start: int) -> InstanceLayout:
+    """A layout with its numbers shifted to ``start``."""
+    return attrs.evolve(
+        layout,
+        numbers={n: (start + at, shape) for n, (at, shape) in layout.numbers.items()},
+        tables={n: (start + at, columns) for n, (at, columns) in layout.tables.items()},
+        par_width=start + layout.par_width,
+    )
+
+
+def _kernel(type_info: TypeInfo, terms: Sequence[TypeInfo]) -> Callable[..., Any]:
+    """The kernel ``value`` of a combination, of the argument and the numbers of all terms."""
+    kernel = type_info.kernels["value"]
+    functions, numbers = [], []
+    for k, term in enumerate(terms):
+        of_term = parameters(term.kernels["value"])
+        numbers += [f"g{k}__{n}" for n in of_term if n != "x"]
+        given = ", ".join("x" if n == "x" else f"g{k}__{n}" for n in of_term)
+        functions.append(f"lambda x: g{k}__value({given})")
+    several = f"({', '.join(functions)},)"
+    own = [n for n in parameters(kernel) if type_info.names[n].derivative != SEVERAL]
+    arguments = ", ".join(
+        several if type_info.names[n].derivative == SEVERAL else n for n in parameters(kernel)
+    )
+    others = [n for n in own if n != "x"]
+    source = (
+        f"def value({', '.join(['x', *others, *numbers])}):\n    return g__value({arguments})\n"
+    )
+    # the file of the type, so that the digest of what is compiled is of its sources
+    code = compile(source, kernel.__code__.co_filename, "exec")
+    names = kernel.__globals__ | {"g__value": kernel}
+    names |= {f"g{k}__value": term.kernels["value"] for k, term in enumerate(terms)}
+    exec(code, names)  # text made of names alone
+    made: Callable[..., Any] = names["value"]
+    return made

@@ -1,0 +1,48 @@
+"""Parts of a run between jumps of velocities, for what interpolates between its instants."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from dap3d_core.model.groups import Floats
+from dap3d_core.result.arrays import Arrays, joined
+from dap3d_core.result.result import Result
+
+
+def jump_times(result: Result) -> Floats:
+    """(k,) instants at which velocities jumped, s, in order."""
+    return np.array([event.t for event in result.events if event.u_after is not None])
+
+
+def smooth_parts(result: Result) -> list[Result]:
+    """A result cut at its jumps; itself alone where there are none.
+
+    A part ends with the state before a jump, and the next begins with that after it: a report at
+    the very instant has been taken after it, and is left out. Of these two
+    the states are known; accelerations and what else was evaluated at reports are NaN.
+    """
+    jumps = [event for event in result.events if event.u_after is not None]
+    if not jumps:
+        return [result]
+    rows: list[Arrays | None] = [None]
+    for event in jumps:
+        rows += [_row(result, event.t, state) for state in (event.u, event.u_after)]
+    rows.append(None)
+    ends = [-np.inf, *(event.t for event in jumps), np.inf]
+    parts = []
+    for (begin, end), first, last in zip(pairwise(ends), rows[::2], rows[1::2], strict=True):
+        start = 0 if first is None else int(np.searchsorted(result.t, begin, side="right"))
+        inner = slice(start, int(np.searchsorted(result.t, end)))
+        pieces = [piece for piece in (first, result.arrays.part(inner), last) if piece is not None]
+        part = Result(result.summary, joined(pieces), result.record, lambda: result._origin)
+        parts.append(part)
+    return [part for part in parts if len(part.t)]
+
+
+def _row(result: Result, t: float, u: tuple[float, ...] | None) -> Arrays:
+    """Arrays of one instant, of which the state is known alone."""
+    arrays = result.arrays
+    nothing = [np.full((1, *column.shape[1:]), np.nan) for column in arrays.columns()]
+    row = Arrays(*nothing)
+    row.t, row.u = np.array([t]), np.array([u])
+    return row

@@ -1,0 +1,1 @@
+"""Signals of a scene: functions that combine others, and inputs."""

@@ -1,0 +1,50 @@
+"""Functions that combine others: their terms, by name, as instances."""
+
+from graphlib import CycleError, TopologicalSorter
+
+import attrs
+
+from dap3d_core.interface.fields import specs_of
+from dap3d_core.scene.validate.mistake_collector import Collector
+from dap3d_core.scene.validate.validated_scene import Instance
+
+#: Most functions in one combination, each counted as often as it occurs: all become one kernel.
+MOST_TERMS = 200
+
+
+def combine_functions(report: Collector, functions: list[Instance]) -> list[Instance]:
+    """The functions with those that they combine; mistakes are reported.
+
+    Args:
+        report: takes mistakes: a function that names itself, or too many terms.
+        functions: without mistakes of their own, in file order.
+    """
+    known = {function.name: function for function in functions}
+    uses = {name: _terms(function) for name, function in known.items()}
+    try:
+        order = list(TopologicalSorter(uses).static_order())
+    except CycleError as error:
+        cycle = error.args[1][::-1]  # each names the next
+        what = f"functions combine one another in a circle: {' -> '.join(cycle)}"
+        report.add(("functions", cycle[0]), list(uses[cycle[0]]), what)
+        return functions
+    sizes: dict[str, int] = {}
+    for name in order:
+        if name not in known or not set(uses[name]) <= sizes.keys():
+            continue  # one of them has a mistake, which is reported
+        sizes[name] = sum(sizes[term] for term in uses[name]) or 1
+        if sizes[name] > MOST_TERMS:
+            what = f"combines {sizes[name]} functions, counted as often as they occur"
+            report.add(("functions", name), list(uses[name]), what, "", f"at most {MOST_TERMS}")
+            return functions
+        known[name] = attrs.evolve(known[name], terms=tuple(known[term] for term in uses[name]))
+    return list(known.values())
+
+
+def _terms(function: Instance) -> tuple[str, ...]:
+    """Names of the functions that a function combines, in the order of its fields."""
+    specs = specs_of(function.type_info.type)
+    return tuple(
+        name for field, spec in specs.items() if spec.kind == "functions"
+        for name in function.values[field]
+    )  # fmt: skip

@@ -1,0 +1,159 @@
+"""States of elements at rest: rate = 0, at a pose or together with it.
+
+At a pose the states follow by Newton's method, the least change where rates leave some of them
+open: a bristle at rest keeps its deflection. Forces and stiffness of the search are those with the
+states settled,
+
+    K = -dF/dx - dF/dz dz/dx        dz/dx = -(dr/dz)^+ dr/dx,        rates r(x, z).
+
+Rates that no state can bring to zero, as of a controller that integrates its error, need the pose:
+then forces and rates are solved together, from the pose that was found.
+"""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations.common.state_derivatives import StateDerivatives, state_derivatives
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.model.element_states import ElementState, first_states, width_of
+from dap3d_core.simulation.errors import AssemblyError
+
+if TYPE_CHECKING:
+    from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
+    from dap3d_core.simulation.linearization.tangent import TangentMatrices
+
+Floats = NDArray[np.float64]
+
+#: Newton steps at most; rates below this part of their terms are zero.
+MOST_STEPS, SETTLED = 50, 1e-11
+#: Singular values below this part of the largest leave a state open.
+OPEN = 1e-10
+#: Sizes, m or rad, of what rates depend on besides states, that their terms are measured by.
+NEARBY = 1e-3
+
+
+def settle(evaluator: Evaluator, t: float, u: Floats) -> None:
+    """Bring ``evaluator.states`` to where their rates vanish at a pose, as far as they can be."""
+    before = np.inf
+    best = evaluator.states
+    for _ in range(MOST_STEPS):
+        own = _derivatives(evaluator, t, u)
+        left = _unsettled(own, evaluator.states)
+        if not np.all(np.isfinite(own.rates)) or not left < before:
+            evaluator.states = best
+            return
+        best, before = evaluator.states, left
+        if left <= SETTLED:
+            return
+        evaluator.states = best - _inverse(evaluator, own.rate_by_states) @ own.rates
+
+
+def unsettled(evaluator: Evaluator, t: float, u: Floats) -> float:
+    """Largest rate of a state at a pose, as a part of its terms."""
+    return _unsettled(_derivatives(evaluator, t, u), evaluator.states)
+
+
+def moving_states(evaluator: Evaluator, t: float, u: Floats) -> list[ElementState]:
+    """The states that do not come to rest at a pose."""
+    own = _derivatives(evaluator, t, u)
+    moves = np.abs(own.rates) > 1e3 * SETTLED * _terms(own, evaluator.states)
+    return [s for s in evaluator.model.element_states
+            if np.any(moves[s.first : s.first + s.length])]  # fmt: skip
+
+
+def with_settled(tangent: "TangentMatrices", evaluator: Evaluator) -> "TangentMatrices":
+    """A tangent with the stiffness of settled states."""
+    own = tangent.states
+    if own is None:
+        return tangent
+    follows = _inverse(evaluator, own.rate_by_states) @ own.rate_by_displacement
+    return attrs.evolve(tangent, stiffness=tangent.stiffness + own.force_by_states @ follows)
+
+
+def find_together(statics: "Statics", pose: "StaticPose") -> "StaticPose | None":
+    """The pose at which forces and rates vanish, by Newton's method; None where it finds none."""
+    evaluator, kept, before = statics.evaluator, statics.evaluator.states, np.inf
+    for _ in range(MOST_STEPS):
+        fixed = statics.fixed_tangent(pose)
+        own = fixed.states
+        assert own is not None
+        left = max(pose.residual, _unsettled(own, evaluator.states))
+        if left <= SETTLED:
+            return pose
+        if not left < 1e3 * before:
+            break
+        before = min(before, left)
+        basis = statics.scale[:, None] * pose.free
+        matrix = np.block(
+            [[-statics.reduced(fixed.stiffness, pose), basis.T @ own.force_by_states.toarray()],
+             [own.rate_by_displacement @ basis, own.rate_by_states.toarray()]]
+        )  # fmt: skip
+        step = _least_solution(matrix, -np.concatenate([pose.unbalanced, own.rates]))
+        evaluator.states = evaluator.states + step[pose.free.shape[1] :]
+        try:
+            moved = statics.moved(pose.u, pose.free @ step[: pose.free.shape[1]])
+            pose = statics.at(statics.closed(moved))
+        except (AssemblyError, np.linalg.LinAlgError):
+            break
+    evaluator.states = kept
+    return None
+
+
+def _derivatives(evaluator: Evaluator, t: float, u: Floats) -> StateDerivatives:
+    model = evaluator.model
+    evaluator.place(t, u)
+    rest = np.zeros(6 * model.body_count)
+    return state_derivatives(evaluator, t, rest, np.zeros(model.row_count), rest)
+
+
+def _terms(own: StateDerivatives, states: Floats) -> Floats:
+    """Sizes of what the rates are sums of."""
+    by_states = abs(own.rate_by_states) @ np.abs(states)
+    by_motion = abs(own.rate_by_displacement).sum(axis=1) + abs(own.rate_by_velocity).sum(axis=1)
+    found: Floats = by_states + NEARBY * np.asarray(by_motion).ravel()
+    return found
+
+
+def _unsettled(own: StateDerivatives, states: Floats) -> float:
+    terms, rates = _terms(own, states), np.abs(own.rates)
+    parts = np.where(rates > 0.0, rates / np.where(terms > 0.0, terms, rates + (rates == 0.0)), 0.0)
+    return float(np.max(parts, initial=0.0))
+
+
+def _elements(evaluator: Evaluator) -> Iterator[slice]:
+    """The states of each element that has some."""
+    for group in evaluator.model.acting:
+        if width := width_of(group):
+            for first in first_states(evaluator.model.acting, group).tolist():
+                yield slice(first, first + width)
+
+
+def _inverse(evaluator: Evaluator, by_states: Any) -> Any:
+    """(s, s) pseudo-inverse of the block-diagonal derivative of rates by states."""
+    from scipy.sparse import block_diag, csr_array
+
+    blocks = [_scaled_inverse(by_states[own, own].toarray()) for own in _elements(evaluator)]
+    return csr_array(block_diag(blocks, format="csr"))
+
+
+def _scaled_inverse(matrix: Floats) -> Floats:
+    """Pseudo-inverse of a matrix whose rows have units of their own."""
+    size = np.max(np.abs(matrix), axis=1, keepdims=True)
+    size[size == 0.0] = 1.0
+    found: Floats = np.linalg.pinv(matrix / size, rcond=OPEN) / size.T
+    return found
+
+
+def _least_solution(matrix: Floats, side: Floats) -> Floats:
+    """The least solution of equations of different units, columns and rows scaled."""
+    rows = np.max(np.abs(matrix), axis=1, initial=0.0)
+    rows[rows == 0.0] = 1.0
+    columns = np.max(np.abs(matrix / rows[:, None]), axis=0, initial=0.0)
+    columns[columns == 0.0] = 1.0
+    scaled = matrix / rows[:, None] / columns
+    found: Floats = np.linalg.lstsq(scaled, side / rows, rcond=OPEN)[0] / columns
+    return found

@@ -1,0 +1,258 @@
+"""Jumps of velocities in the course of a run: where switches cross, and at its start."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from dap3d_core.formulations import ACCEPTED, RHS, WATCH
+from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
+from dap3d_core.formulations.jumps.elements import JumpRows
+from dap3d_core.formulations.jumps.law import ImpossibleJumpError, Jump, JumpLaw
+from dap3d_core.integrators import Integration, Status
+from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.model.state_layout import velocities_of
+from dap3d_core.result import INFORMATION, EventRecord
+from dap3d_core.result.file.validate import are_events, is_number
+from dap3d_core.simulation.errors import SimulationError
+
+Floats = NDArray[np.float64]
+
+#: Records of jumps that a result keeps.
+MOST_RECORDS = 1000
+#: Parts of the run: the time over which a rate is found by a difference; the time to zero of a
+#: switch below which it is on the side to which it goes; the same of a contact that has closed.
+DIFFERENCE, AT_ONCE, SOON = 1e-8, 1e-10, 1e-13
+#: What passes a stop by this part of the length of the scene has gone through it.
+PASSED = 1e-9
+#: Part of the exchanged energy above which work of jumps is no rounding.
+LOSSLESS = 1e-10
+
+
+class Jumps:
+    """Changes velocities where the integrations of a run stop for it.
+
+    Attributes:
+        records: of the first MOST_RECORDS jumps, and of the switches that crossed without one.
+        count: jumps and such crossings.
+        lose: whether a jump took or gave energy.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        """Args: the evaluator of the run."""
+        self._evaluator = evaluator
+        self.records: list[EventRecord] = []
+        self.count, self.lose = 0, False
+
+    @cached_property
+    def _law(self) -> JumpLaw:
+        return JumpLaw(self._evaluator)
+
+    def state(self) -> dict[str, Any]:
+        """The jumps so far, as plain data."""
+        records = [attrs.asdict(one) for one in self.records]
+        return {"records": records, "count": self.count, "lose": self.lose}
+
+    def restore(self, stored: Any) -> None:
+        """Go on from what ``state`` gave.
+
+        Raises:
+            ValueError: it is not of that form.
+        """
+        good = isinstance(stored, Mapping) and are_events(stored.get("records"))
+        if (
+            not good
+            or not is_number(stored.get("count"))
+            or stored.get("lose") not in (True, False)
+        ):
+            raise ValueError("what is known of its jumps is damaged")
+        self.records = [EventRecord(**one) for one in stored["records"]]
+        self.count, self.lose = int(stored["count"]), stored["lose"]
+
+    def begin(self, integration: Integration) -> None:
+        """Let what touches and approaches at the start of a run jump there."""
+        self._jump(integration, np.zeros(integration.work.switches.shape[1]), None)
+
+    def apply(self, integration: Integration) -> None:
+        """Let velocities jump where an integration has stopped for it; it then continues."""
+        work = integration.work
+        crossing, sides = work.switches[[at.CROSSED, at.SIDE]]
+        work.switches[at.CROSSED] = 0.0
+        work.status = Status.RUNNING
+        self._jump(integration, crossing, sides)
+
+    def notes(self, integration: Integration) -> list[str]:
+        """Notes at the end of a run: more jumps than are kept, bodies that passed a stop."""
+        evaluator, notes = self._evaluator, []
+        if self.count > MOST_RECORDS:
+            notes.append(
+                f"{INFORMATION}there were {self.count} jumps; the first {MOST_RECORDS} are kept"
+            )
+        values = np.zeros(len(evaluator.switches))
+        with np.errstate(all="ignore"):  # as compiled code does
+            evaluator.functions[WATCH](
+                integration.t, integration.y, values, evaluator.system, evaluator.loops
+            )
+        passed = self._is_bare & (values < -PASSED * evaluator.model.length)
+        return notes + [
+            f"{self._title(k)}: its switch is {values[k]:.3g} at the end. Contact stayed, and "
+            "nothing carried it: its type has no wrench, and acts by jumps alone"
+            for k in np.flatnonzero(passed).tolist()
+        ]
+
+    def set_velocities(
+        self, integration: Integration, bodies: Mapping[int, Floats], title: str
+    ) -> tuple[Floats, float]:
+        """Let an event set velocities; the state u (13 n,) after it, and the work of that, J.
+
+        Args:
+            integration: of the run, whose state they change.
+            bodies: number of a body, from 0 -> (6,) its r_dot and omega, global axes; NaN leaves a
+                component to the joints.
+            title: of the event.
+
+        Raises:
+            SimulationError: the joints do not allow such velocities.
+        """
+        t, u = integration.t, self._state_of(integration)
+        sides = integration.work.switches[at.SIDE]
+        try:
+            jump = self._law.jump(
+                t, u, sides, np.zeros_like(sides), self._soon(integration), _rows_to(u, bodies)
+            )
+        except ImpossibleJumpError as error:
+            names = ", ".join(self._evaluator.model.body_names[k] for k in bodies)
+            raise SimulationError(
+                f"the run stopped at t = {t:.9g} s: event {title} sets a velocity of {names} that "
+                "the joints do not allow; set fewer components (None leaves one to the joints)"
+            ) from error
+        return self._take(integration, u, jump), jump.work
+
+    def _state_of(self, integration: Integration) -> Floats:
+        u: Floats = self._evaluator.hold(self._evaluator.body_state(integration.y))
+        return u
+
+    def _soon(self, integration: Integration) -> float:
+        return SOON * float(integration.work.times[-1])
+
+    def _jump(self, integration: Integration, crossing: Floats, sides: Floats | None) -> None:
+        t, u = integration.t, self._state_of(integration)
+        states_before = self._evaluator.states
+        try:
+            jump = self._law.jump(t, u, sides, crossing, self._soon(integration))
+        except ImpossibleJumpError as error:
+            raise SimulationError(
+                f"the run stopped at t = {t:.9g} s: {error} cannot change the velocity as its "
+                "impulse asks for: joints hold it. Where a driver moves its bodies, leave the "
+                "element out, or give the driver's bodies a freedom"
+            ) from error
+        if not jump.elements:
+            self._record_crossings(t, crossing)
+            return
+        self.lose |= abs(jump.work) > LOSSLESS * jump.exchanged
+        after = self._take(integration, u, jump)
+        direction = next((int(x) for x in crossing if x != 0.0), 0)
+        name = ", ".join(jump.elements)
+        states = self._changed_states(states_before, jump.states)
+        self.lose |= bool(states)  # what they store is not followed
+        self._record(EventRecord(name=name, t=t, direction=direction, kind="jump", u=u,
+                                 u_after=after, work=jump.work, states=states))  # fmt: skip
+
+    def _changed_states(self, before: Floats, after: Floats) -> dict[str, dict[str, Any]]:
+        """States of elements that a jump has changed: element -> state -> value."""
+        changed: dict[str, dict[str, Any]] = {}
+        for state in self._evaluator.model.element_states:
+            place = slice(state.first, state.first + state.length)
+            if not np.array_equal(before[place], after[place]):
+                value = after[place].tolist()
+                value = value[0] if state.length == 1 else value
+                changed.setdefault(state.element, {})[state.name] = value
+        return changed
+
+    def _take(self, integration: Integration, u: Floats, jump: Jump) -> Floats:
+        """Make the velocities of an integration those after a jump; its state u (13 n,) then."""
+        coordinates = self._evaluator.coordinates
+        y = coordinates.with_jump(integration.y, jump.dv, jump.states, jump.work)
+        integration.work.state[at.Y] = y
+        integration.restart()
+        if len(jump.sides):
+            self._set_sides(integration, jump)
+            self._refuse_what_nothing_carries(integration)
+        after = u.copy()
+        velocities_of(after)[:] += jump.dv
+        return after
+
+    def _refuse_what_nothing_carries(self, integration: Integration) -> None:
+        """SimulationError for contact that stays, of a type without a force that could hold it."""
+        stays = self._is_bare & (integration.work.switches[at.SIDE] < 0.0)
+        for k in np.flatnonzero(stays).tolist():
+            raise SimulationError(
+                f"the run stopped at t = {integration.t:.9g} s: {self._title(k)} stays in contact, "
+                "and nothing carries it: its type has no wrench below zero of its switch, and the "
+                "bodies would pass through each other. Give the type a wrench there, as ptp_stop "
+                "and its like have, or end the run by an event before"
+            )
+
+    @cached_property
+    def _is_bare(self) -> Any:
+        """(switches,) truth values: of rows that push, of a type without a wrench."""
+        types = [switch.group.type_info for switch in self._evaluator.switches]
+        pushes = [bool(getattr(info.type, "unilateral", ())) for info in types]
+        bare = [
+            push and "wrench" not in info.kernels for push, info in zip(pushes, types, strict=True)
+        ]
+        return self._law.elements.is_jump & np.array(bare, dtype=bool)
+
+    def _title(self, k: int) -> str:
+        """Kind and name of the element of a switch."""
+        switch = self._evaluator.switches[k]
+        return f"{switch.group.type_info.type.kind} {switch.name(self._evaluator.model)}"
+
+    def _record_crossings(self, t: float, crossing: Floats) -> None:
+        """Record switches that have crossed and brought no jump."""
+        for k in np.flatnonzero(crossing).tolist():
+            direction = int(crossing[k])
+            self._record(EventRecord(name=self._title(k), t=t, direction=direction, kind="switch"))
+
+    def _record(self, record: EventRecord) -> None:
+        self.count += 1
+        if len(self.records) < MOST_RECORDS:
+            self.records.append(record)
+
+    @IGNORE_FLOAT_ERRORS
+    def _set_sides(self, integration: Integration, jump: Jump) -> None:
+        """Sides of the switches after a jump: of one that goes back at once, where it goes to.
+
+        The state lies beyond zero by rounding, and the way back is no crossing of its own.
+        """
+        evaluator, work = self._evaluator, integration.work
+        functions, arrays = evaluator.functions, (evaluator.system, evaluator.loops)
+        t, y = integration.t, integration.y
+        span = float(work.times[-1] - work.times[0])
+        h = DIFFERENCE * max(span, abs(t))
+        slope, (values, later) = np.zeros_like(y), np.zeros((2, len(evaluator.switches)))
+        functions[RHS](t, y, slope, *arrays)
+        functions[WATCH](t, y, values, *arrays)
+        functions[WATCH](t + h, y + h * slope, later, *arrays)
+        rates = (later - values) / h
+        at_once = np.abs(values) <= AT_ONCE * span * np.abs(rates)
+        sides = np.where(at_once, np.sign(rates), jump.sides)
+        work.switches[at.SIDE] = np.where(self._law.elements.is_jump, sides, 0.0)
+        if work.calls_accepted:  # angles are extrapolated by their rates
+            functions[ACCEPTED](t, y, np.zeros(1), *arrays)
+
+
+def _rows_to(u: Floats, bodies: Mapping[int, Floats]) -> JumpRows:
+    """Rows that bring velocities of bodies to the values given."""
+    v = velocities_of(u)
+    numbers, targets = np.array(list(bodies)), np.array(list(bodies.values()))
+    places = (6 * numbers[:, None] + np.arange(6))[np.isfinite(targets)]
+    change = targets[np.isfinite(targets)] - v[places]
+    count = len(places)
+    G = np.zeros((count, 6 + v.size))
+    G[np.arange(count), 6 + places] = 1.0
+    none = np.full(count, -1)
+    return JumpRows(G, change, np.zeros(count, dtype=bool), none, np.arange(count))

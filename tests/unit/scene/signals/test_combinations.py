@@ -1,0 +1,61 @@
+"""Functions that combine others: what is accepted and what is refused."""
+
+import pytest
+
+import dap3d_core as dap
+from dap3d_core.registry import load_registry
+from dap3d_core.scene import SceneError, check
+from dap3d_core.scene.signals.combinations import MOST_TERMS
+
+
+def scene_with(**combinations):
+    """A body that a force pushes by the function ``all``; combinations: name -> (type, terms)."""
+    scene = dap.Scene(name="combined")
+    scene.add_body("block", mass=2.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_function("harmonic", "swing", frequency=3.0)
+    scene.add_function("a", "ramp", coeff=(0.0, 1.0, 0.0))
+    for name, (type_, terms) in combinations.items():
+        scene.add_function(type_, name, functions=terms)
+    scene.add_force("f", "push", body_i="block", f=(1.0, 0.0, 0.0), function="all")
+    return scene
+
+
+def test_terms_are_found_whatever_their_order_in_the_file():
+    """A sum may name a product that comes after it; what a combination uses is used."""
+    scene = scene_with(all=("sum", ["both", "swing"]), both=("product", ["swing", "ramp"]))
+    checked = check(scene, load_registry())
+    (total,) = (f for f in checked.functions if f.name == "all")
+    assert [term.name for term in total.terms] == ["both", "swing"]
+    assert [term.name for term in total.terms[0].terms] == ["swing", "ramp"]
+    assert not any("functions." in note for note in checked.notes)
+
+
+@pytest.mark.parametrize(
+    ("combinations", "words"),
+    [
+        ({"all": ("sum", ["all"])}, "functions.all.* in a circle: all -> all"),
+        (
+            {"all": ("sum", ["swing", "both"]), "both": ("product", ["ramp", "all"])},
+            "in a circle: (all -> both -> all|both -> all -> both)",
+        ),
+        ({"all": ("sum", ["swung"])}, "there is no function 'swung'; did you mean 'swing'"),
+        ({"all": ("sum", [])}, "functions.all.functions.*should be a list of names of functions"),
+        ({"all": ("sum", "swing")}, r'a list of names of functions.*write functions = \["swing"\]'),
+        ({"all": ("sum", [1])}, "should be the name of a function"),
+        ({"all": ("sum", None)}, "functions.all.functions: is required .names: names of the"),
+    ],
+)
+def test_what_cannot_be_combined_is_refused(combinations, words):
+    """A circle, an unknown function, no list of names: each is one clear mistake."""
+    with pytest.raises(SceneError, match=f"(?s){words}") as caught:
+        check(scene_with(**combinations), load_registry())
+    assert len(caught.value.mistakes) == 1
+
+
+def test_combinations_that_multiply_are_refused():
+    """Each doubles the one before it: all terms together would be one kernel."""
+    count = MOST_TERMS.bit_length()
+    pairs = {f"s{k}": ("sum", [f"s{k - 1}", f"s{k - 1}"] if k else ["swing"]) for k in range(count)}
+    pairs["all"] = ("sum", [f"s{count - 1}", f"s{count - 1}"])
+    with pytest.raises(SceneError, match=f"combines {2**count} functions"):
+        check(scene_with(**pairs), load_registry())
