@@ -184,6 +184,68 @@ def test_an_ellipsoid_on_a_plane(rolls):
         assert found == pytest.approx(np.array(body)[:, k], abs=1e-9)
 
 
+def resting():
+    """A bead near the lowest point of its wire, s = 3 pi / 4."""
+    scene = bead(s_0=2.0, speed=0.0)
+    scene.bodies["bead"].r = tuple(curve(2.2))
+    return scene
+
+
+def test_a_bead_comes_to_rest_where_its_wire_is_lowest():
+    """Statics moves along the wire; the unknown of the equilibrium is where a run from it begins."""
+    model = compiled(resting())
+    rest = dap.equilibrium(model)
+    assert rest.r[0] == pytest.approx(curve(0.75 * np.pi), abs=1e-9)
+    result = dap.simulate(model, start=rest, t_end=0.1, dt=0.1)
+    assert result.quantity("wire.s").values == pytest.approx(0.75 * np.pi, abs=1e-9)
+
+
+def test_the_frequency_of_a_bead_at_the_lowest_point():
+    """w^2 = g z'' / |c'|^2, z'' = 4 h."""
+    model = compiled(resting())
+    found = dap.linearize(model, at=dap.equilibrium(model)).frequencies
+    wanted = np.sqrt(G * 4 * H) / np.linalg.norm(curve(0.75 * np.pi, 1)) / (2 * np.pi)
+    assert np.min(np.abs(found - wanted)) < 1e-9
+
+
+def test_a_run_from_a_result_goes_on():
+    """The unknown is found again where the result ends, beyond a whole turn too."""
+    scene = bead(speed=6.0)
+    whole = dap.simulate(compiled(scene), t_end=1.0, dt=0.25)
+    half = dap.simulate(compiled(scene), t_end=0.5, dt=0.25)
+    again = dap.simulate(compiled(scene), start=half, t_end=0.5, dt=0.25)
+    assert again.r[-1] == pytest.approx(whole.r[-1], abs=1e-6)
+    found = [x.quantity("wire.s").values[-1] for x in (again, whole)]
+    assert found[0] == pytest.approx(found[1], abs=1e-6)
+
+
+PLUGIN = """
+from support.unknown_types import OnCurve
+
+from dap3d_core.interface import hookimpl
+
+interface_version = 1
+
+
+@hookimpl
+def dap3d_joints():
+    return [OnCurve]
+"""
+
+
+def test_points_of_a_sweep_seek_their_own_unknowns(tmp_path):
+    """Each point is the run alone."""
+    bead(speed=2.0).save(tmp_path / "scene.toml")
+    (tmp_path / "plugin.py").write_text(PLUGIN)
+    heights = [0.1, 0.2]
+    swept = dap.sweep(tmp_path, {"joints.wire.h": heights}, outputs="bead.r.z", t_end=0.5, dt=0.25,
+                      allow_code=True, threads=1)  # fmt: skip
+    for k, h in enumerate(heights):
+        alone = dap.simulate(compiled(bead(speed=2.0, h=h)), t_end=0.5, dt=0.25)
+        found = np.asarray(swept["bead.r.z"]).reshape(2, -1)[k, -1]
+        assert found == pytest.approx(alone.r[-1, 0, 2], abs=1e-9)
+
+
 def test_a_start_from_which_no_unknown_is_found_is_told():
     """Where the rows cannot close, the joint is named."""
     scene = bead()

@@ -103,6 +103,11 @@ class Evaluator:
         return bool(kinds[ANGLE + 1] > kinds[ANGLE])
 
     @cached_property
+    def has_unknowns(self) -> bool:
+        """True if joints have unknowns of their own."""
+        return any(group.type_info.layout.unknowns for group in self.model.joints)
+
+    @cached_property
     def switches(self) -> tuple[Switch, ...]:
         """The switches of the model's elements, in the order in which ``watch`` gives them."""
         return switches_of(self.loop_groups)
