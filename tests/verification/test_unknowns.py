@@ -192,7 +192,7 @@ def resting():
 
 
 def test_a_bead_comes_to_rest_where_its_wire_is_lowest():
-    """Statics moves along the wire; the unknown of the equilibrium is where a run from it begins."""
+    """Statics moves along the wire; a run from it begins with its unknown."""
     model = compiled(resting())
     rest = dap.equilibrium(model)
     assert rest.r[0] == pytest.approx(curve(0.75 * np.pi), abs=1e-9)

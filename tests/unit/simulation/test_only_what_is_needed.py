@@ -126,7 +126,7 @@ def test_reactions_and_unknowns_cost_other_scenes_nothing():
     script = (
         "import dap3d_core as dap\n"
         "compiled = dap.compile(dap.load('fourbar3'))\n"
-        "dap.simulate(compiled, t_end=0.02)\n"
+        "dap.simulate(compiled, t_end=0.02, dt=0.02)\n"
         "evaluator = compiled.evaluator\n"
         "print('loops', *(kind for kind, group in evaluator.loop_groups))\n"
         "print(evaluator.system.friction.size, evaluator.has_unknowns)\n"

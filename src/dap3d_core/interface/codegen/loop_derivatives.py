@@ -221,10 +221,9 @@ def differentiate_loop(
     idx = arrays.idx[i0 : i0 + count * width].reshape(count, width)
     slots, first = len(layout.slots), len(layout.slots) + len(layout.functions)
     places = [*range(slots), *range(first, first + len(layout.others))]
-    read: dict[int, int] = {}
-    if what == "friction":
-        read = row_columns(type_info) or {layout.integers: type_info.row_count}
-        places += body_columns(type_info)
+    own = {layout.integers: type_info.row_count}
+    read = (row_columns(type_info) or own) if what == "friction" else {}
+    places += body_columns(type_info) if read else []
     of_bodies = DIRECTIONS * len(places)
     by_numbers = of_bodies + sum(read.values())
     by_states = by_numbers + len(numbers) + len(functions)
@@ -233,11 +232,10 @@ def differentiate_loop(
     slopes = dict(zip(numbers, unit[by_numbers:], strict=False))
     columns = [(slots + field, order) for field, order in functions]
     by_functions = dict(zip(columns, unit[by_numbers + len(numbers) : by_states], strict=True))
-
     ends = of_bodies + np.cumsum(list(read.values()), dtype=np.int64)
     of_rows = {c: unit[e - n : e] for (c, n), e in zip(read.items(), ends, strict=True)}
     friction = _Multipliers(multipliers, idx, of_rows) if multipliers is not None else None
-    outputs = [_Outputs(), _Outputs(friction if what == "friction" else None), _Outputs()]
+    outputs = [_Outputs(), _Outputs(friction if read else None), _Outputs()]
     loop_arrays = SimpleNamespace(
         body=_Bodies(arrays.body, idx, places, directions),
         F=_Functions(arrays.F, idx, by_functions),
@@ -246,8 +244,8 @@ def differentiate_loop(
         states=_States(arrays.states, idx, unit[by_states:] if states else None),
     )
     _run(loop, t, loop_arrays, outputs)
-    bodies = np.ascontiguousarray(idx[:, places])
-    return LoopDerivatives(bodies, _returned(type_info, what, outputs, (count, directions)))
+    found = _returned(type_info, what, outputs, (count, directions))
+    return LoopDerivatives(np.ascontiguousarray(idx[:, places]), found)
 
 
 def _returned(
